@@ -1,0 +1,136 @@
+"""The words of the gun: what can be asked of it, what it answers, and how it can fail.
+
+Nothing here opens, waits or computes. A command beyond a limit cannot be built: the constructor refuses it,
+and no config can lift the limit.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Literal, Protocol, get_args
+
+Direction = Literal["forward", "backward"]
+DIRECTIONS: tuple[Direction, ...] = get_args(Direction)
+
+MAX_VOLTAGE_V = 24.0
+"""The bench supply of the paper; nothing above it exists."""
+MAX_PULSE_S = 0.020
+"""Longest pulse, assumed: twice the paper's 10 ms."""
+
+
+class DeviceError(Exception):
+    """Anything that goes wrong with a gun."""
+
+
+class LimitError(DeviceError, ValueError):
+    """A command beyond a limit that no config can lift. Nothing was sent."""
+
+
+class LinkError(DeviceError):
+    """The gun did not answer, or not in its language."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Pulse:
+    """One drive pulse of the voice coil; refused with `LimitError` beyond 24 V or 20 ms."""
+
+    voltage_V: float
+    pulse_s: float
+
+    def __post_init__(self) -> None:
+        _within("voltage_V", self.voltage_V, 0.0, MAX_VOLTAGE_V)
+        _within("pulse_s", self.pulse_s, 0.0, MAX_PULSE_S)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Effect:
+    """One waveform of the vibration driver's library (DRV2605), 1 to 123."""
+
+    effect: int
+
+    def __post_init__(self) -> None:
+        _within("effect", self.effect, 1, 123)
+
+
+Drive = Pulse | Effect
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Shot:
+    """The command to fire once: which rendering method, which way the gun points, and how it is driven."""
+
+    method: str
+    direction: Direction
+    drive: Drive
+
+    def __post_init__(self) -> None:
+        if not self.method:
+            raise LimitError("shot: method is empty; it must name a rendering method")
+        if self.direction not in DIRECTIONS:
+            raise LimitError(f"shot: direction is {self.direction!r}; it must be one of {', '.join(DIRECTIONS)}")
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ShotReport:
+    """What was rendered and when. Times are seconds on the host's monotonic clock.
+
+    `home_predicted_s` is when the magnet is back at its stop by the model (there is no position sensor).
+    `motion` is the model's status of the shot (`home`, `stuck`, ...), `rendered` for a vibration.
+    """
+
+    shot: Shot
+    requested_s: float
+    pulse_start_s: float
+    pulse_end_s: float
+    home_predicted_s: float
+    motion: str
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Identity:
+    """Who answers: model, firmware version, serial number or `simulated`."""
+
+    model: str
+    version: str
+    serial: str
+
+
+GunState = Literal["disarmed", "armed", "resetting", "fault"]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class GunStatus:
+    """The gun at this moment. `ready_at_s` is the earliest time of the next shot on the host's clock."""
+
+    state: GunState
+    shots: int
+    coil_temperature_C: float
+    ready_at_s: float
+    fault: str | None = None
+
+
+class Gun(Protocol):
+    """What every gun does, real or simulated. It is born disarmed."""
+
+    def identify(self) -> Identity:
+        """Who answers."""
+
+    def arm(self) -> None:
+        """Allow the next shots."""
+
+    def fire(self, shot: Shot) -> ShotReport:
+        """Fire once. `LimitError`: refused, nothing was sent. `LinkError`: the outcome is unknown."""
+
+    def disarm(self) -> None:
+        """Forbid shots, from every state."""
+
+    def status(self) -> GunStatus:
+        """The gun at this moment."""
+
+    def close(self) -> None:
+        """Disarm and let go of the gun."""
+
+
+def _within(name: str, value: float, low: float, high: float) -> None:
+    if not low <= value <= high:  # NaN compares false, so it is refused as well
+        raise LimitError(f"{name} is {value}; it must be between {low:g} and {high:g}")

@@ -1,0 +1,1 @@
+"""Words and rules that experiments are made of; the roof of the house stands in `experiments.cli`."""
