@@ -68,7 +68,9 @@ TRIALS: tuple[Column, ...] = (
     _flag("correct", "1 if the response is the direction, 0 if not; empty without a response"),
     _number("response_time_s", "s", "time from the onset of the pulse to the answer; empty if there is none"),
     _level("response_source", ("participant", "experimenter", "synthetic"), "whose hand gave the answer"),
-    _flag("response_time_valid", "1 if the time is the participant's own; 0 if corrected or by the experimenter's hand"),
+    _flag(
+        "response_time_valid", "1 if the time is the participant's own; 0 if corrected or by the experimenter's hand"
+    ),
     _ATTEMPTS,
     _FLAGS,
     _NOTE,

@@ -1,0 +1,75 @@
+"""Numbers as text in the style of the APA: the only rounding there is. What is undefined becomes a dash."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+NONE = "–"
+"""Stands where there is no number."""
+
+
+def number(value: float | None, digits: int = 2) -> str:
+    """`value` with so many decimals, and a true minus sign.
+
+    >>> number(-1.2345), number(None)
+    ('−1.23', '–')
+    """
+    if value is None:
+        return NONE
+    text = f"{value:.{digits}f}"
+    return text.lstrip("-") if float(text) == 0.0 else text.replace("-", "−")
+
+
+def percent(share: float | None, digits: int = 1) -> str:
+    """A share of 1 in percent.
+
+    >>> percent(0.55714)
+    '55.7 %'
+    """
+    return NONE if share is None else f"{number(100.0 * share, digits)} %"
+
+
+def p_cell(p: float | None) -> str:
+    """A p-value without "p =", for a table: three decimals, no leading zero.
+
+    >>> p_cell(0.0004), p_cell(0.0423), p_cell(0.9999)
+    ('< .001', '.042', '> .999')
+    """
+    if p is None:
+        return NONE
+    if p < 0.001:
+        return "< .001"
+    return "> .999" if p > 0.9995 else f"{p:.3f}".removeprefix("0")
+
+
+def p_value(p: float | None) -> str:
+    """A p-value in a sentence.
+
+    >>> p_value(0.0004), p_value(0.0423), p_value(None)
+    ('p < .001', 'p = .042', 'p undefined')
+    """
+    cell = p_cell(p)
+    if cell == NONE:
+        return "p undefined"
+    return f"p {cell}" if cell[0] in "<>" else f"p = {cell}"
+
+
+def f_test(anova: Mapping[str, Any]) -> str:
+    """An F test in a sentence.
+
+    >>> f_test({"F": 28.4512, "df": [2, 26], "p": 2.7e-7})
+    'F(2, 26) = 28.45, p < .001'
+    """
+    df_effect, df_error = anova["df"]
+    F = "undefined or infinite" if anova["F"] is None else number(anova["F"])
+    return f"F({df_effect}, {df_error}) = {F}, {p_value(anova['p'])}"
+
+
+def interval(low: float | None, high: float | None, digits: int = 2) -> str:
+    """A confidence interval.
+
+    >>> interval(-0.5, 1.25)
+    '[−0.50, 1.25]'
+    """
+    return f"[{number(low, digits)}, {number(high, digits)}]"

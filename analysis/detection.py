@@ -1,0 +1,52 @@
+"""Signal detection: sensitivity apart from the readiness to say one thing rather than the other."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike
+from scipy import special
+
+from analysis.arrays import Values, numbers, plain
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Detection:
+    """d' and criterion with the corrected rates they come from. A criterion below 0 leans towards "yes"."""
+
+    d_prime: Values
+    criterion: Values
+    hit_rate: Values
+    false_alarm_rate: Values
+
+
+def yes_no(hits: ArrayLike, signal_trials: ArrayLike, false_alarms: ArrayLike, noise_trials: ArrayLike) -> Detection:
+    """Sensitivity d' = z(H) - z(F) and criterion c = -(z(H) + z(F)) / 2 of a yes/no judgement, log-linear corrected.
+
+    H = (hits + 0.5) / (signal_trials + 1), F = (false_alarms + 0.5) / (noise_trials + 1), always, not only at 0 and 1.
+    For judgements of direction "yes" is "forward": said on a forward shot a hit, on a backward shot a false alarm.
+    All arguments broadcast. `ValueError`: a count outside 0..its trials, or no trials.
+    Sources: Hautus 1995, Behavior Research Methods 27, 46; Macmillan & Creelman 2005, chapter 2.
+
+    >>> round(yes_no(10, 10, 0, 10).d_prime, 3)
+    3.381
+    """
+    hit_rate = _rate(hits, signal_trials, "hits")
+    false_alarm_rate = _rate(false_alarms, noise_trials, "false_alarms")
+    z_hit, z_false_alarm = special.ndtri(hit_rate), special.ndtri(false_alarm_rate)
+    return Detection(
+        d_prime=plain(z_hit - z_false_alarm),
+        criterion=plain(-(z_hit + z_false_alarm) / 2.0),
+        hit_rate=plain(hit_rate),
+        false_alarm_rate=plain(false_alarm_rate),
+    )
+
+
+def _rate(count: ArrayLike, trials: ArrayLike, name: str) -> Values:
+    counts, totals = np.broadcast_arrays(numbers(count, name), numbers(trials, f"trials of {name}"))
+    if (totals < 1.0).any():
+        raise ValueError(f"{name}: there must be at least 1 trial")
+    if ((counts < 0.0) | (counts > totals)).any():
+        raise ValueError(f"{name} must lie in 0..trials, not {counts[(counts < 0.0) | (counts > totals)][0]:g}")
+    return plain((counts + 0.5) / (totals + 1.0))

@@ -1,0 +1,178 @@
+"""A report's sections in their order. A section without data is left out."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+from analysis import apa
+from analysis.published import Odds, Row
+from analysis.report_experiments import direction_section, preference_section
+from analysis.report_parts import Picture, ReportData, Section, Table
+
+EXPERIMENTS = {"direction": "direction recognition", "preference": "preference"}
+FIGURE_5, FIGURE_8 = "figure-5", "figure-8"
+
+_LUCK = (
+    "One replication is luck. The table says how often each published claim recurred over many simulated replications "
+    "of the study, with a 95 % Wilson interval; a claim that recurs in two of three would fail in one of three honest "
+    "repetitions."
+)
+
+
+def sections(report: ReportData) -> tuple[Section, ...]:
+    """All sections that have something to say."""
+    statistics = report.statistics
+    found = [
+        _analysed(report),
+        _verdicts(report.comparison) if report.comparison else None,
+        _figure_8(statistics) if has_people(statistics) else None,
+        direction_section(statistics["direction"]) if _people(statistics, "direction") else None,
+        preference_section(statistics["preference"]) if _people(statistics, "preference") else None,
+        _odds(report.odds) if report.odds else None,
+        _figure_5(report) if report.panels else None,
+        _left_out(report),
+        _provenance(report),
+    ]
+    return tuple(section for section in found if section is not None)
+
+
+def has_people(statistics: Mapping[str, Any]) -> bool:
+    """Is there an experiment with a complete participant?"""
+    return any(_people(statistics, name) for name in EXPERIMENTS)
+
+
+def _people(statistics: Mapping[str, Any], experiment: str) -> int:
+    return int(statistics.get(experiment, {}).get("n", 0))
+
+
+def _analysed(report: ReportData) -> Section:
+    rows = tuple(
+        (name.capitalize(), str(_people(report.statistics, key)), str(_excluded(report.statistics, key)))
+        for key, name in EXPERIMENTS.items()
+        if key in report.statistics
+    )
+    table = Table(caption="Participants", header=("Experiment", "Analysed", "Left out as incomplete"), rows=rows)
+    files = f"{len(report.files)} log files were read. " if report.files else ""
+    bad = f"Left out, with the reasons listed below: {len(report.problems)}." if report.problems else ""
+    text = (files + bad).strip()
+    nothing = () if rows else ("There was nothing to analyse.",)
+    return Section(
+        title="What was analysed",
+        paragraphs=(*((text,) if text else ()), *nothing),
+        tables=(table,) if rows else (),
+    )
+
+
+def _excluded(statistics: Mapping[str, Any], experiment: str) -> int:
+    return sum(entry["experiment"] == experiment for entry in statistics.get("excluded", []))
+
+
+def _verdicts(comparison: tuple[Row, ...]) -> Section:
+    counts = {verdict: sum(row.verdict == verdict for row in comparison) for verdict in ("agrees", "differs")}
+    missing = sum(row.verdict == "not obtained" for row in comparison)
+    told = f"{counts['agrees']} published numbers and claims agree, {counts['differs']} differ"
+    told += f", {missing} were not obtained." if missing else "."
+    told += " A number agrees if it rounds to the printed digits, a bound or an order if it is true here."
+    experiments = dict.fromkeys(row.experiment for row in comparison)
+    return Section(
+        title="Published and obtained",
+        paragraphs=(told,),
+        tables=tuple(_verdict_table(experiment, comparison) for experiment in experiments),
+    )
+
+
+def _verdict_table(experiment: str, comparison: tuple[Row, ...]) -> Table:
+    rows = (
+        (row.quantity, row.published or apa.NONE, obtained_text(row), row.verdict, row.note)
+        for row in comparison
+        if row.experiment == experiment
+    )
+    return Table(
+        caption=f"{EXPERIMENTS.get(experiment, experiment).capitalize()}, every published number beside the obtained",
+        header=("Quantity", "Published", "Obtained", "Verdict", "Note"),
+        rows=tuple(rows),
+    )
+
+
+def obtained_text(row: Row) -> str:
+    """The obtained number with as many decimals as are printed; two where nothing is printed.
+
+    >>> obtained_text(Row(experiment="", quantity="", published="55.7 %", obtained=61.43, verdict="differs"))
+    '61.4 %'
+    """
+    if row.obtained is None:
+        return apa.NONE
+    if row.published.startswith("<"):
+        return apa.p_cell(row.obtained)
+    digits, _, unit = row.published.partition(" ")
+    decimals = len(digits.partition(".")[2]) if digits else 2
+    return f"{apa.number(row.obtained, decimals)} {unit}".strip()
+
+
+def _figure_8(statistics: Mapping[str, Any]) -> Section:
+    shown = [name for name in EXPERIMENTS if _people(statistics, name)]
+    counts = ", ".join(f"{EXPERIMENTS[name]} n = {_people(statistics, name)}" for name in shown)
+    caption = (
+        f"Mean and SD with every participant ({counts}). Brackets: Tukey's HSD with the repeated-measures error term "
+        "(* p < .05, ** p < .01, *** p < .001, n.s. not significant)."
+    )
+    means = ". ".join(f"{EXPERIMENTS[name].capitalize()}: {_means_words(statistics[name], name)}" for name in shown)
+    alt = f"Bar chart with one bar a rendering method. {means}."
+    return Section(title="Results at a glance", pictures=(Picture(stem=FIGURE_8, caption=caption, alt=alt),))
+
+
+def _means_words(found: Mapping[str, Any], experiment: str) -> str:
+    shown = apa.percent if experiment == "direction" else apa.number
+    return ", ".join(f"{method} {shown(mean)}" for method, mean in found["means"].items())
+
+
+def _odds(odds: tuple[Odds, ...]) -> Section:
+    tables = tuple(
+        Table(
+            caption=f"{EXPERIMENTS.get(one.experiment, one.experiment).capitalize()}: {one.replications} replications",
+            header=("Published claim", "Recurs in", "95 % CI [%]"),
+            rows=tuple(
+                (row.claim, apa.percent(row.share), apa.interval(100.0 * row.ci_low, 100.0 * row.ci_high, 1))
+                for row in one.rows
+            ),
+        )
+        for one in odds
+    )
+    assumed = dict.fromkeys(one.assumptions for one in odds)
+    return Section(title="Odds of the published pattern", paragraphs=(_LUCK, *assumed), tables=tables)
+
+
+def _figure_5(report: ReportData) -> Section:
+    caption = (
+        "Force on the hand F (positive in the direction of recoil), displacement x, velocity dx/dt and drive u of one "
+        "simulated shot. Dashed lines and circles: ends of the stages. Arrow: estimated force of the collision with "
+        "the rear stop, apart from F."
+    )
+    landings = "; ".join(
+        f"column {chr(ord('a') + i)} collides with {apa.number(panel.collision_force_N, 1)} N"
+        for i, panel in enumerate(report.panels)
+    )
+    alt = f"Line charts of F, x, dx/dt and u over time, one column a friction: {landings}."
+    return Section(title="The shot", pictures=(Picture(stem=FIGURE_5, caption=caption, alt=alt),))
+
+
+def _left_out(report: ReportData) -> Section | None:
+    excluded = tuple(
+        f"Participant {entry['participant']} in {EXPERIMENTS.get(entry['experiment'], entry['experiment'])}: "
+        f"{entry['reason']}."
+        for entry in report.statistics.get("excluded", [])
+    )
+    problems = tuple(str(problem) for problem in report.problems)
+    warnings = tuple(f"Warning: {warning}." for warning in report.statistics.get("warnings", []))
+    items = (*excluded, *problems, *warnings)
+    return Section(title="Exclusions and problems", items=items) if items else None
+
+
+def _provenance(report: ReportData) -> Section | None:
+    rows = [*report.provenance.items(), *report.statistics.get("versions", {}).items()]
+    rows += [("log file", str(file)) for file in report.files]
+    if not rows and not report.notes:
+        return None
+    table = Table(caption="Where the numbers come from", header=("What", "Value"), rows=tuple(rows))
+    return Section(title="Provenance and assumptions", items=report.notes, tables=(table,) if rows else ())

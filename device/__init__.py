@@ -1,0 +1,73 @@
+"""The gun: the words of its protocol, its physics, its limits, and `open_gun`, which gives a `Gun`.
+
+Importing this package is cheap; the physics and its libraries are imported when a gun is opened or simulated.
+"""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Mapping
+from typing import TYPE_CHECKING
+
+from device.words import (
+    DeviceError,
+    Effect,
+    Gun,
+    GunStatus,
+    Identity,
+    LimitError,
+    LinkError,
+    Pulse,
+    Shot,
+    ShotReport,
+)
+
+if TYPE_CHECKING:
+    from device.methods import Method
+    from device.parameters import GunParameters
+
+__all__ = [
+    "DeviceError",
+    "Effect",
+    "Gun",
+    "GunStatus",
+    "Identity",
+    "LimitError",
+    "LinkError",
+    "Pulse",
+    "Shot",
+    "ShotReport",
+    "open_gun",
+]
+
+
+def open_gun(
+    address: str,
+    parameters: GunParameters | Mapping[str, Method] | None = None,
+    *,
+    clock: Callable[[], float] = time.monotonic,
+) -> Gun:
+    """A disarmed gun at `address`, "simulated" or "serial:PORT".
+
+    `parameters`: the rendering methods by name, or a gun from which the paper's three are made (the paper's gun if
+    None). `LinkError`: the gun does not answer. `ValueError`: no such form of address.
+
+    >>> gun = open_gun("simulated", clock=lambda: 0.0)
+    >>> gun.arm()
+    >>> gun.fire(Shot(method="vibration", direction="forward", drive=Effect(effect=1))).motion
+    'rendered'
+    """
+    if address.startswith("serial:"):
+        raise LinkError(f"cannot open {address!r}: this version of Recoil drives the simulated gun only")
+    if address != "simulated":
+        raise ValueError(f'address is {address!r}; it must be "simulated" or "serial:PORT"')
+    return _simulated(parameters, clock)
+
+
+def _simulated(parameters: GunParameters | Mapping[str, Method] | None, clock: Callable[[], float]) -> Gun:
+    from device.methods import paper_methods  # noqa: PLC0415 - importing the words alone stays cheap
+    from device.simulated import SimulatedGun  # noqa: PLC0415
+
+    if isinstance(parameters, Mapping):
+        return SimulatedGun(parameters, clock)
+    return SimulatedGun(paper_methods() if parameters is None else paper_methods(parameters), clock)

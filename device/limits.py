@@ -1,0 +1,160 @@
+"""The limits that no config can lift, judged on the history of shots. Pure: time is an argument.
+
+Height and length of a pulse are limited where it is built (`device.words`). Here: 10 % duty over any second, 300
+shots over any minute, no shot before the magnet is home, and an estimated coil temperature of at most 80 degC.
+Times are whole microseconds inside, so that ten pulses of 10 ms are exactly 10 % of a second.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+from device.words import Drive, LimitError, Pulse
+
+MAX_DUTY = 0.10
+"""Of any second: the paper's drive, 10 ms in 100 ms."""
+MAX_SHOTS_PER_MINUTE = 300
+"""Assumed: the paper's 5 Hz."""
+MAX_COIL_C = 80.0
+"""Assumed: well below what enamelled wire and adhesives of such coils stand."""
+AMBIENT_C = 25.0
+"""Assumed."""
+HEAT_CAPACITY_J_K = 20.0
+"""Of the coil and what it is wound on, assumed."""
+THERMAL_RESISTANCE_K_W = 10.0
+"""From the coil to the room, assumed."""
+
+_TICKS = 1_000_000  # per second
+_SECOND, _MINUTE = _TICKS, 60 * _TICKS
+_DUTY_TICKS = round(MAX_DUTY * _SECOND)
+_TIME_CONSTANT_S = HEAT_CAPACITY_J_K * THERMAL_RESISTANCE_K_W
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Load:
+    """What one shot asks of the coil: the time that it is driven, and the heat that it takes at most."""
+
+    on_s: float
+    heat_J: float
+
+    def __post_init__(self) -> None:
+        for name, value in (("on_s", self.on_s), ("heat_J", self.heat_J)):
+            if not 0 <= value < math.inf:
+                raise LimitError(f"{name} is {value}; it must be a finite number of at least 0")
+
+
+def load_of(drive: Drive, resistance_ohm: float) -> Load:
+    """The load of a drive. Heat is V^2/R over the pulse, an upper bound; a vibration does not use the coil."""
+    if not isinstance(drive, Pulse):
+        return Load(on_s=0.0, heat_J=0.0)
+    if not resistance_ohm > 0:
+        raise LimitError(f"resistance_ohm is {resistance_ohm}; it must be above 0 to estimate the coil's heat")
+    return Load(on_s=drive.pulse_s, heat_J=drive.voltage_V**2 / resistance_ohm * drive.pulse_s)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class DriveHistory:
+    """The shots of the last minute, the magnet's return and the coil's warmth. `record` gives the next history.
+
+    The coil is one body, C dT/dt = P - (T - T_ambient)/R_thermal, that takes a pulse's heat at once at its onset.
+    `warmth_K` is its temperature above the room just after the last onset, at `warmth_tick`.
+    """
+
+    pulses: tuple[tuple[int, int], ...] = ()  # start and end of each, ticks, oldest first
+    ready_tick: int | None = None
+    warmth_K: float = 0.0
+    warmth_tick: int = 0
+
+    def earliest_s(self, load: Load) -> float:
+        """The earliest time at which `load` may start, -inf if nothing was fired yet, inf if never.
+
+        It may then start at any later time as well, as long as nothing else is recorded.
+        """
+        return max((time for time, _ in self._earliest(load)), default=-math.inf)
+
+    def check(self, load: Load, at_s: float) -> None:
+        """Nothing if `load` may start at `at_s`. `LimitError` names the limit and the earliest allowed time."""
+        at = _tick("at_s", at_s) / _TICKS
+        broken = [(time, limit) for time, limit in self._earliest(load) if at < time]
+        if not broken:
+            return
+        time, limit = max(broken)
+        allowed = f"the earliest allowed time is {time:.6f} s" if time < math.inf else "it is never allowed"
+        raise LimitError(f"shot at {at_s:.6f} s of {load.on_s:g} s and {load.heat_J:.3g} J: {limit}; {allowed}")
+
+    def record(self, load: Load, at_s: float, ready_s: float) -> DriveHistory:
+        """The history after `load` started at `at_s`, with the magnet home at `ready_s`. `LimitError` as `check`."""
+        self.check(load, at_s)
+        start, ready = _tick("at_s", at_s), _tick("ready_s", ready_s)
+        end = start + _on_ticks(load)
+        recent = tuple(pulse for pulse in self.pulses if pulse[0] > start - _MINUTE)
+        return DriveHistory(
+            pulses=(*recent, (start, end)),
+            ready_tick=max(ready, end),
+            warmth_K=self._warmth(start) + load.heat_J / HEAT_CAPACITY_J_K,
+            warmth_tick=start,
+        )
+
+    @property
+    def ready_s(self) -> float:
+        """When the magnet is home; -inf if nothing was fired yet."""
+        return -math.inf if self.ready_tick is None else self.ready_tick / _TICKS
+
+    def is_ready(self, at_s: float) -> bool:
+        """Whether the magnet is home at `at_s`, to the microsecond."""
+        return self.ready_tick is None or _tick("at_s", at_s) >= self.ready_tick
+
+    def coil_celsius(self, at_s: float) -> float:
+        """The estimated temperature of the coil in degC."""
+        return AMBIENT_C + self._warmth(_tick("at_s", at_s))
+
+    def _warmth(self, tick: int) -> float:
+        return self.warmth_K * math.exp(-max(0, tick - self.warmth_tick) / _TICKS / _TIME_CONSTANT_S)
+
+    def _earliest(self, load: Load) -> list[tuple[float, str]]:
+        """The earliest time that each limit allows, and the limit's name."""
+        count = f"{len(self.pulses)} shots in a minute, limit {MAX_SHOTS_PER_MINUTE}"
+        warm = f"coil at {AMBIENT_C + self.warmth_K:.1f} degC before it, limit {MAX_COIL_C:g} degC after it"
+        return [
+            (self.ready_s, "the magnet is not home yet, by the model"),
+            (self._by_count(), count),
+            (self._by_duty(_on_ticks(load)), f"driven for more than {MAX_DUTY:.0%} of a second"),
+            (self._by_heat(load), warm),
+        ]
+
+    def _by_count(self) -> float:
+        if len(self.pulses) < MAX_SHOTS_PER_MINUTE:
+            return -math.inf
+        return (self.pulses[-MAX_SHOTS_PER_MINUTE][0] + _MINUTE) / _TICKS
+
+    def _by_duty(self, on: int) -> float:
+        """A second is fullest when it ends with the new pulse; it must not begin before the budget is used up."""
+        budget = _DUTY_TICKS - on
+        if budget < 0:
+            return math.inf
+        for start, end in reversed(self.pulses):
+            if end - start > budget:
+                return (end - budget + _SECOND - on) / _TICKS
+            budget -= end - start
+        return -math.inf
+
+    def _by_heat(self, load: Load) -> float:
+        room_K = MAX_COIL_C - AMBIENT_C - load.heat_J / HEAT_CAPACITY_J_K
+        if room_K >= self.warmth_K:
+            return -math.inf
+        if room_K <= 0:
+            return math.inf
+        cooling_s = _TIME_CONSTANT_S * math.log(self.warmth_K / room_K)
+        return (self.warmth_tick + math.ceil(cooling_s * _TICKS)) / _TICKS
+
+
+def _tick(name: str, time_s: float) -> int:
+    if not math.isfinite(time_s):
+        raise LimitError(f"{name} is {time_s}; it must be a finite time in seconds")
+    return round(time_s * _TICKS)
+
+
+def _on_ticks(load: Load) -> int:
+    """The driven time, rounded up; a rounding error of the product does not count as a tick."""
+    return math.ceil(load.on_s * _TICKS - 1e-6)

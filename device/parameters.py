@@ -1,0 +1,84 @@
+"""What the two kinds of actuator are made of: plain frozen numbers, checked when built, each with its source.
+
+"Paper" is section II of the haptic gun's paper; "assumed" is ours, because the paper does not say.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, fields
+from typing import Literal, get_args
+
+DriveOff = Literal["shorted", "open"]
+Emf = Literal["printed", "reciprocal"]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class GunParameters:
+    """The voice-coil gun of equations (1) to (3) and its drive pulse. Defaults: the paper's gun without damper.
+
+    `drive_off` is what the coil does after the pulse: `shorted` keeps equation (3) with u = 0 (assumed default),
+    `open` lets no current flow from the end of the pulse on. `emf` is the back-EMF: `printed` is k_e dx/dt
+    everywhere, `reciprocal` fades with the coil's force, (1 - x/x_c) k_e dx/dt inside the coil and 0 outside, so
+    that energy balances. `ValueError` names the field, its value and the rule.
+    """
+
+    magnet_mass_kg: float = 0.114  # m, paper
+    back_emf_V_s_m: float = 7.6  # k_e, paper
+    resistance_ohm: float = 2.9  # R, paper
+    inductance_H: float = 0.72e-3  # L, paper
+    motor_constant_N_A: float = 7.6  # k_m, paper
+    coil_reach_m: float = 0.0075  # x_c, paper (printed as "x")
+    stiffness_N_m: float = 14.0  # k, paper, measured
+    preload_length_m: float = 0.10  # x_0, paper, measured
+    friction_N: float = 0.21  # F_f, paper, measured: 0.21 without damper, 1.12 with it
+    voltage_V: float = 16.0  # pulse height, paper
+    pulse_s: float = 0.010  # pulse length, paper: 10 % of a 10 Hz period
+    contact_depth_m: float = 0.0005  # x_k, assumed: the paper says "submillimeter"
+    drive_off: DriveOff = "shorted"  # assumed
+    emf: Emf = "printed"  # paper
+
+    def __post_init__(self) -> None:
+        _numbers_are_valid(self, above_zero=_ABOVE_ZERO, not_numbers=("drive_off", "emf"))
+        _is_one_of("drive_off", self.drive_off, get_args(DriveOff))
+        _is_one_of("emf", self.emf, get_args(Emf))
+
+
+_ABOVE_ZERO = ("magnet_mass_kg", "resistance_ohm", "inductance_H", "coil_reach_m", "contact_depth_m")
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class VibrationParameters:
+    """The vibration that serves as reference: one library effect of the linear resonant actuator's driver.
+
+    The paper describes "several decaying sinusoidal waves" by peak, root mean square and duration of the
+    acceleration. `ValueError` names the field, its value and the rule.
+    """
+
+    effect: int = 1  # library waveform of the DRV2605, paper
+    peak_m_s2: float = 1000.0  # paper, measured
+    rms_m_s2: float = 257.54  # paper, over the duration
+    duration_s: float = 0.024  # paper, "about"
+    frequency_Hz: float = 175.0  # assumed: the usual resonance of such actuators, 150 to 250 Hz
+
+    def __post_init__(self) -> None:
+        if not 1 <= self.effect <= 123:
+            raise ValueError(f"effect is {self.effect}; it must be a waveform of the DRV2605, 1 to 123")
+        _numbers_are_valid(self, above_zero=("peak_m_s2", "rms_m_s2", "duration_s", "frequency_Hz"))
+
+
+def _numbers_are_valid(
+    parameters: GunParameters | VibrationParameters, *, above_zero: tuple[str, ...], not_numbers: tuple[str, ...] = ()
+) -> None:
+    for name in (field.name for field in fields(parameters) if field.name not in not_numbers):
+        value = getattr(parameters, name)
+        strict = name in above_zero
+        if not (math.isfinite(value) and (value > 0 if strict else value >= 0)):
+            raise ValueError(
+                f"{name} is {value}; it must be a finite number {'above 0' if strict else 'of at least 0'}"
+            )
+
+
+def _is_one_of(name: str, value: str, options: tuple[str, ...]) -> None:
+    if value not in options:
+        raise ValueError(f"{name} is {value!r}; it must be one of {', '.join(options)}")

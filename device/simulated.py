@@ -1,0 +1,97 @@
+"""The simulated gun: the same words as a real one, answered by the model. It never waits."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+
+from device.limits import DriveHistory, Load, load_of
+from device.methods import Method, rendering_of
+from device.parameters import GunParameters
+from device.words import GunState, GunStatus, Identity, LimitError, LinkError, Shot, ShotReport
+
+MODEL_VERSION = "1"
+"""Counts up whenever the same shot would be predicted otherwise."""
+
+
+class SimulatedGun:
+    """A `Gun` that renders by the model. It is born disarmed; `clock` gives seconds and never runs back."""
+
+    def __init__(self, methods: Mapping[str, Method], clock: Callable[[], float]) -> None:
+        self._methods = dict(methods)
+        self._clock = clock
+        self._history = DriveHistory()
+        self._born_s = clock()
+        self._shots = 0
+        self._armed = False
+        self._closed = False
+
+    def identify(self) -> Identity:
+        """The simulated gun and the version of its model. `LinkError` after `close`."""
+        self._is_open()
+        return Identity(model="simulated", version=MODEL_VERSION, serial="simulated")
+
+    def arm(self) -> None:
+        """Allow the next shots. `LinkError` after `close`."""
+        self._is_open()
+        self._armed = True
+
+    def fire(self, shot: Shot) -> ShotReport:
+        """Fire once and report at once, the return of the magnet included.
+
+        `LimitError`: disarmed, no such method, a drive of another kind, or beyond a limit; nothing was rendered.
+        `LinkError` after `close`.
+        """
+        self._is_open()
+        if not self._armed:
+            raise LimitError("the gun is disarmed; arm it before it may fire")
+        method = self._method(shot.method)
+        rendering = rendering_of(method, shot.drive)
+        load = _load(method, shot)
+        now_s = self._clock()
+        self._history = self._history.record(load, now_s, now_s + rendering.settle_s)
+        self._shots += 1
+        return ShotReport(
+            shot=shot,
+            requested_s=now_s,
+            pulse_start_s=now_s,
+            pulse_end_s=now_s + (load.on_s or rendering.settle_s),
+            home_predicted_s=now_s + rendering.settle_s,
+            motion=rendering.motion,
+        )
+
+    def disarm(self) -> None:
+        """Forbid shots, from every state."""
+        self._armed = False
+
+    def status(self) -> GunStatus:
+        """The gun at this moment; `resetting` while an armed gun's magnet is on its way home."""
+        now_s = self._clock()
+        return GunStatus(
+            state=self._state(now_s),
+            shots=self._shots,
+            coil_temperature_C=self._history.coil_celsius(now_s),
+            ready_at_s=max(self._history.ready_s, self._born_s),
+        )
+
+    def close(self) -> None:
+        """Disarm, and answer no more than `status`, `disarm` and `close`."""
+        self.disarm()
+        self._closed = True
+
+    def _state(self, now_s: float) -> GunState:
+        if not self._armed:
+            return "disarmed"
+        return "armed" if self._history.is_ready(now_s) else "resetting"
+
+    def _method(self, name: str) -> Method:
+        if name not in self._methods:
+            raise LimitError(f"method is {name!r}; this gun renders {', '.join(self._methods)}")
+        return self._methods[name]
+
+    def _is_open(self) -> None:
+        if self._closed:
+            raise LinkError("the gun is closed; open it again")
+
+
+def _load(method: Method, shot: Shot) -> Load:
+    return load_of(shot.drive, method.resistance_ohm if isinstance(method, GunParameters) else 0.0)

@@ -1,0 +1,60 @@
+"""The experiments that Recoil knows. A new one is a folder beside `direction/` and a line in `CATALOGUE`."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any
+
+from experiments.config import ExperimentConfig
+from experiments.direction import observer as direction_observer
+from experiments.direction.config import DirectionConfig
+from experiments.direction.plan import make_plan as direction_plan
+from experiments.direction.rows import rows as direction_rows
+from experiments.direction.session import session as direction_session
+from experiments.plan import Plan
+from experiments.preference import observer as preference_observer
+from experiments.preference.config import PreferenceConfig
+from experiments.preference.plan import make_plan as preference_plan
+from experiments.preference.rows import rows as preference_rows
+from experiments.preference.session import session as preference_session
+from experiments.setup import Setup
+from experiments.steps import History, Session
+from experiments.tables import Row
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Experiment:
+    """What makes an experiment: its config, its plan, its session, its table and its synthetic participants."""
+
+    config: type[ExperimentConfig]
+    make_plan: Callable[[Any, str, int, int | None], Plan]
+    session: Callable[[Plan, Setup[Any]], Session]
+    rows: Callable[[Plan, History], list[Row]]
+    observer: Callable[[Setup[Any], Plan], Any]
+    answer_columns: tuple[str, ...]
+
+
+CATALOGUE: dict[str, Experiment] = {
+    "direction": Experiment(
+        config=DirectionConfig,
+        make_plan=direction_plan,
+        session=direction_session,
+        rows=direction_rows,
+        observer=direction_observer.observer,
+        answer_columns=direction_observer.TABLE_COLUMNS,
+    ),
+    "preference": Experiment(
+        config=PreferenceConfig,
+        make_plan=preference_plan,
+        session=preference_session,
+        rows=preference_rows,
+        observer=preference_observer.observer,
+        answer_columns=preference_observer.TABLE_COLUMNS,
+    ),
+}
+
+
+def experiment(setup: Setup[Any]) -> Experiment:
+    """The experiment that a setup is of."""
+    return CATALOGUE[setup.config.experiment]

@@ -1,0 +1,67 @@
+"""The clock of a run: the machine's own, or a virtual one on which breaks take no time."""
+
+from __future__ import annotations
+
+import time
+from datetime import UTC, datetime, timedelta
+from typing import Protocol
+
+
+class Clock(Protocol):
+    """Seconds that never run backwards, the date and time they fall on, and waiting."""
+
+    name: str
+
+    def now(self) -> float:
+        """Monotonic time in seconds."""
+
+    def utc(self) -> str:
+        """Date and time in UTC, ISO 8601, to the microsecond."""
+
+    def sleep(self, seconds: float) -> None:
+        """Wait; not at all if the time is over."""
+
+
+class RealClock:
+    """The machine's monotonic clock."""
+
+    name = "real"
+
+    def now(self) -> float:
+        """Monotonic time in seconds."""
+        return time.monotonic()
+
+    def utc(self) -> str:
+        """Date and time in UTC."""
+        return _iso(datetime.now(UTC))
+
+    def sleep(self, seconds: float) -> None:
+        """Wait for real."""
+        if seconds > 0:
+            time.sleep(seconds)
+
+
+class VirtualClock:
+    """A clock that moves only when someone waits. It starts at 0 s on the date and time of its making."""
+
+    name = "virtual"
+
+    def __init__(self) -> None:
+        self._elapsed_s = 0.0
+        self._start = datetime.now(UTC)
+
+    def now(self) -> float:
+        """Virtual seconds since the start."""
+        return self._elapsed_s
+
+    def utc(self) -> str:
+        """The start plus the virtual seconds."""
+        return _iso(self._start + timedelta(seconds=self._elapsed_s))
+
+    def sleep(self, seconds: float) -> None:
+        """Move on at once."""
+        self._elapsed_s += max(0.0, seconds)
+
+
+def _iso(moment: datetime) -> str:
+    return moment.isoformat(timespec="microseconds").replace("+00:00", "Z")

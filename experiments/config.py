@@ -1,0 +1,122 @@
+"""What configs are made of: the types, tables and rules that the experiments' own models share.
+
+Unknown keys, wrong types, infinities and contradictions are refused here, at the door; inside, a config is trusted.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import Annotated, Any, Literal, Self
+
+from pydantic import AfterValidator, BaseModel, ConfigDict, Field, model_validator
+
+Order = Literal["random", "williams", "latin-square"]
+
+
+class Model(BaseModel):
+    """A table of a config: unknown keys refused, types as written, no infinities, never changed."""
+
+    model_config = ConfigDict(extra="forbid", frozen=True, strict=True, allow_inf_nan=False)
+
+
+def _distinct(methods: tuple[str, ...]) -> tuple[str, ...]:
+    doubled = sorted({name for name in methods if methods.count(name) > 1})
+    if doubled:
+        raise ValueError(f"{', '.join(doubled)} stands there more than once; name each method once")
+    return methods
+
+
+Count = Annotated[int, Field(ge=1, le=10_000)]
+Seconds = Annotated[float, Field(ge=0, le=86_400)]
+Share = Annotated[float, Field(ge=0, le=1)]
+InnerShare = Annotated[float, Field(gt=0, lt=1)]
+Spread = Annotated[float, Field(ge=0, le=100)]
+Text = Annotated[str, Field(min_length=1, max_length=2_000)]
+Methods = Annotated[tuple[Text, ...], Field(min_length=1, max_length=26), AfterValidator(_distinct)]
+
+
+class SyntheticConfig(Model):
+    """Who answers when nobody sits there: an observer, or the answers of a table."""
+
+    observer: str
+    table: Text | None = None
+
+    @model_validator(mode="after")
+    def _table_is_named(self) -> Self:
+        if self.observer == "table" and self.table is None:
+            raise ValueError('observer = "table" needs the key `table`: the CSV file with the answers')
+        return self
+
+
+class ExperimentConfig(Model):
+    """What every experiment's config says."""
+
+    experiment: str
+    title: Text
+    gun: Text
+    assumed: tuple[Text, ...] = ()
+    seed: Annotated[int, Field(ge=0, le=2**63 - 1)] | None = None
+
+    @model_validator(mode="after")
+    def _assumed_exists(self) -> Self:
+        unknown = sorted(set(self.assumed) - set(leaves(self)))
+        if unknown:
+            raise ValueError(f"assumed names {', '.join(unknown)}, which this config does not have; name existing keys")
+        return self
+
+
+class StudyConfig(Model):
+    """A study: how many people, which experiments, and what to compare with."""
+
+    title: Text
+    participants: Annotated[int, Field(ge=1, le=999)]
+    code_prefix: Annotated[str, Field(pattern=r"^[A-Za-z0-9]{1,29}$")] = "P"
+    experiments: Annotated[tuple[Text, ...], Field(min_length=1)]
+    paper: Text | None = None
+    replications: Annotated[int, Field(ge=0, le=1_000_000)] = 2000
+
+    def codes(self) -> list[str]:
+        """The participants' codes, P01 onwards."""
+        return participant_codes(self.participants, self.code_prefix)
+
+
+def participant_codes(count: int, prefix: str = "P") -> list[str]:
+    """Codes for so many participants, all of one length.
+
+    >>> participant_codes(2)
+    ['P01', 'P02']
+    """
+    width = max(2, len(str(count)))
+    return [f"{prefix}{number:0{width}d}" for number in range(1, count + 1)]
+
+
+def leaves(model: BaseModel, prefix: str = "") -> Iterator[str]:
+    """The dotted keys of a config, tables and values alike."""
+    for name in type(model).model_fields:
+        yield f"{prefix}{name}"
+        yield from _inner_leaves(getattr(model, name), f"{prefix}{name}.")
+
+
+def _inner_leaves(value: Any, prefix: str) -> Iterator[str]:
+    if isinstance(value, BaseModel):
+        yield from leaves(value, prefix)
+    elif isinstance(value, dict):
+        for key, inner in value.items():
+            yield f"{prefix}{key}"
+            yield from _inner_leaves(inner, f"{prefix}{key}.")
+
+
+def check_covered(where: str, values: dict[str, float], methods: tuple[str, ...]) -> None:
+    """Refuse a table that lacks one of the design's methods."""
+    missing = [name for name in methods if name not in values]
+    if missing:
+        raise ValueError(f"{where} has no value for {', '.join(missing)}; give one for each of design.methods")
+
+
+def check_duration(duration_s: float, max_planned_s: float) -> None:
+    """Refuse a plan that takes longer than a participant is to be kept."""
+    if duration_s > max_planned_s:
+        raise ValueError(
+            f"the planned duration of {duration_s:g} s exceeds fatigue.max_planned_s = {max_planned_s:g} s; "
+            "plan fewer or shorter trials and breaks"
+        )

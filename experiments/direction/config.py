@@ -1,0 +1,172 @@
+"""What `direction.toml` may say: a balanced two-alternative forced choice in sessions of one method each."""
+
+from __future__ import annotations
+
+from typing import Annotated, Literal, Self
+
+from pydantic import Field, model_validator
+
+from experiments.config import (
+    Count,
+    ExperimentConfig,
+    InnerShare,
+    Methods,
+    Model,
+    Order,
+    Seconds,
+    Spread,
+    SyntheticConfig,
+    Text,
+    check_covered,
+    check_duration,
+)
+
+Balance = Literal["session", "set", "set-exact"]
+
+
+class Design(Model):
+    """Sessions of one method each, made of sets of trials, with both directions."""
+
+    methods: Methods
+    session_order: Order = "random"
+    sets_per_session: Count
+    trials_per_set: Count
+    forward_per_session: Annotated[int, Field(ge=0)]
+    backward_per_session: Annotated[int, Field(ge=0)]
+    balance: Balance = "session"
+
+    @property
+    def order(self) -> Order:
+        """How the order of methods is found."""
+        return self.session_order
+
+    @property
+    def trials_per_session(self) -> int:
+        """Sets times trials a set."""
+        return self.sets_per_session * self.trials_per_set
+
+    @property
+    def trials(self) -> int:
+        """Trials of the whole run."""
+        return len(self.methods) * self.trials_per_session
+
+    @model_validator(mode="after")
+    def _counts_fit(self) -> Self:
+        forward, backward, planned = self.forward_per_session, self.backward_per_session, self.trials_per_session
+        if forward + backward != planned:
+            raise ValueError(
+                f"{forward} forward and {backward} backward make {forward + backward} trials, but "
+                f"{self.sets_per_session} sets of {self.trials_per_set} make {planned}; make them equal"
+            )
+        if self.balance == "set-exact" and forward % self.sets_per_session:
+            raise ValueError(
+                f'balance = "set-exact" is impossible: {forward} forward trials cannot be shared equally among '
+                f'{self.sets_per_session} sets of {self.trials_per_set}; use "set" for as even as it gets'
+            )
+        return self
+
+
+class Breaks(Model):
+    """Rests between sets and between sessions."""
+
+    between_sets_s: Seconds
+    between_sessions_s: Seconds
+
+
+class Fatigue(Model):
+    """What a participant is spared."""
+
+    max_trials_without_break: Count
+    max_planned_s: Seconds
+
+
+class Question(Model):
+    """The question of the forced choice, and how its two answers are called to the participant."""
+
+    text: Text
+    forward: Text
+    backward: Text
+
+
+class Timing(Model):
+    """How long a trial takes, how much of it the hand-over, and how long the whole is said to take."""
+
+    trial_s: Seconds
+    planned_s: Seconds
+    hand_over_s: Seconds
+
+
+class Rates(Model):
+    """Shares of correct answers in the mean over people, differences between people, and bias (probit units)."""
+
+    forward: dict[str, InnerShare]
+    backward: dict[str, InnerShare]
+    ability_sd: Spread
+    bias_mean: Annotated[float, Field(ge=-10, le=10)]
+    bias_sd: Spread
+
+
+class ResponseTime(Model):
+    """A shifted log-normal response time."""
+
+    shift_s: Seconds
+    median_s: Annotated[float, Field(gt=0, le=3_600)]
+    sigma: Spread
+
+
+class Synthetic(SyntheticConfig):
+    """Who answers when nobody sits there."""
+
+    observer: Literal["rates", "table"]
+    rates: Rates
+    response_time: ResponseTime
+
+
+class DirectionConfig(ExperimentConfig):
+    """Experiment 1: which way did it shoot?"""
+
+    experiment: Literal["direction"]
+    design: Design
+    breaks: Breaks
+    fatigue: Fatigue
+    question: Question
+    timing: Timing
+    synthetic: Synthetic
+
+    @property
+    def break_s(self) -> float:
+        """All planned breaks together."""
+        sessions, sets = len(self.design.methods), self.design.sets_per_session
+        between_sets_s = sessions * (sets - 1) * self.breaks.between_sets_s
+        return between_sets_s + (sessions - 1) * self.breaks.between_sessions_s
+
+    @property
+    def duration_s(self) -> float:
+        """Planned duration: trials and breaks."""
+        return self.design.trials * self.timing.trial_s + self.break_s
+
+    @property
+    def trials_without_break(self) -> int:
+        """The longest stretch of trials that no break interrupts."""
+        if self.breaks.between_sets_s > 0:
+            return self.design.trials_per_set
+        if self.breaks.between_sessions_s > 0:
+            return self.design.trials_per_session
+        return self.design.trials
+
+    @model_validator(mode="after")
+    def _spares_the_participant(self) -> Self:
+        if self.trials_without_break > self.fatigue.max_trials_without_break:
+            raise ValueError(
+                f"{self.trials_without_break} trials without a break exceed fatigue.max_trials_without_break = "
+                f"{self.fatigue.max_trials_without_break}; make sets smaller or the breaks longer than 0"
+            )
+        check_duration(self.duration_s, self.fatigue.max_planned_s)
+        return self
+
+    @model_validator(mode="after")
+    def _methods_have_rates(self) -> Self:
+        rates = self.synthetic.rates
+        check_covered("synthetic.rates.forward", rates.forward, self.design.methods)
+        check_covered("synthetic.rates.backward", rates.backward, self.design.methods)
+        return self

@@ -1,0 +1,126 @@
+"""Synthetic participants of experiment 1: from the published rates with differences and bias, or from a table.
+
+In probit units, with z the probit of the mean correct rate of a method and direction, a person answers "forward" with
+probability Phi(S z_forward + ability + bias) to a forward shot and Phi(-S z_backward - ability + bias) to a backward
+one; S = sqrt(1 + ability_sd^2 + bias_sd^2) keeps the mean over people at the given rates.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from statistics import NormalDist
+
+from device.words import DIRECTIONS, Direction
+from experiments.direction.config import DirectionConfig, Rates, ResponseTime
+from experiments.plan import Plan, Trial
+from experiments.setup import Setup
+from experiments.streams import Stream
+
+_NORMAL = NormalDist()
+
+TABLE_COLUMNS = ("participant_id", "method", "forward_correct", "backward_correct")
+"""The table of answers: how many trials of each direction a participant gets right."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Answer:
+    """A synthetic participant's answer to one shot."""
+
+    response: Direction
+    response_time_s: float
+
+
+def observer(setup: Setup[DirectionConfig], plan: Plan) -> RatesObserver | TableObserver:
+    """The synthetic participant that a setup asks for."""
+    if setup.config.synthetic.observer == "table":
+        return TableObserver(setup.config, plan, setup.answers)
+    return RatesObserver(setup.config, plan)
+
+
+def probit_of_forward(rates: Rates, method: str, direction: Direction) -> float:
+    """The probit of answering "forward", for a person without own ability and bias; mean bias included."""
+    spread = math.sqrt(1 + rates.ability_sd**2 + rates.bias_sd**2)
+    rate = rates.forward[method] if direction == "forward" else 1 - rates.backward[method]
+    return spread * _NORMAL.inv_cdf(rate) + rates.bias_mean
+
+
+class RatesObserver:
+    """A person drawn once, by the seed, who then answers each trial from what they are like.
+
+    Each trial has a stream of its own, so an answer does not depend on what was answered before.
+    """
+
+    def __init__(self, config: DirectionConfig, plan: Plan) -> None:
+        self._seed, self._who = plan.seed, (plan.experiment, plan.participant_id)
+        self._rates, self._times = config.synthetic.rates, config.synthetic.response_time
+        person = Stream(plan.seed, "person", *self._who)
+        self._ability = self._rates.ability_sd * person.normal()
+        self._bias = self._rates.bias_sd * person.normal()
+
+    def answer(self, trial: Trial) -> Answer:
+        """The answer to a shot of this trial's method and direction."""
+        draws = _trial_stream(self._seed, self._who, trial)
+        towards = self._ability if trial.direction == "forward" else -self._ability
+        probit = probit_of_forward(self._rates, trial.method, trial.direction) + towards + self._bias
+        forward = draws.uniform() < _NORMAL.cdf(probit)
+        return Answer(response="forward" if forward else "backward", response_time_s=_response_time(self._times, draws))
+
+
+class TableObserver:
+    """A person who gets exactly as many trials right as the table says, at random ones.
+
+    `ValueError` if the table has no row for the participant and method, or a count beyond the planned trials.
+    """
+
+    def __init__(self, config: DirectionConfig, plan: Plan, answers: Sequence[Mapping[str, str]]) -> None:
+        self._seed, self._who = plan.seed, (plan.experiment, plan.participant_id)
+        self._times = config.synthetic.response_time
+        self._correct: dict[Trial, bool] = {}
+        for method in plan.methods:
+            for direction in DIRECTIONS:
+                trials = [trial for trial in plan.trials if (trial.method, trial.direction) == (method, direction)]
+                marks = _marks(len(trials), answers, plan.participant_id, method, direction)
+                shuffled = Stream(self._seed, "correct", *self._who, method, direction).shuffled(marks)
+                self._correct |= dict(zip(trials, shuffled, strict=True))
+
+    def answer(self, trial: Trial) -> Answer:
+        """The answer that the table leaves for this trial."""
+        other: Direction = "backward" if trial.direction == "forward" else "forward"
+        draws = _trial_stream(self._seed, self._who, trial)
+        return Answer(
+            response=trial.direction if self._correct[trial] else other,
+            response_time_s=_response_time(self._times, draws),
+        )
+
+
+def _trial_stream(seed: int, who: tuple[str, str], trial: Trial) -> Stream:
+    return Stream(seed, "answer", *who, str(trial.session), str(trial.trial))
+
+
+def _marks(
+    planned: int, answers: Sequence[Mapping[str, str]], participant: str, method: str, direction: Direction
+) -> list[bool]:
+    correct = _cell(answers, participant, method, direction)
+    if correct > planned:
+        raise ValueError(
+            f"participant {participant}, {method}, {direction}_correct is {correct}; "
+            f"the plan has {planned} such trials, so it must be 0 to {planned}"
+        )
+    return [True] * correct + [False] * (planned - correct)
+
+
+def _cell(answers: Sequence[Mapping[str, str]], participant: str, method: str, direction: Direction) -> int:
+    rows = [row for row in answers if (row["participant_id"], row["method"]) == (participant, method)]
+    if len(rows) != 1:
+        raise ValueError(f"{len(rows)} rows for participant {participant}, method {method}; there must be one")
+    cell = rows[0][f"{direction}_correct"]
+    if not cell.isdecimal():
+        raise ValueError(f"participant {participant}, {method}, {direction}_correct is {cell!r}; not a whole number")
+    return int(cell)
+
+
+def _response_time(law: ResponseTime, draws: Stream) -> float:
+    """A shifted log-normal time, in whole milliseconds as a response box gives it."""
+    return round(law.shift_s + law.median_s * math.exp(law.sigma * draws.normal()), 3)

@@ -1,0 +1,55 @@
+"""The plan of experiment 1: sessions of one method each, both directions balanced over a session or over its sets."""
+
+from __future__ import annotations
+
+from device.words import Direction
+from experiments.direction.config import Design, DirectionConfig
+from experiments.orders import method_order
+from experiments.plan import Plan, Trial
+from experiments.streams import Stream
+
+
+def make_plan(config: DirectionConfig, participant_id: str, seed: int, order_row: int | None) -> Plan:
+    """The plan that a config, a participant, a seed and a row of the square make; the same for the same."""
+    design, who = config.design, (config.experiment, participant_id)
+    methods = method_order(design.order, design.methods, order_row, Stream(seed, "session-order", *who))
+    trials = [
+        trial
+        for session, method in enumerate(methods, start=1)
+        for trial in _session(design, session, method, Stream(seed, "directions", *who, str(session)))
+    ]
+    return Plan(
+        experiment=config.experiment,
+        participant_id=participant_id,
+        seed=seed,
+        order_row=order_row,
+        trials=tuple(trials),
+    )
+
+
+def _session(design: Design, session: int, method: str, stream: Stream) -> list[Trial]:
+    return [
+        Trial(session=session, method=method, set=1 + place // design.trials_per_set, trial=1 + place, direction=way)
+        for place, way in enumerate(_directions(design, stream))
+    ]
+
+
+def _directions(design: Design, stream: Stream) -> list[Direction]:
+    if design.balance == "session":
+        return stream.shuffled(_ways(design.forward_per_session, design.backward_per_session))
+    return [
+        way
+        for forward in _forward_by_set(design, stream)
+        for way in stream.shuffled(_ways(forward, design.trials_per_set - forward))
+    ]
+
+
+def _forward_by_set(design: Design, stream: Stream) -> list[int]:
+    """Forward trials of each set, as even as it gets; which sets have one more is random."""
+    each, left = divmod(design.forward_per_session, design.sets_per_session)
+    return stream.shuffled([each + 1] * left + [each] * (design.sets_per_session - left))
+
+
+def _ways(forward: int, backward: int) -> list[Direction]:
+    ways: list[Direction] = ["forward"] * forward
+    return ways + ["backward"] * backward

@@ -1,0 +1,95 @@
+"""Where a participant's files lie, and what is there already. Codes can never lead out of the results folder."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+
+from experiments import columns, journal
+
+_CODE = re.compile(r"[A-Za-z0-9]{1,32}")
+
+
+class PlaceError(Exception):
+    """A participant or folder that cannot be used; the message names value and rule."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Place:
+    """The files of one participant in one experiment."""
+
+    results: Path
+    participant_id: str
+    experiment: str
+
+    @property
+    def folder(self) -> Path:
+        """The participant's folder."""
+        return self.results / f"sub-{self.participant_id}"
+
+    @property
+    def stem(self) -> str:
+        """How the names of the files begin."""
+        return f"sub-{self.participant_id}_task-{self.experiment}"
+
+    @property
+    def journal(self) -> Path:
+        """The journal: the truth."""
+        return self.folder / f"{self.stem}_journal.jsonl"
+
+    @property
+    def table(self) -> Path:
+        """The table made from it."""
+        return self.folder / f"{self.stem}_{columns.FILE_SUFFIX[self.experiment]}.csv"
+
+
+def place(results: Path, participant_id: str, experiment: str) -> Place:
+    """The place of a run. `PlaceError` if the code breaks a rule or differs from a known one in case alone."""
+    if not _CODE.fullmatch(participant_id):
+        shown = participant_id if len(participant_id) <= 40 else f"{participant_id[:40]}..."
+        raise PlaceError(
+            f"participant code {shown!r} ({len(participant_id)} characters): must be 1 to 32 letters and digits "
+            "(A-Z, a-z, 0-9), no blanks, dots or slashes; use a code, not a name"
+        )
+    for known in known_codes(results):
+        if known != participant_id and known.lower() == participant_id.lower():
+            raise PlaceError(
+                f"participant code {participant_id!r} differs from {known!r} in {results} in case alone; "
+                f"use {known!r} or another code"
+            )
+    return Place(results=results, participant_id=participant_id, experiment=experiment)
+
+
+def known_codes(results: Path) -> list[str]:
+    """The participants who have a folder."""
+    return sorted(path.name.removeprefix("sub-") for path in results.glob("sub-*") if path.is_dir())
+
+
+def journals(results: Path, experiment: str) -> Iterator[Path]:
+    """The journals of an experiment in a results folder."""
+    yield from sorted(results.glob(f"sub-*/sub-*_task-{experiment}_journal.jsonl"))
+
+
+def used_rows(results: Path, experiment: str) -> list[int]:
+    """The rows of the balancing square that runs in this folder have taken."""
+    plans = [journal.head(path)["plan"] for path in journals(results, experiment)]
+    return [plan["order_row"] for plan in plans if plan["order_row"] is not None]
+
+
+def set_aside(run: Place) -> list[Path]:
+    """Rename a run's files so that a fresh one can begin; nothing is lost. Returns the new names."""
+    return [set_aside_file(path) for path in (run.journal, run.table) if path.exists()]
+
+
+def set_aside_file(path: Path) -> Path:
+    """Rename a file, or a folder, to the first free `NAME.aside-N`. Returns the new name."""
+    number = 1
+    while _aside(path, number).exists():
+        number += 1
+    return path.rename(_aside(path, number))
+
+
+def _aside(path: Path, number: int) -> Path:
+    return path.with_name(f"{path.stem}.aside-{number}{path.suffix}")

@@ -1,0 +1,97 @@
+"""Synthetic participants of experiment 2: from assumed means with two published habits, or from a table."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+
+from experiments.plan import Plan, Trial
+from experiments.preference.config import PreferenceConfig, RatingScale
+from experiments.preference.config import Ratings as RatingsLaw
+from experiments.setup import Setup
+from experiments.streams import Stream
+
+TABLE_COLUMNS = ("participant_id", "method", "rating")
+"""The table of answers: each participant's rating of each method."""
+
+_EXPOSURE_SIGMA = 0.3
+"""Spread of how long people ask for a stimulus (log-normal); assumed."""
+
+
+def observer(setup: Setup[PreferenceConfig], plan: Plan) -> RatingsObserver:
+    """The synthetic participant that a setup asks for."""
+    config = setup.config
+    if config.synthetic.observer == "table":
+        return RatingsObserver(config, plan, _from_table(config, plan, setup.answers))
+    stream = Stream(plan.seed, "ratings", plan.experiment, plan.participant_id)
+    return RatingsObserver(config, plan, draw_ratings(config.synthetic.ratings, config.rating, plan.methods, stream))
+
+
+def draw_ratings(law: RatingsLaw, scale: RatingScale, methods: Sequence[str], stream: Stream) -> dict[str, float]:
+    """One person's ratings: mean + person + noise, kept to the scale and its grain; then the habits.
+
+    With the share `same_share` the two methods of `same` get the first one's rating; the method named `lowest` is kept
+    at least one grain below all others (all that the scale's lower end leaves).
+    """
+    person = law.person_sd * stream.normal()
+    noise = {method: law.noise_sd * stream.normal() for method in sorted(methods)}
+    ratings = {method: on_scale(law.mean[method] + person + noise[method], scale) for method in methods}
+    if law.same and stream.uniform() < law.same_share:
+        ratings[law.same[1]] = ratings[law.same[0]]
+    if law.lowest:
+        others = min(rating for method, rating in ratings.items() if method != law.lowest)
+        ratings[law.lowest] = min(ratings[law.lowest], on_scale(others - scale.grain, scale))
+    return ratings
+
+
+def on_scale(value: float, scale: RatingScale) -> float:
+    """The nearest value of the scale, in whole grains from its minimum.
+
+    A grain such as 0.1 has no exact binary form; rounding to its decimals gives the number a person would write.
+    """
+    steps = round((min(max(value, scale.minimum), scale.maximum) - scale.minimum) / scale.grain)
+    decimals = max(0, -math.floor(math.log10(scale.grain))) + 2
+    return round(scale.minimum + steps * scale.grain, decimals)
+
+
+class RatingsObserver:
+    """A person whose ratings are given beforehand: drawn by the seed, or read from a table. `None` is no answer."""
+
+    def __init__(self, config: PreferenceConfig, plan: Plan, ratings: Mapping[str, float | None]) -> None:
+        self._mean_s = config.timing.exposure_s
+        self._plan = plan
+        self._ratings = ratings
+
+    def rate(self, trial: Trial) -> float | None:
+        """The rating of this trial's method."""
+        return self._ratings[trial.method]
+
+    def exposure_s(self, trial: Trial) -> float:
+        """How long the participant asks for a stimulus before saying next."""
+        plan = self._plan
+        draws = Stream(plan.seed, "exposure", plan.experiment, plan.participant_id, str(trial.trial))
+        return self._mean_s * math.exp(_EXPOSURE_SIGMA * draws.normal() - _EXPOSURE_SIGMA**2 / 2)
+
+
+def _from_table(config: PreferenceConfig, plan: Plan, answers: Sequence[Mapping[str, str]]) -> dict[str, float | None]:
+    """`ValueError` if the table has no row for the participant and method, or a rating off the scale."""
+    return {method: _cell(answers, plan.participant_id, method, config.rating) for method in plan.methods}
+
+
+def _cell(answers: Sequence[Mapping[str, str]], participant: str, method: str, scale: RatingScale) -> float | None:
+    rows = [row for row in answers if (row["participant_id"], row["method"]) == (participant, method)]
+    if len(rows) != 1:
+        raise ValueError(f"{len(rows)} rows for participant {participant}, method {method}; there must be one")
+    cell = rows[0]["rating"]
+    if not cell:
+        return None
+    try:
+        rating = float(cell)
+    except ValueError:
+        rating = math.nan
+    if not scale.minimum <= rating <= scale.maximum:
+        raise ValueError(
+            f"participant {participant}, {method}, rating is {cell!r}; it must be a number from "
+            f"{scale.minimum:g} to {scale.maximum:g}, or empty for no answer"
+        )
+    return rating

@@ -1,0 +1,100 @@
+"""Resume is replay: a journal's outcomes are sent into a fresh session, which then stands where the run broke off."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+from pydantic import ValidationError
+
+from experiments.journal import Contents, JournalError
+from experiments.steps import (
+    Ask,
+    Fire,
+    History,
+    Interrupted,
+    Outcome,
+    Present,
+    Session,
+    Standing,
+    Step,
+    outcome_from,
+    record,
+    step_from,
+)
+
+
+def history(contents: Contents) -> History:
+    """The steps that were done, each with its outcome, as the journal tells them."""
+    pairs: History = []
+    step: Step | None = None
+    for entry in contents.records:
+        if entry["kind"] == "step":
+            step = _read(contents, entry, step_from)
+        elif entry["kind"] == "outcome":
+            if step is None:
+                raise JournalError(f"{_place(contents, entry)}: an outcome without its step; a line was lost")
+            pairs.append((step, _read(contents, entry, outcome_from)))
+            step = None
+    return pairs
+
+
+def replay(session: Session, contents: Contents) -> Standing:
+    """Send a journal's outcomes into a fresh session. `JournalError` if they are not those of this plan."""
+    done = history(contents)
+    step = next(session, None)
+    for number, (told, outcome) in enumerate(done, start=1):
+        _compare(contents, number, step, told)
+        step = _send(session, outcome)
+    return Standing(step=step, history=done)
+
+
+def go_on(session: Session, contents: Contents, standing: Standing, append: Callable[..., None]) -> Standing:
+    """Where a replayed run goes on.
+
+    A step at which the run broke off is given up, told to the journal through `append`, and its trial presented again:
+    its stimulus was felt, may have been, or was about to be.
+    """
+    step, announced = standing.step, _last_step_is_open(contents)
+    if step is None or not (announced or isinstance(step, Fire | Ask | Present)):
+        return standing
+    if not announced:
+        append("step", body=record(step))
+    felt = isinstance(step, Ask) or (announced and isinstance(step, Fire | Present))
+    outcome = Interrupted(presented=felt)
+    append("outcome", body=record(outcome))
+    return Standing(step=_send(session, outcome), history=[*standing.history, (step, outcome)])
+
+
+def _last_step_is_open(contents: Contents) -> bool:
+    """Whether the last step has no outcome; a stop or a resumption may stand behind it."""
+    kinds = [entry["kind"] for entry in contents.records if entry["kind"] in ("step", "outcome")]
+    return bool(kinds) and kinds[-1] == "step"
+
+
+def _send(session: Session, outcome: Outcome) -> Step | None:
+    try:
+        return session.send(outcome)
+    except StopIteration:
+        return None
+
+
+def _compare(contents: Contents, number: int, planned: Step | None, told: Step) -> None:
+    if planned is None or record(planned) != record(told):
+        raise JournalError(
+            f"{contents.path}: step {number} is {told.kind!r} and does not follow from the plan in line 1; "
+            "the journal was changed, or another version of Recoil wrote it"
+        )
+
+
+def _read(contents: Contents, entry: dict[str, Any], reader: Any) -> Any:
+    try:
+        return reader(entry.get("body"))
+    except ValidationError as error:
+        first = error.errors()[0]
+        where = ".".join(str(part) for part in first["loc"])
+        raise JournalError(f"{_place(contents, entry)}: {where}: {first['msg']}; the record was changed") from error
+
+
+def _place(contents: Contents, entry: dict[str, Any]) -> str:
+    return f"{contents.path}: line {entry['n'] + 1}"

@@ -1,0 +1,211 @@
+"""One run: a participant doing an experiment, from a new or resumed journal to the table."""
+
+from __future__ import annotations
+
+import hashlib
+from collections.abc import Callable
+from contextlib import closing
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from typing import Any, Literal
+
+from device import Gun, open_gun
+from experiments import catalogue, limits, orders, places, replay, storage
+from experiments.clock import Clock
+from experiments.columns import FILE_SUFFIX
+from experiments.journal import Contents, Journal, JournalError
+from experiments.journal import read as read_journal
+from experiments.places import Place, PlaceError
+from experiments.plan import Plan
+from experiments.provenance import provenance
+from experiments.runner import Desk, RunStopped, Screen, carry_out
+from experiments.setup import Setup
+from experiments.steps import History, Session, Standing
+from experiments.streams import draw_seed
+from experiments.tables import table_bytes
+
+Again = Literal["ask", "resume", "fresh"]
+"""What to do with an unfinished run: refuse and say what is there, go on with it, or set it aside."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Request:
+    """Who does what, where, with which gun and seed; `seed` is `None` where the config or the system gives it."""
+
+    setup: Setup[Any]
+    participant_id: str
+    results: Path
+    gun: str = "simulated"
+    seed: int | None = None
+    again: Again = "ask"
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Finished:
+    """A finished run: its plan and where it lies."""
+
+    plan: Plan
+    place: Place
+
+
+MakeScreen = Callable[[Setup[Any], Plan, Clock], Screen]
+
+
+def resolve_seed(request: Request) -> int:
+    """The seed of a new run: asked for, else the config's, else drawn from the system."""
+    for seed in (request.seed, request.setup.config.seed):
+        if seed is not None:
+            return seed
+    return draw_seed()
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class _Job:
+    """A run about to begin: what was asked for, where, by which clock, and the unfinished run to go on with, if any."""
+
+    request: Request
+    place: Place
+    clock: Clock
+    before: Contents | None
+
+    @property
+    def experiment(self) -> catalogue.Experiment:
+        return catalogue.experiment(self.request.setup)
+
+
+def run(request: Request, make_screen: MakeScreen, clock: Clock) -> Finished:
+    """Carry out a run. `PlaceError`, `JournalError`, `ConfigError`, `RunStopped`: nothing acknowledged is ever lost."""
+    limits.check_limits(request.setup)
+    place = places.place(request.results, request.participant_id, request.setup.config.experiment)
+    job = _Job(request=request, place=place, clock=clock, before=_before(place, request))
+    with closing(open_gun(request.gun, _methods(request.setup), clock=clock.now)) as gun:
+        return _carry_out(job, gun, make_screen)
+
+
+def _methods(setup: Setup[Any]) -> Any:
+    return setup.gun.renderings(setup.config.design.methods)
+
+
+def _before(where: Place, request: Request) -> Contents | None:
+    """The unfinished run to go on with, if there is one and it is wanted."""
+    if not where.journal.exists():
+        return None
+    contents = read_journal(where.journal) if request.again != "fresh" else _readable(where)
+    if contents is not None and contents.finished:
+        raise PlaceError(
+            f"participant {where.participant_id} has finished {where.experiment}: {where.journal}; "
+            "one finished run a participant and experiment, so use another code"
+        )
+    if request.again == "fresh":
+        places.set_aside(where)
+        return None
+    if request.again == "ask":
+        raise PlaceError(_unfinished(where, contents))
+    return contents
+
+
+def _readable(where: Place) -> Contents | None:
+    try:
+        return read_journal(where.journal)
+    except JournalError:
+        return None
+
+
+def _unfinished(where: Place, contents: Contents | None) -> str:
+    last = contents.records[-1] if contents else {}
+    return (
+        f"participant {where.participant_id} has an unfinished run of {where.experiment}, stopped at "
+        f"{last.get('utc')} after record {last.get('n')}: {where.journal}; "
+        "--resume goes on with it, --fresh sets it aside and starts anew"
+    )
+
+
+def _carry_out(job: _Job, gun: Gun, make_screen: MakeScreen) -> Finished:
+    setup, plan = job.request.setup, _plan(job)
+    session = job.experiment.session(plan, setup)
+    with _open(job) as journal:
+        standing = _begin(job, plan, session, journal, gun)
+        desk = Desk(
+            gun=gun,
+            drives=limits.drives(setup),
+            screen=make_screen(setup, plan, job.clock),
+            journal=journal,
+            clock=job.clock,
+        )
+        _to_the_end(session, desk, standing, plan, job.place)
+    return Finished(plan=plan, place=job.place)
+
+
+def _plan(job: _Job) -> Plan:
+    if job.before is not None:
+        _refuse_changes(job.request, job.before)
+        return Plan.from_record(job.before.header["plan"])
+    config = job.request.setup.config
+    order = config.design.order
+    used = [] if order == "random" else places.used_rows(job.place.results, config.experiment)
+    row = orders.next_row(order, len(config.design.methods), used)
+    return job.experiment.make_plan(config, job.place.participant_id, resolve_seed(job.request), row)
+
+
+def _refuse_changes(request: Request, before: Contents) -> None:
+    began, now = before.header["setup_sha256"], request.setup.sha256()
+    if began != now:
+        raise PlaceError(
+            f"{before.path}: the run began with another config or gun file (setup {began[:12]}, now {now[:12]}); "
+            "resume with the files it began with, or start --fresh"
+        )
+    seed = before.header["plan"]["seed"]
+    if request.seed is not None and request.seed != seed:
+        raise PlaceError(f"{before.path}: the run began with seed {seed}, not {request.seed}; leave out --seed")
+
+
+def _open(job: _Job) -> Journal:
+    if job.before is not None:
+        return Journal.reopen(job.before, job.clock)
+    try:
+        storage.make_folder(job.place.folder)
+    except OSError as error:
+        raise PlaceError(f"{job.place.folder}: cannot be made ({error.strerror}); choose another --results") from error
+    return Journal.create(job.place.journal, job.clock)
+
+
+def _begin(job: _Job, plan: Plan, session: Session, journal: Journal, gun: Gun) -> Standing:
+    """Write the head of a new journal, or stand where a resumed one broke off."""
+    now = {"provenance": provenance(), "gun": asdict(gun.identify()), "clock": job.clock.name}
+    if job.before is not None:
+        standing = replay.replay(session, job.before)
+        stopped_utc = job.before.records[-1]["utc"]
+        journal.append("resumed", cut_bytes=job.before.cut_bytes, stopped_utc=stopped_utc, **now)
+        return replay.go_on(session, job.before, standing, journal.append)
+    setup = job.request.setup
+    plan_head = {"plan": plan.record(), "plan_sha256": plan.sha256()}
+    journal.append("run", **plan_head, setup=setup.record(), setup_sha256=setup.sha256(), **now)
+    return Standing(step=next(session), history=[])
+
+
+def _to_the_end(session: Session, desk: Desk, standing: Standing, plan: Plan, place: Place) -> None:
+    """Carry out what is left. If it is stopped, the journal says why and the table holds what was answered."""
+    try:
+        done = carry_out(session, desk, standing)
+    except (KeyboardInterrupt, RunStopped) as stop:
+        desk.journal.append("stopped", reason=str(stop) or "interrupted")
+        storage.write_whole(place.table, table(plan, replay.history(read_journal(place.journal))))
+        raise
+    data = table(plan, done)
+    desk.journal.append("finished", table_sha256=hashlib.sha256(data).hexdigest())
+    storage.write_whole(place.table, data)
+
+
+def table(plan: Plan, history: History) -> bytes:
+    """The CSV of a plan and what became of it."""
+    return table_bytes(plan.experiment, catalogue.CATALOGUE[plan.experiment].rows(plan, history))
+
+
+def rebuild(path: Path) -> tuple[Path, bytes, Contents]:
+    """The table of a journal: where it belongs, its bytes, and what the journal holds."""
+    contents = read_journal(path)
+    plan = Plan.from_record(contents.header["plan"])
+    if plan.experiment not in catalogue.CATALOGUE:
+        raise JournalError(f"{path}: line 1: experiment {plan.experiment!r} is not known to this version of Recoil")
+    name = path.name.replace("_journal", f"_{FILE_SUFFIX[plan.experiment]}")
+    return path.with_name(name).with_suffix(".csv"), table(plan, replay.history(contents)), contents

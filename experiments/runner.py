@@ -1,0 +1,201 @@
+"""The one loop that carries steps out: it tells the journal, lets gun, person or clock do it, and acknowledges.
+
+Console, terminal and synthetic participant differ only in the `Screen` they hand over.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Protocol
+
+from device import DeviceError, Gun, LimitError, LinkError, Shot, ShotReport
+from device.words import Drive
+from experiments.clock import Clock
+from experiments.journal import Journal
+from experiments.plan import Trial
+from experiments.steps import (
+    Answered,
+    Ask,
+    Describe,
+    Described,
+    Failed,
+    Fire,
+    Fired,
+    History,
+    Outcome,
+    Prepare,
+    Prepared,
+    Present,
+    Presented,
+    Rate,
+    Rated,
+    Rest,
+    Rested,
+    Session,
+    Standing,
+    Step,
+    record,
+)
+
+MAX_FAILURES = 3
+"""Failures of the gun in a row after which a run stops and can be resumed."""
+
+
+class RunStopped(Exception):  # noqa: N818 - a stop is not an error
+    """The run stops here on purpose or for want of a gun; it can be resumed."""
+
+
+class Screen(Protocol):
+    """Where a step meets a person, real or synthetic."""
+
+    def prepare(self, step: Prepare) -> Prepared:
+        """Have the gun turned, set and handed over."""
+
+    def ask(self, step: Ask, onset_s: float) -> Answered:
+        """Have the direction judged; `onset_s` is when the pulse began."""
+
+    def rest(self, step: Rest) -> Rested:
+        """Have the break taken."""
+
+    def said_next(self, step: Present, until_s: float) -> bool:
+        """Wait until the participant says next or until a time; true if they said it."""
+
+    def rate(self, step: Rate) -> Rated:
+        """Have a stimulus rated."""
+
+    def describe(self, step: Describe) -> Described:
+        """Have a stimulus described."""
+
+    def acknowledge(self, step: Step, outcome: Outcome) -> None:
+        """Show that an outcome is safe: its record is on the disk."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Desk:
+    """All that carries steps out: gun and how each method drives it, screen, journal and clock."""
+
+    gun: Gun
+    drives: Mapping[str, Drive]
+    screen: Screen
+    journal: Journal
+    clock: Clock
+
+    @property
+    def gun_name(self) -> str:
+        """Who renders: `simulated`, or model and serial number."""
+        identity = self.gun.identify()
+        return identity.model if identity.model == identity.serial else f"{identity.model}:{identity.serial}"
+
+
+def carry_out(session: Session, desk: Desk, standing: Standing) -> History:
+    """Carry out a session from where it stands to its end, and return all that was done.
+
+    `RunStopped`, `JournalError` and interrupts pass through; whatever happens, the gun is disarmed.
+    """
+    step, done, failures, onset_s = standing.step, list(standing.history), 0, math.nan
+    try:
+        while step is not None:
+            desk.journal.append("step", body=record(step))
+            outcome = _do(step, desk, onset_s)
+            desk.journal.append("outcome", body=record(outcome))
+            desk.screen.acknowledge(step, outcome)
+            done.append((step, outcome))
+            failures = _count(failures, outcome)
+            onset_s = outcome.pulse_start_s if isinstance(outcome, Fired) else onset_s
+            step = _next(session, outcome)
+    finally:
+        session.close()
+        desk.gun.disarm()
+    return done
+
+
+def _next(session: Session, outcome: Outcome) -> Step | None:
+    try:
+        return session.send(outcome)
+    except StopIteration:
+        return None
+
+
+def _count(failures: int, outcome: Outcome) -> int:
+    if isinstance(outcome, Prepared):
+        return failures
+    if not isinstance(outcome, Failed):
+        return 0
+    if failures + 1 == MAX_FAILURES:
+        raise RunStopped(f"the gun failed {MAX_FAILURES} times in a row, last: {outcome.cause}")
+    return failures + 1
+
+
+def _do(step: Step, desk: Desk, onset_s: float) -> Outcome:
+    match step:
+        case Prepare():
+            return desk.screen.prepare(step)
+        case Fire():
+            return _fire(step, desk)
+        case Ask():
+            return desk.screen.ask(step, onset_s)
+        case Rest():
+            return desk.screen.rest(step)
+        case Present():
+            return _present(step, desk)
+        case Rate():
+            return desk.screen.rate(step)
+        case Describe():
+            return desk.screen.describe(step)
+
+
+def _fire(step: Fire, desk: Desk) -> Fired | Failed:
+    """One shot, armed for it alone."""
+    try:
+        desk.gun.arm()
+        onset_utc, report = _shoot(step.trial, desk)
+    except (LimitError, LinkError) as error:
+        return Failed(cause=str(error))
+    finally:
+        desk.gun.disarm()
+    return Fired(
+        gun=desk.gun_name,
+        onset_utc=onset_utc,
+        requested_s=report.requested_s,
+        pulse_start_s=report.pulse_start_s,
+        pulse_end_s=report.pulse_end_s,
+        home_predicted_s=report.home_predicted_s,
+        motion=report.motion,
+    )
+
+
+def _shoot(trial: Trial, desk: Desk) -> tuple[str, ShotReport]:
+    desk.clock.sleep(desk.gun.status().ready_at_s - desk.clock.now())
+    shot = Shot(method=trial.method, direction=trial.direction, drive=desk.drives[trial.method])
+    onset_utc = desk.clock.utc()
+    return onset_utc, desk.gun.fire(shot)
+
+
+def _present(step: Present, desk: Desk) -> Presented | Failed:
+    """Shots at whole multiples of the interval since the first, until next is said."""
+    try:
+        desk.gun.arm()
+        onset_utc, first = _shoot(step.trial, desk)
+        shots = 1
+        while not desk.screen.said_next(step, first.pulse_start_s + shots * step.repeat_every_s):
+            if shots == step.max_shots:
+                return _presented(desk, onset_utc, first, shots, "limit")
+            _shoot(step.trial, desk)
+            shots += 1
+    except DeviceError as error:
+        return Failed(cause=str(error))
+    finally:
+        desk.gun.disarm()
+    return _presented(desk, onset_utc, first, shots, "next")
+
+
+def _presented(desk: Desk, onset_utc: str, first: ShotReport, shots: int, ended_by: str) -> Presented:
+    return Presented(
+        gun=desk.gun_name,
+        onset_utc=onset_utc,
+        shots=shots,
+        exposure_s=desk.clock.now() - first.pulse_start_s,
+        ended_by="next" if ended_by == "next" else "limit",
+    )

@@ -1,0 +1,88 @@
+"""The screen of a synthetic participant: answers come from an observer, waiting from the clock it is given."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+from experiments.clock import Clock
+from experiments.config import ExperimentConfig
+from experiments.steps import (
+    Answered,
+    Ask,
+    Describe,
+    Described,
+    Outcome,
+    Prepare,
+    Prepared,
+    Present,
+    Rate,
+    Rated,
+    Rest,
+    Rested,
+    Step,
+)
+
+
+class SyntheticScreen:
+    """Carries steps out as a person would, in as much time as the config plans for them.
+
+    `tell` is called with each step after its outcome is on the disk: for a progress bar.
+    """
+
+    def __init__(
+        self, config: ExperimentConfig, observer: Any, clock: Clock, tell: Callable[[Step], None] = lambda _: None
+    ) -> None:
+        self._timing: Any = getattr(config, "timing", None)
+        self._observer = observer
+        self._clock = clock
+        self._tell = tell
+        self._next_at_s: float | None = None
+
+    def prepare(self, step: Prepare) -> Prepared:
+        """Take the planned time of a hand-over."""
+        del step
+        self._clock.sleep(self._timing.hand_over_s)
+        return Prepared()
+
+    def ask(self, step: Ask, onset_s: float) -> Answered:
+        """Answer after the observer's own response time."""
+        answer = self._observer.answer(step.trial)
+        self._clock.sleep(onset_s + answer.response_time_s - self._clock.now())
+        return Answered(
+            response=answer.response,
+            response_time_s=answer.response_time_s,
+            response_source="synthetic",
+            response_time_valid=True,
+        )
+
+    def rest(self, step: Rest) -> Rested:
+        """Rest as long as planned."""
+        self._clock.sleep(step.duration_s)
+        return Rested(rested_s=step.duration_s)
+
+    def said_next(self, step: Present, until_s: float) -> bool:
+        """Say next once the observer has felt enough; drawn when the stimulus begins."""
+        if self._next_at_s is None:
+            self._next_at_s = self._clock.now() + self._observer.exposure_s(step.trial)
+        enough = self._next_at_s <= until_s
+        self._clock.sleep((self._next_at_s if enough else until_s) - self._clock.now())
+        if enough:
+            self._next_at_s = None
+        return enough
+
+    def rate(self, step: Rate) -> Rated:
+        """Rate as the observer does."""
+        self._clock.sleep(self._timing.rating_s)
+        return Rated(rating=self._observer.rate(step.trial), rating_by="synthetic")
+
+    def describe(self, step: Describe) -> Described:
+        """Say nothing: a synthetic participant has no words of its own."""
+        del step
+        self._clock.sleep(self._timing.description_s)
+        return Described(comment="")
+
+    def acknowledge(self, step: Step, outcome: Outcome) -> None:
+        """Tell whoever counts."""
+        del outcome
+        self._tell(step)

@@ -1,0 +1,214 @@
+"""The words between a session and the world: steps say what should happen, outcomes what did.
+
+Both are frozen facts. `kind` names them in the journal, from which they are read back and checked by pydantic.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Generator
+from dataclasses import asdict, dataclass
+from typing import Annotated, Any, Literal
+
+from pydantic import Field, TypeAdapter
+
+from device.words import Direction
+from experiments.plan import Trial
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Prepare:
+    """Take the gun, turn it to the trial's direction, set the damper if one is named, hand it over."""
+
+    trial: Trial
+    attempt: int
+    damper: str
+    kind: Literal["prepare"] = "prepare"
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Fire:
+    """Fire one shot of the trial's method."""
+
+    trial: Trial
+    attempt: int
+    kind: Literal["fire"] = "fire"
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Ask:
+    """Ask which way it shot, and take one of two answers."""
+
+    trial: Trial
+    attempt: int
+    question: str
+    forward: str
+    backward: str
+    kind: Literal["ask"] = "ask"
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Rest:
+    """A break that cannot be cut short without a recorded reason."""
+
+    between: Literal["sets", "sessions"]
+    duration_s: float
+    kind: Literal["rest"] = "rest"
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Present:
+    """Fire a shot every so often until the participant says next."""
+
+    trial: Trial
+    attempt: int
+    repeat_every_s: float
+    max_shots: int
+    kind: Literal["present"] = "present"
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Rate:
+    """Ask for a rating of the trial's stimulus, which is named by its order of presentation."""
+
+    trial: Trial
+    question: str
+    minimum: float
+    maximum: float
+    minimum_text: str
+    maximum_text: str
+    grain: float
+    kind: Literal["rate"] = "rate"
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Describe:
+    """Ask for a free description of the trial's stimulus."""
+
+    trial: Trial
+    question: str
+    kind: Literal["describe"] = "describe"
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Prepared:
+    """The gun is in the participant's hand."""
+
+    kind: Literal["prepared"] = "prepared"
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Fired:
+    """One shot was fired. Times are on the host's monotonic clock; home is predicted by the model."""
+
+    gun: str
+    onset_utc: str
+    requested_s: float
+    pulse_start_s: float
+    pulse_end_s: float
+    home_predicted_s: float
+    motion: str
+    kind: Literal["fired"] = "fired"
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Answered:
+    """The participant said which way. The time is valid if it came from the participant's own hand."""
+
+    response: Direction
+    response_time_s: float
+    response_source: Literal["participant", "experimenter", "synthetic"]
+    response_time_valid: bool
+    kind: Literal["answered"] = "answered"
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Rested:
+    """The break is over; `cut_reason` says why it was shorter than planned, empty if it was not."""
+
+    rested_s: float
+    cut_reason: str = ""
+    kind: Literal["rested"] = "rested"
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Presented:
+    """The stimulus was felt until next was said, or until the most shots were fired."""
+
+    gun: str
+    onset_utc: str
+    shots: int
+    exposure_s: float
+    ended_by: Literal["next", "limit"]
+    kind: Literal["presented"] = "presented"
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Rated:
+    """A rating, or `None` if the participant gave none. 0 is a rating."""
+
+    rating: float | None
+    rating_by: Literal["participant", "experimenter", "synthetic"]
+    kind: Literal["rated"] = "rated"
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Described:
+    """The participant's own words; may be empty."""
+
+    comment: str
+    kind: Literal["described"] = "described"
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Failed:
+    """The gun did not do it, or may not have: the trial is presented again."""
+
+    cause: str
+    kind: Literal["failed"] = "failed"
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Interrupted:
+    """The run broke off before this step was done: the trial is presented again.
+
+    `presented` tells whether its stimulus was, or may have been, felt.
+    """
+
+    presented: bool
+    kind: Literal["interrupted"] = "interrupted"
+
+
+Step = Prepare | Fire | Ask | Rest | Present | Rate | Describe
+Outcome = Prepared | Fired | Answered | Rested | Presented | Rated | Described | Failed | Interrupted
+Session = Generator[Step, Outcome, None]
+"""Yields what should happen and is sent what did happen. It opens nothing, waits for nothing and knows no clock."""
+
+History = list[tuple[Step, Outcome]]
+"""What was done, in order."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Standing:
+    """Where a run stands: its next step, `None` at the end, and what was done before."""
+
+    step: Step | None
+    history: History
+
+
+_STEP: TypeAdapter[Step] = TypeAdapter(Annotated[Step, Field(discriminator="kind")])
+_OUTCOME: TypeAdapter[Outcome] = TypeAdapter(Annotated[Outcome, Field(discriminator="kind")])
+
+
+def record(word: Step | Outcome) -> dict[str, Any]:
+    """A step or outcome as plain JSON values."""
+    return asdict(word)
+
+
+def step_from(body: object) -> Step:
+    """The step that a record holds; `pydantic.ValidationError` if it holds none."""
+    return _STEP.validate_python(body)
+
+
+def outcome_from(body: object) -> Outcome:
+    """The outcome that a record holds; `pydantic.ValidationError` if it holds none."""
+    return _OUTCOME.validate_python(body)

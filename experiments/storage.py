@@ -1,0 +1,100 @@
+"""Files that are safe once written: readable by their owner only, synced with their folder, held by one run at a time.
+
+Linux is tested. On macOS a sync asks the drive itself (`F_FULLFSYNC`); on Windows folders cannot be synced and file
+modes do not exist, so the folder's own permissions count there.
+"""
+
+from __future__ import annotations
+
+import os
+import sys
+from pathlib import Path
+
+OWNER_FILE = 0o600
+OWNER_FOLDER = 0o700
+
+
+def make_folder(folder: Path) -> None:
+    """Make a folder and its parents, readable by their owner only, and sync what names them."""
+    missing = [path for path in (folder, *folder.parents) if not path.exists()]
+    for path in reversed(missing):
+        path.mkdir(mode=OWNER_FOLDER, exist_ok=True)
+        sync_folder(path.parent)
+
+
+def create(path: Path) -> int:
+    """A new file to append to; its name is on disk when this returns. `FileExistsError` if there is one."""
+    descriptor = os.open(path, _APPEND | os.O_CREAT | os.O_EXCL, OWNER_FILE)
+    sync_folder(path.parent)
+    return descriptor
+
+
+def reopen(path: Path) -> int:
+    """An existing file to append to."""
+    return os.open(path, _APPEND)
+
+
+_APPEND = os.O_RDWR | os.O_APPEND | getattr(os, "O_BINARY", 0) | getattr(os, "O_CLOEXEC", 0)
+
+
+def write_all(descriptor: int, data: bytes) -> None:
+    """Write every byte, however many calls it takes."""
+    view = memoryview(data)
+    while view:
+        view = view[os.write(descriptor, view) :]
+
+
+def sync(descriptor: int) -> None:
+    """Return when the file's bytes are on the disk."""
+    if sys.platform == "darwin":
+        import fcntl  # noqa: PLC0415 - this system only
+
+        fcntl.fcntl(descriptor, fcntl.F_FULLFSYNC)
+    else:
+        os.fsync(descriptor)
+
+
+def sync_folder(folder: Path) -> None:
+    """Return when the names in a folder are on the disk; where the system cannot, do nothing."""
+    if sys.platform == "win32":
+        return
+    descriptor = os.open(folder, os.O_RDONLY)
+    try:
+        os.fsync(descriptor)
+    finally:
+        os.close(descriptor)
+
+
+def hold(descriptor: int) -> bool:
+    """Take the file for this process alone; false if another holds it. Let go when the file is closed."""
+    try:
+        if sys.platform == "win32":
+            import msvcrt  # noqa: PLC0415 - this system only
+
+            os.lseek(descriptor, 0x7FFF_FFFE, os.SEEK_SET)  # far behind the end, so that reading stays allowed
+            msvcrt.locking(descriptor, msvcrt.LK_NBLCK, 1)
+        else:
+            import fcntl  # noqa: PLC0415 - not on Windows
+
+            fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
+    except OSError:
+        return False
+    return True
+
+
+def write_whole(path: Path, data: bytes) -> None:
+    """Put a whole file in its place at once: readers see the old one or the new one, never a part."""
+    part = path.with_name(f".{path.name}.part")
+    part.unlink(missing_ok=True)
+    try:
+        descriptor = os.open(part, _APPEND | os.O_CREAT | os.O_EXCL, OWNER_FILE)
+        try:
+            write_all(descriptor, data)
+            sync(descriptor)
+        finally:
+            os.close(descriptor)
+        part.replace(path)
+    except OSError:
+        part.unlink(missing_ok=True)
+        raise
+    sync_folder(path.parent)

@@ -1,0 +1,46 @@
+from __future__ import annotations
+
+import pytest
+
+from analysis import yes_no
+
+
+def test_hand_worked_values_of_eight_hits_and_three_false_alarms() -> None:
+    # H = 8.5 / 11 = .7727, z = .7479; F = 3.5 / 11 = .3182, z = -.4728 (normal table)
+    found = yes_no(8, 10, 3, 10)
+    assert (found.hit_rate, found.false_alarm_rate) == pytest.approx((8.5 / 11, 3.5 / 11))
+    assert found.d_prime == pytest.approx(1.2207, abs=2e-4)
+    assert found.criterion == pytest.approx(-0.1375, abs=2e-4)
+
+
+def test_perfect_answers_stay_finite_and_unbiased() -> None:
+    # H = 10.5 / 11, F = 0.5 / 11, z = +-1.6906 (normal table)
+    found = yes_no(10, 10, 0, 10)
+    assert found.d_prime == pytest.approx(2 * 1.6906, abs=2e-4)
+    assert found.criterion == pytest.approx(0.0, abs=1e-12)
+
+
+def test_always_saying_forward_is_bias_without_sensitivity() -> None:
+    found = yes_no(10, 10, 10, 10)
+    assert found.d_prime == 0.0
+    assert found.criterion == pytest.approx(-1.6906, abs=1e-4)
+
+
+def test_swapping_the_two_words_turns_the_criterion_and_keeps_d_prime() -> None:
+    found, swapped = yes_no(7, 10, 2, 10), yes_no(8, 10, 3, 10)
+    assert swapped.d_prime == pytest.approx(found.d_prime)
+    assert swapped.criterion == pytest.approx(-found.criterion)
+
+
+def test_participants_go_in_as_arrays() -> None:
+    found = yes_no([8, 10], 10, [3, 0], 10)
+    assert found.d_prime == pytest.approx([1.2207, 3.3812], abs=2e-4)
+
+
+@pytest.mark.parametrize(
+    ("counts", "reason"),
+    [((11, 10, 0, 10), "hits"), ((1, 10, -1, 10), "false_alarms"), ((0, 0, 0, 10), "at least 1 trial")],
+)
+def test_impossible_counts_are_refused(counts: tuple[int, int, int, int], reason: str) -> None:
+    with pytest.raises(ValueError, match=reason):
+        yes_no(*counts)

@@ -1,0 +1,110 @@
+from __future__ import annotations
+
+import subprocess
+import sys
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from analysis.figures import ShotPanel, display_name, figure_5, figure_8, stars
+from analysis.logs import read_logs
+from analysis.summary import summarize
+from tests.log_files import write_study
+
+
+def shot_panel(collision_N: float = 53.7, landing_s: float = 0.15) -> ShotPanel:
+    time = np.linspace(0.0, 0.25, 500)
+    x = 0.04 * np.sin(np.pi * np.clip(time / 0.15, 0.0, 1.0))
+    return ShotPanel(
+        title="F_f = 0.21 N",
+        time_s=time,
+        force_N=30.0 * np.exp(-time / 0.004),
+        displacement_m=x,
+        velocity_m_s=np.gradient(x, time),
+        drive_V=np.where(time < 0.01, 16.0, 0.0),
+        stage_ends_s=(0.009, 0.075, landing_s),
+        collision_force_N=collision_N,
+    )
+
+
+@pytest.fixture(scope="module")
+def statistics(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Any]:
+    return summarize(read_logs([write_study(tmp_path_factory.mktemp("study"), participants=6)]))
+
+
+def _png_size(path: Path) -> tuple[int, int]:
+    header = path.read_bytes()[:24]
+    assert header.startswith(b"\x89PNG")
+    return int.from_bytes(header[16:20], "big"), int.from_bytes(header[20:24], "big")
+
+
+def test_figure_5_is_written_as_png_and_svg_and_names_the_stages(tmp_path: Path) -> None:
+    png, svg = figure_5([shot_panel(), shot_panel(0.05)], tmp_path / "new" / "figure-5")
+    assert _png_size(png) == (1800, 1480)  # 9.0 x 7.4 inches at 200 dpi
+    text = svg.read_text(encoding="utf-8")
+    for words in ("bullet firing", "resetting", "ready", "dx/dt [m/s]", "x [mm]", "53.7 N, beyond the axis"):
+        assert words in text
+
+
+@pytest.mark.parametrize("landing_s", [0.15, np.nan])
+def test_a_shot_that_does_not_come_home_is_drawn_without_a_collision(landing_s: float, tmp_path: Path) -> None:
+    _, svg = figure_5([shot_panel(np.nan if np.isnan(landing_s) else 1.0, landing_s)], tmp_path / "shot")
+    assert ("collision" in svg.read_text(encoding="utf-8")) is not np.isnan(landing_s)
+
+
+def test_figure_8_shows_both_experiments_or_the_one_there_is(statistics: dict[str, Any], tmp_path: Path) -> None:
+    both, both_svg = figure_8(statistics, tmp_path / "both")
+    one, _ = figure_8({"preference": statistics["preference"]}, tmp_path / "one")
+    assert _png_size(both)[0] > 1.7 * _png_size(one)[0]
+    text = both_svg.read_text(encoding="utf-8")
+    for words in ("correct rate, forward [%]", "rating (0 dislike", "Force II", "n = 6"):
+        assert words in text
+
+
+def test_figures_are_the_same_bytes_each_time(statistics: dict[str, Any], tmp_path: Path) -> None:
+    for first, second in (
+        (figure_5([shot_panel()], tmp_path / "a"), figure_5([shot_panel()], tmp_path / "b")),
+        (figure_8(statistics, tmp_path / "c"), figure_8(statistics, tmp_path / "d")),
+    ):
+        assert [path.read_bytes() for path in first] == [path.read_bytes() for path in second]
+
+
+def test_a_figure_of_one_participant_and_four_unknown_methods_is_drawn(tmp_path: Path) -> None:
+    methods = ["a", "b", "c", "d"]
+    found = {
+        "n": 1,
+        "methods": methods,
+        "means": dict.fromkeys(methods, 5.0),
+        "sds": dict.fromkeys(methods, None),
+        "tukey": None,
+        "participants": {"P01": dict.fromkeys(methods, 5.0)},
+    }
+    figure_8({"preference": found}, tmp_path / "few")
+
+
+def test_without_data_there_is_no_figure(tmp_path: Path) -> None:
+    with pytest.raises(ValueError, match="at least one shot"):
+        figure_5([], tmp_path / "x")
+    with pytest.raises(ValueError, match="complete participant"):
+        figure_8({"direction": {"n": 0}}, tmp_path / "x")
+
+
+def test_names_and_stars_are_the_papers() -> None:
+    assert display_name("asymmetric-1") == "Asymmetric Force I"
+    assert [stars(p) for p in (0.001, 0.01, 0.05, None)] == ["**", "*", "n.s.", "n.s."]
+
+
+def test_importing_analysis_loads_no_plotting_tables_or_templates() -> None:
+    code = (
+        "import sys, analysis; print([m for m in ('matplotlib', 'pandas', 'jinja2', 'pydantic') if m in sys.modules])"
+    )
+    found = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert found.stdout.strip() == "[]"
+
+
+def test_drawing_leaves_pyplot_alone() -> None:
+    code = "import sys, analysis.figures; print('matplotlib.pyplot' in sys.modules)"
+    found = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert found.stdout.strip() == "False"

@@ -1,0 +1,59 @@
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from analysis.paper import load_paper
+
+SHIPPED = Path(__file__).parent.parent / "configs" / "paper.toml"
+
+
+def test_the_shipped_paper_holds_the_published_numbers_as_printed() -> None:
+    paper = load_paper(SHIPPED)
+    assert paper.direction.means == {"vibration": "55.7", "asymmetric-1": "79.3", "asymmetric-2": "92.9"}
+    assert (paper.direction.anova.F, paper.preference.anova.F) == ("28.45", "33.810")
+    assert [claim.p for claim in paper.direction.binomial] == ["0.205", "0.673"]
+    assert (paper.preference.lowest.participants, paper.preference.same_score.participants) == (14, 2)
+
+
+def test_the_shipped_protocol_adds_up() -> None:
+    paper = load_paper(SHIPPED)
+    protocol = paper.direction.protocol
+    trials = protocol.sets_per_session * protocol.trials_per_set
+    assert protocol.forward_trials_per_session + protocol.backward_trials_per_session == trials == 20
+    for published in (paper.direction, paper.preference):
+        k = len(published.methods)
+        assert published.anova.df == [k - 1, (published.n - 1) * (k - 1)]
+    assert paper.participants.female + paper.participants.male == paper.participants.n
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "words"),
+    [
+        ('F = "28.45"', "F = 28.45", ["direction.anova.F", "28.45", "string"]),
+        ('F = "28.45"', 'F = "28,45"', ["direction.anova.F", "'28,45'", "pattern"]),
+        ('F = "28.45"', 'F = "28.45"\nG = 1', ["direction.anova.G", "1", "no other keys"]),
+        ('F = "28.45"\n', "", ["direction.anova.F", "missing", "required"]),
+        ('p = "0.205"', 'p = "20.5"', ["direction.binomial.0.p", "'20.5'", "above 1"]),
+        ('direction = "forward"', 'direction = "left"', ["direction.binomial.0.direction", "'left'", "forward"]),
+        ('higher = "asymmetric-1"', 'higher = "ramp"', ["direction", "ramp above vibration", "two of"]),
+        ("[participants]\nn = 14", "[participants]\nn = 0", ["participants.n", "0", "greater than or equal to 1"]),
+        ("[participants]", "[participants", ["not a TOML file", "line"]),
+    ],
+)
+def test_bad_input_is_one_message_with_file_key_value_and_rule(
+    old: str, new: str, words: list[str], tmp_path: Path
+) -> None:
+    path = tmp_path / "paper.toml"
+    path.write_text(SHIPPED.read_text(encoding="utf-8").replace(old, new, 1), encoding="utf-8")
+    with pytest.raises(ValueError, match=r"paper\.toml: ") as caught:
+        load_paper(path)
+    message = str(caught.value)
+    assert [word for word in words if word not in message] == [], message
+    assert "\n" not in message
+
+
+def test_a_missing_file_is_named(tmp_path: Path) -> None:
+    with pytest.raises(ValueError, match=r"nowhere\.toml: cannot be read"):
+        load_paper(tmp_path / "nowhere.toml")

@@ -1,0 +1,163 @@
+from __future__ import annotations
+
+import json
+import re
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from analysis.logs import Logs, Problem, read_logs
+from analysis.paper import Paper, load_paper
+from analysis.published import compare, odds_of
+from analysis.report import ReportData, write_report
+from analysis.summary import summarize
+from tests.log_files import write_study
+from tests.test_figures import shot_panel
+
+
+@pytest.fixture(scope="module")
+def logs(tmp_path_factory: pytest.TempPathFactory) -> Logs:
+    return read_logs([write_study(tmp_path_factory.mktemp("study"))])
+
+
+@pytest.fixture(scope="module")
+def paper() -> Paper:
+    return load_paper(Path(__file__).parent.parent / "configs" / "paper.toml")
+
+
+@pytest.fixture(scope="module")
+def full(logs: Logs, paper: Paper, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    out = tmp_path_factory.mktemp("report") / "out"
+    statistics = summarize(logs)
+    statistics["excluded"] = [{"experiment": "direction", "participant": "P15", "reason": "3 of 60 trials unanswered"}]
+    problem = Problem(file=Path("sub-<b>_trials.csv"), line=7, column="response", message="'left' is not allowed")
+    report = ReportData(
+        title="Recoil & co: a <study>",
+        statistics=statistics,
+        problems=(problem,),
+        comparison=compare(statistics, paper),
+        odds=(odds_of("direction", {"whole pattern": np.arange(100) < 33}, "Assumed: no spread."),),
+        panels=(shot_panel(), shot_panel(0.05)),
+        files=logs.files,
+        provenance={"seed": "1"},
+        notes=("The coil is shorted after the pulse.",),
+    )
+    write_report(out, report)
+    return out
+
+
+def _text(html: str) -> str:
+    """What a reader sees, in one line."""
+    body = re.sub(r"<style>.*?</style>", "", html, flags=re.DOTALL)
+    return " ".join(re.sub(r"<[^>]+>", " ", body).split())
+
+
+def test_everything_that_the_contract_names_is_written(full: Path) -> None:
+    names = sorted(str(path.relative_to(full)) for path in full.rglob("*") if path.is_file())
+    figures = [f"figures/figure-{i}.{kind}" for i in (5, 8) for kind in ("png", "svg")]
+    assert names == [*figures, "report.html", "report.md", "statistics.json"]
+
+
+@pytest.mark.parametrize(
+    "words",
+    [
+        "28 log files were read",
+        "Vibration",
+        "Asymmetric Force II is above Vibration (p &lt; .001)",
+        "pooled error term of the repeated-measures ANOVA",
+        "ignores that trials come in people",
+        "One replication is luck",
+        "33.0 % [24.6, 42.7]",
+        "Assumed: no spread.",
+        "Participant P15 in direction recognition: 3 of 60 trials unanswered.",
+        "line 7, column response: &#39;left&#39; is not allowed",
+        "The coil is shorted after the pulse.",
+        "28.45",
+        "not published",
+    ],
+)
+def test_the_html_says(words: str, full: Path) -> None:
+    assert words in _text((full / "report.html").read_text(encoding="utf-8"))
+
+
+def test_F_is_written_in_the_style_of_the_apa(full: Path) -> None:
+    statistics = json.loads((full / "statistics.json").read_text(encoding="utf-8"))
+    F = f"F(2, 26) = {statistics['direction']['anova']['F']:.2f}, p < .001"
+    assert F in (full / "report.md").read_text(encoding="utf-8")
+
+
+def test_the_html_stands_alone(full: Path) -> None:
+    html = (full / "report.html").read_text(encoding="utf-8")
+    assert "<script" not in html
+    addresses = re.findall(r'(?:src|href)="([^"]*)"', html)
+    assert all(address.startswith(("data:image/png;base64,", "#")) for address in addresses)
+    assert "url(" not in html
+    assert "@import" not in html
+    assert len(re.findall(r'<img [^>]*alt="[^"]{40,}"', html)) == 2
+    for words in ("prefers-color-scheme: dark", "@media print", 'name="viewport"', 'class="scroll'):
+        assert words in html
+
+
+def test_what_was_typed_is_never_markup(full: Path) -> None:
+    html = (full / "report.html").read_text(encoding="utf-8")
+    assert "<title>Recoil &amp; co: a &lt;study&gt;</title>" in html
+    assert "sub-&lt;b&gt;_trials.csv" in html
+
+
+def test_the_markdown_links_its_figures_and_keeps_its_tables_whole(full: Path) -> None:
+    text = (full / "report.md").read_text(encoding="utf-8")
+    for target in re.findall(r"\((figures/[^)]+)\)", text):
+        assert (full / target).is_file()
+    blocks = re.findall(r"(?:^\|.*\n)+", text, flags=re.MULTILINE)
+    assert len(blocks) >= 9
+    for block in blocks:
+        assert len({len(re.findall(r"(?<!\\)\|", line)) for line in block.splitlines()}) == 1
+
+
+def test_statistics_json_is_unrounded_and_complete(full: Path, logs: Logs) -> None:
+    found = json.loads((full / "statistics.json").read_text(encoding="utf-8"))
+    expected = summarize(logs)
+    assert {key: found[key] for key in ("direction", "preference")} == {
+        key: expected[key] for key in ("direction", "preference")
+    }
+
+
+def test_the_same_report_is_the_same_bytes(full: Path, tmp_path: Path, logs: Logs) -> None:
+    data = ReportData(title="Twice", statistics=summarize(logs))
+    for out in (tmp_path / "a", tmp_path / "b"):
+        write_report(out, data)
+    for name in ("report.html", "report.md", "statistics.json"):
+        assert (tmp_path / "a" / name).read_bytes() == (tmp_path / "b" / name).read_bytes()
+
+
+def _titles(out: Path) -> list[str]:
+    return re.findall(r"<h2>(.*?)</h2>", (out / "report.html").read_text(encoding="utf-8"))
+
+
+def test_sections_without_data_are_left_out(tmp_path: Path) -> None:
+    write_study(tmp_path / "study", participants=3)
+    logs = read_logs(sorted((tmp_path / "study").rglob("*_ratings.csv")))
+    write_report(tmp_path / "out", ReportData(title="Ratings", statistics=summarize(logs)))
+    assert _titles(tmp_path / "out") == [
+        "What was analysed",
+        "Results at a glance",
+        "Preference",
+        "Provenance and assumptions",
+    ]
+
+
+def test_a_report_of_nothing_says_so(tmp_path: Path) -> None:
+    statistics: dict[str, Any] = summarize(read_logs([tmp_path]))
+    write_report(tmp_path / "out", ReportData(title="Nothing", statistics=statistics))
+    assert "There was nothing to analyse." in (tmp_path / "out" / "report.md").read_text(encoding="utf-8")
+    assert not (tmp_path / "out" / "figures").exists()
+
+
+def test_one_participant_gets_means_and_no_tests(tmp_path: Path) -> None:
+    statistics = summarize(read_logs([write_study(tmp_path / "study", participants=1)]))
+    write_report(tmp_path / "out", ReportData(title="One", statistics=statistics))
+    text = (tmp_path / "out" / "report.md").read_text(encoding="utf-8")
+    assert "There are too few participants or methods for a test." in text
+    assert "(–)" in text
