@@ -67,7 +67,7 @@ def _checked(successes: ArrayLike, trials: ArrayLike, p0: ArrayLike) -> tuple[Fl
 
 
 def _log_pmf(k: FloatArray, n: FloatArray, chance: FloatArray) -> FloatArray:
-    """Log of P(k); -inf outside 0..n. The sum of log gammas is for where P itself underflows: it costs digits at 1e9."""
+    """Log of P(k); -inf outside 0..n. Log gammas, which cost digits at 1e9, only where P itself underflows."""
     inside = np.clip(k, 0.0, n)
     with np.errstate(all="ignore"):
         pmf = np.asarray(stats.binom.pmf(inside, n, chance))
@@ -80,13 +80,14 @@ def _log_pmf(k: FloatArray, n: FloatArray, chance: FloatArray) -> FloatArray:
 def _least_likely(k: FloatArray, n: FloatArray, chance: FloatArray) -> tuple[FloatArray, FloatArray]:
     """The outcomes counted: all up to `low` (-1: none) and all from `high` (n + 1: none).
 
-    The probabilities rise up to the mode and fall after it, so each border is found by halving.
+    The probabilities rise up to the mode and fall after it, so the other side is found by halving; the border of
+    the observed side is `k`, which the tolerance must not move.
     """
     mode = np.minimum(np.floor((n + 1.0) * chance), n)
     limit = _log_pmf(k, n, chance) + np.log1p(TIE)
     low = _border(np.full_like(mode, -1.0), mode, limit, n, chance)
     high = _border(n + 1.0, mode, limit, n, chance)
-    return low, high
+    return np.where(k <= mode, k, low), np.where(k >= mode, k, high)
 
 
 def _border(outer: FloatArray, mode: FloatArray, limit: FloatArray, n: FloatArray, chance: FloatArray) -> FloatArray:

@@ -3,40 +3,34 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Any
 
 import pandas as pd
 
+_MEASURES = {"direction": ("correct", "trials unanswered"), "preference": ("rating", "ratings missing")}
 
-def complete_direction(table: pd.DataFrame, methods: Sequence[str], excluded: list[dict[str, Any]]) -> pd.DataFrame:
-    """The trials of participants who answered all of theirs; the others go to `excluded` with the reason.
 
-    The measure counts forward trials, so there must be some under each method.
+def complete_rows(
+    table: pd.DataFrame, experiment: str, methods: Sequence[str]
+) -> tuple[pd.DataFrame, list[dict[str, str]]]:
+    """The rows of the participants who answered everything, and the others: experiment, participant, reason.
+
+    Every method must be there; for direction with forward trials, because these are what the measure counts.
     """
-    return _complete(table, "direction", methods, excluded)
-
-
-def complete_preference(table: pd.DataFrame, methods: Sequence[str], excluded: list[dict[str, Any]]) -> pd.DataFrame:
-    """The ratings of participants who rated every method; the others go to `excluded` with the reason."""
-    return _complete(table, "preference", methods, excluded)
-
-
-def _complete(
-    table: pd.DataFrame, experiment: str, methods: Sequence[str], excluded: list[dict[str, Any]]
-) -> pd.DataFrame:
-    good = []
-    for code, rows in table.groupby("participant_id", sort=True):
-        reason = _reason(rows, experiment, methods)
-        if reason is None:
-            good.append(code)
-        else:
-            excluded.append({"experiment": experiment, "participant": str(code), "reason": reason})
-    return table[table["participant_id"].isin(good)]
+    reasons = {
+        str(code): _reason(rows, experiment, methods) for code, rows in table.groupby("participant_id", sort=True)
+    }
+    good = [code for code, reason in reasons.items() if reason is None]
+    left_out = [
+        {"experiment": experiment, "participant": code, "reason": reason}
+        for code, reason in reasons.items()
+        if reason is not None
+    ]
+    return table[table["participant_id"].isin(good)], left_out
 
 
 def _reason(rows: pd.DataFrame, experiment: str, methods: Sequence[str]) -> str | None:
     """Why a participant is left out; None if nothing is missing."""
-    measure, noun = ("correct", "trials unanswered") if experiment == "direction" else ("rating", "ratings missing")
+    measure, noun = _MEASURES[experiment]
     missing = int(rows[measure].isna().sum())
     if missing:
         return f"{missing} of {len(rows)} {noun}"

@@ -12,11 +12,13 @@ from numpy.typing import ArrayLike, NDArray
 from scipy import special
 
 from analysis.anova import check_scores, rm_anova
-from analysis.paper import PublishedExperiment, TukeyClaim
+from analysis.binomial import binomial_test
+from analysis.paper import PublishedDirection, PublishedExperiment, TukeyClaim
 from analysis.studentized_range import studentized_range_isf
 from analysis.tukey import PairStatistics, pairs_of, pooled_pairs
 
 WHOLE_PATTERN = "whole pattern"
+SIGNIFICANT = 0.05
 
 Recurrence = NDArray[np.bool_]
 
@@ -46,8 +48,8 @@ def recurs(scores: ArrayLike, published: PublishedExperiment) -> dict[str, Recur
 
     `scores`: (..., n participants, k methods), methods in the order of `published.methods`. One array (...) a claim:
     the ANOVA's p below its bound; each Tukey comparison significant at its bound (by the critical q, pooled
-    repeated-measures error) and in the published direction; and all of them together under `whole pattern`. Where
-    nothing varies (0/0) a claim does not hold. `ValueError`: as in `rm_anova`, or if k is not the number of methods.
+    repeated-measures error) and in the published direction. Where nothing varies (0/0) a claim does not hold.
+    `ValueError`: as in `rm_anova`, or if k is not the number of methods.
     """
     checked = check_scores(scores)
     if checked.shape[-1] != len(published.methods):
@@ -58,15 +60,36 @@ def recurs(scores: ArrayLike, published: PublishedExperiment) -> dict[str, Recur
     for claim in published.tukey:
         name = f"{claim.higher} above {claim.lower}, p < {claim.p_below}"
         claims[name] = _holds(pairs, claim, published.methods)
-    return {**claims, WHOLE_PATTERN: np.logical_and.reduce(list(claims.values()))}
+    return claims
+
+
+def chance_recurs(correct: ArrayLike, trials: int, published: PublishedDirection) -> dict[str, Recurrence]:
+    """In which replication the exact binomial test comes out as published: rejecting one half, or not, at 5 %.
+
+    `correct`: (..., k methods, 2 directions), counts of correct answers pooled over participants, of `trials` each;
+    methods in the order of `published.methods`, forward before backward.
+    """
+    counts = np.asarray(correct)
+    claims = {}
+    for claim in published.binomial:
+        method, direction = published.methods.index(claim.method), ("forward", "backward").index(claim.direction)
+        rejected = np.asarray(binomial_test(counts[..., method, direction], trials).p) < SIGNIFICANT
+        expected = float(claim.p) < SIGNIFICANT
+        outcome = "p < .05" if expected else "p not below .05"
+        claims[f"binomial, {claim.method} {claim.direction}, {outcome}"] = np.asarray(rejected == expected)
+    return claims
 
 
 def odds_of(experiment: str, recurrences: Mapping[str, ArrayLike], assumptions: str) -> Odds:
-    """The share of replications in which each claim recurred. `ValueError` without any replication."""
+    """The share of replications in which each claim recurred, and all of them together under `whole pattern`.
+
+    `ValueError` without any replication.
+    """
     flags = {claim: np.asarray(held, dtype=np.bool_).ravel() for claim, held in recurrences.items()}
     sizes = {held.size for held in flags.values()}
     if len(sizes) != 1 or 0 in sizes:
         raise ValueError(f"{experiment}: every claim needs the same number of replications, not {sorted(sizes)}")
+    flags[WHOLE_PATTERN] = np.logical_and.reduce(list(flags.values()))
     rows = [_row(claim, int(held.sum()), held.size) for claim, held in flags.items()]
     return Odds(experiment=experiment, replications=sizes.pop(), rows=tuple(rows), assumptions=assumptions)
 

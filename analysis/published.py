@@ -7,10 +7,7 @@ from dataclasses import dataclass
 from decimal import Decimal
 from typing import Any, Literal
 
-from analysis.odds import Odds, OddsRow, odds_of, recurs
 from analysis.paper import Paper, PublishedDirection, PublishedExperiment, PublishedPreference, TukeyClaim
-
-__all__ = ["Odds", "OddsRow", "Row", "Verdict", "compare", "odds_of", "recurs"]
 
 Verdict = Literal["agrees", "differs", "not published", "not obtained"]
 Statistics = Mapping[str, Any]

@@ -9,7 +9,8 @@ from typing import Any
 
 from analysis.figures import ShotPanel
 from analysis.logs import Problem
-from analysis.published import Odds, Row
+from analysis.odds import Odds
+from analysis.published import Row
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -2,17 +2,27 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Mapping
+from dataclasses import replace
+from pathlib import Path
 from typing import Any
 
 from analysis import apa
-from analysis.published import Odds, Row
+from analysis.figures import named
+from analysis.odds import Odds
+from analysis.published import Row
 from analysis.report_experiments import direction_section, preference_section
 from analysis.report_parts import Picture, ReportData, Section, Table
 
 EXPERIMENTS = {"direction": "direction recognition", "preference": "preference"}
 FIGURE_5, FIGURE_8 = "figure-5", "figure-8"
 
+_HANDS = {
+    "participant": "the participant's own hand",
+    "experimenter": "the experimenter's hand",
+    "synthetic": "synthetic participants",
+}
 _LUCK = (
     "One replication is luck. The table says how often each published claim recurred over many simulated replications "
     "of the study, with a 95 % Wilson interval; a claim that recurs in two of three would fail in one of three honest "
@@ -57,11 +67,24 @@ def _analysed(report: ReportData) -> Section:
     bad = f"Left out, with the reasons listed below: {len(report.problems)}." if report.problems else ""
     text = (files + bad).strip()
     nothing = () if rows else ("There was nothing to analyse.",)
+    present = [key for key in EXPERIMENTS if _people(report.statistics, key)]
+    origins = tuple(_origin(EXPERIMENTS[key], report.statistics[key]) for key in present)
     return Section(
         title="What was analysed",
-        paragraphs=(*((text,) if text else ()), *nothing),
+        paragraphs=(*((text,) if text else ()), *nothing, *origins),
         tables=(table,) if rows else (),
     )
+
+
+def _origin(name: str, found: Mapping[str, Any]) -> str:
+    """Who answered, and on which gun: nobody is to take synthetic participants for people."""
+    answers = ", ".join(f"{count} by {_HANDS[hand]}" for hand, count in found["origin"]["answers"].items())
+    guns = ", ".join(f"{count} on {_gun(gun)}" for gun, count in found["origin"]["guns"].items())
+    return f"{name.capitalize()}: answers {answers}; trials {guns}."
+
+
+def _gun(name: str) -> str:
+    return "the simulated gun" if name == "simulated" else f"the gun {name}"
 
 
 def _excluded(statistics: Mapping[str, Any], experiment: str) -> int:
@@ -84,7 +107,7 @@ def _verdicts(comparison: tuple[Row, ...]) -> Section:
 
 def _verdict_table(experiment: str, comparison: tuple[Row, ...]) -> Table:
     rows = (
-        (row.quantity, row.published or apa.NONE, obtained_text(row), row.verdict, row.note)
+        (named(row.quantity), row.published or apa.NONE, obtained_text(row), row.verdict, row.note)
         for row in comparison
         if row.experiment == experiment
     )
@@ -124,7 +147,7 @@ def _figure_8(statistics: Mapping[str, Any]) -> Section:
 
 def _means_words(found: Mapping[str, Any], experiment: str) -> str:
     shown = apa.percent if experiment == "direction" else apa.number
-    return ", ".join(f"{method} {shown(mean)}" for method, mean in found["means"].items())
+    return ", ".join(f"{named(method)} {shown(mean)}" for method, mean in found["means"].items())
 
 
 def _odds(odds: tuple[Odds, ...]) -> Section:
@@ -133,7 +156,7 @@ def _odds(odds: tuple[Odds, ...]) -> Section:
             caption=f"{EXPERIMENTS.get(one.experiment, one.experiment).capitalize()}: {one.replications} replications",
             header=("Published claim", "Recurs in", "95 % CI [%]"),
             rows=tuple(
-                (row.claim, apa.percent(row.share), apa.interval(100.0 * row.ci_low, 100.0 * row.ci_high, 1))
+                (named(row.claim), apa.percent(row.share), apa.interval(100.0 * row.ci_low, 100.0 * row.ci_high, 1))
                 for row in one.rows
             ),
         )
@@ -163,15 +186,25 @@ def _left_out(report: ReportData) -> Section | None:
         f"{entry['reason']}."
         for entry in report.statistics.get("excluded", [])
     )
-    problems = tuple(str(problem) for problem in report.problems)
+    names = _short_names(report)
+    problems = tuple(str(replace(problem, file=names[problem.file])) for problem in report.problems)
     warnings = tuple(f"Warning: {warning}." for warning in report.statistics.get("warnings", []))
     items = (*excluded, *problems, *warnings)
     return Section(title="Exclusions and problems", items=items) if items else None
 
 
+def _short_names(report: ReportData) -> dict[Path, Path]:
+    """Files by their path below the folder that holds them all: a report says nothing of the machine it was made on."""
+    files = [*report.files, *(problem.file for problem in report.problems)]
+    folders = {file.absolute().parent for file in files}
+    root = Path(os.path.commonpath(folders)) if folders else Path()
+    return {file: file.absolute().relative_to(root) for file in files}
+
+
 def _provenance(report: ReportData) -> Section | None:
     rows = [*report.provenance.items(), *report.statistics.get("versions", {}).items()]
-    rows += [("log file", str(file)) for file in report.files]
+    names = _short_names(report)
+    rows += [("log file", names[file].as_posix()) for file in report.files]
     if not rows and not report.notes:
         return None
     table = Table(caption="Where the numbers come from", header=("What", "Value"), rows=tuple(rows))

@@ -14,7 +14,7 @@ import pandas as pd
 
 from analysis.anova import rm_anova
 from analysis.binomial import binomial_test
-from analysis.completeness import complete_direction, complete_preference
+from analysis.completeness import complete_rows
 from analysis.detection import yes_no
 from analysis.logs import Logs
 from analysis.tukey import rm_tukey_hsd
@@ -38,13 +38,16 @@ def summarize(logs: Logs) -> Json:
     An experiment without a log is left out. Participants who miss an answer or a method are left out of that experiment
     and listed in `excluded`. What is not finite becomes None and is named in `warnings`.
     """
-    excluded: list[Json] = []
-    warnings: list[str] = []
+    tables = {"direction": (logs.trials, _direction), "preference": (logs.ratings, _preference)}
+    excluded: list[dict[str, str]] = []
     result: Json = {}
-    if len(logs.trials):
-        result["direction"] = _direction(logs.trials, excluded, warnings)
-    if len(logs.ratings):
-        result["preference"] = _preference(logs.ratings, excluded, warnings)
+    for experiment, (table, describe) in tables.items():
+        if len(table):
+            methods = methods_in(table)
+            complete, left_out = complete_rows(table, experiment, methods)
+            result[experiment] = describe(complete, methods)
+            excluded += left_out
+    warnings = [_untested(experiment, found) for experiment, found in result.items() if found["anova"] is None]
     finite = json_safe(result, "", warnings)
     return {**finite, "excluded": excluded, "warnings": warnings, "versions": versions()}
 
@@ -63,7 +66,7 @@ def methods_in(table: pd.DataFrame) -> list[str]:
 
 
 def json_safe(value: Any, place: str, warnings: list[str]) -> Any:
-    """`value` in plain Python types, NaN and infinities as None with a warning that names the place."""
+    """`value` in plain Python types; NaN and infinities become None, and their place is appended to `warnings`."""
     if isinstance(value, Mapping):
         return {str(key): json_safe(item, f"{place}.{key}".lstrip("."), warnings) for key, item in value.items()}
     if isinstance(value, list | tuple):
@@ -87,13 +90,17 @@ def _version(name: str) -> str:
         return "not installed"
 
 
-def _direction(table: pd.DataFrame, excluded: list[Json], warnings: list[str]) -> Json:
-    methods = methods_in(table)
-    complete = complete_direction(table, methods, excluded)
+def _untested(experiment: str, found: Json) -> str:
+    there = f"there are {found['n']} complete participants and {len(found['methods'])} methods"
+    return f"{experiment}: no ANOVA and no Tukey test, which need 2 of each; {there}"
+
+
+def _direction(complete: pd.DataFrame, methods: list[str]) -> Json:
     forward = _rates(complete, "forward", methods)
     backward = _rates(complete, "backward", methods)
     return {
-        **_within(forward, methods, "direction", warnings),
+        **_within(forward, methods),
+        "origin": _origin(complete, "response_source"),
         "backward": {
             "means": _by_method(backward.mean()),
             "sds": _by_method(backward.std(ddof=1)),
@@ -106,10 +113,13 @@ def _direction(table: pd.DataFrame, excluded: list[Json], warnings: list[str]) -
     }
 
 
-def _preference(table: pd.DataFrame, excluded: list[Json], warnings: list[str]) -> Json:
-    methods = methods_in(table)
-    complete = complete_preference(table, methods, excluded)
-    return _within(_table(complete, "rating", methods), methods, "preference", warnings)
+def _preference(complete: pd.DataFrame, methods: list[str]) -> Json:
+    return {**_within(_table(complete, "rating", methods), methods), "origin": _origin(complete, "rating_by")}
+
+
+def _origin(complete: pd.DataFrame, source: str) -> Json:
+    """Whose hand gave how many of the answers, and which guns rendered how many of the trials."""
+    return {kind: complete[column].value_counts().to_dict() for kind, column in (("answers", source), ("guns", "gun"))}
 
 
 def _rates(trials: pd.DataFrame, direction: str, methods: Sequence[str]) -> pd.DataFrame:
@@ -125,23 +135,20 @@ def _table(rows: pd.DataFrame, measure: str, methods: Sequence[str]) -> pd.DataF
     return cells.unstack("method").reindex(columns=list(methods))
 
 
-def _within(scores: pd.DataFrame, methods: list[str], experiment: str, warnings: list[str]) -> Json:
+def _within(scores: pd.DataFrame, methods: list[str]) -> Json:
     return {
         "n": len(scores),
         "methods": methods,
         "means": _by_method(scores.mean()),
         "sds": _by_method(scores.std(ddof=1)),
         "participants": _by_participant(scores),
-        **_tests(scores.to_numpy(), methods, experiment, warnings),
+        **_tests(scores.to_numpy(), methods),
         "tukey_error_term": TUKEY_ERROR_TERM,
     }
 
 
-def _tests(scores: np.ndarray[Any, Any], methods: list[str], experiment: str, warnings: list[str]) -> Json:
-    n, k = scores.shape
-    if n < 2 or k < 2:
-        found = f"there are {n} complete participants and {k} methods"
-        warnings.append(f"{experiment}: no ANOVA and no Tukey test, which need 2 of each; {found}")
+def _tests(scores: np.ndarray[Any, Any], methods: list[str]) -> Json:
+    if min(scores.shape) < 2:
         return {"anova": None, "tukey": None}
     anova = asdict(rm_anova(scores))
     df = [anova.pop("df_effect"), anova.pop("df_error")]

@@ -29,7 +29,7 @@ def rest_phase(gun: GunParameters, start_s: float, state: State) -> Phase:
     def at(time_s: float) -> State:
         return State(state.x, 0.0, state.i + (state.i - steady_A) * math.expm1(-rate * (time_s - start_s)))
 
-    waits = ((_time_constants(state.i, i, steady_A) / rate, i) for i in _breakaway_currents(gun, start_s, state.x))
+    waits = _breakaways(gun, start_s, state, steady_A)
     wait_s, current_A = min(waits, default=(math.inf, 0.0))
     end_s, event = latest_end(gun, start_s)
     end = at(end_s)
@@ -40,21 +40,28 @@ def rest_phase(gun: GunParameters, start_s: float, state: State) -> Phase:
     return Phase(name="rest", direction=0, start_s=start_s, end_s=end_s, end=end, ended_by=event, at=at)
 
 
-def _breakaway_currents(gun: GunParameters, time_s: float, x: float) -> list[float]:
-    """The currents at which the coil pushes the magnet out or, off the stop, no longer holds it against the spring."""
-    newtons_per_ampere = gun.motor_constant_N_A * grip(gun, x)
+def _breakaways(gun: GunParameters, time_s: float, state: State, steady_A: float) -> list[tuple[float, float]]:
+    """How long until the coil pushes the magnet out or, off the stop, no longer holds it, and at which current."""
+    newtons_per_ampere = gun.motor_constant_N_A * grip(gun, state.x)
     if newtons_per_ampere == 0 or not coil_is_live(gun, time_s):
         return []
-    spring_N, held_N = spring_force(gun, x), gun.friction_N + breakaway_slack(gun, x)
-    inwards = [(spring_N - held_N) / newtons_per_ampere] if x > 0 else []
-    return [(spring_N + held_N) / newtons_per_ampere, *inwards]
+    time_constant_s = gun.inductance_H / gun.resistance_ohm
+    spring_N, held_N = spring_force(gun, state.x), gun.friction_N + breakaway_slack(gun, state.x)
+    ways = [(1, (spring_N + held_N) / newtons_per_ampere)]
+    if state.x > 0:
+        ways.append((-1, (spring_N - held_N) / newtons_per_ampere))
+    return [(time_constant_s * _time_constants(way, state.i, i, steady_A), i) for way, i in ways]
 
 
-def _time_constants(start: float, threshold: float, steady: float) -> float:
-    """How many time constants an exponential from `start` to `steady` takes to the threshold; infinite if never."""
-    if (threshold - start) * (steady - threshold) > 0:
-        return math.log1p((start - threshold) / (threshold - steady))
-    return 0.0 if threshold == start != steady else math.inf
+def _time_constants(way: int, start: float, threshold: float, steady: float) -> float:
+    """How long an exponential from `start` to `steady` takes past the threshold, upwards (1) or downwards (-1).
+
+    In time constants; infinite if it never gets there or comes back from there.
+    """
+    if way * (steady - threshold) <= 0:
+        return math.inf
+    ahead = way * (threshold - start)
+    return math.log1p(ahead / (way * (steady - threshold))) if ahead > 0 else 0.0
 
 
 # --- free: x'' = a - w^2 (x - x_start), in forms that lose no digits and stay finite for k = 0 ---------------------

@@ -24,17 +24,19 @@ def phases(gun: GunParameters) -> Iterator[Phase]:
     The last one is `settled` (at rest for good), unless the shot was given up: beyond `HORIZON_S`, after
     `MAX_PHASES`, or where the numbers leave the range of floats.
     """
-    time_s, state = 0.0, State(0.0, 0.0, 0.0)
+    time_s, state, halted = 0.0, State(0.0, 0.0, 0.0), False
     for _ in range(MAX_PHASES):
-        phase = _next(gun, time_s, state)
+        phase = _next(gun, time_s, state, halted)
         yield phase
         if phase.ended_by in FINAL:
             return
         time_s, state = phase.end_s, _jump(gun, phase)
+        halted = phase.direction != 0 and phase.end_s == phase.start_s
 
 
-def _next(gun: GunParameters, time_s: float, state: State) -> Phase:
-    direction = _direction(gun, time_s, state)
+def _next(gun: GunParameters, time_s: float, state: State, halted: bool) -> Phase:
+    """The phase that follows. `halted`: the last one set out and got nowhere, a hop below what floats resolve."""
+    direction = 0 if halted and state.v == 0 else _direction(gun, time_s, state)
     if direction == 0:
         return rest_phase(gun, time_s, state)
     inside = state.x < gun.coil_reach_m or (state.x == gun.coil_reach_m and direction < 0)

@@ -25,6 +25,7 @@ MAX_STEPS = 6000
 
 _RTOL, _STIFF_RTOL = 1e-12, 1e-10
 _ATOL = 1e-15  # m, m/s and A: far below anything that a shot reaches
+_PARTS = (0.0, *(2.0**-n for n in range(16, 4, -1)), *(n / 16 for n in range(1, 16)))  # of a step, to look for a hop
 
 
 @dataclass(frozen=True, slots=True)
@@ -144,7 +145,8 @@ def _exactly(gun: GunParameters, event: Event, state: State) -> State:
 
 def _turn(step: _Step, direction: int) -> float:
     """Where the velocity falls to 0. A hop from rest may rise and fall within one step, hence the samples."""
-    samples = np.linspace(step.start_s, step.end_s, 17)[:-1].tolist()
+    width_s = step.end_s - step.start_s
+    samples = [step.start_s + width_s * part for part in _PARTS]
     moving = [t for t in samples if direction * step.at(t).v > 0]
     return _root(lambda t: step.at(t).v, moving[-1], step.end_s) if moving else step.start_s
 

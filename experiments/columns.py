@@ -53,7 +53,10 @@ _METHOD = _level("method", (), "rendering method, as the config names it", requi
 _ATTEMPTS = _integer("attempts", "how often the stimulus was presented; more than 1 after a fault or a repeat")
 _FLAGS = _text("flags", "marks set on the trial, separated by a blank (`interrupted`, `device-error`, ...)")
 _NOTE = _text("note", "the experimenter's note")
-_ONSET = _text("onset_utc", "date and time of the (first) pulse in UTC, ISO 8601; empty if none was fired")
+_ONSET = _text(
+    "onset_utc",
+    "date and time in UTC, ISO 8601, of the (first) pulse when the stimulus was last presented; empty if never",
+)
 _GUN = _text("gun", "who rendered it: model and serial number of the gun, `simulated` for the simulated one")
 
 TRIALS: tuple[Column, ...] = (

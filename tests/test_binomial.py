@@ -60,6 +60,11 @@ def test_the_tie_tolerance_is_the_documented_one() -> None:
     assert binomial_test(0, 10**9, 1e-9).p == 1.0  # strict comparison would give .6321
 
 
+def test_the_tolerance_moves_the_other_side_alone_as_in_scipy_and_R() -> None:
+    k, n = 5 * 10**8 + 10, 10**9
+    assert binomial_test(k, n).p == pytest.approx(stats.binomtest(k, n).pvalue, rel=1e-8)
+
+
 def test_rare_successes_keep_the_digits_of_the_interval() -> None:
     found = binomial_test(1, 10**6)
     assert found.ci_low == pytest.approx(2.5317807663794211e-08, rel=1e-8)  # R binom.test

@@ -85,7 +85,7 @@ def test_a_byte_order_mark_and_plain_line_feeds_are_tolerated(tmp_path: Path) ->
 
 BAD_TRIALS = {
     "level": (_change(3, response="left", correct="0"), ["line 3", "response", "'left'", "forward, backward"]),
-    "experiment": (_change(2, experiment="preference"), ["line 2", "experiment", "'preference'", "direction"]),
+    "experiment": (_change(3, experiment="preference"), ["line 3", "experiment", "'preference'", "direction"]),
     "integer": (_change(4, trial="three"), ["line 4", "trial", "'three'", "whole number"]),
     "decimal integer": (_change(4, attempts="1.5"), ["line 4", "attempts", "'1.5'", "whole number"]),
     "number": (_change(5, response_time_s="0,8"), ["line 5", "response_time_s", "'0,8'", "finite number"]),
@@ -144,10 +144,10 @@ def _without_last_line_end(content: bytes) -> bytes:
 
 BAD_BYTES = {
     "not UTF-8": (lambda content: content.replace(b"synthetic", b"\xff", 1), ["line 2", "0xff", "UTF-8"]),
-    "empty": (lambda content: b"", ["is empty", "header"]),
-    "only a mark": (lambda content: b"\xef\xbb\xbf", ["is empty", "header"]),
+    "empty": (lambda _: b"", ["is empty", "header"]),
+    "only a mark": (lambda _: b"\xef\xbb\xbf", ["is empty", "header"]),
     "header only": (lambda content: content.split(b"\n")[0] + b"\n", ["line 1", "no rows"]),
-    "foreign": (lambda content: b"time,force\r\n0.1,3\r\n", ["line 1", "time,force", "neither"]),
+    "foreign": (lambda _: b"time,force\r\n0.1,3\r\n", ["line 1", "time,force", "neither"]),
     "semicolons": (lambda content: content.replace(b",", b";"), ["line 1", "neither", "comma-separated"]),
     "missing field": (lambda content: content.replace(b"P01,direction", b"P01", 1), ["line 2", "fields", "header"]),
     "no last end": (_without_last_line_end, ["line 61", "line end"]),

@@ -9,8 +9,9 @@ import numpy as np
 import pytest
 
 from analysis.logs import Logs, Problem, read_logs
+from analysis.odds import odds_of
 from analysis.paper import Paper, load_paper
-from analysis.published import compare, odds_of
+from analysis.published import compare
 from analysis.report import ReportData, write_report
 from analysis.summary import summarize
 from tests.log_files import write_study
@@ -38,7 +39,7 @@ def full(logs: Logs, paper: Paper, tmp_path_factory: pytest.TempPathFactory) -> 
         statistics=statistics,
         problems=(problem,),
         comparison=compare(statistics, paper),
-        odds=(odds_of("direction", {"whole pattern": np.arange(100) < 33}, "Assumed: no spread."),),
+        odds=(odds_of("direction", {"all below": np.arange(100) < 33}, "Assumed: no spread."),),
         panels=(shot_panel(), shot_panel(0.05)),
         files=logs.files,
         provenance={"seed": "1"},
@@ -161,3 +162,16 @@ def test_one_participant_gets_means_and_no_tests(tmp_path: Path) -> None:
     text = (tmp_path / "out" / "report.md").read_text(encoding="utf-8")
     assert "There are too few participants or methods for a test." in text
     assert "(–)" in text
+
+
+def test_files_are_named_below_their_common_folder_not_by_the_machine(tmp_path: Path) -> None:
+    write_study(tmp_path / "study", participants=2)
+    broken = tmp_path / "study" / "sub-P03_task-direction_trials.csv"
+    broken.write_bytes(b"")
+    logs = read_logs([tmp_path])
+    data = ReportData(title="Files", statistics=summarize(logs), files=logs.files, problems=logs.problems)
+    write_report(tmp_path / "out", data)
+    text = (tmp_path / "out" / "report.md").read_text(encoding="utf-8")
+    assert str(tmp_path) not in text
+    assert "| log file | sub-P01/sub-P01_task-direction_trials.csv |" in text
+    assert "- sub-P03_task-direction_trials.csv: is empty" in text

@@ -49,6 +49,17 @@ def display_name(method: str) -> str:
     return _DISPLAY_NAMES.get(method, method)
 
 
+def named(text: str) -> str:
+    """`text` with the paper's methods under the paper's names.
+
+    >>> named("asymmetric-2 above vibration")
+    'Asymmetric Force II above Vibration'
+    """
+    for method, name in _DISPLAY_NAMES.items():
+        text = text.replace(method, name)
+    return text
+
+
 def stars(p: float | None) -> str:
     """Significance as the paper marks it.
 

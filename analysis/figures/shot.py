@@ -122,7 +122,7 @@ def _draw_collision(axes: Axes, panel: ShotPanel) -> None:
         return
     bottom, top = axes.get_ylim()
     tip = min(panel.collision_force_N, top)
-    cut = ", beyond the axis" if panel.collision_force_N > top else ""
+    cut = " (off scale)" if panel.collision_force_N > top else ""
     arrow = {"arrowstyle": "-|>", "color": BLACK, "linewidth": 1.4, "shrinkA": 0.0, "shrinkB": 0.0}
     if tip > 0.05 * (top - bottom):
         axes.annotate("", xy=(end_s * 1e3, tip), xytext=(end_s * 1e3, 0.0), arrowprops=arrow)

@@ -9,8 +9,9 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.special import ndtr
 
-from analysis.odds import Odds, odds_of, recurs
+from analysis.odds import Odds, chance_recurs, odds_of, recurs
 from analysis.paper import Paper
+from device.words import DIRECTIONS
 from experiments.direction.config import DirectionConfig
 from experiments.direction.observer import probit_of_forward
 from experiments.preference.config import PreferenceConfig
@@ -18,16 +19,19 @@ from experiments.preference.observer import draw_ratings
 from experiments.streams import Stream, generator
 
 Scores = NDArray[np.float64]
+Counts = NDArray[np.int64]
 
 
-def direction_scores(config: DirectionConfig, methods: list[str], n: int, replications: int, seed: int) -> Scores:
-    """Correct rates on forward trials, (replications, n, methods), of people drawn as `RatesObserver` draws them."""
-    rates, forward = config.synthetic.rates, config.design.forward_per_session
+def direction_counts(config: DirectionConfig, methods: list[str], n: int, replications: int, seed: int) -> Counts:
+    """Correct answers, (replications, n, methods, 2 directions), of people drawn as `RatesObserver` draws them."""
+    rates, design = config.synthetic.rates, config.design
     draws = generator(seed, "odds", config.experiment)
-    person = rates.ability_sd * draws.standard_normal((replications, n, 1))
-    person += rates.bias_sd * draws.standard_normal((replications, n, 1))
-    probits = np.array([probit_of_forward(rates, method, "forward") for method in methods])
-    return draws.binomial(forward, ndtr(probits + person)) / forward
+    ability = rates.ability_sd * draws.standard_normal((replications, n, 1, 1))
+    bias = rates.bias_sd * draws.standard_normal((replications, n, 1, 1))
+    says_forward = [[probit_of_forward(rates, method, way) for way in DIRECTIONS] for method in methods]
+    towards = np.array([1.0, -1.0])  # a correct answer is "forward" on forward trials, not "forward" on backward ones
+    correct = ndtr(towards * (np.array(says_forward) + bias) + ability)
+    return draws.binomial([design.forward_per_session, design.backward_per_session], correct)
 
 
 def preference_scores(config: PreferenceConfig, methods: list[str], n: int, replications: int, seed: int) -> Scores:
@@ -41,14 +45,15 @@ def preference_scores(config: PreferenceConfig, methods: list[str], n: int, repl
 
 def direction_odds(config: DirectionConfig, paper: Paper, replications: int, seed: int) -> Odds:
     """The odds of experiment 1's claims at the published rates."""
-    published, rates = paper.direction, config.synthetic.rates
-    scores = direction_scores(config, published.methods, published.n, replications, seed)
+    published, rates, forward = paper.direction, config.synthetic.rates, config.design.forward_per_session
+    counts = direction_counts(config, published.methods, published.n, replications, seed)
+    claims = recurs(counts[..., 0] / forward, published)
     return odds_of(
         config.experiment,
-        recurs(scores, published),
+        claims | chance_recurs(counts.sum(axis=1), published.n * forward, published),
         f"{published.n} people whose correct rates are, in the mean, the published ones; people differ by an ability "
         f"of SD {rates.ability_sd:g} and a bias of SD {rates.bias_sd:g} in probit units (assumed); "
-        f"{config.design.forward_per_session} forward trials a method; seed {seed}.",
+        f"{forward} forward and as many backward trials a method; seed {seed}.",
     )
 
 

@@ -18,21 +18,19 @@ from analysis.published import Row, compare
 from analysis.report import ReportData, write_report
 from analysis.summary import summarize
 from device.parameters import GunParameters
-from experiments import catalogue, places, storage
+from experiments import places, storage
 from experiments.canonical import sha256
-from experiments.clock import Clock, VirtualClock
+from experiments.clock import VirtualClock
 from experiments.config import StudyConfig
 from experiments.direction.config import DirectionConfig
 from experiments.journal import read as read_journal
 from experiments.load import ConfigError, load_setup, load_study
-from experiments.plan import Plan
 from experiments.preference.config import PreferenceConfig
 from experiments.provenance import git_commit, provenance, recoil_version
 from experiments.roof.odds import direction_odds, preference_odds
 from experiments.roof.pictures import shot_panel
 from experiments.run import Again, Request, run
-from experiments.runner import Screen
-from experiments.screens.synthetic import SyntheticScreen
+from experiments.screens.synthetic import synthetic_screen
 from experiments.setup import Setup
 
 MANIFEST = "reproduction.json"
@@ -120,15 +118,6 @@ def _seat(study: Study, setup: Setup[Any], code: str, results: Path) -> None:
         again = "resume"
     request = Request(setup=setup, participant_id=code, results=results, seed=study.seed, again=again)
     run(request, synthetic_screen, VirtualClock())
-
-
-def synthetic_screen(setup: Setup[Any], plan: Plan, clock: Clock) -> Screen:
-    """The screen of the synthetic participant that a setup asks for. `ConfigError` if its table does not fit."""
-    try:
-        observer = catalogue.experiment(setup).observer(setup, plan)
-    except ValueError as error:
-        raise ConfigError(f"{setup.folder / str(setup.config.synthetic.table)}: {error}") from error
-    return SyntheticScreen(setup.config, observer, clock)
 
 
 def _odds(study: Study) -> Iterator[Odds]:

@@ -12,9 +12,9 @@ from experiments.clock import Clock, RealClock, VirtualClock
 from experiments.load import load_setup
 from experiments.places import Place, PlaceError, set_aside_file
 from experiments.plan import Plan
-from experiments.roof.reproduce import synthetic_screen
 from experiments.run import Again, Request, rebuild, run
 from experiments.runner import RunStopped, Screen
+from experiments.screens.synthetic import synthetic_screen
 from experiments.screens.terminal import TerminalScreen
 from experiments.setup import Setup
 

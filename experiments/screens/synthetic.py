@@ -5,8 +5,12 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Any
 
+from experiments import catalogue
 from experiments.clock import Clock
 from experiments.config import ExperimentConfig
+from experiments.load import ConfigError
+from experiments.plan import Plan
+from experiments.setup import Setup
 from experiments.steps import (
     Answered,
     Ask,
@@ -22,6 +26,15 @@ from experiments.steps import (
     Rested,
     Step,
 )
+
+
+def synthetic_screen(setup: Setup[Any], plan: Plan, clock: Clock) -> SyntheticScreen:
+    """The screen of the synthetic participant that a setup asks for. `ConfigError` if its table does not fit."""
+    try:
+        observer = catalogue.experiment(setup).observer(setup, plan)
+    except ValueError as error:
+        raise ConfigError(f"{setup.folder / str(setup.config.synthetic.table)}: {error}") from error
+    return SyntheticScreen(setup.config, observer, clock)
 
 
 class SyntheticScreen:

@@ -1,0 +1,32 @@
+# Two commands for a fresh machine: `make reproduce` and `make test`. Both set up what they need.
+.PHONY: setup reproduce test soak lock reference clean
+
+setup: .venv/.ready
+
+.venv/.ready: requirements/dev.txt requirements/uv.txt pyproject.toml scripts/setup
+	scripts/setup
+
+reproduce: setup
+	.venv/bin/recoil reproduce
+
+test: setup
+	scripts/system-packages
+	scripts/test
+
+# The full figures of every promise, kept as tables under results/soak/
+soak: setup
+	scripts/system-packages
+	PATH="$(CURDIR)/.venv/bin:$$PATH" .venv/bin/pytest -m soak --durations 10
+
+# The locks, from pyproject.toml
+lock:
+	scripts/lock
+
+# The one result that is committed: remade from nothing
+reference: setup
+	rm -rf results/reference
+	.venv/bin/recoil reproduce --out results/reference
+	rm -rf results/reference/logs results/reference/reproduction.json
+
+clean:
+	rm -rf .venv .tools dist .pytest_cache .mypy_cache .ruff_cache .hypothesis

@@ -1,0 +1,74 @@
+"""The data dictionary, printed from the columns that everything else uses: `python -m experiments.dictionary`."""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Iterator
+
+from experiments.columns import FILE_SUFFIX, TABLES, Column
+
+_HEAD = """# Data dictionary
+
+Made by `python -m experiments.dictionary > DATA_DICTIONARY.md`; do not edit by hand.
+
+A run leaves two files in `RESULTS/sub-<ID>/`, readable by their owner only: the journal, which is the truth, and a table
+made from it (`recoil rebuild` makes it again byte for byte). Words: a *session* is a block of trials with one method, a
+*run* is one participant doing one experiment, a *study* is its participants.
+
+## How tables are written
+
+- RFC 4180: comma, CRLF, quotes doubled; UTF-8 without byte order mark; the header is the first line.
+- An empty cell means that there is no value. 0 is a value: a rating of 0 is a rating.
+- In columns of type *text* a leading `=`, `+`, `-`, `@`, tab, carriage return or `'` gets a `'` in front, so that no
+  spreadsheet takes it for a formula; reading takes it off again. Numbers are never touched.
+- Units end the names: `_s` seconds, `_N` newton, `_V` volt. *flag* is 1 or 0, *level* one of the listed values.
+- One row a planned trial, in planned order, also those that were not reached.
+"""
+
+_TAIL = """
+## Journal
+
+`sub-<ID>_task-<experiment>_journal.jsonl`: one JSON object a line, appended and synced record by record. A line without
+its end was never acknowledged and is not read. Times are seconds on a monotonic clock, and UTC; `clock` says whether
+that clock was real or virtual (synthetic participants: breaks take no time).
+
+| key | in | meaning |
+| --- | --- | --- |
+| `n` | every record | number of the record, from 0 |
+| `kind` | every record | `run`, `step`, `outcome`, `stopped`, `resumed` or `finished` |
+| `monotonic_s`, `utc` | every record | when it was written |
+| `synced_s` | every record | when the record before it was on the disk |
+| `plan`, `plan_sha256` | `run` | the whole frozen plan with its seed, and the hash of its canonical JSON |
+| `setup`, `setup_sha256` | `run` | the resolved configs of experiment and gun, the synthetic table if one was used, and their hash |
+| `provenance`, `gun`, `clock` | `run`, `resumed` | versions, commit, system; who renders; which clock |
+| `body` | `step`, `outcome` | what should happen, what did; its `kind` says which (see `experiments/steps.py`) |
+| `reason` | `stopped` | why the run stopped before its end |
+| `cut_bytes`, `stopped_utc` | `resumed` | bytes of a record cut off at the end, and when the run had stopped |
+| `table_sha256` | `finished` | hash of the table, by which an edited table is noticed |
+
+Canonical JSON: UTF-8, keys sorted, no blanks, no NaN, floats in shortest round-trip form.
+"""
+
+
+def dictionary() -> str:
+    """The data dictionary as Markdown."""
+    tables = "\n".join(line for experiment in TABLES for line in _table(experiment))
+    return f"{_HEAD}\n{tables}\n{_TAIL}"
+
+
+def _table(experiment: str) -> Iterator[str]:
+    yield f"## `sub-<ID>_task-{experiment}_{FILE_SUFFIX[experiment]}.csv`\n"
+    yield "| column | type | values | meaning |"
+    yield "| --- | --- | --- | --- |"
+    for column in TABLES[experiment]:
+        yield f"| `{column.name}` | {column.type} | {_values(column)} | {column.description} |"
+    yield ""
+
+
+def _values(column: Column) -> str:
+    levels = ", ".join(f"`{level}`" for level in column.levels)
+    return levels + (" or empty" if levels and not column.required else "")
+
+
+if __name__ == "__main__":
+    sys.stdout.write(dictionary())

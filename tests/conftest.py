@@ -1,0 +1,57 @@
+"""What several tests share: the program as a user calls it, and the shipped experiments without breaks."""
+
+from __future__ import annotations
+
+import os
+import re
+import subprocess
+import sys
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+from hypothesis import settings
+
+from experiments.load import shipped_folder
+
+settings.register_profile("recoil", deadline=None, derandomize=True)
+settings.load_profile("recoil")
+
+RECOIL = Path(sys.executable).with_name("recoil")
+
+Recoil = Callable[..., subprocess.CompletedProcess[str]]
+
+
+@pytest.fixture
+def recoil(tmp_path: Path) -> Recoil:
+    """The installed command, called in an empty folder with an empty home."""
+    home = tmp_path / "home"
+    home.mkdir()
+    environment = {key: value for key, value in os.environ.items() if key in ("PATH", "LANG", "LC_ALL", "TMPDIR")}
+
+    def call(*words: object) -> subprocess.CompletedProcess[str]:
+        return subprocess.run(
+            [str(RECOIL), *map(str, words)],
+            capture_output=True,
+            text=True,
+            cwd=tmp_path,
+            env=environment | {"HOME": str(home)},
+            stdin=subprocess.DEVNULL,
+            timeout=120,
+            check=False,
+        )
+
+    return call
+
+
+@pytest.fixture
+def quick_configs(tmp_path: Path) -> Path:
+    """The shipped configs in a folder of their own, experiment 1 without breaks, for runs on a real clock."""
+    folder = tmp_path / "configs"
+    folder.mkdir()
+    for source in shipped_folder().glob("*.toml"):
+        (folder / source.name).write_bytes(source.read_bytes())
+    config = folder / "direction.toml"
+    text = re.sub(r"between_(sets|sessions)_s = [\d.]+", r"between_\1_s = 0.0", config.read_text())
+    config.write_text(text.replace("max_trials_without_break = 10", "max_trials_without_break = 60"))
+    return folder

@@ -1,0 +1,60 @@
+import time
+from datetime import UTC, datetime, timedelta
+
+import pytest
+
+from experiments.clock import RealClock, VirtualClock
+
+
+def moment(text: str) -> datetime:
+    assert text.endswith("Z")
+    return datetime.fromisoformat(text)
+
+
+def test_a_virtual_clock_starts_at_zero_and_moves_only_by_waiting() -> None:
+    clock = VirtualClock()
+    assert clock.now() == 0.0
+    assert clock.now() == 0.0
+    clock.sleep(300.0)
+    clock.sleep(0.25)
+    assert clock.now() == 300.25
+
+
+def test_a_virtual_break_takes_no_time() -> None:
+    start = time.monotonic()
+    VirtualClock().sleep(1e6)
+    assert time.monotonic() - start < 0.5
+
+
+@pytest.mark.parametrize("seconds", [0.0, -1.0, -float("inf")])
+def test_waiting_for_a_time_that_is_over_never_runs_a_clock_backwards(seconds: float) -> None:
+    clock = VirtualClock()
+    clock.sleep(1.0)
+    clock.sleep(seconds)
+    assert clock.now() == 1.0
+    RealClock().sleep(seconds)
+
+
+def test_virtual_dates_go_with_virtual_seconds() -> None:
+    clock = VirtualClock()
+    before = moment(clock.utc())
+    clock.sleep(20.5)
+    assert moment(clock.utc()) - before == timedelta(seconds=20.5)
+
+
+def test_dates_are_utc_to_the_microsecond_even_when_it_is_zero() -> None:
+    clock = VirtualClock()
+    clock.sleep(1.0 - moment(clock.utc()).microsecond / 1e6)
+    assert clock.utc().endswith(".000000Z")
+
+
+def test_the_real_clock_is_the_machines() -> None:
+    clock = RealClock()
+    assert abs((moment(clock.utc()) - datetime.now(UTC)).total_seconds()) < 5
+    before = clock.now()
+    clock.sleep(0.01)
+    assert 0.01 <= clock.now() - before < 5
+
+
+def test_a_journal_can_tell_the_clocks_apart() -> None:
+    assert (RealClock().name, VirtualClock().name) == ("real", "virtual")

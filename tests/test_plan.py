@@ -1,0 +1,276 @@
+"""The golden hashes in golden_plans.json were made once, in tests/, by
+
+    ../.venv/bin/python -c "import json, test_plan as t; print(json.dumps([case | {'sha256': t.plan_of(case).sha256()}
+    for case in t.CASES], indent=1))" > golden_plans.json
+
+A plan that was made by one version of Recoil must be made by every other one: do not make them again.
+"""
+
+import json
+import math
+from collections import Counter
+from dataclasses import replace
+from itertools import permutations
+from pathlib import Path
+from typing import NamedTuple
+
+import pytest
+from pydantic import ValidationError
+
+from experiments.canonical import canonical_json
+from experiments.direction.plan import make_plan as direction_plan
+from experiments.load import load_setup
+from experiments.plan import Plan
+from experiments.preference.plan import make_plan as preference_plan
+
+SEEDS = 10_000
+METHODS = ("vibration", "asymmetric-1", "asymmetric-2")
+DIRECTION, PREFERENCE = load_setup("direction").config, load_setup("preference").config
+LARGEST_SEED = 2**63 - 1
+
+
+def case(
+    experiment: str, participant_id: str, seed: int, order: str = "random", balance: str = "", *, row: int | None = None
+) -> dict[str, object]:
+    return {
+        "experiment": experiment,
+        "participant_id": participant_id,
+        "seed": seed,
+        "order": order,
+        "balance": balance,
+        "row": row,
+    }
+
+
+CASES = [
+    case("direction", "P01", 1, "random", "session"),
+    case("direction", "P02", 1, "random", "session"),
+    case("direction", "P14", 1, "random", "session"),
+    case("direction", "P01", 2, "random", "session"),
+    case("direction", "P01", 0, "random", "session"),
+    case("direction", "a", LARGEST_SEED, "random", "session"),
+    case("direction", "P01", 1, "random", "set"),
+    case("direction", "P02", 20240229, "random", "set"),
+    case("direction", "P01", 1, "random", "set-exact"),
+    case("direction", "P01", 1, "williams", "session", row=0),
+    case("direction", "P06", 1, "williams", "session", row=5),
+    case("direction", "P03", 7, "williams", "set", row=3),
+    case("direction", "P01", 1, "latin-square", "session", row=0),
+    case("direction", "P02", 7, "latin-square", "set", row=1),
+    case("direction", "P03", 7, "latin-square", "set-exact", row=2),
+    case("preference", "P01", 1),
+    case("preference", "P02", 1),
+    case("preference", "P01", LARGEST_SEED),
+    case("preference", "P05", 1, "williams", "", row=4),
+    case("preference", "P03", 9, "latin-square", "", row=2),
+]
+
+
+def direction_config(order: str, balance: str):
+    exact = {"sets_per_session": 5, "trials_per_set": 4} if balance == "set-exact" else {}  # two and two in each set
+    changes = {"session_order": order, "balance": balance, **exact}
+    return DIRECTION.model_copy(update={"design": DIRECTION.design.model_copy(update=changes)})
+
+
+def plan_of(wanted: dict[str, object]) -> Plan:
+    who = (wanted["participant_id"], wanted["seed"], wanted["row"])
+    if wanted["experiment"] == "direction":
+        return direction_plan(direction_config(wanted["order"], wanted["balance"]), *who)
+    design = PREFERENCE.design.model_copy(update={"trial_order": wanted["order"]})
+    return preference_plan(PREFERENCE.model_copy(update={"design": design}), *who)
+
+
+@pytest.fixture(scope="module")
+def golden() -> list[dict[str, object]]:
+    return json.loads((Path(__file__).parent / "golden_plans.json").read_text(encoding="utf-8"))
+
+
+@pytest.mark.parametrize("number", range(20))
+def test_a_plan_has_the_hash_that_it_had_in_the_first_release(golden: list[dict[str, object]], number: int) -> None:
+    assert plan_of(golden[number]).sha256() == golden[number]["sha256"]
+
+
+def test_there_are_twenty_golden_hashes_all_different(golden: list[dict[str, object]]) -> None:
+    assert len({entry["sha256"] for entry in golden}) == 20
+    assert [{key: entry[key] for key in entry if key != "sha256"} for entry in golden] == CASES
+
+
+class Facts(NamedTuple):
+    """What a plan of experiment 1 looks like from outside."""
+
+    methods: tuple[str, ...]
+    numbered: bool
+    forward: tuple[tuple[int, ...], ...]  # in each set of each session
+
+
+SESSIONS_SETS_TRIALS = [(session, 1 + trial // 5, 1 + trial) for session in (1, 2, 3) for trial in range(20)]
+
+
+def facts(plan: Plan) -> Facts:
+    trials = plan.trials
+    numbered = [(trial.session, trial.set, trial.trial) for trial in trials] == SESSIONS_SETS_TRIALS
+    one_method_each = all(len({trial.method for trial in trials[start : start + 20]}) == 1 for start in (0, 20, 40))
+    ways = [trial.direction == "forward" for trial in trials]
+    known = {trial.direction for trial in trials} == {"forward", "backward"}
+    forward = tuple(
+        tuple(sum(ways[start : start + 5]) for start in range(first, first + 20, 5)) for first in (0, 20, 40)
+    )
+    return Facts(plan.methods, numbered and one_method_each and known, forward)
+
+
+def all_plans(balance: str) -> list[Facts]:
+    config = direction_config("random", balance)
+    return [facts(direction_plan(config, "P01", seed, None)) for seed in range(SEEDS)]
+
+
+@pytest.fixture(scope="module")
+def over_sessions() -> list[Facts]:
+    return all_plans("session")
+
+
+@pytest.fixture(scope="module")
+def over_sets() -> list[Facts]:
+    return all_plans("set")
+
+
+@pytest.fixture(scope="module", params=["session", "set"])
+def either(request: pytest.FixtureRequest) -> list[Facts]:
+    return request.getfixturevalue("over_sessions" if request.param == "session" else "over_sets")
+
+
+def test_ten_thousand_plans_have_three_sessions_of_four_sets_of_five_trials(either: list[Facts]) -> None:
+    assert len(either) == SEEDS
+    assert all(plan.numbered for plan in either)
+
+
+def test_ten_thousand_plans_have_each_method_in_one_session(either: list[Facts]) -> None:
+    assert all(sorted(plan.methods) == sorted(METHODS) for plan in either)
+
+
+def test_ten_thousand_plans_have_ten_forward_and_ten_backward_trials_a_session(either: list[Facts]) -> None:
+    assert all(sum(session) == 10 for plan in either for session in plan.forward)
+
+
+def test_a_set_of_five_holds_two_or_three_forward_trials_if_balanced_over_sets(over_sets: list[Facts]) -> None:
+    assert all(count in (2, 3) for plan in over_sets for session in plan.forward for count in session)
+
+
+def test_which_sets_hold_three_is_random(over_sets: list[Facts]) -> None:
+    # two sets of four: six choices, as often as each other; chi-square with 5 degrees of freedom, p = 1e-4
+    choices = Counter(session for plan in over_sets for session in plan.forward)
+    expected = 3 * SEEDS / 6
+    assert len(choices) == 6
+    assert sum((count - expected) ** 2 for count in choices.values()) / expected < 25.74
+
+
+def test_only_a_third_of_sessions_has_two_or_three_in_every_set_if_balanced_over_sessions(
+    over_sessions: list[Facts],
+) -> None:
+    # 6 * 10^4 of the 184,756 orders: C(4, 2) choices of the sets with three times C(5, 2) orders in each of four sets
+    share = math.comb(4, 2) * math.comb(5, 2) ** 4 / math.comb(20, 10)
+    even = sum(set(session) <= {2, 3} for plan in over_sessions for session in plan.forward)
+    assert share == pytest.approx(1 / 3, abs=0.01)
+    assert even / (3 * SEEDS) == pytest.approx(share, abs=4 * math.sqrt(share * (1 - share) / (3 * SEEDS)))
+
+
+def test_sets_take_every_possible_count_if_balanced_over_sessions(over_sessions: list[Facts]) -> None:
+    # hypergeometric: 10 forward among 20, 5 drawn
+    counts = Counter(count for plan in over_sessions for session in plan.forward for count in session[:1])
+    for forward in range(6):
+        share = math.comb(10, forward) * math.comb(10, 5 - forward) / math.comb(20, 5)
+        tolerance = 4 * math.sqrt(share * (1 - share) / (3 * SEEDS))
+        assert counts[forward] / (3 * SEEDS) == pytest.approx(share, abs=tolerance)
+
+
+def test_a_random_order_meets_all_six_orders_of_methods_as_often(over_sessions: list[Facts]) -> None:
+    orders = Counter(plan.methods for plan in over_sessions)
+    assert set(orders) == set(permutations(METHODS))
+    assert sum((count - SEEDS / 6) ** 2 for count in orders.values()) / (SEEDS / 6) < 25.74
+
+
+def test_balance_over_sets_leaves_the_order_of_methods_as_it_is(
+    over_sessions: list[Facts], over_sets: list[Facts]
+) -> None:
+    assert [plan.methods for plan in over_sessions] == [plan.methods for plan in over_sets]
+
+
+def test_sessions_have_directions_of_their_own(over_sessions: list[Facts]) -> None:
+    alike = sum(plan.forward[0] == plan.forward[1] for plan in over_sessions)
+    assert alike < SEEDS / 10
+
+
+def test_set_exact_has_the_same_count_in_every_set() -> None:
+    for seed in range(200):
+        plan = direction_plan(direction_config("random", "set-exact"), "P01", seed, None)
+        counts = Counter((trial.session, trial.set) for trial in plan.trials if trial.direction == "forward")
+        assert set(counts.values()) == {2}
+        assert len(counts) == 15
+
+
+def test_the_same_seed_and_participant_make_the_same_plan_and_others_another() -> None:
+    config = direction_config("random", "session")
+    hashes = [direction_plan(config, who, seed, None).sha256() for seed in range(300) for who in ("P01", "P02")]
+    again = [direction_plan(config, who, seed, None).sha256() for seed in range(300) for who in ("P01", "P02")]
+    assert hashes == again
+    assert len(set(hashes)) == 600
+
+
+def test_another_participant_has_other_directions_not_only_another_name() -> None:
+    config = direction_config("random", "session")
+    same = sum(
+        [trial.direction for trial in direction_plan(config, "P01", seed, None).trials]
+        == [trial.direction for trial in direction_plan(config, "P02", seed, None).trials]
+        for seed in range(300)
+    )
+    assert same == 0
+
+
+def test_a_row_of_a_square_fixes_the_methods_whatever_the_seed() -> None:
+    config = direction_config("williams", "session")
+    orders = [{direction_plan(config, "P01", seed, row).methods for seed in range(20)} for row in range(6)]
+    assert all(len(met) == 1 for met in orders)
+    assert set.union(*orders) == set(permutations(METHODS))
+
+
+def test_preference_meets_each_method_once_in_one_direction() -> None:
+    for seed in range(200):
+        plan = preference_plan(PREFERENCE, "P01", seed, None)
+        assert sorted(plan.methods) == sorted(METHODS)
+        assert [(trial.session, trial.set, trial.trial) for trial in plan.trials] == [(1, 1, 1), (1, 1, 2), (1, 1, 3)]
+        assert {trial.direction for trial in plan.trials} == {"forward"}
+
+
+def test_the_orders_of_both_experiments_are_independent() -> None:
+    # each of the 36 pairs of orders about 2000 / 36 times; agreement alone would be 1 in 6
+    pairs = Counter(
+        (direction_plan(DIRECTION, "P01", seed, None).methods, preference_plan(PREFERENCE, "P01", seed, None).methods)
+        for seed in range(2000)
+    )
+    assert len(pairs) == 36
+    assert sum((count - 2000 / 36) ** 2 for count in pairs.values()) / (2000 / 36) < 78  # chi-square, 35 df, p = 4e-5
+
+
+@pytest.mark.parametrize("number", range(0, 20, 4))
+def test_a_plan_reads_back_from_its_record(number: int) -> None:
+    plan = plan_of(CASES[number])
+    assert Plan.from_record(json.loads(canonical_json(plan.record()))) == plan
+
+
+def test_the_hash_covers_every_trial_and_field() -> None:
+    plan = plan_of(CASES[0])
+    flipped = replace(plan.trials[-1], direction="forward" if plan.trials[-1].direction == "backward" else "backward")
+    others = [
+        replace(plan, trials=(*plan.trials[:-1], flipped)),
+        replace(plan, trials=plan.trials[:-1]),
+        replace(plan, seed=plan.seed + 1),
+        replace(plan, order_row=0),
+        replace(plan, participant_id="P99"),
+        replace(plan, format=2),
+    ]
+    assert len({plan.sha256(), *(other.sha256() for other in others)}) == 7
+
+
+@pytest.mark.parametrize("record", [None, [], {}, {"experiment": "direction"}, "plan"])
+def test_what_is_no_plan_is_refused(record: object) -> None:
+    with pytest.raises(ValidationError):
+        Plan.from_record(record)
