@@ -55,7 +55,7 @@ _FLAGS = _text("flags", "marks set on the trial, separated by a blank (`interrup
 _NOTE = _text("note", "the experimenter's note")
 _ONSET = _text(
     "onset_utc",
-    "date and time in UTC, ISO 8601, of the (first) pulse when the stimulus was last presented; empty if never",
+    "date and time (UTC, ISO 8601) of the first pulse of the last presentation; empty if none",
 )
 _GUN = _text("gun", "who rendered it: model and serial number of the gun, `simulated` for the simulated one")
 

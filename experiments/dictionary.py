@@ -11,9 +11,9 @@ _HEAD = """# Data dictionary
 
 Made by `python -m experiments.dictionary > DATA_DICTIONARY.md`; do not edit by hand.
 
-A run leaves two files in `RESULTS/sub-<ID>/`, readable by their owner only: the journal, which is the truth, and a table
-made from it (`recoil rebuild` makes it again byte for byte). Words: a *session* is a block of trials with one method, a
-*run* is one participant doing one experiment, a *study* is its participants.
+A run leaves two files in `RESULTS/sub-<ID>/`, readable by their owner only: the journal, which is the truth, and a
+table made from it (`recoil rebuild` makes it again byte for byte). Words: a *session* is a block of trials with one
+method, a *run* is one participant doing one experiment, a *study* is its participants.
 
 ## How tables are written
 
@@ -39,7 +39,7 @@ that clock was real or virtual (synthetic participants: breaks take no time).
 | `monotonic_s`, `utc` | every record | when it was written |
 | `synced_s` | every record | when the record before it was on the disk |
 | `plan`, `plan_sha256` | `run` | the whole frozen plan with its seed, and the hash of its canonical JSON |
-| `setup`, `setup_sha256` | `run` | the resolved configs of experiment and gun, the synthetic table if one was used, and their hash |
+| `setup`, `setup_sha256` | `run` | the resolved configs (and the synthetic table, if used) and their hash |
 | `provenance`, `gun`, `clock` | `run`, `resumed` | versions, commit, system; who renders; which clock |
 | `body` | `step`, `outcome` | what should happen, what did; its `kind` says which (see `experiments/steps.py`) |
 | `reason` | `stopped` | why the run stopped before its end |
