@@ -8,6 +8,8 @@ from __future__ import annotations
 
 import json
 import os
+from concurrent.futures import Future, ThreadPoolExecutor
+from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Literal, Self, get_args
@@ -55,7 +57,10 @@ class Contents:
 
 
 class Journal:
-    """A journal open for writing. Each `append` returns when the record is on the disk, or raises `JournalError`."""
+    """A journal open for writing. Each `append` returns when the record is on the disk, or raises `JournalError`.
+
+    A thread of its own writes, so that an interrupt, which reaches the main thread alone, never hits half a record.
+    """
 
     def __init__(self, path: Path, descriptor: int, clock: Clock, *, count: int, length: int) -> None:
         self.path = path
@@ -64,6 +69,7 @@ class Journal:
         self._count = count
         self._length = length
         self._synced_s: float | None = None
+        self._writer = ThreadPoolExecutor(max_workers=1, thread_name_prefix="journal")
 
     @classmethod
     def create(cls, path: Path, clock: Clock) -> Self:
@@ -83,8 +89,15 @@ class Journal:
 
     def append(self, kind: Kind, **body: object) -> None:
         """Write one record and return when it is on the disk."""
-        times = {"monotonic_s": self._clock.now(), "utc": self._clock.utc(), "synced_s": self._synced_s}
-        line = canonical_json({"n": self._count, "kind": kind, **times, **body}) + b"\n"
+        self.submit(kind, **body).result()
+
+    def submit(self, kind: Kind, **body: object) -> Future[None]:
+        """Have one record written after those submitted before; the result is there when it is on the disk."""
+        times = {"monotonic_s": self._clock.now(), "utc": self._clock.utc()}
+        return self._writer.submit(self._write, {"kind": kind, **times, **body})
+
+    def _write(self, record: dict[str, object]) -> None:
+        line = canonical_json({"n": self._count, "synced_s": self._synced_s, **record}) + b"\n"
         try:
             storage.write_all(self._descriptor, line)
             storage.sync(self._descriptor)
@@ -100,13 +113,12 @@ class Journal:
 
     def _take_back(self) -> None:
         """Remove a record that was not acknowledged, so that the journal ends with a whole one."""
-        try:
+        with suppress(OSError):  # readers leave out what is cut off, so a rest of it does no harm
             os.ftruncate(self._descriptor, self._length)
-        except OSError:
-            return  # readers leave out what is cut off, so a rest of it does no harm
 
     def close(self) -> None:
-        """Let go of the file."""
+        """Let go of the file, after what was submitted."""
+        self._writer.shutdown()
         os.close(self._descriptor)
 
     def __enter__(self) -> Self:

@@ -78,12 +78,16 @@ def run(request: Request, make_screen: MakeScreen, clock: Clock) -> Finished:
     limits.check_limits(request.setup)
     place = places.place(request.results, request.participant_id, request.setup.config.experiment)
     job = _Job(request=request, place=place, clock=clock, before=_before(place, request))
-    with closing(open_gun(request.gun, _methods(request.setup), clock=clock.now)) as gun:
+    with closing(_open_gun(request, clock)) as gun:
         return _carry_out(job, gun, make_screen)
 
 
-def _methods(setup: Setup[Any]) -> Any:
-    return setup.gun.renderings(setup.config.design.methods)
+def _open_gun(request: Request, clock: Clock) -> Gun:
+    methods = request.setup.gun.renderings(request.setup.config.design.methods)
+    try:
+        return open_gun(request.gun, methods, clock=clock.now)
+    except ValueError as error:
+        raise PlaceError(f"--gun {request.gun}: {error}") from error
 
 
 def _before(where: Place, request: Request) -> Contents | None:

@@ -132,7 +132,7 @@ def test_set_exact_is_possible_only_if_every_set_can_hold_as_many(forward: int, 
     if possible:
         a_design(**changes)
     else:
-        with pytest.raises(ValidationError, match="set-exact.*impossible"):
+        with pytest.raises(ValidationError, match=r"set-exact.*impossible"):
             a_design(**changes)
 
 

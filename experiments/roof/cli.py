@@ -43,11 +43,11 @@ class ScreenName(StrEnum):
 def main() -> None:
     """Run a command. Whatever goes wrong is one message on stderr and an exit code, never a traceback."""
     os.umask(0o077)  # what is written here is about people: for its owner alone
-    signal.signal(signal.SIGTERM, _interrupt)
+    for number in (signal.SIGINT, signal.SIGTERM):
+        signal.signal(number, _interrupt)
     try:
         app()
     except KeyboardInterrupt:
-        _say("recoil: interrupted; what was acknowledged is on the disk")
         sys.exit(INTERRUPTED)
     except OSError as error:
         _say(f"recoil: {error.filename or 'system'}: {error.strerror or error}")
@@ -69,8 +69,10 @@ def _expected() -> tuple[type[Exception], ...]:
     return ConfigError, PlaceError, JournalError, DeviceError
 
 
-def _interrupt(*_: object) -> None:
-    raise KeyboardInterrupt("terminated")
+def _interrupt(number: int, _: object) -> None:
+    """Say so here, since the command line's library catches the exception on its way, and ends with 130."""
+    _say("\nrecoil: interrupted; what was acknowledged is on the disk")
+    raise KeyboardInterrupt(signal.Signals(number).name)
 
 
 def _say(text: str) -> None:

@@ -1,0 +1,261 @@
+"""The command line as its users call it: real processes, their exit codes and what they say."""
+
+from __future__ import annotations
+
+import csv
+import json
+import subprocess
+import time
+from pathlib import Path
+
+import pytest
+
+from experiments.load import shipped_folder
+from tests.conftest import RECOIL, Recoil
+
+TABLE = "results/sub-P01/sub-P01_task-direction_trials.csv"
+JOURNAL = "results/sub-P01/sub-P01_task-direction_journal.jsonl"
+
+
+def refused(done: subprocess.CompletedProcess[str], *said: str) -> None:
+    """Exit code 2 and one message that says it all; no traceback, nothing on standard output."""
+    assert done.returncode == 2, done
+    assert "Traceback" not in done.stderr
+    assert done.stdout == ""
+    for words in said:
+        assert words in done.stderr
+
+
+def synthetic(
+    recoil: Recoil, *more: object, config: object = "direction", participant: str = "P01"
+) -> subprocess.CompletedProcess[str]:
+    return recoil("run", config, "--participant", participant, "--screen", "synthetic", *more)
+
+
+def test_help_answers_in_less_than_three_tenths_of_a_second() -> None:
+    times = []
+    for _ in range(7):
+        start = time.perf_counter()
+        subprocess.run([RECOIL, "--help"], check=True, capture_output=True)
+        times.append(time.perf_counter() - start)
+    assert min(times) < 0.3
+
+
+@pytest.mark.parametrize("command", ["reproduce", "check", "run", "rebuild", "analyze", "simulate", "configs", "new"])
+def test_every_command_has_help(recoil: Recoil, command: str) -> None:
+    done = recoil(command, "--help")
+    assert done.returncode == 0
+    assert "Usage: recoil" in done.stdout
+
+
+def test_wrong_usage_is_2(recoil: Recoil) -> None:
+    refused(recoil("run", "direction"), "--participant")
+    refused(recoil("unknown"), "unknown")
+
+
+def test_check_prints_design_orders_duration_and_limits_and_runs_nothing(recoil: Recoil, tmp_path: Path) -> None:
+    done = recoil("check", "direction", "preference")
+    assert done.returncode == 0
+    assert "30.0 min planned" in done.stdout
+    assert "9 x 20 s + 2 x 300 s" in done.stdout
+    assert "8.0 min planned" in done.stdout
+    assert done.stdout.count("P14") == 2
+    assert "24 V, pulse 20 ms, duty 10 % over any second, 300 shots a minute, coil 80 °C" in done.stdout
+    assert not (tmp_path / "results").exists()
+
+
+@pytest.mark.parametrize("config", ["study", "gun", "paper"])
+def test_every_shipped_config_can_be_checked(recoil: Recoil, config: str) -> None:
+    assert recoil("check", config).returncode == 0
+
+
+def test_the_orders_that_check_shows_are_those_that_runs_get(recoil: Recoil, tmp_path: Path) -> None:
+    shown = json.loads(recoil("check", "direction", "--seed", 5, "--json").stdout)["orders"]["P01"]
+    synthetic(recoil, "--seed", 5)
+    with (tmp_path / TABLE).open(newline="") as table:
+        methods = [row["method"] for row in csv.DictReader(table)]
+    assert list(dict.fromkeys(methods)) == shown
+
+
+def test_a_synthetic_run_leaves_a_journal_and_a_table_for_their_owner_alone(recoil: Recoil, tmp_path: Path) -> None:
+    done = synthetic(recoil)
+    assert done.returncode == 0
+    for name in (TABLE, JOURNAL):
+        assert (tmp_path / name).stat().st_mode & 0o077 == 0
+    assert (tmp_path / TABLE).parent.stat().st_mode & 0o077 == 0
+
+
+def test_without_a_seed_one_is_drawn_and_stored(recoil: Recoil, tmp_path: Path) -> None:
+    seeds = []
+    for code in ("P01", "P02"):
+        synthetic(recoil, participant=code)
+        head = (tmp_path / JOURNAL.replace("P01", code)).read_text().splitlines()[0]
+        seeds.append(json.loads(head)["plan"]["seed"])
+    assert all(isinstance(seed, int) for seed in seeds)
+    assert seeds[0] != seeds[1]
+
+
+def test_a_participant_who_has_finished_is_refused_and_nothing_changes(recoil: Recoil, tmp_path: Path) -> None:
+    synthetic(recoil)
+    before = {name: (tmp_path / name).read_bytes() for name in (TABLE, JOURNAL)}
+    for again in ((), ("--resume",), ("--fresh",)):
+        refused(synthetic(recoil, *again), "P01 has finished direction", "use another code")
+    assert before == {name: (tmp_path / name).read_bytes() for name in (TABLE, JOURNAL)}
+
+
+@pytest.mark.parametrize("code", ["", "P" * 33, "../P01", "a/b", "P 01", "P.01", "P-01", "Ä1", "P01\n"])
+def test_a_code_that_breaks_the_rule_is_refused_and_leaves_no_folder(recoil: Recoil, tmp_path: Path, code: str) -> None:
+    before = sorted(tmp_path.rglob("*"))
+    refused(synthetic(recoil, participant=code), "must be 1 to 32 letters and digits")
+    assert sorted(tmp_path.rglob("*")) == before
+
+
+def test_a_code_that_differs_in_case_alone_is_refused(recoil: Recoil) -> None:
+    synthetic(recoil)
+    refused(synthetic(recoil, participant="p01"), "'p01' differs from 'P01'")
+
+
+def test_a_results_folder_that_cannot_be_made_is_refused(recoil: Recoil, tmp_path: Path) -> None:
+    (tmp_path / "file").write_text("not a folder")
+    refused(synthetic(recoil, "--results", "file/results"), "file/results/sub-P01: cannot be made")
+
+
+def test_a_broken_config_is_refused_with_file_line_key_value_and_rule(recoil: Recoil, tmp_path: Path) -> None:
+    recoil("configs", "--copy", "mine")
+    config = tmp_path / "mine" / "direction.toml"
+    config.write_text(config.read_text().replace("between_sets_s = 20.0", "between_sets_s = -20.0"))
+    line = 1 + config.read_text()[: config.read_text().index("between_sets_s")].count("\n")
+    done = recoil("check", "mine/direction.toml")
+    refused(done, f"mine/direction.toml:{line}: breaks.between_sets_s = -20.0", "greater than or equal to 0")
+    assert done.stderr.count("\n") == 1
+
+
+def test_a_terminal_run_without_a_terminal_prompts_nothing(recoil: Recoil) -> None:
+    refused(recoil("run", "direction", "--participant", "P01"), "no terminal")
+
+
+def test_a_gun_that_is_not_there_is_refused(recoil: Recoil) -> None:
+    refused(synthetic(recoil, "--gun", "serial:/dev/none"), "serial:/dev/none")
+    refused(synthetic(recoil, "--gun", "water"), "water", "simulated")
+
+
+def test_rebuild_finds_a_table_as_its_journal_says(recoil: Recoil) -> None:
+    synthetic(recoil)
+    done = recoil("rebuild", JOURNAL)
+    assert (done.returncode, done.stderr) == (0, "")
+    assert "is as its journal says" in done.stdout
+
+
+def test_rebuild_makes_a_lost_table_again_byte_for_byte(recoil: Recoil, tmp_path: Path) -> None:
+    synthetic(recoil)
+    before = (tmp_path / TABLE).read_bytes()
+    (tmp_path / TABLE).unlink()
+    assert recoil("rebuild", JOURNAL).returncode == 0
+    assert (tmp_path / TABLE).read_bytes() == before
+
+
+def test_rebuild_sets_an_edited_table_aside(recoil: Recoil, tmp_path: Path) -> None:
+    synthetic(recoil)
+    before = (tmp_path / TABLE).read_bytes()
+    edited = before.replace(b"forward,forward,1", b"forward,backward,0", 1)
+    (tmp_path / TABLE).write_bytes(edited)
+    done = recoil("rebuild", JOURNAL)
+    assert done.returncode == 1
+    assert "set aside" in done.stderr
+    assert (tmp_path / TABLE).read_bytes() == before
+    assert (tmp_path / TABLE).with_name("sub-P01_task-direction_trials.aside-1.csv").read_bytes() == edited
+
+
+def test_rebuild_of_something_else_is_refused(recoil: Recoil, tmp_path: Path) -> None:
+    (tmp_path / "notes.jsonl").write_text('{"n": 0, "kind": "note"}\n')
+    refused(recoil("rebuild", "notes.jsonl"), "notes.jsonl: line 1", "kind must be one of")
+    refused(recoil("rebuild", "none.jsonl"), "none.jsonl: cannot be read")
+
+
+def test_analyze_leaves_out_what_was_edited_and_says_so(recoil: Recoil, tmp_path: Path) -> None:
+    for code in ("P01", "P02", "P03"):
+        synthetic(recoil, participant=code)
+    table = tmp_path / TABLE
+    data = table.read_bytes()
+    table.write_bytes(data.replace(b",forward,forward,1,", b",forward,backward,0,", 1))
+    done = recoil("analyze", "results", "--out", "analysis")
+    assert done.returncode == 1
+    assert "edited since the run" in done.stderr
+    assert json.loads((tmp_path / "analysis" / "statistics.json").read_text())["direction"]["n"] == 2
+
+
+def test_analyze_without_any_usable_log_is_2_and_lists_the_reasons(recoil: Recoil, tmp_path: Path) -> None:
+    (tmp_path / "old").mkdir()
+    (tmp_path / "old" / "sub-P01_task-direction_trials.csv").write_text("subject,answer\n1,left\n")
+    refused(recoil("analyze", "old", "--out", "analysis"), "no usable log", "sub-P01_task-direction_trials.csv")
+    refused(recoil("analyze", "nowhere", "--out", "analysis"), "nowhere")
+    assert not (tmp_path / "analysis").exists()
+
+
+def test_simulate_tells_of_a_shot_and_draws_it(recoil: Recoil, tmp_path: Path) -> None:
+    done = recoil("simulate", "--method", "asymmetric-2", "--json", "--trace", "shot.csv", "--plot", "shot.png")
+    summary = json.loads(done.stdout)["summary"]
+    assert summary["status"] == "home"
+    assert summary["peak_force_N"] == pytest.approx(35.14, abs=0.01)
+    assert (tmp_path / "shot.png").stat().st_size > 10_000
+    assert (tmp_path / "shot.svg").exists()
+    assert (tmp_path / "shot.csv").read_text().startswith("time_s,displacement_m,velocity_m_s")
+
+
+@pytest.mark.parametrize(
+    ("words", "said"),
+    [
+        (("--set", "mass=1"), "magnet_mass_kg"),
+        (("--set", "voltage_V"), "key=value"),
+        (("--set", "voltage_V=high"), "'high' is not a number"),
+        (("--set", "magnet_mass_kg=-1"), "magnet_mass_kg"),
+        (("--method", "vibration"), "no force"),
+        (("--method", "laser"), "laser"),
+        (("--fidelity", "perfect"), "perfect"),
+        (("--gun", "none.toml"), "none.toml"),
+    ],
+)
+def test_simulate_refuses_what_it_cannot_do(recoil: Recoil, words: tuple[str, ...], said: str) -> None:
+    refused(recoil("simulate", *words), said)
+
+
+def test_configs_are_copied_once_and_never_over_others(recoil: Recoil, tmp_path: Path) -> None:
+    assert recoil("configs", "--copy", "mine").returncode == 0
+    names = {path.name for path in (tmp_path / "mine").iterdir()}
+    assert names == {path.name for path in shipped_folder().glob("*.toml")}
+    refused(recoil("configs", "--copy", "mine"), "already there")
+
+
+def test_a_new_study_can_be_changed_and_run(recoil: Recoil, tmp_path: Path) -> None:
+    assert recoil("new", "pilot").returncode == 0
+    config = tmp_path / "pilot" / "direction.toml"
+    config.write_text(config.read_text().replace('balance = "session"', 'balance = "set"'))
+    assert synthetic(recoil, "--results", "pilot/results", config="pilot/direction.toml").returncode == 0
+    refused(recoil("new", "pilot"), "not empty")
+
+
+def test_balanced_orders_take_each_row_of_the_square_in_turn(recoil: Recoil, tmp_path: Path) -> None:
+    recoil("configs", "--copy", "mine")
+    config = tmp_path / "mine" / "preference.toml"
+    config.write_text(config.read_text().replace('trial_order = "random"', 'trial_order = "latin-square"'))
+    rows = []
+    for number in range(1, 7):
+        synthetic(recoil, config="mine/preference.toml", participant=f"P{number}")
+        journal = tmp_path / f"results/sub-P{number}/sub-P{number}_task-preference_journal.jsonl"
+        rows.append(json.loads(journal.read_text().splitlines()[0])["plan"]["order_row"])
+    assert rows == [0, 1, 2, 0, 1, 2]
+
+
+def test_a_terminated_run_stops_at_a_whole_record_and_can_be_gone_on_with(recoil: Recoil, tmp_path: Path) -> None:
+    words = [RECOIL, "reproduce", "--out", tmp_path / "out"]
+    process = subprocess.Popen(words, stderr=subprocess.PIPE, stdout=subprocess.PIPE, text=True)
+    while not list((tmp_path / "out").glob("logs/*/*_journal.jsonl")):
+        time.sleep(0.02)
+        assert process.poll() is None
+    process.terminate()
+    _, said = process.communicate(timeout=30)
+    assert process.returncode == 130
+    assert "Traceback" not in said
+    assert "interrupted" in said
+    assert recoil("reproduce", "--out", "out").returncode == 0
+    assert len(list((tmp_path / "out" / "logs").glob("*/*.csv"))) == 28

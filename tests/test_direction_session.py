@@ -1,0 +1,273 @@
+import json
+from collections import Counter
+from dataclasses import fields
+from typing import Any, Literal, get_args, get_origin, get_type_hints
+
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from pydantic import ValidationError
+
+from experiments.canonical import canonical_json
+from experiments.direction.plan import make_plan
+from experiments.direction.session import session
+from experiments.load import load_setup
+from experiments.plan import Plan, Trial
+from experiments.setup import Setup
+from experiments.steps import (
+    Answered,
+    Ask,
+    Failed,
+    Fire,
+    Fired,
+    Interrupted,
+    Outcome,
+    Prepare,
+    Prepared,
+    Rest,
+    Rested,
+    Step,
+    outcome_from,
+    record,
+    step_from,
+)
+
+SETUP = load_setup("direction")
+PLAN = make_plan(SETUP.config, "P01", 1, None)
+DAMPERS = {"vibration": "", "asymmetric-1": "off", "asymmetric-2": "on"}
+FIRED = Fired(
+    gun="simulated",
+    onset_utc="2024-01-01T00:00:00.000000Z",
+    requested_s=0.0,
+    pulse_start_s=0.0,
+    pulse_end_s=0.01,
+    home_predicted_s=0.2,
+    motion="home",
+)
+FAILED, FELT, UNFELT = Failed(cause="no answer"), Interrupted(presented=True), Interrupted(presented=False)
+
+
+def answered(trial: Trial) -> Answered:
+    return Answered(
+        response=trial.direction, response_time_s=1.0, response_source="synthetic", response_time_valid=True
+    )
+
+
+def fitting(step: Step) -> Outcome:
+    """What the world says when all goes well."""
+    match step:
+        case Prepare():
+            return Prepared()
+        case Fire():
+            return FIRED
+        case Ask():
+            return answered(step.trial)
+        case _:
+            return Rested(rested_s=step.duration_s)
+
+
+def driven(plan: Plan, setup: Setup[Any], troubles: dict[int, Outcome] | None = None) -> list[Step]:
+    """All steps of a session; the n-th is sent `troubles[n]` instead of what fits."""
+    going, steps = session(plan, setup), []
+    step = next(going)
+    while step is not None:
+        steps.append(step)
+        outcome = (troubles or {}).get(len(steps) - 1, fitting(step))
+        try:
+            step = going.send(outcome)
+        except StopIteration:
+            step = None
+    return steps
+
+
+def with_breaks(between_sets_s: float, between_sessions_s: float) -> Setup[Any]:
+    breaks = SETUP.config.breaks.model_copy(
+        update={"between_sets_s": between_sets_s, "between_sessions_s": between_sessions_s}
+    )
+    config = SETUP.config.model_copy(update={"breaks": breaks})
+    return Setup(config=config, gun=SETUP.gun, folder=SETUP.folder)
+
+
+STEPS = driven(PLAN, SETUP)
+
+
+def test_each_of_sixty_trials_is_prepared_fired_and_asked_in_the_order_of_the_plan() -> None:
+    of_trials = [step for step in STEPS if not isinstance(step, Rest)]
+    assert [type(step) for step in of_trials] == [Prepare, Fire, Ask] * 60
+    assert [step.trial for step in of_trials] == [trial for trial in PLAN.trials for _ in range(3)]
+    assert {step.attempt for step in of_trials} == {1}
+
+
+def test_there_are_nine_rests_of_20_s_between_sets_and_two_of_300_s_between_sessions() -> None:
+    rests = [step for step in STEPS if isinstance(step, Rest)]
+    one_session = [("sets", 20.0)] * 3
+    assert [(rest.between, rest.duration_s) for rest in rests] == [
+        *one_session,
+        ("sessions", 300.0),
+        *one_session,
+        ("sessions", 300.0),
+        *one_session,
+    ]
+    assert sum(rest.duration_s for rest in rests) == SETUP.config.break_s == 780
+
+
+def test_a_rest_follows_every_fifth_trial_but_the_last() -> None:
+    places = [number for number, step in enumerate(STEPS) if isinstance(step, Rest)]
+    assert places == [15 * k + k - 1 for k in range(1, 12)]
+    assert isinstance(STEPS[-1], Ask)
+    assert len(STEPS) == 60 * 3 + 11
+
+
+def test_a_hand_over_names_the_damper_that_the_gun_file_names_for_the_method() -> None:
+    hand_overs = [step for step in STEPS if isinstance(step, Prepare)]
+    assert {step.trial.method: step.damper for step in hand_overs} == DAMPERS
+
+
+def test_the_question_and_its_answers_are_the_configs_and_name_no_method() -> None:
+    asks = [step for step in STEPS if isinstance(step, Ask)]
+    assert {(step.question, step.forward, step.backward) for step in asks} == {
+        ("Which way did the gun shoot?", "forward", "backward")
+    }
+
+
+@pytest.mark.parametrize("trouble", [FAILED, FELT, UNFELT], ids=["failed", "felt", "unfelt"])
+@pytest.mark.parametrize("part", [0, 1, 2], ids=["hand-over", "shot", "question"])
+@pytest.mark.parametrize("trial", [0, 7, 59])
+def test_a_trial_that_was_not_done_is_presented_again_from_the_hand_over(
+    trouble: Outcome, part: int, trial: int
+) -> None:
+    rests = trial // 5
+    number = trial * 3 + rests + part
+    steps = driven(PLAN, SETUP, {number: trouble})
+    again = steps[number + 1 : number + 4]
+    assert [type(step) for step in again] == [Prepare, Fire, Ask]
+    assert {(step.trial, step.attempt) for step in again} == {(PLAN.trials[trial], 2)}
+    assert steps[: number + 1] + steps[number + 4 :] == STEPS[: number + 1] + STEPS[number - part + 3 :]
+
+
+def test_attempts_count_on_until_a_trial_is_done_and_start_at_1_for_the_next() -> None:
+    # the first shot fails, the second hand-over is broken off, and so is the third question
+    steps = driven(PLAN, SETUP, {1: FAILED, 2: UNFELT, 5: FELT})
+    assert [(step.kind, step.trial.trial, step.attempt) for step in steps[:10]] == [
+        ("prepare", 1, 1),
+        ("fire", 1, 1),
+        ("prepare", 1, 2),
+        ("prepare", 1, 3),
+        ("fire", 1, 3),
+        ("ask", 1, 3),
+        ("prepare", 1, 4),
+        ("fire", 1, 4),
+        ("ask", 1, 4),
+        ("prepare", 2, 1),
+    ]
+
+
+def test_a_break_that_was_interrupted_is_taken_again_in_full() -> None:
+    steps = driven(PLAN, SETUP, {15: UNFELT, 16: UNFELT})
+    assert steps[15:18] == [Rest(between="sets", duration_s=20.0)] * 3
+    assert steps[18:] == STEPS[16:]
+
+
+@pytest.mark.parametrize(
+    ("between_sets_s", "between_sessions_s", "rests"),
+    [(0.0, 300.0, {"sessions": 2}), (20.0, 0.0, {"sets": 9}), (0.0, 0.0, {})],
+)
+def test_a_break_of_no_length_is_no_step(
+    between_sets_s: float, between_sessions_s: float, rests: dict[str, int]
+) -> None:
+    steps = driven(PLAN, with_breaks(between_sets_s, between_sessions_s))
+    assert Counter(step.between for step in steps if isinstance(step, Rest)) == rests
+    assert [step for step in steps if not isinstance(step, Rest)] == [
+        step for step in STEPS if not isinstance(step, Rest)
+    ]
+
+
+def test_a_session_of_one_trial_has_no_rest() -> None:
+    plan = Plan(experiment="direction", participant_id="P01", seed=1, order_row=None, trials=PLAN.trials[:1])
+    assert [type(step) for step in driven(plan, SETUP)] == [Prepare, Fire, Ask]
+
+
+@settings(deadline=None, max_examples=40)
+@given(st.dictionaries(st.integers(0, 250), st.sampled_from([FELT, UNFELT]), max_size=12))
+def test_whatever_goes_wrong_every_trial_is_answered_once_in_order(troubles: dict[int, Outcome]) -> None:
+    steps = driven(PLAN, SETUP, troubles)
+    done = [step for number, step in enumerate(steps) if number not in troubles]
+    assert [step.trial for step in done if isinstance(step, Ask)] == list(PLAN.trials)
+    assert [step for step in done if isinstance(step, Rest)] == [step for step in STEPS if isinstance(step, Rest)]
+
+
+# steps and outcomes in the journal
+
+finite = st.floats(allow_nan=False, allow_infinity=False)
+words = st.text(st.characters(codec="utf-8"))
+
+
+def of_type(hint: Any) -> st.SearchStrategy[Any]:
+    if get_origin(hint) is Literal:
+        return st.sampled_from(get_args(hint))
+    if hint == float | None:
+        return st.none() | finite
+    known = {str: words, int: st.integers(), float: finite, bool: st.booleans()}
+    return known[hint] if hint in known else facts(hint)
+
+
+def facts(kind: type) -> st.SearchStrategy[Any]:
+    hints = get_type_hints(kind)
+    return st.builds(kind, **{field.name: of_type(hints[field.name]) for field in fields(kind)})
+
+
+steps_of_any_kind = st.one_of([facts(kind) for kind in get_args(Step)])
+outcomes_of_any_kind = st.one_of([facts(kind) for kind in get_args(Outcome)])
+
+
+@settings(deadline=None, max_examples=200)
+@given(steps_of_any_kind)
+def test_any_step_reads_back_from_the_journal(step: Step) -> None:
+    assert step_from(json.loads(canonical_json(record(step)))) == step
+
+
+@settings(deadline=None, max_examples=200)
+@given(outcomes_of_any_kind)
+def test_any_outcome_reads_back_from_the_journal(outcome: Outcome) -> None:
+    assert outcome_from(json.loads(canonical_json(record(outcome)))) == outcome
+
+
+def test_kinds_are_told_apart_by_one_word_each() -> None:
+    kinds = [kind.__dataclass_fields__["kind"].default for kind in (*get_args(Step), *get_args(Outcome))]
+    assert len(set(kinds)) == len(kinds) == 16
+
+
+@pytest.mark.parametrize(
+    "body",
+    [
+        None,
+        [],
+        {},
+        {"kind": "leap"},
+        {"kind": "fire"},
+        {"kind": "fire", "trial": {}, "attempt": 1},
+        record(STEPS[1]) | {"attempt": "twice"},
+        record(STEPS[1]) | {"trial": record(STEPS[1])["trial"] | {"direction": "up"}},
+        record(FIRED),
+    ],
+)
+def test_what_is_no_step_is_refused(body: object) -> None:
+    with pytest.raises(ValidationError):
+        step_from(body)
+
+
+@pytest.mark.parametrize(
+    "body",
+    [
+        None,
+        {},
+        {"kind": "answered"},
+        record(answered(PLAN.trials[0])) | {"response": "left"},
+        record(answered(PLAN.trials[0])) | {"response_source": "nobody"},
+        {"kind": "rated", "rating": "good", "rating_by": "participant"},
+        record(STEPS[0]),
+    ],
+)
+def test_what_is_no_outcome_is_refused(body: object) -> None:
+    with pytest.raises(ValidationError):
+        outcome_from(body)

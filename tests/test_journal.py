@@ -1,0 +1,384 @@
+import json
+import os
+import stat
+import subprocess
+import sys
+from contextlib import suppress
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from experiments import storage
+from experiments.clock import VirtualClock
+from experiments.journal import Journal, JournalError, head, read
+
+HEAD = {"plan": {"trials": [1, 2]}, "setup": {"title": "é – 20 °C"}, "setup_sha256": "0" * 64}
+RECORDS = 8
+
+
+def written(path: Path) -> Path:
+    """A journal of a head and steps with outcomes, half a second each."""
+    clock = VirtualClock()
+    with Journal.create(path, clock) as journal:
+        journal.append("run", **HEAD)
+        for number in range(1, RECORDS):
+            clock.sleep(0.5)
+            journal.append("step" if number % 2 else "outcome", body={"number": number, "text": "“next”\n"})
+    return path
+
+
+@pytest.fixture
+def path(tmp_path: Path) -> Path:
+    return written(tmp_path / "a_journal.jsonl")
+
+
+def lines_of(path: Path) -> list[bytes]:
+    return path.read_bytes().splitlines(keepends=True)
+
+
+# writing and reading
+
+
+def test_every_record_has_number_kind_and_times(path: Path) -> None:
+    records = read(path).records
+    assert [entry["n"] for entry in records] == list(range(RECORDS))
+    assert [entry["kind"] for entry in records] == ["run", *["step", "outcome"] * 3, "step"]
+    assert [entry["monotonic_s"] for entry in records] == [0.5 * number for number in range(RECORDS)]
+    assert all(entry["utc"].endswith("Z") for entry in records)
+    assert records[3]["body"] == {"number": 3, "text": "“next”\n"}
+
+
+def test_the_first_record_is_the_head(path: Path) -> None:
+    contents = read(path)
+    assert {key: contents.header[key] for key in HEAD} == HEAD
+    assert head(path) == contents.header == contents.records[0]
+
+
+def test_every_record_tells_when_the_one_before_it_was_on_the_disk(path: Path) -> None:
+    first, *others = read(path).records
+    assert first["synced_s"] is None
+    # on the virtual clock writing takes no time: synced at the time of the record itself, half a second ago
+    assert [entry["synced_s"] for entry in others] == [entry["monotonic_s"] - 0.5 for entry in others]
+
+
+def test_a_record_is_on_the_disk_when_append_returns(tmp_path: Path) -> None:
+    with Journal.create(tmp_path / "j", VirtualClock()) as journal:
+        journal.append("run", **HEAD)
+        for count in range(2, 5):
+            journal.append("step", body=count)
+            assert len(read(tmp_path / "j").records) == count
+
+
+def test_one_record_is_one_line_of_json(path: Path) -> None:
+    lines = lines_of(path)
+    assert len(lines) == RECORDS
+    assert all(line.endswith(b"\n") and isinstance(json.loads(line), dict) for line in lines)
+
+
+def test_a_run_is_finished_once_its_last_record_says_so(path: Path) -> None:
+    contents = read(path)
+    assert not contents.finished
+    with Journal.reopen(contents, VirtualClock()) as journal:
+        journal.append("finished", table_sha256="0")
+    assert read(path).finished
+
+
+def test_an_existing_file_is_never_written_over(path: Path) -> None:
+    before = path.read_bytes()
+    with pytest.raises(JournalError, match=r"cannot be created \(File exists\)"):
+        Journal.create(path, VirtualClock())
+    assert path.read_bytes() == before
+
+
+def test_a_journal_where_there_is_no_folder_is_refused(tmp_path: Path) -> None:
+    with pytest.raises(JournalError, match=r"cannot be created .*nothing was recorded"):
+        Journal.create(tmp_path / "none" / "j", VirtualClock())
+
+
+def test_a_journal_that_is_not_there_cannot_be_read(tmp_path: Path) -> None:
+    for reader in (read, head):
+        with pytest.raises(JournalError, match=r"cannot be read \(No such file"):
+            reader(tmp_path / "none")
+
+
+def test_what_a_terminal_may_take_for_text_is_written_or_refused_as_a_journal_error(tmp_path: Path) -> None:
+    # a byte that is not UTF-8 comes from a terminal as a lone surrogate (surrogateescape, the C locale)
+    with Journal.create(tmp_path / "j", VirtualClock()) as journal:
+        journal.append("run", **HEAD)
+        try:
+            journal.append("outcome", body={"comment": "sch\udcf6n"})
+        except JournalError:
+            assert len(read(tmp_path / "j").records) == 1
+        else:
+            assert len(read(tmp_path / "j").records) == 2
+
+
+# a full disk
+
+
+@pytest.mark.skipif(not Path("/dev/full").exists(), reason="no /dev/full")
+def test_a_full_disk_is_told_with_what_is_safe() -> None:
+    descriptor = os.open("/dev/full", os.O_RDWR | os.O_APPEND)
+    journal = Journal(Path("/dev/full"), descriptor, VirtualClock(), count=7, length=0)
+    with journal, pytest.raises(JournalError, match=r"record 7 cannot be written \(No space left .*record 6 is safe"):
+        journal.append("step", body={})
+
+
+def test_a_record_that_was_written_in_part_is_taken_back(path: Path) -> None:
+    # a limit on the size of files is the only full disk that a test can make; it binds the process it is set in
+    size = path.stat().st_size
+    program = f"""
+import resource, signal, sys
+from pathlib import Path
+from experiments.clock import VirtualClock
+from experiments.journal import Journal, JournalError, read
+signal.signal(signal.SIGXFSZ, signal.SIG_IGN)
+contents = read(Path({str(path)!r}))
+with Journal.reopen(contents, VirtualClock()) as journal:
+    resource.setrlimit(resource.RLIMIT_FSIZE, ({size} + 40, {size} + 40))
+    try:
+        journal.append("outcome", body="x" * 200)
+    except JournalError as error:
+        sys.exit(str(error))
+"""
+    done = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, check=False)
+    assert f"record {RECORDS} cannot be written (File too large); everything up to record {RECORDS - 1}" in done.stderr
+    assert path.stat().st_size == size
+    assert len(read(path).records) == RECORDS
+
+
+# cut off
+
+
+def test_a_journal_cut_at_any_byte_is_read_to_its_last_whole_record(path: Path) -> None:
+    data, cut = path.read_bytes(), path.with_name("cut")
+    ends = [n + 1 for n, byte in enumerate(data) if byte == 0x0A]
+    for length in range(len(data) + 1):
+        cut.write_bytes(data[:length])
+        whole = sum(end <= length for end in ends)
+        if not whole:
+            for reader in (read, head):
+                with pytest.raises(JournalError, match=r"line 1: no whole record.*--fresh sets the file aside"):
+                    reader(cut)
+            continue
+        contents = read(cut)
+        assert len(contents.records) == whole
+        assert contents.whole_bytes == ends[whole - 1]
+        assert contents.cut_bytes == length - ends[whole - 1]
+        assert head(cut) == contents.header
+        if contents.cut_bytes == 0:
+            assert contents.cut_message is None
+        else:
+            assert contents.cut_message == (
+                f"{cut}: line {whole + 1} is cut off after {contents.cut_bytes} bytes and was never acknowledged; "
+                f"everything up to record {whole - 1} is read"
+            )
+
+
+def test_rubbish_behind_the_last_line_end_is_taken_for_a_cut(path: Path) -> None:
+    with path.open("ab") as file:
+        file.write(b"\0" * 4096)  # what some file systems leave behind after a power cut
+    contents = read(path)
+    assert (len(contents.records), contents.cut_bytes) == (RECORDS, 4096)
+
+
+@pytest.mark.parametrize("cut_bytes", [0, 1, 30])
+def test_reopening_takes_away_what_was_cut_off_and_goes_on_numbering(path: Path, cut_bytes: int) -> None:
+    lines = lines_of(path)
+    path.write_bytes(b"".join(lines[:5]) + lines[5][:cut_bytes])
+    with Journal.reopen(read(path), VirtualClock()) as journal:
+        journal.append("resumed", cut_bytes=cut_bytes)
+        journal.append("step", body=1)
+    contents = read(path)
+    assert [entry["n"] for entry in contents.records] == list(range(7))
+    assert [entry["kind"] for entry in contents.records[5:]] == ["resumed", "step"]
+    assert contents.records[5]["synced_s"] is None
+    assert lines_of(path)[:5] == lines[:5]
+
+
+# changed
+
+
+@pytest.mark.parametrize("number", range(1, RECORDS - 1))
+def test_a_record_that_was_removed_is_noticed_at_its_line(path: Path, number: int) -> None:
+    lines = lines_of(path)
+    path.write_bytes(b"".join(lines[:number] + lines[number + 1 :]))
+    with pytest.raises(
+        JournalError, match=rf"a_journal.jsonl: line {number + 1}: record number is {number + 1}, must be {number};"
+    ):
+        read(path)
+
+
+@pytest.mark.parametrize("number", range(1, RECORDS))
+def test_a_record_that_was_doubled_is_noticed_at_its_line(path: Path, number: int) -> None:
+    lines = lines_of(path)
+    path.write_bytes(b"".join([*lines[: number + 1], lines[number], *lines[number + 1 :]]))
+    with pytest.raises(JournalError, match=rf"line {number + 2}: record number is {number}, must be {number + 1}"):
+        read(path)
+
+
+def test_records_that_were_exchanged_are_noticed(path: Path) -> None:
+    lines = lines_of(path)
+    path.write_bytes(b"".join([*lines[:3], lines[4], lines[3], *lines[5:]]))
+    with pytest.raises(JournalError, match="line 4: record number is 4, must be 3"):
+        read(path)
+
+
+def test_a_missing_head_is_noticed(path: Path) -> None:
+    path.write_bytes(b"".join(lines_of(path)[1:]))
+    with pytest.raises(JournalError, match="line 1: record number is 1, must be 0"):
+        read(path)
+
+
+@pytest.mark.parametrize(
+    ("line", "rule"),
+    [
+        (b"", "not a JSON record"),
+        (b"{", "not a JSON record"),
+        (b"\xff\xfe", "not a JSON record"),
+        (b"\0\0\0\0", "not a JSON record"),
+        (b"null", "kind must be one of run, step, outcome"),
+        (b"[3]", "kind must be one of"),
+        (b"{}", "kind must be one of"),
+        (b'{"n":3,"kind":"stap"}', "kind must be one of"),
+        (b'{"n":3,"kind":["step"]}', "kind must be one of"),
+        (b'{"n":3,"kind":{}}', "kind must be one of"),
+        (b'{"kind":"step"}', "record number is None, must be 3"),
+        (b'{"n":"3","kind":"step"}', "record number is '3', must be 3"),
+        (b"[" * 100_000, "not a JSON record"),
+        (b'{"n":' + b"9" * 5000 + b',"kind":"step"}', "line 4"),
+    ],
+    ids=lambda value: str(value)[:24],
+)
+def test_a_record_that_was_changed_is_refused_with_its_line(path: Path, line: bytes, rule: str) -> None:
+    lines = lines_of(path)
+    path.write_bytes(b"".join([*lines[:3], line, b"\n", *lines[4:]]))
+    with pytest.raises(JournalError, match=r"a_journal\.jsonl: line 4: ") as refused:
+        read(path)
+    assert rule in str(refused.value)
+
+
+@pytest.mark.parametrize(
+    "record",
+    [
+        {"n": 0, "kind": "step", **HEAD},
+        {"n": 0, "kind": "run"},
+        {"n": 0, "kind": "run", "plan": {}, "setup": {}},
+        {"n": 1, "kind": "run", **HEAD},
+    ],
+)
+def test_a_head_that_is_none_is_refused(tmp_path: Path, record: dict[str, Any]) -> None:
+    (tmp_path / "j").write_text(json.dumps(record) + "\n")
+    for reader in (read, head):
+        with pytest.raises(JournalError, match="j: line 1: "):
+            reader(tmp_path / "j")
+
+
+def test_line_ends_of_another_system_do_no_harm(path: Path) -> None:
+    before = read(path).records
+    path.write_bytes(path.read_bytes().replace(b"\n", b"\r\n"))
+    assert read(path).records == before
+
+
+# held by one
+
+
+def test_a_second_holder_is_refused_in_the_same_process(path: Path) -> None:
+    with Journal.reopen(read(path), VirtualClock()) as journal:
+        with pytest.raises(JournalError, match="another run holds this journal; close that one first"):
+            Journal.reopen(read(path), VirtualClock())
+        journal.append("step", body=0)
+    with Journal.reopen(read(path), VirtualClock()):
+        pass
+
+
+def test_a_second_holder_is_refused_in_another_process_and_loses_nothing(tmp_path: Path) -> None:
+    path = tmp_path / "j"
+    program = f"""
+import sys
+from pathlib import Path
+from experiments.clock import VirtualClock
+from experiments.journal import Journal, JournalError, read
+try:
+    Journal.reopen(read(Path({str(path)!r})), VirtualClock()).append("step", body="other")
+except JournalError as error:
+    sys.exit(str(error))
+"""
+
+    def other() -> subprocess.CompletedProcess[str]:
+        return subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, check=False)
+
+    with Journal.create(path, VirtualClock()) as journal:
+        journal.append("run", **HEAD)
+        before = path.read_bytes()
+        assert "another run holds this journal" in other().stderr
+        assert path.read_bytes() == before
+    assert other().returncode == 0
+    assert len(read(path).records) == 2
+
+
+def test_records_that_another_run_wrote_since_the_reading_are_not_cut_away(path: Path) -> None:
+    early = read(path)
+    with Journal.reopen(read(path), VirtualClock()) as other:
+        other.append("outcome", body="acknowledged")
+    with suppress(JournalError):  # refusing is as good as going on behind the other's last record
+        Journal.reopen(early, VirtualClock()).close()
+    assert len(read(path).records) == RECORDS + 1
+
+
+def test_a_journal_that_vanished_since_the_reading_is_a_journal_error(path: Path) -> None:
+    contents = read(path)
+    path.unlink()
+    with pytest.raises(JournalError):
+        Journal.reopen(contents, VirtualClock())
+
+
+# files of their owner
+
+
+def mode(path: Path) -> int:
+    return stat.S_IMODE(path.stat().st_mode)
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="no file modes")
+@pytest.mark.parametrize("umask", [0o000, 0o022, 0o077])
+def test_files_and_folders_are_their_owners_alone_whatever_the_umask(tmp_path: Path, umask: int) -> None:
+    before = os.umask(umask)
+    try:
+        folder = tmp_path / "results" / "sub-P01"
+        storage.make_folder(folder)
+        written(folder / "j")
+        storage.write_whole(folder / "table.csv", b"1")
+    finally:
+        os.umask(before)
+    assert [mode(folder.parent), mode(folder)] == [0o700, 0o700]
+    assert [mode(folder / "j"), mode(folder / "table.csv")] == [0o600, 0o600]
+
+
+def test_making_a_folder_again_changes_nothing(tmp_path: Path) -> None:
+    storage.make_folder(tmp_path / "a" / "b")
+    (tmp_path / "a" / "b" / "file").touch()
+    storage.make_folder(tmp_path / "a" / "b")
+    assert (tmp_path / "a" / "b" / "file").exists()
+
+
+def test_a_file_is_replaced_as_a_whole_and_leaves_no_part_behind(tmp_path: Path) -> None:
+    for data in (b"old", b"new" * 1000, b""):
+        storage.write_whole(tmp_path / "table.csv", data)
+        assert (tmp_path / "table.csv").read_bytes() == data
+    assert [file.name for file in tmp_path.iterdir()] == ["table.csv"]
+
+
+def test_a_file_that_cannot_be_replaced_leaves_no_part_behind(tmp_path: Path) -> None:
+    (tmp_path / "table.csv").mkdir()
+    (tmp_path / "table.csv" / "inside").touch()
+    with pytest.raises(OSError, match=r"table\.csv"):
+        storage.write_whole(tmp_path / "table.csv", b"data")
+    assert [file.name for file in tmp_path.iterdir()] == ["table.csv"]
+
+
+def test_a_part_left_by_a_crash_does_not_stand_in_the_way(tmp_path: Path) -> None:
+    (tmp_path / ".table.csv.part").write_bytes(b"half")
+    storage.write_whole(tmp_path / "table.csv", b"whole")
+    assert (tmp_path / "table.csv").read_bytes() == b"whole"

@@ -1,0 +1,372 @@
+"""Resume: runs of both experiments, broken off at many records and gone on with, against the unbroken ones."""
+
+import csv
+import hashlib
+import json
+from collections.abc import Iterator
+from dataclasses import replace
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import pytest
+
+from experiments import catalogue
+from experiments.canonical import canonical_json
+from experiments.clock import VirtualClock
+from experiments.journal import Journal, JournalError, read
+from experiments.load import load_setup
+from experiments.places import PlaceError, place
+from experiments.plan import Plan
+from experiments.replay import go_on, history, replay
+from experiments.roof.reproduce import synthetic_screen
+from experiments.run import Again, Request, rebuild, run
+from experiments.setup import Setup
+
+SETUPS = {name: load_setup(name) for name in ("direction", "preference")}
+EVERY = {"direction": 7, "preference": 1}
+ANSWERS = {
+    "direction": ("response", "correct", "response_time_s", "response_source", "response_time_valid"),
+    "preference": ("rating", "rating_by", "comment", "shots"),
+}
+STIMULI = ("fire", "present")
+LAST_ANSWER = {"direction": "ask", "preference": "describe"}
+
+
+def request(name: str, results: Path, again: Again = "ask", seed: int | None = 1, **changes: Any) -> Request:
+    setup = changes.pop("setup", SETUPS[name])
+    return Request(setup=setup, participant_id="P01", results=results, seed=seed, again=again)
+
+
+class Unbroken(NamedTuple):
+    """A run that was never broken off: its plan, its journal's lines and its table."""
+
+    name: str
+    plan: Plan
+    lines: list[bytes]
+    rows: list[dict[str, str]]
+    table: bytes
+
+    @property
+    def records(self) -> list[dict[str, Any]]:
+        return [json.loads(line) for line in self.lines]
+
+
+def rows_of(path: Path) -> list[dict[str, str]]:
+    with path.open(encoding="utf-8", newline="") as file:
+        return list(csv.DictReader(file, strict=True))
+
+
+@pytest.fixture(scope="module")
+def unbroken(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Unbroken]:
+    runs = {}
+    for name in SETUPS:
+        done = run(request(name, tmp_path_factory.mktemp(name)), synthetic_screen, VirtualClock())
+        lines = done.place.journal.read_bytes().splitlines(keepends=True)
+        table = done.place.table.read_bytes()
+        runs[name] = Unbroken(name, done.plan, lines, rows_of(done.place.table), table)
+    return runs
+
+
+def broken_off(whole: Unbroken, results: Path, records: int, rest: bytes = b"") -> Path:
+    """A copy of the run's journal that ends behind so many records."""
+    where = place(results, "P01", whole.name)
+    where.folder.mkdir(parents=True)
+    where.journal.write_bytes(b"".join(whole.lines[:records]) + rest)
+    return where.journal
+
+
+def expected_flags(whole: Unbroken, records: int) -> tuple[int | None, bool]:
+    """The place of the trial whose stimulus was broken, if one was, by the last record that is left."""
+    steps = [entry for entry in whole.records[:records] if entry["kind"] == "step"]
+    if not steps:
+        return None, False
+    last, ends_with_outcome = steps[-1]["body"], whole.records[records - 1]["kind"] == "outcome"
+    felt = last["kind"] in ("fire", "ask") if not ends_with_outcome else last["kind"] == "fire"
+    felt = felt or (last["kind"] == "present" and not ends_with_outcome)
+    if not felt:
+        return None, False
+    return [trial_key(trial) for trial in whole.plan.record()["trials"]].index(trial_key(last["trial"])), True
+
+
+def trial_key(trial: dict[str, Any]) -> tuple[int, int]:
+    return trial["session"], trial["trial"]
+
+
+def done_trials(entries: list[dict[str, Any]], name: str) -> Iterator[tuple[int, int]]:
+    """The trials in the order in which they were answered."""
+    for step, outcome in zip(entries, entries[1:], strict=False):
+        if step["kind"] == "step" and step["body"]["kind"] == LAST_ANSWER[name] and outcome["kind"] == "outcome":
+            if outcome["body"]["kind"] != "interrupted":
+                yield trial_key(step["body"]["trial"])
+
+
+def check_resumed(whole: Unbroken, journal: Path, records: int) -> None:
+    name, results = whole.name, journal.parent.parent
+    done = run(request(name, results, "resume", seed=None), synthetic_screen, VirtualClock())
+    assert done.plan == whole.plan
+    contents = read(journal)
+    assert contents.finished
+    # nothing that was on the disk changed
+    assert b"".join(journal.read_bytes().splitlines(keepends=True)[:records]) == b"".join(whole.lines[:records])
+    assert contents.records[records]["kind"] == "resumed"
+    # what is left is done in the order of the plan
+    planned = [trial_key(trial) for trial in whole.plan.record()["trials"]]
+    assert list(done_trials(list(contents.records), name)) == planned
+    # one row a trial, each with the answers of the unbroken run
+    rows = rows_of(done.place.table)
+    assert len(rows) == len(planned)
+    for column in ANSWERS[name]:
+        assert [row[column] for row in rows] == [row[column] for row in whole.rows], column
+    for row, other in zip(rows, whole.rows, strict=True):
+        if name == "preference":
+            assert float(row["exposure_s"]) == pytest.approx(float(other["exposure_s"]), abs=1e-6)
+    # a stimulus that was, or may have been, felt in vain is told
+    broken, _ = expected_flags(whole, records)
+    for number, row in enumerate(rows):
+        told = ("2", "interrupted") if number == broken else ("1", "")
+        assert (row["attempts"], row["flags"]) == told, number
+    # rows that were complete before are the same to the last byte
+    complete = set(done_trials(whole.records[:records], name))
+    for key, row, other in zip(planned, rows, whole.rows, strict=True):
+        assert key not in complete or row == other
+    assert rebuild(journal)[1] == done.place.table.read_bytes()
+    assert contents.records[-1]["table_sha256"] == hashlib.sha256(done.place.table.read_bytes()).hexdigest()
+
+
+def cuts(name: str, whole: Unbroken) -> range:
+    return range(1, len(whole.lines), EVERY[name])
+
+
+def test_an_unbroken_run_has_one_attempt_a_trial_and_no_flag(unbroken: dict[str, Unbroken]) -> None:
+    for whole in unbroken.values():
+        assert {(row["attempts"], row["flags"]) for row in whole.rows} == {("1", "")}
+        assert whole.records[-1]["kind"] == "finished"
+        assert whole.records[-1]["table_sha256"] == hashlib.sha256(whole.table).hexdigest()
+
+
+@pytest.mark.parametrize("name", SETUPS)
+def test_a_run_broken_off_at_any_record_goes_on_to_the_same_answers(
+    name: str, unbroken: dict[str, Unbroken], tmp_path: Path
+) -> None:
+    whole = unbroken[name]
+    for records in cuts(name, whole):
+        check_resumed(whole, broken_off(whole, tmp_path / str(records), records), records)
+
+
+@pytest.mark.parametrize("name", SETUPS)
+def test_a_run_broken_off_within_a_record_goes_on_from_the_last_whole_one(
+    name: str, unbroken: dict[str, Unbroken], tmp_path: Path
+) -> None:
+    whole = unbroken[name]
+    for records in (1, 3, 4, 7, 11):
+        rest = whole.lines[records][: len(whole.lines[records]) // 2]
+        journal = broken_off(whole, tmp_path / str(records), records, rest)
+        check_resumed(whole, journal, records)
+        assert read(journal).records[records]["cut_bytes"] == len(rest)
+
+
+@pytest.mark.parametrize("name", SETUPS)
+def test_a_run_may_be_broken_off_and_gone_on_with_many_times(
+    name: str, unbroken: dict[str, Unbroken], tmp_path: Path
+) -> None:
+    whole = unbroken[name]
+    journal = broken_off(whole, tmp_path, 2)
+    for _ in range(8):
+        run(request(name, tmp_path, "resume"), synthetic_screen, VirtualClock())
+        lines = journal.read_bytes().splitlines(keepends=True)
+        resumed = max(number for number, line in enumerate(lines) if json.loads(line)["kind"] == "resumed")
+        if resumed + 8 >= len(lines):
+            break
+        journal.write_bytes(b"".join(lines[: resumed + 8]))
+    run_again = run if not read(journal).finished else None
+    if run_again is not None:
+        run(request(name, tmp_path, "resume"), synthetic_screen, VirtualClock())
+    rows = rows_of(place(tmp_path, "P01", name).table)
+    for column in ANSWERS[name]:
+        assert [row[column] for row in rows] == [row[column] for row in whole.rows]
+
+
+@pytest.mark.parametrize("name", SETUPS)
+def test_the_head_of_a_resumption_says_what_it_goes_on_with(
+    name: str, unbroken: dict[str, Unbroken], tmp_path: Path
+) -> None:
+    whole = unbroken[name]
+    journal = broken_off(whole, tmp_path, 5)
+    run(request(name, tmp_path, "resume"), synthetic_screen, VirtualClock())
+    told = read(journal).records[5]
+    assert told["stopped_utc"] == whole.records[4]["utc"]
+    assert told["clock"] == "virtual"
+    assert told["gun"]["model"] == "simulated"
+    assert "git_commit" in told["provenance"]
+
+
+# refused
+
+
+def changed(name: str) -> Iterator[Setup[Any]]:
+    setup = SETUPS[name]
+    yield replace(setup, config=setup.config.model_copy(update={"title": "another"}))
+    yield replace(setup, gun=setup.gun.model_copy(update={"title": "another"}))
+    yield replace(setup, answers=({"participant_id": "P01"},))
+
+
+@pytest.mark.parametrize("name", SETUPS)
+@pytest.mark.parametrize("records", [1, 8])
+def test_another_config_gun_or_table_of_answers_is_refused(
+    name: str, records: int, unbroken: dict[str, Unbroken], tmp_path: Path
+) -> None:
+    journal = broken_off(unbroken[name], tmp_path, records)
+    before = journal.read_bytes()
+    for setup in changed(name):
+        with pytest.raises(PlaceError, match=r"began with another config or gun file .*--fresh"):
+            run(request(name, tmp_path, "resume", setup=setup), synthetic_screen, VirtualClock())
+    assert journal.read_bytes() == before
+
+
+@pytest.mark.parametrize("name", SETUPS)
+def test_another_seed_is_refused_and_the_same_is_not(name: str, unbroken: dict[str, Unbroken], tmp_path: Path) -> None:
+    journal = broken_off(unbroken[name], tmp_path, 4)
+    before = journal.read_bytes()
+    with pytest.raises(PlaceError, match="began with seed 1, not 2; leave out --seed"):
+        run(request(name, tmp_path, "resume", seed=2), synthetic_screen, VirtualClock())
+    assert journal.read_bytes() == before
+    run(request(name, tmp_path, "resume", seed=1), synthetic_screen, VirtualClock())
+
+
+def with_plan(line: bytes, plan: dict[str, Any], **others: object) -> bytes:
+    return canonical_json(json.loads(line) | {"plan": plan} | others) + b"\n"
+
+
+@pytest.mark.parametrize("name", SETUPS)
+def test_another_plan_is_refused_at_the_first_step_that_does_not_follow(
+    name: str, unbroken: dict[str, Unbroken], tmp_path: Path
+) -> None:
+    whole = unbroken[name]
+    journal = broken_off(whole, tmp_path, 20)
+    other = catalogue.CATALOGUE[name].make_plan(SETUPS[name].config, "P01", 3, None)
+    assert other.trials[0] != whole.plan.trials[0]
+    head = with_plan(whole.lines[0], other.record(), plan_sha256=other.sha256())
+    journal.write_bytes(head + b"".join(whole.lines[1:20]))
+    with pytest.raises(JournalError, match="step 1 is 'prepare' and does not follow from the plan in line 1"):
+        run(request(name, tmp_path, "resume", seed=None), synthetic_screen, VirtualClock())
+
+
+@pytest.mark.parametrize("name", SETUPS)
+def test_a_plan_that_was_changed_where_no_trial_was_reached_yet_is_refused_by_its_hash(
+    name: str, unbroken: dict[str, Unbroken], tmp_path: Path
+) -> None:
+    whole = unbroken[name]
+    journal = broken_off(whole, tmp_path, 5)
+    plan = whole.plan.record()
+    plan["trials"] = list(plan["trials"])
+    plan["trials"][-1] = plan["trials"][-1] | {"direction": "backward" if name == "preference" else "forward"}
+    plan["trials"][-2] = plan["trials"][-2] | {"direction": "backward"}
+    assert plan["trials"] != list(whole.plan.record()["trials"])
+    journal.write_bytes(with_plan(whole.lines[0], plan) + b"".join(whole.lines[1:5]))
+    with pytest.raises(JournalError, match="plan"):
+        run(request(name, tmp_path, "resume"), synthetic_screen, VirtualClock())
+
+
+@pytest.mark.parametrize("plan", [{}, [], None, {"seed": 1}])
+def test_a_head_whose_plan_is_none_is_a_journal_error(plan: Any, unbroken: dict[str, Unbroken], tmp_path: Path) -> None:
+    whole = unbroken["direction"]
+    journal = broken_off(whole, tmp_path, 5)
+    journal.write_bytes(with_plan(whole.lines[0], plan) + b"".join(whole.lines[1:5]))
+    for attempt in (
+        lambda: rebuild(journal),
+        lambda: run(request("direction", tmp_path, "resume"), synthetic_screen, VirtualClock()),
+    ):
+        with pytest.raises(JournalError, match="line 1"):
+            attempt()
+
+
+def test_an_answer_that_was_changed_to_none_is_refused_with_its_line(
+    unbroken: dict[str, Unbroken], tmp_path: Path
+) -> None:
+    whole = unbroken["direction"]
+    journal = broken_off(whole, tmp_path, 9)
+    answer = whole.records[6]
+    assert answer["body"]["kind"] == "answered"
+    answer["body"]["response"] = "left"
+    journal.write_bytes(b"".join([*whole.lines[:6], canonical_json(answer) + b"\n", *whole.lines[7:9]]))
+    with pytest.raises(JournalError, match=r"line 7: .*response.*the record was changed"):
+        run(request("direction", tmp_path, "resume"), synthetic_screen, VirtualClock())
+
+
+def test_an_outcome_without_its_step_is_refused_with_its_line(unbroken: dict[str, Unbroken], tmp_path: Path) -> None:
+    whole = unbroken["direction"]
+    doubled = [whole.records[number] for number in (0, 1, 2, 2)]
+    journal = broken_off(whole, tmp_path, 1)
+    journal.write_bytes(b"".join(canonical_json(entry | {"n": n}) + b"\n" for n, entry in enumerate(doubled)))
+    with pytest.raises(JournalError, match="line 4: an outcome without its step"):
+        history(read(journal))
+
+
+@pytest.mark.parametrize("name", SETUPS)
+def test_an_unfinished_run_is_neither_gone_on_with_nor_written_over_unasked(
+    name: str, unbroken: dict[str, Unbroken], tmp_path: Path
+) -> None:
+    journal = broken_off(unbroken[name], tmp_path, 6)
+    before = journal.read_bytes()
+    with pytest.raises(PlaceError, match=r"unfinished run .* after record 5: .*--resume goes on .*--fresh sets it"):
+        run(request(name, tmp_path, "ask"), synthetic_screen, VirtualClock())
+    assert journal.read_bytes() == before
+
+
+@pytest.mark.parametrize("name", SETUPS)
+def test_a_fresh_run_sets_the_unfinished_one_aside_with_every_byte(
+    name: str, unbroken: dict[str, Unbroken], tmp_path: Path
+) -> None:
+    journal = broken_off(unbroken[name], tmp_path, 6, b'{"half')
+    before = journal.read_bytes()
+    run(request(name, tmp_path, "fresh", seed=5), synthetic_screen, VirtualClock())
+    assert journal.with_name(f"{journal.stem}.aside-1.jsonl").read_bytes() == before
+    assert read(journal).header["plan"]["seed"] == 5
+
+
+def test_a_fresh_run_sets_a_journal_aside_that_cannot_be_read(unbroken: dict[str, Unbroken], tmp_path: Path) -> None:
+    journal = broken_off(unbroken["preference"], tmp_path, 0, b'{"half')
+    with pytest.raises(JournalError, match="no whole record"):
+        run(request("preference", tmp_path, "resume"), synthetic_screen, VirtualClock())
+    run(request("preference", tmp_path, "fresh"), synthetic_screen, VirtualClock())
+    assert journal.with_name(f"{journal.stem}.aside-1.jsonl").read_bytes() == b'{"half'
+
+
+def test_a_run_that_another_process_is_at_cannot_be_set_aside(unbroken: dict[str, Unbroken], tmp_path: Path) -> None:
+    journal = broken_off(unbroken["preference"], tmp_path, 6)
+    with Journal.reopen(read(journal), VirtualClock()), pytest.raises(JournalError, match="another run holds"):
+        run(request("preference", tmp_path, "fresh"), synthetic_screen, VirtualClock())
+
+
+@pytest.mark.parametrize("again", ["ask", "resume", "fresh"])
+def test_a_finished_run_is_never_done_again(again: Again, unbroken: dict[str, Unbroken], tmp_path: Path) -> None:
+    whole = unbroken["preference"]
+    journal = broken_off(whole, tmp_path, len(whole.lines))
+    with pytest.raises(PlaceError, match="has finished preference: .*use another code"):
+        run(request("preference", tmp_path, again), synthetic_screen, VirtualClock())
+    assert journal.read_bytes() == b"".join(whole.lines)
+
+
+# parts
+
+
+@pytest.mark.parametrize("name", SETUPS)
+def test_replaying_a_whole_journal_stands_at_the_end(name: str, unbroken: dict[str, Unbroken], tmp_path: Path) -> None:
+    whole = unbroken[name]
+    contents = read(broken_off(whole, tmp_path, len(whole.lines) - 1))
+    session = catalogue.CATALOGUE[name].session(whole.plan, SETUPS[name])
+    standing = replay(session, contents)
+    assert standing.step is None
+    told: list[object] = []
+    assert go_on(session, contents, standing, lambda *record, **body: told.append(record)) == standing
+    assert told == []
+
+
+@pytest.mark.parametrize("name", SETUPS)
+def test_a_rebuilt_table_is_the_same_to_the_last_byte(name: str, unbroken: dict[str, Unbroken], tmp_path: Path) -> None:
+    whole = unbroken[name]
+    journal = broken_off(whole, tmp_path, len(whole.lines))
+    path, data, contents = rebuild(journal)
+    assert path == place(tmp_path, "P01", name).table
+    assert data == whole.table
+    assert contents.finished

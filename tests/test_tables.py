@@ -1,0 +1,223 @@
+import csv
+import io
+
+import pytest
+from hypothesis import example, given, settings
+from hypothesis import strategies as st
+
+from experiments import columns
+from experiments.columns import guard, unguard
+from experiments.direction.plan import make_plan as direction_plan
+from experiments.direction.rows import rows as direction_rows
+from experiments.load import load_setup
+from experiments.plan import Plan
+from experiments.preference.plan import make_plan as preference_plan
+from experiments.preference.rows import rows as preference_rows
+from experiments.steps import (
+    Answered,
+    Ask,
+    Describe,
+    Described,
+    Failed,
+    Fire,
+    Fired,
+    Interrupted,
+    Outcome,
+    Prepare,
+    Prepared,
+    Present,
+    Presented,
+    Rate,
+    Rated,
+    Rest,
+    Rested,
+    Step,
+)
+from experiments.tables import Row, table_bytes
+
+FORMULA_STARTS = tuple("=+-@\t\r")
+DIRECTION: Plan = direction_plan(load_setup("direction").config, "P01", 1, None)
+PREFERENCE: Plan = preference_plan(load_setup("preference").config, "P01", 1, None)
+anything = st.text(st.characters(codec="utf-8"))
+awkward = st.text(st.sampled_from("=+-@\t\r\n'\"; ,aé\0"), max_size=8)
+
+
+def read(data: bytes) -> list[dict[str, str]]:
+    return list(csv.DictReader(io.StringIO(data.decode("utf-8"), newline=""), strict=True))
+
+
+# text that no spreadsheet takes for a formula
+
+
+@settings(deadline=None)
+@given(anything | awkward)
+@example("'")
+@example("''=1")
+def test_any_text_is_read_back_and_never_starts_like_a_formula(text: str) -> None:
+    assert unguard(guard(text)) == text
+    assert not guard(text).startswith(FORMULA_STARTS)
+
+
+@settings(deadline=None)
+@given(st.lists(st.tuples(anything | awkward, anything | awkward), max_size=5))
+def test_any_comment_and_note_survive_the_table(texts: list[tuple[str, str]]) -> None:
+    rows = [{"participant_id": "P01", "comment": comment, "note": note} for comment, note in texts]
+    cells = read(table_bytes("preference", rows))
+    assert [(unguard(row["comment"]), unguard(row["note"])) for row in cells] == texts
+    assert not any(cell.startswith(FORMULA_STARTS) for row in cells for cell in row.values())
+
+
+@settings(deadline=None)
+@given(st.floats(allow_nan=False, allow_infinity=False), st.integers())
+def test_numbers_are_written_as_they_are_negative_ones_too(number: float, count: int) -> None:
+    [row] = read(table_bytes("preference", [{"rating": number, "shots": count}]))
+    assert float(row["rating"]) == number
+    assert row["shots"] == str(count)
+
+
+def test_a_negative_number_gets_no_apostrophe() -> None:
+    [row] = read(table_bytes("direction", [{"response_time_s": -0.25, "trial": -1}]))
+    assert (row["response_time_s"], row["trial"]) == ("-0.25", "-1")
+
+
+def test_text_is_guarded_in_every_text_column_and_in_no_other() -> None:
+    for experiment, table in columns.TABLES.items():
+        [row] = read(table_bytes(experiment, [{column.name: "=1" for column in table}]))
+        assert {name for name, cell in row.items() if cell == "'=1"} == {c.name for c in table if c.type == "text"}
+        assert {name for name, cell in row.items() if cell == "=1"} == {c.name for c in table if c.type != "text"}
+
+
+# RFC 4180
+
+
+@pytest.mark.parametrize("experiment", ["direction", "preference"])
+def test_lines_end_with_cr_lf_and_the_first_one_names_the_columns(experiment: str) -> None:
+    data = table_bytes(experiment, [{}, {}])
+    assert data.endswith(b"\r\n")
+    assert data.count(b"\r\n") == data.count(b"\n") == 3
+    assert data.split(b"\r\n")[0].decode() == ",".join(columns.names(experiment))
+
+
+def test_quotes_are_doubled_and_line_ends_stay_within_quotes() -> None:
+    data = table_bytes("preference", [{"comment": 'so "soft",\nnice'}])
+    assert b'"so ""soft"",\nnice"' in data
+
+
+def test_text_is_utf_8_without_a_byte_order_mark() -> None:
+    data = table_bytes("preference", [{"comment": "weich – schön"}])
+    assert "weich – schön".encode() in data
+    assert data.startswith(b"participant_id")
+
+
+def test_missing_is_empty_and_0_stays_0() -> None:
+    [row] = read(table_bytes("preference", [{"rating": None, "shots": 0, "exposure_s": 0.0}]))
+    assert (row["rating"], row["shots"], row["exposure_s"], row["comment"]) == ("", "0", "0.0", "")
+
+
+def test_the_columns_of_the_contract_come_in_its_order() -> None:
+    assert columns.names("direction")[:13] == [
+        "participant_id", "experiment", "session", "method", "set", "trial", "direction", "response", "correct",
+        "response_time_s", "response_source", "response_time_valid", "attempts",
+    ]  # fmt: skip
+    assert columns.names("preference")[:7] == [
+        "participant_id", "experiment", "trial", "method", "rating", "rating_by", "comment"
+    ]  # fmt: skip
+
+
+# rows from what was done
+
+FIRED = Fired(
+    gun="COM:1",
+    onset_utc="2024-01-01T00:00:00.000000Z",
+    requested_s=0.0,
+    pulse_start_s=0.0,
+    pulse_end_s=0.01,
+    home_predicted_s=0.2,
+    motion="home",
+)
+FAILED, FELT, UNFELT = Failed(cause="no answer"), Interrupted(presented=True), Interrupted(presented=False)
+PLANNED = ("participant_id", "experiment", "session", "method", "set", "trial", "direction")
+
+
+def told(place: int, *outcomes: tuple[str, Outcome]) -> list[tuple[Step, Outcome]]:
+    """What happened to the trial at a place of the plan of experiment 1."""
+    trial = DIRECTION.trials[place]
+    steps = {
+        "prepare": Prepare(trial=trial, attempt=1, damper=""),
+        "fire": Fire(trial=trial, attempt=1),
+        "ask": Ask(trial=trial, attempt=1, question="?", forward="f", backward="b"),
+    }
+    return [(steps[name], outcome) for name, outcome in outcomes]
+
+
+def answer(response: str) -> Answered:
+    return Answered(response=response, response_time_s=0.0, response_source="experimenter", response_time_valid=False)
+
+
+def written(history: list[tuple[Step, Outcome]]) -> list[dict[str, str]]:
+    return read(table_bytes("direction", direction_rows(DIRECTION, history)))
+
+
+def test_trials_that_were_not_reached_have_a_row_with_the_plan_and_no_more() -> None:
+    rows = written([])
+    assert len(rows) == 60
+    assert all(row[name] for row in rows for name in PLANNED)
+    assert not any(cell for row in rows for name, cell in row.items() if name not in PLANNED)
+
+
+def test_rows_come_in_the_order_of_the_plan() -> None:
+    keys = [(int(row["session"]), int(row["set"]), int(row["trial"])) for row in written([])]
+    assert keys == sorted(keys)
+    assert [row["direction"] for row in written([])] == [trial.direction for trial in DIRECTION.trials]
+
+
+@pytest.mark.parametrize("response", ["forward", "backward"])
+def test_an_answer_is_correct_if_it_is_the_direction(response: str) -> None:
+    row = written(told(3, ("prepare", Prepared()), ("fire", FIRED), ("ask", answer(response))))[3]
+    assert row["response"] == response
+    assert row["correct"] == ("1" if response == DIRECTION.trials[3].direction else "0")
+    assert (row["response_time_s"], row["response_time_valid"], row["response_source"]) == ("0.0", "0", "experimenter")
+    assert (row["attempts"], row["flags"], row["gun"]) == ("1", "", "COM:1")
+
+
+@pytest.mark.parametrize(
+    ("outcomes", "attempts", "flags"),
+    [
+        ((("prepare", UNFELT),), "", ""),
+        ((("prepare", Prepared()), ("fire", UNFELT)), "", ""),
+        ((("prepare", Prepared()), ("fire", FELT)), "1", "interrupted"),
+        ((("fire", FAILED), ("fire", FIRED), ("ask", answer("forward"))), "2", "device-error"),
+        ((("fire", FIRED), ("ask", FELT), ("fire", FIRED), ("ask", answer("forward"))), "2", "interrupted"),
+        ((("fire", FAILED), ("fire", FAILED), ("fire", FELT), ("fire", FIRED)), "4", "device-error interrupted"),
+        ((("fire", UNFELT), ("fire", FIRED), ("ask", answer("backward"))), "1", ""),
+    ],
+)
+def test_attempts_count_stimuli_that_may_have_been_felt_and_flags_say_why_there_were_more(
+    outcomes: tuple[tuple[str, Outcome], ...], attempts: str, flags: str
+) -> None:
+    row = written(told(0, *outcomes))[0]
+    assert (row["attempts"], row["flags"]) == (attempts, flags)
+
+
+def test_what_happens_to_one_trial_or_in_a_break_shows_in_no_other_row() -> None:
+    rest = (Rest(between="sets", duration_s=20.0), Rested(rested_s=1.0, cut_reason="=skip"))
+    rows = written([*told(4, ("fire", FIRED), ("ask", answer("forward"))), rest])
+    assert [number for number, row in enumerate(rows) if row["response"] or row["attempts"]] == [4]
+
+
+@pytest.mark.parametrize(("rating", "cell"), [(0.0, "0.0"), (7.3, "7.3"), (10, "10"), (None, "")])
+def test_a_rating_of_0_is_written_and_none_leaves_the_cell_empty(rating: float | None, cell: str) -> None:
+    trial = PREFERENCE.trials[1]
+    shown = Presented(gun="simulated", onset_utc="t", shots=12, exposure_s=11.5, ended_by="next")
+    rate = Rate(trial=trial, question="?", minimum=0, maximum=10, minimum_text="a", maximum_text="b", grain=0.1)
+    history = [
+        (Present(trial=trial, attempt=1, repeat_every_s=1.0, max_shots=120), shown),
+        (rate, Rated(rating=rating, rating_by="participant")),
+        (Describe(trial=trial, question="?"), Described(comment="-soft")),
+    ]
+    rows: list[Row] = preference_rows(PREFERENCE, history)
+    first, row, last = read(table_bytes("preference", rows))
+    assert (row["rating"], row["rating_by"], row["comment"]) == (cell, "participant", "'-soft")
+    assert (row["shots"], row["exposure_s"], row["attempts"]) == ("12", "11.5", "1")
+    planned = ("participant_id", "experiment", "trial", "method")
+    assert not any(other[name] for other in (first, last) for name in other if name not in planned)
