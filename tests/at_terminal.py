@@ -74,6 +74,11 @@ class AtTerminal:
         self.process.wait()
         self._reader.join(5)
 
+    def hang_up(self) -> None:
+        """Close the terminal."""
+        os.close(self._ours)
+        self._ours = -1
+
     def end(self, timeout_s: float = 30) -> int:
         """The exit code."""
         code = self.process.wait(timeout_s)
@@ -86,7 +91,8 @@ class AtTerminal:
     def __exit__(self, *_: object) -> None:
         if self.process.poll() is None:
             self.kill()
-        os.close(self._ours)
+        if self._ours >= 0:
+            os.close(self._ours)
 
 
 def answer_until_killed(screen: AtTerminal, seconds: float) -> None:

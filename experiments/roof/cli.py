@@ -43,8 +43,9 @@ class ScreenName(StrEnum):
 def main() -> None:
     """Run a command. Whatever goes wrong is one message on stderr and an exit code, never a traceback."""
     os.umask(0o077)  # what is written here is about people: for its owner alone
-    for number in (signal.SIGINT, signal.SIGTERM):
-        signal.signal(number, _interrupt)
+    for name in ("SIGINT", "SIGTERM", "SIGHUP"):
+        if hasattr(signal, name):  # not every system knows all three
+            signal.signal(getattr(signal, name), _interrupt)
     try:
         app()
     except KeyboardInterrupt:

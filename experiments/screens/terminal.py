@@ -8,6 +8,7 @@ from __future__ import annotations
 import queue
 import sys
 import threading
+from contextlib import suppress
 from typing import TYPE_CHECKING, TextIO
 
 from experiments.clock import Clock
@@ -152,8 +153,9 @@ class TerminalScreen:
         return line
 
     def _read(self, lines: TextIO) -> None:
-        for line in lines:
-            self._lines.put(line.strip())
+        with suppress(OSError):  # a terminal that vanishes ends like one that is closed
+            for line in lines:
+                self._lines.put(line.strip())
         self._lines.put(None)
 
 

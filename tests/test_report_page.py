@@ -1,0 +1,63 @@
+"""The report in a real browser: it opens without a network, and nothing is clipped, wide or narrow, light or dark."""
+
+from __future__ import annotations
+
+import re
+import shutil
+import subprocess
+from pathlib import Path
+
+import pytest
+from PIL import Image
+
+from tests.conftest import RECOIL
+
+BROWSER = next(filter(None, map(shutil.which, ("chromium", "chromium-browser", "google-chrome"))), None)
+pytestmark = pytest.mark.skipif(BROWSER is None, reason="needs a Chromium")
+
+MEASURE = """<script>addEventListener("load", () => {
+  const wide = [...document.querySelectorAll("body *")].filter(e =>
+    e.getBoundingClientRect().right > innerWidth + 1 && !e.closest(".wide, .scroll, [class*=table]"));
+  const broken = [...document.images].filter(i => !i.naturalWidth);
+  document.title = `wide:${wide.map(e => e.tagName).join()} broken:${broken.length} images:${document.images.length}`;
+});</script>"""
+
+
+@pytest.fixture(scope="module")
+def page(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    folder = tmp_path_factory.mktemp("page")
+    subprocess.run([RECOIL, "reproduce", "--out", "out"], cwd=folder, check=True, capture_output=True)
+    return folder / "out" / "report.html"
+
+
+def browse(page: Path, folder: Path, *words: str) -> str:
+    """What headless Chromium says of a page, with every name resolved to nowhere."""
+    switches = ["--headless", "--no-sandbox", "--disable-gpu", "--disable-background-networking", "--disable-sync"]
+    offline = ["--host-resolver-rules=MAP * ~NOTFOUND", f"--user-data-dir={folder / 'profile'}"]
+    done = subprocess.run(
+        [str(BROWSER), *switches, *offline, *words, page.as_uri()],
+        capture_output=True,
+        text=True,
+        timeout=120,
+        check=True,
+    )
+    return done.stdout
+
+
+def test_the_page_names_nothing_outside_itself(page: Path) -> None:
+    assert not re.search(r"""(src|href)=["'](?!data:|#)""", page.read_text(encoding="utf-8"))
+    assert "<script" not in page.read_text(encoding="utf-8")
+
+
+@pytest.mark.parametrize("width", [1280, 500])
+def test_nothing_sticks_out_and_every_figure_is_there(page: Path, tmp_path: Path, width: int) -> None:
+    measured = tmp_path / "report.html"
+    measured.write_text(page.read_text(encoding="utf-8") + MEASURE, encoding="utf-8")
+    shown = browse(measured, tmp_path, "--dump-dom", f"--window-size={width},2000")
+    assert "<title>wide: broken:0 images:2</title>" in shown
+
+
+def test_the_page_is_painted_in_more_than_two_colours(page: Path, tmp_path: Path) -> None:
+    picture = tmp_path / "report.png"
+    browse(page, tmp_path, f"--screenshot={picture}", "--window-size=1280,3000")
+    assert len(Image.open(picture).convert("RGB").getcolors(maxcolors=1 << 24)) > 50

@@ -1,0 +1,143 @@
+"""The whole study with one command: what it leaves, and that its parts agree with each other."""
+
+from __future__ import annotations
+
+import json
+import subprocess
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+import pytest
+from scipy.stats import studentized_range
+from statsmodels.stats.anova import AnovaRM
+
+from analysis.logs import read_logs
+from experiments.load import load_setup
+from experiments.roof.odds import direction_counts, preference_scores
+from tests.conftest import RECOIL
+
+EXPERIMENTS = ("direction", "preference")
+METHODS = ["vibration", "asymmetric-1", "asymmetric-2"]
+
+
+@pytest.fixture(scope="module")
+def reproduction(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """`recoil reproduce` in an empty folder."""
+    folder = tmp_path_factory.mktemp("reproduction")
+    subprocess.run([RECOIL, "reproduce", "--out", "out"], cwd=folder, check=True, capture_output=True)
+    return folder / "out"
+
+
+def statistics(folder: Path) -> dict[str, dict[str, object]]:
+    return json.loads((folder / "statistics.json").read_text())
+
+
+def scores(reproduction: Path, experiment: str) -> pd.DataFrame:
+    """One score a participant and method, long."""
+    logs = read_logs([reproduction / "logs"])
+    if experiment == "preference":
+        return logs.ratings.rename(columns={"rating": "score"})[["participant_id", "method", "score"]]
+    forward = logs.trials[logs.trials.direction == "forward"]
+    means = forward.groupby(["participant_id", "method"]).correct.mean().astype(float)
+    return means.rename("score").reset_index()
+
+
+def test_it_leaves_28_logs_with_their_journals_and_a_report(reproduction: Path) -> None:
+    assert len(list(reproduction.glob("logs/sub-*/*_journal.jsonl"))) == 28
+    assert len(list(reproduction.glob("logs/sub-*/*.csv"))) == 28
+    for name in ("report.html", "report.md", "statistics.json", "figures/figure-5.svg", "figures/figure-8.png"):
+        assert (reproduction / name).stat().st_size > 0
+
+
+def test_every_table_rebuilt_from_its_journal_is_the_same_byte_for_byte(reproduction: Path) -> None:
+    journals = sorted(reproduction.glob("logs/sub-*/*_journal.jsonl"))
+    before = {path: path.read_bytes() for path in reproduction.glob("logs/sub-*/*.csv")}
+    for path in before:
+        path.unlink()
+    subprocess.run([RECOIL, "rebuild", *journals], check=True, capture_output=True)
+    assert before == {path: path.read_bytes() for path in reproduction.glob("logs/sub-*/*.csv")}
+
+
+def test_analyze_on_the_tables_alone_gives_the_same_numbers(reproduction: Path, tmp_path: Path) -> None:
+    for table in reproduction.glob("logs/sub-*/*.csv"):
+        (tmp_path / table.name).write_bytes(table.read_bytes())
+    done = subprocess.run(
+        [RECOIL, "analyze", tmp_path, "--out", tmp_path / "analysis"], check=False, capture_output=True
+    )
+    assert done.returncode == 0
+    assert statistics(tmp_path / "analysis") == statistics(reproduction)
+
+
+@pytest.mark.parametrize("experiment", EXPERIMENTS)
+def test_f_is_that_of_statsmodels_to_ten_digits(reproduction: Path, experiment: str) -> None:
+    ours = statistics(reproduction)[experiment]["anova"]
+    theirs = AnovaRM(scores(reproduction, experiment), "score", "participant_id", within=["method"]).fit().anova_table
+    assert ours["df"] == [2, 26]
+    assert ours["F"] == pytest.approx(theirs["F Value"].iloc[0], rel=1e-10)
+    assert ours["p"] == pytest.approx(theirs["Pr > F"].iloc[0], rel=1e-8)
+
+
+@pytest.mark.parametrize("experiment", EXPERIMENTS)
+def test_tukeys_p_is_the_studentized_range_of_the_repeated_measures_error(reproduction: Path, experiment: str) -> None:
+    table = scores(reproduction, experiment).pivot_table(index="participant_id", columns="method", values="score")
+    residuals = table.sub(table.mean(axis=1), axis=0).sub(table.mean() - table.to_numpy().mean(), axis=1)
+    error = (residuals.to_numpy() ** 2).sum() / 26
+    for pair in statistics(reproduction)[experiment]["tukey"]:
+        q = abs(table[pair["a"]].mean() - table[pair["b"]].mean()) / np.sqrt(error / 14)
+        assert pair["p"] == pytest.approx(float(studentized_range.sf(q, 3, 26)), rel=1e-6, abs=1e-12)
+
+
+def test_the_same_seed_gives_the_same_answers_and_another_seed_others(reproduction: Path, tmp_path: Path) -> None:
+    for seed in (1, 2):
+        words = [RECOIL, "reproduce", "--seed", str(seed), "--out", tmp_path / str(seed)]
+        subprocess.run(words, check=True, capture_output=True)
+    assert statistics(tmp_path / "1") == statistics(reproduction)
+    assert statistics(tmp_path / "2") != statistics(reproduction)
+
+
+def test_an_interrupted_reproduction_goes_on_and_ends_as_an_unbroken_one(reproduction: Path, tmp_path: Path) -> None:
+    words = [RECOIL, "reproduce", "--out", tmp_path / "out"]
+    process = subprocess.Popen(words, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
+    while len(list(tmp_path.glob("out/logs/sub-*/*.csv"))) < 5:
+        assert process.poll() is None
+    process.kill()
+    process.wait()
+    subprocess.run(words, check=True, capture_output=True)
+    ours, whole = statistics(tmp_path / "out"), statistics(reproduction)
+    assert ours == whole
+
+
+def test_another_study_in_the_folder_is_set_aside_and_a_strangers_folder_is_refused(tmp_path: Path) -> None:
+    quick = tmp_path / "quick"
+    subprocess.run([RECOIL, "configs", "--copy", quick], check=True, capture_output=True)
+    study = quick / "study.toml"
+    study.write_text(study.read_text().replace("participants = 14", "participants = 2").replace("2000", "10"))
+    for seed in ("1", "2"):
+        words = [RECOIL, "reproduce", "--study", study, "--out", tmp_path / "out", "--seed", seed]
+        subprocess.run(words, check=True, capture_output=True)
+    assert (tmp_path / "out.aside-1" / "report.html").exists()
+    assert (tmp_path / "out" / "report.html").exists()
+    done = subprocess.run([RECOIL, "reproduce", "--out", quick], check=False, capture_output=True, text=True)
+    assert done.returncode == 2
+    assert "is no reproduction" in done.stderr
+
+
+def test_the_odds_draw_the_same_kind_of_people_as_the_session(reproduction: Path) -> None:
+    """The people behind the odds are drawn without a session; here they have the session's rates and spread."""
+    config = load_setup("direction").config
+    counts = direction_counts(config, METHODS, 14, 2000, 1)
+    rates = config.synthetic.rates
+    for place, method in enumerate(METHODS):
+        assert counts[:, :, place, 0].mean() / 10 == pytest.approx(rates.forward[method], abs=0.004)
+        assert counts[:, :, place, 1].mean() / 10 == pytest.approx(rates.backward[method], abs=0.004)
+    seen = statistics(reproduction)["direction"]["means"]
+    for place, method in enumerate(METHODS):
+        studies = counts[:, :, place, 0].mean(axis=1) / 10
+        assert studies.min() <= seen[method] <= studies.max()
+
+
+def test_simulated_ratings_keep_the_published_habits() -> None:
+    ratings = preference_scores(load_setup("preference").config, METHODS, 14, 300, 1)
+    assert (ratings[..., 0] <= ratings[..., 1:].min(axis=-1)).all()
+    assert (ratings[..., 1] == ratings[..., 2]).mean() == pytest.approx(0.143, abs=0.03)

@@ -1,0 +1,146 @@
+"""Runs by a person at a terminal, keys and screen included."""
+
+from __future__ import annotations
+
+import csv
+import re
+from pathlib import Path
+
+import pytest
+
+from tests.at_terminal import AtTerminal
+from tests.conftest import RECOIL
+
+
+def run(configs: Path, experiment: str, *more: object) -> list[object]:
+    return [RECOIL, "run", configs / f"{experiment}.toml", "--participant", "P01", "--results", "results", *more]
+
+
+def rows(folder: Path, name: str) -> list[dict[str, str]]:
+    with (folder / "results" / "sub-P01" / f"sub-P01_task-{name}.csv").open(newline="", encoding="utf-8") as table:
+        return list(csv.DictReader(table))
+
+
+@pytest.fixture
+def short_configs(quick_configs: Path) -> Path:
+    """Experiment 1 with a session of two sets of two trials a method, and breaks of a second."""
+    config = quick_configs / "direction.toml"
+    changes = {
+        "sets_per_session": "2",
+        "trials_per_set": "2",
+        "forward_per_session": "2",
+        "backward_per_session": "2",
+        "between_sets_s": "1.0",
+        "between_sessions_s": "60.0",
+    }
+    text = config.read_text()
+    for key, value in changes.items():
+        text = re.sub(rf"^{key} = [\d.]+", f"{key} = {value}", text, flags=re.MULTILINE)
+    config.write_text(text)
+    return quick_configs
+
+
+def test_experiment_1_from_the_first_hand_over_to_the_table(short_configs: Path, tmp_path: Path) -> None:
+    with AtTerminal(run(short_configs, "direction", "--seed", 3), tmp_path) as screen:
+        for trial in range(12):
+            screen.wait_for("Enter fires:", trial + 1)
+            screen.type("")
+            screen.wait_for("b = backward:", trial + 1)
+            if trial == 0:
+                screen.type("left")
+                screen.wait_for("Not an answer")
+                screen.wait_for("b = backward:", 2)
+            screen.type("f" if trial % 2 else "B")
+            screen.wait_for("Saved.", trial + 1)
+            if trial in (3, 7):
+                screen.wait_for("Break between sessions: 60 s", 1 + (trial == 7))
+                screen.type("skip")
+                screen.wait_for("type `skip` and the reason")
+                screen.type("skip fire drill")
+            if trial == 0:  # one prompt more was shown for the answer that was none
+                screen.seen = screen.seen.replace("b = backward:", "", 1)
+        assert screen.end() == 0
+        shown = screen.seen
+    assert "Break between sets: 1 s" in shown
+    assert "SET THE DAMPER" in shown.upper()
+    assert not re.search(r"correct|wrong|score|%", shown, re.IGNORECASE)
+    table = rows(tmp_path, "direction_trials")
+    assert [row["response"] for row in table] == ["backward", "forward"] * 6
+    assert {row["response_source"] for row in table} == {"experimenter"}
+    assert {row["response_time_valid"] for row in table} == {"0"}
+    journal = (tmp_path / "results/sub-P01/sub-P01_task-direction_journal.jsonl").read_text()
+    assert journal.count('"cut_reason":"fire drill"') == 2
+
+
+def test_experiment_2_with_a_rating_of_zero_no_answer_and_a_comment_that_looks_like_a_formula(
+    quick_configs: Path, tmp_path: Path
+) -> None:
+    with AtTerminal(run(quick_configs, "preference"), tmp_path) as screen:
+        for trial in range(3):
+            screen.wait_for("Enter fires:", trial + 1)
+            screen.type("")
+            screen.wait_for("says next:", trial + 1)
+            screen.type("")
+            screen.wait_for("Presented and saved.", trial + 1)
+        for trial, (rating, comment) in enumerate((("0", "=1+1"), ("none", ""), ("7,5", 'a "toy", said she'))):
+            screen.wait_for("for no answer:", trial + 1)
+            screen.type(rating)
+            screen.wait_for("in your own words.", trial + 1)
+            screen.type(comment)
+        assert screen.end() == 0
+    table = rows(tmp_path, "preference_ratings")
+    assert [row["rating"] for row in table] == ["0.0", "", "7.5"]
+    assert [row["comment"] for row in table] == ["'=1+1", "", 'a "toy", said she']
+    assert all(int(row["shots"]) >= 1 for row in table)
+
+
+def test_a_rating_off_the_scale_is_asked_again(quick_configs: Path, tmp_path: Path) -> None:
+    with AtTerminal(run(quick_configs, "preference"), tmp_path) as screen:
+        for trial in range(3):
+            screen.wait_for("Enter fires:", trial + 1)
+            screen.type("")
+            screen.wait_for("says next:", trial + 1)
+            screen.type("")
+        for count, typed in enumerate(("11", "-1", "much", "nan", ""), start=1):
+            screen.wait_for("for no answer:", count)
+            screen.type(typed)
+            screen.wait_for("Not a rating", count)
+        screen.type("stop")
+        assert screen.end() == 130
+
+
+def test_a_stopped_run_keeps_its_table_and_needs_a_decision(quick_configs: Path, tmp_path: Path) -> None:
+    with AtTerminal(run(quick_configs, "direction"), tmp_path) as screen:
+        screen.answer_trials(2)
+        screen.wait_for("Enter fires:", 3)
+        screen.type("stop lunch")
+        assert screen.end() == 130
+        assert "stopped: lunch. Go on with --resume." in screen.seen
+    assert sum(row["response"] != "" for row in rows(tmp_path, "direction_trials")) == 2
+    with AtTerminal(run(quick_configs, "direction"), tmp_path) as screen:
+        assert screen.end() == 2
+        assert "has an unfinished run of direction" in screen.seen
+    with AtTerminal(run(quick_configs, "direction", "--fresh"), tmp_path) as screen:
+        screen.wait_for("Enter fires:")
+        screen.type("stop")
+        assert screen.end() == 130
+    aside = sorted(path.name for path in (tmp_path / "results/sub-P01").glob("*aside*"))
+    assert aside == ["sub-P01_task-direction_journal.aside-1.jsonl", "sub-P01_task-direction_trials.aside-1.csv"]
+
+
+def test_two_consoles_cannot_run_one_participant(quick_configs: Path, tmp_path: Path) -> None:
+    with AtTerminal(run(quick_configs, "direction"), tmp_path) as first:
+        first.wait_for("Enter fires:")
+        with AtTerminal(run(quick_configs, "direction", "--resume"), tmp_path) as second:
+            assert second.end() == 2
+            assert "another run holds this journal" in second.seen
+        first.answer_trials(1)
+
+
+def test_a_terminal_that_is_closed_stops_the_run(quick_configs: Path, tmp_path: Path) -> None:
+    with AtTerminal(run(quick_configs, "direction"), tmp_path) as screen:
+        screen.answer_trials(1)
+        screen.hang_up()
+        screen.end()
+    journal = (tmp_path / "results/sub-P01/sub-P01_task-direction_journal.jsonl").read_text()
+    assert '"kind":"stopped"' in journal.splitlines()[-1]
