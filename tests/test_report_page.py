@@ -34,13 +34,8 @@ def browse(page: Path, folder: Path, *words: str) -> str:
     """What headless Chromium says of a page, with every name resolved to nowhere."""
     switches = ["--headless", "--no-sandbox", "--disable-gpu", "--disable-background-networking", "--disable-sync"]
     offline = ["--host-resolver-rules=MAP * ~NOTFOUND", f"--user-data-dir={folder / 'profile'}"]
-    done = subprocess.run(
-        [str(BROWSER), *switches, *offline, *words, page.as_uri()],
-        capture_output=True,
-        text=True,
-        timeout=120,
-        check=True,
-    )
+    command = [str(BROWSER), *switches, *offline, *words, page.as_uri()]
+    done = subprocess.run(command, capture_output=True, text=True, timeout=120, check=True)
     return done.stdout
 
 

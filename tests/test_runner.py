@@ -1,6 +1,5 @@
 import csv
 import json
-from collections.abc import Iterator
 from contextlib import closing, suppress
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -277,10 +276,10 @@ def test_faults_that_are_not_in_a_row_do_not_stop_the_run(tmp_path: Path) -> Non
 
 
 @BOTH
-def test_a_gun_that_cannot_say_who_it_is_behind_a_shot_marks_the_trial(name: str, tmp_path: Path) -> None:
+def test_a_gun_that_cannot_say_who_it_is_behind_a_shot_does_not_end_the_run(name: str, tmp_path: Path) -> None:
     desk = sitting(name, tmp_path, {("identify", 1): LinkError("no answer")})
     desk.carry_out()
-    assert (desk.rows()[0]["attempts"], desk.rows()[0]["flags"]) == ("2", "device-error")
+    assert all(row["response" if name == "direction" else "rating"] for row in desk.rows())
 
 
 @BOTH
@@ -295,13 +294,11 @@ def test_a_link_that_is_dead_even_for_disarming_stops_the_run_as_any_other_fault
 # disarmed, whatever happens
 
 
-def unexpected() -> Iterator[Any]:
-    for trouble in (RuntimeError("a bug"), KeyboardInterrupt(), SystemExit(1), OSError("unplugged")):
-        yield pytest.param(trouble, id=type(trouble).__name__)
+UNEXPECTED = [RuntimeError("a bug"), KeyboardInterrupt(), SystemExit(1), OSError("unplugged")]
 
 
 @BOTH
-@pytest.mark.parametrize("trouble", unexpected())
+@pytest.mark.parametrize("trouble", UNEXPECTED, ids=lambda trouble: type(trouble).__name__)
 @pytest.mark.parametrize("call", [("arm", 2), ("fire", 2), ("status", 2)], ids=lambda call: call[0])
 def test_the_gun_is_disarmed_after_any_exception_of_its_own(
     name: str, trouble: BaseException, call: tuple[str, int], tmp_path: Path
@@ -315,7 +312,7 @@ def test_the_gun_is_disarmed_after_any_exception_of_its_own(
 
 
 @BOTH
-@pytest.mark.parametrize("trouble", unexpected())
+@pytest.mark.parametrize("trouble", UNEXPECTED, ids=lambda trouble: type(trouble).__name__)
 @pytest.mark.parametrize("number", [1, 2, 5])
 def test_the_gun_is_disarmed_after_any_exception_of_the_screen(
     name: str, trouble: BaseException, number: int, tmp_path: Path
@@ -344,6 +341,7 @@ def test_what_was_acknowledged_before_an_interrupt_is_there_when_resumed(name: s
 def test_an_interrupted_run_leaves_a_reason_and_a_table_of_what_was_answered(tmp_path: Path) -> None:
     class Impatient(SyntheticScreen):
         def acknowledge(self, step: Step, outcome: Outcome) -> None:
+            super().acknowledge(step, outcome)
             if outcome.kind == "answered":
                 raise KeyboardInterrupt
 
