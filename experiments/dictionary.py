@@ -37,6 +37,7 @@ that clock was real or virtual (synthetic participants: breaks take no time).
 | `n` | every record | number of the record, from 0 |
 | `kind` | every record | `run`, `step`, `outcome`, `stopped`, `resumed` or `finished` |
 | `monotonic_s`, `utc` | every record | when it was written |
+| `link` | every record | first 16 digits of the SHA-256 of the line before: a record changed by hand breaks the chain |
 | `synced_s` | every record | when the record before it was on the disk |
 | `plan`, `plan_sha256` | `run` | the whole frozen plan with its seed, and the hash of its canonical JSON |
 | `setup`, `setup_sha256` | `run` | the resolved configs (and the synthetic table, if used) and their hash |

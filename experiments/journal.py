@@ -1,11 +1,13 @@
 """The journal of a run: append-only, synced record by record. It is the truth; every table is made from it.
 
 One JSON object a line. The first record holds the whole plan, the resolved setup and where they came from. Every record
-has its number `n`, its `kind`, monotonic and UTC time, and when the record before it was on the disk (`synced_s`).
+has its number `n`, its `kind`, monotonic and UTC time, when the record before it was on the disk (`synced_s`), and the
+hash of that record's line (`link`): a record changed by hand breaks the chain.
 """
 
 from __future__ import annotations
 
+import hashlib
 import json
 import os
 from concurrent.futures import Future, ThreadPoolExecutor
@@ -15,7 +17,7 @@ from pathlib import Path
 from typing import Any, Literal, Self, get_args
 
 from experiments import storage
-from experiments.canonical import canonical_json
+from experiments.canonical import canonical_json, sha256
 from experiments.clock import Clock
 
 Kind = Literal["run", "step", "outcome", "resumed", "stopped", "finished"]
@@ -34,6 +36,7 @@ class Contents:
     records: tuple[dict[str, Any], ...]
     whole_bytes: int
     cut_bytes: int
+    link: str
 
     @property
     def header(self) -> dict[str, Any]:
@@ -62,12 +65,13 @@ class Journal:
     A thread of its own writes, so that an interrupt, which reaches the main thread alone, never hits half a record.
     """
 
-    def __init__(self, path: Path, descriptor: int, clock: Clock, *, count: int, length: int) -> None:
+    def __init__(self, path: Path, descriptor: int, clock: Clock, before: Contents | None = None) -> None:
         self.path = path
         self._descriptor = descriptor
         self._clock = clock
-        self._count = count
-        self._length = length
+        self._count = len(before.records) if before else 0
+        self._length = before.whole_bytes if before else 0
+        self._link = before.link if before else ""
         self._synced_s: float | None = None
         self._writer = ThreadPoolExecutor(max_workers=1, thread_name_prefix="journal")
 
@@ -78,14 +82,23 @@ class Journal:
             descriptor = storage.create(path)
         except OSError as error:
             raise JournalError(f"{path}: cannot be created ({error.strerror}); nothing was recorded") from error
-        return cls(path, _held(path, descriptor), clock, count=0, length=0)
+        return cls(path, _held(path, descriptor), clock)
 
     @classmethod
     def reopen(cls, contents: Contents, clock: Clock) -> Self:
-        """A journal to go on with: what was cut off, and so never acknowledged, is taken away first."""
-        descriptor = _held(contents.path, storage.reopen(contents.path))
-        os.ftruncate(descriptor, contents.whole_bytes)
-        return cls(contents.path, descriptor, clock, count=len(contents.records), length=contents.whole_bytes)
+        """A journal to go on with: what was cut off, and so never acknowledged, is taken away first.
+
+        `JournalError` if another run holds it, or wrote to it since `contents` was read.
+        """
+        descriptor = hold(contents.path)
+        try:
+            if os.fstat(descriptor).st_size != contents.whole_bytes + contents.cut_bytes:
+                raise JournalError(f"{contents.path}: another run wrote to it just now; look again and start anew")
+            os.ftruncate(descriptor, contents.whole_bytes)
+        except BaseException:
+            os.close(descriptor)
+            raise
+        return cls(contents.path, descriptor, clock, contents)
 
     def append(self, kind: Kind, **body: object) -> None:
         """Write one record and return when it is on the disk."""
@@ -97,19 +110,21 @@ class Journal:
         return self._writer.submit(self._write, {"kind": kind, **times, **body})
 
     def _write(self, record: dict[str, object]) -> None:
-        line = canonical_json({"n": self._count, "synced_s": self._synced_s, **record}) + b"\n"
         try:
+            line = canonical_json({"n": self._count, "link": self._link, "synced_s": self._synced_s, **record}) + b"\n"
             storage.write_all(self._descriptor, line)
             storage.sync(self._descriptor)
-        except OSError as error:
+        except (OSError, ValueError) as error:
             self._take_back()
+            reason = error.strerror if isinstance(error, OSError) else error
             raise JournalError(
-                f"{self.path}: record {self._count} cannot be written ({error.strerror}); "
+                f"{self.path}: record {self._count} cannot be written ({reason}); "
                 f"everything up to record {self._count - 1} is safe on the disk"
             ) from error
         self._synced_s = self._clock.now()
         self._count += 1
         self._length += len(line)
+        self._link = link(line)
 
     def _take_back(self) -> None:
         """Remove a record that was not acknowledged, so that the journal ends with a whole one."""
@@ -128,11 +143,25 @@ class Journal:
         self.close()
 
 
+def hold(path: Path) -> int:
+    """An existing journal opened for this process alone. `JournalError` if it is gone or another run holds it."""
+    try:
+        descriptor = storage.reopen(path)
+    except OSError as error:
+        raise JournalError(f"{path}: cannot be opened ({error.strerror})") from error
+    return _held(path, descriptor)
+
+
 def _held(path: Path, descriptor: int) -> int:
     if not storage.hold(descriptor):
         os.close(descriptor)
         raise JournalError(f"{path}: another run holds this journal; close that one first")
     return descriptor
+
+
+def link(line: bytes) -> str:
+    """What the next record says of a line: the first 16 digits of its SHA-256."""
+    return hashlib.sha256(line.rstrip(b"\r\n")).hexdigest()[:16]
 
 
 def read(path: Path) -> Contents:
@@ -142,16 +171,23 @@ def read(path: Path) -> Contents:
     """
     data = _bytes(path)
     whole_bytes = data.rfind(b"\n") + 1
-    lines = data[:whole_bytes].splitlines()
+    lines = data[:whole_bytes].split(b"\n")[:-1]
     _check_head(path, lines)
-    records = tuple(_record(path, number, line) for number, line in enumerate(lines))
-    return Contents(path=path, records=records, whole_bytes=whole_bytes, cut_bytes=len(data) - whole_bytes)
+    links = ["", *map(link, lines)]
+    records = tuple(_record(path, number, line, links[number]) for number, line in enumerate(lines))
+    cut_bytes = len(data) - whole_bytes
+    return Contents(path=path, records=records, whole_bytes=whole_bytes, cut_bytes=cut_bytes, link=links[-1])
 
 
-def head(path: Path) -> dict[str, Any]:
-    """The first record of a journal: plan, setup, provenance."""
-    first = _bytes(path).split(b"\n", 1)
-    return _check_head(path, first[:-1])
+def head(path: Path) -> dict[str, Any] | None:
+    """The first record of a journal: plan, setup, provenance. `None` if the run was killed before it was whole."""
+    lines = _bytes(path).split(b"\n", 1)[:-1]
+    return _check_head(path, lines) if lines else None
+
+
+def is_empty(path: Path) -> bool:
+    """Whether a journal holds no whole record: the run was killed before anything was acknowledged."""
+    return b"\n" not in _bytes(path)
 
 
 def _bytes(path: Path) -> bytes:
@@ -163,21 +199,26 @@ def _bytes(path: Path) -> bytes:
 
 def _check_head(path: Path, lines: list[bytes]) -> dict[str, Any]:
     if not lines:
-        raise JournalError(f"{path}: line 1: no whole record, so nothing was acknowledged; --fresh sets the file aside")
-    first = _record(path, 0, lines[0])
-    if first["kind"] != "run" or not {"plan", "setup", "setup_sha256"} <= first.keys():
+        raise JournalError(f"{path}: line 1: no whole record, so nothing was acknowledged")
+    first = _record(path, 0, lines[0], "")
+    if first["kind"] != "run" or not {"plan", "setup"} <= first.keys():
         raise JournalError(f"{path}: line 1: not the head of a journal (kind `run` with `plan` and `setup`)")
+    for part in ("plan", "setup"):
+        if sha256(first[part]) != first.get(f"{part}_sha256"):
+            raise JournalError(f"{path}: line 1: {part} does not have the hash {part}_sha256; it was changed")
     return first
 
 
-def _record(path: Path, number: int, line: bytes) -> dict[str, Any]:
+def _record(path: Path, number: int, line: bytes, before: str) -> dict[str, Any]:
     place = f"{path}: line {number + 1}"
     try:
         value = json.loads(line)
-    except ValueError as error:
+    except (ValueError, RecursionError) as error:
         raise JournalError(f"{place}: not a JSON record ({error}); the journal was changed or damaged") from error
     if not isinstance(value, dict) or value.get("kind") not in _KINDS:
         raise JournalError(f"{place}: kind must be one of {', '.join(_KINDS)}; the journal was changed or damaged")
     if value.get("n") != number:
         raise JournalError(f"{place}: record number is {value.get('n')!r}, must be {number}; a line was lost or added")
+    if value.get("link") != before:
+        raise JournalError(f"{place}: does not follow from line {number}, which was changed after it was written")
     return value

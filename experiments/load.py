@@ -6,6 +6,7 @@ import csv
 import json
 import re
 import tomllib
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Any, TypeVar
 
@@ -45,12 +46,12 @@ def load_setup(name: str) -> Setup[Any]:
     path = find(name)
     table = read_toml(path)
     kind = table.get("experiment")
-    if kind not in CATALOGUE:
+    if not isinstance(kind, str) or kind not in CATALOGUE:
         known = ", ".join(CATALOGUE)
         raise ConfigError(f"{path}: experiment = {kind!r}; must be one of {known} (is it the config of a run?)")
     config = _checked(CATALOGUE[kind].config, path, table)
     gun = load_gun(path.parent / config.gun)
-    setup = Setup(config=config, gun=gun, folder=path.parent, answers=_answers(path, config))
+    setup = Setup(config=config, gun=gun, source=path, answers=_answers(path, config))
     _check_methods(path, setup)
     return setup
 
@@ -72,10 +73,10 @@ def read_toml(path: Path) -> dict[str, Any]:
     """The tables of a TOML file, unchecked."""
     try:
         return tomllib.loads(path.read_text(encoding="utf-8"))
-    except tomllib.TOMLDecodeError as error:
-        raise ConfigError(f"{path}: not TOML: {error}") from error
     except UnicodeDecodeError as error:
         raise ConfigError(f"{path}: byte {error.start}: not UTF-8; save the file as UTF-8") from error
+    except (ValueError, RecursionError) as error:  # also numbers and nestings beyond all reason
+        raise ConfigError(f"{path}: not TOML: {error}") from error
     except OSError as error:
         raise ConfigError(f"{path}: cannot be read ({error.strerror})") from error
 
@@ -83,10 +84,15 @@ def read_toml(path: Path) -> dict[str, Any]:
 def _checked(model: type[SomeModel], path: Path, table: dict[str, Any]) -> SomeModel:
     try:
         # JSON on the way: strict types, while TOML's arrays may become tuples
-        return model.model_validate_json(json.dumps(table, default=str))
+        return model.model_validate_json(json.dumps(table, default=_no_json))
     except ValidationError as error:
         text = path.read_text(encoding="utf-8")
         raise ConfigError("\n".join(_finding(path, text, finding) for finding in error.errors())) from error
+
+
+def _no_json(value: object) -> dict[str, str]:
+    """Dates and times, which no config has: as something that is neither text nor number."""
+    return {"date": str(value)}
 
 
 def _finding(path: Path, text: str, finding: Any) -> str:
@@ -107,7 +113,7 @@ def line_of(text: str, keys: list[str]) -> int | None:
     """
     places: dict[tuple[str, ...], int] = {}
     table: tuple[str, ...] = ()
-    for number, line in enumerate(text.splitlines(), start=1):
+    for number, line in enumerate(text.split("\n"), start=1):
         if header := re.match(r"\s*\[([^\[\]]+)\]", line):
             table = tuple(part.strip(' "') for part in header[1].split("."))
             places.setdefault(table, number)
@@ -130,14 +136,16 @@ def _answers(path: Path, config: ExperimentConfig) -> tuple[dict[str, str], ...]
     table, columns = path.parent / synthetic.table, CATALOGUE[config.experiment].answer_columns
     try:
         with table.open(encoding="utf-8-sig", newline="") as file:
-            reader = csv.DictReader(file, strict=True)
-            rows = tuple(reader)
-            header = tuple(reader.fieldnames or ())
-    except (OSError, UnicodeDecodeError, csv.Error) as error:
+            return tuple(_answer_rows(table, csv.reader(file, strict=True), columns))
+    except (OSError, ValueError, csv.Error) as error:
         raise ConfigError(f"{table}: cannot be read ({error}); the config's key synthetic.table names it") from error
+
+
+def _answer_rows(table: Path, lines: Any, columns: tuple[str, ...]) -> Iterator[dict[str, str]]:
+    header = tuple(next(lines, ()))
     if header != columns:
         raise ConfigError(f"{table}: line 1: columns are {', '.join(header)}; they must be {', '.join(columns)}")
-    for number, row in enumerate(rows, start=2):
-        if None in row or None in row.values():
-            raise ConfigError(f"{table}: line {number}: must have {len(columns)} fields")
-    return rows
+    for row in filter(None, lines):
+        if len(row) != len(columns):
+            raise ConfigError(f"{table}: line {lines.line_num}: {len(row)} fields; there must be {len(columns)}")
+        yield dict(zip(columns, row, strict=True))

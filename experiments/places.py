@@ -74,8 +74,8 @@ def journals(results: Path, experiment: str) -> Iterator[Path]:
 
 def used_rows(results: Path, experiment: str) -> list[int]:
     """The rows of the balancing square that runs in this folder have taken."""
-    plans = [journal.head(path)["plan"] for path in journals(results, experiment)]
-    return [plan["order_row"] for plan in plans if plan["order_row"] is not None]
+    heads = filter(None, map(journal.head, journals(results, experiment)))
+    return [head["plan"]["order_row"] for head in heads if head["plan"]["order_row"] is not None]
 
 
 def set_aside(run: Place) -> list[Path]:

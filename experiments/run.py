@@ -3,22 +3,25 @@
 from __future__ import annotations
 
 import hashlib
+import os
 from collections.abc import Callable
 from contextlib import closing
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any, Literal
 
+from pydantic import ValidationError
+
 from device import Gun, open_gun
 from experiments import catalogue, limits, orders, places, replay, storage
 from experiments.clock import Clock
 from experiments.columns import FILE_SUFFIX
-from experiments.journal import Contents, Journal, JournalError
+from experiments.journal import Contents, Journal, JournalError, hold, is_empty
 from experiments.journal import read as read_journal
 from experiments.places import Place, PlaceError
 from experiments.plan import Plan
 from experiments.provenance import provenance
-from experiments.runner import Desk, RunStopped, Screen, carry_out
+from experiments.runner import Desk, RunStopped, Screen, carry_out, gun_name
 from experiments.setup import Setup
 from experiments.steps import History, Session, Standing
 from experiments.streams import draw_seed
@@ -94,18 +97,24 @@ def _before(where: Place, request: Request) -> Contents | None:
     """The unfinished run to go on with, if there is one and it is wanted."""
     if not where.journal.exists():
         return None
-    contents = read_journal(where.journal) if request.again != "fresh" else _readable(where)
+    if request.again == "fresh" or is_empty(where.journal):
+        _refuse_finished(where, _readable(where))
+        os.close(hold(where.journal))  # refused while another run is at it
+        places.set_aside(where)
+        return None
+    contents = read_journal(where.journal)
+    _refuse_finished(where, contents)
+    if request.again == "ask":
+        raise PlaceError(_unfinished(where, contents))
+    return contents
+
+
+def _refuse_finished(where: Place, contents: Contents | None) -> None:
     if contents is not None and contents.finished:
         raise PlaceError(
             f"participant {where.participant_id} has finished {where.experiment}: {where.journal}; "
             "one finished run a participant and experiment, so use another code"
         )
-    if request.again == "fresh":
-        places.set_aside(where)
-        return None
-    if request.again == "ask":
-        raise PlaceError(_unfinished(where, contents))
-    return contents
 
 
 def _readable(where: Place) -> Contents | None:
@@ -115,24 +124,25 @@ def _readable(where: Place) -> Contents | None:
         return None
 
 
-def _unfinished(where: Place, contents: Contents | None) -> str:
-    last = contents.records[-1] if contents else {}
+def _unfinished(where: Place, contents: Contents) -> str:
+    last = contents.records[-1]
     return (
         f"participant {where.participant_id} has an unfinished run of {where.experiment}, stopped at "
-        f"{last.get('utc')} after record {last.get('n')}: {where.journal}; "
+        f"{last['utc']} after record {last['n']}: {where.journal}; "
         "--resume goes on with it, --fresh sets it aside and starts anew"
     )
 
 
 def _carry_out(job: _Job, gun: Gun, make_screen: MakeScreen) -> Finished:
     setup, plan = job.request.setup, _plan(job)
-    session = job.experiment.session(plan, setup)
+    session, screen = job.experiment.session(plan, setup), make_screen(setup, plan, job.clock)
     with _open(job) as journal:
         standing = _begin(job, plan, session, journal, gun)
         desk = Desk(
             gun=gun,
+            gun_name=gun_name(gun.identify()),
             drives=limits.drives(setup),
-            screen=make_screen(setup, plan, job.clock),
+            screen=screen,
             journal=journal,
             clock=job.clock,
         )
@@ -143,7 +153,7 @@ def _carry_out(job: _Job, gun: Gun, make_screen: MakeScreen) -> Finished:
 def _plan(job: _Job) -> Plan:
     if job.before is not None:
         _refuse_changes(job.request, job.before)
-        return Plan.from_record(job.before.header["plan"])
+        return plan_of(job.before)
     config = job.request.setup.config
     order = config.design.order
     used = [] if order == "random" else places.used_rows(job.place.results, config.experiment)
@@ -200,6 +210,14 @@ def _to_the_end(session: Session, desk: Desk, standing: Standing, plan: Plan, pl
     storage.write_whole(place.table, data)
 
 
+def plan_of(contents: Contents) -> Plan:
+    """The plan at the head of a journal."""
+    try:
+        return Plan.from_record(contents.header["plan"])
+    except ValidationError as error:
+        raise JournalError(f"{contents.path}: line 1: no plan of this version of Recoil") from error
+
+
 def table(plan: Plan, history: History) -> bytes:
     """The CSV of a plan and what became of it."""
     return table_bytes(plan.experiment, catalogue.CATALOGUE[plan.experiment].rows(plan, history))
@@ -208,7 +226,7 @@ def table(plan: Plan, history: History) -> bytes:
 def rebuild(path: Path) -> tuple[Path, bytes, Contents]:
     """The table of a journal: where it belongs, its bytes, and what the journal holds."""
     contents = read_journal(path)
-    plan = Plan.from_record(contents.header["plan"])
+    plan = plan_of(contents)
     if plan.experiment not in catalogue.CATALOGUE:
         raise JournalError(f"{path}: line 1: experiment {plan.experiment!r} is not known to this version of Recoil")
     name = path.name.replace("_journal", f"_{FILE_SUFFIX[plan.experiment]}")

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 from typing import Protocol
 
 from device import DeviceError, Gun, LimitError, LinkError, Shot, ShotReport
-from device.words import Drive
+from device.words import Drive, Identity
 from experiments.clock import Clock
 from experiments.journal import Journal
 from experiments.plan import Trial
@@ -77,16 +77,24 @@ class Desk:
     """All that carries steps out: gun and how each method drives it, screen, journal and clock."""
 
     gun: Gun
+    gun_name: str
     drives: Mapping[str, Drive]
     screen: Screen
     journal: Journal
     clock: Clock
 
-    @property
-    def gun_name(self) -> str:
-        """Who renders: `simulated`, or model and serial number."""
-        identity = self.gun.identify()
-        return identity.model if identity.model == identity.serial else f"{identity.model}:{identity.serial}"
+
+def gun_name(identity: Identity) -> str:
+    """Who renders, as the tables say it: `simulated`, or model and serial number."""
+    return identity.model if identity.model == identity.serial else f"{identity.model}:{identity.serial}"
+
+
+def disarm(gun: Gun) -> None:
+    """Disarm, or stop the run: nobody is to hold a gun that may fire. `RunStopped` says what to do."""
+    try:
+        gun.disarm()
+    except DeviceError as error:
+        raise RunStopped(f"the gun cannot be disarmed ({error}): switch off its power") from error
 
 
 def carry_out(session: Session, desk: Desk, standing: Standing) -> History:
@@ -107,7 +115,7 @@ def carry_out(session: Session, desk: Desk, standing: Standing) -> History:
             step = _next(session, outcome)
     finally:
         session.close()
-        desk.gun.disarm()
+        disarm(desk.gun)
     return done
 
 
@@ -154,7 +162,7 @@ def _fire(step: Fire, desk: Desk) -> Fired | Failed:
     except (LimitError, LinkError) as error:
         return Failed(cause=str(error))
     finally:
-        desk.gun.disarm()
+        disarm(desk.gun)
     return Fired(
         gun=desk.gun_name,
         onset_utc=onset_utc,
@@ -187,7 +195,7 @@ def _present(step: Present, desk: Desk) -> Presented | Failed:
     except DeviceError as error:
         return Failed(cause=str(error))
     finally:
-        desk.gun.disarm()
+        disarm(desk.gun)
     return _presented(desk, onset_utc, first, shots, "next")
 
 

@@ -15,11 +15,11 @@ Config_co = TypeVar("Config_co", bound=ExperimentConfig, covariant=True)
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Setup(Generic[Config_co]):
-    """An experiment's config, its gun and the answers of its table, if a table answers. `folder` is where they lie."""
+    """An experiment's config, its gun and the answers of its table, if a table answers. `source` is its file."""
 
     config: Config_co
     gun: GunConfig
-    folder: Path
+    source: Path
     answers: tuple[dict[str, str], ...] = field(default=())
 
     def record(self) -> dict[str, Any]:

@@ -57,8 +57,8 @@ class Stream:
         return order
 
     def uniform(self) -> float:
-        """A number strictly between 0 and 1, on a grid of 2**-53 shifted by half a step."""
-        return ((self._raw() >> 11) + 0.5) * 2.0**-53
+        """A number strictly between 0 and 1, on a grid of 2**-52 shifted by half a step."""
+        return ((self._raw() >> 12) + 0.5) * 2.0**-52
 
     def normal(self) -> float:
         """A standard normal number, by the inverse of its distribution."""

@@ -85,7 +85,7 @@ def with_breaks(between_sets_s: float, between_sessions_s: float) -> Setup[Any]:
         update={"between_sets_s": between_sets_s, "between_sessions_s": between_sessions_s}
     )
     config = SETUP.config.model_copy(update={"breaks": breaks})
-    return Setup(config=config, gun=SETUP.gun, folder=SETUP.folder)
+    return Setup(config=config, gun=SETUP.gun, source=SETUP.source)
 
 
 STEPS = driven(PLAN, SETUP)

@@ -46,7 +46,7 @@ def refusal(path: Path) -> str:
 def test_a_shipped_config_loads_by_its_name_and_is_within_the_limits(name: str, ending: str) -> None:
     setup = load_setup(f"{name}{ending}")
     assert setup.config.experiment == name
-    assert setup.folder == shipped_folder()
+    assert setup.source.parent == shipped_folder()
     assert [limits.method for limits in check_limits(setup)] == ["vibration", "asymmetric-1", "asymmetric-2"]
 
 
@@ -220,7 +220,9 @@ BROKEN = {
         PREFERENCE, PREFERENCE, "grain = 0.1 ", "grain = 0.3 ", ("rating: grain 0.3 does not divide the scale",),
         "[rating]",
     ),
-    "grain beyond all doubles": Broken(PREFERENCE, PREFERENCE, "grain = 0.1 ", "grain = 1e-320 ", ("grain",)),
+    "grain beyond all doubles": Broken(
+        PREFERENCE, PREFERENCE, "grain = 0.1 ", "grain = 1e-320 ", ("rating.grain = 1e-320",), "grain = "
+    ),
     "scale upside down": Broken(
         PREFERENCE, PREFERENCE, "minimum = 0.0", "minimum = 11.0",
         ("rating: minimum 11 and maximum 10: need 0 <= minimum < maximum <= 10",), "[rating]",
@@ -241,36 +243,37 @@ BROKEN = {
 
 BROKEN_GUNS = {
     "unknown key of the coil": Broken(
-        DIRECTION, GUN, "magnet_mass_kg", "magnet_mass", ("voice_coil: unknown key magnet_mass", "magnet_mass_kg")
+        DIRECTION, GUN, "magnet_mass_kg", "magnet_mass", ("voice_coil.magnet_mass is an unknown key", "magnet_mass_kg")
     ),
     "unknown key of a method": Broken(
         DIRECTION, GUN, "voice_coil.friction_N = 1.12", "voice_coil.friction = 1.12",
-        ("methods.asymmetric-2.voice_coil: unknown key friction", "friction_N"),
+        ("methods.asymmetric-2.voice_coil.friction is an unknown key", "friction_N"),
     ),
     "unknown key beside the label": Broken(
         DIRECTION, GUN, 'damper = "on"', 'dampr = "on"', ("methods.asymmetric-2.dampr = 'on': unknown key",), "dampr"
     ),
     "negative mass": Broken(
         DIRECTION, GUN, "magnet_mass_kg = 0.114", "magnet_mass_kg = -0.114",
-        ("voice_coil: magnet_mass_kg is -0.114", "above 0"),
+        ("voice_coil.magnet_mass_kg is -0.114", "above 0"),
     ),
     "mass that is no number": Broken(
-        DIRECTION, GUN, "magnet_mass_kg = 0.114", "magnet_mass_kg = nan", ("voice_coil.magnet_mass_kg", "nan"),
-        "magnet_mass_kg",
+        DIRECTION, GUN, "magnet_mass_kg = 0.114", "magnet_mass_kg = nan", ("voice_coil.magnet_mass_kg is nan", "finite")
     ),
     "text for a mass": Broken(
         DIRECTION, GUN, "magnet_mass_kg = 0.114", 'magnet_mass_kg = "heavy"', ("magnet_mass_kg", "heavy", "number")
     ),
     "number for an option": Broken(
-        DIRECTION, GUN, 'drive_off = "shorted"', "drive_off = 1", ("drive_off is 1", "shorted, open")
+        DIRECTION, GUN, 'drive_off = "shorted"', "drive_off = 1", ("voice_coil.drive_off is 1", "must be text")
     ),
     "unknown option": Broken(
         DIRECTION, GUN, 'emf = "printed"', 'emf = "none"', ("emf is 'none'", "printed, reciprocal")
     ),
     "effect that the driver does not have": Broken(
-        DIRECTION, GUN, "effect = 1 ", "effect = 124 ", ("vibration: effect is 124", "1 to 123")
+        DIRECTION, GUN, "effect = 1 ", "effect = 124 ", ("vibration.effect is 124", "1 to 123")
     ),
-    "effect between two": Broken(DIRECTION, GUN, "effect = 1 ", "effect = 1.5 ", ("effect", "1.5", "1 to 123")),
+    "effect between two": Broken(
+        DIRECTION, GUN, "effect = 1 ", "effect = 1.5 ", ("vibration.effect is 1.5", "must be a whole number")
+    ),
     "unknown actuator": Broken(
         DIRECTION, GUN, 'actuator = "vibration"', 'actuator = "voice"',
         ("methods.vibration.actuator = 'voice'", "'voice-coil' or 'vibration'"), 'actuator = "voice"',
@@ -446,12 +449,12 @@ def test_a_table_with_another_header_is_refused_with_the_columns_it_must_have(an
 @pytest.mark.parametrize("row", ["P01,vibration,6", "P01", "P01,vibration,6,5,4"])
 def test_a_row_with_too_few_or_too_many_fields_is_refused_with_its_line(answers: Path, row: str) -> None:
     answers.write_text(f"{DIRECTION_HEADER}P01,asymmetric-1,6,5\n{row}\n")
-    assert refusal(answers.parent / DIRECTION) == f"{answers}: line 3: must have 4 fields"
+    assert refusal(answers.parent / DIRECTION) == f"{answers}: line 3: {1 + row.count(',')} fields; there must be 4"
 
 
 def test_the_line_of_a_short_row_is_right_behind_an_empty_line(answers: Path) -> None:
     answers.write_text(f"{DIRECTION_HEADER}\nP01,asymmetric-1,6,5\n\nP01,vibration,6\n")
-    assert "line 5: must have 4 fields" in refusal(answers.parent / DIRECTION)
+    assert "line 5: 3 fields; there must be 4" in refusal(answers.parent / DIRECTION)
 
 
 @pytest.mark.parametrize(

@@ -12,10 +12,11 @@ from experiments.direction.observer import RatesObserver, TableObserver
 from experiments.direction.observer import observer as direction_observer
 from experiments.direction.plan import make_plan as direction_plan
 from experiments.load import ConfigError, load_setup
-from experiments.preference.observer import RatingsObserver, draw_ratings, on_scale
+from experiments.preference.observer import RatingsObserver, draw_ratings
 from experiments.preference.observer import observer as preference_observer
 from experiments.preference.plan import make_plan as preference_plan
-from experiments.roof.reproduce import synthetic_screen
+from experiments.preference.scale import on_scale
+from experiments.screens.synthetic import synthetic_screen
 from experiments.setup import Setup
 from experiments.streams import Stream
 
@@ -200,7 +201,7 @@ def test_which_trials_are_right_is_random() -> None:
         ([counts("-1", 1), *ALL_COUNTS[1:]], ("P01, vibration, forward_correct is '-1'", "not a whole number")),
         ([counts("5.0", 1), *ALL_COUNTS[1:]], ("P01, vibration, forward_correct is '5.0'", "not a whole number")),
         ([counts("²", 1), *ALL_COUNTS[1:]], ("P01, vibration, forward_correct is '²'", "not a whole number")),
-        ([counts("9" * 5000, 1), *ALL_COUNTS[1:]], ("P01, vibration, forward_correct is", "0 to 10")),
+        ([counts("9" * 5000, 1), *ALL_COUNTS[1:]], ("P01, vibration, forward_correct is", "not a whole number")),
     ],
     ids=["empty", "missing", "double", "other case", "too many", "too many back", "blank", "negative", "fraction",
          "superscript", "endless"],
@@ -295,7 +296,7 @@ def test_a_single_method_can_be_the_lowest_of_all() -> None:
     ("value", "rating"), [(-3.0, 0.0), (0.0, 0.0), (0.04, 0.0), (0.06, 0.1), (0.3, 0.3), (9.96, 10.0), (99.0, 10.0)]
 )
 def test_the_nearest_value_of_the_scale_is_as_a_person_would_write_it(value: float, rating: float) -> None:
-    assert on_scale(value, PREFERENCE.config.rating) == rating
+    assert on_scale(value, 0.0, 10.0, 0.1) == rating
 
 
 def test_exposures_are_positive_last_as_long_as_planned_in_the_mean_and_depend_on_nothing_before() -> None:

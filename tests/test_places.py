@@ -5,6 +5,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from experiments.canonical import canonical_json, sha256
 from experiments.places import Place, PlaceError, journals, known_codes, place, set_aside, set_aside_file, used_rows
 
 RESULTS = Path("/nowhere/results")
@@ -133,10 +134,10 @@ def test_a_folder_is_set_aside_as_a_whole(tmp_path: Path) -> None:
 def a_head(results: Path, code: str, row: int | None, experiment: str = "direction") -> Place:
     where = place(results, code, experiment)
     where.folder.mkdir(parents=True, exist_ok=True)
-    told = "null" if row is None else str(row)
-    where.journal.write_text(
-        f'{{"n":0,"kind":"run","plan":{{"order_row":{told}}},"setup":{{}},"setup_sha256":""}}\n{{"n":1,"ki'
-    )
+    parts: dict[str, dict[str, int | None]] = {"plan": {"order_row": row}, "setup": {}}
+    hashes = {f"{name}_sha256": sha256(part) for name, part in parts.items()}
+    head = canonical_json({"n": 0, "kind": "run", "link": "", **parts, **hashes})
+    where.journal.write_bytes(head + b'\n{"n":1,"ki')
     return where
 
 

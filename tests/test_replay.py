@@ -3,7 +3,7 @@
 import csv
 import hashlib
 import json
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from itertools import pairwise
 from pathlib import Path
@@ -14,13 +14,13 @@ import pytest
 from experiments import catalogue
 from experiments.canonical import canonical_json
 from experiments.clock import VirtualClock
-from experiments.journal import Journal, JournalError, read
+from experiments.journal import Journal, JournalError, link, read
 from experiments.load import load_setup
 from experiments.places import PlaceError, place
 from experiments.plan import Plan
 from experiments.replay import go_on, history, replay
-from experiments.roof.reproduce import synthetic_screen
 from experiments.run import Again, Request, rebuild, run
+from experiments.screens.synthetic import synthetic_screen
 from experiments.setup import Setup
 
 SETUPS = {name: load_setup(name) for name in ("direction", "preference")}
@@ -229,6 +229,15 @@ def test_another_seed_is_refused_and_the_same_is_not(name: str, unbroken: dict[s
     run(request(name, tmp_path, "resume", seed=1), synthetic_screen, VirtualClock())
 
 
+def forged(entries: Sequence[dict[str, Any]]) -> bytes:
+    """Records as lines whose numbers and links are right, whatever they say."""
+    lines: list[bytes] = []
+    for n, entry in enumerate(entries):
+        before = link(lines[-1]) if lines else ""
+        lines.append(canonical_json(entry | {"n": n, "link": before}) + b"\n")
+    return b"".join(lines)
+
+
 def with_plan(line: bytes, plan: dict[str, Any], **others: object) -> bytes:
     return canonical_json(json.loads(line) | {"plan": plan} | others) + b"\n"
 
@@ -241,8 +250,8 @@ def test_another_plan_is_refused_at_the_first_step_that_does_not_follow(
     journal = broken_off(whole, tmp_path, 20)
     other = catalogue.CATALOGUE[name].make_plan(SETUPS[name].config, "P01", 3, None)
     assert other.trials[0] != whole.plan.trials[0]
-    head = with_plan(whole.lines[0], other.record(), plan_sha256=other.sha256())
-    journal.write_bytes(head + b"".join(whole.lines[1:20]))
+    head = json.loads(with_plan(whole.lines[0], other.record(), plan_sha256=other.sha256()))
+    journal.write_bytes(forged([head, *whole.records[1:20]]))
     with pytest.raises(JournalError, match="step 1 is 'prepare' and does not follow from the plan in line 1"):
         run(request(name, tmp_path, "resume", seed=None), synthetic_screen, VirtualClock())
 
@@ -283,6 +292,9 @@ def test_an_answer_that_was_changed_to_none_is_refused_with_its_line(
     assert answer["body"]["kind"] == "answered"
     answer["body"]["response"] = "left"
     journal.write_bytes(b"".join([*whole.lines[:6], canonical_json(answer) + b"\n", *whole.lines[7:9]]))
+    with pytest.raises(JournalError, match="line 8: does not follow from line 7, which was changed"):
+        run(request("direction", tmp_path, "resume"), synthetic_screen, VirtualClock())
+    journal.write_bytes(forged([*whole.records[:6], answer, *whole.records[7:9]]))
     with pytest.raises(JournalError, match=r"line 7: .*response.*the record was changed"):
         run(request("direction", tmp_path, "resume"), synthetic_screen, VirtualClock())
 
@@ -291,7 +303,7 @@ def test_an_outcome_without_its_step_is_refused_with_its_line(unbroken: dict[str
     whole = unbroken["direction"]
     doubled = [whole.records[number] for number in (0, 1, 2, 2)]
     journal = broken_off(whole, tmp_path, 1)
-    journal.write_bytes(b"".join(canonical_json(entry | {"n": n}) + b"\n" for n, entry in enumerate(doubled)))
+    journal.write_bytes(forged(doubled))
     with pytest.raises(JournalError, match="line 4: an outcome without its step"):
         history(read(journal))
 
@@ -318,11 +330,13 @@ def test_a_fresh_run_sets_the_unfinished_one_aside_with_every_byte(
     assert read(journal).header["plan"]["seed"] == 5
 
 
-def test_a_fresh_run_sets_a_journal_aside_that_cannot_be_read(unbroken: dict[str, Unbroken], tmp_path: Path) -> None:
+@pytest.mark.parametrize("again", ["ask", "resume", "fresh"])
+def test_a_journal_in_which_nothing_was_acknowledged_is_set_aside(
+    again: Again, unbroken: dict[str, Unbroken], tmp_path: Path
+) -> None:
     journal = broken_off(unbroken["preference"], tmp_path, 0, b'{"half')
-    with pytest.raises(JournalError, match="no whole record"):
-        run(request("preference", tmp_path, "resume"), synthetic_screen, VirtualClock())
-    run(request("preference", tmp_path, "fresh"), synthetic_screen, VirtualClock())
+    run(request("preference", tmp_path, again), synthetic_screen, VirtualClock())
+    assert read(journal).finished
     assert journal.with_name(f"{journal.stem}.aside-1.jsonl").read_bytes() == b'{"half'
 
 

@@ -14,10 +14,9 @@ from experiments.journal import Journal, read
 from experiments.load import load_setup
 from experiments.places import Place, place
 from experiments.plan import Plan
-from experiments.roof.reproduce import synthetic_screen
 from experiments.run import Request, run, table
 from experiments.runner import MAX_FAILURES, Desk, RunStopped, carry_out
-from experiments.screens.synthetic import SyntheticScreen
+from experiments.screens.synthetic import SyntheticScreen, synthetic_screen
 from experiments.setup import Setup
 from experiments.steps import History, Outcome, Prepare, Prepared, Standing, Step, record
 
@@ -110,6 +109,7 @@ class Sitting(NamedTuple):
         going = catalogue.CATALOGUE[self.plan.experiment].session(self.plan, self.setup)
         desk = Desk(
             gun=self.gun,
+            gun_name="simulated",
             drives=limits.drives(self.setup),
             screen=self.screen,
             journal=self.journal,
@@ -246,7 +246,7 @@ def test_a_train_that_ends_with_the_most_shots_does_not_shorten_the_next(tmp_pat
     setup = SETUPS["preference"]
     fatigue = setup.config.fatigue.model_copy(update={"max_shots_per_trial": 5})
     config = setup.config.model_copy(update={"fatigue": fatigue})
-    capped = Setup(config=config, gun=setup.gun, folder=setup.folder)
+    capped = Setup(config=config, gun=setup.gun, source=setup.source)
     desk = sitting("preference", tmp_path, setup=capped)
     done = desk.carry_out()
     told = [(outcome.shots, outcome.ended_by) for _, outcome in done if outcome.kind == "presented"]
@@ -287,7 +287,7 @@ def test_a_link_that_is_dead_even_for_disarming_stops_the_run_as_any_other_fault
     words = ("arm", "fire", "disarm", "status", "identify")
     troubles = {(word, count): LinkError("no answer") for word in words for count in range(1, 20)}
     desk = sitting(name, tmp_path, troubles)
-    with pytest.raises(RunStopped, match="the gun failed 3 times in a row"):
+    with pytest.raises(RunStopped, match="switch off its power"):
         desk.carry_out()
 
 

@@ -148,11 +148,13 @@ class DirectionConfig(ExperimentConfig):
     @property
     def trials_without_break(self) -> int:
         """The longest stretch of trials that no break interrupts."""
-        if self.breaks.between_sets_s > 0:
-            return self.design.trials_per_set
-        if self.breaks.between_sessions_s > 0:
-            return self.design.trials_per_session
-        return self.design.trials
+        longest = stretch = 0
+        for place in range(len(self.design.methods) * self.design.sets_per_session):
+            new_session = place % self.design.sets_per_session == 0
+            rest_s = self.breaks.between_sessions_s if new_session else self.breaks.between_sets_s
+            stretch = self.design.trials_per_set + (0 if rest_s > 0 else stretch)
+            longest = max(longest, stretch)
+        return longest
 
     @model_validator(mode="after")
     def _spares_the_participant(self) -> Self:

@@ -8,6 +8,7 @@ one; S = sqrt(1 + ability_sd^2 + bias_sd^2) keeps the mean over people at the gi
 from __future__ import annotations
 
 import math
+import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from statistics import NormalDist
@@ -116,7 +117,7 @@ def _cell(answers: Sequence[Mapping[str, str]], participant: str, method: str, d
     if len(rows) != 1:
         raise ValueError(f"{len(rows)} rows for participant {participant}, method {method}; there must be one")
     cell = rows[0][f"{direction}_correct"]
-    if not cell.isdecimal():
+    if not re.fullmatch(r"[0-9]{1,6}", cell):
         raise ValueError(f"participant {participant}, {method}, {direction}_correct is {cell!r}; not a whole number")
     return int(cell)
 

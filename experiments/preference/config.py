@@ -55,7 +55,7 @@ class RatingScale(Model):
     maximum: float
     minimum_text: Text
     maximum_text: Text
-    grain: Annotated[float, Field(gt=0)]
+    grain: Annotated[float, Field(ge=1e-6)]
 
     @model_validator(mode="after")
     def _ends_in_order(self) -> Self:

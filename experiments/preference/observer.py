@@ -8,6 +8,7 @@ from collections.abc import Mapping, Sequence
 from experiments.plan import Plan, Trial
 from experiments.preference.config import PreferenceConfig, RatingScale
 from experiments.preference.config import Ratings as RatingsLaw
+from experiments.preference.scale import on_scale
 from experiments.setup import Setup
 from experiments.streams import Stream
 
@@ -35,23 +36,17 @@ def draw_ratings(law: RatingsLaw, scale: RatingScale, methods: Sequence[str], st
     """
     person = law.person_sd * stream.normal()
     noise = {method: law.noise_sd * stream.normal() for method in sorted(methods)}
-    ratings = {method: on_scale(law.mean[method] + person + noise[method], scale) for method in methods}
+    ratings = {method: _kept(law.mean[method] + person + noise[method], scale) for method in methods}
     if law.same and stream.uniform() < law.same_share:
         ratings[law.same[1]] = ratings[law.same[0]]
+    others = min((rating for method, rating in ratings.items() if method != law.lowest), default=scale.maximum)
     if law.lowest:
-        others = min(rating for method, rating in ratings.items() if method != law.lowest)
-        ratings[law.lowest] = min(ratings[law.lowest], on_scale(others - scale.grain, scale))
+        ratings[law.lowest] = min(ratings[law.lowest], _kept(others - scale.grain, scale))
     return ratings
 
 
-def on_scale(value: float, scale: RatingScale) -> float:
-    """The nearest value of the scale, in whole grains from its minimum.
-
-    A grain such as 0.1 has no exact binary form; rounding to its decimals gives the number a person would write.
-    """
-    steps = round((min(max(value, scale.minimum), scale.maximum) - scale.minimum) / scale.grain)
-    decimals = max(0, -math.floor(math.log10(scale.grain))) + 2
-    return round(scale.minimum + steps * scale.grain, decimals)
+def _kept(value: float, scale: RatingScale) -> float:
+    return on_scale(value, scale.minimum, scale.maximum, scale.grain)
 
 
 class RatingsObserver:

@@ -23,13 +23,14 @@ from experiments.canonical import sha256
 from experiments.clock import VirtualClock
 from experiments.config import StudyConfig
 from experiments.direction.config import DirectionConfig
+from experiments.journal import is_empty
 from experiments.journal import read as read_journal
 from experiments.load import ConfigError, load_setup, load_study
 from experiments.preference.config import PreferenceConfig
 from experiments.provenance import git_commit, provenance, recoil_version
 from experiments.roof.odds import direction_odds, preference_odds
 from experiments.roof.pictures import shot_panel
-from experiments.run import Again, Request, run
+from experiments.run import Request, rebuild, run
 from experiments.screens.synthetic import synthetic_screen
 from experiments.setup import Setup
 
@@ -111,13 +112,16 @@ def _claim(study: Study, out: Path) -> None:
 def _seat(study: Study, setup: Setup[Any], code: str, results: Path) -> None:
     """Have a synthetic participant do an experiment, unless the logs hold it already."""
     where = places.place(results, code, setup.config.experiment)
-    again: Again = "ask"
-    if where.journal.exists():
-        if read_journal(where.journal).finished and where.table.exists():
-            return
-        again = "resume"
-    request = Request(setup=setup, participant_id=code, results=results, seed=study.seed, again=again)
-    run(request, synthetic_screen, VirtualClock())
+    if not _finished(where):
+        request = Request(setup=setup, participant_id=code, results=results, seed=study.seed, again="resume")
+        run(request, synthetic_screen, VirtualClock())
+    elif not where.table.exists():  # killed between the last record and the table
+        table, data, _ = rebuild(where.journal)
+        storage.write_whole(table, data)
+
+
+def _finished(where: places.Place) -> bool:
+    return where.journal.exists() and not is_empty(where.journal) and read_journal(where.journal).finished
 
 
 def _odds(study: Study) -> Iterator[Odds]:
@@ -156,7 +160,7 @@ def _panels(setup: Setup[Any]) -> Iterator[Any]:
 def _notes(study: Study) -> Iterator[str]:
     """What the numbers rest on beyond the paper."""
     gun = study.setups[0].gun
-    coil = GunParameters(**gun.voice_coil)  # type: ignore[arg-type] # checked when the config was read
+    coil = GunParameters(**gun.voice_coil)
     yield f"The coil after the pulse is {coil.drive_off}, its back-EMF is {coil.emf}; the paper leaves both open."
     for setup in study.setups:
         keys = ", ".join(setup.config.assumed)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import sys
+from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -48,7 +49,8 @@ def run_session(asked: Asked) -> Place:
     try:
         return run(request, synthetic_screen if asked.screen == "synthetic" else _terminal, clock).place
     except RunStopped as stop:
-        sys.stderr.write(f"recoil: stopped: {stop}. Go on with --resume.\n")
+        with suppress(OSError):  # where the terminal is gone, nobody reads it
+            sys.stderr.write(f"recoil: stopped: {stop}. Go on with --resume.\n")
         raise KeyboardInterrupt from stop
 
 

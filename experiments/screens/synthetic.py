@@ -33,7 +33,7 @@ def synthetic_screen(setup: Setup[Any], plan: Plan, clock: Clock) -> SyntheticSc
     try:
         observer = catalogue.experiment(setup).observer(setup, plan)
     except ValueError as error:
-        raise ConfigError(f"{setup.folder / str(setup.config.synthetic.table)}: {error}") from error
+        raise ConfigError(f"{setup.source.parent / str(setup.config.synthetic.table)}: {error}") from error
     return SyntheticScreen(setup.config, observer, clock)
 
 
@@ -55,6 +55,7 @@ class SyntheticScreen:
     def prepare(self, step: Prepare) -> Prepared:
         """Take the planned time of a hand-over."""
         del step
+        self._next_at_s = None
         self._clock.sleep(self._timing.hand_over_s)
         return Prepared()
 
@@ -78,11 +79,8 @@ class SyntheticScreen:
         """Say next once the observer has felt enough; drawn when the stimulus begins."""
         if self._next_at_s is None:
             self._next_at_s = self._clock.now() + self._observer.exposure_s(step.trial)
-        enough = self._next_at_s <= until_s
-        self._clock.sleep((self._next_at_s if enough else until_s) - self._clock.now())
-        if enough:
-            self._next_at_s = None
-        return enough
+        self._clock.sleep(min(self._next_at_s, until_s) - self._clock.now())
+        return self._next_at_s <= until_s
 
     def rate(self, step: Rate) -> Rated:
         """Rate as the observer does."""

@@ -5,6 +5,7 @@ Times come from the experimenter's hand and are logged as such. Neither correctn
 
 from __future__ import annotations
 
+import io
 import queue
 import sys
 import threading
@@ -12,6 +13,7 @@ from contextlib import suppress
 from typing import TYPE_CHECKING, TextIO
 
 from experiments.clock import Clock
+from experiments.preference.scale import on_scale
 from experiments.runner import RunStopped
 from experiments.steps import (
     Answered,
@@ -45,6 +47,8 @@ class TerminalScreen:
         self._plan = plan
         self._clock = clock
         self._out = out or sys.stdout
+        if isinstance(sys.stdin, io.TextIOWrapper):
+            sys.stdin.reconfigure(errors="replace")  # a byte that is no UTF-8 is not to end the run
         self._lines: queue.Queue[str | None] = queue.Queue()
         threading.Thread(target=self._read, args=(lines or sys.stdin,), daemon=True).start()
         self._say(f"Participant {plan.participant_id}, experiment {plan.experiment}. {_HELP.capitalize()}.")
@@ -79,8 +83,7 @@ class TerminalScreen:
 
     def _count_down(self, end_s: float) -> str:
         while (left_s := end_s - self._clock.now()) > 0:
-            self._out.write(f"\r  {left_s:4.0f} s ")
-            self._out.flush()
+            self._show(f"\r  {left_s:4.0f} s ")
             line = self._poll(min(1.0, left_s))
             if line is not None and line.startswith("skip "):
                 return line.removeprefix("skip ").strip()
@@ -105,7 +108,8 @@ class TerminalScreen:
                 return Rated(rating=None, rating_by="experimenter")
             rating = _number(typed)
             if rating is not None and step.minimum <= rating <= step.maximum:
-                return Rated(rating=rating, rating_by="experimenter")
+                kept = on_scale(rating, step.minimum, step.maximum, step.grain)
+                return Rated(rating=kept, rating_by="experimenter")
             self._say(f"  Not a rating: type a number from {step.minimum:g} to {step.maximum:g}.")
 
     def describe(self, step: Describe) -> Described:
@@ -131,8 +135,14 @@ class TerminalScreen:
         return f"Feedback {trial.trial} of {len(self._plan.trials)}, in order of presentation"
 
     def _say(self, text: str) -> None:
-        self._out.write(f"{text}\n")
-        self._out.flush()
+        self._show(f"{text}\n")
+
+    def _show(self, text: str) -> None:
+        try:
+            self._out.write(text)
+            self._out.flush()
+        except OSError as error:
+            raise RunStopped("the terminal was closed") from error
 
     def _line(self, prompt: str) -> str:
         line = self._poll(None, prompt)
@@ -140,8 +150,7 @@ class TerminalScreen:
 
     def _poll(self, timeout_s: float | None, prompt: str = "") -> str | None:
         """The next typed line, or `None` after the time. `RunStopped` on `stop` or a closed terminal."""
-        self._out.write(prompt)
-        self._out.flush()
+        self._show(prompt)
         try:
             line = self._lines.get(timeout=timeout_s)
         except queue.Empty:
