@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 import os
+import platform
 import re
 import subprocess
 import sys
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from pathlib import Path
 
 import pytest
@@ -55,3 +56,22 @@ def quick_configs(tmp_path: Path) -> Path:
     text = re.sub(r"between_(sets|sessions)_s = [\d.]+", r"between_\1_s = 0.0", config.read_text())
     config.write_text(text.replace("max_trials_without_break = 10", "max_trials_without_break = 60"))
     return folder
+
+
+Soak = Callable[..., None]
+
+SOAK_FOLDER = Path(__file__).parent.parent / "results" / "soak"
+
+
+@pytest.fixture(scope="module")
+def soak(request: pytest.FixtureRequest) -> Iterator[Soak]:
+    """Keeps measured figures: `soak(promise, figure, bound, detail)`; a module's become its table in results/soak/."""
+    rows: list[tuple[str, ...]] = []
+    yield lambda *cells: rows.append(tuple(map(str, cells)))
+    name = request.module.__name__.removeprefix("tests.test_soak_")
+    machine = f"Python {platform.python_version()}, {platform.system()} {platform.machine()}, {os.cpu_count()} cores"
+    header = ["| promise | figure | bound | how |", "| --- | --- | --- | --- |"]
+    lines = [f"# {name.capitalize()}", "", f"Made by `make soak` on {machine}.", "", *header]
+    lines += [f"| {' | '.join(row)} |" for row in rows]
+    SOAK_FOLDER.mkdir(parents=True, exist_ok=True)
+    (SOAK_FOLDER / f"{name}.md").write_text("\n".join(lines) + "\n", encoding="utf-8")

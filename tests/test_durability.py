@@ -146,14 +146,3 @@ def test_a_full_disk_stops_the_run_at_the_last_safe_answer(quick_configs: Path, 
     assert 0 < len(safe) < 60
     assert answers(whole).startswith(safe)
     assert whole.finished
-
-
-@pytest.mark.soak
-def test_200_kills_at_random_moments_lose_nothing(quick_configs: Path, tmp_path: Path, soak: object) -> None:
-    moments = random.Random(200)
-    acknowledged = 0
-    for kill in range(200):
-        folder = tmp_path / str(kill)
-        folder.mkdir()
-        acknowledged += check_killed_run(quick_configs, folder, moments.uniform(0.0, 5.0), begun=kill % 5 > 0)
-    soak("answers lost over 200 kills", 0, "0", f"{acknowledged} acknowledged")
