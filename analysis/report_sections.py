@@ -35,8 +35,8 @@ def sections(report: ReportData) -> tuple[Section, ...]:
     statistics = report.statistics
     found = [
         _analysed(report),
-        _verdicts(report.comparison) if report.comparison else None,
         _figure_8(statistics) if has_people(statistics) else None,
+        _verdicts(report.comparison) if report.comparison else None,
         direction_section(statistics["direction"]) if _people(statistics, "direction") else None,
         preference_section(statistics["preference"]) if _people(statistics, "preference") else None,
         _odds(report.odds) if report.odds else None,
