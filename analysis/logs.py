@@ -7,7 +7,7 @@ import hashlib
 import io
 import json
 import re
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -20,6 +20,9 @@ _PATTERNS = tuple(f"*_{suffix}.csv" for suffix in columns.FILE_SUFFIX.values())
 _DTYPES = {"text": "string", "level": "string", "integer": "Int64", "flag": "Int64", "number": "float64"}
 _TAIL_BYTES = 1 << 16
 """As much of a journal as surely holds its last record."""
+
+
+Track = Callable[[Sequence[Path]], Iterable[Path]]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -52,15 +55,16 @@ class Logs:
     files: tuple[Path, ...]
 
 
-def read_logs(paths: Iterable[str | Path]) -> Logs:
+def read_logs(paths: Iterable[str | Path], track: Track = iter) -> Logs:
     """The logs in `paths`, files or folders (searched through for `*_trials.csv` and `*_ratings.csv`).
 
     Files with `practice` in their name are not read. A bad file, a missing path or a second log of the same participant
-    for an experiment is a `Problem`, never an exception.
+    for an experiment is a `Problem`, never an exception. `track` is given the files and gives them back one by one: for
+    a progress bar.
     """
     files, problems = _find([Path(path) for path in paths])
     tables: dict[Path, Table] = {}
-    for file in files:
+    for file in track(files):
         try:
             table = read_table(file)
             _check_new(table, tables)

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
-from analysis.logs import Problem, read_logs
+from analysis.logs import Problem, Track, read_logs
 from analysis.paper import load_paper
 from analysis.published import compare
 from analysis.report import ReportData, write_report
@@ -17,13 +17,15 @@ from experiments.places import PlaceError
 from experiments.provenance import provenance
 
 
-def analyze(paths: Sequence[Path], out: Path, paper: Path | None) -> tuple[dict[str, Any], tuple[Problem, ...]]:
+def analyze(
+    paths: Sequence[Path], out: Path, paper: Path | None, track: Track = iter
+) -> tuple[dict[str, Any], tuple[Problem, ...]]:
     """Write statistics and report of all usable logs; returns the statistics and what was left out.
 
     `PlaceError` if there is no usable log at all, with every reason.
     """
     published = _paper(paper)
-    logs = read_logs(paths)
+    logs = read_logs(paths, track)
     if not logs.files:
         reasons = "\n".join(str(problem) for problem in logs.problems)
         raise PlaceError("\n".join(filter(None, ["no usable log in " + ", ".join(map(str, paths)), reasons])))

@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
+    from collections.abc import Callable, Iterable, Sequence
 
 DONE, EXCEPTIONS, UNUSABLE, INTERRUPTED = 0, 1, 2, 130
 
@@ -170,7 +170,7 @@ def analyze(
     """Statistics, figures and report of any number of logs."""
     from experiments.roof.analyze import analyze as roof
 
-    statistics, problems = roof(paths, out, paper)
+    statistics, problems = roof(paths, out, paper, _tracked)
     for problem in problems:
         _say(f"recoil: left out: {problem}")
     _show(statistics, f"Report: {out / 'report.html'}", as_json)
@@ -218,6 +218,14 @@ def new(study: Annotated[Path, typer.Argument(metavar="STUDY", help="The folder 
     from experiments.roof.folders import new_study
 
     sys.stdout.write("".join(f"{path}\n" for path in new_study(study)))
+
+
+def _tracked(files: Sequence[Path]) -> Iterable[Path]:
+    """The files one by one, with a progress bar on stderr."""
+    from rich.console import Console
+    from rich.progress import track
+
+    return track(files, description="read logs", console=Console(stderr=True), disable=not files)
 
 
 @contextmanager
