@@ -19,8 +19,8 @@ from experiments.preference.plan import make_plan as preference_plan
 from experiments.preference.rows import rows as preference_rows
 from experiments.preference.session import session as preference_session
 from experiments.setup import Setup
-from experiments.steps import History, Session
-from experiments.tables import Row
+from experiments.steps import Session
+from experiments.tables import Row, Told
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -30,7 +30,7 @@ class Experiment:
     config: type[ExperimentConfig]
     make_plan: Callable[[Any, str, int, int | None], Plan]
     session: Callable[[Plan, Setup[Any]], Session]
-    rows: Callable[[Plan, History], list[Row]]
+    rows: Callable[[Plan, Told], list[Row]]
     observer: Callable[[Setup[Any], Plan], Any]
     answer_columns: tuple[str, ...]
 

@@ -8,6 +8,7 @@ from typing import Any
 from pydantic import ValidationError
 
 from experiments.journal import Contents, JournalError
+from experiments.remarks import Remark, remark_from
 from experiments.steps import (
     Ask,
     Fire,
@@ -22,21 +23,29 @@ from experiments.steps import (
     record,
     step_from,
 )
+from experiments.tables import Told
 
 
-def history(contents: Contents) -> History:
-    """The steps that were done, each with its outcome, as the journal tells them."""
-    pairs: History = []
+def told(contents: Contents) -> Told:
+    """All that a journal tells, in order: the steps that were done, each with its outcome, and remarks between them."""
+    tale: list[tuple[Step | None, Outcome | Remark]] = []
     step: Step | None = None
     for entry in contents.records:
         if entry["kind"] == "step":
             step = _read(contents, entry, step_from)
+        elif entry["kind"] == "remark":
+            tale.append((None, _read(contents, entry, remark_from)))
         elif entry["kind"] == "outcome":
             if step is None:
                 raise JournalError(f"{_place(contents, entry)}: an outcome without its step; a line was lost")
-            pairs.append((step, _read(contents, entry, outcome_from)))
+            tale.append((step, _read(contents, entry, outcome_from)))
             step = None
-    return pairs
+    return tale
+
+
+def history(contents: Contents) -> History:
+    """The steps that were done, each with its outcome."""
+    return [(step, outcome) for step, outcome in told(contents) if step and not isinstance(outcome, Remark)]
 
 
 def replay(session: Session, contents: Contents) -> Standing:

@@ -23,7 +23,7 @@ from experiments.plan import Plan
 from experiments.provenance import provenance
 from experiments.runner import Desk, RunStopped, Screen, carry_out, gun_name
 from experiments.setup import Setup
-from experiments.steps import History, Session, Standing
+from experiments.steps import Session, Standing
 from experiments.streams import draw_seed
 from experiments.tables import table_bytes
 
@@ -146,7 +146,7 @@ def _carry_out(job: _Job, gun: Gun, make_screen: MakeScreen) -> Finished:
             journal=journal,
             clock=job.clock,
         )
-        _to_the_end(session, desk, standing, plan, job.place)
+        _to_the_end(session, desk, standing, job.place)
     return Finished(plan=plan, place=job.place)
 
 
@@ -197,17 +197,28 @@ def _begin(job: _Job, plan: Plan, session: Session, journal: Journal, gun: Gun) 
     return Standing(step=next(session), history=[])
 
 
-def _to_the_end(session: Session, desk: Desk, standing: Standing, plan: Plan, place: Place) -> None:
+def _to_the_end(session: Session, desk: Desk, standing: Standing, place: Place) -> None:
     """Carry out what is left. If it is stopped, the journal says why and the table holds what was answered."""
     try:
-        done = carry_out(session, desk, standing)
+        carry_out(session, desk, standing)
     except (KeyboardInterrupt, RunStopped) as stop:
         desk.journal.append("stopped", reason=str(stop) or "interrupted")
-        storage.write_whole(place.table, table(plan, replay.history(read_journal(place.journal))))
+        storage.write_whole(place.table, table(read_journal(place.journal)))
         raise
-    data = table(plan, done)
+    data = table(read_journal(place.journal))
     desk.journal.append("finished", table_sha256=hashlib.sha256(data).hexdigest())
     storage.write_whole(place.table, data)
+
+
+def table(contents: Contents) -> bytes:
+    """The CSV that a journal makes. `JournalError` if this version does not know its plan."""
+    plan = plan_of(contents)
+    if plan.experiment not in catalogue.CATALOGUE:
+        raise JournalError(
+            f"{contents.path}: line 1: experiment {plan.experiment!r} is not known to this version of Recoil"
+        )
+    rows = catalogue.CATALOGUE[plan.experiment].rows(plan, replay.told(contents))
+    return table_bytes(plan.experiment, rows)
 
 
 def plan_of(contents: Contents) -> Plan:
@@ -218,16 +229,9 @@ def plan_of(contents: Contents) -> Plan:
         raise JournalError(f"{contents.path}: line 1: no plan of this version of Recoil") from error
 
 
-def table(plan: Plan, history: History) -> bytes:
-    """The CSV of a plan and what became of it."""
-    return table_bytes(plan.experiment, catalogue.CATALOGUE[plan.experiment].rows(plan, history))
-
-
 def rebuild(path: Path) -> tuple[Path, bytes, Contents]:
     """The table of a journal: where it belongs, its bytes, and what the journal holds."""
     contents = read_journal(path)
-    plan = plan_of(contents)
-    if plan.experiment not in catalogue.CATALOGUE:
-        raise JournalError(f"{path}: line 1: experiment {plan.experiment!r} is not known to this version of Recoil")
-    name = path.name.replace("_journal", f"_{FILE_SUFFIX[plan.experiment]}")
-    return path.with_name(name).with_suffix(".csv"), table(plan, replay.history(contents)), contents
+    data = table(contents)
+    name = path.name.replace("_journal", f"_{FILE_SUFFIX[plan_of(contents).experiment]}")
+    return path.with_name(name).with_suffix(".csv"), data, contents

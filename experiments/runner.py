@@ -31,6 +31,7 @@ from experiments.steps import (
     Presented,
     Rate,
     Rated,
+    Repeat,
     Rest,
     Rested,
     Session,
@@ -50,11 +51,14 @@ class RunStopped(Exception):  # noqa: N818 - a stop is not an error
 class Screen(Protocol):
     """Where a step meets a person, real or synthetic."""
 
-    def prepare(self, step: Prepare) -> Prepared:
-        """Have the gun turned, set and handed over."""
+    def begin(self, desk: Desk, standing: Standing) -> None:
+        """Take the place at the desk, where the run stands so."""
 
-    def ask(self, step: Ask, onset_s: float) -> Answered:
-        """Have the direction judged; `onset_s` is when the pulse began."""
+    def prepare(self, step: Prepare) -> Prepared | Repeat:
+        """Have the gun turned, set and handed over; or ask for an earlier trial of the set again."""
+
+    def ask(self, step: Ask, onset_s: float) -> Answered | Repeat:
+        """Have the direction judged; `onset_s` is when the pulse began. Or ask for the stimulus again."""
 
     def rest(self, step: Rest) -> Rested:
         """Have the break taken."""
@@ -103,6 +107,7 @@ def carry_out(session: Session, desk: Desk, standing: Standing) -> History:
     `RunStopped`, `JournalError` and interrupts pass through; whatever happens, the gun is disarmed.
     """
     step, done, failures, onset_s = standing.step, list(standing.history), 0, math.nan
+    desk.screen.begin(desk, standing)
     try:
         while step is not None:
             desk.journal.append("step", body=record(step))

@@ -178,8 +178,17 @@ class Interrupted:
     kind: Literal["interrupted"] = "interrupted"
 
 
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Repeat:
+    """A trial was spoiled, this one or an earlier one of its set, and is to be presented again."""
+
+    trial: Trial
+    reason: str
+    kind: Literal["repeat"] = "repeat"
+
+
 Step = Prepare | Fire | Ask | Rest | Present | Rate | Describe
-Outcome = Prepared | Fired | Answered | Rested | Presented | Rated | Described | Failed | Interrupted
+Outcome = Prepared | Fired | Answered | Rested | Presented | Rated | Described | Failed | Interrupted | Repeat
 Session = Generator[Step, Outcome, None]
 """Yields what should happen and is sent what did happen. It opens nothing, waits for nothing and knows no clock."""
 

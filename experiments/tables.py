@@ -4,40 +4,85 @@ from __future__ import annotations
 
 import csv
 import io
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+from typing import TypeVar
 
 from experiments import columns
 from experiments.plan import Trial
-from experiments.steps import Failed, Fire, Fired, History, Interrupted, Outcome, Present, Presented, Rest
+from experiments.remarks import AnswerCorrected, Flagged, Noted, RatingCorrected, Remark
+from experiments.steps import Failed, Fire, Fired, Interrupted, Outcome, Present, Presented, Repeat, Rest, Step
 
 Row = dict[str, object]
+Word = TypeVar("Word")
 
 
-def where(history: History, trial: Trial) -> History:
-    """The part of a history that belongs to one trial."""
-    return [(step, outcome) for step, outcome in history if not isinstance(step, Rest) and step.trial == trial]
+Told = Sequence[tuple[Step | None, Outcome | Remark]]
+"""What a journal tells, in order: steps with their outcomes, and remarks, which have no step."""
 
 
-def presentation(history: History, shown: type[Fired | Presented]) -> Row:
-    """How a trial was presented: attempts, flags, onset of the last stimulus, gun. Empty if it never was."""
-    attempts = sum(isinstance(step, Fire | Present) and not _unfelt(outcome) for step, outcome in history)
-    stimuli = [outcome for _, outcome in history if isinstance(outcome, shown)]
-    row: Row = {"attempts": attempts or None, "flags": " ".join(_flags(history))}
-    if stimuli:
-        row |= {"onset_utc": stimuli[-1].onset_utc, "gun": stimuli[-1].gun}
-    return row
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Story:
+    """What the journal tells of one trial, in order, and whether it was asked to be repeated."""
+
+    events: list[tuple[Step | None, Outcome | Remark]]
+    repeated: bool
+
+    @property
+    def words(self) -> list[Outcome | Remark]:
+        """The outcomes and remarks, in order."""
+        return [word for _, word in self.events]
+
+    def all(self, kind: type[Word]) -> list[Word]:
+        """The outcomes or remarks of a kind."""
+        return [word for word in self.words if isinstance(word, kind)]
+
+    def last(self, kind: type[Word]) -> Word | None:
+        """The last outcome or remark of a kind."""
+        return next(reversed(self.all(kind)), None)
 
 
-def _unfelt(outcome: Outcome) -> bool:
-    return isinstance(outcome, Interrupted) and not outcome.presented
+def stories(trials: Sequence[Trial], told: Told) -> dict[Trial, Story]:
+    """What the journal tells, by trial."""
+    repeated = {word.trial for _, word in told if isinstance(word, Repeat)}
+    found = {trial: Story(events=[], repeated=trial in repeated) for trial in trials}
+    for step, word in told:
+        trial = _trial(step, word)
+        if trial is not None:
+            found[trial].events.append((step, word))
+    return found
 
 
-def _flags(history: History) -> list[str]:
-    """What went wrong with the stimulus on the way, each once."""
-    outcomes = [outcome for _, outcome in history]
-    failed = any(isinstance(outcome, Failed) for outcome in outcomes)
-    interrupted = any(isinstance(outcome, Interrupted) and outcome.presented for outcome in outcomes)
-    return ["device-error"] * failed + ["interrupted"] * interrupted
+def _trial(step: Step | None, word: Outcome | Remark) -> Trial | None:
+    """The trial that an event is about, if it is about one."""
+    if step is not None:
+        return None if isinstance(step, Rest) else step.trial
+    return getattr(word, "trial", None)
+
+
+def presentation(story: Story, shown: type[Fired | Presented]) -> Row:
+    """How a trial was presented: attempts, flags, note, onset of the last stimulus, gun. Empty if it never was."""
+    attempts = sum(isinstance(step, Fire | Present) and not _unfelt(word) for step, word in story.events)
+    notes = "; ".join(remark.text for remark in story.all(Noted))
+    row: Row = {"attempts": attempts or None, "flags": " ".join(_flags(story)), "note": notes}
+    stimulus = story.last(shown)
+    return row | ({"onset_utc": stimulus.onset_utc, "gun": stimulus.gun} if stimulus else {})
+
+
+def _unfelt(word: Outcome | Remark) -> bool:
+    return isinstance(word, Interrupted) and not word.presented
+
+
+def _flags(story: Story) -> list[str]:
+    """What went wrong with the stimulus on the way, what was changed afterwards, and the experimenter's own marks."""
+    found = {
+        "device-error": bool(story.all(Failed)),
+        "interrupted": any(outcome.presented for outcome in story.all(Interrupted)),
+        "repeated": story.repeated,
+        "corrected": bool(story.all(AnswerCorrected) or story.all(RatingCorrected)),
+    }
+    own = [remark.flag for remark in story.all(Flagged)]
+    return list(dict.fromkeys([flag for flag, there in found.items() if there] + own))
 
 
 def table_bytes(experiment: str, rows: Iterable[Row]) -> bytes:

@@ -119,7 +119,7 @@ class Sitting(NamedTuple):
             return carry_out(going, desk, Standing(step=next(going), history=[]))
 
     def rows(self) -> list[dict[str, str]]:
-        data = table(self.plan, replay.history(read(self.where.journal)))
+        data = table(read(self.where.journal))
         return list(csv.DictReader(data.decode().splitlines(keepends=True)))
 
 

@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
-
 from experiments.plan import Plan, Trial
-from experiments.steps import Answered, Fired, History, Outcome
-from experiments.tables import Row, presentation, where
+from experiments.remarks import AnswerCorrected
+from experiments.steps import Answered, Fired
+from experiments.tables import Row, Story, Told, presentation, stories
 
 
-def rows(plan: Plan, history: History) -> list[Row]:
+def rows(plan: Plan, told: Told) -> list[Row]:
     """One row a planned trial, in order; what was not reached is empty."""
     return [
         {
@@ -20,22 +19,24 @@ def rows(plan: Plan, history: History) -> list[Row]:
             "set": trial.set,
             "trial": trial.trial,
             "direction": trial.direction,
-            **_answer(trial, (outcome for _, outcome in where(history, trial))),
-            **presentation(where(history, trial), Fired),
+            **_answer(trial, story),
+            **presentation(story, Fired),
         }
-        for trial in plan.trials
+        for trial, story in stories(plan.trials, told).items()
     ]
 
 
-def _answer(trial: Trial, outcomes: Iterable[Outcome]) -> Row:
-    answers = [outcome for outcome in outcomes if isinstance(outcome, Answered)]
-    if not answers:
+def _answer(trial: Trial, story: Story) -> Row:
+    """The answer that counts: the last one given, or what it was corrected to, whose time is not the participant's."""
+    given = story.last(Answered)
+    if given is None:
         return {}
-    last = answers[-1]
+    counts = [word for word in story.words if isinstance(word, Answered | AnswerCorrected)][-1]
+    as_given = counts is given
     return {
-        "response": last.response,
-        "correct": int(last.response == trial.direction),
-        "response_time_s": last.response_time_s,
-        "response_source": last.response_source,
-        "response_time_valid": int(last.response_time_valid),
+        "response": counts.response,
+        "correct": int(counts.response == trial.direction),
+        "response_time_s": given.response_time_s,
+        "response_source": given.response_source if as_given else "experimenter",
+        "response_time_valid": int(given.response_time_valid and as_given),
     }

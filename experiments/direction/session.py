@@ -2,45 +2,35 @@
 
 from __future__ import annotations
 
-from collections.abc import Generator
+from functools import partial
 from itertools import pairwise
 
 from experiments.direction.config import Breaks, DirectionConfig
 from experiments.plan import Plan, Trial
+from experiments.presenting import Presenter, until_done
 from experiments.setup import Setup
-from experiments.steps import Ask, Failed, Fire, Interrupted, Outcome, Prepare, Rest, Session, Step
+from experiments.steps import Ask, Fire, Prepare, Rest, Session, Step
 
 
 def session(plan: Plan, setup: Setup[DirectionConfig]) -> Session:
     """The steps of a run, from the first hand-over to the last answer."""
-    yield from _present(plan.trials[0], setup)
+    presenter = Presenter(partial(_steps, setup))
+    yield from presenter.present(plan.trials[0])
     for before, trial in pairwise(plan.trials):
         yield from _rest(before, trial, setup.config.breaks)
-        yield from _present(trial, setup)
+        yield from presenter.present(trial)
 
 
 def _rest(before: Trial, trial: Trial, breaks: Breaks) -> Session:
-    if trial.session != before.session:
-        yield from _take(Rest(between="sessions", duration_s=breaks.between_sessions_s))
-    elif trial.set != before.set:
-        yield from _take(Rest(between="sets", duration_s=breaks.between_sets_s))
+    if trial.session != before.session and breaks.between_sessions_s:
+        yield from until_done(Rest(between="sessions", duration_s=breaks.between_sessions_s))
+    elif trial.session == before.session and trial.set != before.set and breaks.between_sets_s:
+        yield from until_done(Rest(between="sets", duration_s=breaks.between_sets_s))
 
 
-def _take(rest: Rest) -> Session:
-    while rest.duration_s > 0 and isinstance((yield rest), Interrupted):
-        pass
-
-
-def _present(trial: Trial, setup: Setup[DirectionConfig]) -> Session:
-    attempt = 1
-    while not (yield from _attempt(trial, attempt, setup)):
-        attempt += 1
-
-
-def _attempt(trial: Trial, attempt: int, setup: Setup[DirectionConfig]) -> Generator[Step, Outcome, bool]:
-    """One presentation of a trial; false if it has to be presented again."""
+def _steps(setup: Setup[DirectionConfig], trial: Trial, attempt: int) -> tuple[Step, ...]:
     question = setup.config.question
-    steps = (
+    return (
         Prepare(trial=trial, attempt=attempt, damper=setup.gun.methods[trial.method].damper),
         Fire(trial=trial, attempt=attempt),
         Ask(
@@ -51,7 +41,3 @@ def _attempt(trial: Trial, attempt: int, setup: Setup[DirectionConfig]) -> Gener
             backward=question.backward,
         ),
     )
-    for step in steps:
-        if isinstance((yield step), Failed | Interrupted):
-            return False
-    return True

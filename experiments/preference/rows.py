@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 from experiments.plan import Plan
-from experiments.steps import Described, History, Presented, Rated
-from experiments.tables import Row, presentation, where
+from experiments.remarks import RatingCorrected
+from experiments.steps import Described, Presented, Rated
+from experiments.tables import Row, Story, Told, presentation, stories
 
 
-def rows(plan: Plan, history: History) -> list[Row]:
+def rows(plan: Plan, told: Told) -> list[Row]:
     """One row a planned trial, in order of presentation; what was not reached is empty."""
     return [
         {
@@ -15,24 +16,26 @@ def rows(plan: Plan, history: History) -> list[Row]:
             "experiment": plan.experiment,
             "trial": trial.trial,
             "method": trial.method,
-            **_exposure(own := where(history, trial)),
-            **_rating(own),
-            **presentation(own, Presented),
+            **_exposure(story),
+            **_rating(story),
+            **presentation(story, Presented),
         }
-        for trial in plan.trials
+        for trial, story in stories(plan.trials, told).items()
     ]
 
 
-def _exposure(history: History) -> Row:
-    shown = [outcome for _, outcome in history if isinstance(outcome, Presented)]
-    return {"shots": shown[-1].shots, "exposure_s": shown[-1].exposure_s} if shown else {}
+def _exposure(story: Story) -> Row:
+    shown = story.last(Presented)
+    return {"shots": shown.shots, "exposure_s": shown.exposure_s} if shown else {}
 
 
-def _rating(history: History) -> Row:
-    row: Row = {}
-    for _, outcome in history:
-        if isinstance(outcome, Rated):
-            row |= {"rating": outcome.rating, "rating_by": outcome.rating_by}
-        elif isinstance(outcome, Described):
-            row["comment"] = outcome.comment
-    return row
+def _rating(story: Story) -> Row:
+    """The rating that counts, the participant's words, and whose hand entered them."""
+    entered = [word for word in story.words if isinstance(word, Rated | RatingCorrected)]
+    described = story.last(Described)
+    row: Row = {"comment": described.comment} if described else {}
+    if not entered:
+        return row
+    counts = entered[-1]
+    by = counts.rating_by if isinstance(counts, Rated) else "experimenter"
+    return row | {"rating": counts.rating, "rating_by": by}

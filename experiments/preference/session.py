@@ -2,37 +2,27 @@
 
 from __future__ import annotations
 
-from collections.abc import Generator
+from functools import partial
 
 from experiments.plan import Plan, Trial
 from experiments.preference.config import PreferenceConfig
+from experiments.presenting import Presenter, until_done
 from experiments.setup import Setup
-from experiments.steps import Describe, Failed, Interrupted, Outcome, Prepare, Present, Rate, Session, Step
+from experiments.steps import Describe, Prepare, Present, Rate, Session, Step
 
 
 def session(plan: Plan, setup: Setup[PreferenceConfig]) -> Session:
     """The steps of a run, from the first hand-over to the last description."""
+    presenter = Presenter(partial(_steps, setup))
     for trial in plan.trials:
-        yield from _present(trial, setup)
+        yield from presenter.present(trial)
     for trial in plan.trials:
-        yield from _until_done(_rate(trial, setup.config))
-        yield from _until_done(Describe(trial=trial, question=setup.config.description.text))
+        yield from until_done(_rate(trial, setup.config))
+        yield from until_done(Describe(trial=trial, question=setup.config.description.text))
 
 
-def _until_done(step: Step) -> Session:
-    while isinstance((yield step), Interrupted):
-        pass
-
-
-def _present(trial: Trial, setup: Setup[PreferenceConfig]) -> Session:
-    attempt = 1
-    while not (yield from _attempt(trial, attempt, setup)):
-        attempt += 1
-
-
-def _attempt(trial: Trial, attempt: int, setup: Setup[PreferenceConfig]) -> Generator[Step, Outcome, bool]:
-    """One presentation of a trial; false if it has to be presented again."""
-    steps = (
+def _steps(setup: Setup[PreferenceConfig], trial: Trial, attempt: int) -> tuple[Step, ...]:
+    return (
         Prepare(trial=trial, attempt=attempt, damper=setup.gun.methods[trial.method].damper),
         Present(
             trial=trial,
@@ -41,10 +31,6 @@ def _attempt(trial: Trial, attempt: int, setup: Setup[PreferenceConfig]) -> Gene
             max_shots=setup.config.fatigue.max_shots_per_trial,
         ),
     )
-    for step in steps:
-        if isinstance((yield step), Failed | Interrupted):
-            return False
-    return True
 
 
 def _rate(trial: Trial, config: PreferenceConfig) -> Rate:

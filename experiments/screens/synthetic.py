@@ -10,6 +10,7 @@ from experiments.clock import Clock
 from experiments.config import ExperimentConfig
 from experiments.load import ConfigError
 from experiments.plan import Plan
+from experiments.runner import Desk
 from experiments.setup import Setup
 from experiments.steps import (
     Answered,
@@ -24,6 +25,7 @@ from experiments.steps import (
     Rated,
     Rest,
     Rested,
+    Standing,
     Step,
 )
 
@@ -51,6 +53,9 @@ class SyntheticScreen:
         self._clock = clock
         self._tell = tell
         self._next_at_s: float | None = None
+
+    def begin(self, desk: Desk, standing: Standing) -> None:
+        """Nothing to take over: every step says all."""
 
     def prepare(self, step: Prepare) -> Prepared:
         """Take the planned time of a hand-over."""

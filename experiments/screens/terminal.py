@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, TextIO
 
 from experiments.clock import Clock
 from experiments.preference.scale import on_scale
-from experiments.runner import RunStopped
+from experiments.runner import Desk, RunStopped
 from experiments.steps import (
     Answered,
     Ask,
@@ -29,6 +29,7 @@ from experiments.steps import (
     Rated,
     Rest,
     Rested,
+    Standing,
     Step,
 )
 
@@ -52,6 +53,9 @@ class TerminalScreen:
         self._lines: queue.Queue[str | None] = queue.Queue()
         threading.Thread(target=self._read, args=(lines or sys.stdin,), daemon=True).start()
         self._say(f"Participant {plan.participant_id}, experiment {plan.experiment}. {_HELP.capitalize()}.")
+
+    def begin(self, desk: Desk, standing: Standing) -> None:
+        """Nothing to take over: every step says all."""
 
     def prepare(self, step: Prepare) -> Prepared:
         """Say where to turn the gun and which damper to set; Enter fires."""
