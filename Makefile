@@ -1,20 +1,26 @@
 # Two commands for a fresh machine: `make reproduce` and `make test`. Both set up what they need.
-.PHONY: setup reproduce test soak lock reference clean
+.PHONY: setup full reproduce test soak lock reference clean
 
 setup: .venv/.ready
 
 .venv/.ready: requirements/dev.txt requirements/uv.txt pyproject.toml scripts/setup
-	scripts/setup
+	scripts/setup dev
+
+# with the console and the participant's screen: PsychoPy and Qt
+full: .venv/.ready-full
+
+.venv/.ready-full: requirements/full.txt requirements/uv.txt pyproject.toml scripts/setup
+	scripts/setup full
 
 reproduce: setup
 	.venv/bin/recoil reproduce
 
-test: setup
+test: full
 	scripts/system-packages
 	scripts/test
 
 # The full figures of every promise, kept as tables under results/soak/
-soak: setup
+soak: full
 	scripts/system-packages
 	PATH="$(CURDIR)/.venv/bin:$$PATH" .venv/bin/pytest -m soak --durations 10
 

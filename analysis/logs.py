@@ -9,12 +9,13 @@ import json
 import re
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
+from functools import lru_cache
 from pathlib import Path
 
 import pandas as pd
 
 from analysis.log_rules import BadLogError, Row, Table, check_table
-from experiments import columns
+from experiments import columns, register
 
 _PATTERNS = tuple(f"*_{suffix}.csv" for suffix in columns.FILE_SUFFIX.values())
 _DTYPES = {"text": "string", "level": "string", "integer": "Int64", "flag": "Int64", "number": "float64"}
@@ -62,11 +63,12 @@ def read_logs(paths: Iterable[str | Path], track: Track = iter) -> Logs:
     for an experiment is a `Problem`, never an exception. `track` is given the files and gives them back one by one: for
     a progress bar.
     """
+    _exclusions.cache_clear()  # the register may have been written since
     files, problems = _find([Path(path) for path in paths])
     tables: dict[Path, Table] = {}
     for file in track(files):
         try:
-            table = read_table(file)
+            _check_admitted(file, table := read_table(file))
             _check_new(table, tables)
         except BadLogError as bad:
             problems.append(Problem(file=file, line=bad.line, column=bad.column, message=bad.message))
@@ -164,6 +166,21 @@ def _last_record(journal: Path) -> dict[str, object]:
     except (OSError, ValueError):
         return {}
     return record if isinstance(record, dict) else {}
+
+
+def _check_admitted(file: Path, table: Table) -> None:
+    """An exclusion in the register beside the participants' folders keeps their logs out, with its reason."""
+    code = str(table.rows[0]["participant_id"])
+    reason = _exclusions(file.parent.parent).get(code)
+    if reason is not None:
+        raise BadLogError(f"participant {code} is excluded: {reason} (`recoil study` readmits them)")
+
+
+@lru_cache(maxsize=64)
+def _exclusions(results: Path) -> dict[str, str]:
+    """Who is excluded in a results folder, as far as its register can be read."""
+    members = register.read(results).members
+    return {code: member.excluded for code, member in members.items() if member.excluded is not None}
 
 
 def _check_new(table: Table, tables: dict[Path, Table]) -> None:

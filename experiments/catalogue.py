@@ -10,6 +10,7 @@ from experiments.config import ExperimentConfig
 from experiments.direction import observer as direction_observer
 from experiments.direction.config import DirectionConfig
 from experiments.direction.plan import make_plan as direction_plan
+from experiments.direction.plan import make_practice as direction_practice
 from experiments.direction.rows import rows as direction_rows
 from experiments.direction.session import session as direction_session
 from experiments.plan import Plan
@@ -25,10 +26,11 @@ from experiments.tables import Row, Told
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Experiment:
-    """What makes an experiment: its config, its plan, its session, its table and its synthetic participants."""
+    """What makes an experiment: config, plan and practice, session, table and synthetic participants."""
 
     config: type[ExperimentConfig]
     make_plan: Callable[[Any, str, int, int | None], Plan]
+    make_practice: Callable[[Any, str, int], Plan | None]
     session: Callable[[Plan, Setup[Any]], Session]
     rows: Callable[[Plan, Told], list[Row]]
     observer: Callable[[Setup[Any], Plan], Any]
@@ -39,6 +41,7 @@ CATALOGUE: dict[str, Experiment] = {
     "direction": Experiment(
         config=DirectionConfig,
         make_plan=direction_plan,
+        make_practice=direction_practice,
         session=direction_session,
         rows=direction_rows,
         observer=direction_observer.observer,
@@ -47,6 +50,7 @@ CATALOGUE: dict[str, Experiment] = {
     "preference": Experiment(
         config=PreferenceConfig,
         make_plan=preference_plan,
+        make_practice=lambda *_: None,
         session=preference_session,
         rows=preference_rows,
         observer=preference_observer.observer,

@@ -6,11 +6,18 @@ Unknown keys, wrong types, infinities and contradictions are refused here, at th
 from __future__ import annotations
 
 from collections.abc import Iterator
-from typing import Annotated, Any, Literal, Self
+from typing import Annotated, Any, Literal, Self, TypeVar
 
 from pydantic import AfterValidator, BaseModel, ConfigDict, Field, model_validator
 
 Order = Literal["random", "williams", "latin-square"]
+Fact = Literal["age_years", "sex", "handedness"]
+"""What may be asked of a participant before a run."""
+Sex = Literal["female", "male", "other", "undisclosed"]
+Handedness = Literal["right", "left", "both"]
+
+CODE = r"[A-Za-z0-9]{1,32}"
+"""A participant's code, as a pattern."""
 
 
 class Model(BaseModel):
@@ -65,8 +72,54 @@ class ExperimentConfig(Model):
         return self
 
 
+AgeYears = Annotated[int, Field(ge=1, le=120)]
+Some = TypeVar("Some", bound=str)
+
+
+def _once(levels: tuple[Some, ...]) -> tuple[Some, ...]:
+    doubled = sorted({level for level in levels if levels.count(level) > 1})
+    if doubled:
+        raise ValueError(f"{', '.join(doubled)} stands there more than once; name each once")
+    return levels
+
+
+class EligibilityConfig(Model):
+    """What is asked of a participant before a run, and who may take part. Empty levels and missing ages: any."""
+
+    ask: Annotated[tuple[Fact, ...], AfterValidator(_once)] = ()
+    handedness: Annotated[tuple[Handedness, ...], AfterValidator(_once)] = ()
+    sex: Annotated[tuple[Sex, ...], AfterValidator(_once)] = ()
+    age_years_min: AgeYears | None = None
+    age_years_max: AgeYears | None = None
+
+    @model_validator(mode="after")
+    def _ages_are_possible(self) -> Self:
+        low, high = self.age_years_min, self.age_years_max
+        if low is not None and high is not None and low > high:
+            raise ValueError(f"age_years_min = {low} is above age_years_max = {high}, so nobody could take part")
+        return self
+
+    @model_validator(mode="after")
+    def _rules_are_about_what_is_asked(self) -> Self:
+        for key, fact in _RULES.items():
+            value = getattr(self, key)
+            if value not in ((), None) and fact not in self.ask:
+                shown = list(value) if isinstance(value, tuple) else value
+                raise ValueError(f'{key} = {shown} is a rule about {fact}, which is not asked; add "{fact}" to ask')
+        return self
+
+
+_RULES: dict[str, Fact] = {
+    "handedness": "handedness",
+    "sex": "sex",
+    "age_years_min": "age_years",
+    "age_years_max": "age_years",
+}
+"""Which fact each rule is about."""
+
+
 class StudyConfig(Model):
-    """A study: how many people, which experiments, and what to compare with."""
+    """A study: how many people, which experiments, who may take part, and what to compare with."""
 
     title: Text
     participants: Annotated[int, Field(ge=1, le=999)]
@@ -74,6 +127,7 @@ class StudyConfig(Model):
     experiments: Annotated[tuple[Text, ...], Field(min_length=1)]
     paper: Text | None = None
     replications: Annotated[int, Field(ge=0, le=1_000_000)] = 2000
+    eligibility: EligibilityConfig = EligibilityConfig()
 
     def codes(self) -> list[str]:
         """The participants' codes, P01 onwards."""

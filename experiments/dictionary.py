@@ -35,19 +35,40 @@ that clock was real or virtual (synthetic participants: breaks take no time).
 | key | in | meaning |
 | --- | --- | --- |
 | `n` | every record | number of the record, from 0 |
-| `kind` | every record | `run`, `step`, `outcome`, `stopped`, `resumed` or `finished` |
+| `kind` | every record | `run`, `step`, `outcome`, `remark`, `stopped`, `resumed` or `finished` |
 | `monotonic_s`, `utc` | every record | when it was written |
 | `link` | every record | first 16 digits of the SHA-256 of the line before: a record changed by hand breaks the chain |
 | `synced_s` | every record | when the record before it was on the disk |
 | `plan`, `plan_sha256` | `run` | the whole frozen plan with its seed, and the hash of its canonical JSON |
 | `setup`, `setup_sha256` | `run` | the resolved configs (and the synthetic table, if used) and their hash |
 | `provenance`, `gun`, `clock` | `run`, `resumed` | versions, commit, system; who renders; which clock |
-| `body` | `step`, `outcome` | what should happen, what did; its `kind` says which (see `experiments/steps.py`) |
+| `body` | `step`, `outcome`, `remark` | what should happen, what did, what was said beside it; its `kind` says which |
+| `shown_s` | `outcome` | when the console had painted the step, where there was a console |
 | `reason` | `stopped` | why the run stopped before its end |
 | `cut_bytes`, `stopped_utc` | `resumed` | bytes of a record cut off at the end, and when the run had stopped |
 | `table_sha256` | `finished` | hash of the table, by which an edited table is noticed |
 
 Canonical JSON: UTF-8, keys sorted, no blanks, no NaN, floats in shortest round-trip form.
+
+## `participants.jsonl`
+
+The register of a results folder, beside the `sub-<ID>` folders and readable by its owner only: who joined, with the
+facts that the study asks for, and who is excluded. Codes only, never names. Appended, synced and chained like a
+journal; `recoil study` shows and changes it. A later `joined` of the same code corrects the facts of the earlier one;
+the last of `excluded` and `readmitted` counts. Who is excluded keeps their files, but gives their row of the balancing
+square back.
+
+| key | in | meaning |
+| --- | --- | --- |
+| `n` | every record | number of the record, from 0 |
+| `kind` | every record | `joined`, `excluded` or `readmitted` |
+| `utc` | every record | date and time (UTC, ISO 8601) when it was written |
+| `link` | every record | first 16 digits of the SHA-256 of the line before; empty in the first |
+| `participant_id` | every record | participant's code, 1 to 32 letters and digits |
+| `facts.age_years` | `joined` | age in whole years, 1 to 120; `null` if it was not asked |
+| `facts.sex` | `joined` | `female`, `male`, `other`, `undisclosed`; `null` if it was not asked |
+| `facts.handedness` | `joined` | `right`, `left`, `both`; `null` if it was not asked |
+| `reason` | `excluded`, `readmitted` | why, at most 200 characters in one line; the only free text, never a name |
 """
 
 

@@ -7,9 +7,10 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
-from experiments import columns, journal
+from experiments import columns, journal, register
+from experiments.config import CODE
 
-_CODE = re.compile(r"[A-Za-z0-9]{1,32}")
+_CODE = re.compile(CODE)
 
 
 class PlaceError(Exception):
@@ -23,6 +24,7 @@ class Place:
     results: Path
     participant_id: str
     experiment: str
+    practice: bool = False
 
     @property
     def folder(self) -> Path:
@@ -32,7 +34,8 @@ class Place:
     @property
     def stem(self) -> str:
         """How the names of the files begin."""
-        return f"sub-{self.participant_id}_task-{self.experiment}"
+        practice = "_practice" if self.practice else ""
+        return f"sub-{self.participant_id}_task-{self.experiment}{practice}"
 
     @property
     def journal(self) -> Path:
@@ -63,8 +66,9 @@ def place(results: Path, participant_id: str, experiment: str) -> Place:
 
 
 def known_codes(results: Path) -> list[str]:
-    """The participants who have a folder."""
-    return sorted(path.name.removeprefix("sub-") for path in results.glob("sub-*") if path.is_dir())
+    """The participants who have a folder or stand in the register."""
+    folders = {path.name.removeprefix("sub-") for path in results.glob("sub-*") if path.is_dir()}
+    return sorted(folders | register.codes(results))
 
 
 def journals(results: Path, experiment: str) -> Iterator[Path]:
@@ -73,9 +77,15 @@ def journals(results: Path, experiment: str) -> Iterator[Path]:
 
 
 def used_rows(results: Path, experiment: str) -> list[int]:
-    """The rows of the balancing square that runs in this folder have taken."""
-    heads = filter(None, map(journal.head, journals(results, experiment)))
+    """The rows of the balancing square that runs in this folder have taken; who is excluded gives theirs back."""
+    left_out = register.excluded(results)
+    counted = (path for path in journals(results, experiment) if _code(path) not in left_out)
+    heads = filter(None, map(journal.head, counted))
     return [head["plan"]["order_row"] for head in heads if head["plan"]["order_row"] is not None]
+
+
+def _code(journal_path: Path) -> str:
+    return journal_path.parent.name.removeprefix("sub-")
 
 
 def set_aside(run: Place) -> list[Path]:

@@ -6,14 +6,14 @@ import hashlib
 import os
 from collections.abc import Callable
 from contextlib import closing
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import Any, Literal
 
 from pydantic import ValidationError
 
 from device import Gun, open_gun
-from experiments import catalogue, limits, orders, places, replay, storage
+from experiments import catalogue, limits, orders, places, register, replay, storage
 from experiments.clock import Clock
 from experiments.columns import FILE_SUFFIX
 from experiments.journal import Contents, Journal, JournalError, hold, is_empty
@@ -33,7 +33,10 @@ Again = Literal["ask", "resume", "fresh"]
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Request:
-    """Who does what, where, with which gun and seed; `seed` is `None` where the config or the system gives it."""
+    """Who does what, where, with which gun and seed; `seed` is `None` where the config or the system gives it.
+
+    A `practice` is not analysed: it has files of its own and can be done again.
+    """
 
     setup: Setup[Any]
     participant_id: str
@@ -41,6 +44,7 @@ class Request:
     gun: str = "simulated"
     seed: int | None = None
     again: Again = "ask"
+    practice: bool = False
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -80,9 +84,22 @@ def run(request: Request, make_screen: MakeScreen, clock: Clock) -> Finished:
     """Carry out a run. `PlaceError`, `JournalError`, `ConfigError`, `RunStopped`: nothing acknowledged is ever lost."""
     limits.check_limits(request.setup)
     place = places.place(request.results, request.participant_id, request.setup.config.experiment)
-    job = _Job(request=request, place=place, clock=clock, before=_before(place, request))
+    place = replace(place, practice=request.practice)
+    before = _before(place, request)
+    if before is None:
+        _refuse_excluded(place)
+    job = _Job(request=request, place=place, clock=clock, before=before)
     with closing(_open_gun(request, clock)) as gun:
         return _carry_out(job, gun, make_screen)
+
+
+def _refuse_excluded(place: Place) -> None:
+    reason = register.excluded(place.results).get(place.participant_id)
+    if reason is not None:
+        raise PlaceError(
+            f"participant {place.participant_id} is excluded ({reason}); "
+            "readmit them with `recoil study`, or use another code"
+        )
 
 
 def _open_gun(request: Request, clock: Clock) -> Gun:
@@ -97,7 +114,7 @@ def _before(where: Place, request: Request) -> Contents | None:
     """The unfinished run to go on with, if there is one and it is wanted."""
     if not where.journal.exists():
         return None
-    if request.again == "fresh" or is_empty(where.journal):
+    if request.again == "fresh" or request.practice or is_empty(where.journal):
         _refuse_finished(where, _readable(where))
         os.close(hold(where.journal))  # refused while another run is at it
         places.set_aside(where)
@@ -110,7 +127,7 @@ def _before(where: Place, request: Request) -> Contents | None:
 
 
 def _refuse_finished(where: Place, contents: Contents | None) -> None:
-    if contents is not None and contents.finished:
+    if contents is not None and contents.finished and not where.practice:
         raise PlaceError(
             f"participant {where.participant_id} has finished {where.experiment}: {where.journal}; "
             "one finished run a participant and experiment, so use another code"
@@ -154,11 +171,21 @@ def _plan(job: _Job) -> Plan:
     if job.before is not None:
         _refuse_changes(job.request, job.before)
         return plan_of(job.before)
+    if job.place.practice:
+        return _practice(job)
     config = job.request.setup.config
     order = config.design.order
     used = [] if order == "random" else places.used_rows(job.place.results, config.experiment)
     row = orders.next_row(order, len(config.design.methods), used)
     return job.experiment.make_plan(config, job.place.participant_id, resolve_seed(job.request), row)
+
+
+def _practice(job: _Job) -> Plan:
+    config = job.request.setup.config
+    plan = job.experiment.make_practice(config, job.place.participant_id, resolve_seed(job.request))
+    if plan is None:
+        raise PlaceError(f"{job.request.setup.source}: there is no practice (practice.trials_per_method)")
+    return plan
 
 
 def _refuse_changes(request: Request, before: Contents) -> None:

@@ -49,7 +49,9 @@ class RunStopped(Exception):  # noqa: N818 - a stop is not an error
 
 
 class Screen(Protocol):
-    """Where a step meets a person, real or synthetic."""
+    """Where a step meets a person, real or synthetic. `shown_s` is when the step that waits was painted, if known."""
+
+    shown_s: float | None
 
     def begin(self, desk: Desk, standing: Standing) -> None:
         """Take the place at the desk, where the run stands so."""
@@ -111,8 +113,9 @@ def carry_out(session: Session, desk: Desk, standing: Standing) -> History:
     try:
         while step is not None:
             desk.journal.append("step", body=record(step))
+            desk.screen.shown_s = None
             outcome = _do(step, desk, onset_s)
-            desk.journal.append("outcome", body=record(outcome))
+            desk.journal.append("outcome", body=record(outcome), **_shown(desk.screen))
             desk.screen.acknowledge(step, outcome)
             done.append((step, outcome))
             failures = _count(failures, outcome)
@@ -122,6 +125,11 @@ def carry_out(session: Session, desk: Desk, standing: Standing) -> History:
         session.close()
         disarm(desk.gun)
     return done
+
+
+def _shown(screen: Screen) -> dict[str, float]:
+    """When the step was painted, where that is known."""
+    return {} if screen.shown_s is None else {"shown_s": screen.shown_s}
 
 
 def _next(session: Session, outcome: Outcome) -> Step | None:

@@ -10,11 +10,27 @@ import pytest
 
 ROOT = Path(__file__).parent.parent
 ROOMS = ("device", "experiments", "analysis")
+READERS = ("experiments.columns", "experiments.journal", "experiments.register")
+"""What the analysis may know of the experiments: the names of columns, and the readers of what runs leave."""
 PURE = {
     "device": {"words", "parameters", "limits", "methods", "physics", "vibration"},
-    "experiments": {"canonical", "columns", "config", "gun", "orders", "plan", "setup", "steps", "streams", "tables"},
+    "experiments": {
+        "canonical",
+        "columns",
+        "config",
+        "gun",
+        "orders",
+        "plan",
+        "setup",
+        "steps",
+        "streams",
+        "study",
+        "tables",
+    },
 }
 HEAVY = {
+    "psychopy": ("experiments.screens.participant", "experiments.doctor.programs"),
+    "PyQt6": ("experiments.screens.console", "experiments.doctor.programs"),
     "matplotlib": "analysis.figures",
     "jinja2": "analysis.report",
     "rich": "experiments.roof",
@@ -48,7 +64,7 @@ def allowed(importer: str, imported: str) -> bool:
     if importer.startswith("device"):
         return room == "device"
     if importer.startswith("analysis"):
-        return room == "analysis" or imported.startswith(("experiments.columns", "experiments.journal"))
+        return room == "analysis" or imported.startswith(READERS)
     return room in ("device", "experiments") and not imported.startswith("experiments.roof")
 
 

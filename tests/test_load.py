@@ -153,7 +153,7 @@ BROKEN = {
         PREFERENCE, PREFERENCE, 'direction = "forward"', 'direction = "up"',
         ("design.direction = 'up'", "'forward' or 'backward'"), "direction =",
     ),
-    "not TOML": Broken(DIRECTION, DIRECTION, "[breaks]", "[breaks", ("not TOML", "line 28")),
+    "not TOML": Broken(DIRECTION, DIRECTION, "[breaks]", "[breaks", ("not TOML", "(at line ")),
     "key twice": Broken(DIRECTION, DIRECTION, "[timing]", "[timing]\ntrial_s = 1.0", ("not TOML", "overwrite")),
     "number of 5000 digits": Broken(DIRECTION, DIRECTION, "= 20.0", "= " + "9" * 5000, ()),
     "unknown experiment": Broken(

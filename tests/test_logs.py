@@ -8,7 +8,8 @@ from pathlib import Path
 import pytest
 
 from analysis.logs import read_logs
-from experiments import columns
+from experiments import columns, register
+from experiments.clock import RealClock
 from tests.log_files import TextRow, rating_rows, ratings_path, trial_rows, trials_path, write_rows, write_study
 
 TRIALS_FILE = "sub-P01_task-direction_trials.csv"
@@ -207,3 +208,13 @@ def test_the_table_of_an_unfinished_run_is_read_as_it_is(record: str, tmp_path: 
     path = write_rows(trials_path(tmp_path, "P01"), trial_rows())
     _journal(path, record)
     assert read_logs([tmp_path]).problems == ()
+
+
+def test_the_logs_of_an_excluded_participant_are_left_out_with_the_reason(tmp_path: Path) -> None:
+    for code in ("P01", "P02"):
+        (tmp_path / f"sub-{code}").mkdir()
+        write_rows(tmp_path / f"sub-{code}" / f"sub-{code}_task-direction_trials.csv", trial_rows(code))
+    register.append(tmp_path, register.entry("excluded", "P02", reason="fell ill"), RealClock())
+    logs = read_logs([tmp_path])
+    assert set(logs.trials["participant_id"]) == {"P01"}
+    assert "participant P02 is excluded: fell ill" in str(logs.problems[0])

@@ -73,6 +73,12 @@ class Breaks(Model):
     between_sessions_s: Seconds
 
 
+class Practice(Model):
+    """Trials before the first session, which are not analysed; 0 for none."""
+
+    trials_per_method: Annotated[int, Field(ge=0, le=100)] = 0
+
+
 class Fatigue(Model):
     """What a participant is spared."""
 
@@ -128,6 +134,7 @@ class DirectionConfig(ExperimentConfig):
     experiment: Literal["direction"]
     design: Design
     breaks: Breaks
+    practice: Practice = Practice()
     fatigue: Fatigue
     question: Question
     timing: Timing

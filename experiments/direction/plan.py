@@ -27,6 +27,23 @@ def make_plan(config: DirectionConfig, participant_id: str, seed: int, order_row
     )
 
 
+def make_practice(config: DirectionConfig, participant_id: str, seed: int) -> Plan | None:
+    """The plan of a practice: some trials of each method, mixed, in one set. `None` if the config has none."""
+    who, each = (config.experiment, participant_id), config.practice.trials_per_method
+    methods = Stream(seed, "practice-methods", *who).shuffled([*config.design.methods] * each)
+    forward = len(methods) // 2
+    ways = Stream(seed, "practice-directions", *who).shuffled(_ways(forward, len(methods) - forward))
+    trials = [
+        Trial(session=1, method=method, set=1, trial=place, direction=way)
+        for place, (method, way) in enumerate(zip(methods, ways, strict=True), start=1)
+    ]
+    if not trials:
+        return None
+    return Plan(
+        experiment=config.experiment, participant_id=participant_id, seed=seed, order_row=None, trials=tuple(trials)
+    )
+
+
 def _session(design: Design, session: int, method: str, stream: Stream) -> list[Trial]:
     return [
         Trial(session=session, method=method, set=1 + place // design.trials_per_set, trial=1 + place, direction=way)

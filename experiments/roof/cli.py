@@ -119,18 +119,32 @@ def check(
 @app.command()
 def run(
     config: Annotated[str, typer.Argument(help="File or name of a shipped config.")],
-    participant: Annotated[str, typer.Option(help="Participant's code: 1 to 32 letters and digits.")],
+    participant: Annotated[
+        str | None, typer.Option(help="Participant's code, 1 to 32 letters and digits; without: the start window.")
+    ] = None,
     gun: Annotated[str, typer.Option(help="`simulated` or `serial:PORT`.")] = "simulated",
     screen: Annotated[ScreenName, typer.Option(help="Where the run takes place.")] = ScreenName.terminal,
     results: Annotated[Path, typer.Option(help="Folder for the logs.")] = Path("results"),
     seed: Seed = None,
     resume: Annotated[bool, typer.Option("--resume", help="Go on with an unfinished run.")] = False,
     fresh: Annotated[bool, typer.Option("--fresh", help="Set an unfinished run aside and start anew.")] = False,
+    visual: Annotated[bool, typer.Option("--visual", help="A synthetic participant works the console.")] = False,
+    participant_screen: Annotated[
+        bool, typer.Option("--participant-screen", help="The participant rates on a screen of their own (PsychoPy).")
+    ] = False,
+    participant_keys: Annotated[
+        bool, typer.Option("--participant-keys", help="The participant answers with keys of their own (PsychoPy).")
+    ] = False,
     as_json: AsJson = False,
 ) -> None:
     """One run: a participant doing one experiment."""
     from experiments.roof import session
 
+    if participant is None:
+        if screen is not ScreenName.console:
+            raise typer.BadParameter("give --participant CODE, or --screen console for its start window")
+        session.run_lab_day(config, results, gun, seed)
+        return
     finished = session.run_session(
         session.Asked(
             config=config,
@@ -141,9 +155,36 @@ def run(
             seed=seed,
             resume=resume,
             fresh=fresh,
+            visual=visual,
+            participant_screen=participant_screen,
+            participant_keys=participant_keys,
         )
     )
     _show({"journal": str(finished.journal), "table": str(finished.table)}, f"Done: {finished.table}", as_json)
+
+
+@app.command()
+def study(
+    folder: Annotated[Path, typer.Argument(metavar="DIR", help="A study's folder, or a results folder.")],
+    join: Annotated[str | None, typer.Option(metavar="CODE", help="Take someone in, or correct their facts.")] = None,
+    age: Annotated[int | None, typer.Option(min=1, max=120, help="With --join: age in years.")] = None,
+    sex: Annotated[str | None, typer.Option(help="With --join: female, male, other or undisclosed.")] = None,
+    handedness: Annotated[str | None, typer.Option(help="With --join: right, left or both.")] = None,
+    exclude: Annotated[str | None, typer.Option(metavar="CODE", help="Exclude a participant; needs --reason.")] = None,
+    readmit: Annotated[str | None, typer.Option(metavar="CODE", help="Take an exclusion back; needs --reason.")] = None,
+    reason: Annotated[str | None, typer.Option(help="Why; never a name.")] = None,
+    as_json: AsJson = False,
+) -> None:
+    """The participants of a study: done, in progress, excluded, and who comes next in which orders."""
+    from experiments.roof import study as roof
+
+    facts = {"age_years": age, "sex": sex, "handedness": handedness}
+    asked = {"join": join, "exclude": exclude, "readmit": readmit}
+    found, notes = roof.study(folder, roof.change(asked, facts, reason))
+    for message in (*notes, *found.overview.problems):
+        _say(f"recoil: {message}")
+    _show(roof.as_json(found), roof.as_text(found), as_json)
+    raise typer.Exit(EXCEPTIONS if found.overview.problems else DONE)
 
 
 @app.command()
@@ -218,6 +259,24 @@ def new(study: Annotated[Path, typer.Argument(metavar="STUDY", help="The folder 
     from experiments.roof.folders import new_study
 
     sys.stdout.write("".join(f"{path}\n" for path in new_study(study)))
+
+
+@app.command()
+def doctor(
+    results: Annotated[Path, typer.Option(help="Folder for the logs, and its console runs.")] = Path("results"),
+    gun: Annotated[str, typer.Option(help="`simulated` or `serial:PORT`. It is not fired.")] = "simulated",
+    out: Annotated[Path | None, typer.Option(metavar="FILE.json", help="Keep the result.")] = None,
+    as_json: AsJson = False,
+) -> None:
+    """The rig's self-test: what was measured, and what to do about what is not good."""
+    from experiments.roof import doctor as roof
+
+    findings = roof.examine(results, gun, _progress)
+    found = roof.as_json(findings)
+    _show(found, roof.as_text(findings), as_json)
+    if out:
+        roof.keep(found, out)
+    raise typer.Exit(EXCEPTIONS if roof.fails(findings) else DONE)
 
 
 def _tracked(files: Sequence[Path]) -> Iterable[Path]:

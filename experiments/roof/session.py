@@ -13,7 +13,7 @@ from experiments.clock import Clock, RealClock, VirtualClock
 from experiments.load import load_setup
 from experiments.places import Place, PlaceError, set_aside_file
 from experiments.plan import Plan
-from experiments.run import Again, Request, rebuild, run
+from experiments.run import Again, Finished, Request, rebuild, run
 from experiments.runner import RunStopped, Screen
 from experiments.screens.synthetic import synthetic_screen
 from experiments.screens.terminal import TerminalScreen
@@ -32,12 +32,14 @@ class Asked:
     seed: int | None
     resume: bool
     fresh: bool
+    visual: bool = False
+    participant_screen: bool = False
+    participant_keys: bool = False
 
 
 def run_session(asked: Asked) -> Place:
     """Carry out what was asked for. `PlaceError` for what cannot be done here; a stop raises `KeyboardInterrupt`."""
     _check_screen(asked)
-    clock: Clock = VirtualClock() if asked.screen == "synthetic" else RealClock()
     request = Request(
         setup=load_setup(asked.config),
         participant_id=asked.participant_id,
@@ -47,7 +49,7 @@ def run_session(asked: Asked) -> Place:
         again=_again(asked),
     )
     try:
-        return run(request, synthetic_screen if asked.screen == "synthetic" else _terminal, clock).place
+        return _SCREENS[asked.screen](request, asked).place
     except RunStopped as stop:
         with suppress(OSError):  # where the terminal is gone, nobody reads it
             sys.stderr.write(f"recoil: stopped: {stop}. Go on with --resume.\n")
@@ -55,10 +57,47 @@ def run_session(asked: Asked) -> Place:
 
 
 def _check_screen(asked: Asked) -> None:
-    if asked.screen == "console":
-        raise PlaceError("--screen console: this version has no console; use --screen terminal")
     if asked.screen == "terminal" and not (sys.stdin.isatty() and sys.stdout.isatty()):
         raise PlaceError("--screen terminal: standard input and output are no terminal; use --screen synthetic")
+    if asked.screen != "console" and (asked.visual or asked.participant_screen or asked.participant_keys):
+        raise PlaceError("--visual, --participant-screen and --participant-keys go with --screen console")
+
+
+def _at_terminal(request: Request, asked: Asked) -> Finished:
+    del asked
+    return run(request, _terminal, RealClock())
+
+
+def _synthetic(request: Request, asked: Asked) -> Finished:
+    del asked
+    return run(request, synthetic_screen, VirtualClock())
+
+
+def _at_console(request: Request, asked: Asked) -> Finished:
+    live = _console()
+    sides = live.Sides(visual=asked.visual, screen=asked.participant_screen, own_keys=asked.participant_keys)
+    finished: Finished = live.run_live(request, sides)
+    return finished
+
+
+def run_lab_day(config: str, results: Path, gun: str, seed: int | None) -> None:
+    """The start window at the console, and one run after the other from it."""
+    request = Request(setup=load_setup(config), participant_id="", results=results, gun=gun, seed=seed)
+    _console().lab_day(request)
+
+
+def _console() -> Any:
+    try:
+        from experiments.screens.console import live  # noqa: PLC0415 - Qt is an extra, and slow
+    except ModuleNotFoundError as error:
+        raise PlaceError(
+            f"--screen console needs the extra `gui` ({error.name} is missing): uv pip sync --python .venv "
+            "--require-hashes requirements/full.txt, or use --screen terminal"
+        ) from error
+    return live
+
+
+_SCREENS = {"terminal": _at_terminal, "synthetic": _synthetic, "console": _at_console}
 
 
 def _again(asked: Asked) -> Again:

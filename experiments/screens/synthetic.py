@@ -45,6 +45,8 @@ class SyntheticScreen:
     `tell` is called with each step after its outcome is on the disk: for a progress bar.
     """
 
+    shown_s: float | None = None
+
     def __init__(
         self, config: ExperimentConfig, observer: Any, clock: Clock, tell: Callable[[Step], None] = lambda _: None
     ) -> None:

@@ -44,6 +44,8 @@ _HELP = "type `stop` and Enter at any time to stop; the run can be resumed"
 class TerminalScreen:
     """Asks on a terminal and waits for typed lines."""
 
+    shown_s: float | None = None
+
     def __init__(self, plan: Plan, clock: Clock, lines: TextIO | None = None, out: TextIO | None = None) -> None:
         self._plan = plan
         self._clock = clock

@@ -1,0 +1,19 @@
+"""`python -m experiments.doctor.programs NAME`: look at one thing and answer."""
+
+from __future__ import annotations
+
+import sys
+from importlib import import_module
+
+from experiments.doctor.figures import Display, Keys, Sound, Stage
+from experiments.doctor.programs.answer import answer
+
+
+def look() -> Display | Keys | Sound | Stage:
+    """Import what the program needs, which may fail, and look."""
+    found: Display | Keys | Sound | Stage = import_module(f"experiments.doctor.programs.{sys.argv[1]}").look()
+    return found
+
+
+if __name__ == "__main__":
+    answer(look)

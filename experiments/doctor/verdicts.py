@@ -1,0 +1,260 @@
+"""From figures to findings: the bounds, and what to do when they are passed. Pure."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import asdict
+from typing import Literal
+
+from experiments.doctor.figures import Adapter, Appends, Display, Keys, Link, Machine, Sound, Stage, Ticks
+from experiments.doctor.finding import Finding, Verdict
+from experiments.doctor.latencies import Latencies
+from experiments.doctor.spread import Spread, spread
+
+MAX_STEP_TO_SCREEN_MS = 50.0
+MAX_KEY_TO_DISK_MS = 10.0
+MAX_APPEND_MS = 10.0
+MAX_ADAPTER_MS = 1
+MAX_OVERSLEEP_MS = 5.0
+"""Assumed: half of what a key may take to the disk."""
+MAX_STEP_S = 0.001
+"""Assumed: response times are read to the millisecond."""
+MAX_ROUND_TRIP_MS = 10.0
+"""Assumed: beyond it the adapter keeps bytes back, 16 ms as it leaves the factory."""
+MAX_KEY_MS = 10.0
+"""Assumed: as long as the way on to the disk may take."""
+MIN_FREE_BYTES = 100_000_000
+"""Assumed: about a thousand runs."""
+MIN_WIDTH_PX, MIN_HEIGHT_PX = 1024, 720
+"""Assumed: what the console needs for its large type."""
+
+INSTALL = 'install the screens: pip install "recoil[gui]"'
+
+
+def of_machine(found: Machine) -> Finding:
+    """The machine itself; a warning if the packages of the screens are not installed."""
+    versions = ", ".join(f"{name} {version or 'none'}" for name, version in found.versions.items())
+    missing = [name for name, version in found.versions.items() if version is None]
+    return _judged(
+        "machine",
+        f"{found.system}, Python {found.python}, {found.cores} cores; {versions}",
+        f"{', '.join(missing)} not found; {INSTALL}" if missing else "",
+        found,
+    )
+
+
+def of_clock(found: Ticks) -> Finding:
+    """The clock that stamps the trials."""
+    step_us, sleep = 1e6 * found.smallest_step_s, found.oversleep_ms
+    advice = []
+    if max(found.smallest_step_s, found.resolution_s) > MAX_STEP_S:
+        advice.append("times are coarser than 1 ms: use another machine for response times")
+    if sleep.p99 > MAX_OVERSLEEP_MS:
+        advice.append(f"sleeps overrun by more than {MAX_OVERSLEEP_MS:g} ms: close other programs, leave power saving")
+    measured = (
+        f"resolution {1e9 * found.resolution_s:.0f} ns, smallest step {step_us:.2f} µs; "
+        f"a sleep of 1 ms overruns by {sleep.median:.2f} ms, 99th percentile {sleep.p99:.2f} ms"
+    )
+    return _judged("clock", measured, "; ".join(advice), found)
+
+
+def of_disk(found: Appends) -> Finding:
+    """The disk under the results folder."""
+    advice = []
+    if found.append_ms.p95 > MAX_APPEND_MS:
+        advice.append(
+            f"syncs take more than {MAX_APPEND_MS:g} ms: keep results on a local disk, best a solid-state one"
+        )
+    if found.free_bytes < MIN_FREE_BYTES:
+        advice.append(f"less than {MIN_FREE_BYTES / 1e6:g} MB free: make room")
+    measured = f"synced append {_tail(found.append_ms)}; {found.free_bytes / 1e9:.1f} GB free"
+    return _judged("disk", measured, "; ".join(advice), found)
+
+
+def of_disk_failure(folder: str, reason: str) -> Finding:
+    """A results folder that takes no records."""
+    advice = f"make {folder} a folder that you may write to, with room on its disk, or give another with --results"
+    return Finding(check="disk", verdict="fails", measured=f"{folder}: {reason}", advice=advice)
+
+
+def of_link(found: Link) -> Finding:
+    """The gun and the way to it."""
+    measured = f"{found.gun}, {found.state}; round trip {_tail(found.round_trip_ms)}"
+    if found.fault is not None or found.state != "disarmed":
+        return Finding(
+            check="gun",
+            verdict="fails",
+            measured=measured if found.fault is None else f"{measured}; fault: {found.fault}",
+            advice="switch off the gun's power, remove the cause, and look again before anybody holds it",
+            figures=asdict(found),
+        )
+    slow = found.round_trip_ms.p95 > MAX_ROUND_TRIP_MS
+    return _judged("gun", measured, "set the USB adapter's latency timer to 1 ms, see below" if slow else "", found)
+
+
+def of_link_failure(reason: str) -> Finding:
+    """A gun that does not answer."""
+    advice = "check power, cable and port; on Linux you must be in the group dialout"
+    return Finding(check="gun", verdict="fails", measured=reason, advice=advice)
+
+
+def of_adapters(found: Sequence[Adapter]) -> Finding:
+    """The latency timers of USB serial adapters, where the system shows them."""
+    if not found:
+        measured = "this system shows no USB serial adapter with a latency timer"
+        return Finding(
+            check="USB adapter",
+            verdict="not there",
+            measured=measured,
+            advice="nothing, unless the gun is on a USB serial port",
+        )
+    slow = [adapter for adapter in found if adapter.latency_ms > MAX_ADAPTER_MS]
+    return Finding(
+        check="USB adapter",
+        verdict="warning" if slow else "good",
+        measured=", ".join(f"{adapter.name}: latency timer {adapter.latency_ms} ms" for adapter in found),
+        advice="; ".join(f"echo {MAX_ADAPTER_MS} | sudo tee {adapter.setting}" for adapter in slow),
+        figures={"adapters": [asdict(adapter) for adapter in found]},
+    )
+
+
+def of_display(found: Display) -> Finding:
+    """The screen that the console is seen on."""
+    size = f"{found.width_px} x {found.height_px} at {found.refresh_Hz:.0f} Hz ({found.platform})"
+    if found.opened_ms is None:
+        advice = "see that the desktop shows windows, then look again"
+        figures = asdict(found)
+        return Finding(
+            check="display", verdict="fails", measured=f"{size}; no window was seen", advice=advice, figures=figures
+        )
+    advice = ""
+    if found.platform in ("offscreen", "minimal"):
+        advice = "nobody sees this display: unset QT_QPA_PLATFORM"
+    elif found.width_px < MIN_WIDTH_PX or found.height_px < MIN_HEIGHT_PX:
+        advice = f"the console needs {MIN_WIDTH_PX} x {MIN_HEIGHT_PX}: choose a larger resolution"
+    return _judged("display", f"{size}; a window was seen after {found.opened_ms:.0f} ms", advice, found)
+
+
+def of_stage(found: Stage) -> Finding:
+    """PsychoPy. How fast it draws is information only: without vertical sync it means nothing."""
+    measured = (
+        f"PsychoPy {found.version} imported in {found.import_s:.1f} s, a window in {found.opened_s:.1f} s; "
+        f"{found.frames_Hz:.0f} frames/s (no verdict)"
+    )
+    return _judged("PsychoPy", measured, "", found)
+
+
+def of_sound(found: Sound) -> Finding:
+    """The device that plays the break's tone and the masking noise."""
+    if not found.outputs:
+        return no_sound("no output device")
+    count = f"{len(found.outputs)} output device{'s' if len(found.outputs) > 1 else ''}"
+    advice = "" if found.default else "none is the default: choose one in the system's sound settings"
+    return _judged("sound", f"{count}, default: {found.default or 'none'}", advice, found)
+
+
+def no_sound(reason: str) -> Finding:
+    """A machine that cannot be heard."""
+    advice = (
+        "the break's tone and masking noise stay silent: connect headphones or loudspeakers "
+        "and see that the system lists them"
+    )
+    return Finding(check="sound", verdict="not there", measured=reason, advice=advice)
+
+
+def of_keys(found: Keys) -> Finding:
+    """The way of a key to a Qt window. It begins at the display's server: the keyboard's own delay is not in it."""
+    came = len(found.to_event_ms)
+    if came == 0:
+        measured = f"none of {found.injected} injected keys came to the window"
+        advice = "leave the doctor's window in front, keep your hands off, and look again"
+        return Finding(check="keyboard", verdict="warning", measured=measured, advice=advice, figures=asdict(found))
+    event, painted = spread(found.to_event_ms), spread(found.to_painted_ms)
+    measured = f"{came} of {found.injected} keys; to the event {_short(event)}; until painted {_short(painted)}"
+    advice = "" if came == found.injected else "some keys went elsewhere: leave the doctor's window in front"
+    if event.p99 > MAX_KEY_MS:
+        advice = f"keys take more than {MAX_KEY_MS:g} ms: close other programs and desktop effects"
+    return _judged("keyboard", measured, advice, found)
+
+
+def of_latencies(found: Latencies) -> tuple[Finding, Finding]:
+    """What the console took in the runs of a results folder."""
+    return (
+        _latency("step to screen", found.step_to_screen_ms, MAX_STEP_TO_SCREEN_MS, "steps", found.trials),
+        _latency("key to disk", found.key_to_disk_ms, MAX_KEY_TO_DISK_MS, "answers", found.trials),
+    )
+
+
+def _latency(check: str, values: Sequence[float], bound: float, what: str, trials: int) -> Finding:
+    if not values:
+        return Finding(
+            check=check,
+            verdict="not there",
+            measured="no console runs here",
+            advice="look again after a run with --screen console, with the same --results",
+        )
+    found = spread(values)
+    measured = f"{_short(found)}, worst {_ms(found.worst)}; {found.n} {what} in {trials} trials"
+    slow = found.p99 > bound
+    return Finding(
+        check=check,
+        verdict="warning" if slow else "good",
+        measured=measured,
+        advice=f"more than {bound:g} ms: close other programs; see the disk and display above" if slow else "",
+        figures={"ms": asdict(found), "bound_ms": bound, "trials": trials},
+    )
+
+
+def of_absent(check: str, reason: str) -> Finding:
+    """Something that this machine does not have."""
+    advice = INSTALL if reason.endswith("not installed") else _ABSENT[check]
+    return Finding(check=check, verdict="not there", measured=reason, advice=advice)
+
+
+def of_failure(check: str, reason: str) -> Finding:
+    """A check that broke off."""
+    return Finding(check=check, verdict="fails", measured=reason, advice=_BROKEN.get(check, _REPORT))
+
+
+_ABSENT = {
+    "display": "start it from a desktop session, or set DISPLAY; until then --screen terminal and synthetic work",
+    "PsychoPy": "the participant's screen needs a display: see above",
+    "keyboard": "key times are measured under X with its extension XTEST alone; the console works without",
+}
+_REPORT = "look again with other programs closed; if it stays so, report it with this line"
+_WINDOWLESS = (
+    "see that DISPLAY names a display that you may use, and that Qt's libraries are there; on Debian and Ubuntu: "
+    "sudo apt install libegl1 libxcb-cursor0 libxcb-icccm4 libxcb-image0 libxcb-keysyms1 libxcb-render-util0 "
+    "libxcb-xkb1 libxkbcommon-x11-0"
+)
+_BROKEN = {
+    "display": _WINDOWLESS,
+    "keyboard": _WINDOWLESS,
+    "PsychoPy": "see that a display with OpenGL is there, and that the system libraries of PsychoPy are installed",
+}
+
+
+def overall(verdicts: Sequence[Verdict]) -> Literal["good", "warning", "fails"]:
+    """The worst of the verdicts; what is not there does no harm."""
+    return "fails" if "fails" in verdicts else "warning" if "warning" in verdicts else "good"
+
+
+def _judged(
+    check: str, measured: str, advice: str, figures: Machine | Ticks | Appends | Link | Display | Stage | Sound | Keys
+) -> Finding:
+    """Good if there is nothing to advise, else a warning."""
+    verdict: Verdict = "warning" if advice else "good"
+    return Finding(check=check, verdict=verdict, measured=measured, advice=advice, figures=asdict(figures))
+
+
+def _tail(of: Spread) -> str:
+    return f"median {_ms(of.median)}, 95th percentile {_ms(of.p95)}, worst {_ms(of.worst)} (n = {of.n})"
+
+
+def _short(of: Spread) -> str:
+    return f"median {_ms(of.median)}, 99th percentile {_ms(of.p99)}"
+
+
+def _ms(value: float) -> str:
+    """Hundredths of a millisecond; thousandths where there is nothing else."""
+    return f"{value:.2f} ms" if value >= 0.1 else f"{value:.3f} ms"

@@ -1,0 +1,85 @@
+"""The participant's own screen beside the console: its answers come as replies, its failures as troubles."""
+
+from __future__ import annotations
+
+import threading
+from collections.abc import Callable
+
+from experiments.screens.console.messages import Message, ParticipantAnswered, ParticipantRated, Reply, Trouble
+from experiments.screens.participant.link import ParticipantLink
+from experiments.screens.participant.mailbox import ParticipantError
+from experiments.screens.participant.words import AskDirection, AskRating
+from experiments.steps import Ask, Rate
+
+
+class ParticipantSide:
+    """Asks on the participant's screen without making anyone wait: the experimenter can always answer instead."""
+
+    def __init__(self, link: ParticipantLink, *, own_keys: bool) -> None:
+        self._link = link
+        self.own_keys = own_keys
+        self._called_off = threading.Event()
+        self._reply: Callable[[Reply], None] = lambda _: None
+        self._tell: Callable[[Message], None] = lambda _: None
+
+    def sit(self, reply: Callable[[Reply], None], tell: Callable[[Message], None]) -> None:
+        """Take the place beside a console."""
+        self._reply, self._tell = reply, tell
+
+    def rate(self, step: Rate, of: int, describe: str) -> None:
+        """Have a stimulus rated and described."""
+        question = AskRating(
+            number=step.trial.trial,
+            of=of,
+            question=step.question,
+            minimum=step.minimum,
+            maximum=step.maximum,
+            minimum_text=step.minimum_text,
+            maximum_text=step.maximum_text,
+            grain=step.grain,
+            describe=describe,
+        )
+        self._beside(lambda: self._rated(question))
+
+    def judge(self, step: Ask, onset_s: float) -> None:
+        """Have a direction judged, if the participant has keys of their own."""
+        if not self.own_keys:
+            return
+        question = AskDirection(
+            question=step.question,
+            forward=step.forward,
+            backward=step.backward,
+            forward_key="up",
+            backward_key="down",
+            onset_s=onset_s,
+        )
+        self._beside(lambda: self._judged(question))
+
+    def _rated(self, question: AskRating) -> None:
+        given = self._link.ask_rating(question)
+        self._reply(ParticipantRated(rating=given.rating, comment=given.comment))
+
+    def _judged(self, question: AskDirection) -> None:
+        given = self._link.ask_direction(question)
+        self._reply(ParticipantAnswered(response=given.response, at_s=given.pressed_s))
+
+    def call_off(self) -> None:
+        """Ask no longer: somebody else answered, or the run stopped."""
+        self._called_off.set()
+        self._link.cancel()
+
+    def close(self) -> None:
+        """Close the participant's screen."""
+        self._link.close()
+
+    def _beside(self, ask: Callable[[], None]) -> None:
+        self._called_off.clear()
+
+        def carry() -> None:
+            try:
+                ask()
+            except ParticipantError as error:
+                if not self._called_off.is_set():
+                    self._tell(Trouble(text=f"The participant's screen: {error}. Enter the answer here."))
+
+        threading.Thread(target=carry, daemon=True, name="participant").start()

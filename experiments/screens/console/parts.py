@@ -1,0 +1,111 @@
+"""The parts of the console's window: buttons that show their key, the panels, the areas for each kind of step."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+from PyQt6.QtCore import Qt
+from PyQt6.QtGui import QKeySequence, QShortcut
+from PyQt6.QtWidgets import (
+    QFrame,
+    QHBoxLayout,
+    QLabel,
+    QListWidget,
+    QProgressBar,
+    QPushButton,
+    QVBoxLayout,
+    QWidget,
+)
+
+Slot = Callable[[], object]
+
+
+def label(name: str, text: str = "", *, wrap: bool = True) -> QLabel:
+    """A label in the style of its name."""
+    made = QLabel(text)
+    made.setObjectName(name)
+    made.setWordWrap(wrap)
+    made.setTextFormat(Qt.TextFormat.PlainText)
+    return made
+
+
+def set_mood(widget: QWidget, mood: str) -> None:
+    """Give a label the colour of a mood; drawn anew only if it changes."""
+    if widget.property("mood") != mood:
+        widget.setProperty("mood", mood)
+        style = widget.style()
+        if style is not None:
+            style.unpolish(widget)
+            style.polish(widget)
+
+
+def button(parent: QWidget, text: str, key: str, slot: Slot, *, name: str = "") -> QPushButton:
+    """A button that shows its key, and the key. Both do the same, and only while the button is there to be seen."""
+    made = _button(f"{text}  [{key}]", text, slot, name)
+
+    def pressed() -> None:
+        if made.isVisible():
+            slot()
+
+    QShortcut(QKeySequence(key), parent).activated.connect(pressed)
+    return made
+
+
+def main_button(text: str, slot: Slot) -> QPushButton:
+    """The large button of the main key; the window itself listens to the key."""
+    return _button(f"{text}  [Space]", text, slot, "large")
+
+
+def _button(shown: str, spoken: str, slot: Slot, name: str) -> QPushButton:
+    made = QPushButton(shown)
+    made.setObjectName(name)
+    made.setAccessibleName(spoken)
+    made.setFocusPolicy(Qt.FocusPolicy.TabFocus)
+    made.clicked.connect(lambda _: slot())
+    return made
+
+
+def panel(*widgets: QWidget) -> QFrame:
+    """A framed column."""
+    frame = QFrame()
+    frame.setObjectName("panel")
+    column = QVBoxLayout(frame)
+    for widget in widgets:
+        column.addWidget(widget)
+    return frame
+
+
+def row(*widgets: QWidget) -> QWidget:
+    """Widgets side by side."""
+    made = QWidget()
+    across = QHBoxLayout(made)
+    across.setContentsMargins(0, 0, 0, 0)
+    for widget in widgets:
+        across.addWidget(widget)
+    return made
+
+
+def column(*widgets: QWidget) -> QWidget:
+    """Widgets below each other."""
+    made = QWidget()
+    down = QVBoxLayout(made)
+    down.setContentsMargins(0, 0, 0, 0)
+    for widget in widgets:
+        down.addWidget(widget)
+    return made
+
+
+def quiet_list() -> QListWidget:
+    """A list that is only looked at."""
+    made = QListWidget()
+    made.setFocusPolicy(Qt.FocusPolicy.NoFocus)
+    made.setSelectionMode(QListWidget.SelectionMode.SingleSelection)
+    return made
+
+
+def bar(what: str) -> QProgressBar:
+    """A progress bar that says what of what is done."""
+    made = QProgressBar()
+    made.setAccessibleName(what)
+    made.setFormat(f"{what}: %v of %m")
+    return made

@@ -1,0 +1,95 @@
+"""Dark and light, for a dim and a bright lab. Text keeps a contrast of at least 7 to 1 against its ground."""
+
+from __future__ import annotations
+
+from typing import Literal
+
+Theme = Literal["dark", "light"]
+MOODS = ("act", "ask", "rest", "wait", "good", "bad")
+"""What a line is about, which chooses its colour; the words say it as well."""
+
+_COLOURS: dict[Theme, dict[str, str]] = {
+    "dark": {
+        "ground": "#101418",
+        "panel": "#1b2229",
+        "line": "#4a5764",
+        "text": "#f2f5f7",
+        "quiet": "#b9c4ce",
+        "act": "#8fd0ff",
+        "ask": "#ffd479",
+        "rest": "#9fe0b5",
+        "wait": "#c8d0d8",
+        "good": "#9fe0b5",
+        "bad": "#ffb3a7",
+        "stop": "#b3261e",
+        "stop_text": "#ffffff",
+    },
+    "light": {
+        "ground": "#ffffff",
+        "panel": "#f0f3f6",
+        "line": "#7a8794",
+        "text": "#10161c",
+        "quiet": "#3c4852",
+        "act": "#00497a",
+        "ask": "#6b4300",
+        "rest": "#0b5028",
+        "wait": "#3c4852",
+        "good": "#0b5028",
+        "bad": "#8c1d18",
+        "stop": "#b3261e",
+        "stop_text": "#ffffff",
+    },
+}
+
+
+def colour(theme: Theme, name: str) -> str:
+    """A colour by what it is for."""
+    return _COLOURS[theme][name]
+
+
+def contrast(theme: Theme, name: str, ground: str = "ground") -> float:
+    """The contrast ratio of a colour against a ground (WCAG 2): 1 to 21."""
+    light, dark = sorted((_luminance(colour(theme, name)), _luminance(colour(theme, ground))), reverse=True)
+    return (light + 0.05) / (dark + 0.05)
+
+
+def _luminance(hex_colour: str) -> float:
+    parts = [int(hex_colour[start : start + 2], 16) / 255 for start in (1, 3, 5)]
+    linear = [part / 12.92 if part <= 0.04045 else ((part + 0.055) / 1.055) ** 2.4 for part in parts]
+    return 0.2126 * linear[0] + 0.7152 * linear[1] + 0.0722 * linear[2]
+
+
+def sheet(theme: Theme) -> str:
+    """The Qt style sheet of a theme."""
+    c = _COLOURS[theme]
+    moods = "\n".join(f'QLabel[mood="{mood}"] {{ color: {c[mood]}; }}' for mood in MOODS)
+    return f"""
+    QWidget {{ background: {c["ground"]}; color: {c["text"]}; font-size: 17px;
+        font-family: "DejaVu Sans", "Noto Sans"; }}
+    QFrame#panel {{ background: {c["panel"]}; border: 1px solid {c["line"]}; border-radius: 8px; }}
+    QFrame#panel QLabel {{ background: transparent; }}
+    QLabel#title {{ font-size: 52px; font-weight: bold; }}
+    QLabel#detail {{ font-size: 26px; }}
+    QLabel#place {{ font-size: 22px; color: {c["quiet"]}; }}
+    QLabel#quiet {{ color: {c["quiet"]}; }}
+    QLabel#saved {{ font-size: 22px; color: {c["good"]}; }}
+    QPushButton {{ background: {c["panel"]}; border: 2px solid {c["line"]}; border-radius: 8px; padding: 10px 16px; }}
+    QPushButton:focus {{ border: 3px solid {c["act"]}; }}
+    QPushButton:hover {{ border-color: {c["act"]}; }}
+    QPushButton:disabled {{ color: {c["line"]}; border-style: dashed; }}
+    QPushButton#large {{ font-size: 34px; font-weight: bold; padding: 22px; }}
+    QPushButton#stop {{ background: {c["stop"]}; color: {c["stop_text"]}; font-weight: bold; font-size: 22px; }}
+    QLineEdit, QDoubleSpinBox, QSpinBox, QComboBox {{
+        background: {c["panel"]}; border: 2px solid {c["line"]}; border-radius: 6px; padding: 8px; font-size: 24px; }}
+    QLineEdit:focus, QDoubleSpinBox:focus, QSpinBox:focus, QComboBox:focus {{ border: 3px solid {c["act"]}; }}
+    QProgressBar {{ border: 1px solid {c["line"]}; border-radius: 6px; text-align: center; background: {c["panel"]};
+        color: {c["text"]}; min-height: 26px; }}
+    QProgressBar::chunk {{ background: {c["line"]}; }}
+    QCheckBox::indicator {{ width: 22px; height: 22px; border: 2px solid {c["line"]}; border-radius: 4px; }}
+    QCheckBox::indicator:checked {{ background: {c["act"]}; }}
+    QCheckBox:focus {{ color: {c["act"]}; }}
+    QListWidget, QTableWidget {{ background: {c["panel"]}; border: 1px solid {c["line"]}; font-size: 20px; }}
+    QListWidget::item:selected, QTableWidget::item:selected {{ background: {c["act"]}; color: {c["ground"]}; }}
+    QHeaderView::section {{ background: {c["ground"]}; color: {c["quiet"]}; border: none; padding: 6px; }}
+    {moods}
+    """

@@ -1,0 +1,105 @@
+"""The participant's program: words in, pages on the window, answers out, until the console says close."""
+
+from __future__ import annotations
+
+import time
+import traceback
+from typing import BinaryIO
+
+from experiments.screens.participant.keys import Keys
+from experiments.screens.participant.look import Look
+from experiments.screens.participant.noise import MaskingNoise
+from experiments.screens.participant.pages import DirectionPage, MessagePage
+from experiments.screens.participant.rating_page import RatingPage
+from experiments.screens.participant.stage import Page, Stage
+from experiments.screens.participant.toolkit import load
+from experiments.screens.participant.wire import Wire
+from experiments.screens.participant.words import (
+    AskDirection,
+    AskRating,
+    Close,
+    Failed,
+    FromParticipant,
+    Noise,
+    Ready,
+    Show,
+    ToParticipant,
+)
+
+_STEP_S = 0.004
+"""How long the program rests between two looks at words, mouse and keys."""
+
+_THANKS = "Thank you. Please wait."
+
+
+def run(look: Look, heard: BinaryIO, said: BinaryIO) -> int:
+    """Run the program; whatever ends it but the console is said as `Failed`. Gives back the exit code."""
+    wire = Wire(heard, said, time.monotonic)
+    try:
+        toolkit = load()
+        wire = Wire(heard, said, toolkit.now)
+        app = App(Stage(toolkit, look), wire)
+        app.begin()
+        app.serve()
+    except KeyboardInterrupt:
+        wire.say(Failed(message="it was interrupted from the keyboard (Ctrl-C)"))
+        return 130
+    except SystemExit as error:  # PsychoPy ends the program where others raise
+        wire.say(Failed(message=f"PsychoPy ended the program ({error.code})"))
+        return 1
+    except BaseException as error:  # noqa: BLE001 - some of PsychoPy's errors derive from BaseException alone
+        traceback.print_exc()
+        wire.say(Failed(message=f"{type(error).__name__}: {error}"))
+        return 1
+    return 0
+
+
+class App:
+    """The window and who speaks to it."""
+
+    def __init__(self, stage: Stage, wire: Wire) -> None:
+        self._stage, self._wire = stage, wire
+        self._keys = Keys(stage.toolkit)
+        self._noise = MaskingNoise()
+
+    def begin(self) -> None:
+        """Show an empty window and say that it is ready."""
+        refresh_Hz = self._stage.measure_refresh()
+        self._stage.put(MessagePage(self._stage, ""))
+        self._stage.step()
+        size = f"{self._stage.width_px}x{self._stage.height_px}"
+        self._wire.say(Ready(psychopy=self._stage.toolkit.version, window=size, refresh_Hz=refresh_Hz))
+        self._wire.listen()
+
+    def serve(self) -> None:
+        """Do as the words say until they say close."""
+        while not isinstance(word := self._wire.word(), Close):
+            if word is not None:
+                self._obey(word)
+            self._stage.step()
+            self._keys.poll()
+            self._follow(self._stage.page.outcome() if self._stage.page else None)
+            time.sleep(_STEP_S)
+        self._noise.stop()
+        self._stage.close()
+
+    def _obey(self, word: ToParticipant) -> None:
+        match word:
+            case Show():
+                self._stage.put(MessagePage(self._stage, word.text))
+            case AskRating():
+                self._stage.put(RatingPage(self._stage, word))
+            case AskDirection():
+                self._stage.put(DirectionPage(self._stage, word, self._keys))
+            case Noise():
+                self._wire.say(self._noise.turn(word))
+
+    def _follow(self, outcome: Page | FromParticipant | None) -> None:
+        """Go on to the next page, or say the answer and thank for it."""
+        if outcome is None:
+            return
+        if isinstance(outcome, FromParticipant):
+            self._wire.say(outcome)
+            self._stage.put(MessagePage(self._stage, _THANKS))
+        else:
+            self._stage.put(outcome)

@@ -1,0 +1,188 @@
+"""The console's end of the participant's screen: questions out, answers in, clocks mapped. Imports no PsychoPy.
+
+Whatever goes wrong there is one exception here, `ParticipantError`; nothing waits for ever on a screen that is gone.
+Questions may be asked from any thread but the one that draws the console; `cancel` and `close` from any at all.
+"""
+
+from __future__ import annotations
+
+import sys
+import threading
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from dataclasses import replace
+from typing import Self, TypeVar
+
+from pydantic import ValidationError
+
+from experiments.clock import Clock, RealClock
+from experiments.screens.participant.clocks import ClockMap, RoundTrip, clock_map
+from experiments.screens.participant.look import Look, arguments
+from experiments.screens.participant.mailbox import Mailbox, ParticipantError
+from experiments.screens.participant.process import ParticipantProcess
+from experiments.screens.participant.words import (
+    AskDirection,
+    AskRating,
+    Close,
+    DirectionGiven,
+    Failed,
+    Noise,
+    NoiseIs,
+    Ping,
+    Pong,
+    RatingGiven,
+    Ready,
+    Show,
+    from_participant_from,
+    line,
+)
+
+PINGS = 8
+"""Pings of one mapping of the clocks; the shortest counts."""
+
+REPLY_S = 5.0
+"""How long the screen may take over what no person has a hand in."""
+
+NOISE_S = 15.0
+"""How long the sound system may take to start."""
+
+MAX_CLOCK_STEP_S = 0.02
+"""How far the clocks may move against each other while a direction is asked; a clock that was set moves further."""
+
+Question = AskRating | AskDirection | Noise
+Answer = TypeVar("Answer", RatingGiven, DirectionGiven, NoiseIs)
+
+__all__ = ["ParticipantError", "ParticipantLink"]
+
+
+class ParticipantLink:
+    """The participant's screen, as a console sees it. Use it as a context manager, or `close` it."""
+
+    def __init__(self, command: Sequence[str], clock: Clock) -> None:
+        self._clock = clock
+        self._mail = Mailbox()
+        self._asking = threading.RLock()
+        self._clocks: ClockMap | None = None
+        try:
+            self._process = ParticipantProcess(command, self._said, self._mail.fail)
+        except OSError as error:
+            raise ParticipantError(f"the participant's screen cannot be started: {error}") from error
+
+    @classmethod
+    def start(
+        cls, look: Look | None = None, *, clock: Clock | None = None, command: Sequence[str] | None = None
+    ) -> Self:
+        """Start the program and return at once; its window takes seconds to open. `command` is another program."""
+        program = command or (sys.executable, "-m", "experiments.screens.participant", *arguments(look or Look()))
+        return cls(program, clock or RealClock())
+
+    @property
+    def failure(self) -> str | None:
+        """Why the screen is gone, or `None` while it is there."""
+        return self._mail.failure
+
+    @property
+    def clocks(self) -> ClockMap | None:
+        """The last mapping of the clocks, with its uncertainty; `None` before the first."""
+        return self._clocks
+
+    @property
+    def pid(self) -> int:
+        """The process id of the program."""
+        return self._process.pid
+
+    def wait_ready(self, timeout_s: float = 60.0) -> Ready:
+        """Wait until the window is open, and map the clocks."""
+        ready = self._mail.wait(Ready, lambda _: True, timeout_s, None)
+        self.map_clocks()
+        return ready
+
+    def show(self, text: str) -> None:
+        """Show a plain message; a question that is being asked is called off."""
+        self._mail.call_off()
+        self._process.write(line(Show(text=text)))
+
+    def map_clocks(self, pings: int = PINGS) -> ClockMap:
+        """Map the clocks anew."""
+        with self._alone():
+            self._clocks = clock_map([self._trip() for _ in range(pings)])
+            return self._clocks
+
+    def ask_rating(self, question: AskRating, timeout_s: float | None = None) -> RatingGiven:
+        """Have a stimulus rated, and described if `describe` asks for it. Waits for the participant."""
+        with self._alone():
+            asked = replace(question, ask=self._mail.open_ask())
+            return self._answer(asked, RatingGiven, timeout_s)
+
+    def ask_direction(self, question: AskDirection, timeout_s: float | None = None) -> DirectionGiven:
+        """Have a direction judged. Waits for the participant. `onset_s` and `pressed_s` are on this side's clock."""
+        with self._alone():
+            ask, clocks = self._mail.open_ask(), self.map_clocks()
+            asked = replace(question, ask=ask, onset_s=clocks.there(question.onset_s))
+            given = self._answer(asked, DirectionGiven, timeout_s)
+            moved_s = self.map_clocks().offset_s - clocks.offset_s
+        if abs(moved_s) > MAX_CLOCK_STEP_S:
+            raise ParticipantError(
+                f"a clock was set by {moved_s:.3f} s while {given.response!r} was answered: the key's time is lost"
+            )
+        return replace(given, pressed_s=clocks.here(given.pressed_s))
+
+    def noise(self, on: bool, level: float = 0.3) -> NoiseIs:
+        """Turn the masking noise on or off; the answer says whether it plays, and if it cannot, why."""
+        with self._alone():
+            return self._answer(Noise(on=on, level=level, ask=self._mail.open_ask()), NoiseIs, NOISE_S)
+
+    def cancel(self) -> bool:
+        """Call off the question that is being asked, from another thread; true if there was one."""
+        return self._mail.call_off()
+
+    def close(self) -> None:
+        """End the program: by asking, then by force. Who still waits for it is told."""
+        self._process.write(line(Close()))
+        self._mail.fail("the participant's screen was closed by the console")
+        self._process.end()
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.close()
+
+    @contextmanager
+    def _alone(self) -> Iterator[None]:
+        """One question at a time; one that was just called off has a moment to leave."""
+        if not self._asking.acquire(timeout=REPLY_S):
+            raise ParticipantError("another question is being asked on the participant's screen")
+        try:
+            yield
+        finally:
+            self._asking.release()
+
+    def _answer(self, asked: Question, kind: type[Answer], timeout_s: float | None) -> Answer:
+        """Ask and wait; a question that gets no answer is taken off the screen."""
+        try:
+            self._process.write(line(asked))
+            return self._mail.wait(kind, lambda given: given.ask == asked.ask, timeout_s, asked.ask)
+        except ParticipantError:
+            self._process.write(line(Show(text="")))
+            raise
+        finally:
+            self._mail.call_off()
+
+    def _trip(self) -> RoundTrip:
+        """One ping, waited for where its return is stamped."""
+        sent_s = self._clock.now()
+        self._process.write(line(Ping(sent_s=sent_s)))
+        pong = self._mail.wait(Pong, lambda pong: pong.sent_s == sent_s, REPLY_S, None)
+        return RoundTrip(sent_s=sent_s, there_s=pong.there_s, back_s=self._clock.now())
+
+    def _said(self, wire: bytes) -> None:
+        try:
+            word = from_participant_from(wire)
+        except ValidationError:
+            self._mail.fail(f"the participant's screen said what is no word: {wire[:200]!r}")
+            return
+        if isinstance(word, Failed):
+            self._mail.fail(f"the participant's screen failed: {word.message}")
+        else:
+            self._mail.put(word)

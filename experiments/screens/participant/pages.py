@@ -1,0 +1,96 @@
+"""The pages of the participant's window that want no more than a look or a key: message and direction."""
+
+from __future__ import annotations
+
+from experiments.screens.participant.keys import Keys
+from experiments.screens.participant.stage import Box, Page, Stage
+from experiments.screens.participant.words import AskDirection, DirectionGiven, FromParticipant
+
+STILL_S = 0.1
+"""How often a page is drawn on which nothing moves."""
+
+
+class QuietPage:
+    """A page that hears nothing; the others hear what concerns them."""
+
+    redraw_s = STILL_S
+    pointer = False
+    typed = False
+
+    def pressed(self, x: float, y: float) -> None:
+        """Nothing."""
+
+    def dragged(self, x: float) -> None:
+        """Nothing."""
+
+    def released(self) -> None:
+        """Nothing."""
+
+    def key(self, name: str, ctrl: bool) -> bool:
+        """Nothing, and nothing for PsychoPy."""
+        del name, ctrl
+        return True
+
+    def motion(self, name: str) -> None:
+        """Nothing."""
+
+    def outcome(self) -> Page | FromParticipant | None:
+        """Nothing."""
+        return None
+
+    def leave(self) -> None:
+        """Nothing."""
+
+
+class MessagePage(QuietPage):
+    """A plain message in the middle."""
+
+    def __init__(self, stage: Stage, text: str) -> None:
+        box = Box(y=0, width=2 * stage.half_width, height=0.9, anchor="center")
+        self._text = stage.text(text, box, 0.06, stage.palette.ink)
+
+    def draw(self) -> None:
+        """The message."""
+        self._text.draw()
+
+
+class DirectionPage(QuietPage):
+    """Two answers, each with its key. Keys count from the onset on, even those that went down before the page stood."""
+
+    def __init__(self, stage: Stage, asked: AskDirection, keys: Keys) -> None:
+        self._asked, self._keys = asked, keys
+        width, ink = stage.half_width, stage.palette.ink
+        question = Box(y=0.4, width=2 * width, height=0.25)
+        self._drawn = [stage.text(asked.question, question, 0.06, ink)]
+        for x, key, answer in (
+            (-width / 2, asked.forward_key, asked.forward),
+            (width / 2, asked.backward_key, asked.backward),
+        ):
+            self._drawn.append(stage.panel(Box(x=x, y=-0.12, width=0.9 * width, height=0.4), stage.palette.panel))
+            letter = Box(x=x, y=-0.06, width=0.8 * width, height=0.16, anchor="center")
+            self._drawn.append(stage.text(_key_text(key), letter, 0.12, stage.palette.accent))
+            words = Box(x=x, y=-0.22, width=0.8 * width, height=0.12, anchor="center")
+            self._drawn.append(stage.text(answer, words, 0.055, ink))
+
+    def draw(self) -> None:
+        """The question and both answers."""
+        for stimulus in self._drawn:
+            stimulus.draw()
+
+    def outcome(self) -> DirectionGiven | None:
+        """The first of the two keys since the onset."""
+        for press in self._keys.since(self._asked.onset_s):
+            if press.name == self._asked.forward_key:
+                return DirectionGiven(response="forward", pressed_s=press.pressed_s, ask=self._asked.ask)
+            if press.name == self._asked.backward_key:
+                return DirectionGiven(response="backward", pressed_s=press.pressed_s, ask=self._asked.ask)
+        return None
+
+
+def _key_text(key: str) -> str:
+    """A key as it is printed on the keyboard.
+
+    >>> _key_text("f"), _key_text("left"), _key_text("num_1")
+    ('F', 'LEFT', '1')
+    """
+    return key.removeprefix("num_").upper()

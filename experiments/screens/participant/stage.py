@@ -1,0 +1,204 @@
+"""The participant's window: what can be put on it, and what happens on it.
+
+Places are in parts of the window's height from its middle, `half_width` to either side and 0.5 up and down.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any, Protocol
+
+from experiments.screens.participant.look import PALETTES, Look
+from experiments.screens.participant.toolkit import Toolkit
+from experiments.screens.participant.words import FromParticipant
+
+_SMALLEST = 0.018
+_SHRINK = 0.92
+_MARGIN = 0.94
+_STEADY_FLIPS, _MOST_FLIPS = 10, 60
+
+
+class WindowClosed(Exception):  # noqa: N818 - somebody closed it; that is no error of ours
+    """The participant's window was closed."""
+
+
+class Page(Protocol):
+    """What fills the window, and hears what happens on it. A handler that returns true keeps it from PsychoPy."""
+
+    redraw_s: float
+    pointer: bool
+    typed: bool
+
+    def draw(self) -> None:
+        """Draw one frame."""
+
+    def pressed(self, x: float, y: float) -> None:
+        """The mouse went down."""
+
+    def dragged(self, x: float) -> None:
+        """The mouse moved while it was down."""
+
+    def released(self) -> None:
+        """The mouse was let go."""
+
+    def key(self, name: str, ctrl: bool) -> bool:
+        """A key went down while the window had the focus; `name` as pyglet names it."""
+
+    def motion(self, name: str) -> None:
+        """A key that moves something went down, or is held."""
+
+    def outcome(self) -> Page | FromParticipant | None:
+        """What it comes to: a word to say, another page, or nothing yet."""
+
+    def leave(self) -> None:
+        """It is taken off the window."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Box:
+    """Where text goes: its anchor point, how large it may be, and what of it stands at the anchor."""
+
+    x: float = 0.0
+    y: float
+    width: float
+    height: float
+    anchor: str = "top"
+
+
+class Stage:
+    """The open window with one page on it."""
+
+    def __init__(self, toolkit: Toolkit, look: Look) -> None:
+        self.toolkit, self.look, self.palette = toolkit, look, PALETTES[look.theme]
+        self.window = _open(toolkit, look, self.palette.ground)
+        self.width_px, self.height_px = (int(pixels) for pixels in self.window.clientSize)
+        self.half_width = _MARGIN * self.width_px / self.height_px / 2
+        self.page: Page | None = None
+        self._drawn_s = 0.0
+        self._closed = False
+        self._font_files = [str(path) for path in sorted(toolkit.fonts.glob("NotoSans-*.ttf"))]
+        self._handlers = _Handlers(self)  # pyglet holds them weakly
+        self.window.winHandle.push_handlers(self._handlers)
+
+    def measure_refresh(self) -> float | None:
+        """The refresh rate in Hz; `None` if frames do not come steadily."""
+        measured = self.window.getActualFrameRate(nIdentical=_STEADY_FLIPS, nMaxFrames=_MOST_FLIPS, nWarmUpFrames=2)
+        return None if measured is None else round(float(measured), 2)
+
+    def put(self, page: Page) -> None:
+        """Fill the window with another page; one that is typed on gets the focus."""
+        if self.page is not None:
+            self.page.leave()
+        self.page = page
+        self.window.mouseVisible = page.pointer
+        if page.typed:
+            self.window.winHandle.activate()
+        self._drawn_s = 0.0
+
+    def step(self) -> None:
+        """Let happen what happens, and draw when it is time. `WindowClosed` if it is."""
+        self.window.winHandle.dispatch_events()
+        if self._closed:
+            raise WindowClosed("the participant's window was closed")
+        now_s = self.toolkit.now()
+        if self.page is not None and now_s - self._drawn_s >= self.page.redraw_s:
+            self._drawn_s = now_s
+            self.page.draw()
+            self.window.flip()
+
+    def note_closed(self) -> None:
+        """The window's own close button was used."""
+        self._closed = True
+
+    def at(self, x_px: float, y_px: float) -> tuple[float, float]:
+        """A place in pixels from the lower left, as a place of this window."""
+        return (x_px - self.width_px / 2) / self.height_px, y_px / self.height_px - 0.5
+
+    def text(self, text: str, box: Box, size: float, color: str) -> Any:
+        """Text that fits its box: smaller than asked if it must."""
+        while True:
+            stimulus = self._text(text, box, size, color)
+            width_px, height_px = stimulus.boundingBox
+            fits = width_px <= box.width * self.height_px and height_px <= box.height * self.height_px
+            if fits or size * _SHRINK < _SMALLEST:
+                return stimulus
+            size *= _SHRINK
+
+    def _text(self, text: str, box: Box, size: float, color: str) -> Any:
+        return self.toolkit.visual.TextStim(
+            self.window,
+            text=text or " ",  # PsychoPy cannot measure no text
+            font=self.look.font,
+            fontFiles=self._font_files,
+            pos=(box.x, box.y),
+            height=size,
+            wrapWidth=box.width,
+            anchorVert=box.anchor,
+            anchorHoriz="center",
+            alignText="center",
+            color=color,
+        )
+
+    def panel(self, box: Box, fill: str, line: str | None = None) -> Any:
+        """A filled rectangle; its box's place is its middle."""
+        return self.toolkit.visual.Rect(
+            self.window,
+            width=box.width,
+            height=box.height,
+            pos=(box.x, box.y),
+            fillColor=fill,
+            lineColor=line,
+            lineWidth=2,
+        )
+
+    def close(self) -> None:
+        """Close the window."""
+        self.window.close()
+
+
+def _open(toolkit: Toolkit, look: Look, ground: str) -> Any:
+    window = toolkit.visual.Window(
+        size=(look.width_px, look.height_px),
+        screen=look.screen,
+        fullscr=look.full_screen,
+        allowGUI=not look.full_screen,
+        units="height",
+        color=ground,
+        checkTiming=False,
+        monitor=None,
+    )
+    window.winHandle.set_caption("Recoil: participant")
+    return window
+
+
+class _Handlers:
+    """What pyglet calls, told to the page. Before PsychoPy's own handlers, which a true answer keeps out."""
+
+    def __init__(self, stage: Stage) -> None:
+        self._stage = stage
+        self._names = stage.toolkit.key
+
+    def on_close(self) -> bool:
+        self._stage.note_closed()
+        return True
+
+    def on_mouse_press(self, x: int, y: int, button: int, _: int) -> None:
+        if self._stage.page is not None and button == 1:
+            self._stage.page.pressed(*self._stage.at(x, y))
+
+    def on_mouse_drag(self, x: int, y: int, *_: int) -> None:
+        if self._stage.page is not None:
+            self._stage.page.dragged(self._stage.at(x, y)[0])
+
+    def on_mouse_release(self, _x: int, _y: int, button: int, _: int) -> None:
+        if self._stage.page is not None and button == 1:
+            self._stage.page.released()
+
+    def on_key_press(self, symbol: int, modifiers: int) -> bool:
+        if self._stage.page is None:
+            return False
+        return self._stage.page.key(self._names.symbol_string(symbol), bool(modifiers & self._names.MOD_CTRL))
+
+    def on_text_motion(self, motion: int) -> None:
+        if self._stage.page is not None:
+            self._stage.page.motion(self._names.motion_string(motion))

@@ -1,0 +1,170 @@
+"""The words between a console and the participant's screen: one JSON object a line, both ways.
+
+Moments ending in `_s` are on the clock of the side that took them. On the wire `onset_s` and `pressed_s` are on the
+participant's clock: the link, which knows both clocks, maps them. `ask` numbers what wants an answer and comes back
+with it, so that an answer that is late is never taken for that of the next question.
+"""
+
+from __future__ import annotations
+
+import json
+from dataclasses import asdict, dataclass
+from typing import Annotated, Literal
+
+from pydantic import Field, TypeAdapter
+
+from device.words import Direction
+
+Finite = Annotated[float, Field(allow_inf_nan=False)]
+Positive = Annotated[float, Field(gt=0, allow_inf_nan=False)]
+Share = Annotated[float, Field(ge=0, le=1, allow_inf_nan=False)]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Show:
+    """Show a plain message; whatever was asked is asked no longer."""
+
+    text: str
+    kind: Literal["show"] = "show"
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class AskRating:
+    """Ask for a rating of one of several stimuli, named by its order of presentation, then for a description.
+
+    An empty `describe` asks for no description.
+    """
+
+    number: int
+    of: int
+    question: str
+    minimum: Finite
+    maximum: Finite
+    minimum_text: str
+    maximum_text: str
+    grain: Positive
+    describe: str = ""
+    ask: int = 0
+    kind: Literal["ask-rating"] = "ask-rating"
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class AskDirection:
+    """Ask which way it shot; a key pressed before `onset_s` is no answer. Keys have PsychoPy's names."""
+
+    question: str
+    forward: str
+    backward: str
+    forward_key: str
+    backward_key: str
+    onset_s: Finite
+    ask: int = 0
+    kind: Literal["ask-direction"] = "ask-direction"
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Ping:
+    """What time is it there?"""
+
+    sent_s: Finite
+    kind: Literal["ping"] = "ping"
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Noise:
+    """Turn the masking noise on or off; `level` is a part of full scale."""
+
+    on: bool
+    level: Share = 0.3
+    ask: int = 0
+    kind: Literal["noise"] = "noise"
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Close:
+    """Close the window and end."""
+
+    kind: Literal["close"] = "close"
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Ready:
+    """The window is open: PsychoPy's version, its size in pixels, its measured refresh rate if that is steady."""
+
+    psychopy: str
+    window: str
+    refresh_Hz: Finite | None
+    kind: Literal["ready"] = "ready"
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Pong:
+    """It was `there_s` here when the ping came that was sent at `sent_s`."""
+
+    sent_s: Finite
+    there_s: Finite
+    kind: Literal["pong"] = "pong"
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class RatingGiven:
+    """A confirmed rating, of which 0 is one, and the participant's own words; may be empty."""
+
+    rating: Finite
+    comment: str
+    ask: int = 0
+    kind: Literal["rating-given"] = "rating-given"
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class DirectionGiven:
+    """Which way, and when the key went down."""
+
+    response: Direction
+    pressed_s: Finite
+    ask: int = 0
+    kind: Literal["direction-given"] = "direction-given"
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class NoiseIs:
+    """Whether the noise plays; if it cannot, the message says why and what to do."""
+
+    on: bool
+    message: str
+    ask: int = 0
+    kind: Literal["noise-is"] = "noise-is"
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Failed:
+    """The participant's screen ends, and why."""
+
+    message: str
+    kind: Literal["failed"] = "failed"
+
+
+ToParticipant = Show | AskRating | AskDirection | Ping | Noise | Close
+FromParticipant = Ready | Pong | RatingGiven | DirectionGiven | NoiseIs | Failed
+
+_TO: TypeAdapter[ToParticipant] = TypeAdapter(Annotated[ToParticipant, Field(discriminator="kind")])
+_FROM: TypeAdapter[FromParticipant] = TypeAdapter(Annotated[FromParticipant, Field(discriminator="kind")])
+
+
+def line(word: ToParticipant | FromParticipant) -> bytes:
+    r"""A word as a line of the wire: JSON in ASCII. `ValueError` for a number that is none.
+
+    >>> line(Show(text="one\ntwo"))
+    b'{"text": "one\\ntwo", "kind": "show"}\n'
+    """
+    return json.dumps(asdict(word), allow_nan=False).encode("ascii") + b"\n"
+
+
+def to_participant_from(wire: bytes) -> ToParticipant:
+    """The word to the participant that a line holds; `pydantic.ValidationError` if it holds none."""
+    return _TO.validate_json(wire)
+
+
+def from_participant_from(wire: bytes) -> FromParticipant:
+    """The word from the participant that a line holds; `pydantic.ValidationError` if it holds none."""
+    return _FROM.validate_json(wire)

@@ -1,0 +1,147 @@
+"""A person at a display: a program on a virtual screen (Xvfb), worked by real key events (XTest)."""
+
+from __future__ import annotations
+
+import json
+import os
+import shutil
+import signal
+import subprocess
+import time
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any, Self
+
+import pytest
+
+READY = shutil.which("Xvfb") is not None
+needs_display = pytest.mark.skipif(not READY, reason="needs Xvfb")
+
+_NAMES = {" ": "space", "\n": "Return", ".": "period", "-": "minus", ",": "comma", "?": "question"}
+
+
+@contextmanager
+def virtual_display() -> Iterator[str]:
+    """A virtual screen of 1280 by 800; its name."""
+    read, write = os.pipe()
+    words = ["Xvfb", "-displayfd", str(write), "-screen", "0", "1280x800x24", "-nolisten", "tcp"]
+    server = subprocess.Popen(words, pass_fds=[write], stderr=subprocess.DEVNULL)
+    os.close(write)
+    try:
+        with os.fdopen(read) as told:
+            yield f":{told.readline().strip()}"
+    finally:
+        server.terminate()
+        server.wait()
+
+
+class Keyboard:
+    """The keys of a virtual screen."""
+
+    def __init__(self, display: str) -> None:
+        from Xlib import XK
+        from Xlib.display import Display
+
+        self._names, self._display = XK, Display(display)
+
+    def close(self) -> None:
+        """Let go of the screen."""
+        self._display.close()
+
+    def press(self, name: str, *held: str) -> None:
+        """Press a key by its X name, with others held."""
+        from Xlib import X
+        from Xlib.ext import xtest
+
+        codes = [self._display.keysym_to_keycode(self._names.string_to_keysym(key)) for key in (*held, name)]
+        for code in codes:
+            xtest.fake_input(self._display, X.KeyPress, code)
+        for code in reversed(codes):
+            xtest.fake_input(self._display, X.KeyRelease, code)
+        self._display.sync()
+
+    def type(self, text: str) -> None:
+        """Type text of small letters, digits and blanks, and what stands in `_NAMES`."""
+        for letter in text:
+            shifted = letter.isupper() or letter == "?"
+            self.press(_NAMES.get(letter, letter.lower()), *(["Shift_L"] if shifted else []))
+
+    def focus_on_window(self, timeout_s: float = 30) -> None:
+        """Give the keys to the newest window: no window manager does it here."""
+        from Xlib import X
+
+        deadline = time.monotonic() + timeout_s
+        while time.monotonic() < deadline:
+            for window in reversed(self._display.screen().root.query_tree().children):
+                shown = window.get_attributes().map_state == X.IsViewable
+                if shown and window.get_geometry().width > 400:
+                    window.set_input_focus(X.RevertToParent, X.CurrentTime)
+                    self._display.sync()
+                    return
+            time.sleep(0.05)
+        raise AssertionError("no window was shown")
+
+
+class AtDisplay:
+    """A program on a virtual screen."""
+
+    def __init__(self, words: Sequence[object], folder: Path, display: str) -> None:
+        environment = os.environ | {"DISPLAY": display, "HOME": str(folder), "QT_QPA_PLATFORM": "xcb"}
+        self.process = subprocess.Popen(
+            [str(word) for word in words],
+            cwd=folder,
+            env=environment,
+            stdout=subprocess.PIPE,
+            stderr=subprocess.STDOUT,
+            text=True,
+            start_new_session=True,
+        )
+        self.keys = Keyboard(display)
+
+    def kill(self) -> None:
+        """`kill -9`."""
+        os.killpg(self.process.pid, signal.SIGKILL)
+        self.process.communicate()
+
+    def end(self, timeout_s: float = 60) -> tuple[int, str]:
+        """The exit code, and what was said."""
+        said, _ = self.process.communicate(timeout=timeout_s)
+        return self.process.returncode, said
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        if self.process.poll() is None:
+            self.kill()
+        self.keys.close()
+
+
+def last_record(journal: Path) -> dict[str, Any]:
+    """The last whole record of a journal that is being written; empty if there is none yet."""
+    try:
+        lines = journal.read_bytes().split(b"\n")[:-1]
+    except FileNotFoundError:
+        return {}
+    return json.loads(lines[-1]) if lines else {}
+
+
+def work_console(
+    screen: AtDisplay, journal: Path, key_for: Callable[[dict[str, Any]], None], timeout_s: float = 120
+) -> dict[str, Any]:
+    """Press what `key_for` presses at each step that waits, until the run ends or the program does; the last record.
+
+    A key that came before the window was painted is lost, as it would be for a person; it is pressed again.
+    """
+    deadline, pressed, at = time.monotonic() + timeout_s, -1, 0.0
+    while time.monotonic() < deadline and screen.process.poll() is None:
+        record = last_record(journal)
+        if record.get("kind") in ("finished", "stopped"):
+            return record
+        again = time.monotonic() - at > 0.5
+        if record.get("kind") == "step" and (record["n"] != pressed or again):
+            key_for(record["body"])
+            pressed, at = record["n"], time.monotonic()
+        time.sleep(0.002)
+    return last_record(journal)

@@ -1,0 +1,489 @@
+"""The rig's self-test: its sums, its bounds, and the command where a display, a gun, a disk or a folder is missing."""
+
+from __future__ import annotations
+
+import json
+import math
+import os
+import shlex
+import shutil
+import subprocess
+import sys
+import time
+from collections.abc import Iterator
+from dataclasses import replace
+from pathlib import Path
+from typing import Any, NoReturn
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from device import LinkError
+from experiments.canonical import sha256
+from experiments.clock import VirtualClock
+from experiments.doctor import children, verdicts
+from experiments.doctor.checks import Check, carry_out, checks, no_display
+from experiments.doctor.deadline import within
+from experiments.doctor.figures import Adapter, Appends, Display, Keys, Link, Machine, Sound, Stage, Ticks
+from experiments.doctor.finding import VERDICTS, Finding
+from experiments.doctor.latencies import Latencies, latencies, together
+from experiments.doctor.link import adapters
+from experiments.doctor.measures import APPENDS, appends, ticks
+from experiments.doctor.spread import Spread, percentile, spread
+from experiments.journal import Journal
+from experiments.places import PlaceError
+from experiments.roof.doctor import as_text
+from tests.conftest import RECOIL, Recoil
+from tests.test_durability import can_mount, in_small_disk
+
+milliseconds = st.floats(min_value=0, max_value=1e4)
+
+FAST = Spread(n=200, median=0.2, p95=0.3, p99=0.4, worst=0.5)
+SLOW = Spread(n=25, median=190.0, p95=210.0, p99=220.0, worst=230.0)
+
+
+# sums
+
+
+@given(st.lists(milliseconds, min_size=1), st.integers(1, 100))
+def test_a_percentile_is_that_of_numpys_inverted_distribution_function(values: list[float], percent: int) -> None:
+    assert percentile(values, percent) == np.percentile(values, percent, method="inverted_cdf")
+
+
+@given(st.lists(milliseconds, min_size=1))
+def test_a_spread_goes_from_the_middle_to_the_worst_and_all_of_it_was_measured(values: list[float]) -> None:
+    found = spread(values)
+    assert found.n == len(values)
+    assert found.median <= found.p95 <= found.p99 <= found.worst == max(values)
+    assert {found.median, found.p95, found.p99} <= set(values)
+
+
+@pytest.mark.parametrize(("values", "percent"), [([], 50), ([1.0], 0), ([1.0], 101), ([1.0], math.nan)])
+def test_no_percentile_of_nothing_and_none_beyond_a_hundred(values: list[float], percent: float) -> None:
+    with pytest.raises(ValueError, match="percentile"):
+        percentile(values, percent)
+
+
+# console latencies
+
+
+def told(trials: list[tuple[float, float]]) -> list[dict[str, Any]]:
+    """The records of trials at a console, one every 10 s: how long a paint took, and how long a key to the disk."""
+    records: list[dict[str, Any]] = [{"kind": "run", "clock": "real", "monotonic_s": 0.0, "synced_s": None}]
+    for number, (paint_ms, key_ms) in enumerate(trials):
+        start_s = 10.0 * number
+        fired = {"kind": "fired", "pulse_start_s": start_s + 2}
+        answered = {"kind": "answered", "response_time_s": 1.5}
+        times_s = {"prepare": start_s, "fire": start_s + 1.9, "ask": start_s + 2.1}
+        shown_s = {kind: at_s + paint_ms / 1000 for kind, at_s in times_s.items()} | {"fire": start_s + 0.02}
+        for kind, body in (("prepare", {"kind": "prepared"}), ("fire", fired), ("ask", answered)):
+            records.append({"kind": "step", "body": {"kind": kind}, "monotonic_s": times_s[kind], "synced_s": None})
+            records.append({"kind": "outcome", "body": body, "shown_s": shown_s[kind], "synced_s": None})
+        records.append({"kind": "remark", "body": {"kind": "noted"}, "synced_s": start_s + 3.5 + key_ms / 1000})
+    return records
+
+
+@given(st.lists(st.tuples(milliseconds, milliseconds), max_size=20))
+def test_what_the_console_took_is_read_back_from_the_records(trials: list[tuple[float, float]]) -> None:
+    found = latencies(told(trials))
+    paints = [paint for paint, _ in trials for _ in ("prepare", "ask")]
+    assert found.trials == len(trials)
+    assert found.step_to_screen_ms == pytest.approx(paints, abs=1e-6)
+    assert found.key_to_disk_ms == pytest.approx([key for _, key in trials], abs=1e-6)
+
+
+@pytest.mark.parametrize("left_out", ["shown_s", "clock"])
+def test_a_run_without_a_console_or_on_a_virtual_clock_tells_nothing(left_out: str) -> None:
+    records = told([(20, 3)])
+    if left_out == "shown_s":
+        records = [{key: value for key, value in record.items() if key != "shown_s"} for record in records]
+    else:
+        records[0]["clock"] = "virtual"
+    assert latencies(records) == Latencies()
+    assert latencies([]) == Latencies()
+
+
+def test_a_step_or_shot_before_a_crash_is_not_paired_with_an_outcome_after_it() -> None:
+    resumed = {"kind": "resumed", "clock": "real", "monotonic_s": 1e6, "synced_s": None}
+    records = told([(20, 3)])
+    for place in (2, 6):  # between a step and its outcome; between shot and answer
+        assert latencies([*records[:place], resumed, *records[place:]]).trials == 1
+    assert len(latencies([*records[:2], resumed, *records[2:]]).step_to_screen_ms) == 1
+    assert latencies([*records[:6], resumed, *records[6:]]).key_to_disk_ms == ()
+
+
+def test_a_presentation_is_left_out_since_every_shot_paints_it_anew() -> None:
+    records: list[dict[str, Any]] = [
+        {"kind": "run", "clock": "real"},
+        {"kind": "step", "body": {"kind": "present"}, "monotonic_s": 1.0, "synced_s": None},
+        {"kind": "outcome", "body": {"kind": "presented"}, "shown_s": 9.0, "synced_s": 1.1},
+    ]
+    assert latencies(records) == Latencies()
+
+
+def test_latencies_of_several_journals_are_counted_together() -> None:
+    found = together(latencies(told([(paint, 1.0)])) for paint in (10.0, 20.0))
+    assert (found.trials, len(found.step_to_screen_ms), len(found.key_to_disk_ms)) == (2, 4, 2)
+    assert together([]) == Latencies()
+
+
+# verdicts
+
+MACHINE = Machine(system="Linux", python="3.11.7", cores=2, versions={"numpy": "2.4", "psychopy": "2026.2.5"})
+TICKS = Ticks(resolution_s=1e-9, smallest_step_s=4e-8, oversleep_ms=FAST)
+DISK = Appends(append_ms=FAST, free_bytes=10**10)
+LINK = Link(gun="RG-1:7", state="disarmed", fault=None, round_trip_ms=FAST)
+ADAPTER = Adapter(name="ttyUSB0", setting="sys/ttyUSB0/latency_timer", latency_ms=1)
+DISPLAY = Display(platform="xcb", width_px=1280, height_px=800, refresh_Hz=60.0, opened_ms=20.0)
+STAGE = Stage(version="2026.2.5", import_s=8.0, opened_s=0.6, frames_Hz=444.0)
+SOUND = Sound(outputs=["Headphones"], default="Headphones")
+KEYS = Keys(injected=2, to_event_ms=[0.4, 0.5], to_painted_ms=[0.8, 0.9])
+
+
+@pytest.mark.parametrize(
+    ("finding", "verdict", "advice"),
+    [
+        (verdicts.of_machine(MACHINE), "good", ""),
+        (verdicts.of_machine(replace(MACHINE, versions={"PyQt6": None})), "warning", "PyQt6 not found; install"),
+        (verdicts.of_clock(TICKS), "good", ""),
+        (verdicts.of_clock(replace(TICKS, smallest_step_s=0.0156)), "warning", "coarser than 1 ms"),
+        (verdicts.of_clock(replace(TICKS, oversleep_ms=SLOW)), "warning", "close other programs"),
+        (verdicts.of_disk(DISK), "good", ""),
+        (verdicts.of_disk(replace(DISK, append_ms=SLOW)), "warning", "local disk"),
+        (verdicts.of_disk(replace(DISK, free_bytes=10**6)), "warning", "make room"),
+        (verdicts.of_disk_failure("results", "Read-only file system"), "fails", "--results"),
+        (verdicts.of_link(LINK), "good", ""),
+        (verdicts.of_link(replace(LINK, round_trip_ms=SLOW)), "warning", "latency timer"),
+        (verdicts.of_link(replace(LINK, state="armed")), "fails", "switch off"),
+        (verdicts.of_link(replace(LINK, fault="coil open")), "fails", "switch off"),
+        (verdicts.of_link_failure("no answer"), "fails", "cable"),
+        (verdicts.of_adapters([]), "not there", "nothing"),
+        (verdicts.of_adapters([ADAPTER]), "good", ""),
+        (
+            verdicts.of_adapters([replace(ADAPTER, latency_ms=16)]),
+            "warning",
+            "echo 1 | sudo tee sys/ttyUSB0/latency_timer",
+        ),
+        (verdicts.of_display(DISPLAY), "good", ""),
+        (verdicts.of_display(replace(DISPLAY, opened_ms=None)), "fails", "look again"),
+        (verdicts.of_display(replace(DISPLAY, height_px=600)), "warning", "larger"),
+        (verdicts.of_display(replace(DISPLAY, platform="offscreen")), "warning", "QT_QPA_PLATFORM"),
+        (verdicts.of_stage(STAGE), "good", ""),
+        (verdicts.of_stage(replace(STAGE, frames_Hz=3.0)), "good", ""),
+        (verdicts.of_sound(SOUND), "good", ""),
+        (verdicts.of_sound(replace(SOUND, default="")), "warning", "choose one"),
+        (verdicts.of_sound(Sound(outputs=[], default="")), "not there", "stay silent: connect"),
+        (verdicts.of_keys(KEYS), "good", ""),
+        (verdicts.of_keys(replace(KEYS, injected=30)), "warning", "some keys went elsewhere"),
+        (verdicts.of_keys(replace(KEYS, to_event_ms=[0.4, 40.0])), "warning", "more than 10 ms"),
+        (verdicts.of_keys(Keys(injected=30, to_event_ms=[], to_painted_ms=[])), "warning", "in front"),
+        (verdicts.of_absent("display", "neither is set"), "not there", "DISPLAY"),
+        (verdicts.of_absent("PsychoPy", "psychopy is not installed"), "not there", "recoil[gui]"),
+        (verdicts.of_failure("display", "was killed by signal 6"), "fails", "libxcb-icccm4"),
+        (verdicts.of_failure("clock", "did not end within 20 s"), "fails", "look again"),
+    ],
+)
+def test_every_figure_has_its_verdict_and_all_but_good_ones_advice(finding: Finding, verdict: str, advice: str) -> None:
+    assert finding.verdict == verdict
+    assert advice in finding.advice
+    assert bool(finding.advice) == (verdict != "good")
+    json.dumps(dict(finding.figures), allow_nan=False)
+
+
+@pytest.mark.parametrize(("slowest", "verdict"), [(50.0, "good"), (50.1, "warning")])
+def test_a_console_is_good_up_to_its_bounds(slowest: float, verdict: str) -> None:
+    found = Latencies(step_to_screen_ms=(slowest,), key_to_disk_ms=(slowest / 5,), trials=1)
+    assert [finding.verdict for finding in verdicts.of_latencies(found)] == [verdict, verdict]
+
+
+def test_without_console_runs_it_says_so() -> None:
+    assert {finding.measured for finding in verdicts.of_latencies(Latencies())} == {"no console runs here"}
+
+
+@given(st.lists(st.sampled_from(VERDICTS)))
+def test_the_worst_verdict_counts_and_what_is_not_there_does_no_harm(found: list[Any]) -> None:
+    there = [("good", "warning", "fails").index(verdict) for verdict in found if verdict != "not there"]
+    assert verdicts.overall(found) == ("good", "warning", "fails")[max(there, default=0)]
+
+
+@pytest.mark.parametrize(
+    ("environment", "platform", "missing"),
+    [
+        ({}, "linux", True),
+        ({"DISPLAY": ""}, "linux", True),
+        ({"DISPLAY": ":0"}, "linux", False),
+        ({"WAYLAND_DISPLAY": "wayland-0"}, "linux", False),
+        ({}, "darwin", False),
+        ({}, "win32", False),
+    ],
+)
+def test_a_display_is_asked_for_on_linux_before_a_window_is_tried(
+    environment: dict[str, str], platform: str, missing: bool
+) -> None:
+    assert bool(no_display(environment, platform)) == missing
+
+
+def test_a_dead_child_is_explained_by_the_library_it_missed_or_by_its_first_words() -> None:
+    search = 'qt.core.plugin.factoryloader: looking at "libqxcb.so"\n'
+    lacking = f"{search}cannot load: libxcb-icccm.so.4: cannot open shared object file: No such file\nqt.qpa: sorry\n"
+    assert children.cause(lacking) == "libxcb-icccm.so.4: cannot open shared object file"
+    assert children.cause(f"{search}\nqt.qpa.xcb: could not connect to display :9\nmore\n").endswith("display :9")
+    assert children.cause("") == "it said nothing"
+
+
+def test_the_table_shows_names_in_brackets_as_they_are() -> None:
+    text = as_text([Finding(check="sound", verdict="good", measured="[red]Headphones[/red]")])
+    assert "[red]Headphones[/red]" in text
+
+
+# measuring
+
+
+def test_the_clock_of_this_machine_has_steps_and_sleeps_overrun() -> None:
+    found = ticks()
+    assert 0 < found.smallest_step_s < 1
+    assert found.oversleep_ms.worst > 0
+
+
+def test_appending_measures_and_leaves_nothing_neither_file_nor_folder(tmp_path: Path) -> None:
+    found = appends(tmp_path / "new" / "results")
+    assert 0 < found.append_ms.n <= APPENDS
+    assert found.free_bytes > 0
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_latency_timers_are_read_and_an_adapter_pulled_out_is_passed_over(tmp_path: Path) -> None:
+    for name, text in (("ttyUSB0", "16\n"), ("ttyUSB1", "")):
+        (tmp_path / name).mkdir()
+        (tmp_path / name / "latency_timer").write_text(text)
+    setting = str(tmp_path / "ttyUSB0" / "latency_timer")
+    assert adapters(tmp_path) == [Adapter(name="ttyUSB0", setting=setting, latency_ms=16)]
+    assert adapters(tmp_path / "none") == []
+
+
+def test_work_that_hangs_is_left_to_itself_and_errors_come_through() -> None:
+    assert within(5, lambda: 3) == 3
+    with pytest.raises(TimeoutError, match=r"did not end within 0\.05 s"):
+        within(0.05, lambda: time.sleep(0.3))
+    with pytest.raises(LinkError, match="gone"):
+        within(5, lose_the_gun)
+
+
+def test_work_that_is_interrupted_may_put_away_what_it_holds(tmp_path: Path) -> None:
+    program = (
+        "import os, signal, threading, time\n"
+        "from pathlib import Path\n"
+        "from experiments.doctor.deadline import within\n"
+        "def work():\n    time.sleep(0.6)\n    Path({!r}).touch()\n"
+        "threading.Timer(0.2, os.kill, (os.getpid(), signal.SIGINT)).start()\n"
+        "within(10, work)"
+    )
+    answer = children.run([sys.executable, "-c", program.format(str(tmp_path / "put away"))], 20)
+    assert "signal 2" in answer.error
+    assert (tmp_path / "put away").exists()
+
+
+def lose_the_gun() -> NoReturn:
+    raise LinkError("gone")
+
+
+@pytest.mark.parametrize(
+    ("program", "error"),
+    [
+        ("import time; time.sleep(60)", "did not end within 0.5 s"),
+        ("import os; os.write(2, b'no plug-in'); os.kill(os.getpid(), 6)", "was killed by signal 6: no plug-in"),
+        ("raise SystemExit(3)", "ended with exit code 3: it said nothing"),
+    ],
+)
+def test_a_child_that_hangs_or_dies_is_an_answer(program: str, error: str) -> None:
+    start_s = time.monotonic()
+    assert children.run([sys.executable, "-S", "-c", program], 0.5).error == error
+    assert time.monotonic() - start_s < 5
+
+
+def test_what_the_libraries_of_a_child_print_and_raise_does_not_spoil_its_answer() -> None:
+    program = (
+        "from experiments.doctor.programs.answer import answer, Absent\n"
+        "def look():\n    print('noise')\n    raise {}\n"
+        "answer(look)"
+    )
+    for error, said in (
+        ("SystemExit(0)", children.Answer(error="SystemExit: 0")),
+        ("Absent('no screen')", children.Answer(absent="no screen")),
+        ("ModuleNotFoundError(name='Xlib')", children.Answer(absent="Xlib is not installed")),
+        ("ModuleNotFoundError('no wx', name='wx')", children.Answer(error="ModuleNotFoundError: no wx")),
+    ):
+        assert children.run([sys.executable, "-c", program.format(error)], 20) == said
+
+
+def test_a_check_that_breaks_off_is_a_finding_and_an_impossible_wish_is_refused() -> None:
+    (finding,) = carry_out(Check(name="gun", look=lose_the_gun))
+    assert (finding.verdict, finding.check, finding.measured) == ("fails", "gun", "gone")
+    gun = next(check for check in checks(Path("results"), "water") if check.name == "gun")
+    with pytest.raises(PlaceError, match="water"):
+        carry_out(gun)
+
+
+# the command
+
+
+def rows(done: subprocess.CompletedProcess[str]) -> dict[str, dict[str, Any]]:
+    """The checks of a `--json` result by their names."""
+    assert "Traceback" not in done.stderr
+    return {row["check"]: row for row in json.loads(done.stdout)["checks"]}
+
+
+def test_without_a_display_the_rest_is_looked_at_and_nothing_fails(recoil: Recoil, tmp_path: Path) -> None:
+    done = recoil("doctor", "--json")
+    found = rows(done)
+    assert done.returncode == 0
+    assert {name for name, row in found.items() if row["verdict"] == "fails"} == set()
+    for name in ("display", "PsychoPy", "keyboard", "step to screen", "key to disk"):
+        assert found[name]["verdict"] == "not there"
+    assert found["disk"]["figures"]["append_ms"]["n"] > 0
+    assert found["gun"]["figures"]["state"] == "disarmed"
+    assert found["gun"]["figures"]["round_trip_ms"]["n"] == 200
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["home"]
+
+
+def test_the_table_has_a_row_a_check_and_the_result_can_be_kept(recoil: Recoil, tmp_path: Path) -> None:
+    done = recoil("doctor", "--out", "kept/doctor.json")
+    kept = json.loads((tmp_path / "kept" / "doctor.json").read_text())
+    assert done.returncode == 0
+    assert all(row["check"] in done.stdout for row in kept["checks"])
+    assert kept["verdict"] in ("good", "warning")
+    assert (tmp_path / "kept" / "doctor.json").stat().st_mode & 0o077 == 0
+
+
+def test_what_cannot_be_kept_is_said_after_the_table(recoil: Recoil, tmp_path: Path) -> None:
+    (tmp_path / "file").write_text("no folder")
+    done = recoil("doctor", "--out", "file/doctor.json")
+    assert done.returncode == 2
+    assert "disk" in done.stdout
+    assert "Traceback" not in done.stderr
+
+
+@pytest.mark.parametrize("words", [("--gun", "water"), ("--guns", "simulated"), ("direction",)])
+def test_wrong_usage_is_2(recoil: Recoil, words: tuple[str, ...]) -> None:
+    done = recoil("doctor", *words)
+    assert (done.returncode, done.stdout) == (2, "")
+    assert "Traceback" not in done.stderr
+
+
+def test_a_results_folder_under_a_file_and_a_gun_that_is_not_there_fail_with_what_to_do(
+    recoil: Recoil, tmp_path: Path
+) -> None:
+    (tmp_path / "file").write_text("no folder")
+    done = recoil("doctor", "--json", "--results", "file/results", "--gun", "serial:/dev/no-such-port")
+    found = rows(done)
+    assert done.returncode == 1
+    assert (found["disk"]["verdict"], found["disk"]["measured"]) == ("fails", "file/results: Not a directory")
+    assert "--results" in found["disk"]["advice"]
+    assert found["gun"]["verdict"] == "fails"
+    assert "/dev/no-such-port" in found["gun"]["measured"]
+    assert "cable" in found["gun"]["advice"]
+    assert found["clock"]["figures"]
+
+
+def test_a_full_disk_fails_and_nothing_is_left_on_it(tmp_path: Path) -> None:
+    if not can_mount(tmp_path):
+        pytest.skip("no private mounts here")
+    done = in_small_disk(
+        "mkdir results && mount -t tmpfs -o size=64k none results && head -c 64k /dev/zero > results/full;"
+        f"unset DISPLAY WAYLAND_DISPLAY QT_QPA_PLATFORM; {shlex.quote(str(RECOIL))} doctor --json; code=$?;"
+        "ls -A results >&2; exit $code",
+        tmp_path,
+    )
+    found = rows(done)
+    assert done.returncode == 1
+    assert (found["disk"]["verdict"], found["disk"]["measured"]) == ("fails", "results: No space left on device")
+    assert done.stderr.split()[-1] == "full"
+
+
+def console_run(results: Path) -> None:
+    """A journal as a console leaves it: 20 ms to the screen, 4 ms from the key to the disk, 25 trials."""
+    parts: dict[str, object] = {"plan": {}, "setup": {}}
+    hashes = {f"{name}_sha256": sha256(part) for name, part in parts.items()}
+    folder = results / "sub-P01"
+    folder.mkdir(parents=True)
+    clock = VirtualClock()
+    with Journal.create(folder / "sub-P01_task-direction_journal.jsonl", clock) as journal:
+        journal.append("run", **parts, **hashes, clock="real")
+        for _ in range(25):
+            journal.append("step", body={"kind": "fire"})
+            fired_s = clock.now()
+            journal.append("outcome", body={"kind": "fired", "pulse_start_s": fired_s})
+            journal.append("step", body={"kind": "ask"})
+            clock.sleep(1)
+            answered = {"kind": "answered", "response_time_s": 1 - 0.004}
+            journal.append("outcome", body=answered, shown_s=fired_s + 0.020)
+        journal.append("finished")
+
+
+def test_a_folder_with_console_runs_shows_how_fast_the_console_was(recoil: Recoil, tmp_path: Path) -> None:
+    console_run(tmp_path / "results")
+    found = rows(recoil("doctor", "--json"))
+    for name, ms, bound_ms in (("step to screen", 20, 50), ("key to disk", 4, 10)):
+        figures = found[name]["figures"]
+        assert found[name]["verdict"] == "good"
+        assert "25 trials" in found[name]["measured"]
+        assert (figures["ms"]["n"], figures["trials"], figures["bound_ms"]) == (25, 25, bound_ms)
+        assert figures["ms"]["p99"] == pytest.approx(ms)
+
+
+@pytest.fixture
+def display() -> Iterator[str]:
+    """A display of its own without a window manager."""
+    if shutil.which("Xvfb") is None:
+        pytest.skip("needs Xvfb")
+    words = ["Xvfb", "-displayfd", "1", "-screen", "0", "1280x800x24", "-nolisten", "tcp"]
+    with subprocess.Popen(words, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, text=True) as server:
+        assert server.stdout is not None
+        try:
+            yield f":{int(server.stdout.readline())}"
+        finally:
+            server.terminate()
+
+
+def on_display(name: str, folder: Path) -> subprocess.CompletedProcess[str]:
+    environment = {key: value for key, value in os.environ.items() if not key.startswith(("QT_", "WAYLAND"))}
+    return subprocess.run(
+        [str(RECOIL), "doctor", "--json"],
+        env=environment | {"DISPLAY": name, "HOME": str(folder)},
+        cwd=folder,
+        capture_output=True,
+        text=True,
+        timeout=120,
+        check=False,
+    )
+
+
+def test_on_a_display_windows_open_and_injected_keys_come_to_them(display: str, tmp_path: Path) -> None:
+    done = on_display(display, tmp_path)
+    found = rows(done)
+    for name in ("display", "keyboard", "PsychoPy"):
+        if "not installed" in found[name]["measured"] or "shared object file" in found[name]["measured"]:
+            pytest.skip(f"{name}: {found[name]['measured']}")
+    assert done.returncode == 0
+    figures = found["display"]["figures"]
+    assert (figures["platform"], figures["width_px"], figures["height_px"]) == ("xcb", 1280, 800)
+    assert found["PsychoPy"]["verdict"] == "good"
+    assert found["PsychoPy"]["figures"]["frames_Hz"] > 0
+    keys = found["keyboard"]["figures"]
+    assert len(keys["to_event_ms"]) == keys["injected"] == 30
+    assert all(0 < event < painted for event, painted in zip(keys["to_event_ms"], keys["to_painted_ms"], strict=True))
+
+
+def test_a_display_that_nobody_serves_fails_with_what_to_do_and_stops_nothing(tmp_path: Path) -> None:
+    done = on_display(":32000", tmp_path)
+    found = rows(done)
+    for name in ("display", "PsychoPy", "keyboard"):
+        if "not installed" in found[name]["measured"]:
+            pytest.skip(f"{name}: {found[name]['measured']}")
+        assert found[name]["verdict"] == "fails"
+        assert "DISPLAY" in found[name]["advice"] or "display" in found[name]["advice"]
+    assert done.returncode == 1
+    assert found["disk"]["verdict"] != "fails"
+    assert "key to disk" in found

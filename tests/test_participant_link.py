@@ -1,0 +1,206 @@
+"""The link against small real programs that speak, stammer, hang and die."""
+
+import os
+import signal
+import subprocess
+import sys
+import threading
+import time
+
+import pytest
+
+from experiments.screens.participant.link import ParticipantError, ParticipantLink
+from experiments.screens.participant.words import AskDirection, AskRating, RatingGiven
+
+SCALE = AskRating(
+    number=1, of=3, question='"?"\n很', minimum=0, maximum=10, minimum_text="low", maximum_text="high", grain=0.1
+)
+WHICH = AskDirection(
+    question="?", forward="forward", backward="backward", forward_key="f", backward_key="b", onset_s=0.0
+)
+
+CHILD = """
+import json, os, sys, time
+step_s = 0.0
+def now(): return time.monotonic() + 1000 + step_s
+def say(**word): print(json.dumps(word), flush=True)
+def ready(): say(kind="ready", psychopy="none", window="1x1", refresh_Hz=None)
+def rate(word, rating=0): say(kind="rating-given", rating=rating, comment=word["question"], ask=word["ask"])
+def direct(word): say(kind="direction-given", response="backward", pressed_s=word["onset_s"] + 0.5, ask=word["ask"])
+def words():
+    for line in sys.stdin:
+        word = json.loads(line)
+        if word["kind"] == "ping": say(kind="pong", sent_s=word["sent_s"], there_s=now())
+        elif word["kind"] == "close": sys.exit()
+        else: yield word
+"""
+
+
+@pytest.fixture
+def child():
+    links = []
+
+    def start(program: str) -> ParticipantLink:
+        links.append(ParticipantLink.start(command=[sys.executable, "-c", CHILD + program]))
+        return links[-1]
+
+    yield start
+    for link in links:
+        link.close()
+
+
+def test_a_rating_of_0_and_any_text_come_through(child):
+    link = child("ready()\nfor word in words(): rate(word)")
+    assert link.wait_ready(10).psychopy == "none"
+    given = link.ask_rating(SCALE, 10)
+    assert given == RatingGiven(rating=0.0, comment='"?"\n很', ask=given.ask)
+
+
+def test_moments_are_mapped_there_and_back(child):
+    link = child("ready()\nfor word in words(): direct(word)")
+    link.wait_ready(10)
+    onset_s = time.monotonic()
+    given = link.ask_direction(AskDirection(**fields(WHICH) | {"onset_s": onset_s}), 10)
+    assert given.response == "backward"
+    assert given.pressed_s == pytest.approx(onset_s + 0.5, abs=1e-6)
+    assert link.clocks.offset_s == pytest.approx(1000, abs=link.clocks.uncertainty_s)
+    assert link.clocks.uncertainty_s < 0.05
+
+
+def fields(word):
+    return {name: getattr(word, name) for name in word.__slots__}
+
+
+def test_a_clock_that_is_set_in_mid_question_spoils_the_time_and_is_said(child):
+    link = child("ready()\nfor word in words():\n    step_s = 3600.0\n    direct(word)")
+    link.wait_ready(10)
+    with pytest.raises(ParticipantError, match=r"clock was set by 3600\.\d+ s.*'backward'"):
+        link.ask_direction(WHICH, 10)
+
+
+def test_a_screen_that_is_never_ready_is_not_waited_for_longer_than_said(child):
+    link = child("time.sleep(60)")
+    start_s = time.monotonic()
+    with pytest.raises(ParticipantError, match=r"no answer within 0\.3 s"):
+        link.wait_ready(0.3)
+    assert time.monotonic() - start_s < 2
+
+
+def test_a_late_answer_is_never_taken_for_that_of_the_next_question(child):
+    link = child(
+        "ready()\nasked = []\n"
+        "for word in words():\n"
+        "    if word['kind'] == 'ask-rating': asked.append(word)\n"
+        "    if len(asked) == 2: rate(asked[0], 1); rate(asked[1], 2); asked.clear()"
+    )
+    link.wait_ready(10)
+    with pytest.raises(ParticipantError, match="no answer within"):
+        link.ask_rating(SCALE, 0.2)
+    assert link.ask_rating(SCALE, 10).rating == 2
+
+
+def test_a_question_that_got_no_answer_is_taken_off_the_screen(child):
+    link = child(
+        "ready()\nfor word in words():\n    if word['kind'] == 'show': say(kind='failed', message='taken off')"
+    )
+    link.wait_ready(10)
+    with pytest.raises(ParticipantError, match="no answer within"):
+        link.ask_rating(SCALE, 0.2)
+    with pytest.raises(ParticipantError, match="taken off"):
+        link.ask_rating(SCALE, 10)
+
+
+def test_garbage_is_a_failure_that_shows_it(child):
+    link = child("ready()\nfor word in words(): print('ALSA lib pcm.c', flush=True)")
+    link.wait_ready(10)
+    with pytest.raises(ParticipantError, match=r"no word.*ALSA lib"):
+        link.ask_rating(SCALE, 10)
+    with pytest.raises(ParticipantError, match="ALSA lib"):
+        link.ask_rating(SCALE, 10)
+
+
+def test_a_screen_that_dies_tells_its_last_words(child):
+    link = child("ready()\nfor word in words():\n    sys.exit('out of\\nmemory')")
+    link.wait_ready(10)
+    with pytest.raises(ParticipantError, match="ended with exit code 1; its last words: memory"):
+        link.ask_rating(SCALE, 10)
+
+
+def test_a_screen_that_is_killed_in_mid_question_is_noticed_at_once(child):
+    link = child("ready()\nfor word in words(): pass")
+    link.wait_ready(10)
+    killed_s = []
+
+    def kill():
+        killed_s.append(time.monotonic())
+        os.kill(link.pid, signal.SIGKILL)
+
+    threading.Timer(0.2, kill).start()
+    with pytest.raises(ParticipantError, match="killed by signal 9"):
+        link.ask_rating(SCALE)
+    assert time.monotonic() - killed_s[0] < 0.5
+    assert "signal 9" in link.failure
+
+
+def test_what_the_screen_itself_fails_at_is_told(child):
+    link = child("say(kind='failed', message='the window was closed')\ntime.sleep(60)")
+    with pytest.raises(ParticipantError, match="the window was closed"):
+        link.wait_ready(10)
+
+
+@pytest.mark.parametrize("way", ["cancel", "show", "close"])
+def test_a_question_can_be_called_off_from_another_thread(child, way):
+    link = child("ready()\nfor word in words(): pass")
+    link.wait_ready(10)
+    call_off = {"cancel": link.cancel, "show": lambda: link.show("Please wait"), "close": link.close}[way]
+    threading.Timer(0.2, call_off).start()
+    with pytest.raises(ParticipantError, match=r"called off|closed by the console"):
+        link.ask_rating(SCALE)
+
+
+def test_there_is_nothing_to_call_off_when_nothing_is_asked(child):
+    link = child("ready()\nfor word in words(): rate(word)")
+    link.wait_ready(10)
+    link.ask_rating(SCALE, 10)
+    assert link.cancel() is False
+    assert link.ask_rating(SCALE, 10).rating == 0
+
+
+def test_after_a_question_was_called_off_the_next_is_answered(child):
+    link = child("ready()\nfor word in words():\n    if word.get('number') == 2: rate(word)")
+    link.wait_ready(10)
+    threading.Timer(0.2, link.cancel).start()
+    with pytest.raises(ParticipantError, match="called off"):
+        link.ask_rating(SCALE)
+    assert link.ask_rating(AskRating(**fields(SCALE) | {"number": 2}), 10).rating == 0
+
+
+def test_a_screen_that_reads_nothing_keeps_nobody_waiting_and_is_killed(child, monkeypatch):
+    monkeypatch.setattr("experiments.screens.participant.process._END_S", 0.2)
+    link = child("import signal; signal.signal(signal.SIGTERM, signal.SIG_IGN); ready(); time.sleep(60)")
+    with pytest.raises(ParticipantError, match="no answer within"):
+        link.ask_rating(AskRating(**fields(SCALE) | {"question": "long " * 100_000}), 0.5)
+    start_s = time.monotonic()
+    link.close()
+    assert time.monotonic() - start_s < 2
+    with pytest.raises(ProcessLookupError):
+        os.kill(link.pid, 0)
+
+
+def test_a_screen_that_is_closed_answers_nothing_more_and_may_be_closed_again(child):
+    link = child("ready()\nfor word in words(): rate(word)")
+    link.wait_ready(10)
+    link.close()
+    link.close()
+    with pytest.raises(ParticipantError, match="closed by the console"):
+        link.ask_rating(SCALE)
+
+
+def test_a_program_that_is_not_there_is_one_clear_error():
+    with pytest.raises(ParticipantError, match=r"cannot be started.*no-such-program"):
+        ParticipantLink.start(command=["no-such-program"])
+
+
+def test_importing_the_link_imports_no_psychopy():
+    code = "import sys, experiments.screens.participant.link; sys.exit('psychopy' in sys.modules)"
+    assert subprocess.run([sys.executable, "-c", code], check=False).returncode == 0

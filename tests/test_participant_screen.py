@@ -1,0 +1,308 @@
+"""The participant's real window under Xvfb, answered by real key and mouse events."""
+
+import importlib.util
+import os
+import shutil
+import signal
+import subprocess
+import time
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import replace
+
+import pytest
+
+from experiments.screens.participant.link import ParticipantError, ParticipantLink
+from experiments.screens.participant.look import Look
+from experiments.screens.participant.words import AskDirection, AskRating
+
+pytestmark = [
+    pytest.mark.skipif(shutil.which("Xvfb") is None, reason="Xvfb is not installed: a window needs a display"),
+    pytest.mark.skipif(importlib.util.find_spec("psychopy") is None, reason="PsychoPy is not installed: extra `gui`"),
+]
+WIDTH, HEIGHT = 1280, 800
+
+SCALE = AskRating(
+    number=2,
+    of=3,
+    question="How much do you like such haptic feedback?",
+    minimum=0.0,
+    maximum=10.0,
+    minimum_text="dislike very much",
+    maximum_text="like very much",
+    grain=0.1,
+)
+DESCRIBED = replace(SCALE, describe="Please describe this feedback in your own words.")
+WHICH = AskDirection(
+    question="Which way did it shoot?",
+    forward="forward",
+    backward="backward",
+    forward_key="f",
+    backward_key="b",
+    onset_s=0.0,
+)
+LINE_Y, BUTTON_Y, OFF_LINE_Y = 0.56, 0.84, 0.30
+LEFT_END, RIGHT_END = 0.1428, 0.8572
+LOOK = Look(full_screen=False, width_px=WIDTH, height_px=HEIGHT)
+
+
+@pytest.fixture(scope="module")
+def display():
+    ours, theirs = os.pipe()
+    words = ["Xvfb", "-displayfd", str(theirs), "-screen", "0", f"{WIDTH}x{HEIGHT}x24", "-nolisten", "tcp"]
+    server = subprocess.Popen(words, pass_fds=[theirs], stderr=subprocess.DEVNULL)
+    os.close(theirs)
+    with os.fdopen(ours) as told:  # the server picks a free number and tells it
+        yield f":{told.readline().strip()}"
+    server.terminate()
+    server.wait(10)
+
+
+class Hands:
+    """Two hands on keyboard and mouse, and an eye on the display."""
+
+    def __init__(self, name):
+        # imported when used: it comes with PsychoPy
+        from Xlib import XK, X, display
+        from Xlib.ext import xtest
+
+        self._X, self._XK, self._fake = X, XK, xtest.fake_input
+        self.display = display.Display(name)
+        self._root = self.display.screen().root
+
+    def key(self, name, *held):
+        """Press a key by its X name while others are held; gives back when."""
+        codes = [self.display.keysym_to_keycode(self._XK.string_to_keysym(each)) for each in (*held, name)]
+        pressed_s = time.monotonic()
+        for code in codes:
+            self._fake(self.display, self._X.KeyPress, code)
+        for code in reversed(codes):
+            self._fake(self.display, self._X.KeyRelease, code)
+        self.display.sync()
+        return pressed_s
+
+    def click(self, x, y):
+        """Click at a place, in parts of the screen."""
+        self._fake(self.display, self._X.MotionNotify, x=int(x * WIDTH), y=int(y * HEIGHT))
+        self._fake(self.display, self._X.ButtonPress, 1)
+        self._fake(self.display, self._X.ButtonRelease, 1)
+        self.display.sync()
+
+    def close_window(self):
+        """Use the close button that a window manager would draw."""
+        from Xlib.protocol import event
+
+        shown = self._X.IsViewable
+        window = next(w for w in self._root.query_tree().children if w.get_attributes().map_state == shown)
+        delete, protocols = (self.display.intern_atom(f"WM_{name}") for name in ("DELETE_WINDOW", "PROTOCOLS"))
+        window.send_event(event.ClientMessage(window=window, client_type=protocols, data=(32, [delete, 0, 0, 0, 0])))
+        self.display.sync()
+
+    def seen(self):
+        """All that the display shows."""
+        return bytes(self._root.get_image(0, 0, WIDTH, HEIGHT, self._X.ZPixmap, 0xFFFFFFFF).data)
+
+    def settled(self):
+        """All that the display shows, once nothing changes any more."""
+        seen = None
+        while seen != (seen := self.seen()):
+            time.sleep(0.15)
+        return seen
+
+    def wait_for_change(self, before):
+        """Wait until the display shows something else."""
+        end_s = time.monotonic() + 10
+        while self.seen() == before:
+            assert time.monotonic() < end_s, "the display does not change"
+            time.sleep(0.02)
+
+
+@pytest.fixture(scope="module")
+def hands(display):
+    hands = Hands(display)
+    yield hands
+    hands.display.close()
+
+
+@pytest.fixture(scope="module")
+def console():
+    """A thread that asks, as a console's would."""
+    with ThreadPoolExecutor(1) as executor:
+        yield executor
+
+
+def started(display, home, look=LOOK):
+    """The program on a display, with a home of its own."""
+    with pytest.MonkeyPatch.context() as environment:
+        environment.setenv("DISPLAY", display)
+        environment.setenv("HOME", str(home))
+        return ParticipantLink.start(look)
+
+
+@pytest.fixture(scope="module")
+def link(display, tmp_path_factory):
+    with started(display, tmp_path_factory.mktemp("home")) as link:
+        ready = link.wait_ready(60)
+        assert ready.window == f"{WIDTH}x{HEIGHT}"
+        yield link
+
+
+@pytest.fixture
+def ask(link, hands, console):
+    """Ask, and come back when the question stands on the display."""
+
+    def ask(question):
+        before = hands.seen()
+        link.show(f"Please wait ({time.monotonic()})")
+        hands.wait_for_change(before)
+        before = hands.settled()
+        answer = console.submit(link.ask_rating, question, 20)
+        hands.wait_for_change(before)
+        return answer
+
+    return ask
+
+
+def confirm_rating(hands):
+    """Confirm, and come back when the next page stands: what is typed before it does is typed nowhere."""
+    before = hands.settled()
+    hands.key("Return")
+    hands.wait_for_change(before)
+
+
+def test_the_left_end_of_the_scale_is_a_rating_of_0(ask, hands):
+    answer = ask(SCALE)
+    hands.click(LEFT_END, LINE_Y)
+    hands.click(0.5, BUTTON_Y)
+    assert answer.result(10).rating == 0.0
+
+
+@pytest.mark.parametrize(("x", "rating"), [(RIGHT_END, 10.0), (0.95, None), (0.5, 5.0), (0.643, 7.0)])
+def test_a_click_rates_where_it_falls_and_beyond_the_line_nowhere(ask, hands, link, x, rating):
+    answer = ask(SCALE)
+    hands.click(x, LINE_Y)
+    hands.click(0.5, BUTTON_Y)
+    if rating is None:
+        time.sleep(0.2)
+        assert not answer.done()
+        hands.key("End")
+        hands.key("Return")
+        rating = 10.0
+    assert answer.result(10).rating == rating
+
+
+def test_nothing_is_confirmed_before_there_is_a_marker(ask, hands):
+    answer = ask(SCALE)
+    hands.key("Return")
+    hands.click(0.5, BUTTON_Y)
+    hands.click(0.5, OFF_LINE_Y)
+    hands.key("Return")
+    time.sleep(0.3)
+    assert not answer.done()
+    hands.key("Home")
+    hands.key("Return")
+    assert answer.result(10).rating == 0.0
+
+
+def test_a_scale_is_answered_by_keys_alone(ask, hands):
+    answer = ask(SCALE)
+    for name in ("Right", "Right", "Right", "Left", "Next", "KP_Enter"):  # to the middle, then by grains, then by ten
+        hands.key(name)
+    assert answer.result(10).rating == 6.1
+
+
+def test_a_description_keeps_its_quotes_lines_and_asterisks(ask, hands):
+    answer = ask(DESCRIBED)
+    hands.click(0.5, LINE_Y)
+    confirm_rating(hands)
+    for name in ("a", "quotedbl", "Return", "asterisk", "b", "x", "BackSpace", "asterisk", "Tab", "backslash"):
+        hands.key(name, *(["Shift_L"] if name in ("quotedbl", "asterisk") else []))
+    hands.key("Return", "Control_L")
+    given = answer.result(10)
+    assert given.rating == 5.0
+    assert given.comment == 'a"\n*b*\\'
+
+
+def test_a_description_longer_than_its_box_is_taken_as_long_as_there_is_room(ask, hands):
+    answer = ask(DESCRIBED)
+    hands.key("End")
+    confirm_rating(hands)
+    for line in range(30):
+        hands.key("Return")
+        hands.key("abc"[line % 3])
+        time.sleep(0.05)
+    time.sleep(0.5)
+    hands.key("Return", "Control_L")
+    lines = answer.result(10).comment.split()
+    assert 8 < len(lines) < 30
+    assert lines[:4] == ["a", "b", "c", "a"]
+
+
+def test_an_empty_description_is_one_and_the_button_ends_it(ask, hands):
+    answer = ask(DESCRIBED)
+    hands.click(0.5, LINE_Y)
+    confirm_rating(hands)
+    hands.click(0.5, BUTTON_Y)
+    assert answer.result(10).comment == ""
+
+
+def test_a_key_tells_the_direction_and_when_it_went_down(link, hands, console):
+    answer = console.submit(link.ask_direction, replace(WHICH, onset_s=time.monotonic()), 20)
+    time.sleep(0.5)
+    hands.key("x")
+    pressed_s = hands.key("b")
+    given = answer.result(10)
+    assert given.response == "backward"
+    assert abs(given.pressed_s - pressed_s) < 0.05
+
+
+def test_a_key_before_the_onset_is_no_answer_but_one_before_the_question_stands_is(link, hands):
+    hands.key("b")
+    time.sleep(0.1)
+    onset_s = time.monotonic()
+    time.sleep(0.1)
+    pressed_s = hands.key("f")
+    time.sleep(0.1)
+    given = link.ask_direction(replace(WHICH, onset_s=onset_s), 10)
+    assert given.response == "forward"
+    assert abs(given.pressed_s - pressed_s) < 0.05
+
+
+def test_without_a_sound_device_the_noise_stays_off_with_one_clear_message(link):
+    noise = link.noise(on=True, level=0.0)
+    if noise.on:
+        link.noise(on=False)
+        pytest.skip("this machine has a sound device")
+    assert noise.message.startswith("Masking noise stays off: no sound device")
+    assert "\n" not in noise.message
+    assert link.noise(on=False).message == ""
+
+
+def test_a_question_that_is_called_off_leaves_the_screen_ready_for_the_next(ask, hands, link):
+    answer = ask(SCALE)
+    assert link.cancel()
+    with pytest.raises(ParticipantError, match="called off"):
+        answer.result(10)
+    again = ask(SCALE)
+    hands.key("End")
+    hands.key("Return")
+    assert again.result(10).rating == 10.0
+
+
+def test_a_window_that_is_closed_in_mid_question_ends_it_with_an_error(ask, hands, link):
+    answer = ask(SCALE)
+    hands.close_window()
+    with pytest.raises(ParticipantError, match="window was closed"):
+        answer.result(10)
+
+
+def test_a_full_screen_in_a_home_that_takes_no_files_opens_and_an_interrupt_from_the_keyboard_is_told(display):
+    with started(display, "/proc/no-home", Look(theme="light")) as link:
+        assert link.wait_ready(60).window == f"{WIDTH}x{HEIGHT}"
+        os.kill(link.pid, signal.SIGINT)
+        with pytest.raises(ParticipantError, match="interrupted from the keyboard"):
+            link.ask_rating(SCALE, 10)
+
+
+def test_without_a_display_the_error_says_so(tmp_path):
+    with started(":999", tmp_path) as link, pytest.raises(ParticipantError, match=r"NoSuchDisplay|display"):
+        link.wait_ready(60)

@@ -1,0 +1,289 @@
+"""`recoil study` as its users call it: real processes over real runs, what they say and how they end."""
+
+from __future__ import annotations
+
+import json
+import os
+import subprocess
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from experiments.clock import VirtualClock
+from experiments.load import load_setup
+from experiments.register import append, entry
+from experiments.roof.folders import new_study
+from experiments.run import Request, run
+from experiments.screens.synthetic import synthetic_screen
+from tests.conftest import RECOIL, Recoil
+from tests.test_cli import refused
+
+RIGHT = ("--age", 25, "--sex", "female", "--handedness", "right")
+
+
+@pytest.fixture
+def pilot(tmp_path: Path) -> Path:
+    """A new study whose orders are balanced by a Latin square of three rows."""
+    new_study(tmp_path / "pilot")
+    for name in ("direction", "preference"):
+        config = tmp_path / "pilot" / f"{name}.toml"
+        text = config.read_text().replace('session_order = "random"', 'session_order = "latin-square"')
+        config.write_text(text.replace('trial_order = "random"', 'trial_order = "latin-square"'))
+    return tmp_path / "pilot"
+
+
+def do(pilot: Path, code: str, experiment: str = "direction", results: Path | None = None) -> None:
+    """A run with a synthetic participant, as `recoil run --screen synthetic` does it."""
+    setup, where = load_setup(str(pilot / f"{experiment}.toml")), results or pilot / "results"
+    run(Request(setup=setup, participant_id=code, results=where), synthetic_screen, VirtualClock())
+
+
+def told(recoil: Recoil, *more: object, folder: str = "pilot", code: int = 0) -> Any:
+    done = recoil("study", folder, "--json", *more)
+    assert done.returncode == code, done
+    return json.loads(done.stdout)
+
+
+def states(found: Any) -> dict[str, list[str]]:
+    return {
+        one["participant_id"]: [run["state"] for run in one["experiments"].values()] for one in found["participants"]
+    }
+
+
+def journal_of(pilot: Path, code: str, experiment: str = "direction") -> Path:
+    return pilot / "results" / f"sub-{code}" / f"sub-{code}_task-{experiment}_journal.jsonl"
+
+
+def cut(journal: Path, lines: int) -> int:
+    """The journal as a power cut would leave it: so many whole lines and a part of the next. The answers it holds."""
+    whole = journal.read_bytes().splitlines(keepends=True)
+    journal.write_bytes(b"".join(whole[:lines]) + whole[lines][:20])
+    return sum(b'"kind":"answered"' in line for line in whole[:lines])
+
+
+# looking
+
+
+def test_a_new_study_has_nobody_and_its_first_code_comes_next(recoil: Recoil, pilot: Path) -> None:
+    found = told(recoil)
+    assert found["participants"] == []
+    assert (found["next"]["participant_id"], found["next"]["new"]) == ("P01", True)
+    assert found["next"]["orders"]["direction"] == ["vibration", "asymmetric-1", "asymmetric-2"]
+    assert not (pilot / "results" / "participants.jsonl").exists()
+
+
+def test_the_table_tells_who_is_done_in_progress_and_next(recoil: Recoil, pilot: Path) -> None:
+    recoil("study", "pilot", "--join", "P01", *RIGHT)
+    for experiment in ("direction", "preference"):
+        do(pilot, "P01", experiment)
+    do(pilot, "P02")
+    answered = cut(journal_of(pilot, "P02"), 40)
+    assert answered
+    done = recoil("study", "pilot")
+    assert (done.returncode, done.stderr) == (0, "")
+    row = next(line for line in done.stdout.splitlines() if "P01" in line)
+    assert row.replace("│", " ").split() == ["P01", "25", "female", "right", "done", "done"]
+    assert f"in progress, {answered} of 60 trials, last record 20" in done.stdout
+    assert "asymmetric-1 > asymmetric-2 > vibration" in done.stdout
+    assert "1 of 14 participants done, 0 excluded" in done.stdout
+    assert "Next: P02\n  direction: asymmetric-1 > asymmetric-2 > vibration (go on with --resume)" in done.stdout
+
+
+def test_the_next_order_that_is_shown_is_the_one_the_run_gets(recoil: Recoil, pilot: Path) -> None:
+    for code in ("P01", "P02", "P03", "P04"):
+        shown = told(recoil)["next"]
+        assert shown["participant_id"] == code
+        for experiment in ("direction", "preference"):
+            do(pilot, code, experiment)
+        runs = told(recoil)["participants"][-1]["experiments"]
+        assert {experiment: run["methods"] for experiment, run in runs.items()} == shown["orders"]
+
+
+def test_a_random_order_is_not_foretold(recoil: Recoil, tmp_path: Path) -> None:
+    recoil("new", "pilot")
+    assert told(recoil)["next"]["orders"] == {"direction": None, "preference": None}
+    assert "order drawn when the run begins" in recoil("study", "pilot").stdout
+
+
+def test_a_results_folder_is_its_studys_and_without_one_the_shipped_studys(recoil: Recoil, pilot: Path) -> None:
+    do(pilot, "P01")
+    do(pilot, "P01", results=pilot.parent / "elsewhere")
+    assert told(recoil, folder="pilot/results") == told(recoil)
+    assert told(recoil, folder="elsewhere")["planned_participants"] == 14
+    assert states(told(recoil, folder="elsewhere")) == {"P01": ["done", "not begun"]}
+
+
+def test_a_study_ends_when_its_participants_are_done(recoil: Recoil, pilot: Path) -> None:
+    config = pilot / "study.toml"
+    text = config.read_text().replace("participants = 14", "participants = 1")
+    config.write_text(text.replace('"direction.toml", "preference.toml"', '"preference.toml"'))
+    do(pilot, "P01", "preference")
+    assert told(recoil)["next"] is None
+    assert "Next: nobody, the study is done" in recoil("study", "pilot").stdout
+
+
+# a journal that is cut off, empty, damaged, or being written
+
+
+@pytest.mark.parametrize(("lines", "state"), [(0, "not begun"), (1, "in progress"), (40, "in progress")])
+def test_a_journal_cut_off_is_read_and_left_as_it_is(recoil: Recoil, pilot: Path, lines: int, state: str) -> None:
+    do(pilot, "P01")
+    answered = cut(journal_of(pilot, "P01"), lines)
+    before = journal_of(pilot, "P01").read_bytes()
+    run = told(recoil)["participants"][0]["experiments"]["direction"]
+    assert (run["state"], run["answered"]) == (state, answered)
+    assert journal_of(pilot, "P01").read_bytes() == before
+
+
+def test_looking_while_a_run_writes_disturbs_neither(recoil: Recoil, pilot: Path) -> None:
+    words = [RECOIL, "run", "direction.toml", "--participant", "P01", "--screen", "synthetic"]
+    for number in range(1, 4):
+        words[4] = f"P{number:02d}"
+        running = subprocess.Popen([str(word) for word in words], cwd=pilot, stdout=subprocess.DEVNULL)
+        while running.poll() is None:
+            assert all(one[1] == "not begun" for one in states(told(recoil)).values())
+        assert running.returncode == 0
+    assert states(told(recoil)) == {f"P{number:02d}": ["done", "not begun"] for number in range(1, 4)}
+
+
+def test_what_cannot_be_read_is_listed_once_and_the_rest_is_shown(recoil: Recoil, pilot: Path) -> None:
+    for code in ("P01", "P02", "P03"):
+        do(pilot, code)
+    whole = journal_of(pilot, "P02").read_bytes().splitlines(keepends=True)
+    journal_of(pilot, "P02").write_bytes(b"".join([*whole[:5], b"damage\n", *whole[6:]]))
+    journal_of(pilot, "P03").write_bytes(journal_of(pilot, "P01").read_bytes())
+    (pilot / "results" / "sub-Jane Doe").mkdir()
+    done = recoil("study", "pilot")
+    assert done.returncode == 1
+    assert "Traceback" not in done.stderr
+    problems = done.stderr.splitlines()
+    assert len(problems) == 3
+    assert "sub-Jane Doe" in problems[0]
+    assert "sub-P02_task-direction_journal.jsonl: line 6" in problems[1]
+    assert "is of participant P01" in problems[2]
+    assert states(told(recoil, code=1)) == {
+        "P01": ["done", "not begun"],
+        "P02": ["unreadable", "not begun"],
+        "P03": ["unreadable", "not begun"],
+    }
+
+
+def test_a_damaged_register_is_listed_and_stops_changes_but_not_looking(recoil: Recoil, pilot: Path) -> None:
+    do(pilot, "P01")
+    (pilot / "results" / "participants.jsonl").write_text("damage\n")
+    done = recoil("study", "pilot")
+    assert done.returncode == 1
+    assert done.stderr.count("participants.jsonl: line 1") == done.stderr.count("\n") == 1
+    assert "P01" in done.stdout
+    refused(recoil("study", "pilot", "--exclude", "P01", "--reason", "left"), "participants.jsonl: line 1", "restore")
+    assert (pilot / "results" / "participants.jsonl").read_text() == "damage\n"
+
+
+# joining, excluding, readmitting
+
+
+def test_who_joins_has_facts_and_comes_next(recoil: Recoil, pilot: Path) -> None:
+    found = told(recoil, "--join", "P07", *RIGHT)
+    assert found["participants"][0]["facts"] == {"age_years": 25, "sex": "female", "handedness": "right"}
+    assert (found["next"]["participant_id"], found["next"]["new"]) == ("P07", False)
+    assert (pilot / "results" / "participants.jsonl").stat().st_mode & 0o077 == 0
+
+
+def test_facts_are_corrected_and_then_told_if_they_break_a_rule(recoil: Recoil, pilot: Path) -> None:
+    recoil("study", "pilot", "--join", "P01", *RIGHT)
+    done = recoil("study", "pilot", "--join", "P01", "--age", 35, *RIGHT[2:])
+    assert done.returncode == 0
+    assert "P01 is not eligible: age_years = 35: must be at most 29" in done.stderr
+    one = told(recoil)["participants"][0]
+    assert one["facts"]["age_years"] == 35
+    assert one["not_eligible"] == ["age_years = 35: must be at most 29"]
+
+
+def test_who_is_not_eligible_is_refused_and_nothing_is_recorded(recoil: Recoil, pilot: Path) -> None:
+    done = recoil("study", "pilot", "--join", "P01", "--age", 35, "--sex", "male", "--handedness", "left")
+    refused(done, "age_years = 35: must be at most 29; handedness = left: must be right", "pilot/study.toml")
+    assert told(recoil)["participants"] == []
+
+
+def test_an_exclusion_gives_the_row_to_the_next_one_until_it_is_taken_back(recoil: Recoil, pilot: Path) -> None:
+    for code in ("P01", "P02", "P03"):
+        for experiment in ("direction", "preference"):
+            do(pilot, code, experiment)
+    found = told(recoil, "--exclude", "P02", "--reason", "slept [twice]")
+    assert found["participants"][1]["excluded"] == "slept [twice]"
+    assert found["next"]["participant_id"] == "P04"
+    assert found["next"]["orders"] == {
+        experiment: run["methods"] for experiment, run in found["participants"][1]["experiments"].items()
+    }
+    shown = recoil("study", "pilot").stdout
+    assert "excluded: slept [twice]" in shown
+    assert "2 of 14 participants done, 1 excluded" in shown
+    found = told(recoil, "--readmit", "P02", "--reason", "was awake")
+    assert found["participants"][1]["excluded"] is None
+    assert found["next"]["orders"]["direction"] == found["participants"][0]["experiments"]["direction"]["methods"]
+
+
+# wrong usage
+
+
+@pytest.mark.parametrize(
+    ("words", "said"),
+    [
+        (("--exclude", "P09", "--reason", "left"), ("P09 is not known in pilot/results", "P01")),
+        (("--readmit", "P01", "--reason", "back"), ("P01 is not excluded",)),
+        (("--readmit", "P09", "--reason", "back"), ("P09 is not known",)),
+        (("--exclude", "P01"), ("--exclude: needs --reason",)),
+        (("--exclude", "P01", "--reason", " "), ("reason = ' '", "must say why")),
+        (("--exclude", "P01", "--reason", "two\nlines"), ("must say why",)),
+        (("--exclude", "P01", "--reason", "x" * 201), ("200",)),
+        (("--exclude", "p01", "--reason", "left"), ("'p01' differs from 'P01'",)),
+        (("--exclude", "", "--reason", "left"), ("must be 1 to 32 letters and digits",)),
+        (("--exclude", "../P01", "--reason", "left"), ("must be 1 to 32 letters and digits",)),
+        (("--exclude", "P01", "--readmit", "P01", "--reason", "?"), ("--exclude and --readmit: give one",)),
+        (("--reason", "left"), ("--reason: goes with --exclude",)),
+        (("--age", 25), ("--age: facts go with --join",)),
+        (("--join", "Jane Doe", *RIGHT), ("'Jane Doe'", "use a code, not a name")),
+        (("--join", "", *RIGHT), ("must be 1 to 32 letters and digits",)),
+        (("--join", "p01", *RIGHT), ("'p01' differs from 'P01'",)),
+        (("--join", "P02", "--age", 25), ("not given: sex, handedness", "eligibility.ask")),
+        (("--join", "P02", *RIGHT[:4], "--handedness", "strong"), ("--handedness 'strong'", "'right'")),
+        (("--join", "P02", "--age", 0, *RIGHT[2:]), ("--age",)),
+        (("--join", "P02", "--age", "young", *RIGHT[2:]), ("--age",)),
+        (("--join", "P02", *RIGHT, "--reason", "because"), ("--reason: goes with",)),
+    ],
+)
+def test_what_cannot_be_done_is_refused_and_changes_nothing(
+    recoil: Recoil, pilot: Path, words: tuple[str, ...], said: tuple[str, ...]
+) -> None:
+    append(pilot / "results", entry("joined", "P01", facts={}), VirtualClock())
+    before = (pilot / "results" / "participants.jsonl").read_bytes()
+    refused(recoil("study", "pilot", *words), *said)
+    assert (pilot / "results" / "participants.jsonl").read_bytes() == before
+
+
+def test_a_fact_that_the_study_does_not_ask_for_is_refused(recoil: Recoil, pilot: Path) -> None:
+    text = (pilot / "study.toml").read_text()
+    (pilot / "study.toml").write_text(text[: text.index("[eligibility]")])
+    refused(recoil("study", "pilot", "--join", "P01", "--age", 25), "age_years", "does not ask")
+    assert told(recoil, "--join", "P01")["participants"][0]["facts"]["age_years"] is None
+
+
+def test_a_folder_that_is_no_study_is_refused(recoil: Recoil, tmp_path: Path) -> None:
+    refused(recoil("study", "nowhere"), "nowhere: no such folder")
+    (tmp_path / "other").mkdir()
+    refused(recoil("study", "other"), "other: neither a study's folder", "recoil new")
+    (tmp_path / "other" / "study.toml").write_text("title = 1\n")
+    refused(recoil("study", "other"), "other/study.toml:1: title = 1")
+    refused(recoil("study"), "DIR")
+
+
+def test_consoles_that_join_people_at_once_all_find_them_there(recoil: Recoil, pilot: Path) -> None:
+    words = [str(RECOIL), "study", "pilot", *map(str, RIGHT), "--join"]
+    environment = {**os.environ, "COLUMNS": "120"}
+    started = [
+        subprocess.Popen([*words, f"P{n:02d}"], cwd=pilot.parent, env=environment, stdout=subprocess.DEVNULL)
+        for n in range(1, 7)
+    ]
+    assert [one.wait(60) for one in started] == [0] * 6
+    assert list(states(told(recoil))) == [f"P{n:02d}" for n in range(1, 7)]
