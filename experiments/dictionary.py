@@ -42,6 +42,7 @@ that clock was real or virtual (synthetic participants: breaks take no time).
 | `plan`, `plan_sha256` | `run` | the whole frozen plan with its seed, and the hash of its canonical JSON |
 | `setup`, `setup_sha256` | `run` | the resolved configs (and the synthetic table, if used) and their hash |
 | `provenance`, `gun`, `clock` | `run`, `resumed` | versions, commit, system; who renders; which clock |
+| `experimenter_knows` | `run`, `resumed` | what the experimenter could not be kept from knowing: direction, dampers |
 | `body` | `step`, `outcome`, `remark` | what should happen, what did, what was said beside it; its `kind` says which |
 | `shown_s` | `outcome` | when the console had painted the step, where there was a console |
 | `reason` | `stopped` | why the run stopped before its end |

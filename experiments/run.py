@@ -31,6 +31,10 @@ Again = Literal["ask", "resume", "fresh"]
 """What to do with an unfinished run: refuse and say what is there, go on with it, or set it aside."""
 
 
+class UnfinishedRun(PlaceError):  # noqa: N818 - what is there, not what went wrong
+    """An unfinished run is there; the message says when it stopped, and that it takes a decision."""
+
+
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Request:
     """Who does what, where, with which gun and seed; `seed` is `None` where the config or the system gives it.
@@ -122,7 +126,7 @@ def _before(where: Place, request: Request) -> Contents | None:
     contents = read_journal(where.journal)
     _refuse_finished(where, contents)
     if request.again == "ask":
-        raise PlaceError(_unfinished(where, contents))
+        raise UnfinishedRun(_unfinished(where, contents))
     return contents
 
 
@@ -212,7 +216,12 @@ def _open(job: _Job) -> Journal:
 
 def _begin(job: _Job, plan: Plan, session: Session, journal: Journal, gun: Gun) -> Standing:
     """Write the head of a new journal, or stand where a resumed one broke off."""
-    now = {"provenance": provenance(), "gun": asdict(gun.identify()), "clock": job.clock.name}
+    now = {
+        "provenance": provenance(),
+        "gun": asdict(gun.identify()),
+        "clock": job.clock.name,
+        "experimenter_knows": _experimenter_knows(job.request.setup),
+    }
     if job.before is not None:
         standing = replay.replay(session, job.before)
         stopped_utc = job.before.records[-1]["utc"]
@@ -222,6 +231,12 @@ def _begin(job: _Job, plan: Plan, session: Session, journal: Journal, gun: Gun) 
     plan_head = {"plan": plan.record(), "plan_sha256": plan.sha256()}
     journal.append("run", **plan_head, setup=setup.record(), setup_sha256=setup.sha256(), **now)
     return Standing(step=next(session), history=[])
+
+
+def _experimenter_knows(setup: Setup[Any]) -> list[str]:
+    """What the experimenter cannot be kept from knowing: they turn the gun, and set a damper by hand."""
+    by_hand = [name for name in setup.config.design.methods if setup.gun.methods[name].damper]
+    return ["direction", *(f"method {name}" for name in by_hand)]
 
 
 def _to_the_end(session: Session, desk: Desk, standing: Standing, place: Place) -> None:

@@ -1,0 +1,60 @@
+import csv
+import json
+from collections import Counter
+from pathlib import Path
+
+import pytest
+
+from analysis.logs import read_logs
+from experiments.clock import VirtualClock
+from experiments.direction.plan import make_practice
+from experiments.load import load_setup
+from experiments.places import PlaceError
+from experiments.run import Request, run
+from experiments.screens.synthetic import synthetic_screen
+
+DIRECTION, PREFERENCE = load_setup("direction"), load_setup("preference")
+
+
+def practise(results: Path, setup: object = DIRECTION) -> Path:
+    request = Request(setup=setup, participant_id="P01", results=results, seed=1, practice=True)
+    return run(request, synthetic_screen, VirtualClock()).place.table
+
+
+def test_a_practice_has_as_many_trials_of_each_method_as_the_config_says() -> None:
+    plan = make_practice(DIRECTION.config, "P01", 1)
+    assert plan is not None
+    assert Counter(trial.method for trial in plan.trials) == dict.fromkeys(DIRECTION.config.design.methods, 2)
+    assert Counter(trial.direction for trial in plan.trials) == {"forward": 3, "backward": 3}
+    assert {(trial.session, trial.set) for trial in plan.trials} == {(1, 1)}
+
+
+def test_a_practice_has_files_of_its_own_that_are_never_analysed(tmp_path: Path) -> None:
+    table = practise(tmp_path)
+    assert table.name == "sub-P01_task-direction_practice_trials.csv"
+    with table.open(newline="") as file:
+        assert len(list(csv.DictReader(file))) == 6
+    assert read_logs([tmp_path]).files == ()
+
+
+def test_a_practice_can_be_done_again_and_leaves_the_run_itself_open(tmp_path: Path) -> None:
+    practise(tmp_path)
+    practise(tmp_path)
+    names = sorted(path.name for path in (tmp_path / "sub-P01").glob("*.jsonl"))
+    assert names == [
+        "sub-P01_task-direction_practice_journal.aside-1.jsonl",
+        "sub-P01_task-direction_practice_journal.jsonl",
+    ]
+    request = Request(setup=DIRECTION, participant_id="P01", results=tmp_path, seed=1)
+    assert run(request, synthetic_screen, VirtualClock()).place.table.name == "sub-P01_task-direction_trials.csv"
+
+
+def test_an_experiment_without_a_practice_says_so(tmp_path: Path) -> None:
+    with pytest.raises(PlaceError, match="no practice"):
+        practise(tmp_path, PREFERENCE)
+
+
+def test_the_journal_says_what_the_experimenter_could_know(tmp_path: Path) -> None:
+    table = practise(tmp_path)
+    head = json.loads(table.with_name("sub-P01_task-direction_practice_journal.jsonl").read_text().splitlines()[0])
+    assert head["experimenter_knows"] == ["direction", "method asymmetric-1", "method asymmetric-2"]
