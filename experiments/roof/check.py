@@ -45,7 +45,12 @@ def _study_facts(name: str, seed: int | None) -> Facts:
     study, folder = load_study(name)
     setups = [load_setup(str(folder / experiment)) for experiment in study.experiments]
     facts = [setup_facts(setup, seed, study.codes()) for setup in setups]
-    return {"study": study.title, "participants": study.participants, "experiments": facts}
+    return {
+        "study": study.title,
+        "participants": study.participants,
+        "eligibility": study.eligibility.model_dump(mode="json", exclude_none=True),
+        "experiments": facts,
+    }
 
 
 def setup_facts(setup: Setup[Any], seed: int | None, codes: list[str]) -> Facts:
@@ -121,7 +126,9 @@ def as_text(facts: Facts) -> str:
     """The facts for a person."""
     if "study" in facts:
         parts = [as_text(part) for part in facts["experiments"]]
-        return "\n\n".join([f"Study: {facts['study']}, {facts['participants']} participants", *parts])
+        rules = ", ".join(f"{key} {value}" for key, value in facts["eligibility"].items() if value)
+        head = f"Study: {facts['study']}, {facts['participants']} participants; eligibility: {rules or 'everyone'}"
+        return "\n\n".join([head, *parts])
     if "experiment" not in facts:
         return "\n".join(f"{key}: {value}" for key, value in facts.items())
     return "\n".join([*_design_lines(facts), *_order_lines(facts), *_drive_lines(facts), *_assumed_lines(facts)])

@@ -14,7 +14,10 @@ Edit the configs here; every number of the protocol is in them.
 
     recoil check study.toml                                   the design, the orders, the duration, the limits
     recoil reproduce --study study.toml --out simulated       the whole study with synthetic participants
-    recoil run direction.toml --participant P01               a session, on a terminal
+    recoil doctor                                             the rig's self-test
+    recoil run direction.toml --screen console                sessions at the console, from its start window
+    recoil run direction.toml --participant P01               a session on a terminal
+    recoil study .                                            who is done, in progress, excluded, next
     recoil analyze results --out analysis                     statistics, figures and report of all logs
 
 Logs go to `results/`; it is readable by its owner only. Use codes for participants, never names.
