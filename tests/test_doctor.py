@@ -276,6 +276,7 @@ def test_work_that_is_interrupted_may_put_away_what_it_holds(tmp_path: Path) -> 
         "import os, signal, threading, time\n"
         "from pathlib import Path\n"
         "from experiments.doctor.deadline import within\n"
+        "signal.signal(signal.SIGINT, signal.default_int_handler)\n"  # tests in the background have it ignored
         "def work():\n    time.sleep(0.6)\n    Path({!r}).touch()\n"
         "threading.Timer(0.2, os.kill, (os.getpid(), signal.SIGINT)).start()\n"
         "within(10, work)"

@@ -6,6 +6,7 @@ Its output carries words and nothing else: what libraries print is turned to the
 from __future__ import annotations
 
 import os
+import signal
 import sys
 
 from experiments.screens.participant.look import look_from
@@ -14,6 +15,7 @@ from experiments.screens.participant.toolkit import writable_home
 
 def main() -> int:
     """Run until the console says close, and give back the exit code."""
+    signal.signal(signal.SIGINT, signal.default_int_handler)  # a console in the background has it ignored
     look = look_from(sys.argv[1:])
     said = os.fdopen(os.dup(1), "wb")  # ours alone: a program that a library starts does not get it
     os.dup2(2, 1)
