@@ -18,14 +18,12 @@ import pytest
 READY = shutil.which("Xvfb") is not None
 needs_display = pytest.mark.skipif(not READY, reason="needs Xvfb")
 
-_NAMES = {" ": "space", "\n": "Return", ".": "period", "-": "minus", ",": "comma", "?": "question"}
-
 
 @contextmanager
 def virtual_display() -> Iterator[str]:
     """A virtual screen of 1280 by 800; its name."""
     read, write = os.pipe()
-    words = ["Xvfb", "-displayfd", str(write), "-screen", "0", "1280x800x24", "-nolisten", "tcp"]
+    words = ["Xvfb", "-displayfd", str(write), "-screen", "0", "1280x800x24", "-nolisten", "tcp", "-noreset"]
     server = subprocess.Popen(words, pass_fds=[write], stderr=subprocess.DEVNULL)
     os.close(write)
     try:
@@ -34,53 +32,6 @@ def virtual_display() -> Iterator[str]:
     finally:
         server.terminate()
         server.wait()
-
-
-class Keyboard:
-    """The keys of a virtual screen."""
-
-    def __init__(self, display: str) -> None:
-        from Xlib import XK
-        from Xlib.display import Display
-
-        self._names, self._display = XK, Display(display)
-
-    def close(self) -> None:
-        """Let go of the screen."""
-        self._display.close()
-
-    def press(self, name: str, *held: str) -> None:
-        """Press a key by its X name, with others held."""
-        from Xlib import X
-        from Xlib.ext import xtest
-
-        codes = [self._display.keysym_to_keycode(self._names.string_to_keysym(key)) for key in (*held, name)]
-        for code in codes:
-            xtest.fake_input(self._display, X.KeyPress, code)
-        for code in reversed(codes):
-            xtest.fake_input(self._display, X.KeyRelease, code)
-        self._display.sync()
-
-    def type(self, text: str) -> None:
-        """Type text of small letters, digits and blanks, and what stands in `_NAMES`."""
-        for letter in text:
-            shifted = letter.isupper() or letter == "?"
-            self.press(_NAMES.get(letter, letter.lower()), *(["Shift_L"] if shifted else []))
-
-    def focus_on_window(self, timeout_s: float = 30) -> None:
-        """Give the keys to the newest window: no window manager does it here."""
-        from Xlib import X
-
-        deadline = time.monotonic() + timeout_s
-        while time.monotonic() < deadline:
-            for window in reversed(self._display.screen().root.query_tree().children):
-                shown = window.get_attributes().map_state == X.IsViewable
-                if shown and window.get_geometry().width > 400:
-                    window.set_input_focus(X.RevertToParent, X.CurrentTime)
-                    self._display.sync()
-                    return
-            time.sleep(0.05)
-        raise AssertionError("no window was shown")
 
 
 class AtDisplay:
@@ -97,7 +48,13 @@ class AtDisplay:
             text=True,
             start_new_session=True,
         )
-        self.keys = Keyboard(display)
+        from experiments.screens.xkeys import Hands  # here: python-xlib is in the extra `gui`
+
+        self.keys = Hands(display)
+
+    def focus_on(self, title: str = "Recoil") -> None:
+        """Give the keys to the newest window of a title: no window manager does it here."""
+        assert self.keys.focus_on(title, timeout_s=30) is not None, f"no window {title!r} was shown"
 
     def kill(self) -> None:
         """`kill -9`."""

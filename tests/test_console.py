@@ -61,7 +61,7 @@ def answer_by(screen: AtDisplay, body: dict[str, Any]) -> None:
 def start(screen: AtDisplay, code: str = "P01") -> None:
     """From the start window: read the code back, say what is asked, start."""
     keys = screen.keys
-    keys.focus_on_window()
+    screen.focus_on()
     keys.type(code)
     keys.press("Tab")
     keys.type("25")
@@ -77,7 +77,7 @@ def focus_on_console(screen: AtDisplay, journal: Path) -> None:
     while not last_record(journal) and time.monotonic() < deadline:
         time.sleep(0.02)
     time.sleep(0.3)
-    screen.keys.focus_on_window()
+    screen.focus_on()
 
 
 def test_experiment_1_from_the_start_window_to_the_end_screen(
@@ -92,7 +92,7 @@ def test_experiment_1_from_the_start_window_to_the_end_screen(
         time.sleep(0.5)
         screen.keys.press("q")
         time.sleep(1.0)
-        screen.keys.focus_on_window()
+        screen.focus_on()
         screen.keys.press("q", "Control_L")
         code, said = screen.end()
     assert code == 0, said
@@ -169,7 +169,7 @@ def check_killed_console(configs: Path, folder: Path, display: str, seconds: flo
     with AtDisplay(words(configs, "direction", "--participant", "P01", "--resume"), folder, display) as screen:
         focus_on_console(screen, journal)
         time.sleep(0.5)
-        screen.keys.focus_on_window()
+        screen.focus_on()
         goal = min(60, len(before) + 2)
         limit = time.monotonic() + 30
         while len(answers(journal)) < goal and time.monotonic() < limit:

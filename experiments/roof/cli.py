@@ -135,6 +135,9 @@ def run(
     participant_keys: Annotated[
         bool, typer.Option("--participant-keys", help="The participant answers with keys of their own (PsychoPy).")
     ] = False,
+    noise: Annotated[
+        bool, typer.Option("--noise", help="Masking white noise through the participant's headphones (PsychoPy).")
+    ] = False,
     as_json: AsJson = False,
 ) -> None:
     """One run: a participant doing one experiment."""
@@ -158,6 +161,7 @@ def run(
             visual=visual,
             participant_screen=participant_screen,
             participant_keys=participant_keys,
+            noise=noise,
         )
     )
     _show({"journal": str(finished.journal), "table": str(finished.table)}, f"Done: {finished.table}", as_json)

@@ -35,6 +35,7 @@ class Asked:
     visual: bool = False
     participant_screen: bool = False
     participant_keys: bool = False
+    noise: bool = False
 
 
 def run_session(asked: Asked) -> Place:
@@ -59,8 +60,9 @@ def run_session(asked: Asked) -> Place:
 def _check_screen(asked: Asked) -> None:
     if asked.screen == "terminal" and not (sys.stdin.isatty() and sys.stdout.isatty()):
         raise PlaceError("--screen terminal: standard input and output are no terminal; use --screen synthetic")
-    if asked.screen != "console" and (asked.visual or asked.participant_screen or asked.participant_keys):
-        raise PlaceError("--visual, --participant-screen and --participant-keys go with --screen console")
+    sides = (asked.visual, asked.participant_screen, asked.participant_keys, asked.noise)
+    if asked.screen != "console" and any(sides):
+        raise PlaceError("--visual, --participant-screen, --participant-keys and --noise go with --screen console")
 
 
 def _at_terminal(request: Request, asked: Asked) -> Finished:
@@ -75,7 +77,12 @@ def _synthetic(request: Request, asked: Asked) -> Finished:
 
 def _at_console(request: Request, asked: Asked) -> Finished:
     live = _console()
-    sides = live.Sides(visual=asked.visual, screen=asked.participant_screen, own_keys=asked.participant_keys)
+    sides = live.Sides(
+        visual=asked.visual,
+        screen=asked.participant_screen,
+        own_keys=asked.participant_keys,
+        noise=asked.noise,
+    )
     finished: Finished = live.run_live(request, sides)
     return finished
 

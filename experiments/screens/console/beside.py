@@ -13,11 +13,15 @@ from experiments.steps import Ask, Rate
 
 
 class ParticipantSide:
-    """Asks on the participant's screen without making anyone wait: the experimenter can always answer instead."""
+    """Asks on the participant's screen without making anyone wait: the experimenter can always answer instead.
 
-    def __init__(self, link: ParticipantLink, *, own_keys: bool) -> None:
+    `rates` and `own_keys` say what is asked there; `trouble` is what did not start, told when the run begins.
+    """
+
+    def __init__(self, link: ParticipantLink, *, rates: bool, own_keys: bool, trouble: str = "") -> None:
         self._link = link
-        self.own_keys = own_keys
+        self.rates, self.own_keys = rates, own_keys
+        self._trouble = trouble
         self._called_off = threading.Event()
         self._reply: Callable[[Reply], None] = lambda _: None
         self._tell: Callable[[Message], None] = lambda _: None
@@ -26,8 +30,20 @@ class ParticipantSide:
         """Take the place beside a console."""
         self._reply, self._tell = reply, tell
 
+    def begin(self) -> None:
+        """Tell what did not start."""
+        if self._trouble:
+            self._tell(Trouble(text=self._trouble))
+
+    @property
+    def asking(self) -> bool:
+        """Whether the participant is asked something at this moment."""
+        return self._link.asking
+
     def rate(self, step: Rate, of: int, describe: str) -> None:
-        """Have a stimulus rated and described."""
+        """Have a stimulus rated and described, if the participant does so on their own screen."""
+        if not self.rates:
+            return
         question = AskRating(
             number=step.trial.trial,
             of=of,
@@ -80,6 +96,6 @@ class ParticipantSide:
                 ask()
             except ParticipantError as error:
                 if not self._called_off.is_set():
-                    self._tell(Trouble(text=f"The participant's screen: {error}. Enter the answer here."))
+                    self._tell(Trouble(text=f"Enter the answer here: {error}."))
 
         threading.Thread(target=carry, daemon=True, name="participant").start()

@@ -11,6 +11,7 @@ from device.words import Direction
 from experiments.clock import Clock
 from experiments.journal import JournalError
 from experiments.plan import Trial
+from experiments.preference.scale import on_scale
 from experiments.remarks import AnswerCorrected, Continued, Flagged, Noted, Paused, RatingCorrected, Remark, record
 from experiments.runner import Desk
 from experiments.screens.console.messages import (
@@ -109,15 +110,27 @@ class Controls:
         self.correcting = answered[max(0, place - 1)]
         self._view.refresh()
 
-    def _undo_rating(self) -> None:
-        rated = self._state.rated()
+    def _undo_rating(self, back: int = 1) -> None:
+        """Correct the last rating, or one further back."""
+        rated = list(dict.fromkeys(self._state.rated()))
         if not rated:
             self._view.say("There is no rating to undo yet.", "bad")
             return
-        trial = rated[-1]
-        question = f"{ordinal(self._state, trial)} was rated {self._state.said(trial)}. What did the participant say?"
-        correct = lambda rating: self._remark(RatingCorrected(trial=trial, rating=rating))  # noqa: E731 - read once
-        self._view.ask_line(question, lambda typed: self._with_rating(typed, correct))
+        trial = rated[max(0, len(rated) - back)]
+        question = (
+            f"{ordinal(self._state, trial)} was rated {self._state.said(trial)}. What did the participant say? "
+            "A number, X for no answer, U to go further back."
+        )
+        self._view.ask_line(question, lambda typed: self._correct_rating(trial, typed, back))
+
+    def _correct_rating(self, trial: Trial, typed: str, back: int) -> None:
+        word = typed.strip().lower()
+        if word == "u":
+            self._undo_rating(back + 1)
+        elif word == "x":
+            self._remark(RatingCorrected(trial=trial, rating=None))
+        else:
+            self._with_rating(typed, lambda rating: self._remark(RatingCorrected(trial=trial, rating=rating)))
 
     def _with_rating(self, typed: str, use: Callable[[float], None]) -> None:
         scale = self._state.setup.config.rating
@@ -125,7 +138,7 @@ class Controls:
         if rating is None:
             self._view.say(f"Not a rating: type a number from {scale.minimum:g} to {scale.maximum:g}.", "bad")
         else:
-            use(rating)
+            use(on_scale(rating, scale.minimum, scale.maximum, scale.grain))
 
     def repeat(self) -> None:
         """Present the trial at hand again, or at a hand-over the last one of the set."""

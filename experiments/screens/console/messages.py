@@ -9,15 +9,16 @@ from device.words import Direction
 from experiments.plan import Trial
 from experiments.remarks import Remark
 from experiments.runner import Desk
-from experiments.steps import Outcome, Standing, Step
+from experiments.steps import Outcome, Step
+from experiments.tables import Told
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Began:
-    """The run is at its desk and stands so."""
+    """The run is at its desk; what was told before, if it is resumed: steps with their outcomes, and remarks."""
 
     desk: Desk
-    standing: Standing
+    told: Told
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -4,12 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
-from PyQt6.QtCore import Qt
-from PyQt6.QtGui import QKeySequence, QShortcut
+from PyQt6.QtCore import QEvent, Qt
+from PyQt6.QtGui import QKeyEvent, QKeySequence, QShortcut
 from PyQt6.QtWidgets import (
     QFrame,
     QHBoxLayout,
     QLabel,
+    QLineEdit,
     QListWidget,
     QProgressBar,
     QPushButton,
@@ -93,6 +94,17 @@ def column(*widgets: QWidget) -> QWidget:
     for widget in widgets:
         down.addWidget(widget)
     return made
+
+
+class NumberEdit(QLineEdit):
+    """A line for a number. Letters are no part of one, so that they stay the keys of the window."""
+
+    def event(self, event: QEvent | None) -> bool:
+        """Leave letters to the window."""
+        if isinstance(event, QKeyEvent) and event.text().isalpha() and not event.modifiers():
+            event.ignore()
+            return False
+        return super().event(event)
 
 
 def quiet_list() -> QListWidget:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import queue
 import threading
 from collections.abc import Callable
@@ -9,7 +10,9 @@ from typing import TYPE_CHECKING, Any, Literal, TypeVar
 
 from device import DeviceError
 from experiments.clock import Clock
+from experiments.journal import read
 from experiments.preference.scale import on_scale
+from experiments.replay import told
 from experiments.runner import Desk, RunStopped
 from experiments.screens.console.messages import (
     Again,
@@ -61,6 +64,7 @@ C = TypeVar("C", bound=Reply)
 
 
 Hand = Literal["experimenter", "synthetic"]
+OwnHand = Literal["participant", "synthetic"]
 
 
 class ConsoleScreen:
@@ -80,6 +84,7 @@ class ConsoleScreen:
     ) -> None:
         self._clock, self._tell, self._setup = clock, tell, setup
         self._hand, self._beside = hand, beside
+        self._own_hand: OwnHand = "synthetic" if hand == "synthetic" else "participant"
         self._replies: queue.Queue[Reply] = queue.Queue()
         self._stop_looking = threading.Event()
         self._comment: str | None = None
@@ -98,7 +103,10 @@ class ConsoleScreen:
 
     def begin(self, desk: Desk, standing: Standing) -> None:
         """Show where the run stands, and look after the gun from now on."""
-        self._tell(Began(desk=desk, standing=standing))
+        before = told(read(desk.journal.path)) if standing.history else []
+        self._tell(Began(desk=desk, told=before))
+        if self._beside is not None:
+            self._beside.begin()
         threading.Thread(target=self._look, args=(desk,), daemon=True, name="gun-look").start()
 
     def end(self) -> None:
@@ -109,6 +117,7 @@ class ConsoleScreen:
 
     def prepare(self, step: Prepare) -> Prepared | Repeat:
         """Wait until the gun is handed over, or until an earlier trial is to be repeated."""
+        self._drop_early()
         reply = self._ask(step, Go, Again, Again)
         if isinstance(reply, Again):
             return Repeat(trial=reply.trial, reason=reply.reason)
@@ -126,7 +135,7 @@ class ConsoleScreen:
         return Answered(
             response=reply.response,
             response_time_s=round(reply.at_s - onset_s, 6),
-            response_source="participant" if own else self._hand,
+            response_source=self._own_hand if own else self._hand,
             response_time_valid=own,
         )
 
@@ -155,7 +164,7 @@ class ConsoleScreen:
         reply = self._ask(step, Rating, ParticipantRated, ParticipantRated)
         if isinstance(reply, ParticipantRated):
             self._comment = reply.comment
-            return Rated(rating=reply.rating, rating_by="participant")
+            return Rated(rating=reply.rating, rating_by=self._own_hand)
         if reply.rating is None:
             return Rated(rating=None, rating_by=self._hand)
         kept = on_scale(reply.rating, step.minimum, step.maximum, step.grain)
@@ -174,6 +183,11 @@ class ConsoleScreen:
     def _show(self, message: Waiting) -> None:
         self.shown_s = None
         self._tell(message)
+
+    def _drop_early(self) -> None:
+        """Drop what was replied before a hand-over was shown: a key pressed twice is not to fire by itself."""
+        while self._next_reply(-math.inf) is not None:
+            pass
 
     def _ask(self, step: Step, first: type[A], second: type[B], third: type[C]) -> A | B | C:
         """The reply that a step waits for, one of three kinds; others came too late for theirs and are dropped."""

@@ -38,6 +38,7 @@ from experiments.study import Facts, Participant, RunStanding
 
 _LEVELS: dict[str, tuple[str, ...]] = {"sex": get_args(Sex), "handedness": get_args(Handedness)}
 _FACT_TEXT = {"age_years": "Age in years", "sex": "Sex", "handedness": "Handedness"}
+_HOW_TO_START = "Read the code back with the participant, fill in what is asked, then Start."
 _STATE_TEXT = {"done": "done", "not begun": "–"}
 
 
@@ -52,6 +53,7 @@ class Choice:
     training: bool = False
     participant_screen: bool = False
     participant_keys: bool = False
+    noise: bool = False
 
 
 class _Told(QObject):
@@ -104,18 +106,17 @@ class StartWindow(QWidget):
         self.experiment.addItems(self._study.experiments)
         self.experiment.setCurrentText(experiment)
         self.own_screen, self.own_keys = QCheckBox("rates on a screen of their own"), QCheckBox("answers with own keys")
+        self.noise = QCheckBox("hears masking noise")
         self.facts: dict[str, QLineEdit | QComboBox] = {fact: self._fact(fact) for fact in self._asked()}
         form = QFormLayout(holder := QWidget())
-        rows: dict[str, QWidget] = {
-            "Experiment": self.experiment,
-            "Code": self.code,
-            "Code, read back": self.code_again,
-        }
+        holder.setObjectName("form")
+        rows: dict[str, QWidget] = {"Experiment": self.experiment, "Code": self.code}
+        rows["Code, read back"] = self.code_again
         rows |= {_FACT_TEXT[fact]: field for fact, field in self.facts.items()}
-        for name, field in (rows | {"Participant": self.own_screen, "": self.own_keys}).items():
+        for name, field in (rows | {"Participant": self.own_screen, "": self.own_keys, " ": self.noise}).items():
             field.setAccessibleName(name)
             form.addRow(name, field)
-        return parts.panel(holder)
+        return parts.panel(parts.label("quiet", _HOW_TO_START), holder)
 
     def _asked(self) -> tuple[str, ...]:
         return tuple(self._study.config.eligibility.ask)
@@ -250,6 +251,7 @@ class StartWindow(QWidget):
             training=training,
             participant_screen=self.own_screen.isChecked(),
             participant_keys=self.own_keys.isChecked(),
+            noise=self.noise.isChecked(),
         )
         self.close()
 
@@ -286,9 +288,11 @@ def _note_text(person: Participant) -> str:
     return f"excluded: {person.excluded}" if person.excluded is not None else ""
 
 
-def choose(study: StudyFolder, experiment: str, gun: str, clock: Clock) -> Choice | None:
-    """Show the start window until something is chosen; `None` if it was closed."""
+def choose(study: StudyFolder, experiment: str, gun: str, clock: Clock, said: str = "") -> Choice | None:
+    """Show the start window until something is chosen; `None` if it was closed. `said` is what it has to tell first."""
     window = StartWindow(study, experiment, gun, clock)
+    if said:
+        window.say(said, "bad")
     loop = QEventLoop()
     window.closed.connect(loop.quit)
     window.show()

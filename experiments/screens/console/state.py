@@ -50,7 +50,7 @@ class State:
         """Take a message that came now."""
         match message:
             case Began():
-                self.told = list(message.standing.history)
+                self.told = list(message.told)
                 self.resumed_at = len(self.told)
                 self.began_s = now_s
             case Waiting():
@@ -165,8 +165,11 @@ def instruction(state: State, now_s: float) -> Instruction:
 
 def _end(ended: Ended) -> Instruction:
     if ended.reason is None:
-        return Instruction(title="Finished", detail="Every answer is saved. Thank the participant.", mood="good")
-    return Instruction(title="Stopped", detail=f"{ended.reason}\nEvery answer up to here is saved.", mood="bad")
+        return Instruction(
+            title="Finished", detail="Every answer is saved. Thank the participant.\nQ closes this window.", mood="good"
+        )
+    safe = "Every answer up to here is saved, and the run can be resumed.\nQ closes this window."
+    return Instruction(title="Stopped", detail=f"{ended.reason}\n{safe}", mood="bad")
 
 
 def _of_step(state: State, waiting: Waiting, now_s: float) -> Instruction:
@@ -175,7 +178,7 @@ def _of_step(state: State, waiting: Waiting, now_s: float) -> Instruction:
         case Prepare():
             return _prepare(state, step)
         case Ask():
-            return Instruction(title=step.question, detail="Enter what the participant says.", mood="ask")
+            return Instruction(title=step.question, detail="Enter what the participant says: F or B.", mood="ask")
         case Rest():
             left_s = (waiting.until_s or now_s) - now_s
             return Instruction(
@@ -184,7 +187,11 @@ def _of_step(state: State, waiting: Waiting, now_s: float) -> Instruction:
                 mood="rest",
             )
         case Present():
-            return Instruction(title="Wait for “next”", detail="The gun goes on firing until then.", mood="ask")
+            return Instruction(
+                title="Wait for “next”",
+                detail="The gun goes on firing until then. Press Space when the participant says it.",
+                mood="ask",
+            )
         case Rate() | Describe():
             return Instruction(title=ordinal(state, step.trial), detail=step.question, mood="ask")
         case _:
@@ -196,7 +203,7 @@ def _prepare(state: State, step: Prepare) -> Instruction:
     again = f"Presented again, for the {_nth(step.attempt)} time.\n" if step.attempt > 1 else ""
     return Instruction(
         title=f"Turn the gun to {step.trial.direction.upper()}\nand hand it over",
-        detail=f"{again}{damper if step.damper else ''}Then fire.",
+        detail=f"{again}{damper if step.damper else ''}Then fire with Space.",
     )
 
 
@@ -222,16 +229,27 @@ def place_text(state: State) -> str:
 
 def coming(state: State, count: int = 3) -> list[str]:
     """The next few things to do after the trial at hand."""
+    if state.ended is not None and state.ended.reason is None:
+        return ["the end"]
+    if isinstance(state.step, Rate | Describe):
+        return _still_to_rate(state, state.step)[:count]
     trials = state.plan.trials
     after = trials.index(state.trial) + 1
-    lines = []
+    lines: list[str] = []
     for before, trial in zip(trials[after - 1 :], trials[after : after + count], strict=False):
-        lines += _break_between(state, before, trial)
+        if lines or not isinstance(state.step, Rest):  # a break that is taken now is not still to come
+            lines += _break_between(state, before, trial)
         damper = state.setup.gun.methods[trial.method].damper
         lines.append(f"{trial.direction.upper()}{f', damper {damper.upper()}' if damper else ''}")
     if len(lines) < count and state.plan.experiment == "preference":
         lines.append("ratings and descriptions")
     return lines[:count] or ["the end"]
+
+
+def _still_to_rate(state: State, step: Rate | Describe) -> list[str]:
+    trials = state.plan.trials
+    lines = ["its description"] if isinstance(step, Rate) else []
+    return [*lines, *(f"rating: {ordinal(state, t)}" for t in trials[trials.index(step.trial) + 1 :]), "the end"]
 
 
 def _break_between(state: State, before: Trial, trial: Trial) -> list[str]:
@@ -250,4 +268,4 @@ def gun_text(seen: GunSeen | None) -> tuple[str, str]:
     if status is None or status.fault:
         return f"Gun: FAULT – {seen.fault or (status.fault if status else '')}", "bad"
     mood = {"armed": "act", "resetting": "wait", "disarmed": "good", "fault": "bad"}[status.state]
-    return f"Gun: connected, {status.state} · {status.shots} shots · coil {status.coil_temperature_C:.0f} °C", mood
+    return f"Gun: connected, {status.state}\n{status.shots} shots · coil {status.coil_temperature_C:.0f} °C", mood

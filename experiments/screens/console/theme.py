@@ -13,6 +13,7 @@ _COLOURS: dict[Theme, dict[str, str]] = {
         "ground": "#101418",
         "panel": "#1b2229",
         "line": "#4a5764",
+        "filled": "#34414d",
         "text": "#f2f5f7",
         "quiet": "#b9c4ce",
         "act": "#8fd0ff",
@@ -28,6 +29,7 @@ _COLOURS: dict[Theme, dict[str, str]] = {
         "ground": "#ffffff",
         "panel": "#f0f3f6",
         "line": "#7a8794",
+        "filled": "#c3ccd5",
         "text": "#10161c",
         "quiet": "#3c4852",
         "act": "#00497a",
@@ -59,21 +61,26 @@ def _luminance(hex_colour: str) -> float:
     return 0.2126 * linear[0] + 0.7152 * linear[1] + 0.0722 * linear[2]
 
 
+def _with_mood(mood: str) -> str:
+    """The labels of a mood. Those that have a colour by their name are named, or that colour would win."""
+    return ", ".join(f'QLabel{name}[mood="{mood}"]' for name in ("", "#saved", "#quiet"))
+
+
 def sheet(theme: Theme) -> str:
     """The Qt style sheet of a theme."""
     c = _COLOURS[theme]
-    moods = "\n".join(f'QLabel[mood="{mood}"] {{ color: {c[mood]}; }}' for mood in MOODS)
+    moods = "\n".join(f"{_with_mood(mood)} {{ color: {c[mood]}; }}" for mood in MOODS)
     return f"""
     QWidget {{ background: {c["ground"]}; color: {c["text"]}; font-size: 17px;
         font-family: "DejaVu Sans", "Noto Sans"; }}
     QFrame#panel {{ background: {c["panel"]}; border: 1px solid {c["line"]}; border-radius: 8px; }}
-    QFrame#panel QLabel {{ background: transparent; }}
+    QFrame#panel QLabel, QFrame#panel QCheckBox, QWidget#form {{ background: transparent; }}
     QLabel#title {{ font-size: 52px; font-weight: bold; }}
     QLabel#detail {{ font-size: 26px; }}
     QLabel#place {{ font-size: 22px; color: {c["quiet"]}; }}
-    QLabel#quiet {{ color: {c["quiet"]}; }}
+    QLabel#quiet {{ font-size: 19px; color: {c["quiet"]}; }}
     QLabel#saved {{ font-size: 22px; color: {c["good"]}; }}
-    QPushButton {{ background: {c["panel"]}; border: 2px solid {c["line"]}; border-radius: 8px; padding: 10px 16px; }}
+    QPushButton {{ background: {c["panel"]}; border: 2px solid {c["line"]}; border-radius: 8px; padding: 10px 8px; }}
     QPushButton:focus {{ border: 3px solid {c["act"]}; }}
     QPushButton:hover {{ border-color: {c["act"]}; }}
     QPushButton:disabled {{ color: {c["line"]}; border-style: dashed; }}
@@ -84,7 +91,7 @@ def sheet(theme: Theme) -> str:
     QLineEdit:focus, QDoubleSpinBox:focus, QSpinBox:focus, QComboBox:focus {{ border: 3px solid {c["act"]}; }}
     QProgressBar {{ border: 1px solid {c["line"]}; border-radius: 6px; text-align: center; background: {c["panel"]};
         color: {c["text"]}; min-height: 26px; }}
-    QProgressBar::chunk {{ background: {c["line"]}; }}
+    QProgressBar::chunk {{ background: {c["filled"]}; }}
     QCheckBox::indicator {{ width: 22px; height: 22px; border: 2px solid {c["line"]}; border-radius: 4px; }}
     QCheckBox::indicator:checked {{ background: {c["act"]}; }}
     QCheckBox:focus {{ color: {c["act"]}; }}

@@ -1,7 +1,7 @@
 """A synthetic participant in visual mode: it works the real console by key events, as an experimenter would for it.
 
-Its answers are those of data mode for the same seed; times are real, but for breaks, which it ends early for a recorded
-reason.
+It rates on the participant's own screen where there is one. Its answers are those of data mode for the same seed; times
+are real, but for breaks, which it ends early for a recorded reason.
 """
 
 from __future__ import annotations
@@ -14,7 +14,9 @@ from PyQt6.QtWidgets import QApplication, QWidget
 
 from experiments import catalogue
 from experiments.screens.console.app import Console
+from experiments.screens.console.beside import ParticipantSide
 from experiments.screens.console.messages import Waiting
+from experiments.screens.console.rater import Rater
 from experiments.screens.console.window import ConsoleWindow
 from experiments.setup import Setup
 from experiments.steps import Ask, Describe, Prepare, Present, Rate, Rest
@@ -27,8 +29,15 @@ _KEYS = {"forward": Qt.Key.Key_F, "backward": Qt.Key.Key_B}
 class VisualParticipant:
     """Watches a console's window and presses a key at every step that waits. Keep it for as long as the run lasts."""
 
-    def __init__(self, setup: Setup[Any], console: Console) -> None:
+    def __init__(
+        self,
+        setup: Setup[Any],
+        console: Console,
+        rater: Rater | None = None,
+        beside: ParticipantSide | None = None,
+    ) -> None:
         self._setup, self._console = setup, console
+        self._rater, self._beside = rater, beside
         self._observer: Any = None
         self._done: Waiting | None = None
         self._timer = QTimer()
@@ -37,7 +46,7 @@ class VisualParticipant:
 
     def _look(self) -> None:
         window = self._console.window
-        if window is None:
+        if window is None or self._rates_beside(window):
             return
         if not window.isActiveWindow():
             window.activateWindow()  # keys reach the window that has the focus
@@ -50,9 +59,25 @@ class VisualParticipant:
         if waiting is None or waiting is self._done:
             return
         self._done = waiting
+        self._press(window, waiting)
+
+    def _rates_beside(self, window: ConsoleWindow) -> bool:
+        """Whether a rating is being given on the participant's screen. No answer has no place there."""
+        step = window.state.step
+        if self._rater is None or self._beside is None or not isinstance(step, Rate):
+            return False
+        rating = self._seen(window).rate(step.trial)
+        if rating is None:
+            return False
+        if self._beside.asking:  # only then: what comes later would be done to the next question
+            self._rater.rate(step, rating)
+        return True
+
+    def _seen(self, window: ConsoleWindow) -> Any:
+        """The observer, made when the plan is known."""
         if self._observer is None:
             self._observer = catalogue.experiment(self._setup).observer(self._setup, window.state.plan)
-        self._press(window, waiting)
+        return self._observer
 
     def _press(self, window: ConsoleWindow, waiting: Waiting) -> None:
         step = waiting.step
@@ -60,12 +85,12 @@ class VisualParticipant:
             case Prepare() | Present():
                 _key(window, Qt.Key.Key_Space)
             case Ask():
-                _key(window, _KEYS[self._observer.answer(step.trial).response])
+                _key(window, _KEYS[self._seen(window).answer(step.trial).response])
             case Rest():
                 _key(window, Qt.Key.Key_E)
                 _type(BREAK_REASON, window)
             case Rate():
-                rating = self._observer.rate(step.trial)
+                rating = self._seen(window).rate(step.trial)
                 if rating is None:
                     _key(window, Qt.Key.Key_X, Qt.KeyboardModifier.ControlModifier)
                 else:

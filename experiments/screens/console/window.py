@@ -7,7 +7,6 @@ from collections.abc import Callable
 from PyQt6.QtCore import QObject, QTimer, pyqtSignal
 from PyQt6.QtGui import QCloseEvent, QKeySequence, QShortcut
 from PyQt6.QtWidgets import (
-    QApplication,
     QHBoxLayout,
     QLineEdit,
     QListWidget,
@@ -19,8 +18,8 @@ from PyQt6.QtWidgets import (
 )
 
 from experiments.clock import Clock
-from experiments.remarks import AnswerCorrected, Flagged, Noted, RatingCorrected
-from experiments.screens.console import parts, theme
+from experiments.remarks import AnswerCorrected, Flagged, Noted, RatingCorrected, Remark
+from experiments.screens.console import parts, theme, tone
 from experiments.screens.console.controls import Controls
 from experiments.screens.console.messages import Began, Ended, Message, Saved, Trouble, Waiting
 from experiments.screens.console.pace import clock_text
@@ -34,9 +33,23 @@ from experiments.screens.console.state import (
     ordinal,
     place_text,
 )
-from experiments.steps import Answered, Ask, Describe, Prepare, Present, Rate, Rated, Rest, Rested
+from experiments.steps import (
+    Answered,
+    Ask,
+    Describe,
+    Failed,
+    Outcome,
+    Prepare,
+    Present,
+    Rate,
+    Rated,
+    Repeat,
+    Rest,
+    Rested,
+)
 
 REFRESH_MS = 100
+TWO_LINES_PX = 50
 
 
 class Bridge(QObject):
@@ -89,13 +102,14 @@ class ConsoleWindow(QMainWindow):
     def _build_actions(self) -> None:
         """What can be done at each kind of step."""
         do = self.controls
-        self.rating_ends, self.rating, self.words = parts.label("quiet"), QLineEdit(), QLineEdit()
+        self.rating_ends, self.rating, self.words = parts.label("quiet"), parts.NumberEdit(), QLineEdit()
         self.rating.setPlaceholderText("type a number")
         self.rating.setAccessibleName("rating")
         self.rating.returnPressed.connect(lambda: do.rating(self.rating.text()))
         self.words.setAccessibleName("description")
         self.words.returnPressed.connect(lambda: do.words(self.words.text()))
         no_answer = parts.button(self, "No answer", "Ctrl+X", do.no_rating)
+        hint = "Type the participant's words; Enter saves. For the keys below, press Tab first."
         self.areas: dict[type | None, QWidget] = {
             None: QWidget(),
             Prepare: parts.main_button("Fire", do.main),
@@ -106,7 +120,7 @@ class ConsoleWindow(QMainWindow):
             Present: parts.main_button("“Next” was said", do.main),
             Rest: parts.button(self, "End the break early…", "E", do.end_break),
             Rate: parts.column(self.rating_ends, self.rating, no_answer),
-            Describe: parts.column(parts.label("quiet", "Type the participant's words; Enter saves."), self.words),
+            Describe: parts.column(parts.label("quiet", hint), self.words),
         }
         self.stack = QStackedWidget()
         for area in self.areas.values():
@@ -114,12 +128,15 @@ class ConsoleWindow(QMainWindow):
 
     def _build_entry(self) -> None:
         self.entry_label, self.entry = parts.label("detail"), QLineEdit()
+        self.entry.setAccessibleName("line of text")
         self.entry.returnPressed.connect(self._entered)
         self.entry_bar = parts.column(self.entry_label, self.entry)
         self.entry_bar.hide()
 
     def _side(self) -> QWidget:
         self.gun, self.times = parts.label("quiet"), parts.label("quiet")
+        for lines in (self.gun, self.times):
+            lines.setMinimumHeight(TWO_LINES_PX)
         self.coming, self.answers = parts.quiet_list(), parts.quiet_list()
         titles = parts.label("quiet", "Coming next"), parts.label("quiet", "Answers of this set")
         panels = parts.panel(self.gun), parts.panel(self.times)
@@ -128,15 +145,16 @@ class ConsoleWindow(QMainWindow):
     def _keys(self) -> QWidget:
         do = self.controls
         self.pause_button = parts.button(self, "Pause", "P", do.pause)
+        self.stop_button = parts.button(self, "Stop", "Q", self._stop)
         return parts.row(
             parts.button(self, "Undo", "U", do.undo),
             parts.button(self, "Repeat", "R", do.repeat),
             parts.button(self, "Flag", "G", do.flag),
             parts.button(self, "Note", "N", do.note),
             self.pause_button,
-            parts.button(self, "Stop", "Q", self._stop),
+            self.stop_button,
             parts.button(self, "Dark/light", "D", self._other_theme),
-            parts.button(self, "EMERGENCY STOP", "F12", do.emergency_stop, name="stop"),
+            parts.button(self, "EMERGENCY STOP · Esc", "F12", do.emergency_stop, name="stop"),
         )
 
     # messages
@@ -155,7 +173,7 @@ class ConsoleWindow(QMainWindow):
                 self.say(message.text, "bad")
             case Ended():
                 self._screen.end()
-                QApplication.beep()
+                tone.play()
         self.refresh()
         if isinstance(message, Waiting):
             self.repaint()
@@ -183,9 +201,11 @@ class ConsoleWindow(QMainWindow):
         """Say that it is safe; a tone at the end of a break."""
         text = saved_text(self.state, message)
         if text:
-            self.say(text, "good")
+            self.say(text, "bad" if isinstance(message.word, Failed) else "good")
         if isinstance(message.word, Rested):
-            QApplication.beep()
+            tone.play()
+        if isinstance(message.word, Rated) and message.word.rating_by == "participant":
+            self.activateWindow()  # the participant's screen took the keys to be rated on
 
     def say(self, text: str, mood: str) -> None:
         """Show a line of answer."""
@@ -204,6 +224,7 @@ class ConsoleWindow(QMainWindow):
         self.place.setText(place_text(state))
         self._show_action()
         self.pause_button.setText("Pause  [P]" if self.controls.paused_at_s is None else "Go on  [P]")
+        self.stop_button.setText("Stop  [Q]" if state.ended is None else "Close  [Q]")
         found = state.progress()
         for bar, (done, planned) in zip(self.bars, (found.in_set, found.in_session, found.in_all), strict=True):
             bar.setMaximum(planned)
@@ -302,18 +323,30 @@ class ConsoleWindow(QMainWindow):
 
 def saved_text(state: State, message: Saved) -> str:
     """What was saved, as the experimenter entered it; nothing for what needs no answer."""
+    if message.step is None:
+        return _remark_text(state, message.word)
     word, step = message.word, message.step
     match word:
         case Answered() if isinstance(step, Ask):
             return f"Saved: trial {step.trial.trial}, {word.response.upper()}"
         case Rated() if isinstance(step, Rate):
             return f"Saved: {ordinal(state, step.trial)}, {state.said(step.trial)}"
+        case Failed():
+            return f"The gun failed: {word.cause}. The trial is marked and presented again."
+        case Repeat():
+            return f"Saved: trial {word.trial.trial} is presented again ({word.reason})"
         case Rested():
             return "The break is over."
+        case _:
+            return ""
+
+
+def _remark_text(state: State, remark: Outcome | Remark) -> str:
+    match remark:
         case AnswerCorrected() | RatingCorrected():
-            return f"Saved: trial {word.trial.trial} corrected to {state.said(word.trial)}"
+            return f"Saved: trial {remark.trial.trial} corrected to {state.said(remark.trial)}"
         case Flagged():
-            return f"Saved: trial {word.trial.trial} flagged {word.flag}"
+            return f"Saved: trial {remark.trial.trial} flagged {remark.flag}"
         case Noted():
             return "Saved: note"
         case _:

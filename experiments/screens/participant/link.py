@@ -82,6 +82,11 @@ class ParticipantLink:
         return self._mail.failure
 
     @property
+    def asking(self) -> bool:
+        """Whether a question is open; no longer once its answer is here."""
+        return self._mail.asking
+
+    @property
     def clocks(self) -> ClockMap | None:
         """The last mapping of the clocks, with its uncertainty; `None` before the first."""
         return self._clocks

@@ -31,6 +31,11 @@ class Mailbox:
             self._last[type(word)] = word
             self._news.notify_all()
 
+    @property
+    def asking(self) -> bool:
+        """Whether a question is open."""
+        return self._open is not None
+
     def fail(self, message: str) -> None:
         """Nothing comes any more; the first reason stands."""
         with self._news:

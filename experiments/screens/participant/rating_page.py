@@ -8,11 +8,13 @@ from experiments.screens.participant.confirming import ENTER, Button, heading, h
 from experiments.screens.participant.description_page import DescriptionPage
 from experiments.screens.participant.marker import Move, move, put
 from experiments.screens.participant.pages import QuietPage
-from experiments.screens.participant.stage import Box, Page, Stage
+from experiments.screens.participant.stage import Box, Page, Stage, half_width
 from experiments.screens.participant.words import AskRating, RatingGiven
 
 _HINT = "Click on the line or use the arrow keys, then Confirm or Enter"
 _SCALE_Y = -0.06
+_LENGTH = 0.76
+"""The scale's, as a part of the page's width."""
 _REACH = 0.06
 """How far above and below the line a press still takes the marker."""
 
@@ -28,6 +30,16 @@ _MOVES: dict[str, Move] = {
 }
 
 
+def spot_px(part: float, width_px: int, height_px: int) -> tuple[int, int]:
+    """Where a part of the scale's length lies on the window, in pixels from its upper left.
+
+    >>> spot_px(0.0, 1280, 800), spot_px(0.5, 1280, 800)
+    ((183, 448), (640, 448))
+    """
+    half = _LENGTH * half_width(width_px, height_px)
+    return round(width_px / 2 + (2 * part - 1) * half * height_px), round((0.5 - _SCALE_Y) * height_px)
+
+
 class RatingPage(QuietPage):
     """The scale. No marker stands on it until the participant puts one there, and nothing is confirmed before."""
 
@@ -39,7 +51,7 @@ class RatingPage(QuietPage):
         self._stage, self._asked = stage, asked
         self._rating: float | None = None
         self._dragging = self._done = False
-        self._half = 0.76 * stage.half_width
+        self._half = _LENGTH * stage.half_width
         self._slider = self._scale()
         self._button = Button(stage, "Confirm")
         self._drawn = [*heading(stage, asked, asked.question), *self._ends(), hint(stage, _HINT)]

@@ -8,6 +8,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Any, Protocol
 
+from experiments.screens.participant.focus import Focus
 from experiments.screens.participant.look import PALETTES, Look
 from experiments.screens.participant.toolkit import Toolkit
 from experiments.screens.participant.words import FromParticipant
@@ -15,6 +16,7 @@ from experiments.screens.participant.words import FromParticipant
 _SMALLEST = 0.018
 _SHRINK = 0.92
 _MARGIN = 0.94
+TITLE = "Recoil: participant"
 _STEADY_FLIPS, _MOST_FLIPS = 10, 60
 
 
@@ -65,6 +67,11 @@ class Box:
     anchor: str = "top"
 
 
+def half_width(width_px: int, height_px: int) -> float:
+    """How far pages reach to either side, in parts of the window's height."""
+    return _MARGIN * width_px / height_px / 2
+
+
 class Stage:
     """The open window with one page on it."""
 
@@ -72,8 +79,9 @@ class Stage:
         self.toolkit, self.look, self.palette = toolkit, look, PALETTES[look.theme]
         self.window = _open(toolkit, look, self.palette.ground)
         self.width_px, self.height_px = (int(pixels) for pixels in self.window.clientSize)
-        self.half_width = _MARGIN * self.width_px / self.height_px / 2
+        self.half_width = half_width(self.width_px, self.height_px)
         self.page: Page | None = None
+        self._focus = Focus(self.window.winHandle)
         self._drawn_s = 0.0
         self._closed = False
         self._font_files = [str(path) for path in sorted(toolkit.fonts.glob("NotoSans-*.ttf"))]
@@ -86,13 +94,19 @@ class Stage:
         return None if measured is None else round(float(measured), 2)
 
     def put(self, page: Page) -> None:
-        """Fill the window with another page; one that is typed on gets the focus."""
+        """Fill the window with another page; one that is typed on borrows the keys for as long as it stands.
+
+        What was done before it stands is done to the page that stood there: a second click is no rating.
+        """
+        self.window.winHandle.dispatch_events()
         if self.page is not None:
             self.page.leave()
         self.page = page
         self.window.mouseVisible = page.pointer
         if page.typed:
-            self.window.winHandle.activate()
+            self._focus.take()
+        else:
+            self._focus.give_back()
         self._drawn_s = 0.0
 
     def step(self) -> None:
@@ -153,6 +167,7 @@ class Stage:
 
     def close(self) -> None:
         """Close the window."""
+        self._focus.give_back()
         self.window.close()
 
 
@@ -167,7 +182,7 @@ def _open(toolkit: Toolkit, look: Look, ground: str) -> Any:
         checkTiming=False,
         monitor=None,
     )
-    window.winHandle.set_caption("Recoil: participant")
+    window.winHandle.set_caption(TITLE)
     return window
 
 

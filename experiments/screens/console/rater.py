@@ -1,0 +1,52 @@
+"""A synthetic participant on the participant's own screen: its rating is clicked, its empty description confirmed."""
+
+from __future__ import annotations
+
+import time
+from typing import Protocol
+
+from experiments.preference.scale import on_scale
+from experiments.screens.participant.rating_page import spot_px
+from experiments.screens.participant.stage import TITLE
+from experiments.steps import Rate
+
+AGAIN_S = 0.2
+"""How long hands wait before they try again: what is done before the page stands is lost, as a person's would be."""
+
+
+class Hands(Protocol):
+    """What is needed of hands."""
+
+    def focus_on(self, title: str) -> tuple[int, int, int, int] | None:
+        """Raise a window and give it the keys; its place and size."""
+
+    def click(self, x_px: int, y_px: int) -> None:
+        """Click at a place of the display."""
+
+    def press(self, name: str, *held: str) -> float:
+        """Press a key, with others held."""
+
+
+class Rater:
+    """Rates on the participant's screen. Whatever it does may be done again, on whichever page stands, to no harm."""
+
+    def __init__(self, hands: Hands) -> None:
+        self._hands = hands
+        self._at_s = 0.0
+
+    def rate(self, step: Rate, rating: float) -> None:
+        """Click the rating and confirm the page; the description's page takes the same for an end without words."""
+        if time.monotonic() - self._at_s < AGAIN_S:
+            return
+        self._at_s = time.monotonic()
+        place = self._hands.focus_on(TITLE)
+        if place is not None:
+            x_px, y_px = _spot(step, rating, width_px=place[2], height_px=place[3])
+            self._hands.click(place[0] + x_px, place[1] + y_px)
+            self._hands.press("Return", "Control_L")
+
+
+def _spot(step: Rate, rating: float, *, width_px: int, height_px: int) -> tuple[int, int]:
+    """Where the rating's grain lies on the window."""
+    kept = on_scale(rating, step.minimum, step.maximum, step.grain)
+    return spot_px((kept - step.minimum) / (step.maximum - step.minimum), width_px, height_px)

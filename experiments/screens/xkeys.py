@@ -1,0 +1,102 @@
+"""Keyboard and mouse of an X display by synthetic events (XTest): what a real hand does, as every program sees it."""
+
+from __future__ import annotations
+
+import time
+from typing import Any
+
+from Xlib import XK, X
+from Xlib.display import Display
+from Xlib.error import DisplayError, XError
+from Xlib.ext import xtest
+
+LOOK_S = 0.05
+_SMALLEST_PX = 400
+"""Qt keeps small windows of its own; what people work at is wider."""
+
+_NAMES = {" ": "space", "\n": "Return", ".": "period", "-": "minus", ",": "comma", "?": "question"}
+
+
+class NoDisplay(Exception):  # noqa: N818 - a machine may well have none
+    """There is no X display that takes synthetic events."""
+
+
+class Hands:
+    """Two hands on keyboard and mouse. `NoDisplay` where there is no X; `name` is another display than `DISPLAY`."""
+
+    def __init__(self, name: str | None = None) -> None:
+        try:
+            self._display = Display(name)
+        except (DisplayError, OSError) as error:
+            raise NoDisplay(f"no X display ({' '.join(str(error).split())})") from error
+        if not self._display.has_extension("XTEST"):
+            raise NoDisplay("the X display has no XTEST extension")
+        self._root = self._display.screen().root
+
+    def close(self) -> None:
+        """Let go of the display."""
+        self._display.close()
+
+    def press(self, name: str, *held: str) -> float:
+        """Press a key by its X name, with others held; gives back when, on the monotonic clock."""
+        codes = [self._display.keysym_to_keycode(XK.string_to_keysym(key)) for key in (*held, name)]
+        pressed_s = time.monotonic()
+        for code in codes:
+            xtest.fake_input(self._display, X.KeyPress, code)
+        for code in reversed(codes):
+            xtest.fake_input(self._display, X.KeyRelease, code)
+        self._display.sync()
+        return pressed_s
+
+    def type(self, text: str) -> None:
+        """Type text of letters, digits and blanks, and what stands in `_NAMES`."""
+        for letter in text:
+            shifted = letter.isupper() or letter == "?"
+            self.press(_NAMES.get(letter, letter.lower()), *(["Shift_L"] if shifted else []))
+
+    def click(self, x_px: int, y_px: int) -> None:
+        """Click at a place of the display, in pixels from its upper left."""
+        xtest.fake_input(self._display, X.MotionNotify, x=x_px, y=y_px)
+        xtest.fake_input(self._display, X.ButtonPress, 1)
+        xtest.fake_input(self._display, X.ButtonRelease, 1)
+        self._display.sync()
+
+    def focus_on(self, title: str, timeout_s: float = 0.0) -> tuple[int, int, int, int] | None:
+        """Raise the newest window whose title holds a text, and give it the keys.
+
+        Gives back its place and size in pixels (x, y, width, height); `None` if there is none within the time.
+        """
+        end_s = time.monotonic() + timeout_s
+        while (found := self._focused(title)) is None and time.monotonic() < end_s:
+            time.sleep(LOOK_S)
+        return found
+
+    def _focused(self, title: str) -> tuple[int, int, int, int] | None:
+        """A window may go while it is looked at: then there is none."""
+        try:
+            window = self._find(self._root, title)
+            if window is None:
+                return None
+            window.configure(stack_mode=X.Above)
+            window.set_input_focus(X.RevertToParent, X.CurrentTime)
+            self._display.sync()
+            corner, size = self._root.translate_coords(window, 0, 0), window.get_geometry()
+        except XError:
+            return None
+        return corner.x, corner.y, size.width, size.height
+
+    def _find(self, parent: Any, title: str) -> Any:
+        """The topmost window under a parent that fits. A window manager puts frames of its own around them."""
+        for window in reversed(parent.query_tree().children):
+            if window.get_attributes().map_state != X.IsViewable or window.get_geometry().width <= _SMALLEST_PX:
+                continue
+            if title in self._title(window):
+                return window
+            if (inner := self._find(window, title)) is not None:
+                return inner
+        return None
+
+    def _title(self, window: Any) -> str:
+        """The title as modern programs say it, else as old ones do."""
+        told = window.get_full_text_property(self._display.intern_atom("_NET_WM_NAME"))
+        return str(told or window.get_wm_name() or "")

@@ -1,0 +1,241 @@
+"""The console with the participant's real screen beside it, on one virtual display, both worked by real events."""
+
+from __future__ import annotations
+
+import importlib.util
+import json
+import os
+import re
+import signal
+import subprocess
+import time
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from tests.at_display import AtDisplay, last_record, needs_display, virtual_display, work_console
+from tests.conftest import RECOIL
+from tests.test_console import DIRECTION, PREFERENCE, answer_by, rows, words
+
+pytestmark = [
+    needs_display,
+    pytest.mark.skipif(importlib.util.find_spec("psychopy") is None, reason="PsychoPy is not installed: extra `gui`"),
+]
+PARTICIPANT = "Recoil: participant"
+CONSOLE = "Recoil – P01"
+OPENS_S = 60
+LEFT_END, LINE_Y, BUTTON_Y = 0.1428, 0.56, 0.84
+
+
+@pytest.fixture(scope="module")
+def display() -> Iterator[str]:
+    with virtual_display() as name:
+        yield name
+
+
+def wait_for(what: Callable[[], object], timeout_s: float = 15) -> None:
+    end_s = time.monotonic() + timeout_s
+    while not what():
+        assert time.monotonic() < end_s, "it did not happen"
+        time.sleep(0.02)
+
+
+def console_stands(screen: AtDisplay, journal: Path) -> None:
+    wait_for(lambda: last_record(journal) or screen.process.poll() is not None, OPENS_S)
+    time.sleep(0.3)
+    screen.focus_on(CONSOLE)
+
+
+def is_at(journal: Path, kind: str, trial: int) -> bool:
+    body = last_record(journal).get("body", {})
+    return body.get("kind") == kind and body["trial"]["trial"] == trial
+
+
+def participant_pid(screen: AtDisplay) -> int:
+    """The participant's process: the console's child that runs its program."""
+    found = subprocess.run(
+        ["pgrep", "-P", str(screen.process.pid), "-f", "screens.participant"],
+        capture_output=True,
+        text=True,
+        check=True,
+    )
+    return int(found.stdout)
+
+
+def click(screen: AtDisplay, x: float, y: float) -> None:
+    """Click on the participant's window at a place in parts of it."""
+    place = screen.keys.focus_on(PARTICIPANT)
+    assert place is not None
+    left, top, width, height = place
+    screen.keys.click(left + int(x * width), top + int(y * height))
+
+
+def rate_by_mouse(screen: AtDisplay) -> None:
+    """0 by a click on the scale's left end, then a typed description, ended by the button."""
+    click(screen, LEFT_END, LINE_Y)
+    click(screen, 0.5, BUTTON_Y)
+    time.sleep(1.0)  # the page of the description is being built
+    screen.keys.type("soft")
+    click(screen, 0.5, BUTTON_Y)
+
+
+def rate_by_keys(screen: AtDisplay) -> None:
+    """6.1 by keys alone, then a typed description, ended by keys."""
+    for name in ("Right", "Next", "Right", "Return"):
+        screen.keys.press(name)
+    time.sleep(1.0)
+    screen.keys.type("hard")
+    screen.keys.press("Return", "Control_L")
+
+
+def fire(screen: AtDisplay, journal: Path, body: dict[str, Any]) -> None:
+    """What the experimenter presses until there is something to answer."""
+    if body["kind"] in ("prepare", "present"):
+        answer_by(screen, body)
+
+
+def until(screen: AtDisplay, journal: Path, kind: str, trial: int) -> None:
+    """Fire until a trial's question stands, on the participant's screen as well."""
+    end_s = time.monotonic() + 20
+    while not is_at(journal, kind, trial):
+        assert time.monotonic() < end_s, f"{kind} of trial {trial} did not come: {last_record(journal)}"
+        work_console(screen, journal, lambda body: fire(screen, journal, body), timeout_s=0.2)
+
+
+def enter_rating(screen: AtDisplay, journal: Path, trial: int) -> None:
+    """The experimenter's rating and the description they are told."""
+    for kind in ("rate", "describe"):
+        wait_for(lambda kind=kind: is_at(journal, kind, trial))
+        time.sleep(0.3)
+        screen.keys.type("7.5\n" if kind == "rate" else "like a toy\n")
+
+
+def test_two_ratings_by_the_participants_own_hand_and_one_entered_for_them(
+    quick_configs: Path, tmp_path: Path, display: str
+) -> None:
+    journal = tmp_path / f"{PREFERENCE}_journal.jsonl"
+    run = words(quick_configs, "preference", "--participant", "P01", "--participant-screen")
+    with AtDisplay(run, tmp_path, display) as screen:
+        console_stands(screen, journal)
+        until(screen, journal, "rate", 1)
+        time.sleep(1.0)  # the page is being built
+        rate_by_mouse(screen)
+        wait_for(lambda: is_at(journal, "rate", 2))
+        time.sleep(1.0)
+        screen.focus_on(CONSOLE)
+        enter_rating(screen, journal, 2)
+        wait_for(lambda: is_at(journal, "rate", 3))
+        time.sleep(1.0)
+        screen.focus_on(PARTICIPANT)
+        rate_by_keys(screen)
+        wait_for(lambda: last_record(journal)["kind"] == "finished")
+        time.sleep(0.5)
+        screen.keys.press("q")  # the console has the keys again
+        code, said = screen.end(15)
+    assert code == 0, said
+    table = rows(tmp_path, PREFERENCE, "ratings")
+    assert [row["rating"] for row in table] == ["0.0", "7.5", "6.1"]
+    assert [row["rating_by"] for row in table] == ["participant", "experimenter", "participant"]
+    assert [row["comment"] for row in table] == ["soft", "like a toy", "hard"]
+
+
+def test_a_participants_key_is_a_response_time_and_a_killed_participants_process_loses_nothing(
+    quick_configs: Path, tmp_path: Path, display: str
+) -> None:
+    journal = tmp_path / f"{DIRECTION}_journal.jsonl"
+    run = words(quick_configs, "direction", "--participant", "P01", "--participant-keys", "--noise")
+    pressed_s: list[float] = []
+    with AtDisplay(run, tmp_path, display) as screen:
+        console_stands(screen, journal)
+        for trial, key in enumerate(("Up", "Down"), 1):
+            until(screen, journal, "ask", trial)
+            time.sleep(0.4)
+            pressed_s.append(screen.keys.press(key))
+        until(screen, journal, "ask", 3)
+        time.sleep(0.3)
+        os.kill(participant_pid(screen), signal.SIGKILL)
+        time.sleep(1.0)
+        screen.keys.press("f")
+        wait_for(lambda: is_at(journal, "prepare", 4))
+        screen.keys.press("F12")
+        wait_for(lambda: last_record(journal)["kind"] == "stopped")
+        time.sleep(0.5)
+        screen.keys.press("q")
+        code, said = screen.end()
+    assert code == 130, said
+    first, second, third, *_ = rows(tmp_path, DIRECTION, "trials")
+    assert [row["response"] for row in (first, second, third)] == ["forward", "backward", "forward"]
+    assert [row["response_source"] for row in (first, second, third)] == ["participant"] * 2 + ["experimenter"]
+    assert [row["response_time_valid"] for row in (first, second, third)] == ["1", "1", "0"]
+    for row, key_s, onset_s in zip((first, second), pressed_s, onsets_s(journal), strict=False):
+        assert float(row["response_time_s"]) == pytest.approx(key_s - onset_s, abs=0.05)
+
+
+def onsets_s(journal: Path) -> list[float]:
+    """When the shots began, on the machine's monotonic clock."""
+    bodies = [json.loads(line).get("body", {}) for line in journal.read_text().splitlines()]
+    return [body["pulse_start_s"] for body in bodies if body.get("kind") == "fired"]
+
+
+def test_a_participants_process_killed_in_mid_rating_leaves_the_answer_to_the_experimenter(
+    quick_configs: Path, tmp_path: Path, display: str
+) -> None:
+    journal = tmp_path / f"{PREFERENCE}_journal.jsonl"
+    run = words(quick_configs, "preference", "--participant", "P01", "--participant-screen")
+    with AtDisplay(run, tmp_path, display) as screen:
+        console_stands(screen, journal)
+        until(screen, journal, "rate", 1)
+        time.sleep(1.0)
+        click_scale_only(screen)
+        os.kill(participant_pid(screen), signal.SIGKILL)
+        time.sleep(1.0)
+        screen.focus_on(CONSOLE)  # as a window manager does when the window with the keys is gone
+        for trial in (1, 2, 3):
+            enter_rating(screen, journal, trial)
+        wait_for(lambda: last_record(journal)["kind"] == "finished")
+        time.sleep(0.5)
+        screen.keys.press("q")
+        code, said = screen.end()
+    assert code == 0, said
+    table = rows(tmp_path, PREFERENCE, "ratings")
+    assert [(row["rating"], row["rating_by"]) for row in table] == [("7.5", "experimenter")] * 3
+
+
+def click_scale_only(screen: AtDisplay) -> None:
+    """A marker that is not confirmed yet."""
+    click(screen, LEFT_END, LINE_Y)
+
+
+def test_a_synthetic_participant_rates_on_the_participants_screen_as_in_data_mode(
+    quick_configs: Path, tmp_path: Path, display: str
+) -> None:
+    run = words(quick_configs, "preference", "--participant", "P01", "--visual", "--participant-screen")
+    with AtDisplay(run, tmp_path, display) as screen:
+        code, said = screen.end(90)
+    assert code == 0, said
+    data = [RECOIL, "run", quick_configs / "preference.toml", "--participant", "P01", "--seed", "1"]
+    subprocess.run([*data, "--screen", "synthetic", "--results", "data"], cwd=tmp_path, check=True, capture_output=True)
+    seen = rows(tmp_path, PREFERENCE, "ratings")
+    expected = rows(tmp_path, re.sub("^results", "data", PREFERENCE), "ratings")
+    for column in ("rating", "rating_by", "comment"):
+        assert [row[column] for row in seen] == [row[column] for row in expected]
+
+
+def test_where_there_is_no_x_the_synthetic_rating_is_refused_with_one_message(
+    quick_configs: Path, tmp_path: Path
+) -> None:
+    environment = {key: value for key, value in os.environ.items() if key != "DISPLAY"}
+    run = words(quick_configs, "preference", "--participant", "P01", "--visual", "--participant-screen")
+    done = subprocess.run(
+        [str(word) for word in run],
+        cwd=tmp_path,
+        env=environment | {"QT_QPA_PLATFORM": "offscreen"},
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    assert done.returncode == 2
+    assert done.stderr.startswith("recoil: --visual --participant-screen rates by synthetic events, which only an X")
+    assert done.stderr.count("\n") == 1
