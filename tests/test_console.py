@@ -103,19 +103,80 @@ def test_experiment_1_from_the_start_window_to_the_end_screen(
     assert '"age_years":25' in register
 
 
-def test_experiment_2_with_a_rating_of_zero(quick_configs: Path, tmp_path: Path, display: str) -> None:
+def close_the_day(screen: AtDisplay) -> tuple[int, str]:
+    """From an end screen back to the start window, and out of it."""
+    time.sleep(0.5)
+    screen.keys.press("q")
+    time.sleep(1.0)
+    screen.focus_on()
+    screen.keys.press("q", "Control_L")
+    return screen.end()
+
+
+def test_experiment_2_from_the_start_window_to_the_end_screen_with_a_rating_of_zero(
+    quick_configs: Path, tmp_path: Path, display: str
+) -> None:
     journal = tmp_path / f"{PREFERENCE}_journal.jsonl"
-    with AtDisplay(words(quick_configs, "preference", "--participant", "P01"), tmp_path, display) as screen:
+    with AtDisplay(words(quick_configs, "preference"), tmp_path, display) as screen:
+        start(screen)
         focus_on_console(screen, journal)
         last = work_console(screen, journal, lambda body: answer_by(screen, body))
         assert last["kind"] == "finished"
-        time.sleep(0.5)
-        screen.keys.press("q")
-        code, said = screen.end()
+        code, said = close_the_day(screen)
     assert code == 0, said
     table = rows(tmp_path, PREFERENCE, "ratings")
     assert [row["rating"] for row in table] == ["0.0", "7.5", "7.5"]
     assert {row["comment"] for row in table} == {"like a toy"}
+
+
+def test_a_training_leaves_nothing_behind(quick_configs: Path, tmp_path: Path, display: str) -> None:
+    with AtDisplay(words(quick_configs, "direction"), tmp_path, display) as screen:
+        screen.focus_on()
+        screen.keys.press("r", "Control_L")
+        time.sleep(2.0)
+        screen.focus_on()
+        for _ in range(6):
+            for key in ("space", "f"):
+                time.sleep(0.6)
+                screen.keys.press(key)
+        time.sleep(0.6)
+        code, said = close_the_day(screen)
+    assert code == 0, said
+    assert not list(tmp_path.glob("results/sub-*"))
+
+
+@pytest.mark.parametrize(("key", "kept"), [("g", 2), ("a", 0)])
+def test_an_unfinished_run_is_shown_and_asked_about(
+    quick_configs: Path, tmp_path: Path, display: str, key: str, kept: int
+) -> None:
+    journal = tmp_path / f"{DIRECTION}_journal.jsonl"
+
+    def two_answers(screen: AtDisplay) -> None:
+        work_console(
+            screen,
+            journal,
+            lambda body: screen.keys.press("F12") if body["trial"]["trial"] == 3 else answer_by(screen, body),
+        )
+        time.sleep(0.5)
+        screen.keys.press("q")
+
+    run = words(quick_configs, "direction", "--participant", "P01")
+    with AtDisplay(run, tmp_path, display) as screen:
+        focus_on_console(screen, journal)
+        two_answers(screen)
+        assert screen.end()[0] == 130
+    with AtDisplay(run, tmp_path, display) as screen:
+        screen.focus_on()
+        screen.keys.press(key, "Alt_L")
+        time.sleep(2.0)
+        screen.focus_on()
+        answered = len(answers(journal))
+        screen.keys.press("F12")
+        time.sleep(0.5)
+        screen.keys.press("q")
+        assert screen.end()[0] == 130
+    assert answered == kept
+    assert bool(list(journal.parent.glob("*aside*"))) is (kept == 0)
 
 
 def test_undo_flag_note_pause_and_repeat_by_keys(quick_configs: Path, tmp_path: Path, display: str) -> None:
@@ -225,3 +286,14 @@ def test_without_a_display_the_console_says_so(quick_configs: Path, tmp_path: Pa
     )
     assert done.returncode == 2
     assert "there is no display" in done.stderr
+
+
+def test_a_terminated_console_stops_in_order_and_says_so(quick_configs: Path, tmp_path: Path, display: str) -> None:
+    journal = tmp_path / f"{DIRECTION}_journal.jsonl"
+    with AtDisplay(words(quick_configs, "direction", "--participant", "P01"), tmp_path, display) as screen:
+        focus_on_console(screen, journal)
+        screen.process.terminate()
+        code, said = screen.end()
+    assert code == 130, said
+    assert last_record(journal)["kind"] == "stopped"
+    assert last_record(journal)["reason"] == "SIGTERM"

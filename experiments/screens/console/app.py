@@ -3,13 +3,15 @@
 from __future__ import annotations
 
 import os
+import signal
 import sys
 import threading
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from functools import lru_cache
 from typing import Any
 
-from PyQt6.QtCore import QTimer
+from PyQt6.QtCore import QEventLoop, QTimer
 from PyQt6.QtWidgets import QApplication
 
 from experiments.clock import Clock
@@ -41,7 +43,9 @@ def application() -> QApplication:
 @lru_cache(maxsize=1)
 def _only_application() -> QApplication:
     """Made once and kept: Qt's windows live only as long as it."""
-    return QApplication(["recoil"])
+    made = QApplication(["recoil"])
+    made.setQuitOnLastWindowClosed(False)  # one window may follow the other
+    return made
 
 
 class Console:
@@ -52,6 +56,7 @@ class Console:
         self._hand, self._beside = hand, beside
         self._bridge = Bridge()
         self._opened = threading.Event()
+        self.closed: Callable[[], None] = lambda: None
         self.window: ConsoleWindow | None = None
         self.result: Finished | None = None
         self.error: BaseException | None = None
@@ -62,6 +67,12 @@ class Console:
         """Begin the run; the window opens once its plan is there."""
         self._thread.start()
 
+    def leave(self, reason: str) -> None:
+        """Stop the run and close the window."""
+        if self.window is not None:
+            self.window.controls.stop_for(reason)
+            self.window.close()
+
     def finish(self) -> None:
         """Wait until the run has let go of gun and journal."""
         self._thread.join()
@@ -71,6 +82,7 @@ class Console:
         if isinstance(message, _Open):
             self.window = ConsoleWindow(message.state, message.screen, self._bridge, self._clock)
             self.window.resize(1280, 800)
+            self.window.closed.connect(self.closed)
             self.window.show()
             self.window.activateWindow()
             self._opened.set()
@@ -112,16 +124,18 @@ def run_console(
 
     The window stays open at the end until it is closed. Without a window, an error is raised at once.
     """
-    app = application()
+    application()
     sys.setswitchinterval(SWITCH_S)
-    console = Console(request, clock, hand, beside)
+    console, loop = Console(request, clock, hand, beside), QEventLoop()
+    console.closed = loop.quit
     wake = QTimer()  # lets Python look at signals such as Ctrl-C while Qt waits
-    wake.timeout.connect(lambda: _leave_without_window(app, console))
+    wake.timeout.connect(lambda: _leave_without_window(loop, console))
     wake.start(WAKE_MS)
-    console.start()
-    watch(console)
-    app.exec()
-    console.finish()
+    with _signals_to(console.leave):
+        console.start()
+        watch(console)
+        loop.exec()
+        console.finish()
     if console.error is not None:
         raise console.error
     if console.result is None:
@@ -129,6 +143,20 @@ def run_console(
     return console.result
 
 
-def _leave_without_window(app: QApplication, console: Console) -> None:
+def _leave_without_window(loop: QEventLoop, console: Console) -> None:
     if console.error is not None and console.window is None:
-        app.quit()
+        loop.quit()
+
+
+@contextmanager
+def _signals_to(leave: Callable[[str], None]) -> Iterator[None]:
+    """Have an interrupt stop the run in order: an exception out of a Qt slot would end the process at once."""
+    known = [getattr(signal, name) for name in ("SIGINT", "SIGTERM", "SIGHUP") if hasattr(signal, name)]
+    before = {number: signal.getsignal(number) for number in known}
+    try:
+        for number in known:
+            signal.signal(number, lambda got, _: leave(signal.Signals(got).name))
+        yield
+    finally:
+        for number, handler in before.items():
+            signal.signal(number, handler)

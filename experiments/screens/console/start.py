@@ -73,6 +73,7 @@ class StartWindow(QWidget):
         self.choice: Choice | None = None
         self._told = _Told()
         self._told.text.connect(self.say)
+        self._wanted = experiment
         self._build(experiment)
         self.setStyleSheet(theme.sheet("dark"))
         self._fill()
@@ -155,7 +156,8 @@ class StartWindow(QWidget):
         else:
             self.next.setText(f"Next: {coming.participant_id}, {' and '.join(run.experiment for run in coming.runs)}")
             self.code.setText(coming.participant_id)
-            self.experiment.setCurrentText(coming.runs[0].experiment)
+            ahead = [run.experiment for run in coming.runs]
+            self.experiment.setCurrentText(self._wanted if self._wanted in ahead else ahead[0])
         for problem in self._seen.problems:
             self.say(problem, "bad")
         self.code_again.setFocus()

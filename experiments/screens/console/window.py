@@ -61,6 +61,8 @@ class Bridge(QObject):
 class ConsoleWindow(QMainWindow):
     """What to do now, the keys that do it, and what an experimenter looks for: progress, gun, what comes next."""
 
+    closed = pyqtSignal()
+
     def __init__(self, state: State, screen: ConsoleScreen, bridge: Bridge, clock: Clock) -> None:
         super().__init__()
         self.state, self._screen, self._clock = state, screen, clock
@@ -319,6 +321,7 @@ class ConsoleWindow(QMainWindow):
         if self.state.ended is None:
             self.controls.stop_for("the window was closed")
         super().closeEvent(event)
+        self.closed.emit()
 
 
 def saved_text(state: State, message: Saved) -> str:
