@@ -245,7 +245,7 @@ def check_killed_console(configs: Path, folder: Path, display: str, seconds: flo
     assert [row["response"] for row in table[: goal - 1]] == (["forward", "backward"] * 30)[: goal - 1]
 
 
-@pytest.mark.parametrize("kill", range(4))
+@pytest.mark.parametrize("kill", range(10))
 def test_a_killed_console_loses_nothing_and_goes_on(
     quick_configs: Path, tmp_path: Path, display: str, kill: int
 ) -> None:
