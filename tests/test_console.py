@@ -61,7 +61,7 @@ def answer_by(screen: AtDisplay, body: dict[str, Any]) -> None:
 def start(screen: AtDisplay, code: str = "P01") -> None:
     """From the start window: read the code back, say what is asked, start."""
     keys = screen.keys
-    screen.focus_on()
+    screen.focus_on("start")
     keys.type(code)
     keys.press("Tab")
     keys.type("25")
@@ -77,7 +77,7 @@ def focus_on_console(screen: AtDisplay, journal: Path) -> None:
     while not last_record(journal) and time.monotonic() < deadline:
         time.sleep(0.02)
     time.sleep(0.3)
-    screen.focus_on()
+    screen.focus_on("P01")
 
 
 def test_experiment_1_from_the_start_window_to_the_end_screen(
@@ -92,7 +92,7 @@ def test_experiment_1_from_the_start_window_to_the_end_screen(
         time.sleep(0.5)
         screen.keys.press("q")
         time.sleep(1.0)
-        screen.focus_on()
+        screen.focus_on("start")
         screen.keys.press("q", "Control_L")
         code, said = screen.end()
     assert code == 0, said
@@ -108,7 +108,7 @@ def close_the_day(screen: AtDisplay) -> tuple[int, str]:
     time.sleep(0.5)
     screen.keys.press("q")
     time.sleep(1.0)
-    screen.focus_on()
+    screen.focus_on("start")
     screen.keys.press("q", "Control_L")
     return screen.end()
 
@@ -131,13 +131,12 @@ def test_experiment_2_from_the_start_window_to_the_end_screen_with_a_rating_of_z
 
 def test_a_training_leaves_nothing_behind(quick_configs: Path, tmp_path: Path, display: str) -> None:
     with AtDisplay(words(quick_configs, "direction"), tmp_path, display) as screen:
-        screen.focus_on()
+        screen.focus_on("start")
         screen.keys.press("r", "Control_L")
-        time.sleep(2.0)
-        screen.focus_on()
-        for _ in range(6):
+        screen.focus_on("training")
+        for _ in range(14):  # six trials, and some keys for those that came before the window was ready
             for key in ("space", "f"):
-                time.sleep(0.6)
+                time.sleep(0.4)
                 screen.keys.press(key)
         time.sleep(0.6)
         code, said = close_the_day(screen)
@@ -166,10 +165,10 @@ def test_an_unfinished_run_is_shown_and_asked_about(
         two_answers(screen)
         assert screen.end()[0] == 130
     with AtDisplay(run, tmp_path, display) as screen:
-        screen.focus_on()
+        screen.focus_on("unfinished")
         screen.keys.press(key, "Alt_L")
         time.sleep(2.0)
-        screen.focus_on()
+        screen.focus_on("P01")
         answered = len(answers(journal))
         screen.keys.press("F12")
         time.sleep(0.5)
@@ -230,7 +229,7 @@ def check_killed_console(configs: Path, folder: Path, display: str, seconds: flo
     with AtDisplay(words(configs, "direction", "--participant", "P01", "--resume"), folder, display) as screen:
         focus_on_console(screen, journal)
         time.sleep(0.5)
-        screen.focus_on()
+        screen.focus_on("P01")
         goal = min(60, len(before) + 2)
         limit = time.monotonic() + 30
         while len(answers(journal)) < goal and time.monotonic() < limit:
