@@ -164,6 +164,25 @@ def link(line: bytes) -> str:
     return hashlib.sha256(line.rstrip(b"\r\n")).hexdigest()[:16]
 
 
+def parsed(line: bytes) -> dict[str, Any]:
+    """The JSON object on a line; else `JournalError`."""
+    try:
+        value = json.loads(line)
+    except (ValueError, RecursionError) as error:
+        raise JournalError(f"not a JSON record ({error}); it was changed or damaged") from error
+    if not isinstance(value, dict):
+        raise JournalError("not a JSON object; it was changed or damaged")
+    return value
+
+
+def check_chain(value: dict[str, Any], number: int, before: str) -> None:
+    """`JournalError` unless the record's number `n` and its `link` follow from the line before."""
+    if value.get("n") != number:
+        raise JournalError(f"record number is {value.get('n')!r}, must be {number}; a line was lost or added")
+    if value.get("link") != before:
+        raise JournalError(f"does not follow from line {number}, which was changed after it was written")
+
+
 def read(path: Path) -> Contents:
     """Every whole record of a journal. A record is whole if its line has its end; the rest is counted, not read.
 
@@ -210,15 +229,11 @@ def _check_head(path: Path, lines: list[bytes]) -> dict[str, Any]:
 
 
 def _record(path: Path, number: int, line: bytes, before: str) -> dict[str, Any]:
-    place = f"{path}: line {number + 1}"
     try:
-        value = json.loads(line)
-    except (ValueError, RecursionError) as error:
-        raise JournalError(f"{place}: not a JSON record ({error}); the journal was changed or damaged") from error
-    if not isinstance(value, dict) or value.get("kind") not in _KINDS:
-        raise JournalError(f"{place}: kind must be one of {', '.join(_KINDS)}; the journal was changed or damaged")
-    if value.get("n") != number:
-        raise JournalError(f"{place}: record number is {value.get('n')!r}, must be {number}; a line was lost or added")
-    if value.get("link") != before:
-        raise JournalError(f"{place}: does not follow from line {number}, which was changed after it was written")
+        value = parsed(line)
+        if value.get("kind") not in _KINDS:
+            raise JournalError(f"kind must be one of {', '.join(_KINDS)}; it was changed or damaged")
+        check_chain(value, number, before)
+    except JournalError as error:
+        raise JournalError(f"{path}: line {number + 1}: {error}") from error
     return value

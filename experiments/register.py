@@ -7,7 +7,6 @@ the facts of an earlier one; nothing is ever taken away.
 
 from __future__ import annotations
 
-import json
 import os
 import time
 from collections.abc import Iterable, Iterator
@@ -22,7 +21,7 @@ from experiments import storage
 from experiments.canonical import canonical_json
 from experiments.clock import Clock
 from experiments.config import CODE, Model
-from experiments.journal import JournalError, link
+from experiments.journal import JournalError, check_chain, link, parsed
 from experiments.study import Facts
 
 NAME = "participants.jsonl"
@@ -151,31 +150,20 @@ def read(results: Path) -> Register:
     for number, line in enumerate(data[: data.rfind(b"\n") + 1].split(b"\n")[:-1]):
         try:
             found = _with_line(found, number, line)
-        except RegisterError as error:
+        except JournalError as error:
             return replace(found, problem=f"{path}: line {number + 1}: {error}; {_DAMAGED}")
     return found
 
 
 def _with_line(before: Register, number: int, line: bytes) -> Register:
-    values = _values(line)
-    for key, expected in (("n", number), ("link", before.link)):
-        if key not in values or values.pop(key) != expected:
-            raise RegisterError(f"does not follow from the line before it ({key} must be {expected!r})")
-    utc = values.pop("utc", None)
+    values = parsed(line)
+    check_chain(values, number, before.link)
+    utc = values.get("utc")
     if not isinstance(utc, str):
         raise RegisterError(f"utc = {utc!r}: must be the date and time of the record")
-    entries = (*before.entries, (utc, _checked(values)))
+    body = {key: value for key, value in values.items() if key not in ("n", "link", "utc")}
+    entries = (*before.entries, (utc, _checked(body)))
     return replace(before, entries=entries, whole_bytes=before.whole_bytes + len(line) + 1, link=link(line))
-
-
-def _values(line: bytes) -> dict[str, Any]:
-    try:
-        values = json.loads(line)
-    except (ValueError, RecursionError) as error:
-        raise RegisterError(f"not a JSON record ({error})") from error
-    if not isinstance(values, dict):
-        raise RegisterError("not a JSON object")
-    return values
 
 
 def codes(results: Path) -> set[str]:
