@@ -15,6 +15,8 @@ from hypothesis import settings
 
 from experiments.load import shipped_folder
 
+pytest.register_assert_rewrite("tests.at_controls", "tests.experimenters")
+
 settings.register_profile("recoil", deadline=None, derandomize=True)
 settings.load_profile("recoil")
 

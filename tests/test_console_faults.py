@@ -32,7 +32,7 @@ from experiments.run import Request
 from experiments.runner import RunStopped
 from experiments.screens.console import theme
 from experiments.steps import Answered, Ask, Failed, Fire, Fired, Prepared, Rate, Rated, Step
-from tests.test_console_rules import short_direction
+from tests.at_controls import short_direction
 
 pytest.importorskip("PyQt6")
 

@@ -8,6 +8,7 @@ import os
 import re
 import signal
 import subprocess
+import sys
 import time
 from collections.abc import Callable, Iterator
 from pathlib import Path
@@ -15,6 +16,7 @@ from typing import Any
 
 import pytest
 
+from tests import watched_console
 from tests.at_display import AtDisplay, last_record, needs_display, virtual_display, work_console
 from tests.conftest import RECOIL
 from tests.test_console import DIRECTION, PREFERENCE, answer_by, rows, words
@@ -26,6 +28,7 @@ pytestmark = [
 PARTICIPANT = "Recoil: participant"
 CONSOLE = "Recoil – P01"
 OPENS_S = 60
+GONE = "Enter the answer here: the participant's screen was killed by signal 9."
 LEFT_END, LINE_Y, BUTTON_Y = 0.1428, 0.56, 0.84
 
 
@@ -112,6 +115,37 @@ def enter_rating(screen: AtDisplay, journal: Path, trial: int) -> None:
         screen.keys.type("7.5\n" if kind == "rate" else "like a toy\n")
 
 
+def plays_sound(home: Path) -> bool:
+    """Whether there is a device for the noise, as the sound library says in a process of its own."""
+    ask = "import sounddevice; sounddevice.check_output_settings(channels=2, samplerate=44_100)"
+    environment = os.environ | {"HOME": str(home)}
+    asked = subprocess.run([sys.executable, "-c", ask], env=environment, capture_output=True, check=False)
+    return asked.returncode == 0
+
+
+def told_at_hand_over(eye: Path, start: str) -> list[str]:
+    """What stands in the console's window at a hand-over and starts so."""
+    hand_overs = [texts for texts in watched_console.seen(eye) if any(text.startswith("Turn the") for text in texts)]
+    return [text for texts in hand_overs for text in texts if text.startswith(start)]
+
+
+def check_noise_is_told_of(eye: Path, home: Path) -> None:
+    """At the hand-over the console says why the noise stays off if nothing can play it, and else nothing."""
+    wait_for(lambda: told_at_hand_over(eye, "Turn the"))
+    if plays_sound(home):
+        assert not told_at_hand_over(eye, "Masking noise")
+    else:
+        wait_for(lambda: told_at_hand_over(eye, "Masking noise stays off: no sound device"))
+        assert "Connect headphones" in told_at_hand_over(eye, "Masking noise")[0]
+
+
+def kill_participants_process(screen: AtDisplay, eye: Path) -> None:
+    """The console says that the participant's screen is gone and where the answer goes now, and not before."""
+    assert not any(GONE in texts for texts in watched_console.seen(eye))
+    os.kill(participant_pid(screen), signal.SIGKILL)
+    wait_for(lambda: GONE in watched_console.seen(eye)[-1])
+
+
 def test_two_ratings_by_the_participants_own_hand_and_one_entered_for_them(
     quick_configs: Path, tmp_path: Path, display: str
 ) -> None:
@@ -144,19 +178,19 @@ def test_two_ratings_by_the_participants_own_hand_and_one_entered_for_them(
 def test_a_participants_key_is_a_response_time_and_a_killed_participants_process_loses_nothing(
     quick_configs: Path, tmp_path: Path, display: str
 ) -> None:
-    journal = tmp_path / f"{DIRECTION}_journal.jsonl"
+    journal, eye = tmp_path / f"{DIRECTION}_journal.jsonl", tmp_path / "seen.jsonl"
     run = words(quick_configs, "direction", "--participant", "P01", "--participant-keys", "--noise")
     pressed_s: list[float] = []
-    with AtDisplay(run, tmp_path, display) as screen:
+    with AtDisplay(watched_console.words(eye, run), tmp_path, display) as screen:
         console_stands(screen, journal)
+        check_noise_is_told_of(eye, tmp_path)
         for trial, key in enumerate(("Up", "Down"), 1):
             until(screen, journal, "ask", trial)
             time.sleep(0.4)
             pressed_s.append(screen.keys.press(key))
         until(screen, journal, "ask", 3)
         time.sleep(0.3)
-        os.kill(participant_pid(screen), signal.SIGKILL)
-        time.sleep(1.0)
+        kill_participants_process(screen, eye)
         screen.keys.press("f")
         wait_for(lambda: is_at(journal, "prepare", 4))
         screen.keys.press("F12")
@@ -173,6 +207,25 @@ def test_a_participants_key_is_a_response_time_and_a_killed_participants_process
         assert float(row["response_time_s"]) == pytest.approx(key_s - onset_s, abs=0.05)
 
 
+def test_of_a_masking_noise_that_plays_the_console_says_nothing(
+    quick_configs: Path, tmp_path: Path, display: str
+) -> None:
+    (tmp_path / ".asoundrc").write_text("pcm.!default { type null }\n")  # a device without a sound
+    if not plays_sound(tmp_path):
+        pytest.skip("the sound library does not take its devices from ALSA")
+    journal, eye = tmp_path / f"{DIRECTION}_journal.jsonl", tmp_path / "seen.jsonl"
+    run = words(quick_configs, "direction", "--participant", "P01", "--noise")
+    with AtDisplay(watched_console.words(eye, run), tmp_path, display) as screen:
+        console_stands(screen, journal)
+        check_noise_is_told_of(eye, tmp_path)
+        screen.keys.press("F12")
+        wait_for(lambda: last_record(journal)["kind"] == "stopped")
+        time.sleep(0.5)
+        screen.keys.press("q")
+        code, said = screen.end()
+    assert code == 130, said
+
+
 def onsets_s(journal: Path) -> list[float]:
     """When the shots began, on the machine's monotonic clock."""
     bodies = [json.loads(line).get("body", {}) for line in journal.read_text().splitlines()]
@@ -182,14 +235,14 @@ def onsets_s(journal: Path) -> list[float]:
 def test_a_participants_process_killed_in_mid_rating_leaves_the_answer_to_the_experimenter(
     quick_configs: Path, tmp_path: Path, display: str
 ) -> None:
-    journal = tmp_path / f"{PREFERENCE}_journal.jsonl"
+    journal, eye = tmp_path / f"{PREFERENCE}_journal.jsonl", tmp_path / "seen.jsonl"
     run = words(quick_configs, "preference", "--participant", "P01", "--participant-screen")
-    with AtDisplay(run, tmp_path, display) as screen:
+    with AtDisplay(watched_console.words(eye, run), tmp_path, display) as screen:
         console_stands(screen, journal)
         until(screen, journal, "rate", 1)
         time.sleep(1.0)
         click_scale_only(screen)
-        os.kill(participant_pid(screen), signal.SIGKILL)
+        kill_participants_process(screen, eye)
         time.sleep(1.0)
         screen.focus_on(CONSOLE)  # as a window manager does when the window with the keys is gone
         for trial in (1, 2, 3):

@@ -41,10 +41,14 @@ class State:
     working: bool = False
     gun: GunSeen | None = None
     ended: Ended | None = None
-    began_s: float = 0.0
+    began_s: float | None = None
     trial_began_s: float | None = None
     measured_s: list[float] = field(default_factory=list)
     resumed_at: int = 0
+
+    def elapsed_s(self, now_s: float) -> float:
+        """How long the run has been under way; 0 before it begins."""
+        return 0.0 if self.began_s is None else now_s - self.began_s
 
     def take(self, message: Message, now_s: float) -> None:
         """Take a message that came now."""

@@ -234,7 +234,7 @@ class ConsoleWindow(QMainWindow):
         text, mood = gun_text(state.gun)
         self.gun.setText(text)
         parts.set_mood(self.gun, mood)
-        elapsed, left = clock_text(now_s - state.began_s), clock_text(state.remaining_s())
+        elapsed, left = clock_text(state.elapsed_s(now_s)), clock_text(state.remaining_s())
         self.times.setText(f"Elapsed {elapsed}\nStill about {left}")
         _fill(self.coming, coming(state))
         _fill(self.answers, [f"Trial {t.trial}: {said}" for t in state.answered_in_set() if (said := state.said(t))])

@@ -57,5 +57,5 @@ def _why_not(error: BaseException) -> str:
     reason = " ".join(str(error).split()) or type(error).__name__
     return (
         f"Masking noise stays off: no sound device plays it ({type(error).__name__}: {reason}). "
-        "Connect headphones, see that the system lists them, and turn the noise on again."
+        "Connect headphones, see that the system lists them, then stop this run and resume it."
     )
