@@ -38,7 +38,7 @@ def display() -> Iterator[str]:
         yield name
 
 
-def wait_for(what: Callable[[], object], timeout_s: float = 15) -> None:
+def wait_for(what: Callable[[], object], timeout_s: float = 30) -> None:
     end_s = time.monotonic() + timeout_s
     while not what():
         assert time.monotonic() < end_s, "it did not happen"
@@ -218,6 +218,7 @@ def test_of_a_masking_noise_that_plays_the_console_says_nothing(
     with AtDisplay(watched_console.words(eye, run), tmp_path, display) as screen:
         console_stands(screen, journal)
         check_noise_is_told_of(eye, tmp_path)
+        assert '"Masking noise plays."' in journal.read_text()
         screen.keys.press("F12")
         wait_for(lambda: last_record(journal)["kind"] == "stopped")
         time.sleep(0.5)

@@ -8,20 +8,19 @@ from collections.abc import Callable
 from experiments.screens.console.messages import Message, ParticipantAnswered, ParticipantRated, Reply, Trouble
 from experiments.screens.participant.link import ParticipantLink
 from experiments.screens.participant.mailbox import ParticipantError
-from experiments.screens.participant.words import AskDirection, AskRating
+from experiments.screens.participant.words import AskDirection, AskRating, NoiseIs
 from experiments.steps import Ask, Rate
 
 
 class ParticipantSide:
     """Asks on the participant's screen without making anyone wait: the experimenter can always answer instead.
 
-    `rates` and `own_keys` say what is asked there; `trouble` is what did not start, told when the run begins.
+    `rates` and `own_keys` say what is asked there; `noise` whether masking noise plays, and why not, if it was wanted.
     """
 
-    def __init__(self, link: ParticipantLink, *, rates: bool, own_keys: bool, trouble: str = "") -> None:
+    def __init__(self, link: ParticipantLink, *, rates: bool, own_keys: bool, noise: NoiseIs | None = None) -> None:
         self._link = link
-        self.rates, self.own_keys = rates, own_keys
-        self._trouble = trouble
+        self.rates, self.own_keys, self._noise = rates, own_keys, noise
         self._called_off = threading.Event()
         self._reply: Callable[[Reply], None] = lambda _: None
         self._tell: Callable[[Message], None] = lambda _: None
@@ -30,10 +29,14 @@ class ParticipantSide:
         """Take the place beside a console."""
         self._reply, self._tell = reply, tell
 
-    def begin(self) -> None:
-        """Tell what did not start."""
-        if self._trouble:
-            self._tell(Trouble(text=self._trouble))
+    def begin(self) -> str:
+        """Tell what did not start. Gives back what the record of the run is to say of the noise, if anything."""
+        if self._noise is None:
+            return ""
+        if self._noise.on:
+            return "Masking noise plays."
+        self._tell(Trouble(text=self._noise.message))
+        return self._noise.message
 
     @property
     def asking(self) -> bool:

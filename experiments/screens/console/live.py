@@ -27,6 +27,7 @@ from experiments.screens.console.visual import VisualParticipant
 from experiments.screens.participant.link import ParticipantLink
 from experiments.screens.participant.look import Look
 from experiments.screens.participant.mailbox import ParticipantError
+from experiments.screens.participant.words import NoiseIs
 from experiments.setup import Setup
 from experiments.standings import StudyFolder
 
@@ -136,8 +137,8 @@ def _participant(stack: ExitStack, sides: Sides) -> ParticipantSide:
         link.show("Please wait.")
     except ParticipantError as error:
         raise PlaceError(f"--participant-screen: {error}; look at `recoil doctor`, or run without it") from error
-    trouble = _noise(link) if sides.noise else ""
-    return ParticipantSide(link, rates=sides.screen, own_keys=sides.own_keys, trouble=trouble)
+    noise = _noise(link) if sides.noise else None
+    return ParticipantSide(link, rates=sides.screen, own_keys=sides.own_keys, noise=noise)
 
 
 def _look() -> Look:
@@ -146,12 +147,12 @@ def _look() -> Look:
     return Look(screen=screens - 1, full_screen=screens > 1)
 
 
-def _noise(link: ParticipantLink) -> str:
+def _noise(link: ParticipantLink) -> NoiseIs:
     """Masking noise, which ends with the participant's process; why it stays off, if it does."""
     try:
-        return link.noise(on=True).message
+        return link.noise(on=True)
     except ParticipantError as error:
-        return f"Masking noise stays off: {error}"
+        return NoiseIs(on=False, message=f"Masking noise stays off: {error}")
 
 
 def _rater(stack: ExitStack) -> Rater:

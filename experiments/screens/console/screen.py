@@ -12,6 +12,8 @@ from device import DeviceError
 from experiments.clock import Clock
 from experiments.journal import read
 from experiments.preference.scale import on_scale
+from experiments.remarks import Noted
+from experiments.remarks import record as remark_record
 from experiments.replay import told
 from experiments.runner import Desk, RunStopped
 from experiments.screens.console.messages import (
@@ -105,8 +107,9 @@ class ConsoleScreen:
         """Show where the run stands, and look after the gun from now on."""
         before = told(read(desk.journal.path)) if standing.history else []
         self._tell(Began(desk=desk, told=before))
-        if self._beside is not None:
-            self._beside.begin()
+        noise = self._beside.begin() if self._beside is not None else ""
+        if noise:
+            desk.journal.append("remark", body=remark_record(Noted(trial=None, text=noise)))
         threading.Thread(target=self._look, args=(desk,), daemon=True, name="gun-look").start()
 
     def end(self) -> None:
