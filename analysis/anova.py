@@ -6,19 +6,25 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 from scipy import special
 
 from analysis.arrays import FloatArray, Values, numbers, plain
-from analysis.sums_of_squares import Sums, between_sums, repeated_sums, unscaled
+from analysis.slices import unscaled
+from analysis.sums_of_squares import Sums, between_sums, repeated_sums
+
+NO_ERROR = "no error variance: the effect is the same in everyone, F is infinite"
+NO_VARIANCE = "neither effect nor error beyond the rounding of the data: F is 0/0, undefined"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Anova:
     """One-way ANOVA between participants.
 
-    No error variance but an effect: F = inf, p = 0. Neither (all values equal): 0/0, F and p are NaN.
-    `ss_effect, ss_error, ms_error` are in the squared unit of the data.
+    An error no larger than what rounding decimals to doubles makes is none. No error but an effect: F = inf, p = 0.
+    Neither (all values equal): 0/0, F and p are NaN. `reason` says which.
+    `ss_effect, ss_error, ms_error` are in the squared unit of the data: of data beyond 1e154 they can be inf, of data
+    below 1e-162 they can be 0, while F and p stand.
     """
 
     F: Values
@@ -28,6 +34,12 @@ class Anova:
     ss_effect: Values
     ss_error: Values
     ms_error: Values
+
+    @property
+    def reason(self) -> str | NDArray[np.str_]:
+        """Why F is infinite or undefined, empty if it is neither; an array of texts over the leading axes for many."""
+        texts = np.select([np.isnan(self.F), np.isinf(self.F)], [NO_VARIANCE, NO_ERROR], default="")
+        return str(texts) if texts.ndim == 0 else texts
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -81,7 +93,6 @@ def rm_anova(scores: ArrayLike) -> RepeatedMeasuresAnova:
     sums = repeated_sums(check_scores(scores))
     F, p = _f_test(sums)
     effect, error, ms_error = _in_data_units(sums)
-    people = sums.participants if sums.participants is not None else np.zeros_like(sums.effect)
     return RepeatedMeasuresAnova(
         F=F,
         df_effect=sums.df_effect,
@@ -90,7 +101,7 @@ def rm_anova(scores: ArrayLike) -> RepeatedMeasuresAnova:
         ss_effect=effect,
         ss_error=error,
         ms_error=ms_error,
-        ss_participants=plain(unscaled(people, 2 * sums.exponent)),
+        ss_participants=plain(unscaled(sums.participants, 2 * sums.exponent)),
     )
 
 

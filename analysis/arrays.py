@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+from numbers import Real
+
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
@@ -11,15 +14,40 @@ Values = float | FloatArray
 
 
 def numbers(values: ArrayLike, name: str) -> FloatArray:
-    """`values` as float64; `ValueError` if they are not finite numbers. Truth values count as 0 and 1."""
-    array = np.asarray(values)
+    """`values` as float64, itself if it is that already. Truth values count as 0 and 1.
+
+    `ValueError` naming the place if a value is missing, infinite or not a number, or if rows differ in length. Numbers
+    in text are not read: who wrote "7" may have meant a label.
+    """
+    if isinstance(values, np.ma.MaskedArray) and values.mask.any():
+        place = tuple(int(i) for i in np.argwhere(values.mask)[0])
+        raise ValueError(f"{name} must be complete, but the value at index {place} is masked")
+    try:
+        array = np.asarray(values)
+    except ValueError as error:
+        raise ValueError(f"{name} must be numbers in a full rectangle: {_ragged(values)}") from error
     if array.dtype.kind not in "biuf":
-        raise ValueError(f"{name} must be numbers in a full rectangle, not {array.dtype}")
-    array = array.astype(np.float64)
+        raise ValueError(f"{name} must be numbers in a full rectangle, not {array.dtype}{_first_stranger(array)}")
+    array = array.astype(np.float64, copy=False)
     if not np.isfinite(array).all():
         place = tuple(int(i) for i in np.argwhere(~np.isfinite(array))[0])
         raise ValueError(f"{name} must be finite, but the value at index {place} is {array[place]}")
     return array
+
+
+def _ragged(values: object) -> str:
+    rows = list(values) if isinstance(values, Sequence) else []
+    lengths = [len(row) if isinstance(row, Sequence | np.ndarray) else 1 for row in rows]
+    odd = [i for i, length in enumerate(lengths) if length != lengths[0]]
+    return f"row 0 has {lengths[0]} values, row {odd[0]} has {lengths[odd[0]]}" if odd else "the rows differ in shape"
+
+
+def _first_stranger(array: NDArray[np.generic]) -> str:
+    for place, value in np.ndenumerate(array):
+        if not isinstance(value, Real | np.bool_):
+            found = value.item() if isinstance(value, np.generic) else value
+            return f"; the value at index {place} is {found!r}"
+    return ""
 
 
 def plain(values: ArrayLike) -> Values:

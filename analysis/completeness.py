@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 
 import pandas as pd
 
@@ -16,25 +16,37 @@ def complete_rows(
 
     Every method must be there; for direction with forward trials, because these are what the measure counts.
     """
-    reasons = {
-        str(code): _reason(rows, experiment, methods) for code, rows in table.groupby("participant_id", sort=True)
-    }
-    good = [code for code, reason in reasons.items() if reason is None]
+    reasons = _reasons(table, experiment, methods)
     left_out = [
-        {"experiment": experiment, "participant": code, "reason": reason}
-        for code, reason in reasons.items()
-        if reason is not None
+        {"experiment": experiment, "participant": code, "reason": reason} for code, reason in sorted(reasons.items())
     ]
-    return table[table["participant_id"].isin(good)], left_out
+    return (rows_without(table, reasons) if reasons else table), left_out
 
 
-def _reason(rows: pd.DataFrame, experiment: str, methods: Sequence[str]) -> str | None:
-    """Why a participant is left out; None if nothing is missing."""
+def rows_without(table: pd.DataFrame, participants: Iterable[str]) -> pd.DataFrame:
+    """The rows of all other participants; categories that no longer occur are gone."""
+    kept = table[~table["participant_id"].isin(list(participants))]
+    return tidied(kept)
+
+
+def tidied(table: pd.DataFrame) -> pd.DataFrame:
+    """The table without categories that do not occur in it: so that none is counted."""
+    categories = [name for name in table.columns if isinstance(table[name].dtype, pd.CategoricalDtype)]
+    return table.assign(**{name: table[name].cat.remove_unused_categories() for name in categories})
+
+
+def _reasons(table: pd.DataFrame, experiment: str, methods: Sequence[str]) -> dict[str, str]:
+    """Why participants are left out, by code."""
     measure, noun = _MEASURES[experiment]
-    missing = int(rows[measure].isna().sum())
-    if missing:
-        return f"{missing} of {len(rows)} {noun}"
-    counted = rows[rows["direction"] == "forward"] if experiment == "direction" else rows
-    absent = [method for method in methods if method not in set(counted["method"])]
+    people = table.groupby("participant_id", sort=True, observed=True)[measure]
+    rows, missing = people.size(), people.size() - people.count()
+    lacking = {str(code): f"{missing[code]} of {rows[code]} {noun}" for code in missing.index[missing > 0]}
+    counted = table[table["direction"] == "forward"] if experiment == "direction" else table
+    seen = counted.groupby(["participant_id", "method"], observed=True).size().unstack("method")
+    seen = seen.reindex(index=rows.index, columns=list(methods)).fillna(0)
     what = "no forward trials with" if experiment == "direction" else "no rating of"
-    return f"{what} {', '.join(absent)}" if absent else None
+    absent = {
+        str(code): f"{what} {', '.join(method for method in methods if not seen.loc[code, method])}"
+        for code in seen.index[(seen == 0).any(axis=1)]
+    }
+    return absent | lacking

@@ -40,7 +40,7 @@ class Table:
 def check_table(records: Sequence[tuple[int, list[str]]], code_in_name: str | None) -> Table:
     """The table in `records` (line number and cells, header first) if it keeps every rule; else `BadLogError`."""
     line, header = records[0]
-    experiment = _experiment(header, line)
+    experiment = experiment_of(header, line)
     if len(records) == 1:
         raise BadLogError("has a header but no rows (rule: one row a planned trial)", line)
     rows = tuple(_row(experiment, header, number, cells) for number, cells in records[1:])
@@ -59,7 +59,7 @@ def _numbered(table: Table) -> Iterable[tuple[Row, int]]:
     return zip(table.rows, table.lines, strict=True)
 
 
-def _experiment(header: list[str], line: int) -> str:
+def experiment_of(header: list[str], line: int) -> str:
     """Which table the header is of: the one that shares most columns with it."""
     shared = {name: len(set(header) & set(columns.names(name))) for name in columns.TABLES}
     experiment = max(shared, key=lambda name: shared[name])
@@ -89,14 +89,17 @@ def _row(experiment: str, header: list[str], line: int, cells: list[str]) -> Row
     if len(cells) != len(header):
         raise BadLogError(f"has {len(cells)} fields (rule: {len(header)}, as in the header)", line)
     given = dict(zip(header, cells, strict=True))
-    return {column.name: _cell(column, given.get(column.name, columns.MISSING), line) for column in _of(experiment)}
+    return {
+        column.name: parse_cell(column, given.get(column.name, columns.MISSING), line) for column in _of(experiment)
+    }
 
 
 def _of(experiment: str) -> tuple[Column, ...]:
     return columns.TABLES[experiment]
 
 
-def _cell(column: Column, text: str, line: int) -> Cell:
+def parse_cell(column: Column, text: str, line: int) -> Cell:
+    """The value of a cell, None if it is empty; `BadLogError` if it is none that the column may hold."""
     if text == columns.MISSING:
         if column.required:
             raise BadLogError("the cell is empty (rule: a value is required)", line, column.name)
@@ -128,10 +131,15 @@ def _level(column: Column, text: str, line: int) -> Cell:
     return int(text) if column.type == "flag" else text
 
 
+def is_code(text: str) -> bool:
+    """Whether a text may be a participant's code."""
+    return _CODE.fullmatch(text) is not None
+
+
 def _check_participant(table: Table, code_in_name: str | None) -> None:
     code = str(table.rows[0]["participant_id"])
     first = table.lines[0]
-    if not _CODE.fullmatch(code):
+    if not is_code(code):
         raise BadLogError(f"{_shown(code)} is not a code (rule: 1 to 32 letters or digits)", first, "participant_id")
     if code_in_name is not None and code_in_name != code:
         rule = f"the file is named sub-{code_in_name} (rule: one participant a file, the one in its name)"

@@ -2,53 +2,42 @@
 
 from __future__ import annotations
 
-import csv
-import hashlib
-import io
-import json
-import re
+import os
 from collections.abc import Callable, Iterable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field, replace
 from functools import lru_cache
 from pathlib import Path
 
+import numpy as np
 import pandas as pd
 
-from analysis.log_rules import BadLogError, Row, Table, check_table
-from experiments import columns, register
+from analysis.column_map import ColumnMap
+from analysis.log_batch import Source, read_batch
+from analysis.log_files import ENDINGS, Found, Problem, code_in_name, find_logs, read_content
+from analysis.log_frames import Block, block_of_rows, joined
+from analysis.log_records import records
+from analysis.log_rules import BadLogError, check_table
+from analysis.mapped_logs import MappedLog, is_recoils, read_mapped
+from analysis.studies import study_names
+from experiments import register
 
-_PATTERNS = tuple(f"*_{suffix}.csv" for suffix in columns.FILE_SUFFIX.values())
-_DTYPES = {"text": "string", "level": "string", "integer": "Int64", "flag": "Int64", "number": "float64"}
-_TAIL_BYTES = 1 << 16
-"""As much of a journal as surely holds its last record."""
+__all__ = ["Logs", "Problem", "Track", "read_logs"]
 
+_BATCH_BYTES = 2 << 20
+"""So much is read before it is checked: enough for speed, and little enough for the cache."""
+
+_LOGS_A_FILE = 1 << 20
+"""Numbers of logs are so far apart from file to file: a mapped file may hold several."""
 
 Track = Callable[[Sequence[Path]], Iterable[Path]]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Problem:
-    """A file that was left out, the place, and why."""
-
-    file: Path
-    line: int | None
-    column: str | None
-    message: str
-
-    def __str__(self) -> str:
-        place = "".join(
-            [
-                str(self.file),
-                f", line {self.line}" if self.line is not None else "",
-                f", column {self.column}" if self.column is not None else "",
-            ]
-        )
-        return f"{place}: {self.message}"
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
 class Logs:
-    """The rows of all good files, with the columns of `experiments.columns`; empty cells are NA."""
+    """The rows of all good files, with the columns of `experiments.columns` and the study; empty cells are NA.
+
+    With several studies a participant is `study/code`: the same code in another study is another person.
+    """
 
     trials: pd.DataFrame
     ratings: pd.DataFrame
@@ -56,151 +45,167 @@ class Logs:
     files: tuple[Path, ...]
 
 
-def read_logs(paths: Iterable[str | Path], track: Track = iter) -> Logs:
+@dataclass(frozen=True, slots=True, kw_only=True)
+class _Log:
+    """One participant's log of an experiment, as far as it tells who was where."""
+
+    file: Path
+    study: str
+    experiment: str
+    code: str
+
+    @property
+    def key(self) -> tuple[str, str, str]:
+        """There may be one such log."""
+        return self.study, self.experiment, self.code.casefold()
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class _Waiting:
+    """A file's content, or why there is none."""
+
+    log: Found
+    file: Path
+    content: bytes | BadLogError
+
+    @property
+    def whole(self) -> bytes:
+        """The content, empty if there is none."""
+        return self.content if isinstance(self.content, bytes) else b""
+
+
+@dataclass(slots=True, kw_only=True)
+class _Reading:
+    """What was read so far. Logs are numbered in the order of their files."""
+
+    problems: list[Problem]
+    mapping: ColumnMap | None
+    blocks: list[Block] = field(default_factory=list)
+    good: dict[int, _Log] = field(default_factory=dict)
+    keys: dict[tuple[str, str, str], _Log] = field(default_factory=dict)
+    count: int = 0
+
+    def refuse(self, file: Path, bad: BadLogError) -> None:
+        """Note why a file is left out."""
+        self.problems.append(Problem(file=file, line=bad.line, column=bad.column, message=bad.message))
+
+    def admit(self, number: int, log: _Log) -> None:
+        """Take a log, or note why it is left out."""
+        try:
+            _check_admitted(log)
+            _check_new(log, self.keys.setdefault(log.key, log))
+        except BadLogError as bad:
+            self.refuse(log.file, bad)
+        else:
+            self.good[number] = log
+
+
+def read_logs(paths: Iterable[str | Path], track: Track = iter, mapping: ColumnMap | None = None) -> Logs:
     """The logs in `paths`, files or folders (searched through for `*_trials.csv` and `*_ratings.csv`).
 
     Files with `practice` in their name are not read. A bad file, a missing path or a second log of the same participant
-    for an experiment is a `Problem`, never an exception. `track` is given the files and gives them back one by one: for
-    a progress bar.
+    for an experiment in a study is a `Problem`, never an exception. `track` is given the files and gives them back one
+    by one: for a progress bar. With a `mapping`, files without the header of Recoil's own tables are read by it.
     """
     _exclusions.cache_clear()  # the register may have been written since
-    files, problems = _find([Path(path) for path in paths])
-    tables: dict[Path, Table] = {}
-    for file in track(files):
-        try:
-            _check_admitted(file, table := read_table(file))
-            _check_new(table, tables)
-        except BadLogError as bad:
-            problems.append(Problem(file=file, line=bad.line, column=bad.column, message=bad.message))
-        else:
-            tables[file] = table
+    endings = mapping.files_end_with if mapping else ()
+    found, problems = find_logs([Path(path) for path in paths], (*ENDINGS, *endings))
+    reading = _Reading(problems=problems, mapping=mapping)
+    waiting: list[_Waiting] = []
+    size = 0
+    for log, file in zip(found, track([Path(log.path) for log in found]), strict=True):
+        waiting.append(_Waiting(log=log, file=file, content=_content(log)))
+        size += len(waiting[-1].whole)
+        if size >= _BATCH_BYTES:
+            _check(reading, waiting)
+            waiting, size = [], 0
+    _check(reading, waiting)
+    return _logs(reading)
+
+
+def _logs(reading: _Reading) -> Logs:
+    folders = {log.study for log in reading.good.values()}
+    names = study_names(folder for folder in folders if Path(folder).is_absolute())
+    studies = {number: names.get(log.study, log.study) for number, log in reading.good.items()}
     return Logs(
-        trials=_frame("direction", tables.values()),
-        ratings=_frame("preference", tables.values()),
-        problems=tuple(problems),
-        files=tuple(tables),
+        trials=joined("direction", reading.blocks, studies),
+        ratings=joined("preference", reading.blocks, studies),
+        problems=tuple(reading.problems),
+        files=tuple({str(log.file): log.file for log in reading.good.values()}.values()),
     )
 
 
-def read_table(file: Path) -> Table:
-    """One log file, checked by every rule; `BadLogError` names the first that it breaks."""
+def _content(log: Found) -> bytes | BadLogError:
     try:
-        content = file.read_bytes()
-    except OSError as error:
-        raise BadLogError(f"cannot be read: {error.strerror or error}") from error
-    _check_unedited(file, content)
-    return check_table(_records(content), _code_in_name(file))
+        return read_content(log.path)
+    except BadLogError as bad:
+        return bad
 
 
-def _find(paths: Sequence[Path]) -> tuple[list[Path], list[Problem]]:
-    found: dict[Path, Path] = {}
-    problems = []
-    for path in paths:
-        logs = _in_folder(path) if path.is_dir() else [path]
-        if not logs or not path.exists():
-            reason = "no *_trials.csv or *_ratings.csv in this folder" if path.is_dir() else "no such file or folder"
-            problems.append(Problem(file=path, line=None, column=None, message=reason))
+def _check(reading: _Reading, waiting: Sequence[_Waiting]) -> None:
+    """Add files to what was read: all that surely are right at once, the others one by one."""
+    sources = [Source(content=one.whole, code_in_name=code_in_name(one.log.path)) for one in waiting]
+    blocks, codes = read_batch(sources)
+    experiments = {number: block.experiment for block in blocks for number in np.unique(block.log).tolist()}
+    for block in blocks:
+        logs = (block.log + reading.count) * _LOGS_A_FILE
+        reading.blocks.append(replace(block, log=logs))
+    for number, one in enumerate(waiting):
+        if number in codes:
+            place = (reading.count + number) * _LOGS_A_FILE
+            sure = _Log(file=one.file, study=one.log.study, experiment=experiments[number], code=codes[number])
+            reading.admit(place, sure)
+        else:
+            _check_carefully(reading, one, reading.count + number)
+    reading.count += len(waiting)
+
+
+def _check_carefully(reading: _Reading, one: _Waiting, number: int) -> None:
+    try:
+        logs = _careful(one, reading.mapping)
+    except BadLogError as bad:
+        reading.refuse(one.file, bad)
+        return
+    for place, log in enumerate(logs, start=number * _LOGS_A_FILE):
+        if isinstance(log.table, BadLogError):
+            reading.refuse(one.file, log.table)
             continue
-        for log in logs:
-            found.setdefault(log.resolve(), log)
-    return [log for log in found.values() if "practice" not in log.name.lower()], problems
+        reading.blocks.append(block_of_rows(log.table.experiment, log.table.rows, place))
+        study = log.study or one.log.study
+        reading.admit(place, _Log(file=one.file, study=study, experiment=log.table.experiment, code=log.code))
 
 
-def _in_folder(folder: Path) -> list[Path]:
-    return sorted(file for pattern in _PATTERNS for file in folder.rglob(pattern) if file.is_file())
+def _careful(one: _Waiting, mapping: ColumnMap | None) -> list[MappedLog]:
+    """The logs of a file that is in doubt: one, if it is Recoil's."""
+    if isinstance(one.content, BadLogError):
+        raise one.content
+    if mapping is not None and not is_recoils(one.content):
+        return read_mapped(one.content, one.file.name, mapping)
+    table = check_table(records(one.content), code_in_name(one.log.path))
+    return [MappedLog(study=None, code=str(table.rows[0]["participant_id"]), table=table)]
 
 
-def _records(content: bytes) -> list[tuple[int, list[str]]]:
-    """The records of an RFC 4180 file, each with the line it starts on."""
-    text = _text(content)
-    reader = csv.reader(io.StringIO(text, newline=""), strict=True)
-    records: list[tuple[int, list[str]]] = []
-    start = 1
-    try:
-        for cells in reader:
-            records.append((start, cells))
-            start = reader.line_num + 1
-    except csv.Error as error:
-        raise BadLogError(f"is not comma-separated text by RFC 4180: {error}", start) from error
-    if not text.endswith(("\n", "\r")):
-        raise BadLogError(
-            "the last line has no end (rule: every row ends with a line end; was the file cut off?)", start - 1
-        )
-    return records
-
-
-def _text(content: bytes) -> str:
-    try:
-        text = content.decode("utf-8-sig")
-    except UnicodeDecodeError as error:
-        line = content[: error.start].count(b"\n") + 1
-        raise BadLogError(f"byte 0x{content[error.start]:02x} is not UTF-8 (rule: UTF-8 text)", line) from error
-    if not text.strip():
-        raise BadLogError("is empty (rule: a header and one row a planned trial)")
-    return text
-
-
-def _code_in_name(file: Path) -> str | None:
-    match = re.match(r"sub-([^_]+)_", file.name)
-    return match[1] if match else None
-
-
-def _check_unedited(file: Path, content: bytes) -> None:
-    """If the journal beside the file says that the run was finished, the file is still the one it finished with."""
-    stem = re.sub(rf"_({'|'.join(columns.FILE_SUFFIX.values())})$", "", file.stem)
-    journal = file.with_name(f"{stem}_journal.jsonl")
-    finished = _last_record(journal)
-    expected = finished.get("table_sha256") if finished.get("kind") == "finished" else None
-    if expected is not None and expected != hashlib.sha256(content).hexdigest():
-        raise BadLogError(f"edited since the run; `recoil rebuild {journal}` gives the original")
-
-
-def _last_record(journal: Path) -> dict[str, object]:
-    """The last record of a journal, or nothing if there is no journal or its last line is torn."""
-    try:
-        with journal.open("rb") as stream:
-            size = stream.seek(0, io.SEEK_END)
-            stream.seek(max(0, size - _TAIL_BYTES))
-            lines = stream.read().splitlines()
-        record = json.loads(lines[-1]) if lines else {}
-    except (OSError, ValueError):
-        return {}
-    return record if isinstance(record, dict) else {}
-
-
-def _check_admitted(file: Path, table: Table) -> None:
+def _check_admitted(log: _Log) -> None:
     """An exclusion in the register beside the participants' folders keeps their logs out, with its reason."""
-    code = str(table.rows[0]["participant_id"])
-    reason = _exclusions(file.parent.parent).get(code)
+    results = str(log.file).rpartition(os.sep)[0].rpartition(os.sep)[0] or str(log.file.parent.parent)
+    reason = _exclusions(results).get(log.code)
     if reason is not None:
-        raise BadLogError(f"participant {code} is excluded: {reason} (`recoil study` readmits them)")
+        raise BadLogError(f"participant {log.code} is excluded: {reason} (`recoil study` readmits them)")
 
 
 @lru_cache(maxsize=64)
-def _exclusions(results: Path) -> dict[str, str]:
+def _exclusions(results: str) -> dict[str, str]:
     """Who is excluded in a results folder, as far as its register can be read."""
-    members = register.read(results).members
+    members = register.read(Path(results)).members
     return {code: member.excluded for code, member in members.items() if member.excluded is not None}
 
 
-def _check_new(table: Table, tables: dict[Path, Table]) -> None:
-    for file, other in tables.items():
-        if _key(other) == _key(table):
-            code, twin = table.rows[0]["participant_id"], other.rows[0]["participant_id"]
-            name = f"participant {code!r}" if code == twin else f"participant {code!r} (there {twin!r})"
-            rule = "(rule: one log a participant and experiment, upper and lower case alike)"
-            raise BadLogError(f"{name} has a {table.experiment} log already in {file} {rule}", None, "participant_id")
-
-
-def _key(table: Table) -> tuple[str, str]:
-    return table.experiment, str(table.rows[0]["participant_id"]).casefold()
-
-
-def _frame(experiment: str, tables: Iterable[Table]) -> pd.DataFrame:
-    rows: list[Row] = [row for table in tables if table.experiment == experiment for row in table.rows]
-    return pd.DataFrame(
-        {
-            column.name: pd.Series([row[column.name] for row in rows], dtype=_DTYPES[column.type])
-            for column in columns.TABLES[experiment]
-        }
-    )
+def _check_new(log: _Log, first: _Log) -> None:
+    if first is not log:
+        name = (
+            f"participant {log.code!r}"
+            if log.code == first.code
+            else f"participant {log.code!r} (there {first.code!r})"
+        )
+        rule = "(rule: one log a participant and experiment, upper and lower case alike)"
+        raise BadLogError(f"{name} has a {log.experiment} log already in {first.file} {rule}", None, "participant_id")

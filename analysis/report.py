@@ -9,16 +9,19 @@ from pathlib import Path
 
 from jinja2 import Environment, PackageLoader, StrictUndefined, select_autoescape
 
-from analysis.figures import figure_5, figure_8
 from analysis.report_parts import Picture, ReportData, Section, Table
-from analysis.report_sections import FIGURE_5, FIGURE_8, has_people, sections
+from analysis.report_pictures import write_figures
+from analysis.report_sections import sections
 
-__all__ = ["Picture", "ReportData", "Section", "Table", "write_report"]
+__all__ = ["Picture", "ReportData", "Section", "Table", "write_page", "write_report"]
 
 VERDICTS = ("agrees", "differs", "not published", "not obtained")
 
 _MARKDOWN_MARKS = re.compile(r"[\\`*|~]|<(?=[a-zA-Z/!?])|(?<![a-zA-Z0-9])_|_(?![a-zA-Z0-9])|](?=[(\[:])|^[#>+-]")
 """What Markdown would take for its own: `<` before a tag, `_` at the edge of a word, `]` before an address."""
+
+_TIGHT = re.compile(r" (?=[=<>] [\d.−])|(?<= [=<>]) (?=[\d.−])|(?<=\d) (?=%)|(?<=% CI) (?=\[)|(?<=,) (?=[\d.]+[)\]])")
+"""Spaces that no line may break at: around `=` and `<` before a number, before a percent sign, in brackets."""
 
 
 def write_report(out: Path, report: ReportData) -> None:
@@ -27,11 +30,15 @@ def write_report(out: Path, report: ReportData) -> None:
     Files of an earlier report there are replaced. The same data give the same bytes.
     """
     out.mkdir(parents=True, exist_ok=True)
-    _write_figures(out / "figures", report)
-    parts = sections(report)
-    for name in ("report.html", "report.md"):
-        _write(out / name, _render(f"{name}.j2", report.title, parts, out / "figures"))
+    write_figures(out / "figures", report)
+    write_page(out, report.title, sections(report))
     _write(out / "statistics.json", json.dumps(report.statistics, indent=1, ensure_ascii=False, allow_nan=False) + "\n")
+
+
+def write_page(out: Path, title: str, parts: tuple[Section, ...]) -> None:
+    """Write `report.html` and `report.md` of finished sections; their pictures stand in `out / "figures"` already."""
+    for name in ("report.html", "report.md"):
+        _write(out / name, _render(f"{name}.j2", title, parts, out / "figures"))
 
 
 def markdown(text: str) -> str:
@@ -43,11 +50,13 @@ def markdown(text: str) -> str:
     return _MARKDOWN_MARKS.sub(r"\\\g<0>", " ".join(text.splitlines()))
 
 
-def _write_figures(folder: Path, report: ReportData) -> None:
-    if has_people(report.statistics):
-        figure_8(report.statistics, folder / FIGURE_8)
-    if report.panels:
-        figure_5(report.panels, folder / FIGURE_5)
+def unbroken(text: str) -> str:
+    r"""`text` whose numbers stay on the line of their signs and units.
+
+    >>> unbroken("a test, p = .002, 60.0 %").replace("\N{NO-BREAK SPACE}", "~")
+    'a test, p~=~.002, 60.0~%'
+    """
+    return _TIGHT.sub("\N{NO-BREAK SPACE}", text)
 
 
 def _render(template: str, title: str, parts: tuple[Section, ...], figures: Path) -> str:
@@ -59,7 +68,7 @@ def _render(template: str, title: str, parts: tuple[Section, ...], figures: Path
         lstrip_blocks=True,
         keep_trailing_newline=True,
     )
-    environment.filters["markdown"] = markdown
+    environment.filters |= {"markdown": markdown, "unbroken": unbroken}
     embedded = {
         part.stem: _data_address(figures / f"{part.stem}.png") for section in parts for part in section.pictures
     }

@@ -2,12 +2,23 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping
 from typing import Any
 
 from analysis import apa
-from analysis.figures import display_name
-from analysis.report_parts import Section, Table
+from analysis.figures import display_name, people
+from analysis.report_parts import Section
+from analysis.report_pictures import directions_picture, response_times_picture
+from analysis.report_tables import (
+    binomial_table,
+    direction_means,
+    direction_people,
+    mean_sd,
+    means_table,
+    preference_people,
+    scaled,
+    tukey_table,
+)
 
 Statistics = Mapping[str, Any]
 
@@ -20,162 +31,109 @@ _DIRECTION_NOTE = (
 
 def direction_section(found: Statistics) -> Section:
     """Experiment 1: correct rates, sensitivity, response times, tests."""
-    tables = [_direction_means(found), _direction_people(found)]
-    if found["tukey"]:
-        tables.insert(1, _tukey_table(found, "correct rate, forward (percentage points)", 100.0, 1))
-    tables.insert(-1, _binomial_table(found))
+    tests = (tukey_table(found, "correct rate, forward (percentage points)", 100.0, 1),) if found["tukey"] else ()
+    times = response_times_picture(found)
     return Section(
         title="Direction recognition",
         paragraphs=(
-            _effect_sentence(found, "the correct rate on forward shots", apa.percent),
-            *_post_hoc_sentences(found),
+            _effect_sentence(found, "the correct rate on forward shots", 100.0, 1, " %"),
+            *_post_hoc_sentences(found, 100.0, 1, " percentage points"),
             _DIRECTION_NOTE,
-            f"Binomial tests: {found['binomial_note']}",
+            _binomial_sentence(found),
+            _times_sentence(found["response_times"]),
         ),
-        tables=tuple(tables),
+        pictures=(directions_picture(found), *((times,) if times else ())),
+        tables=(
+            means_table(found, 100.0, 1, " [%]"),
+            direction_means(found),
+            *tests,
+            binomial_table(found),
+            direction_people(found),
+        ),
     )
 
 
 def preference_section(found: Statistics) -> Section:
     """Experiment 2: ratings and tests."""
-    means = Table(
-        caption="Ratings from 0 (dislike very much) to 10 (like very much), mean and SD over participants",
-        header=("Method", "n", "Mean", "SD"),
-        rows=tuple(
-            (display_name(m), str(found["n"]), apa.number(found["means"][m]), apa.number(found["sds"][m]))
-            for m in found["methods"]
-        ),
-    )
-    tests = (_tukey_table(found, "rating", 1.0, 2),) if found["tukey"] else ()
-    people = _people_table(found["participants"], found["methods"], "Rating of each participant", _rating)
+    tests = (tukey_table(found, "rating", 1.0, 2),) if found["tukey"] else ()
     return Section(
         title="Preference",
         paragraphs=(
-            _effect_sentence(found, "the rating", lambda mean: apa.number(mean, 2)),
-            *_post_hoc_sentences(found),
+            "Ratings go from 0 (dislike very much) to 10 (like very much).",
+            _effect_sentence(found, "the rating", 1.0, 2, ""),
+            *_post_hoc_sentences(found, 1.0, 2, ""),
         ),
-        tables=(means, *tests, people),
+        tables=(means_table(found, 1.0, 2, ""), *tests, preference_people(found)),
     )
 
 
-def _effect_sentence(found: Statistics, measure: str, shown: Callable[[float | None], str]) -> str:
-    means = ", ".join(f"{display_name(m)} {shown(found['means'][m])}" for m in found["methods"])
-    means = f"Means of {measure} over {found['n']} participants: {means}."
+def _effect_sentence(found: Statistics, measure: str, scale: float, digits: int, unit: str) -> str:
+    means = ", ".join(
+        f"{display_name(m)} {mean_sd(found['means'][m], found['sds'][m], scale, digits, unit)}"
+        for m in found["methods"]
+    )
+    means = f"Means (SD) of {measure} over {people(found)}: {means}."
     anova = found["anova"]
     if anova is None:
         return f"{means} There are too few participants or methods for a test."
     if anova["p"] is None:
         return f"{means} The {anova['name']} is undefined: all scores are equal."
-    verb = "changed" if anova["p"] < 0.05 else "did not significantly change"
-    return f"{means} The rendering method {verb} {measure}, {apa.f_test(anova)} ({anova['name']})."
+    effect = "had a significant effect" if anova["p"] < 0.05 else "had no significant effect"
+    return f"{means} The rendering method {effect} on {measure}, {apa.f_test(anova)}{_size(found)} ({anova['name']})."
 
 
-def _post_hoc_sentences(found: Statistics) -> tuple[str, ...]:
+def _size(found: Statistics) -> str:
+    """The partial eta squared, if there is one."""
+    partial = (found.get("effect_size") or {}).get("partial_eta_squared")
+    return "" if partial is None else f", partial η² = {apa.below_one(partial)}"
+
+
+def _post_hoc_sentences(found: Statistics, scale: float, digits: int, unit: str) -> tuple[str, ...]:
     if not found["tukey"]:
         return ()
-    pairs = "; ".join(_pair_words(comparison) for comparison in found["tukey"])
-    return (f"Post-hoc comparisons: {pairs}. {found['tukey_error_term']}",)
+    pairs = "; ".join(_pair_words(comparison, scale, digits, unit) for comparison in found["tukey"])
+    return (f"Post-hoc comparisons (95 % CIs are simultaneous): {pairs}. {found['tukey_error_term']}",)
 
 
-def _pair_words(comparison: Statistics) -> str:
+def _pair_words(comparison: Statistics, scale: float, digits: int, unit: str) -> str:
+    """The larger mean first."""
     a, b = display_name(comparison["a"]), display_name(comparison["b"])
-    p = comparison["p"]
+    low, high, p = comparison["ci_low"], comparison["ci_high"], comparison["p"]
+    if comparison["difference"] < 0.0:
+        a, b, low, high = b, a, scaled(high, -1.0), scaled(low, -1.0)
+    amount = f"{apa.number(scale * abs(comparison['difference']), digits)}{unit}"
+    tested = f"95 % CI {apa.interval(scaled(low, scale), scaled(high, scale), digits)}, {apa.p_value(p)}"
     if p is None or p >= 0.05:
-        return f"{a} and {b} do not differ significantly ({apa.p_value(p)})"
-    return f"{a} is {'above' if comparison['difference'] > 0 else 'below'} {b} ({apa.p_value(p)})"
+        return f"{a} and {b} do not differ significantly (by {amount}, {tested})"
+    return f"{a} is above {b} by {amount}, {tested}"
 
 
-def _tukey_table(found: Statistics, measure: str, scale: float, digits: int) -> Table:
-    df = found["anova"]["df"][1]
-    rows = (
+def _binomial_sentence(found: Statistics) -> str:
+    """Which rates differ from guessing; the reservation about pooling with it."""
+    tests = [
         (
-            f"{display_name(c['a'])} − {display_name(c['b'])}",
-            apa.number(scale * c["difference"], digits),
-            apa.interval(scale * c["ci_low"], scale * c["ci_high"], digits),
-            apa.number(c["q"]),
-            apa.p_cell(c["p"]),
+            test["p"] < 0.05,
+            f"{display_name(method)} {direction} {test['successes']} of {test['trials']}, {apa.p_value(test['p'])}",
         )
-        for c in found["tukey"]
+        for method, directions in found["binomial"].items()
+        for direction, test in directions.items()
+    ]
+    parts = []
+    for differs, words in (
+        (False, "no significant difference from 50 %"),
+        (True, "a significant difference from 50 %"),
+    ):
+        named = "; ".join(text for significant, text in tests if significant is differs)
+        parts += [f"{words} ({named})"] if named else []
+    return f"Exact binomial tests of the correct rate: {', and '.join(parts)}. {found['binomial_note']}"
+
+
+def _times_sentence(times: Statistics) -> str:
+    """How many response times there are, and which are none."""
+    left_out = (
+        f"{times['left_out']:,} answered trials have none: it was entered or corrected by the experimenter, whose hand "
+        "tells nothing of the participant's time."
     )
-    return Table(
-        caption=f"Tukey's HSD of the {measure}, repeated-measures error term, {df} degrees of freedom",
-        header=("Pair", "Difference", "95 % CI, simultaneous", "q", "p"),
-        rows=tuple(rows),
-    )
-
-
-def _direction_means(found: Statistics) -> Table:
-    return Table(
-        caption="Correct rates, sensitivity and response time, mean (SD) over participants",
-        header=("Method", "Forward", "Backward", "d′", "Criterion", "Response time, median [s]"),
-        rows=tuple(_direction_row(found, method) for method in found["methods"]),
-    )
-
-
-def _direction_row(found: Statistics, method: str) -> tuple[str, ...]:
-    backward, sensitivity = found["backward"], found["sensitivity"][method]
-    time = found["response_time"][method]
-    return (
-        display_name(method),
-        _mean_sd(found["means"][method], found["sds"][method], 100.0, 1, " %"),
-        _mean_sd(backward["means"].get(method), backward["sds"].get(method), 100.0, 1, " %"),
-        *(_sensitivity(sensitivity, key) for key in ("d_prime", "criterion")),
-        f"{apa.number(time['median'])} (n = {time['n']})",
-    )
-
-
-def _sensitivity(sensitivity: Statistics | None, key: str) -> str:
-    return apa.NONE if sensitivity is None else _mean_sd(sensitivity[key]["mean"], sensitivity[key]["sd"], 1.0, 2, "")
-
-
-def _mean_sd(mean: float | None, sd: float | None, scale: float, digits: int, unit: str) -> str:
-    if mean is None:
-        return apa.NONE
-    spread = apa.NONE if sd is None else apa.number(scale * sd, digits)
-    return f"{apa.number(scale * mean, digits)}{unit} ({spread})"
-
-
-def _binomial_table(found: Statistics) -> Table:
-    rows = (
-        (
-            display_name(method),
-            direction,
-            f"{test['successes']} of {test['trials']}",
-            apa.percent(test["estimate"]),
-            apa.interval(100.0 * test["ci_low"], 100.0 * test["ci_high"], 1),
-            apa.p_cell(test["p"]),
-        )
-        for method, tests in found["binomial"].items()
-        for direction, test in tests.items()
-    )
-    return Table(
-        caption="Exact binomial tests against 50 %, trials pooled over participants (their clustering is ignored)",
-        header=("Method", "Direction", "Correct", "Rate", "95 % CI [%]", "p"),
-        rows=tuple(rows),
-    )
-
-
-def _direction_people(found: Statistics) -> Table:
-    """Forward and backward rate of each participant in one cell a method."""
-    backward = found["backward"]["participants"]
-    cells = {
-        code: {
-            m: f"{apa.percent(rate, 0)} / {apa.percent(backward.get(code, {}).get(m), 0)}" for m, rate in row.items()
-        }
-        for code, row in found["participants"].items()
-    }
-    return _people_table(cells, found["methods"], "Correct rate of each participant, forward / backward", str)
-
-
-def _rating(value: float | None) -> str:
-    return apa.number(value, 1)
-
-
-def _people_table(
-    people: Mapping[str, Mapping[str, Any]], methods: Sequence[str], caption: str, shown: Callable[[Any], str]
-) -> Table:
-    return Table(
-        caption=caption,
-        header=("Participant", *(display_name(method) for method in methods)),
-        rows=tuple((code, *(shown(row[method]) for method in methods)) for code, row in people.items()),
-    )
+    if not times["n"]:
+        return f"There is no valid response time, and so no figure of them. {left_out}"
+    return f"Response times: {times['n']:,} valid ones.{' ' + left_out if times['left_out'] else ''}"

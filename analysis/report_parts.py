@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -11,6 +11,12 @@ from analysis.figures import ShotPanel
 from analysis.logs import Problem
 from analysis.odds import Odds
 from analysis.published import Row
+
+EXPERIMENTS = {"direction": "direction recognition", "preference": "preference"}
+LISTED = 100
+"""A list longer than this is cut: a page of ten thousand rows is read by nobody, and opens slowly."""
+SHOWN = 50
+"""So many of it are left."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -58,3 +64,19 @@ class Section:
     pictures: tuple[Picture, ...] = ()
     tables: tuple[Table, ...] = ()
     items: tuple[str, ...] = ()
+
+
+def analysed(statistics: Mapping[str, Any], experiment: str) -> int:
+    """How many participants of an experiment were complete."""
+    return int(statistics.get(experiment, {}).get("n", 0))
+
+
+def shortened(items: Sequence[str], noun: str) -> tuple[str, ...]:
+    """All `items`, or the first 50 of more than 100 and how many more there are.
+
+    >>> shortened(["a", "b"], "files"), shortened(["a"] * 10_000, "files")[-1]
+    (('a', 'b'), 'and 9,950 more files')
+    """
+    if len(items) <= LISTED:
+        return tuple(items)
+    return (*items[:SHOWN], f"and {len(items) - SHOWN:,} more {noun}")

@@ -9,14 +9,13 @@ from pathlib import Path
 from typing import Any
 
 from analysis import apa
-from analysis.figures import named
+from analysis.figures import ShotPanel, named
 from analysis.odds import Odds
 from analysis.published import Row
 from analysis.report_experiments import direction_section, preference_section
-from analysis.report_parts import Picture, ReportData, Section, Table
-
-EXPERIMENTS = {"direction": "direction recognition", "preference": "preference"}
-FIGURE_5, FIGURE_8 = "figure-5", "figure-8"
+from analysis.report_parts import EXPERIMENTS, LISTED, SHOWN, ReportData, Section, Table, analysed, shortened
+from analysis.report_pictures import results_picture, shot_picture
+from analysis.report_supplement import supplement_sections
 
 _HANDS = {
     "participant": "the participant's own hand",
@@ -35,39 +34,31 @@ def sections(report: ReportData) -> tuple[Section, ...]:
     statistics = report.statistics
     found = [
         _analysed(report),
-        _figure_8(statistics) if has_people(statistics) else None,
+        _glance(statistics) if any(analysed(statistics, name) for name in EXPERIMENTS) else None,
         _verdicts(report.comparison) if report.comparison else None,
-        direction_section(statistics["direction"]) if _people(statistics, "direction") else None,
-        preference_section(statistics["preference"]) if _people(statistics, "preference") else None,
+        direction_section(statistics["direction"]) if analysed(statistics, "direction") else None,
+        preference_section(statistics["preference"]) if analysed(statistics, "preference") else None,
+        *supplement_sections(statistics),
         _odds(report.odds) if report.odds else None,
-        _figure_5(report) if report.panels else None,
+        _shot(report.panels) if report.panels else None,
         _left_out(report),
         _provenance(report),
     ]
     return tuple(section for section in found if section is not None)
 
 
-def has_people(statistics: Mapping[str, Any]) -> bool:
-    """Is there an experiment with a complete participant?"""
-    return any(_people(statistics, name) for name in EXPERIMENTS)
-
-
-def _people(statistics: Mapping[str, Any], experiment: str) -> int:
-    return int(statistics.get(experiment, {}).get("n", 0))
-
-
 def _analysed(report: ReportData) -> Section:
     rows = tuple(
-        (name.capitalize(), str(_people(report.statistics, key)), str(_excluded(report.statistics, key)))
+        (name.capitalize(), f"{analysed(report.statistics, key):,}", f"{_excluded(report.statistics, key):,}")
         for key, name in EXPERIMENTS.items()
         if key in report.statistics
     )
     table = Table(caption="Participants", header=("Experiment", "Analysed", "Left out as incomplete"), rows=rows)
-    files = f"{len(report.files)} log files were read. " if report.files else ""
+    files = f"{len(report.files):,} log files were read. " if report.files else ""
     bad = f"Left out, with the reasons listed below: {len(report.problems)}." if report.problems else ""
     text = (files + bad).strip()
     nothing = () if rows else ("There was nothing to analyse.",)
-    present = [key for key in EXPERIMENTS if _people(report.statistics, key)]
+    present = [key for key in EXPERIMENTS if analysed(report.statistics, key)]
     origins = tuple(_origin(EXPERIMENTS[key], report.statistics[key]) for key in present)
     return Section(
         title="What was analysed",
@@ -80,7 +71,8 @@ def _origin(name: str, found: Mapping[str, Any]) -> str:
     """Who answered, and on which gun: nobody is to take synthetic participants for people."""
     answers = ", ".join(f"{count} by {_HANDS[hand]}" for hand, count in found["origin"]["answers"].items())
     guns = ", ".join(f"{count} on {_gun(gun)}" for gun, count in found["origin"]["guns"].items())
-    return f"{name.capitalize()}: answers {answers}; trials {guns}."
+    trials = f"; trials {guns}" if guns else ""
+    return f"{name.capitalize()}: answers {answers}{trials}."
 
 
 def _gun(name: str) -> str:
@@ -133,21 +125,12 @@ def obtained_text(row: Row) -> str:
     return f"{apa.number(row.obtained, decimals)} {unit}".strip()
 
 
-def _figure_8(statistics: Mapping[str, Any]) -> Section:
-    shown = [name for name in EXPERIMENTS if _people(statistics, name)]
-    counts = ", ".join(f"{EXPERIMENTS[name]} n = {_people(statistics, name)}" for name in shown)
-    caption = (
-        f"Mean and SD with every participant ({counts}). Brackets: Tukey's HSD with the repeated-measures error term "
-        "(* p < .05, ** p < .01, *** p < .001, n.s. not significant)."
-    )
-    means = ". ".join(f"{EXPERIMENTS[name].capitalize()}: {_means_words(statistics[name], name)}" for name in shown)
-    alt = f"Bar chart with one bar a rendering method. {means}."
-    return Section(title="Results at a glance", pictures=(Picture(stem=FIGURE_8, caption=caption, alt=alt),))
+def _glance(statistics: Mapping[str, Any]) -> Section:
+    return Section(title="Results at a glance", pictures=(results_picture(statistics),))
 
 
-def _means_words(found: Mapping[str, Any], experiment: str) -> str:
-    shown = apa.percent if experiment == "direction" else apa.number
-    return ", ".join(f"{named(method)} {shown(mean)}" for method, mean in found["means"].items())
+def _shot(panels: tuple[ShotPanel, ...]) -> Section:
+    return Section(title="The shot", pictures=(shot_picture(panels),))
 
 
 def _odds(odds: tuple[Odds, ...]) -> Section:
@@ -166,20 +149,6 @@ def _odds(odds: tuple[Odds, ...]) -> Section:
     return Section(title="Odds of the published pattern", paragraphs=(_LUCK, *assumed), tables=tables)
 
 
-def _figure_5(report: ReportData) -> Section:
-    caption = (
-        "Force on the hand F (positive in the direction of recoil), displacement x, velocity dx/dt and drive u of one "
-        "simulated shot. Dashed lines and circles: ends of the stages. Arrow: estimated force of the collision with "
-        "the rear stop, apart from F."
-    )
-    landings = "; ".join(
-        f"column {chr(ord('a') + i)} collides with {apa.number(panel.collision_force_N, 1)} N"
-        for i, panel in enumerate(report.panels)
-    )
-    alt = f"Line charts of F, x, dx/dt and u over time, one column a friction: {landings}."
-    return Section(title="The shot", pictures=(Picture(stem=FIGURE_5, caption=caption, alt=alt),))
-
-
 def _left_out(report: ReportData) -> Section | None:
     excluded = tuple(
         f"Participant {entry['participant']} in {EXPERIMENTS.get(entry['experiment'], entry['experiment'])}: "
@@ -189,7 +158,7 @@ def _left_out(report: ReportData) -> Section | None:
     names = _short_names(report)
     problems = tuple(str(replace(problem, file=names[problem.file])) for problem in report.problems)
     warnings = tuple(f"Warning: {warning}." for warning in report.statistics.get("warnings", []))
-    items = (*excluded, *problems, *warnings)
+    items = (*shortened(excluded, "exclusions"), *shortened(problems, "problems"), *shortened(warnings, "warnings"))
     return Section(title="Exclusions and problems", items=items) if items else None
 
 
@@ -202,10 +171,17 @@ def _short_names(report: ReportData) -> dict[Path, Path]:
 
 
 def _provenance(report: ReportData) -> Section | None:
-    rows = [*report.provenance.items(), *report.statistics.get("versions", {}).items()]
-    names = _short_names(report)
-    rows += [("log file", names[file].as_posix()) for file in report.files]
+    pairs = [*report.provenance.items(), *report.statistics.get("versions", {}).items()]
+    rows = [*dict.fromkeys(pairs), *_file_rows(report)]
     if not rows and not report.notes:
         return None
     table = Table(caption="Where the numbers come from", header=("What", "Value"), rows=tuple(rows))
     return Section(title="Provenance and assumptions", items=report.notes, tables=(table,) if rows else ())
+
+
+def _file_rows(report: ReportData) -> list[tuple[str, str]]:
+    names = _short_names(report)
+    shown = report.files if len(report.files) <= LISTED else report.files[:SHOWN]
+    rows = [("log file", names[file].as_posix()) for file in shown]
+    rest = len(report.files) - len(shown)
+    return [*rows, ("log files", f"and {rest:,} more")] if rest else rows

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import platform
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import asdict
 from importlib.metadata import PackageNotFoundError, version
 from typing import Any
@@ -13,14 +13,22 @@ import numpy as np
 import pandas as pd
 
 from analysis.anova import rm_anova
+from analysis.assumptions import assumptions
 from analysis.binomial import binomial_test
+from analysis.cells import DIRECTIONS, TrialCells, coded, trial_cells
+from analysis.clustering import METHOD as CLUSTERING_NOTE
 from analysis.completeness import complete_rows
 from analysis.detection import yes_no
 from analysis.logs import Logs
+from analysis.response_times import response_times
+from analysis.supplement import model, pooled_clustering, within_supplement
 from analysis.tukey import rm_tukey_hsd
+from analysis.within_subject import cousineau_morey
 
 Json = dict[str, Any]
 
+SCALES = {"direction": (0.0, 1.0), "preference": (0.0, 10.0)}
+"""The least and the most that a score can be."""
 METHOD_ORDER = ("vibration", "asymmetric-1", "asymmetric-2")
 TUKEY_ERROR_TERM = (
     "Tukey's HSD with the pooled error term of the repeated-measures ANOVA (MS_error of participant × method), "
@@ -44,10 +52,10 @@ def summarize(logs: Logs) -> Json:
     for experiment, (table, describe) in tables.items():
         if len(table):
             methods = methods_in(table)
-            complete, left_out = complete_rows(table, experiment, methods)
-            result[experiment] = describe(complete, methods)
+            complete, left_out = complete_rows(coded(table), experiment, methods)
+            result[experiment] = _with_assumptions(describe(complete, methods))
             excluded += left_out
-    warnings = [_untested(experiment, found) for experiment, found in result.items() if found["anova"] is None]
+    warnings = [warning for experiment, found in result.items() for warning in _warnings(experiment, found)]
     finite = json_safe(result, "", warnings)
     return {**finite, "excluded": excluded, "warnings": warnings, "versions": versions()}
 
@@ -55,7 +63,7 @@ def summarize(logs: Logs) -> Json:
 def versions() -> dict[str, str]:
     """What computed the statistics."""
     return {"python": platform.python_version()} | {
-        name: _version(name) for name in ("numpy", "scipy", "pandas", "recoil")
+        name: _version(name) for name in ("numpy", "scipy", "pandas", "pingouin", "recoil")
     }
 
 
@@ -67,14 +75,24 @@ def methods_in(table: pd.DataFrame) -> list[str]:
 
 def json_safe(value: Any, place: str, warnings: list[str]) -> Any:
     """`value` in plain Python types; NaN and infinities become None, and their place is appended to `warnings`."""
-    if isinstance(value, Mapping):
-        return {str(key): json_safe(item, f"{place}.{key}".lstrip("."), warnings) for key, item in value.items()}
+    if isinstance(value, dict):
+        if all(map(_is_safe, value.values())):
+            return value
+        return {
+            str(key): item if _is_safe(item) else json_safe(item, f"{place}.{key}".lstrip("."), warnings)
+            for key, item in value.items()
+        }
     if isinstance(value, list | tuple):
         return [json_safe(item, f"{place}[{i}]", warnings) for i, item in enumerate(value)]
     if isinstance(value, float | np.floating) and not math.isfinite(value):
         warnings.append(f"{place} is {_not_finite(float(value))}; written as null")
         return None
     return value.item() if isinstance(value, np.generic) else value
+
+
+def _is_safe(value: Any) -> bool:
+    """Is it a leaf as it should be? Asked first: of tens of thousands of scores nearly all are."""
+    return math.isfinite(value) if type(value) is float else type(value) is str or value is None
 
 
 def _not_finite(value: float) -> str:
@@ -90,31 +108,42 @@ def _version(name: str) -> str:
         return "not installed"
 
 
-def _untested(experiment: str, found: Json) -> str:
-    there = f"there are {found['n']} complete participants and {len(found['methods'])} methods"
-    return f"{experiment}: no ANOVA and no Tukey test, which need 2 of each; {there}"
+def _with_assumptions(found: Json) -> Json:
+    return {**found, "assumptions": [asdict(assumption) for assumption in assumptions(found)]}
+
+
+def _warnings(experiment: str, found: Json) -> list[str]:
+    """Why there is no test, or the violated assumptions that change which number to read."""
+    if found["anova"] is None:
+        there = f"there are {found['n']} complete participants and {len(found['methods'])} methods"
+        return [f"{experiment}: no ANOVA and no Tukey test, which need 2 of each; {there}"]
+    return [f"{experiment}: {entry['warning']}" for entry in found["assumptions"] if entry["serious"]]
 
 
 def _direction(complete: pd.DataFrame, methods: list[str]) -> Json:
-    forward = _rates(complete, "forward", methods)
-    backward = _rates(complete, "backward", methods)
+    cells = trial_cells(complete, methods)
+    forward, backward = cells.rates("forward"), cells.rates("backward")
     return {
-        **_within(forward, methods),
+        **_within(forward, methods, SCALES["direction"]),
         "origin": _origin(complete, "response_source"),
         "backward": {
             "means": _by_method(backward.mean()),
             "sds": _by_method(backward.std(ddof=1)),
             "participants": _by_participant(backward),
         },
-        "binomial": {method: _binomials(complete[complete["method"] == method]) for method in methods},
+        "binomial": {method: _binomials(cells, method) for method in methods},
         "binomial_note": BINOMIAL_NOTE,
-        "sensitivity": {method: _sensitivity(complete[complete["method"] == method]) for method in methods},
+        "clustering_note": CLUSTERING_NOTE,
+        "model": model(cells),
+        "sensitivity": {method: _sensitivity(cells, method) for method in methods},
         "response_time": {method: _response_time(complete[complete["method"] == method]) for method in methods},
+        "response_times": response_times(complete, methods),
     }
 
 
 def _preference(complete: pd.DataFrame, methods: list[str]) -> Json:
-    return {**_within(_table(complete, "rating", methods), methods), "origin": _origin(complete, "rating_by")}
+    scores = _table(complete, "rating", methods)
+    return {**_within(scores, methods, SCALES["preference"]), "origin": _origin(complete, "rating_by")}
 
 
 def _origin(complete: pd.DataFrame, source: str) -> Json:
@@ -122,29 +151,35 @@ def _origin(complete: pd.DataFrame, source: str) -> Json:
     return {kind: complete[column].value_counts().to_dict() for kind, column in (("answers", source), ("guns", "gun"))}
 
 
-def _rates(trials: pd.DataFrame, direction: str, methods: Sequence[str]) -> pd.DataFrame:
-    """Share of correct answers, participants by methods."""
-    return _table(trials[trials["direction"] == direction], "correct", methods)
-
-
 def _table(rows: pd.DataFrame, measure: str, methods: Sequence[str]) -> pd.DataFrame:
     """Means of `measure`, participants (in the order of their codes) by methods."""
     if not len(rows):
         return pd.DataFrame(columns=list(methods), dtype="float64")
-    cells = rows.groupby(["participant_id", "method"])[measure].mean().astype("float64")
+    cells = rows.groupby(["participant_id", "method"], observed=True)[measure].mean().astype("float64")
     return cells.unstack("method").reindex(columns=list(methods))
 
 
-def _within(scores: pd.DataFrame, methods: list[str]) -> Json:
+def _within(scores: pd.DataFrame, methods: list[str], scale: tuple[float, float]) -> Json:
     return {
         "n": len(scores),
         "methods": methods,
         "means": _by_method(scores.mean()),
         "sds": _by_method(scores.std(ddof=1)),
         "participants": _by_participant(scores),
+        "within_ci": _within_ci(scores),
         **_tests(scores.to_numpy(), methods),
         "tukey_error_term": TUKEY_ERROR_TERM,
+        **within_supplement(scores, scale),
     }
+
+
+def _within_ci(scores: pd.DataFrame) -> Json | None:
+    """Cousineau-Morey intervals of the means, None for fewer than 2 participants or methods."""
+    if min(scores.shape) < 2:
+        return None
+    found = cousineau_morey(scores.to_numpy())
+    rows = zip(scores.columns, found.ci_low, found.ci_high, strict=True)
+    return {str(method): {"ci_low": float(low), "ci_high": float(high)} for method, low, high in rows}
 
 
 def _tests(scores: np.ndarray[Any, Any], methods: list[str]) -> Json:
@@ -161,35 +196,38 @@ def _by_method(row: pd.Series) -> dict[str, float]:
 
 
 def _by_participant(scores: pd.DataFrame) -> dict[str, dict[str, float]]:
-    return {str(code): _by_method(row) for code, row in scores.iterrows()}
+    names = [str(method) for method in scores.columns]
+    rows = scores.to_numpy(dtype="float64").tolist()
+    return {str(code): dict(zip(names, row, strict=True)) for code, row in zip(scores.index, rows, strict=True)}
 
 
-def _binomials(trials: pd.DataFrame) -> Json:
+def _binomials(cells: TrialCells, method: str) -> Json:
     """The test of each direction that was presented; empty without complete participants."""
     result: Json = {}
-    for direction in ("forward", "backward"):
-        correct = trials.loc[trials["direction"] == direction, "correct"]
-        if len(correct):
-            successes = int(correct.sum())
-            test = asdict(binomial_test(successes, len(correct)))
-            result[direction] = {"successes": successes, "trials": len(correct), **test}
+    for place, direction in enumerate(DIRECTIONS):
+        column = cells.methods.index(method), place
+        successes, trials = int(cells.correct[:, *column].sum()), int(cells.trials[:, *column].sum())
+        if trials:
+            test = asdict(binomial_test(successes, trials))
+            clustered = pooled_clustering(cells, method, direction)
+            result[direction] = {"successes": successes, "trials": trials, **test, "clustering": clustered}
     return result
 
 
-def _sensitivity(trials: pd.DataFrame) -> Json | None:
-    """Mean and SD over participants of d' and criterion; None where one direction was never presented."""
-    forward, backward = trials[trials["direction"] == "forward"], trials[trials["direction"] == "backward"]
-    if not len(forward) or not len(backward):
+def _sensitivity(cells: TrialCells, method: str) -> Json | None:
+    """Mean and SD over participants of d' and criterion; None where nobody was presented with both directions."""
+    column = cells.methods.index(method)
+    both = np.flatnonzero(cells.trials[:, column].min(axis=1, initial=np.inf))
+    if not both.size:
         return None
-    hits = forward.groupby("participant_id")["correct"].agg(["sum", "size"])
-    rejections = backward.groupby("participant_id")["correct"].agg(["sum", "size"])
-    found = yes_no(
-        hits["sum"].to_numpy(dtype=np.float64),
-        hits["size"].to_numpy(),
-        (rejections["size"] - rejections["sum"]).to_numpy(dtype=np.float64),
-        rejections["size"].to_numpy(),
-    )
-    return {"d_prime": _mean_sd(found.d_prime), "criterion": _mean_sd(found.criterion)}
+    (hits, rejections), (signals, noises) = cells.correct[both, column].T, cells.trials[both, column].T
+    found = yes_no(hits, signals, noises - rejections, noises)
+    measures = {"d_prime": np.atleast_1d(found.d_prime), "criterion": np.atleast_1d(found.criterion)}
+    people = zip((cells.participants[i] for i in both), *measures.values(), strict=True)
+    return {
+        **{name: _mean_sd(values) for name, values in measures.items()},
+        "participants": {code: {"d_prime": float(d), "criterion": float(c)} for code, d, c in people},
+    }
 
 
 def _mean_sd(values: float | np.ndarray[Any, Any]) -> dict[str, float]:

@@ -1,140 +1,165 @@
 """Sums of squares that keep their digits, whatever the offset and the scale of the data.
 
-Three measures, in this order: the data are scaled by a power of two, which is exact; a datum is subtracted before any
-mean is taken, because the rounding of a mean at 1e12 costs more digits than everything after it; and the error is
-the sum of squared residuals, never a difference of sums, so it cannot be negative.
+Three measures: the data are scaled by a power of two, which is exact; totals and deviations are formed in slices
+(`analysis.slices`) and times the number of values, so that no mean is divided and nothing rounded; and the error is the
+sum of squared residuals, never a difference of sums, so it cannot be negative.
+
+What is left is the rounding of the data themselves: tenths are no doubles. `noise` bounds what it can add to a sum of
+squares. Below it an error is no error: it is set to 0 where the effect is of another order of magnitude (F = inf) and
+where the effect is as small (0/0, undefined); in between, F is that of the doubles as they stand.
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from math import prod
 
 import numpy as np
 from numpy.typing import NDArray
 
 from analysis.arrays import FloatArray
+from analysis.slices import exponent_of, joined, pairwise, scale, sliced
 
-_NOISE = 4.0 * float(np.finfo(np.float64).eps)
-"""Relative size of a residual that rounding alone can make: half an eps from storing the number, the rest from ours."""
+_NOISE = 2.0 * float(np.finfo(np.float64).eps)
+"""Relative error of a number that a few operations on decimals have made: four roundings of half an eps."""
+
+_CERTAIN = 2.0**40
+"""An effect so many times the noise leaves no doubt that F is beyond every bound, if the error is within the noise."""
+
+_BLOCK = 16_128
+"""Cells decomposed together: 384 data sets of 14 x 3, what stays in a processor's second cache."""
+
+_Parts = tuple[NDArray[np.int64], FloatArray, FloatArray, FloatArray, FloatArray, FloatArray]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Sums:
-    """Decomposed data sets. Leading axes (...); `means` is (..., k).
+    """Decomposed data sets, leading axes (...). The sums of squares are in units of 4**exponent.
 
-    `means` (of the conditions, less the grand mean) is in units of 2**exponent, the sums of squares in 4**exponent.
-    `noise` is the sum of squares that rounding could have made: an error at or below it has been set to 0.
+    `totals` (3, ..., k) are the slices of the conditions' totals, in 2**exponent, `counts` (k,) the values of each.
+    `participants` is 0 where everybody is in one condition. `noise` is the sum of squares that the rounding of the data
+    could have made.
     """
 
     exponent: NDArray[np.int64]
-    means: FloatArray
+    totals: FloatArray
+    counts: FloatArray
     effect: FloatArray
     error: FloatArray
     noise: FloatArray
     df_effect: int
     df_error: int
-    participants: FloatArray | None = None
+    participants: FloatArray
 
     @property
     def ms_error(self) -> FloatArray:
         """Mean squared error, in 4**exponent."""
         return self.error / self.df_error
 
-
-def unscaled(values: FloatArray, exponent: NDArray[np.int64]) -> FloatArray:
-    """`values` * 2**exponent; what no double can hold becomes inf or 0, silently, as it must."""
-    with np.errstate(over="ignore", under="ignore"):
-        return np.ldexp(values, exponent)
-
-
-def exponent_of(largest: FloatArray) -> NDArray[np.int64]:
-    """The power of two just above `largest`."""
-    return np.frexp(largest)[1].astype(np.int64)
+    def differences(self, a: NDArray[np.intp], b: NDArray[np.intp]) -> FloatArray:
+        """Means of the conditions `a` less those of `b`, (..., pairs), in 2**exponent: total_a n_b - total_b n_a."""
+        weighted = self.totals[..., a] * self.counts[b] - self.totals[..., b] * self.counts[a]
+        difference: FloatArray = joined(weighted) / (self.counts[a] * self.counts[b])
+        return difference
 
 
 def repeated_sums(scores: FloatArray) -> Sums:
     """Participants by conditions, (..., n, k): what conditions and participants explain, and the rest."""
-    n, k = scores.shape[-2:]
-    exponent = exponent_of(np.abs(scores).max(axis=(-2, -1)))
-    scaled = np.ldexp(scores, -exponent[..., None, None])
-    high, low = _exact_difference(scaled, scaled[..., :1])
-    first_high, first_low = high[..., :1, :], low[..., :1, :]
-    rest = (high - first_high) + (low - first_low)
-    columns, residuals = _double_centred(rest)
-    means = _centred(first_high + first_low + columns)[..., 0, :]
-    people = _centred((scaled[..., 0] - scaled[..., :1, 0]) + (high + low).mean(axis=-1))
-    noise = _NOISE**2 * np.square(scaled).sum(axis=(-2, -1))
-    effect = n * np.square(means).sum(axis=-1)
-    effect, error = _without_noise(effect, np.square(residuals).sum(axis=(-2, -1)), noise)
+    leading, (n, k) = scores.shape[:-2], scores.shape[-2:]
+    sets = scores.reshape(prod(leading), n, k)
+    step = max(1, _BLOCK // (n * k))
+    blocks = [_decomposed(sets[first : first + step]) for first in range(0, max(len(sets), 1), step)]
+    exponent, totals, effect, people, error, noise = (
+        np.concatenate(parts, axis=-1) for parts in zip(*blocks, strict=True)
+    )
+    effect, error = _without_noise(effect, error, noise)
     return Sums(
-        exponent=exponent,
-        means=means,
-        effect=effect,
-        error=error,
-        noise=noise,
+        exponent=exponent.reshape(leading),
+        totals=np.moveaxis(totals, 1, -1).reshape(3, *leading, k),
+        counts=np.full(k, float(n)),
+        effect=effect.reshape(leading),
+        error=error.reshape(leading),
+        noise=noise.reshape(leading),
         df_effect=k - 1,
         df_error=(n - 1) * (k - 1),
-        participants=k * np.square(people).sum(axis=-1),
+        participants=people.reshape(leading),
     )
 
 
+def _decomposed(sets: FloatArray) -> _Parts:
+    """Exponents, totals (3, k, sets), effects, participants, errors and noise of data sets (sets, n, k).
+
+    The data sets are laid along the last axis, so that every pass runs over many of them. With cells x, totals of
+    rows R and of columns C and grand total T, n k times the residual is n k x - n R - (k C - T), slice by slice.
+    """
+    n, k = sets.shape[1:]
+    cells = np.array(sets.transpose(1, 2, 0), order="C")
+    flat = cells.reshape(n * k, len(sets))
+    exponent = exponent_of(np.maximum(flat.max(axis=0), -flat.min(axis=0)))
+    scale(cells, exponent)
+    slices = sliced(cells)
+    rows, columns = slices.sum(axis=2), slices.sum(axis=1)
+    grand = columns.sum(axis=1)[:, None]
+    rows *= n
+    effects = k * columns - grand
+    effect, people = (pairwise(np.square(joined(parts))) for parts in (effects, rows - grand))
+    slices *= n * k
+    slices -= rows[:, :, None]
+    slices -= effects[:, None]
+    error = pairwise(np.square(joined(slices)).reshape(flat.shape)) / float((n * k) ** 2)
+    noise = _NOISE**2 * pairwise(np.square(flat))
+    return exponent, columns, effect / float(n * k**2), people / float(n**2 * k), error, noise
+
+
 def between_sums(groups: Sequence[FloatArray]) -> Sums:
-    """Groups of different people, each (..., n_i): effect of the group, and the spread within the groups."""
+    """Groups of different people, each (..., n_i): effect of the group, and the spread within the groups.
+
+    The first value is taken off all, slice by slice, which is exact and leaves room for large groups.
+    """
     leading = np.broadcast_shapes(*(group.shape[:-1] for group in groups))
-    full = [np.broadcast_to(group, leading + group.shape[-1:]) for group in groups]
-    exponent = exponent_of(np.max([np.abs(group).max(axis=-1) for group in full], axis=0))
-    scaled = [np.ldexp(group, -exponent[..., None]) for group in full]
-    pivot = scaled[0][..., :1]
-    centres, spreads = zip(*(_mean_and_squares(group - pivot) for group in scaled), strict=True)
+    scaled = [np.array(np.broadcast_to(group, leading + group.shape[-1:])) for group in groups]
+    exponent = exponent_of(np.max([np.abs(group).max(axis=-1) for group in scaled], axis=0))
+    for group in scaled:
+        scale(group, exponent[..., None])
+    slices = [sliced(group) for group in scaled]
+    slices = [part - slices[0][..., :1] for part in slices]
     counts = np.array([group.shape[-1] for group in groups], dtype=np.float64)
-    means = np.stack(centres, axis=-1)
-    means = means - (means * counts).sum(axis=-1, keepdims=True) / counts.sum()
+    totals = np.stack([part.sum(axis=-1) for part in slices], axis=-1)
     noise = _NOISE**2 * np.sum([np.square(group).sum(axis=-1) for group in scaled], axis=0)
-    effect, error = _without_noise((counts * np.square(means)).sum(axis=-1), np.sum(spreads, axis=0), noise)
+    effect, error = _without_noise(
+        _between_effect(totals, counts), np.sum([_spread(part) for part in slices], axis=0), noise
+    )
     return Sums(
         exponent=exponent,
-        means=means,
+        totals=totals,
+        counts=counts,
         effect=effect,
         error=error,
         noise=noise,
         df_effect=len(groups) - 1,
         df_error=int(counts.sum()) - len(groups),
+        participants=np.zeros_like(error),
     )
 
 
-def _exact_difference(a: FloatArray, b: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Difference a - b and its rounding error (Knuth's two-sum): nothing is lost where the effect is huge."""
-    high = a - b
-    b_virtual = a - high
-    a_virtual = high + b_virtual
-    return high, (a - a_virtual) + (b_virtual - b)
+def _between_effect(totals: FloatArray, counts: FloatArray) -> FloatArray:
+    """Sum of n_i (m_i - m)^2, where N n_i (m_i - m) = N total_i - n_i total."""
+    everyone = counts.sum()
+    deviations = joined(everyone * totals - counts * totals.sum(axis=-1, keepdims=True))
+    effect: FloatArray = (np.square(deviations) / (counts * everyone**2)).sum(axis=-1)
+    return effect
 
 
-def _centred(values: FloatArray) -> FloatArray:
-    """Last axis less its mean, twice: the second pass takes off what the first mean's rounding left."""
-    once: FloatArray = values - values.mean(axis=-1, keepdims=True)
-    twice: FloatArray = once - once.mean(axis=-1, keepdims=True)
-    return twice
-
-
-def _double_centred(values: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Column means (..., 1, k) of the row-centred values, and the residuals (..., n, k)."""
-    within = _centred(values)
-    columns = within.mean(axis=-2, keepdims=True)
-    residuals = _centred(within - columns)
-    correction = residuals.mean(axis=-2, keepdims=True)
-    return columns + correction, residuals - correction
-
-
-def _mean_and_squares(values: FloatArray) -> tuple[FloatArray, FloatArray]:
-    mean = values.mean(axis=-1, keepdims=True)
-    rest = values - mean
-    correction = rest.mean(axis=-1, keepdims=True)
-    return (mean + correction)[..., 0], np.square(rest - correction).sum(axis=-1)
+def _spread(slices: FloatArray) -> FloatArray:
+    """Sum of (x - m)^2 over the last axis of the slices (3, ..., n), where n (x - m) = n x - total."""
+    n = slices.shape[-1]
+    deviations = joined(n * slices - slices.sum(axis=-1, keepdims=True))
+    spread: FloatArray = np.square(deviations).sum(axis=-1) / float(n) ** 2
+    return spread
 
 
 def _without_noise(effect: FloatArray, error: FloatArray, noise: FloatArray) -> tuple[FloatArray, FloatArray]:
-    error = np.where(error <= noise, 0.0, error)
-    effect = np.where((error == 0.0) & (effect <= noise), 0.0, effect)
-    return effect, error
+    nothing = (error <= noise) & (effect <= noise)
+    certain = (error <= noise) & (effect >= _CERTAIN * noise)
+    return np.where(nothing, 0.0, effect), np.where(nothing | certain, 0.0, error)

@@ -11,12 +11,13 @@ from dataclasses import dataclass
 from itertools import combinations
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from analysis.anova import check_groups, check_scores
 from analysis.arrays import FloatArray, Values, plain, share
+from analysis.slices import unscaled
 from analysis.studentized_range import studentized_range_isf, studentized_range_sf
-from analysis.sums_of_squares import between_sums, exponent_of, repeated_sums, unscaled
+from analysis.sums_of_squares import Sums, between_sums, repeated_sums
 
 Label = str | int
 
@@ -66,14 +67,7 @@ def tukey_hsd(
 
     `groups`: k >= 2 arrays (..., n_i); `ValueError` as in `one_way_anova`. Source: Kramer 1956, Biometrics 12, 307.
     """
-    arrays = check_groups(groups)
-    sums = between_sums(arrays)
-    first, second = _index_pairs(len(arrays))
-    sizes = np.array([array.shape[-1] for array in arrays], dtype=np.float64)
-    squared = sums.ms_error[..., None] * (1.0 / sizes[first] + 1.0 / sizes[second]) / 2.0
-    difference = sums.means[..., first] - sums.means[..., second]
-    pairs = _statistics(difference, np.sqrt(squared), sums.noise, sums.exponent, (len(arrays), sums.df_error))
-    return _comparisons(pairs, labels, confidence)
+    return _comparisons(group_pairs(check_groups(groups)), labels, confidence)
 
 
 def rm_tukey_hsd(
@@ -99,47 +93,40 @@ def rm_tukey_hsd_paired(
     return _comparisons(own_pairs(check_scores(scores)), labels, confidence)
 
 
+def group_pairs(groups: list[FloatArray]) -> PairStatistics:
+    """Differences and q of `tukey_hsd` for checked groups, without p-values."""
+    return _statistics(between_sums(groups))
+
+
 def pooled_pairs(scores: FloatArray) -> PairStatistics:
     """Differences and q of `rm_tukey_hsd` for checked scores, without p-values: what a simulation needs."""
-    n, k = scores.shape[-2:]
-    sums = repeated_sums(scores)
-    first, second = _index_pairs(k)
-    difference = sums.means[..., first] - sums.means[..., second]
-    error = np.broadcast_to(np.sqrt(sums.ms_error / n)[..., None], difference.shape)
-    return _statistics(difference, error, sums.noise, sums.exponent, (k, sums.df_error))
+    return _statistics(repeated_sums(scores))
 
 
 def own_pairs(scores: FloatArray) -> PairStatistics:
     """Differences and q of `rm_tukey_hsd_paired` for checked scores, without p-values."""
     n, k = scores.shape[-2:]
-    exponent = exponent_of(np.abs(scores).max(axis=(-2, -1)))
-    pairs = [repeated_sums(np.ldexp(scores[..., [b, a]], -exponent[..., None, None])) for a, b in pairs_of(k)]
-    means = np.stack([unscaled(pair.means[..., 1] - pair.means[..., 0], pair.exponent) for pair in pairs], axis=-1)
-    errors = np.stack([unscaled(np.sqrt(pair.ms_error / n), pair.exponent) for pair in pairs], axis=-1)
-    noise = np.max([unscaled(pair.noise, 2 * pair.exponent) for pair in pairs], axis=0)
-    return _statistics(means, errors, noise, exponent, (k, n - 1))
+    pairs = [pooled_pairs(scores[..., [b, a]]) for a, b in pairs_of(k)]
+    difference, error, q = (
+        np.concatenate([getattr(pair, name) for pair in pairs], axis=-1) for name in ("difference", "error", "q")
+    )
+    return PairStatistics(difference=difference, error=error, q=q, k=k, df=n - 1)
 
 
-def _index_pairs(k: int) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
-    pairs = np.array(pairs_of(k), dtype=np.intp)
-    return pairs[:, 0], pairs[:, 1]
-
-
-def _statistics(
-    difference: FloatArray,
-    error: FloatArray,
-    noise: FloatArray,
-    exponent: NDArray[np.int64],
-    k_and_df: tuple[int, int],
-) -> PairStatistics:
-    """The pairs' q, taken before the scale is put back: at 1e-200 the squares would be gone."""
-    k, df = k_and_df
-    no_difference = (error == 0.0) & (np.square(difference) <= noise[..., None])
+def _statistics(sums: Sums) -> PairStatistics:
+    """All pairs on the pooled error; q is taken before the scale is put back: at 1e-200 the squares would be gone."""
+    k = len(sums.counts)
+    a, b = np.array(pairs_of(k), dtype=np.intp).T
+    difference = sums.differences(a, b)
+    error = np.sqrt(sums.ms_error[..., None] * (1.0 / sums.counts[a] + 1.0 / sums.counts[b]) / 2.0)
+    no_difference = (error == 0.0) & (np.square(difference) <= sums.noise[..., None])
     difference = np.where(no_difference, 0.0, difference)
     with np.errstate(divide="ignore", invalid="ignore"):
         q = np.abs(difference) / error
-    scale = exponent[..., None]
-    return PairStatistics(difference=unscaled(difference, scale), error=unscaled(error, scale), q=q, k=k, df=df)
+    scale = sums.exponent[..., None]
+    return PairStatistics(
+        difference=unscaled(difference, scale), error=unscaled(error, scale), q=q, k=k, df=sums.df_error
+    )
 
 
 def _comparisons(pairs: PairStatistics, labels: Sequence[Label] | None, confidence: float) -> tuple[Comparison, ...]:

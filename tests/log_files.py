@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import csv
+from datetime import UTC, datetime, timedelta
 from pathlib import Path
 
 import numpy as np
@@ -88,4 +89,18 @@ def write_study(folder: Path, participants: int = 14, seed: int = 1) -> Path:
         code = f"P{i:02d}"
         write_rows(trials_path(folder, code), trial_rows(code, seed * 1000 + i))
         write_rows(ratings_path(folder, code), rating_rows(code, seed * 1000 + i))
+    return folder
+
+
+def write_many(folder: Path, participants: int) -> Path:
+    """Direction trials of so many participants with every column that a run fills in, each its own answers."""
+    start = datetime(2026, 11, 21, 9, tzinfo=UTC)
+    for i in range(1, participants + 1):
+        rng = np.random.default_rng(i)
+        rows = trial_rows(f"P{i:05d}", i)
+        for k, row in enumerate(rows):
+            onset = start + timedelta(hours=i, seconds=17 * k + float(rng.random()))
+            row["onset_utc"] = onset.isoformat(timespec="microseconds").replace("+00:00", "Z")
+            row |= {"gun": "simulated", "response_time_s": f"{0.6 + rng.random():.6f}"}
+        write_rows(trials_path(folder, f"P{i:05d}"), rows)
     return folder

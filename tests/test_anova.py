@@ -1,6 +1,7 @@
 from __future__ import annotations
 
 import math
+from typing import Any
 
 import numpy as np
 import pandas as pd
@@ -12,7 +13,8 @@ from scipy import stats
 from statsmodels.stats.anova import AnovaRM
 
 from analysis import one_way_anova, rm_anova
-from tests.exact import exact_one_way_F, exact_rm_F
+from tests.exact import digits, exact_one_way_F, exact_rm_F, p_digits
+from tests.made_scores import KINDS, made_scores
 
 TENTHS = arrays(np.int64, st.tuples(st.integers(2, 8), st.integers(2, 5)), elements=st.integers(0, 10))
 FINITE = arrays(
@@ -38,23 +40,46 @@ def test_F_and_p_agree_with_statsmodels_AnovaRM_to_ten_digits(seed: int) -> None
 
 
 @pytest.mark.parametrize("offset", [0.0, 1e3, 1e6, 1e9, 1e12])
-@pytest.mark.parametrize("exponent", [-1000, -500, 0, 500, 980])
-def test_repeated_measures_F_keeps_fourteen_digits_at_any_offset_and_scale(offset: float, exponent: int) -> None:
+@pytest.mark.parametrize("exponent", [-1000, -500, 0, 500, 950])
+def test_repeated_measures_F_keeps_fifteen_digits_at_any_offset_and_scale(offset: float, exponent: int) -> None:
     scores = np.ldexp(_table(1) + offset, exponent)
-    assert pytest.approx(float(exact_rm_F(scores)), rel=1e-14) == rm_anova(scores).F
+    assert digits(rm_anova(scores).F, exact_rm_F(scores)) >= 15
+
+
+@pytest.mark.parametrize("scale", [1e-300, 1e-160, 1e154, 1e290, 1e300])
+def test_repeated_measures_F_keeps_fifteen_digits_at_scales_that_are_no_powers_of_two(scale: float) -> None:
+    scores = (_table(1) + 7.0) * scale
+    assert digits(rm_anova(scores).F, exact_rm_F(scores)) >= 15
+
+
+@given(
+    seed=st.integers(0, 2**32 - 1),
+    n=st.integers(2, 40),
+    k=st.integers(2, 10),
+    offset=st.sampled_from([1.0, 1e4, 1e8, 1e12]),
+    exponent=st.integers(-990, 950),
+    kind=st.sampled_from(KINDS),
+)
+@settings(max_examples=80)
+def test_F_has_fifteen_digits_and_p_thirteen(exponent: int, **table: Any) -> None:
+    scores = np.ldexp(made_scores(**table), exponent)
+    found = rm_anova(scores)
+    assert found.ss_error >= 0.0
+    assert digits(found.F, exact_rm_F(scores)) >= 15
+    assert p_digits(found) >= 13
 
 
 @pytest.mark.parametrize("offset", [0.0, 1e6, 1e12])
-@pytest.mark.parametrize("exponent", [-1000, 0, 980])
-def test_between_subjects_F_keeps_fourteen_digits_at_any_offset_and_scale(offset: float, exponent: int) -> None:
+@pytest.mark.parametrize("exponent", [-1000, 0, 950])
+def test_between_subjects_F_keeps_fifteen_digits_at_any_offset_and_scale(offset: float, exponent: int) -> None:
     rng = np.random.default_rng(2)
     groups = [np.ldexp(rng.normal(size=n) + 0.3 * n + offset, exponent) for n in (5, 6, 9)]
-    assert pytest.approx(float(exact_one_way_F(groups)), rel=1e-14) == one_way_anova(groups).F
+    assert digits(one_way_anova(groups).F, exact_one_way_F(groups)) >= 15
 
 
 def test_a_huge_effect_with_tiny_residuals_keeps_its_digits() -> None:
     scores = np.arange(3.0) + 1e-7 * _table(3)
-    assert pytest.approx(float(exact_rm_F(scores)), rel=1e-13) == rm_anova(scores).F
+    assert digits(rm_anova(scores).F, exact_rm_F(scores)) >= 15
 
 
 def test_between_subjects_anova_agrees_with_scipy() -> None:
@@ -77,29 +102,6 @@ def test_sums_of_squares_add_up_to_the_total() -> None:
     total = np.square(scores - scores.mean()).sum()
     assert found.ss_effect + found.ss_error + found.ss_participants == pytest.approx(total, rel=1e-13)
     assert found.ms_error == pytest.approx(found.ss_error / 26, rel=1e-15)
-
-
-def test_additive_tenths_have_no_error_variance_though_no_tenth_is_a_double() -> None:
-    scores = np.array([[0.1, 0.2, 0.3], [0.4, 0.5, 0.6], [0.2, 0.3, 0.4], [0.7, 0.8, 0.9]])
-    found = rm_anova(scores)
-    assert (found.F, found.p, found.ss_error) == (math.inf, 0.0, 0.0)
-
-
-@pytest.mark.parametrize(
-    "scores",
-    [np.ones((14, 3)), np.full((14, 3), 0.1), np.zeros((3, 2)), np.repeat(np.arange(14)[:, None] / 10, 3, axis=1)],
-    ids=["ceiling", "tenths", "floor", "identical columns"],
-)
-def test_without_any_effect_or_error_F_is_undefined(scores: np.ndarray) -> None:
-    found = rm_anova(scores)
-    assert math.isnan(found.F)
-    assert math.isnan(found.p)
-
-
-def test_equal_groups_are_undefined_and_constant_different_groups_infinite() -> None:
-    assert math.isnan(one_way_anova([[0.1, 0.1], [0.1, 0.1]]).F)
-    found = one_way_anova([[0.1, 0.1], [0.3, 0.3]])
-    assert (found.F, found.p) == (math.inf, 0.0)
 
 
 @given(TENTHS)
@@ -157,33 +159,3 @@ def test_one_table_gives_plain_floats() -> None:
     found = rm_anova(_table(9))
     assert type(found.F) is float
     assert type(found.p) is float
-
-
-@pytest.mark.parametrize(
-    ("scores", "reason"),
-    [
-        (np.ones((1, 3)), "at least 2 participants and 2 conditions"),
-        (np.ones((3, 1)), "at least 2 participants and 2 conditions"),
-        (np.ones(3), "two axes"),
-        ([[1.0, np.nan], [1.0, 2.0]], r"finite.*\(0, 1\).*nan"),
-        ([[1.0, 2.0], [np.inf, 2.0]], r"finite.*\(1, 0\).*inf"),
-        ([["1", "2"], ["3", "4"]], "must be numbers"),
-    ],
-)
-def test_repeated_measures_refuse_what_cannot_be_tested(scores: object, reason: str) -> None:
-    with pytest.raises(ValueError, match=reason):
-        rm_anova(scores)
-
-
-@pytest.mark.parametrize(
-    ("groups", "reason"),
-    [
-        ([[1.0, 2.0]], "at least 2 groups"),
-        ([[1.0, 2.0], []], "group 1 must hold"),
-        ([[1.0], [2.0]], "no group has two values"),
-        ([[1.0, 2.0], [np.nan, 1.0]], "group 1 must be finite"),
-    ],
-)
-def test_groups_refuse_what_cannot_be_tested(groups: list[list[float]], reason: str) -> None:
-    with pytest.raises(ValueError, match=reason):
-        one_way_anova(groups)

@@ -1,15 +1,22 @@
 from __future__ import annotations
 
+import json
 import math
 from fractions import Fraction
+from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from scipy import stats
+from mpmath import mp, mpf
+from scipy import special, stats
 
 from analysis import binomial_test
+
+GOLDEN = json.loads((Path(__file__).parent / "golden" / "binomial.json").read_text())
+"""References of mpmath, remade by `python -m tests.golden.make_binomial`."""
 
 
 def _exact_p(k: int, n: int, p0: Fraction) -> Fraction:
@@ -26,7 +33,7 @@ def test_the_papers_binomial_tests_are_reproduced(successes: int, p: float) -> N
 def test_p_is_the_exact_sum_of_all_outcomes_not_more_likely(n: int, data: st.DataObject, p0: Fraction) -> None:
     k = data.draw(st.integers(0, n))
     found = binomial_test(k, n, float(p0))
-    assert found.p == pytest.approx(float(_exact_p(k, n, p0)), rel=1e-11)
+    assert found.p == pytest.approx(float(_exact_p(k, n, p0)), rel=1e-13)
     assert found.log_p == pytest.approx(math.log(found.p), rel=1e-12, abs=1e-15)
 
 
@@ -47,17 +54,70 @@ def test_certain_chances_give_certain_answers() -> None:
     assert found.p.tolist() == [1.0, 0.0, 1.0, 0.0]
 
 
+def digits_of(found: float, reference: str) -> float:
+    """Correct digits, at most 17; an infinite or vanished reference must be met exactly."""
+    with mp.workdps(40):
+        exact = mpf(reference)
+        if found == exact:
+            return 17.0
+        return min(17.0, float(-mp.log10(abs(mpf(found) / exact - 1)))) if exact and mp.isfinite(exact) else 0.0
+
+
+@pytest.mark.parametrize("case", GOLDEN["tests"], ids=lambda case: f"{case['k']} of {case['n']} at {case['p0']:.3g}")
+def test_p_and_its_logarithm_agree_with_sums_of_mpmath(case: dict[str, Any]) -> None:
+    found = binomial_test(case["k"], case["n"], case["p0"])
+    far = case["n"] > 10**6
+    assert digits_of(found.log_p, case["log_p"]) >= (11 if far else 14)
+    if 0 < mpf(case["p"]) < 1e-300:
+        assert found.p < 1e-299
+    else:
+        assert digits_of(found.p, case["p"]) >= (11 if far else 13)
+
+
+@pytest.mark.parametrize("case", GOLDEN["intervals"], ids=lambda case: f"{case['k']} of {case['n']}")
+def test_both_intervals_have_fourteen_digits(case: dict[str, Any]) -> None:
+    found = binomial_test(case["k"], case["n"])
+    for limit in ("ci_low", "ci_high", "wilson_low", "wilson_high"):
+        assert digits_of(getattr(found, limit), case[limit]) >= 14
+
+
+@given(st.integers(0, 400), st.data(), st.sampled_from([1e-9, 0.5, 0.9, 0.999]))
+def test_clopper_pearson_limits_leave_the_tail_they_promise(k: int, data: st.DataObject, confidence: float) -> None:
+    n = data.draw(st.integers(max(k, 1), 10**6))
+    found, tail = binomial_test(k, n, confidence=confidence), (1 - confidence) / 2
+    if k > 0:
+        assert special.bdtrc(k - 1, n, found.ci_low) == pytest.approx(tail, rel=1e-8)
+    if k < n:
+        assert special.bdtr(k, n, found.ci_high) == pytest.approx(tail, rel=1e-8)
+    assert 0.0 <= found.wilson_low <= found.estimate <= found.wilson_high <= 1.0
+
+
+@pytest.mark.parametrize(("k", "low", "high"), [(0, 0.0, 0.1611), (1, 0.0089, 0.2361), (20, 0.8389, 1.0)])
+def test_wilson_interval_of_a_few_in_twenty(k: int, low: float, high: float) -> None:
+    found = binomial_test(k, 20)  # statsmodels.proportion_confint(k, 20, method="wilson")
+    assert (found.wilson_low, found.wilson_high) == pytest.approx((low, high), abs=5e-5)
+
+
 def test_the_logarithm_goes_on_where_p_underflows() -> None:
-    found = binomial_test(7000, 10_000)
-    assert found.p == 0.0
-    assert found.log_p / math.log(10) == pytest.approx(math.log10(1.4) - 359, abs=0.02)  # mpmath, 1.4e-359
+    found = binomial_test(2700, 3000)
     exact = sum(math.comb(3000, i) for i in range(301))  # each tail of 2700 in 3000
-    expected = math.log(2 * exact) - 3000 * math.log(2)
-    assert binomial_test(2700, 3000).log_p == pytest.approx(expected, rel=1e-10)
+    assert found.log_p == pytest.approx(math.log(2 * exact) - 3000 * math.log(2), rel=1e-14)
+
+
+def test_the_logarithm_keeps_its_digits_where_p_is_nearly_one() -> None:
+    found = binomial_test(500_001, 10**6)
+    with mp.workdps(30):  # all but the mode counts
+        middle = mp.exp(mp.loggamma(10**6 + 1) - 2 * mp.loggamma(500_001) - 10**6 * mp.log(2))
+        assert found.log_p == pytest.approx(float(mp.log1p(-middle)), rel=1e-14)
 
 
 def test_the_tie_tolerance_is_the_documented_one() -> None:
     assert binomial_test(0, 10**9, 1e-9).p == 1.0  # strict comparison would give .6321
+
+
+def test_outcomes_as_likely_but_for_rounding_count_as_ties() -> None:
+    assert binomial_test(3, 9, 1 / 3 + 1e-12).p == 1.0
+    assert binomial_test(2, 5).p == binomial_test(3, 5).p == 1.0
 
 
 def test_the_tolerance_moves_the_other_side_alone_as_in_scipy_and_R() -> None:
@@ -86,6 +146,7 @@ def test_broadcasting_is_the_same_as_looping() -> None:
         (-1, 10, 0.5, r"0\.\.trials, not -1"),
         (1.5, 10, 0.5, "whole"),
         (0, 0, 0.5, "at least 1"),
+        (0, 2.0**54, 0.5, r"at most 1e\+10"),
         (1, 10, 1.5, "p0 must lie"),
         (np.nan, 10, 0.5, "finite"),
     ],

@@ -1,5 +1,7 @@
 from __future__ import annotations
 
+import json
+import re
 import subprocess
 import sys
 from pathlib import Path
@@ -8,7 +10,15 @@ from typing import Any
 import numpy as np
 import pytest
 
-from analysis.figures import ShotPanel, display_name, figure_5, figure_8, stars
+from analysis.figures import (
+    ShotPanel,
+    display_name,
+    figure_5,
+    figure_8,
+    figure_directions,
+    figure_response_times,
+    stars,
+)
 from analysis.logs import read_logs
 from analysis.summary import summarize
 from tests.log_files import write_study
@@ -40,9 +50,10 @@ def _png_size(path: Path) -> tuple[int, int]:
     return int.from_bytes(header[16:20], "big"), int.from_bytes(header[20:24], "big")
 
 
-def test_figure_5_is_written_as_png_and_svg_and_names_the_stages(tmp_path: Path) -> None:
-    png, svg = figure_5([shot_panel(), shot_panel(0.05)], tmp_path / "new" / "figure-5")
+def test_figure_5_is_written_as_png_svg_and_pdf_and_names_the_stages(tmp_path: Path) -> None:
+    png, svg, pdf = figure_5([shot_panel(), shot_panel(0.05)], tmp_path / "new" / "figure-5")
     assert _png_size(png) == (1800, 1480)  # 9.0 x 7.4 inches at 200 dpi
+    assert pdf.read_bytes().startswith(b"%PDF-")
     text = svg.read_text(encoding="utf-8")
     for words in ("bullet firing", "resetting", "ready", "dx/dt [m/s]", "x [mm]", "53.7 N (off scale)"):
         assert words in text
@@ -50,16 +61,16 @@ def test_figure_5_is_written_as_png_and_svg_and_names_the_stages(tmp_path: Path)
 
 @pytest.mark.parametrize("landing_s", [0.15, np.nan])
 def test_a_shot_that_does_not_come_home_is_drawn_without_a_collision(landing_s: float, tmp_path: Path) -> None:
-    _, svg = figure_5([shot_panel(np.nan if np.isnan(landing_s) else 1.0, landing_s)], tmp_path / "shot")
+    _, svg, _ = figure_5([shot_panel(np.nan if np.isnan(landing_s) else 1.0, landing_s)], tmp_path / "shot")
     assert ("collision" in svg.read_text(encoding="utf-8")) is not np.isnan(landing_s)
 
 
 def test_figure_8_shows_both_experiments_or_the_one_there_is(statistics: dict[str, Any], tmp_path: Path) -> None:
-    both, both_svg = figure_8(statistics, tmp_path / "both")
-    one, _ = figure_8({"preference": statistics["preference"]}, tmp_path / "one")
+    both, both_svg, _ = figure_8(statistics, tmp_path / "both")
+    one, *_ = figure_8({"preference": statistics["preference"]}, tmp_path / "one")
     assert _png_size(both)[0] > 1.7 * _png_size(one)[0]
     text = both_svg.read_text(encoding="utf-8")
-    for words in ("correct rate, forward [%]", "rating (0 dislike", "Force II", "n = 6"):
+    for words in ("correct rate, forward [%]", "rating (0 dislike", "Force II", "(6 synthetic participants)", "chance"):
         assert words in text
 
 
@@ -67,8 +78,70 @@ def test_figures_are_the_same_bytes_each_time(statistics: dict[str, Any], tmp_pa
     for first, second in (
         (figure_5([shot_panel()], tmp_path / "a"), figure_5([shot_panel()], tmp_path / "b")),
         (figure_8(statistics, tmp_path / "c"), figure_8(statistics, tmp_path / "d")),
+        *(
+            (draw(statistics["direction"], tmp_path / "e"), draw(statistics["direction"], tmp_path / "f"))
+            for draw in (figure_directions, figure_response_times)
+        ),
     ):
         assert [path.read_bytes() for path in first] == [path.read_bytes() for path in second]
+        assert not [
+            path for path in first if re.search(rb"CreationDate|<dc:date>|Producer|matplotlib v", path.read_bytes())
+        ]
+
+
+def test_the_directions_are_shown_against_chance_with_sensitivity_and_criterion(
+    statistics: dict[str, Any], tmp_path: Path
+) -> None:
+    _, svg, _ = figure_directions(statistics["direction"], tmp_path / "directions")
+    text = svg.read_text(encoding="utf-8")
+    for words in ("forward shots", "backward shots", "chance", "d′", "possible", "(c) Criterion", "no bias"):
+        assert f"<!-- {words}" in text or words in text
+
+
+def test_without_backward_shots_there_is_no_sensitivity_to_draw(statistics: dict[str, Any], tmp_path: Path) -> None:
+    found = statistics["direction"]
+    bare = found | {
+        "backward": {"means": {}, "sds": {}, "participants": {}},
+        "sensitivity": dict.fromkeys(found["methods"]),
+        "binomial": {method: {"forward": tests["forward"]} for method, tests in found["binomial"].items()},
+    }
+    _, svg, _ = figure_directions(bare, tmp_path / "forward")
+    assert "(b)" not in svg.read_text(encoding="utf-8")
+
+
+def test_response_times_say_how_many_and_cut_a_single_slow_one(statistics: dict[str, Any], tmp_path: Path) -> None:
+    found = json.loads(json.dumps(statistics["direction"]))
+    found["response_times"]["methods"]["vibration"]["percentiles"][100] = 41.3
+    _, svg, _ = figure_response_times(found, tmp_path / "times")
+    text = svg.read_text(encoding="utf-8")
+    for words in ("n = 60 / 60", "Vibration (n = 120)", "the slowest took 41.3 s"):
+        assert words in text
+
+
+def test_no_valid_response_time_makes_no_figure(statistics: dict[str, Any], tmp_path: Path) -> None:
+    found = statistics["direction"] | {"response_times": {"n": 0}}
+    with pytest.raises(ValueError, match="at least one valid time"):
+        figure_response_times(found, tmp_path / "times")
+
+
+@pytest.mark.parametrize("people", [200, 201])
+def test_beyond_200_people_their_distribution_is_drawn_instead_of_each(
+    people: int, statistics: dict[str, Any], tmp_path: Path
+) -> None:
+    one = statistics["preference"]
+    rows = list(one["participants"].values())
+    crowd = one | {"n": people, "participants": {f"P{i}": rows[i % len(rows)] for i in range(people)}}
+    _, svg, _ = figure_8({"preference": crowd}, tmp_path / "crowd")
+    text = svg.read_text(encoding="utf-8")
+    assert ("shaded: histograms over participants" in text) is (people > 200)
+    assert (text.count("<use ") > 3 * 200) is (people <= 200)
+
+
+def test_an_undefined_comparison_gets_no_bracket(statistics: dict[str, Any], tmp_path: Path) -> None:
+    one = statistics["preference"]
+    undefined = one | {"tukey": [comparison | {"p": None} for comparison in one["tukey"]]}
+    _, svg, _ = figure_8({"preference": undefined}, tmp_path / "undefined")
+    assert "n.s." not in svg.read_text(encoding="utf-8")
 
 
 def test_a_figure_of_one_participant_and_four_unknown_methods_is_drawn(tmp_path: Path) -> None:

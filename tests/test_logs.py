@@ -34,7 +34,7 @@ def test_a_study_is_read_whole_with_numbers_as_numbers(tmp_path: Path) -> None:
     assert logs.problems == ()
     assert len(logs.files) == 6
     assert (len(logs.trials), len(logs.ratings)) == (180, 9)
-    assert list(logs.trials.columns) == columns.names("direction")
+    assert list(logs.trials.columns) == [*columns.names("direction"), "study"]
     assert logs.trials["correct"].isin([0, 1]).all()
     assert logs.ratings["rating"].between(0.0, 10.0).all()
 

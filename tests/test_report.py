@@ -2,6 +2,7 @@ from __future__ import annotations
 
 import json
 import re
+import time
 from pathlib import Path
 from typing import Any
 
@@ -14,7 +15,7 @@ from analysis.paper import Paper, load_paper
 from analysis.published import compare
 from analysis.report import ReportData, write_report
 from analysis.summary import summarize
-from tests.log_files import write_study
+from tests.log_files import trial_rows, trials_path, write_rows, write_study
 from tests.test_figures import shot_panel
 
 
@@ -57,7 +58,8 @@ def _text(html: str) -> str:
 
 def test_everything_that_the_contract_names_is_written(full: Path) -> None:
     names = sorted(str(path.relative_to(full)) for path in full.rglob("*") if path.is_file())
-    figures = [f"figures/figure-{i}.{kind}" for i in (5, 8) for kind in ("png", "svg")]
+    stems = ("5", "8", "directions", "response-times")
+    figures = [f"figures/figure-{stem}.{kind}" for stem in stems for kind in ("pdf", "png", "svg")]
     assert names == [*figures, "report.html", "report.md", "statistics.json"]
 
 
@@ -66,7 +68,11 @@ def test_everything_that_the_contract_names_is_written(full: Path) -> None:
     [
         "28 log files were read",
         "Vibration",
-        "Asymmetric Force II is above Vibration (p &lt; .001)",
+        "percentage points, 95 % CI [",
+        "partial η² = .",
+        "Response times: 840 valid ones.",
+        "Means (SD) of the correct rate on forward shots over 14 synthetic participants: Vibration",
+        "The CI is within-subject (Cousineau–Morey)",
         "pooled error term of the repeated-measures ANOVA",
         "ignores that trials come in people",
         "One replication is luck",
@@ -96,7 +102,7 @@ def test_the_html_stands_alone(full: Path) -> None:
     assert all(address.startswith(("data:image/png;base64,", "#")) for address in addresses)
     assert "url(" not in html
     assert "@import" not in html
-    assert len(re.findall(r'<img [^>]*alt="[^"]{40,}"', html)) == 2
+    assert len(re.findall(r'<img [^>]*alt="[^"]{40,}"', html)) == 4
     for words in ("prefers-color-scheme: dark", "@media print", 'name="viewport"', 'class="scroll'):
         assert words in html
 
@@ -141,12 +147,11 @@ def test_sections_without_data_are_left_out(tmp_path: Path) -> None:
     write_study(tmp_path / "study", participants=3)
     logs = read_logs(sorted((tmp_path / "study").rglob("*_ratings.csv")))
     write_report(tmp_path / "out", ReportData(title="Ratings", statistics=summarize(logs)))
-    assert _titles(tmp_path / "out") == [
-        "What was analysed",
-        "Results at a glance",
-        "Preference",
-        "Provenance and assumptions",
-    ]
+    titles = _titles(tmp_path / "out")
+    assert titles[:3] == ["What was analysed", "Results at a glance", "Preference"]
+    assert titles[-1] == "Provenance and assumptions"
+    assert not [title for title in titles if re.search("[Dd]irection|shot|[Pp]ublished", title)]
+    assert {path.stem for path in (tmp_path / "out" / "figures").iterdir()} == {"figure-8"}
 
 
 def test_a_report_of_nothing_says_so(tmp_path: Path) -> None:
@@ -175,3 +180,62 @@ def test_files_are_named_below_their_common_folder_not_by_the_machine(tmp_path: 
     assert str(tmp_path) not in text
     assert "| log file | sub-P01/sub-P01_task-direction_trials.csv |" in text
     assert "- sub-P03_task-direction_trials.csv: is empty" in text
+
+
+def test_no_p_is_zero_and_none_has_a_leading_zero_in_the_sentences(full: Path) -> None:
+    text = (full / "report.md").read_text(encoding="utf-8")
+    sentences = "\n".join(line for line in text.splitlines() if not line.startswith("|"))
+    assert not re.search(r"p = \.000|p = 0", sentences)
+
+
+def test_figures_and_tables_are_numbered_from_one(full: Path) -> None:
+    for name, mark in (("report.md", r"\*\*{} (\d+)\.\*\*"), ("report.html", r"<b>{} (\d+)\.</b>")):
+        text = (full / name).read_text(encoding="utf-8")
+        for kind, least in (("Figure", 4), ("Table", 9)):
+            numbers = [int(number) for number in re.findall(mark.format(kind), text)]
+            assert numbers == list(range(1, len(numbers) + 1))
+            assert len(numbers) >= least
+
+
+def test_times_by_the_experimenters_hand_are_no_response_times(tmp_path: Path) -> None:
+    for code in ("P01", "P02"):
+        rows = [row | {"response_source": "experimenter", "response_time_valid": "0"} for row in trial_rows(code)]
+        write_rows(trials_path(tmp_path / "study", code), rows)
+    write_report(tmp_path / "out", ReportData(title="Hand", statistics=summarize(read_logs([tmp_path / "study"]))))
+    text = (tmp_path / "out" / "report.md").read_text(encoding="utf-8")
+    assert "There is no valid response time, and so no figure of them. 120 answered trials have none" in text
+    assert "figure-response-times" not in text
+    assert not list((tmp_path / "out" / "figures").glob("figure-response-times.*"))
+
+
+@pytest.fixture(scope="module")
+def crowded(logs: Logs) -> ReportData:
+    """Ten thousand people: those of the study again and again."""
+    statistics = json.loads(json.dumps(summarize(logs)))
+    direction = statistics["direction"]
+    crowds = [direction, statistics["preference"], direction["backward"], direction["response_times"]]
+    for one in [*crowds, *direction["sensitivity"].values()]:
+        people = list(one["participants"].values())
+        one["participants"] = {f"P{i:05d}": people[i % len(people)] for i in range(10_000)}
+    direction["n"] = statistics["preference"]["n"] = 10_000
+    files = tuple(Path(f"/logs/sub-P{i:05d}_task-direction_trials.csv") for i in range(10_000))
+    bad = tuple(Problem(file=file, line=1, column=None, message="is empty") for file in files)
+    return ReportData(title="Ten thousand", statistics=statistics, files=files, problems=bad)
+
+
+def test_a_report_of_ten_thousand_is_made_in_five_seconds_and_stays_short(crowded: ReportData, tmp_path: Path) -> None:
+    started = time.process_time()
+    write_report(tmp_path, crowded)
+    assert time.process_time() - started < 5.0
+    text = (tmp_path / "report.md").read_text(encoding="utf-8")
+    for words in (
+        "the first 50 of 10,000; everybody is in direction_wide.csv",
+        "the first 50 of 10,000; everybody is in preference_wide.csv",
+        "| log files | and 9,950 more |",
+        "- and 9,950 more problems",
+        "10,000 synthetic participants",
+    ):
+        assert words in text
+    assert len(text.splitlines()) < 700
+    assert max(path.stat().st_size for path in (tmp_path / "figures").iterdir()) < 1_000_000
+    assert (tmp_path / "report.html").stat().st_size < 2_000_000

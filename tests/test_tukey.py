@@ -11,6 +11,7 @@ from scipy import stats
 from analysis import rm_anova, rm_tukey_hsd, rm_tukey_hsd_paired, tukey_hsd
 from analysis.anova import check_scores
 from analysis.tukey import own_pairs, pooled_pairs
+from tests.exact import digits, exact_squared_group_q, exact_squared_q
 
 METHODS = ("vibration", "asymmetric-1", "asymmetric-2")
 SCORES = np.random.default_rng(1).normal(size=(14, 3)) + np.array([0.0, 0.9, 1.6])
@@ -66,13 +67,33 @@ def test_the_between_subjects_test_agrees_with_scipy_on_unequal_groups() -> None
         assert (c.ci_low, c.ci_high) == pytest.approx((intervals.low[c.a, c.b], intervals.high[c.a, c.b]), rel=1e-8)
 
 
+@pytest.mark.parametrize("scale", [1e-300, 1e-160, 1.0, 1e154, 1e295])
+@pytest.mark.parametrize("offset", [0.0, 1e6, 1e12])
+def test_q_has_fourteen_digits_of_the_exact_one_at_any_offset_and_scale(offset: float, scale: float) -> None:
+    scores = (SCORES + offset) * scale
+    groups = [scores[:5, 0], scores[:9, 1], scores[:, 2]]
+    for c in rm_tukey_hsd(scores):
+        assert digits(c.q**2, exact_squared_q(scores, c.a, c.b)) >= 14
+    for c in rm_tukey_hsd_paired(scores):
+        assert digits(c.q**2, exact_squared_q(scores[:, [c.b, c.a]], 1, 0)) >= 14
+    for c in tukey_hsd(groups):
+        assert digits(c.q**2, exact_squared_group_q(groups, c.a, c.b)) >= 14
+
+
+def test_two_means_that_nearly_agree_beside_one_far_off_keep_the_digits_of_their_difference() -> None:
+    scores = SCORES - SCORES.mean(axis=0) + np.array([0.0, 1e-9, 1e6])
+    near = rm_tukey_hsd(scores)[0]
+    assert digits(near.q**2, exact_squared_q(scores, 1, 0)) >= 14
+
+
 @pytest.mark.parametrize("scale", [2.0**-660, 2.0**530])
 def test_scale_changes_neither_q_nor_p(scale: float) -> None:
     for test in (rm_tukey_hsd, rm_tukey_hsd_paired):
         for c, small in zip(test(SCORES), test(SCORES * scale), strict=True):
-            assert (small.q, small.p) == pytest.approx((c.q, c.p), rel=1e-12)
+            assert (small.q, small.p) == (c.q, c.p)
+            assert (small.ci_low, small.ci_high) == pytest.approx((c.ci_low * scale, c.ci_high * scale), rel=1e-12)
     between = tukey_hsd(list(SCORES.T * scale))
-    assert [c.q for c in between] == pytest.approx([c.q for c in tukey_hsd(list(SCORES.T))], rel=1e-12)
+    assert [c.q for c in between] == [c.q for c in tukey_hsd(list(SCORES.T))]
 
 
 @pytest.mark.parametrize("test", [rm_tukey_hsd, rm_tukey_hsd_paired])

@@ -1,6 +1,22 @@
-"""The paper's two result figures, drawn from plain values. matplotlib enters the project's analysis here alone."""
+"""The paper's two result figures and what stands beside them, drawn from plain values.
 
-from analysis.figures.results import display_name, figure_8, named, stars
+matplotlib enters the project's analysis here alone.
+"""
+
+from analysis.figures.directions import figure_directions
+from analysis.figures.names import display_name, named, people, stars
+from analysis.figures.results import figure_8
 from analysis.figures.shot import ShotPanel, figure_5
+from analysis.figures.times import figure_response_times
 
-__all__ = ["ShotPanel", "display_name", "figure_5", "figure_8", "named", "stars"]
+__all__ = [
+    "ShotPanel",
+    "display_name",
+    "figure_5",
+    "figure_8",
+    "figure_directions",
+    "figure_response_times",
+    "named",
+    "people",
+    "stars",
+]

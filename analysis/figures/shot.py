@@ -43,8 +43,8 @@ class _Trace:
     colour: str
 
 
-def figure_5(panels: Sequence[ShotPanel], path_stem: Path) -> tuple[Path, Path]:
-    """A column (a), (b), ... for each shot; rows F, x, dx/dt, u over time in ms; PNG and SVG are written.
+def figure_5(panels: Sequence[ShotPanel], path_stem: Path) -> tuple[Path, Path, Path]:
+    """A column (a), (b), ... for each shot; rows F, x, dx/dt, u over time in ms; PNG, SVG and PDF are written.
 
     Stage borders are lines with open circles on the traces. The collision is an arrow at the end of the reset, cut at
     the top of the axis where it is larger. `ValueError` without a panel.
@@ -56,6 +56,8 @@ def figure_5(panels: Sequence[ShotPanel], path_stem: Path) -> tuple[Path, Path]:
         grid = figure.subplots(4, len(panels), sharex=True, sharey="row", squeeze=False)
         for column, panel in enumerate(panels):
             _draw_column(list(grid[:, column]), panel, chr(ord("a") + column))
+        ends = [float(at) * 1e3 for panel in panels for at in (panel.time_s[0], panel.time_s[-1])]
+        grid[0, 0].set_xlim(min(ends), max(ends))
         for row, label in enumerate(trace.label for trace in _traces(panels[0])):
             grid[row, 0].set_ylabel(label)
         _leave_room(grid[0, 0], panels)
@@ -76,16 +78,18 @@ def _traces(panel: ShotPanel) -> tuple[_Trace, ...]:
 
 def _draw_column(column: Sequence[Axes], panel: ShotPanel, letter: str) -> None:
     time_ms = panel.time_s * 1e3
+    at_rest = abs(panel.velocity_m_s[-1]) < 1e-3  # so it stays until the longest shot ends
     for axes, trace in zip(column, _traces(panel), strict=True):
         light_grid(axes)
         axes.plot(time_ms, trace.values, color=trace.colour, linewidth=1.3)
+        if at_rest:
+            axes.plot([time_ms[-1], 1e4], [trace.values[-1]] * 2, color=trace.colour, linewidth=1.3, scalex=False)
         for end_ms in _borders_ms(panel):
             axes.axvline(end_ms, color="#777777", linewidth=0.8, linestyle=(0, (4, 3)), zorder=1)
             height = float(np.interp(end_ms, time_ms, trace.values))
             axes.plot([end_ms], [height], "o", markersize=5.0, mfc="white", mec=BLACK, mew=1.0, zorder=4)
     column[0].set_title(f"({letter}) {panel.title}", loc="left", pad=54.0, fontweight="bold")
     column[-1].set_xlabel("time [ms]")
-    column[-1].set_xlim(float(time_ms[0]), float(time_ms[-1]))
     _name_stages(column[0], panel)
 
 

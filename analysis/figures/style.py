@@ -3,16 +3,24 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import Any
 
 import matplotlib as mpl
 from matplotlib.axes import Axes
 from matplotlib.backends.backend_agg import FigureCanvasAgg
+from matplotlib.backends.backend_pdf import FigureCanvasPdf
+from matplotlib.backends.backend_svg import FigureCanvasSVG
 from matplotlib.figure import Figure
+from matplotlib.image import imsave
 
 BLUE, ORANGE, GREEN, VERMILION = "#0072B2", "#E69F00", "#009E73", "#D55E00"
 PURPLE, SKY, YELLOW, BLACK = "#CC79A7", "#56B4E9", "#F0E442", "#000000"
-METHOD_COLOURS = (SKY, ORANGE, GREEN, BLUE, PURPLE, VERMILION, YELLOW)
-"""Okabe and Ito 2008: told apart with any common colour vision."""
+INK = "#333333"
+METHOD_COLOURS = (BLUE, VERMILION, GREEN, PURPLE, ORANGE, SKY, YELLOW)
+"""Okabe and Ito 2008: told apart with any common colour vision; those that stand out most from white first."""
+METHOD_LINES: tuple[str | tuple[int, tuple[float, ...]], ...] = ("-", "--", "-.", ":", (0, (6, 1, 1, 1, 1, 1)))
+"""The methods' lines without colour."""
+DIRECTION_MARKERS = {"forward": "o", "backward": "^"}
 
 PNG_DPI = 200
 
@@ -24,6 +32,7 @@ _STYLE = {
     "axes.spines.top": False,
     "axes.spines.right": False,
     "svg.hashsalt": "recoil",
+    "pdf.fonttype": 42,  # whole letters: journals refuse outlines of type 3
 }
 
 
@@ -34,21 +43,52 @@ def style() -> dict[str, object]:
 
 def new_figure(width_in: float, height_in: float) -> Figure:
     """An empty figure that lays its axes out so that nothing is clipped, and that no pyplot knows of."""
-    figure = Figure(figsize=(width_in, height_in), layout="constrained", facecolor="white")
-    FigureCanvasAgg(figure)
-    return figure
+    return Figure(figsize=(width_in, height_in), dpi=PNG_DPI, layout="constrained", facecolor="white")
 
 
-def save(figure: Figure, path_stem: Path) -> tuple[Path, Path]:
-    """`path_stem`.png and `path_stem`.svg, without dates or versions inside. Folders are made."""
+def save(figure: Figure, path_stem: Path) -> tuple[Path, Path, Path]:
+    """`path_stem`.png, .svg and .pdf, without dates or versions inside. Folders are made."""
     path_stem.parent.mkdir(parents=True, exist_ok=True)
-    png, svg = (path_stem.with_name(f"{path_stem.name}.{kind}") for kind in ("png", "svg"))
-    figure.savefig(png, dpi=PNG_DPI, metadata={"Software": None})
-    figure.savefig(svg, metadata={"Date": None, "Creator": None})
-    return png, svg
+    png, svg, pdf = (path_stem.with_name(f"{path_stem.name}.{kind}") for kind in ("png", "svg", "pdf"))
+    canvas: Any = FigureCanvasAgg(figure)
+    canvas.draw()
+    no_program: Any = {"Software": None}
+    imsave(png, canvas.buffer_rgba(), format="png", dpi=PNG_DPI, metadata=no_program)
+    figure.set_layout_engine("none")  # all three in the one layout; savefig would draw each of them twice
+    canvas = FigureCanvasSVG(figure)
+    canvas.print_svg(svg, metadata={"Date": None, "Creator": None})
+    canvas = FigureCanvasPdf(figure)
+    canvas.print_pdf(pdf, metadata={"CreationDate": None, "Creator": None, "Producer": None})
+    return png, svg, pdf
+
+
+def method_colour(i: int) -> str:
+    """The colour of the method at place `i`, from the start again after the last."""
+    return METHOD_COLOURS[i % len(METHOD_COLOURS)]
 
 
 def light_grid(axes: Axes) -> None:
     """Horizontal lines behind the data."""
     axes.grid(visible=True, axis="y", color="#dddddd", linewidth=0.6)
     axes.set_axisbelow(True)
+
+
+def bounded(axes: Axes, low: float, high: float) -> None:
+    """The axis ends with the scale: what stands above it (brackets) has no values."""
+    axes.spines["left"].set_bounds(low, high)
+
+
+def reference_line(axes: Axes, height: float, text: str) -> None:
+    """A dashed line across, named at its right."""
+    axes.axhline(height, color="#666666", linewidth=0.9, linestyle=(0, (4, 3)), zorder=1.5)
+    axes.annotate(
+        text,
+        xy=(1.0, height),
+        xycoords=axes.get_yaxis_transform(),
+        xytext=(3.0, 0.0),
+        textcoords="offset points",
+        ha="left",
+        va="center",
+        fontsize=7.5,
+        color="#444444",
+    )

@@ -205,17 +205,49 @@ def rebuild(journals: Annotated[list[Path], typer.Argument(metavar="JOURNAL...")
     raise typer.Exit(EXCEPTIONS if any(one.messages for one in built) else DONE)
 
 
+export = typer.Typer(help="Data sets for other programs.", rich_markup_mode=None, no_args_is_help=True)
+app.add_typer(export, name="export")
+
+
+@export.command()
+def bids(
+    folder: Annotated[Path, typer.Argument(metavar="DIR", help="The folder that holds the logs.")],
+    out: Annotated[
+        Path | None, typer.Option(metavar="BIDS", help="Folder for the data set; DIR/bids unless given.")
+    ] = None,
+    free_text: Annotated[
+        bool, typer.Option("--free-text", help="With comments and notes; they might say who someone is.")
+    ] = False,
+    as_json: AsJson = False,
+) -> None:
+    """The logs as a BIDS data set of behavioural runs; an earlier export is replaced."""
+    from experiments.roof.bids import export as roof
+
+    done = roof(folder, out or folder / "bids", free_text=free_text, track=_tracked)
+    for problem in done.problems:
+        _say(f"recoil: left out: {problem}")
+    _show(done.as_json(), done.as_text(), as_json)
+    raise typer.Exit(EXCEPTIONS if done.problems else DONE)
+
+
 @app.command()
 def analyze(
     paths: Annotated[list[Path], typer.Argument(metavar="PATH...", help="Logs, or folders with logs.")],
     out: Annotated[Path, typer.Option(help="Folder for statistics, figures and report.")],
+    columns: Annotated[
+        Path | None, typer.Option(metavar="MAP.toml", help="Which columns mean what in logs that Recoil did not write.")
+    ] = None,
+    rules: Annotated[
+        Path | None, typer.Option(metavar="RULES.toml", help="Which trials and participants to leave out.")
+    ] = None,
     paper: Annotated[Path | None, typer.Option(help="Published numbers to compare with.")] = None,
     as_json: AsJson = False,
 ) -> None:
-    """Statistics, figures and report of any number of logs."""
-    from experiments.roof.analyze import analyze as roof
+    """Statistics, tables, figures and report of any number of logs."""
+    from experiments.roof import analyze as roof
 
-    statistics, problems = roof(paths, out, paper, _tracked)
+    asked = roof.Request(paths=paths, out=out, paper=paper, columns=columns, rules=rules)
+    statistics, problems = roof.analyze(asked, _tracked)
     for problem in problems:
         _say(f"recoil: left out: {problem}")
     _show(statistics, f"Report: {out / 'report.html'}", as_json)
@@ -266,6 +298,34 @@ def new(study: Annotated[Path, typer.Argument(metavar="STUDY", help="The folder 
 
 
 @app.command()
+def twin(
+    gun: Annotated[str, typer.Option(help="Config of a gun, or the name of a shipped one.")] = "gun",
+    link: Annotated[Path | None, typer.Option(help="A path that leads to its pseudo-terminal and stays.")] = None,
+    tcp: Annotated[int | None, typer.Option(min=0, max=65535, help="A TCP port of this machine instead.")] = None,
+    speed: Annotated[float, typer.Option(help="So many times faster than the world.")] = 1.0,
+    drift_ppm: Annotated[float, typer.Option(min=-900, max=900, help="Error of its clock, in millionths.")] = 0.0,
+    wire: Annotated[int | None, typer.Option(min=0, max=9999, help="Speak another version of the wire.")] = None,
+    trouble: Annotated[
+        list[str] | None, typer.Option(metavar="NAME=VALUE", help="latency_s=0.005, lose=0.01, unplug=0.1, ...")
+    ] = None,
+    seed: Annotated[int, typer.Option(min=0, max=2**63 - 1, help="Seed of the troubles.")] = 1,
+    as_json: AsJson = False,
+) -> None:
+    """The gun's twin on a pseudo-terminal, until interrupted: prints its port, to be given to --gun."""
+    from experiments.roof import twin as roof
+
+    asked = roof.Asked(
+        gun=gun, link=link, tcp=tcp, speed=speed, drift_ppm=drift_ppm, wire=wire, troubles=trouble or [], seed=seed
+    )
+
+    def tell(found: dict[str, Any]) -> None:
+        _show(found, f"{found['address']}\nTry: recoil doctor --gun {found['gun']}", as_json)
+        sys.stdout.flush()
+
+    roof.serve(asked, tell)
+
+
+@app.command()
 def doctor(
     results: Annotated[Path, typer.Option(help="Folder for the logs, and its console runs.")] = Path("results"),
     gun: Annotated[str, typer.Option(help="`simulated` or `serial:PORT`. It is not fired.")] = "simulated",
@@ -281,6 +341,67 @@ def doctor(
     if out:
         roof.keep(found, out)
     raise typer.Exit(EXCEPTIONS if roof.fails(findings) else DONE)
+
+
+@app.command()
+def bench(
+    parts: Annotated[list[str] | None, typer.Argument(metavar="PART...", help="What to measure; else all.")] = None,
+    out: Annotated[Path, typer.Option(help="Folder for bench.json and the report.")] = Path("results/bench"),
+    seed: Annotated[int, typer.Option(min=0, max=2**63 - 1, help="Seed of the simulations.")] = 1,
+    as_json: AsJson = False,
+) -> None:
+    """Measure our own methods: error rates of the post-hoc tests."""
+    from experiments.roof import bench as roof
+
+    unknown = set(parts or []) - set(roof.PARTS)
+    if unknown:
+        raise typer.BadParameter(f"no part {', '.join(sorted(unknown))}; there are {', '.join(roof.PARTS)}")
+    found = roof.bench(out, seed, parts or [], _progress)
+    _show(found, f"Report: {out / 'report.html'}", as_json)
+
+
+@app.command()
+def power(
+    config: Annotated[str, typer.Argument(help="File or name of a shipped config.")],
+    participants: Annotated[
+        str | None, typer.Option(metavar="N,N-N", help="How many people, such as 8,10,14-20.")
+    ] = None,
+    trials: Annotated[
+        str | None, typer.Option(metavar="N,N-N", help="Trials of a method; the config's own unless given.")
+    ] = None,
+    methods: Annotated[
+        list[str] | None, typer.Option(metavar="NAME,NAME", help="Compare these alone; may be given again.")
+    ] = None,
+    effect: Annotated[
+        str | None, typer.Option(metavar="FACTOR,FACTOR", help="Factors on what people feel; 1 is the config.")
+    ] = None,
+    studies: Annotated[int, typer.Option(min=1, max=10_000_000, help="Simulated studies of each design.")] = 10_000,
+    target: Annotated[float, typer.Option(help="Power that a design is to reach.")] = 0.8,
+    null: Annotated[bool, typer.Option("--null", help="People who feel no difference: false positives.")] = False,
+    seed: Annotated[int, typer.Option(min=0, max=2**63 - 1, help="Seed of the studies.")] = 1,
+    paper: Annotated[str, typer.Option(help="Published numbers whose pattern may recur.")] = "paper",
+    workers: Annotated[int | None, typer.Option(min=1, help="Processes; as many as cores unless given.")] = None,
+    scheduler: Annotated[str | None, typer.Option(metavar="ADDRESS", help="Work on this Dask cluster instead.")] = None,
+    out: Annotated[Path, typer.Option(help="Folder for power.json, figures and report.")] = Path("results/power"),
+    as_json: AsJson = False,
+) -> None:
+    """Simulated power and precision: how many people and trials does it take, and what does it cost?"""
+    from experiments.roof import power as roof
+
+    request = roof.Request(
+        config=config,
+        participants=participants,
+        trials=trials,
+        methods=tuple(methods or ()),
+        effects=effect,
+        studies=studies,
+        target=target,
+        null=null,
+        seed=seed,
+        paper=paper,
+    )
+    found = roof.power(request, roof.Where(workers=workers, scheduler=scheduler), out, _progress)
+    _show(found, f"{roof.as_text(found)}\nReport: {out / 'report.html'}", as_json)
 
 
 def _tracked(files: Sequence[Path]) -> Iterable[Path]:

@@ -1,0 +1,110 @@
+"""What the tests of an experiment take for granted, in plain sentences, and a warning where it does not hold."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+Statistics = Mapping[str, Any]
+
+EPSILON = 0.75
+"""Below it the pooled Tukey test is not to be read: its familywise error grows to .064 at .72 and .088 at .45."""
+END_SHARE = 0.15
+"""Share of participants at an end of the scale that counts as a floor or ceiling effect (Terwee et al. 2007)."""
+ALPHA = 0.05
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Assumption:
+    """A sentence, the warning if it does not hold, and whether that changes which number to read (`serious`)."""
+
+    assumption: str
+    warning: str | None = None
+    serious: bool = False
+
+
+def assumptions(found: Statistics) -> list[Assumption]:
+    """The assumptions behind one experiment's entry of `statistics.json`; none where nothing was tested."""
+    if found["anova"] is None:
+        return []
+    direction = [_answers_independent(found), _log_odds(found)] if "binomial" in found else []
+    return [_people_independent(), _sphericity(found), _normality(found), _ends(found), _outliers(found), *direction]
+
+
+def _people_independent() -> Assumption:
+    return Assumption(assumption="Participants are independent of each other; the design has to see to it.")
+
+
+def _sphericity(found: Statistics) -> Assumption:
+    text = "The uncorrected F test and the pooled Tukey test take all differences of two methods to vary alike."
+    corrected = found["sphericity"]["greenhouse_geisser"]
+    if corrected is None or corrected["epsilon"] >= EPSILON:
+        return Assumption(assumption=text)
+    warning = (
+        f"sphericity does not hold (Greenhouse-Geisser epsilon below {EPSILON}): read the corrected F test and "
+        "the Tukey test with each pair's own error (tukey_paired), not the pooled one"
+    )
+    return Assumption(assumption=text, warning=warning, serious=True)
+
+
+def _normality(found: Statistics) -> Assumption:
+    text = "The residuals of the ANOVA are normal; F and t tests of means hardly mind small departures."
+    p = found["diagnostics"]["normality"]["p"]
+    departs = p is not None and p < ALPHA
+    warning = f"the residuals depart from normal (Shapiro-Wilk p < {ALPHA}): see the Friedman test" if departs else None
+    return Assumption(assumption=text, warning=warning)
+
+
+def _ends(found: Statistics) -> Assumption:
+    counts, n = found["diagnostics"], found["n"]
+    hit = [
+        f"{method} ({end} {counts[end][method]} of {n})"
+        for end in ("floor", "ceiling")
+        for method in found["methods"]
+        if counts[end][method] > END_SHARE * n
+    ]
+    warning = (
+        f"many participants score at an end of the scale, which shrinks variances: {', '.join(hit)}" if hit else None
+    )
+    return Assumption(assumption="The scale leaves room at both ends for every participant.", warning=warning)
+
+
+def _outliers(found: Statistics) -> Assumption:
+    people = sorted({outlier["participant"] for outlier in found["diagnostics"]["outliers"]["found"]})
+    shown = ", ".join(people[:5]) + (f" and {len(people) - 5} more" if len(people) > 5 else "")
+    warning = f"participants with a score far from the others' (kept): {shown}" if people else None
+    return Assumption(assumption="No single participant decides a mean.", warning=warning)
+
+
+def _answers_independent(found: Statistics) -> Assumption:
+    turned = [
+        f"{method} {direction}"
+        for method, tests in found["binomial"].items()
+        for direction, test in tests.items()
+        if _turned(test)
+    ]
+    warning = (
+        f"people differ so much that the pooled binomial test is not to be read: {', '.join(turned)}"
+        if turned
+        else None
+    )
+    text = "The pooled binomial tests take all answers as independent; the clustering in people stands beside each."
+    return Assumption(assumption=text, warning=warning, serious=bool(turned))
+
+
+def _turned(test: Statistics) -> bool:
+    """Does the clustering change on which side of .05 the pooled p lies?"""
+    found = test["clustering"]
+    if found["design_effect"] is None or found["design_effect"] <= 1.0:
+        return False
+    return bool((test["p"] < ALPHA) != (found["p_adjusted"] < ALPHA))
+
+
+def _log_odds(found: Statistics) -> Assumption:
+    model = found["model"]
+    text = "The logistic model takes every method to have right and wrong answers, enough of both."
+    warning = f"there is no logistic model. {model['reason'].rstrip('.')}" if model["reason"] else None
+    if model["few"]:
+        warning = f"fewer than 5 right or wrong answers, so its tests are unreliable: {', '.join(model['few'])}"
+    return Assumption(assumption=text, warning=warning)

@@ -1,0 +1,168 @@
+"""Printed numbers: decimal text into the exact intervals of the true values that print so.
+
+A tie can fall either way in binary arithmetic, so half-down stands beside half-up and half-even; truncation is a
+habit of its own. `ANY` is the union of the four: what lies outside it prints so under none.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable
+from dataclasses import dataclass
+from enum import StrEnum
+from fractions import Fraction
+from math import ceil, floor
+from typing import Literal
+
+Relation = Literal["=", "<", "<=", ">", ">="]
+_RELATIONS: dict[str, Relation] = {"": "=", "=": "=", "<": "<", ">": ">", "<=": "<=", ">=": ">=", "≤": "<=", "≥": ">="}
+_TEXT = re.compile(r"^(<=|>=|[<>=≤≥]?)\s*([-+−]?)\s*([0-9]*)(?:\.([0-9]*))?\s*(%?)$")
+
+
+class Rounding(StrEnum):
+    """How a value became its printed digits; the text is what a report says."""
+
+    HALF_UP = "rounding half up"
+    HALF_EVEN = "rounding half to even"
+    HALF_DOWN = "rounding half down"
+    TRUNCATION = "truncation"
+    ANY = "roundings mixed"
+
+
+@dataclass(frozen=True, slots=True)
+class Interval:
+    """Rational numbers between two ends, each in or out; an end that is None is infinite."""
+
+    low: Fraction | None
+    high: Fraction | None
+    low_closed: bool = True
+    high_closed: bool = True
+
+    def holds(self, value: Fraction) -> bool:
+        """Is `value` inside?"""
+        above = self.low is None or value > self.low or (self.low_closed and value == self.low)
+        below = self.high is None or value < self.high or (self.high_closed and value == self.high)
+        return above and below
+
+    def mapped(self, change: Callable[[Fraction], Fraction]) -> Interval:
+        """The image under a strictly increasing `change`."""
+        low = None if self.low is None else change(self.low)
+        high = None if self.high is None else change(self.high)
+        return Interval(low, high, self.low_closed, self.high_closed)
+
+    def integers(self, low: int | None = None, high: int | None = None) -> range:
+        """The integers inside, also within `low..high`; `ValueError` if that leaves an end open."""
+        ends = [] if self.low is None else [ceil(self.low) if self.low_closed else floor(self.low) + 1]
+        tops = [] if self.high is None else [floor(self.high) if self.high_closed else ceil(self.high) - 1]
+        ends += [] if low is None else [low]
+        tops += [] if high is None else [high]
+        if not ends or not tops:
+            raise ValueError("the interval has an infinite end: name the bound of the integers")
+        return range(max(ends), max(min(tops), max(ends) - 1) + 1)
+
+    def squared(self) -> Interval | None:
+        """The squares of the numbers inside that are not negative; None if there are none."""
+        if self.high is not None and (self.high < 0 or (self.high == 0 and not self.high_closed)):
+            return None
+        negative = self.low is None or self.low < 0
+        low = Fraction(0) if self.low is None or negative else self.low**2
+        high = None if self.high is None else self.high**2
+        return Interval(low, high, self.low_closed or negative, self.high_closed)
+
+    def meets(self, other: Interval) -> bool:
+        """Is any number in both?"""
+        return _before(self, other) and _before(other, self)
+
+    def __str__(self) -> str:
+        low = "-inf" if self.low is None else decimal(self.low)
+        high = "inf" if self.high is None else decimal(self.high)
+        return f"{'[' if self.low_closed else '('}{low}, {high}{']' if self.high_closed else ')'}"
+
+
+def _before(one: Interval, other: Interval) -> bool:
+    """Does `one` begin before `other` ends?"""
+    if one.low is None or other.high is None:
+        return True
+    return one.low < other.high or (one.low == other.high and one.low_closed and other.high_closed)
+
+
+@dataclass(frozen=True, slots=True)
+class PrintedNumber:
+    """A number as printed: `value` and `unit` (one of its last digit) with a percent sign already divided out.
+
+    `digits` is the number in units of its last digit: its evenness decides ties to even.
+    """
+
+    text: str
+    relation: Relation
+    value: Fraction
+    unit: Fraction
+
+    @property
+    def digits(self) -> int:
+        """The value in units of the last digit."""
+        return int(self.value / self.unit)
+
+    def interval(self, rounding: Rounding) -> Interval:
+        """The true values that print so; for a bound such as "< .001" all that satisfy it, however rounded."""
+        if self.relation != "=":
+            return _bound(self.relation, self.value)
+        positive = _positive_interval(abs(self.value), self.unit, abs(self.digits), rounding)
+        if self.value == 0:
+            end, closed = positive.high, positive.high_closed
+            return Interval(None if end is None else -end, end, closed, closed)
+        return positive if self.value > 0 else _mirrored(positive)
+
+
+def read(text: str | int) -> PrintedNumber:
+    """A printed number such as "28.45", ".205", "< .001", "64.3%"; `ValueError` if it is none.
+
+    >>> read("64.3%").value
+    Fraction(643, 1000)
+    """
+    found = _TEXT.match(str(text).strip())
+    if found is None or not (found[3] or found[4]):
+        raise ValueError(f"{text!r} is no printed number (rule: digits, as in '28.45', '< .001' or '64.3%')")
+    relation, sign, whole, decimals, percent = found.groups()
+    decimals = decimals or ""
+    unit = Fraction(1, 10 ** len(decimals)) / (100 if percent else 1)
+    value = int(whole + decimals) * unit
+    return PrintedNumber(str(text).strip(), _RELATIONS[relation], -value if sign in {"-", "−"} else value, unit)
+
+
+def _positive_interval(value: Fraction, unit: Fraction, digits: int, rounding: Rounding) -> Interval:
+    half = unit / 2
+    even = digits % 2 == 0
+    match rounding:
+        case Rounding.HALF_UP:
+            return Interval(value - half, value + half, True, False)
+        case Rounding.HALF_EVEN:
+            return Interval(value - half, value + half, even, even)
+        case Rounding.HALF_DOWN:
+            return Interval(value - half, value + half, False, True)
+        case Rounding.TRUNCATION:
+            return Interval(value, value + unit, True, False)
+        case Rounding.ANY:
+            return Interval(value - half, value + unit, True, False)
+
+
+def _mirrored(interval: Interval) -> Interval:
+    low = None if interval.high is None else -interval.high
+    high = None if interval.low is None else -interval.low
+    return Interval(low, high, interval.high_closed, interval.low_closed)
+
+
+def _bound(relation: Relation, value: Fraction) -> Interval:
+    if relation in {"<", "<="}:
+        return Interval(None, value, False, relation == "<=")
+    return Interval(value, None, relation == ">=", False)
+
+
+def decimal(value: Fraction, digits: int = 6) -> str:
+    """`value` to at most so many decimals for a report: the display rounds, no check does.
+
+    >>> decimal(Fraction(5, 14))
+    '0.357143'
+    """
+    whole, part = divmod(abs(round(value * 10**digits)), 10**digits)
+    return f"{'-' if value < 0 else ''}{whole}.{part:0{digits}d}".rstrip("0").rstrip(".")

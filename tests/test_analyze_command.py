@@ -1,0 +1,159 @@
+"""`recoil analyze` with several studies, maps and rules, and the tables it writes for other programs."""
+
+from __future__ import annotations
+
+import csv
+import json
+import os
+import signal
+import stat
+import subprocess
+import time
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from analysis.logs import read_logs
+from analysis.studies import study_names
+from analysis.summary import summarize
+from analysis.tables_out import MAX_NAME, short_names
+from tests.conftest import RECOIL, Recoil
+from tests.log_files import METHODS, trial_rows, trials_path, write_rows, write_study
+
+EXAMPLES = Path(__file__).parent.parent / "configs" / "examples"
+
+
+def _statistics(out: Path) -> Any:
+    return json.loads((out / "statistics.json").read_text(encoding="utf-8"))
+
+
+def _table(path: Path) -> list[dict[str, str]]:
+    with path.open(encoding="utf-8", newline="") as stream:
+        return list(csv.DictReader(stream, strict=True))
+
+
+@pytest.fixture
+def sites(tmp_path: Path) -> Path:
+    """Two sites with the same codes, of different people."""
+    write_study(tmp_path / "data" / "kyoto" / "results", participants=3, seed=1)
+    write_study(tmp_path / "data" / "oslo" / "results", participants=2, seed=2)
+    return tmp_path / "data"
+
+
+def test_the_same_code_at_two_sites_is_two_people(recoil: Recoil, sites: Path, tmp_path: Path) -> None:
+    done = recoil("analyze", sites, "--out", tmp_path / "out")
+    assert done.returncode == 0, done.stderr
+    found = _statistics(tmp_path / "out")
+    people = ["kyoto/P01", "kyoto/P02", "kyoto/P03", "oslo/P01", "oslo/P02"]
+    assert list(found["direction"]["participants"]) == people
+    alone = summarize(read_logs([sites / "oslo"]))
+    for key in ("n", "means", "sds", "participants"):
+        assert found["studies"]["oslo"]["direction"][key] == alone["direction"][key]
+    assert {name: one["preference"]["n"] for name, one in found["studies"].items()} == {"kyoto": 3, "oslo": 2}
+
+
+def test_one_study_is_told_as_before(recoil: Recoil, sites: Path, tmp_path: Path) -> None:
+    recoil("analyze", sites / "oslo", "--out", tmp_path / "out")
+    found = _statistics(tmp_path / "out")
+    assert list(found["direction"]["participants"]) == ["P01", "P02"]
+    assert "studies" not in found
+    assert "rules" not in found
+
+
+def test_a_second_log_within_a_study_is_a_problem_and_across_studies_none(sites: Path) -> None:
+    copy = sites / "oslo" / "results" / "sub-P01" / "sub-P01_task-direction_run-2_trials.csv"
+    write_rows(copy, trial_rows("P01", 99))
+    (problem,) = read_logs([sites]).problems
+    assert "has a direction log already in" in problem.message
+
+
+def test_tables_for_other_programs_hold_the_statistics_scores(recoil: Recoil, sites: Path, tmp_path: Path) -> None:
+    out = tmp_path / "out"
+    recoil("analyze", sites / "kyoto", "--out", out)
+    found = _statistics(out)
+    wide = _table(out / "direction_wide.csv")
+    for row in wide:
+        for method in METHODS:
+            name = method.replace("-", "_")
+            scores = found["direction"]["participants"][row["participant_id"]]
+            assert float(row[f"{name}_rate_forward"]) == scores[method]
+    assert [len(wide), len(_table(out / "direction_long.csv"))] == [3, 9]
+    ratings = {
+        (row["participant_id"], row["method"]): float(row["rating"]) for row in _table(out / "preference_long.csv")
+    }
+    scores = found["preference"]["participants"]
+    assert ratings == {(code, method): scores[code][method] for code in scores for method in METHODS}
+    assert b"\r\n" in (out / "preference_wide.csv").read_bytes()
+    assert stat.S_IMODE((out / "preference_wide.csv").stat().st_mode) == 0o600
+
+
+def test_rules_and_what_they_left_out_stand_in_the_statistics_and_the_report(recoil: Recoil, tmp_path: Path) -> None:
+    write_study(tmp_path / "study", participants=4)
+    rows = trial_rows("P02", 7)
+    rows[0]["flags"] = "interrupted"
+    write_rows(trials_path(tmp_path / "study", "P02"), rows)
+    rules = tmp_path / "rules.toml"
+    rules.write_text((EXAMPLES / "rules.toml").read_text() + '\n[[excluded]]\ncode = "P04"\nreason = "fell ill"\n')
+    done = recoil("analyze", tmp_path / "study", "--out", tmp_path / "out", "--rules", rules)
+    assert done.returncode == 1, done.stderr
+    found = _statistics(tmp_path / "out")
+    assert found["rules"]["dropped"]["direction"] == {"P02": {"drop_flags": 1}}
+    assert found["rules"]["trials"]["direction"] == {"recorded": 240, "kept": 239}
+    assert {"experiment": "direction", "participant": "P04", "reason": "fell ill", "rule": "excluded"} in found[
+        "excluded"
+    ]
+    report = (tmp_path / "out" / "report.md").read_text(encoding="utf-8")
+    assert "Participant P04 in direction recognition: fell ill." in report
+    assert "drop_flags 1" in report.replace("\\", "")
+
+
+def test_a_map_reads_other_programs_logs_and_the_report_says_so(recoil: Recoil, tmp_path: Path) -> None:
+    for i in (1, 2):
+        lines = ["participant,phase,condition,shot_direction,key_resp.keys,key_resp.rt"]
+        keys = {"forward": "up", "backward": "down"}
+        lines += [
+            f"P0{i},main,{r['method']},{r['direction'][0]},{keys[r['response']]},{r['response_time_s']}"
+            for r in trial_rows(f"P0{i}", i)
+        ]
+        (tmp_path / f"P0{i}.csv").write_text("\n".join(lines) + "\n")
+    words = ("analyze", *sorted(tmp_path.glob("P*.csv")), "--out", tmp_path / "out")
+    done = recoil(*words, "--columns", EXAMPLES / "columns.toml")
+    assert done.returncode == 0, done.stderr
+    assert _statistics(tmp_path / "out")["direction"]["n"] == 2
+    assert "columns.toml, sha256" in (tmp_path / "out" / "report.md").read_text(encoding="utf-8")
+
+
+@pytest.mark.parametrize("option", ["--columns", "--rules"])
+def test_a_bad_map_or_bad_rules_end_with_one_message_and_2(recoil: Recoil, tmp_path: Path, option: str) -> None:
+    bad = tmp_path / "bad.toml"
+    bad.write_text("speed = 9\n")
+    done = recoil("analyze", tmp_path, "--out", tmp_path / "out", option, bad)
+    assert done.returncode == 2
+    assert "bad.toml: key speed = 9 is unknown" in done.stderr
+    assert "Traceback" not in done.stderr
+
+
+def test_an_interrupt_ends_at_once_with_130(tmp_path: Path) -> None:
+    lines = b"participant_id,experiment\n" + b"P01,direction\n" * 200
+    for number in range(4000):
+        (tmp_path / f"{number}_trials.csv").write_bytes(lines)
+    words = [str(RECOIL), "analyze", str(tmp_path), "--out", str(tmp_path / "out")]
+    with subprocess.Popen(words, stderr=subprocess.PIPE, stdout=subprocess.DEVNULL, env={**os.environ}) as running:
+        time.sleep(1.5)
+        if running.poll() is None:
+            running.send_signal(signal.SIGINT)
+        assert running.wait(timeout=20) in {130, 2}  # 2: was done already, with nothing usable
+
+
+def test_names_of_studies_are_what_tells_them_apart() -> None:
+    assert study_names(["/d/a/results", "/d/b/results"]) == {"/d/a/results": "a", "/d/b/results": "b"}
+    assert study_names(["/d/a", "/d/a/b"]) == {"/d/a": "a", "/d/a/b": "a/b"}
+    assert study_names(["/d/a/x", "/d/b"]) == {"/d/a/x": "a/x", "/d/b": "b"}
+    assert study_names([]) == {}
+
+
+def test_long_names_stay_apart_and_within_the_limit() -> None:
+    names = short_names([f"{'a very long method name ' * 5}{i}_rate_forward" for i in range(12)] + ["A", "a"])
+    assert max(map(len, names)) <= MAX_NAME
+    assert len({name.lower() for name in names}) == 14

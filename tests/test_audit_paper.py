@@ -1,0 +1,146 @@
+"""The audit of whole files: this paper's numbers, the example from another field, and the messages of the door."""
+
+from __future__ import annotations
+
+import inspect
+from fractions import Fraction
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from analysis.audit import CHECKS, Finding, audit, load_paper_file, parse_paper, repeated_f
+from analysis.audit.claims import AnyClaim
+from tests.exact import exact_rm_F
+
+ROOT = Path(__file__).parent
+GOLDEN = ROOT / "golden" / "audit"
+RATES = ["55.7%", "79.3%", "92.9%"]
+
+
+@pytest.fixture(scope="module")
+def findings() -> tuple[Finding, ...]:
+    text = (ROOT.parent / "configs" / "paper.toml").read_text(encoding="utf-8")
+    if "[[claims]]" not in text:
+        text += (GOLDEN / "paper_claims.toml").read_text(encoding="utf-8")
+    return audit(parse_paper(text))
+
+
+def one(findings: tuple[Finding, ...], check: str, quote: str) -> Finding:
+    found = [f for f in findings if f.result.check == check and quote in f.quote]
+    assert len(found) == 1, [f.quote for f in found]
+    return found[0]
+
+
+def test_f_of_experiment_1_is_off_the_lattice_and_rescued_by_readings_only(findings: tuple[Finding, ...]) -> None:
+    """By hand: A = 3 (78^2 + 111^2 + 130^2) - 319^2 = 4154, F = 13 A / (14 W - A), W even: 434 and 432 are next."""
+    result = one(findings, "repeated-measures F", "28.45").result
+    assert result.verdict == "only under a reading"
+    assert result.readings == ("arcsine transform", "scores in steps of 0.05 with other means")
+    assert result.below == Fraction(13 * 4154, 14 * 434 - 4154)  # 28.10
+    assert result.above == Fraction(13 * 4154, 14 * 432 - 4154)  # 28.51
+    assert dict(result.numbers)["A"] == "4154"
+
+
+def test_no_scores_in_tenths_give_f_of_experiment_1() -> None:
+    assert repeated_f("28.45", 14, 3, RATES, grain="0.1", low="0", high="1").verdict == "not attainable"
+    assert repeated_f("28.45", 14, 3, RATES, grain="0.1").verdict == "not attainable"
+
+
+@pytest.mark.parametrize("F", ["28.51", "28.10"])
+def test_the_neighbours_of_f_have_data_that_give_them(F: str) -> None:
+    result = repeated_f(F, 14, 3, RATES, grain="0.1", low="0", high="1")
+    rows = np.array([[int(10 * value) for value in row] for row in result.witness])
+    assert result.verdict == "attainable"
+    assert rows.sum(axis=0).tolist() == [78, 111, 130]
+    assert rows.min() >= 0
+    assert rows.max() <= 10
+    assert f"{float(exact_rm_F(rows.astype(float))):.2f}" == F
+
+
+def test_two_percentages_contradict_their_counts(findings: tuple[Finding, ...]) -> None:
+    wrong = {f.result.printed: dict(f.result.numbers) for f in findings if f.result.verdict == "not attainable"}
+    assert wrong == {
+        "5 of 14, 33.7%": {"counts of 14 that print 33.7%": "none"},
+        "4 of 14, 35.7%": {"counts of 14 that print 35.7%": "5"},
+    }
+
+
+def test_the_binomial_p_say_which_counts_gave_them(findings: tuple[Finding, ...]) -> None:
+    forward = one(findings, "binomial p", "0.205").result
+    backward = one(findings, "binomial p", "0.673").result
+    assert (forward.verdict, dict(forward.numbers)["counts of 140 that give p"]) == ("attainable", "62, 78")
+    assert (backward.verdict, dict(backward.numbers)["counts of 140 that give p"]) == ("attainable", "67, 73")
+
+
+def test_all_else_stands_or_is_left_open(findings: tuple[Finding, ...]) -> None:
+    others = {f.result.check for f in findings if f.result.verdict in {"not attainable", "only under a reading"}}
+    assert others == {"repeated-measures F", "percent of count"}
+    assert {f.result.check for f in findings if f.result.verdict == "undecided"} == {"stated"}
+    assert {f.result.check for f in findings if f.result.verdict == "not published"} == {"unpublished"}
+    assert len(findings) > 55
+
+
+def test_every_attainable_f_has_its_data(findings: tuple[Finding, ...]) -> None:
+    second = one(findings, "repeated-measures F", "33.810").result
+    assert second.verdict == "attainable"
+    table = [[int(10 * value) for value in row] for row in second.witness]
+    assert f"{float(exact_rm_F(np.array(table, dtype=float))):.3f}" == "33.810"
+
+
+def test_the_shipped_file_loads_as_it_is() -> None:
+    assert load_paper_file(ROOT.parent / "configs" / "paper.toml").direction is not None
+
+
+def test_an_example_from_another_field_gets_the_verdicts_its_notes_announce() -> None:
+    for finding in audit(load_paper_file(GOLDEN / "example.toml")):
+        assert finding.note.startswith(finding.result.verdict), finding
+
+
+def test_the_example_has_every_kind_of_claim() -> None:
+    text = (GOLDEN / "example.toml").read_text(encoding="utf-8")
+    missing = [kind for kind in [*CHECKS, "stated", "unpublished"] if f'kind = "{kind}"' not in text]
+    assert not missing
+
+
+def test_a_claim_has_the_arguments_of_its_check_and_no_others() -> None:
+    union = AnyClaim.__args__[0].__args__
+    for model in union:
+        kind = model.model_fields["kind"].annotation.__args__[0]
+        if kind in CHECKS:
+            names = set(model.model_fields) - model.not_arguments
+            assert names == set(inspect.signature(CHECKS[kind]).parameters), kind
+
+
+def test_every_check_names_its_source() -> None:
+    assert all("Source" in (check.__doc__ or "") for check in CHECKS.values())
+
+
+@pytest.mark.parametrize(
+    ("claim", "message"),
+    [
+        ('kind = "grim"\nmean = "5.2x"\nn = 28', "no printed number"),
+        ('kind = "grim"\nmean = 5.2\nn = 28', "mean"),
+        ('kind = "grim"\nmean = "5.2"\nn = 0', "n"),
+        ('kind = "grim"\nmean = "5.2"', "n"),
+        ('kind = "guess"', "kind"),
+        ('kind = "grim"\nmean = "5.2"\nn = 28\nextra = 1', "extra"),
+    ],
+)
+def test_a_fault_is_named_with_its_key(claim: str, message: str) -> None:
+    with pytest.raises(ValueError, match=message) as error:
+        parse_paper(f'[[claims]]\nplace = "I"\nquote = "x"\n{claim}', "some.toml")
+    assert str(error.value).startswith("some.toml: key claims.0")
+
+
+def test_a_claim_that_makes_no_sense_is_named_by_its_place() -> None:
+    paper = parse_paper('[[claims]]\nplace = "II"\nquote = "x"\nkind = "percent"\npercent = "50%"\ncount = 3\nn = 2')
+    with pytest.raises(ValueError, match=r"II, “x”: count must lie in 0\.\.2"):
+        audit(paper)
+
+
+def test_what_is_no_toml_or_no_file_is_said() -> None:
+    with pytest.raises(ValueError, match="not a TOML file"):
+        parse_paper("a = ")
+    with pytest.raises(ValueError, match="cannot be read"):
+        load_paper_file("nowhere.toml")

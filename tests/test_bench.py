@@ -1,0 +1,28 @@
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+from tests.conftest import Recoil
+
+
+def test_the_bench_tells_error_rates_and_power_of_every_post_hoc_test(recoil: Recoil, tmp_path: Path) -> None:
+    out = tmp_path / "bench"
+    done = recoil("bench", "post-hocs", "--out", out, "--json")
+    assert done.returncode == 0, done.stderr
+    found = json.loads(done.stdout)
+    assert found == json.loads((out / "bench.json").read_text(encoding="utf-8"))
+    assert len(found["post-hocs"]) == 12
+    assert all(row["data_sets"] == 20_000 for row in found["post-hocs"])
+    page = (out / "report.md").read_text(encoding="utf-8")
+    assert all(row["post_hoc"] in page for row in found["post-hocs"])
+    pooled = next(row for row in found["post-hocs"] if row["claimed"] == 0.05)
+    assert f"{pooled['null_error']:.4f}" in page
+    assert (out / "report.html").stat().st_mode & 0o077 == 0
+
+
+def test_an_unknown_part_is_named_with_those_there_are(recoil: Recoil) -> None:
+    done = recoil("bench", "horoscope")
+    assert done.returncode == 2
+    assert "horoscope" in done.stderr
+    assert "post-hocs" in done.stderr

@@ -1,0 +1,137 @@
+"""Rules leave out trials and participants, and everything left out is counted and named."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from analysis.exclusions import Effect, Rules, apply_rules
+from analysis.logs import Logs, read_logs
+from analysis.summary import summarize
+from analysis.toml_model import load_model
+from tests.log_files import TextRow, rating_rows, ratings_path, trial_rows, trials_path, write_rows, write_study
+
+EXAMPLE = Path(__file__).parent.parent / "configs" / "examples" / "rules.toml"
+
+
+def _rules(folder: Path, text: str) -> Rules:
+    path = folder / "rules.toml"
+    path.write_text(text, encoding="utf-8")
+    return load_model(Rules, path)
+
+
+def _spoilt(folder: Path) -> Logs:
+    """Four people: P02 has a quick, a slow, a flagged and an unanswered trial, P03 says always forward."""
+    write_study(folder, participants=4)
+    rows = trial_rows("P02", 1002)
+    rows[0]["response_time_s"], rows[1]["response_time_s"], rows[2]["flags"] = "0.01", "30", "repeated interrupted"
+    rows[3].update(response="", correct="", response_time_s="", response_time_valid="")
+    rows[4].update(response_time_s="0.01", response_time_valid="0")
+    rows[5].update(response_time_s="0.02", flags="interrupted")
+    write_rows(trials_path(folder, "P02"), rows)
+    write_rows(trials_path(folder, "P03"), [_forward(row) for row in trial_rows("P03", 1003)])
+    return read_logs([folder])
+
+
+def _forward(row: TextRow) -> TextRow:
+    return row | {"response": "forward", "correct": str(int(row["direction"] == "forward"))}
+
+
+@pytest.fixture
+def effect(tmp_path: Path) -> Effect:
+    return apply_rules(_spoilt(tmp_path), load_model(Rules, EXAMPLE))
+
+
+def test_dropped_trials_are_counted_by_participant_and_the_first_rule_that_drops_them(effect: Effect) -> None:
+    assert effect.dropped == {
+        "direction": {
+            "P02": {"drop_flags": 2, "response_time_min_s": 1, "response_time_max_s": 1, "drop_unanswered": 1}
+        },
+        "preference": {},
+    }
+    assert effect.trials["direction"] == {"recorded": 240, "kept": 235}
+
+
+def test_statistics_are_over_the_trials_and_people_that_are_kept(effect: Effect) -> None:
+    found = summarize(effect.logs)
+    assert found["excluded"] == []
+    assert (found["direction"]["n"], found["preference"]["n"]) == (3, 4)
+    tested = [test["trials"] for tests in found["direction"]["binomial"].values() for test in tests.values()]
+    assert sum(tested) == 180 - 5
+
+
+def test_who_says_always_the_same_is_left_out_with_rule_and_reason(effect: Effect) -> None:
+    reason = "1 of the answers are the same (rule: at most 0.95)"
+    assert effect.excluded == (
+        {"experiment": "direction", "participant": "P03", "reason": reason, "rule": "max_same_response_share"},
+    )
+
+
+def test_participants_need_a_share_of_their_trials_and_of_correct_answers(tmp_path: Path) -> None:
+    rules = _rules(
+        tmp_path,
+        """
+trials.response_time_max_s = 20
+trials.drop_unanswered = true
+participants.min_kept_share = 0.98
+accuracy = [{method = "vibration", min_share = 0.51}, {method = "ramp", min_share = 0.5}]
+""",
+    )
+    effect = apply_rules(_spoilt(tmp_path), rules)
+    found = {entry["participant"]: (entry["rule"], entry["reason"]) for entry in effect.excluded}
+    assert found["P02"] == ("min_kept_share", "58 of 60 trials kept (rule: at least 0.98 of them)")
+    assert found["P03"] == ("accuracy", "0.5 correct with vibration (rule: at least 0.51)")
+    assert effect.warnings == ("the rules ask for accuracy with ramp, which no direction log has",)
+
+
+def test_listed_participants_are_left_out_of_both_experiments_and_unknown_ones_are_named(tmp_path: Path) -> None:
+    write_study(tmp_path, participants=2)
+    entries = '[[excluded]]\ncode = "P02"\nreason = "left-handed"\n[[excluded]]\ncode = "P9"\nreason = "typing error"'
+    effect = apply_rules(read_logs([tmp_path]), _rules(tmp_path, entries))
+    assert [(entry["experiment"], entry["participant"], entry["reason"]) for entry in effect.excluded] == [
+        ("direction", "P02", "left-handed"),
+        ("preference", "P02", "left-handed"),
+    ]
+    assert set(effect.logs.trials["participant_id"]) == set(effect.logs.ratings["participant_id"]) == {"P01"}
+    assert effect.warnings == ("the rules exclude P9, who has no log here",)
+
+
+def test_of_several_studies_the_one_that_is_named(tmp_path: Path) -> None:
+    for number, site in enumerate(("kyoto", "oslo")):
+        write_study(tmp_path / site, participants=2, seed=number + 1)
+    entry = '[[excluded]]\ncode = "P02"\nstudy = "oslo"\nreason = "left-handed"'
+    effect = apply_rules(read_logs([tmp_path]), _rules(tmp_path, entry))
+    assert set(effect.logs.ratings["participant_id"]) == {"kyoto/P01", "kyoto/P02", "oslo/P01"}
+
+
+def test_who_has_no_trial_left_is_listed(tmp_path: Path) -> None:
+    write_study(tmp_path, participants=2)
+    write_rows(ratings_path(tmp_path, "P02"), [row | {"flags": "noise"} for row in rating_rows("P02")])
+    effect = apply_rules(read_logs([tmp_path]), _rules(tmp_path, 'trials.drop_flags = ["noise"]'))
+    assert [(one["participant"], one["reason"]) for one in effect.excluded] == [
+        ("P02", "0 of 3 trials kept (rule: at least one)")
+    ]
+
+
+def test_no_rules_change_nothing(tmp_path: Path) -> None:
+    logs = _spoilt(tmp_path)
+    effect = apply_rules(logs, Rules())
+    assert summarize(effect.logs) == summarize(logs)
+    assert effect.excluded == ()
+
+
+@pytest.mark.parametrize(
+    ("text", "words"),
+    [
+        ("trials.response_time_min_s = 2.0\ntrials.response_time_max_s = 1.0", "must be below response_time_max_s = 1"),
+        ("participants.min_kept_share = 80", "key participants.min_kept_share = 80"),
+        ('excluded = [{code = "P 1", reason = "x"}]', "key excluded.0.code = 'P 1'"),
+        ('excluded = [{code = "P1"}]', "key excluded.0.reason is missing"),
+        ("trials.drop = 1", "key trials.drop = 1 is unknown"),
+    ],
+)
+def test_bad_rules_are_refused_with_file_key_value_and_rule(text: str, words: str, tmp_path: Path) -> None:
+    with pytest.raises(ValueError, match=r"rules[.]toml: ") as refused:
+        _rules(tmp_path, text)
+    assert words in str(refused.value)

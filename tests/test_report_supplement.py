@@ -1,0 +1,71 @@
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from analysis.report_parts import Section
+from analysis.report_supplement import TITLES, supplement_sections
+from tests.test_sphericity import RIGHT
+from tests.test_supplement import CEILING, ONE_AT_CEILING, _ratings, _study
+
+
+@pytest.fixture(scope="module")
+def direction(tmp_path_factory: pytest.TempPathFactory) -> Section:
+    (section,) = supplement_sections(_study(tmp_path_factory.mktemp("study"), RIGHT))
+    return section
+
+
+@pytest.mark.parametrize(
+    "words",
+    [
+        "Mauchly's W = .54, χ²(2) = 7.34, p = .025",
+        "Greenhouse-Geisser corrected (ε = .69): F(1.37, 17.84) = 36.52, p < .001",
+        "Huynh-Feldt corrected (ε = .74): F(1.48, 19.24) = 36.52, p < .001",
+        "Partial η² = .74, 90 % CI [0.54, 0.81], 95 % CI [0.50, 0.82]; generalised η² = .64",
+        "χ²(2) = 25.53, p < .001, Kendall's W = .91",
+        "Mancl & DeRouen",
+        "r = 0.707",
+        "W = .95, p = .059",
+    ],
+)
+def test_the_section_says_in_the_style_of_the_apa(words: str, direction: Section) -> None:
+    assert words in "\n".join(direction.paragraphs)
+
+
+def test_the_pairs_stand_side_by_side_with_every_test(direction: Section) -> None:
+    pairs = direction.tables[0]
+    assert pairs.rows[0][:3] == ("Asymmetric Force I − Vibration", "< .001", ".001")
+    assert pairs.rows[2][0] == "Asymmetric Force II − Asymmetric Force I"
+    assert all(len(row) == len(table.header) for table in direction.tables for row in table.rows)
+
+
+def test_assumptions_are_a_list_with_warnings_in_the_words_of_the_report(direction: Section) -> None:
+    told = "\n".join(direction.items)
+    assert "Warning: sphericity does not hold" in told
+    assert "Asymmetric Force II (ceiling 10 of 14)" in told
+    assert "asymmetric-2" not in told
+
+
+def test_ratings_have_no_model_of_answers(tmp_path: Path) -> None:
+    (section,) = supplement_sections(_ratings(tmp_path, RIGHT))
+    assert section.title == TITLES["preference"]
+    assert len(section.tables) == 2
+    assert "odds" not in " ".join(section.paragraphs)
+
+
+def test_separation_is_told_instead_of_a_table(tmp_path: Path) -> None:
+    (section,) = supplement_sections(_study(tmp_path, ONE_AT_CEILING))
+    assert any(
+        "Asymmetric Force II (every answer right); no contrast is given" in words for words in section.paragraphs
+    )
+    assert not any("Odds ratios" in table.caption for table in section.tables)
+
+
+def test_reasons_stand_where_there_are_no_numbers(tmp_path: Path) -> None:
+    (section,) = supplement_sections(_study(tmp_path, CEILING))
+    told = "\n".join(section.paragraphs)
+    assert "Sphericity: There is no error variance" in told
+    assert "Friedman test: Every participant scores all conditions alike" in told
+    assert "None" not in told
+    assert "nan" not in told

@@ -1,0 +1,103 @@
+"""The full figures behind "tens of thousands of logs", kept as a table: `make soak`."""
+
+from __future__ import annotations
+
+import json
+import statistics as st
+import subprocess
+import sys
+import time
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from experiments.load import load_setup
+from tests.conftest import RECOIL, Soak
+from tests.log_files import trials_path, write_many
+
+pytestmark = pytest.mark.soak
+
+ROOT = Path(__file__).parent.parent
+LOGS = 10_000
+
+BOTH_WAYS = """
+import json, sys, time
+from pathlib import Path
+import pandas as pd
+from analysis.logs import read_logs
+from analysis.summary import summarize
+folder = Path(sys.argv[1])
+files = sorted(folder.rglob("*_trials.csv"))
+times = {"loop": [], "read": [], "summarize": []}
+def timed(name, work):
+    start = time.perf_counter()
+    done = work()
+    times[name].append(time.perf_counter() - start)
+    return done
+for _ in range(4):
+    timed("loop", lambda: [pd.read_csv(file).shape for file in files])
+    logs = timed("read", lambda: read_logs([folder]))
+    timed("summarize", lambda: summarize(logs))
+assert len(logs.trials) == 60 * len(files) and not logs.problems
+print(json.dumps({name: found[1:] for name, found in times.items()}))
+"""
+"""The first round of each only warms up."""
+
+ALONE = """
+import resource, sys
+from pathlib import Path
+from analysis.logs import read_logs
+from analysis.summary import summarize
+summarize(read_logs([Path(sys.argv[1])]))
+print(resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024)
+"""
+
+
+@pytest.fixture(scope="module")
+def logs(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    return write_many(tmp_path_factory.mktemp("many"), LOGS)
+
+
+def _child(program: str, folder: Path) -> Any:
+    words = [sys.executable, "-c", program, folder]
+    return json.loads(subprocess.run(words, cwd=ROOT, check=True, capture_output=True, text=True).stdout)
+
+
+def test_reading_checking_and_analysing_against_a_loop_that_merely_reads(logs: Path, soak: Soak) -> None:
+    found = _child(BOTH_WAYS, logs)
+    loop, read, summarize = (st.median(found[name]) for name in ("loop", "read", "summarize"))
+    ratio = st.median(a / (b + c) for a, b, c in zip(*found.values(), strict=True))
+    how = "600,000 rows, warm cache, median of 3, one process"
+    soak(f"a loop of `pandas.read_csv` over {LOGS} logs", f"{loop:.2f} s", "stated", how)
+    soak("the same logs read and checked", f"{read:.2f} s", "stated", how)
+    soak("the statistics of these", f"{summarize:.2f} s", "stated", how)
+    soak("read, checked and analysed, times faster than the loop", f"{ratio:.1f}", "5", "in the same process, by turns")
+    assert ratio >= 5
+
+
+def test_memory(logs: Path, soak: Soak) -> None:
+    peak = _child(ALONE, logs)
+    soak(f"peak memory, {LOGS} logs read and analysed", f"{peak:.0f} MB", "1000 MB", "resident, of its own process")
+    assert peak < 1000
+
+
+def test_the_whole_command_with_broken_files(logs: Path, tmp_path: Path, soak: Soak) -> None:
+    assert load_setup("direction").config.design.trials * LOGS == 600_000
+    broken = [trials_path(logs, f"P{number:05d}") for number in range(100, LOGS + 1, 100)]
+    kept = [path.read_bytes() for path in broken]
+    for path, data in zip(broken, kept, strict=True):
+        path.write_bytes(data.replace(b",forward,", b",left,", 1))
+    try:
+        start = time.perf_counter()
+        words = [RECOIL, "analyze", logs, "--out", tmp_path]
+        done = subprocess.run(words, capture_output=True, text=True, check=False)
+        elapsed = time.perf_counter() - start
+    finally:
+        for path, data in zip(broken, kept, strict=True):
+            path.write_bytes(data)
+    named = sum("'left' is not allowed" in line for line in done.stderr.splitlines())
+    n = json.loads((tmp_path / "statistics.json").read_text(encoding="utf-8"))["direction"]["n"]
+    soak("broken logs named with line and reason", f"{named} of {len(broken)}", "all", f"{n} others analysed")
+    soak("`recoil analyze` of these, with report and figures", f"{elapsed:.1f} s", "stated", "one run")
+    assert (done.returncode, named, n) == (1, len(broken), LOGS - len(broken))

@@ -1,0 +1,233 @@
+from __future__ import annotations
+
+import json
+import subprocess
+import sys
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pandas as pd
+import pytest
+
+from analysis import rm_tukey_hsd_paired
+from analysis.assumptions import assumptions
+from analysis.bayes import SCALE, jzs_paired
+from analysis.logs import Logs, read_logs
+from analysis.report_supplement import supplement_sections
+from analysis.summary import summarize
+from analysis.supplement import WITHIN, within_supplement
+from tests.log_files import METHODS, rating_rows, ratings_path, trial_rows, trials_path, write_rows, write_study
+from tests.test_sphericity import RIGHT
+
+Json = dict[str, Any]
+
+
+@pytest.fixture(scope="module")
+def logs(tmp_path_factory: pytest.TempPathFactory) -> Logs:
+    return read_logs([write_study(tmp_path_factory.mktemp("study"))])
+
+
+@pytest.fixture(scope="module")
+def found(logs: Logs) -> Json:
+    return summarize(logs)
+
+
+def _study(folder: Path, right: Any, methods: tuple[str, ...] = METHODS) -> Json:
+    """Statistics of participants with so many right forward answers of ten; every second backward answer is right."""
+    for i, counts in enumerate(right):
+        code = f"P{i + 1:02d}"
+        rows = trial_rows(code, methods=methods)
+        for method, count in zip(methods, counts, strict=True):
+            for direction, share in (("forward", int(count)), ("backward", 5)):
+                chosen = [r for r in rows if r["method"] == method and r["direction"] == direction]
+                for place, row in enumerate(chosen):
+                    other = "backward" if direction == "forward" else "forward"
+                    correct = place < share
+                    row.update(response=direction if correct else other, correct=str(int(correct)))
+        write_rows(trials_path(folder, code), rows)
+    return summarize(read_logs([folder]))
+
+
+def _ratings(folder: Path, table: Any, methods: tuple[str, ...] = METHODS) -> Json:
+    for i, ratings in enumerate(table):
+        rows = rating_rows(f"P{i + 1:02d}", methods=methods)
+        for row, rating in zip(rows, ratings, strict=True):
+            row["rating"] = str(rating)
+        write_rows(ratings_path(folder, f"P{i + 1:02d}"), rows)
+    return summarize(read_logs([folder]))
+
+
+@pytest.mark.parametrize("experiment", ["direction", "preference"])
+def test_every_key_is_there_and_plain_json(experiment: str, found: Json) -> None:
+    assert set(WITHIN) < set(found[experiment])
+    assert json.loads(json.dumps(found, allow_nan=False)) == found
+    assert ("model" in found[experiment]) == (experiment == "direction")
+
+
+def test_published_like_rates_give_the_numbers_of_r(tmp_path: Path) -> None:
+    # R 4.2.2, afex 1.2.1 and emmeans 1.8.4: pairs(emmeans(a, "m", model = "multivariate")); see test_sphericity
+    direction = _study(tmp_path, RIGHT)["direction"]
+    assert direction["sphericity"]["W"] == pytest.approx(0.542433747971877)
+    assert direction["effect_size"]["generalized_eta_squared"] == pytest.approx(0.639745796372302)
+    assert direction["friedman"]["chi2"] == pytest.approx(25.5294117647059)
+    own = [pair["p"] for pair in direction["tukey_paired"]]
+    assert own == pytest.approx(
+        [1.39928138233e-03, 1.28807696171e-05, 4.22318922663e-04], rel=1e-5
+    )  # ptukey errs by 3e-6
+    assert direction["diagnostics"]["normality"]["W"] == pytest.approx(0.949001646180764)
+    assert direction["binomial"]["vibration"]["forward"]["clustering"]["icc"] == pytest.approx(0.0444936086529012)
+    assert direction["model"]["conditions"][2]["log_odds"] == pytest.approx(3.29583686600253)
+
+
+def test_bayes_factors_belong_to_the_paired_t_tests(found: Json) -> None:
+    for experiment in ("direction", "preference"):
+        factors = found[experiment]["bayes_factors"]
+        assert factors["r"] == SCALE
+        for factor, pair in zip(factors["pairs"], found[experiment]["paired_t"], strict=True):
+            assert factor["bf10"] == jzs_paired(pair["t"], 14)
+
+
+def test_outliers_are_named_by_participant_and_method(tmp_path: Path) -> None:
+    table = [[2.0 + 0.1 * i, 5.0, 8.0 - 0.1 * (i % 3)] for i in range(9)] + [[9.5, 5.0, 7.9]]
+    diagnostics = _ratings(tmp_path, table)["preference"]["diagnostics"]
+    (outlier,) = diagnostics["outliers"]["found"]
+    assert (outlier["participant"], outlier["method"], outlier["score"]) == ("P10", "vibration", 9.5)
+    assert diagnostics["scale"] == [0.0, 10.0]
+
+
+def test_low_epsilon_warns_against_the_pooled_tukey_once_at_the_top(tmp_path: Path) -> None:
+    found = _study(tmp_path, RIGHT)
+    assert found["direction"]["sphericity"]["greenhouse_geisser"]["epsilon"] < 0.75
+    assert [warning for warning in found["warnings"] if "tukey_paired" in warning] == [
+        "direction: sphericity does not hold (Greenhouse-Geisser epsilon below 0.75): read the corrected F test and "
+        "the Tukey test with each pair's own error (tukey_paired), not the pooled one"
+    ]
+
+
+def test_milder_departures_stay_beside_the_assumptions(tmp_path: Path) -> None:
+    found = _study(tmp_path, RIGHT)
+    told = [entry["warning"] for entry in found["direction"]["assumptions"] if entry["warning"]]
+    assert any("asymmetric-2 (ceiling 10 of 14)" in warning for warning in told)
+    assert len(found["warnings"]) == 1
+
+
+def test_clustering_that_turns_the_pooled_test_over_is_told_at_the_top(tmp_path: Path) -> None:
+    counts = [[10, 8, 9], [10, 9, 8], [10, 8, 9], [9, 7, 8], [10, 8, 9], [1, 8, 9], [0, 8, 9], [2, 9, 8]]
+    found = _study(tmp_path, counts)
+    test = found["direction"]["binomial"]["vibration"]["forward"]
+    assert test["p"] < 0.05 < test["clustering"]["p_adjusted"]
+    assert any("pooled binomial test is not to be read: vibration forward" in warning for warning in found["warnings"])
+
+
+CEILING = np.full((6, 3), 10)
+ALIKE = np.column_stack([RIGHT[:, 0], RIGHT[:, 0], RIGHT[:, 1]])
+ADDITIVE = np.add.outer([3, 5, 4, 6], [0, 1, 3])
+ONE_AT_CEILING = np.column_stack([RIGHT[:, :2], np.full(14, 10)])
+DEGENERATE = {
+    "all at ceiling": CEILING,
+    "all at floor": 0 * CEILING,
+    "all at chance": CEILING // 2,
+    "identical columns": np.column_stack([RIGHT[:, 0]] * 3),
+    "two identical columns": ALIKE,
+    "people and methods only add up": ADDITIVE,
+    "one method at ceiling": ONE_AT_CEILING,
+    "two people": RIGHT[:2],
+    "two people, alike": RIGHT[[0, 0]],
+    "as many people as methods": RIGHT[:3],
+}
+
+
+def test_supplements_of_any_scores_are_finite_or_have_a_reason() -> None:
+    """Nearly degenerate, huge, tiny and far from 0: a warning of a library would fail the test, too."""
+    rng = np.random.default_rng(6)
+    for _ in range(150):
+        n, k = int(rng.integers(2, 16)), int(rng.integers(2, 6))
+        size = rng.choice([1.0, 0.1, 1e-200, 1e200])
+        scores = size * (np.add.outer(rng.integers(0, 11, n), rng.integers(0, 4, k)) + rng.choice([0.0, 1e9]))
+        scores = scores + size * rng.choice([0.0, 1e-15, 1e-9, 1e-3, 1.0]) * rng.normal(size=(n, k))
+        if rng.random() < 0.3:
+            scores[:, 1] = scores[:, 0]
+        found = within_supplement(pd.DataFrame(scores, index=range(n), columns=range(k)), (0.0, 10.0))
+        json.dumps(found, allow_nan=False)
+
+
+def _numbers(value: Any) -> list[float]:
+    if isinstance(value, dict):
+        return [number for item in value.values() for number in _numbers(item)]
+    if isinstance(value, list):
+        return [number for item in value for number in _numbers(item)]
+    return [value] if isinstance(value, float) else []
+
+
+@pytest.mark.parametrize("name", DEGENERATE)
+def test_degenerate_answers_never_crash_and_never_give_a_silent_number(name: str, tmp_path: Path) -> None:
+    found = _study(tmp_path, DEGENERATE[name])
+    direction = found["direction"]
+    assert np.isfinite(_numbers(found)).all()
+    json.dumps(found, allow_nan=False)
+    for entry in (*direction["paired_t"], *direction["tukey_paired"], *direction["bayes_factors"]["pairs"]):
+        assert (entry.get("p", entry.get("bf10")) is None) == (entry["reason"] is not None)
+    for entry in (direction["friedman"], direction["sphericity"], direction["diagnostics"]["normality"]):
+        assert entry["p"] is not None or entry["reason"]
+    assert direction["model"]["contrasts"] or direction["model"]["reason"]
+    assert supplement_sections(found)
+
+
+@pytest.mark.parametrize("name", DEGENERATE)
+def test_degenerate_ratings_never_crash_either(name: str, tmp_path: Path) -> None:
+    found = _ratings(tmp_path, DEGENERATE[name])
+    assert np.isfinite(_numbers(found)).all()
+    assert supplement_sections(found)
+
+
+def test_all_at_ceiling_gives_reasons_everywhere(tmp_path: Path) -> None:
+    direction = _study(tmp_path, CEILING)["direction"]
+    assert direction["effect_size"]["partial_eta_squared"] is None
+    assert direction["friedman"]["reason"]
+    assert [pair["p"] for pair in direction["paired_t"]] == [None] * 3
+    assert [pair["q"] for pair in direction["tukey_paired"]] == [None] * 3
+    assert "every answer right" in direction["model"]["reason"]
+    assert direction["binomial"]["vibration"]["forward"]["clustering"]["p_adjusted"] is None
+    assert direction["diagnostics"]["ceiling"] == dict.fromkeys(METHODS, 6)
+
+
+def test_fewer_people_than_methods_have_no_mauchly_test_but_a_reason(tmp_path: Path) -> None:
+    sphericity = _study(tmp_path, RIGHT[:2])["direction"]["sphericity"]
+    assert (sphericity["W"], sphericity["huynh_feldt"]) == (None, None)
+    assert "fewer participants than conditions" in sphericity["reason"]
+
+
+def test_two_methods_need_no_sphericity(tmp_path: Path) -> None:
+    found = _study(tmp_path, RIGHT[:, :2], ("ramp", "click"))["direction"]
+    (pair,) = found["paired_t"]
+    assert found["anova"]["F"] == pytest.approx(pair["t"] ** 2)
+    assert found["anova"]["p"] == pytest.approx(pair["p"]) == pytest.approx(found["tukey_paired"][0]["p"])
+    assert "trivially" in found["sphericity"]["reason"]
+    assert "three conditions" in found["friedman"]["reason"]
+    assert found["model"]["test"]["df"] == [1, 13]
+    assert found["model"]["test"]["F"] == pytest.approx(found["model"]["contrasts"][0]["t"] ** 2)
+
+
+@pytest.mark.parametrize("right", [RIGHT[:1], RIGHT[:, :1]])
+def test_one_person_or_one_method_has_no_supplement(right: Any, tmp_path: Path) -> None:
+    found = _study(tmp_path, right, METHODS[: right.shape[1]])
+    direction = found["direction"]
+    assert [direction[key] for key in WITHIN] == [None] * len(WITHIN)
+    assert direction["assumptions"] == assumptions(direction) == []
+    assert direction["model"]["reason"]
+    assert supplement_sections(found) == ()
+
+
+def test_the_paired_tukey_is_the_one_of_the_core(found: Json) -> None:
+    scores = [[row[m] for m in METHODS] for row in found["preference"]["participants"].values()]
+    own = rm_tukey_hsd_paired(scores, METHODS)
+    assert [(c["a"], c["b"], c["q"], c["p"]) for c in found["preference"]["tukey_paired"]] == [
+        (c.a, c.b, c.q, c.p) for c in own
+    ]
+
+
+def test_nothing_slow_is_imported_before_it_is_used() -> None:
+    program = "import sys, analysis.summary; print([m for m in ('pingouin', 'statsmodels') if m in sys.modules])"
+    done = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, check=True, timeout=120)
+    assert done.stdout.strip() == "[]"
