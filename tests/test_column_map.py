@@ -1,0 +1,168 @@
+"""Logs that Recoil did not write, read by a map: the same rules, the same tables."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+
+from analysis.column_map import ColumnMap
+from analysis.logs import Logs, read_logs
+from analysis.summary import summarize
+from analysis.toml_model import load_model
+from tests.log_files import TextRow, trial_rows, write_study
+
+EXAMPLE = Path(__file__).parent.parent / "configs" / "examples" / "columns.toml"
+CONDITIONS = {"vibration": "vib", "asymmetric-1": "weak", "asymmetric-2": "strong"}
+HEADER = ("participant", "phase", "condition", "shot_direction", "key_resp.keys", "key_resp.rt", "date")
+
+
+def _psychopy(rows: list[TextRow]) -> list[list[str]]:
+    """Recoil's rows as PsychoPy would have written them, with a row of practice and one of no trial."""
+    keys = {"forward": "up", "backward": "down", "": "None"}
+    found = [[rows[0]["participant_id"], "practice", "vib", "f", "up", "9.9", "d"], ["", "", "", "", "", "", "d"]]
+    return found + [
+        [r["participant_id"], "main", CONDITIONS[r["method"]], r["direction"][0], keys[r["response"]],
+         r["response_time_s"], "d"]
+        for r in rows
+    ]  # fmt: skip
+
+
+def _write(path: Path, rows: list[list[str]], header: tuple[str, ...] = HEADER, delimiter: str = ",") -> Path:
+    path.parent.mkdir(parents=True, exist_ok=True)
+    path.write_text("\n".join(delimiter.join(row) for row in [list(header), *rows]) + "\n", encoding="utf-8-sig")
+    return path
+
+
+def _read(path: Path, text: str | None = None) -> Logs:
+    toml = path.parent / "map.toml"
+    toml.write_text(EXAMPLE.read_text(encoding="utf-8") if text is None else text, encoding="utf-8")
+    return read_logs([path], mapping=load_model(ColumnMap, toml))
+
+
+def test_psychopys_files_give_the_statistics_of_the_same_answers_in_recoils_own(tmp_path: Path) -> None:
+    for i in range(1, 4):
+        _write(tmp_path / "old" / f"P{i:02d}_gun_2024.csv", _psychopy(trial_rows(f"P{i:02d}", 1000 + i)))
+    mapped = _read(tmp_path / "old")
+    assert mapped.problems == ()
+    own = read_logs([write_study(tmp_path / "own", participants=3)])
+    keys = ("n", "means", "sds", "anova", "binomial", "response_time")
+    found, expected = (summarize(logs)["direction"] for logs in (mapped, own))
+    assert [found[key] for key in keys] == [expected[key] for key in keys]
+    assert found["origin"]["guns"] == {"not stated": 180}
+
+
+def test_a_long_table_of_several_people_and_sites_is_taken_apart(tmp_path: Path) -> None:
+    rows = [[*row, site] for site in ("kyoto", "oslo") for row in _psychopy(trial_rows("P01", len(site)))]
+    text = EXAMPLE.read_text(encoding="utf-8").replace('# study = "site"', 'study = "site"')
+    logs = _read(_write(tmp_path / "all.csv", rows, (*HEADER, "site")), text)
+    assert logs.problems == ()
+    assert set(logs.trials["participant_id"]) == {"kyoto/P01", "oslo/P01"}
+
+
+def test_one_bad_participant_of_a_long_table_leaves_the_others(tmp_path: Path) -> None:
+    bad = trial_rows("P02", 2)
+    rows = _psychopy(trial_rows("P01")) + _psychopy(bad)
+    rows[64 + 5][4] = "left"
+    logs = _read(_write(tmp_path / "all.csv", rows))
+    assert set(logs.trials["participant_id"]) == {"P01"}
+    (problem,) = logs.problems
+    assert (problem.line, problem.column) == (71, "key_resp.keys")
+    assert "'left' is not allowed (rule: one of up, down, forward, backward" in problem.message
+
+
+def test_semicolons_decimal_commas_milliseconds_and_another_encoding(tmp_path: Path) -> None:
+    rows = [
+        [f"{1000 * float(c):.1f}".replace(".", ",") if i == 5 else c for i, c in enumerate(row)]
+        for row in _psychopy(trial_rows()) if row[0]
+    ]  # fmt: skip
+    text = EXAMPLE.read_text(encoding="utf-8")
+    for old, new in (('delimiter = ","', 'delimiter = ";"'), ('decimal = "."', 'decimal = ","'),
+                     ('"utf-8-sig"  ', '"cp1252"'), ('unit = "s"', 'unit = "ms"')):  # fmt: skip
+        text = text.replace(old, new)
+    path = _write(tmp_path / "P01.csv", [[*row, "müde"] for row in rows], (*HEADER, "mood"), ";")
+    path.write_bytes(path.read_bytes().decode("utf-8-sig").encode("cp1252"))
+    logs = _read(path, text)
+    assert logs.problems == ()
+    expected = [float(row["response_time_s"]) for row in trial_rows()]
+    assert logs.trials["response_time_s"].tolist() == pytest.approx(expected)
+
+
+def test_ratings_on_another_scale_and_a_code_from_the_files_name(tmp_path: Path) -> None:
+    text = """
+experiment = "preference"
+[participant]
+file_name = "^([A-Za-z0-9]+)_"
+[columns]
+method = "method"
+rating = "slider"
+[rating]
+scale_min = 1
+scale_max = 7
+"""
+    _write(
+        tmp_path / "old" / "P07_x.csv",
+        [["vibration", "1"], ["asymmetric-1", "4"], ["asymmetric-2", "7"]],
+        ("method", "slider"),
+    )
+    _write(tmp_path / "old" / "P08_x.csv", [["vibration", "8"]], ("method", "slider"))
+    logs = _read(tmp_path / "old", text)
+    assert logs.ratings["rating"].tolist() == [0.0, 5.0, 10.0]
+    assert logs.ratings["trial"].tolist() == [1, 2, 3]
+    assert set(logs.ratings["participant_id"]) == {"P07"}
+    assert "line 2, column slider: rating 8 is out of range (rule: 1 to 7" in str(logs.problems[0])
+
+
+def test_recoils_own_logs_may_lie_beside_them(tmp_path: Path) -> None:
+    write_study(tmp_path / "both", participants=1)
+    _write(tmp_path / "both" / "P02_old.csv", _psychopy(trial_rows("P02", 2)))
+    logs = _read(tmp_path / "both")
+    assert (logs.problems, len(logs.trials), len(logs.ratings)) == ((), 120, 3)
+
+
+FAULTS: dict[str, tuple[Callable[[str], str], str]] = {
+    "unknown key": (lambda t: t.replace("delimiter =", "separator ="), "key text.separator = ',' is unknown"),
+    "no experiment": (lambda t: t.replace('experiment = "direction"', ""), "key experiment is missing"),
+    "no response": (lambda t: t.replace('response = "key', '# "'), "columns.response is missing"),
+    "level": (lambda t: t.replace('up = "forward"', 'up = "left"'), "key values.response.up = 'left'"),
+    "unit": (lambda t: t.replace('unit = "s"', 'unit = "min"'), "key response_time.unit = 'min'"),
+    "no unit": (lambda t: t.replace('[response_time]\nunit = "s"', ""), "response_time.unit is missing"),
+    "decimal": (lambda t: t.replace('decimal = "."', 'decimal = ","'), "is also text.delimiter"),
+    "both": (lambda t: t.replace("# file_name", "file_name"), "either `column` or `file_name`"),
+    "pattern": (lambda t: t.replace('column = "participant"', 'file_name = "P.."'), "has 0 groups"),
+    "skip": (lambda t: t.replace("empty = true", ""), "give `values`, or `empty = true`"),
+    "not TOML": (lambda t: t + "[", "not a TOML file"),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("case", FAULTS)
+def test_a_bad_map_is_refused_with_file_key_value_and_rule(case: str, tmp_path: Path) -> None:
+    spoil, words = FAULTS[case]
+    path = tmp_path / "map.toml"
+    path.write_text(spoil(EXAMPLE.read_text(encoding="utf-8")), encoding="utf-8")
+    with pytest.raises(ValueError, match=r"map[.]toml: ") as refused:
+        load_model(ColumnMap, path)
+    assert words in str(refused.value)
+
+
+@pytest.mark.parametrize(
+    ("change", "words"),
+    [
+        (lambda text: text.replace("condition", "cond"), "column condition: column 'condition' is missing"),
+        (lambda text: text.replace("date", "phase"), "stands 2 times"),
+        (lambda text: text.replace(",up,", ',"up,', 1), "is not separated text"),
+        (lambda text: text.replace(",d\n", "\n", 1), "line 2: has 6 fields (rule: 7"),
+        (lambda text: text.replace("0.", "zero."), "column response_time_s: 'zero."),
+        (lambda text: text.replace("P01", "P-1"), "is not a code"),
+        (lambda text: text.replace("main", "practice"), "has no row left"),
+    ],
+)  # fmt: skip
+def test_a_file_that_the_map_does_not_fit_is_a_problem(
+    change: Callable[[str], str], words: str, tmp_path: Path
+) -> None:
+    path = _write(tmp_path / "P01.csv", _psychopy(trial_rows()))
+    path.write_text(change(path.read_text(encoding="utf-8")), encoding="utf-8")
+    logs = _read(path)
+    assert logs.files == ()
+    assert words in str(logs.problems[0])
