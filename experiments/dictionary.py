@@ -73,36 +73,36 @@ square back.
 
 ## What `recoil analyze` writes
 
-`statistics.json`: nothing is rounded; rates 0 to 1; SD with n - 1; `null` where a number is undefined, with a `reason` or a
-line in `warnings` that says why. Under `direction` and `preference`:
+`statistics.json`: nothing is rounded; rates 0 to 1; SD with n - 1; `null` where a number is undefined, with a `reason`
+or a line in `warnings` that says why. Under `direction` and `preference`:
 
 | key | meaning |
 | --- | --- |
 | `n`, `methods` | complete participants; methods in their order |
-| `means`, `sds`, `participants`, `within_ci` | of the correct rate on forward shots, or of the rating; Cousineau-Morey 95 % intervals |
+| `means`, `sds`, `participants`, `within_ci` | of correct rates (forward) or ratings; Cousineau-Morey 95 % intervals |
 | `anova` | repeated-measures ANOVA: `F`, `df` [effect, error], `p`, sums of squares |
-| `tukey`, `tukey_paired` | all pairs, with the pooled error term (the paper's) and with each pair's own; simultaneous 95 % intervals |
+| `tukey`, `tukey_paired` | all pairs: pooled error term (the paper's); each pair's own; simultaneous intervals |
 | `sphericity` | Mauchly's test; Greenhouse-Geisser and Huynh-Feldt epsilon with corrected `df` and `p` |
 | `effect_size` | partial eta squared with intervals, generalised eta squared |
-| `friedman`, `paired_t`, `bayes_factors` | rank test with post-hoc; paired t-tests with Holm's correction; JZS Bayes factors |
+| `friedman`, `paired_t`, `bayes_factors` | rank test and post-hoc; paired t-tests, Holm; JZS factors |
 | `diagnostics` | normality of the residuals, outliers by participant, scores at the ends of the scale |
 | `assumptions` | what was assumed, and a warning where it does not hold |
 | `origin` | whose hand gave how many answers, and which guns rendered the trials |
 | `backward`, `sensitivity` | rates on backward shots; d' and criterion, log-linear corrected (direction only) |
-| `binomial` | pooled exact tests by method and direction: `p`, `log_p`, Clopper-Pearson and Wilson intervals, `clustering` |
+| `binomial` | pooled exact tests: `p`, `log_p`, Clopper-Pearson and Wilson intervals, `clustering` |
 | `model` | logistic GEE of the forward answers with a bias-reduced sandwich (direction only) |
 | `response_time`, `response_times` | of times from the participant's own hand alone (direction only) |
 
-Beside them: `excluded` (who, where, why), `rules` (what was dropped by which rule), `studies` (each study's own statistics,
-where there are several), `warnings`, `versions`.
+Beside them: `excluded` (who, where, why), `rules` (what was dropped by which rule), `studies` (each study's own
+statistics, where there are several), `warnings`, `versions`.
 
-`direction_long.csv`, `preference_long.csv`: a row a participant and method; `direction_wide.csv`, `preference_wide.csv`: a row
-a participant, `<method>_<measure>` as columns, `-` as `_`.
+`direction_long.csv`, `preference_long.csv`: a row a participant and method; `direction_wide.csv`, `preference_wide.csv`:
+a row a participant, `<method>_<measure>` as columns, `-` as `_`.
 
 | column | meaning |
 | --- | --- |
 | `study`, `participant_id`, `method` | the results folder; the code; the rendering method (long tables) |
-| `trials_forward`, `correct_forward`, `rate_forward` | analysed trials, correct answers and their share; likewise `backward` |
+| `trials_forward`, `correct_forward`, `rate_forward` | trials, correct answers, their share; likewise `backward` |
 | `response_time_median_s` | median of the participant's own valid response times |
 | `rating`, `order` | the rating from 0 to 10; the place in the order of presentation |
 """
