@@ -96,8 +96,8 @@ or a line in `warnings` that says why. Under `direction` and `preference`:
 Beside them: `excluded` (who, where, why), `rules` (what was dropped by which rule), `studies` (each study's own
 statistics, where there are several), `warnings`, `versions`.
 
-`direction_long.csv`, `preference_long.csv`: a row a participant and method; `direction_wide.csv`, `preference_wide.csv`:
-a row a participant, `<method>_<measure>` as columns, `-` as `_`.
+`direction_long.csv`, `preference_long.csv`: a row a participant and method. `direction_wide.csv`,
+`preference_wide.csv`: a row a participant, `<method>_<measure>` as columns, `-` as `_`.
 
 | column | meaning |
 | --- | --- |
