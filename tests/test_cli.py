@@ -221,8 +221,9 @@ def test_simulate_refuses_what_it_cannot_do(recoil: Recoil, words: tuple[str, ..
 
 def test_configs_are_copied_once_and_never_over_others(recoil: Recoil, tmp_path: Path) -> None:
     assert recoil("configs", "--copy", "mine").returncode == 0
-    names = {path.name for path in (tmp_path / "mine").iterdir()}
-    assert names == {path.name for path in shipped_folder().glob("*.toml")}
+    copied = {path.relative_to(tmp_path / "mine") for path in (tmp_path / "mine").rglob("*.toml")}
+    assert copied == {path.relative_to(shipped_folder()) for path in shipped_folder().rglob("*.toml")}
+    assert Path("examples/columns.toml") in copied
     refused(recoil("configs", "--copy", "mine"), "already there")
 
 

@@ -14,6 +14,8 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from experiments.roof import power_command
+
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Sequence
 
@@ -282,10 +284,9 @@ def configs(
     copy: Annotated[Path | None, typer.Option(help="Copy the shipped configs into this folder.")] = None,
 ) -> None:
     """List the shipped configs, or copy them to edit."""
-    from experiments.load import shipped_folder
-    from experiments.roof.folders import copy_configs
+    from experiments.roof.folders import copy_configs, shipped
 
-    paths = copy_configs(copy) if copy else sorted(shipped_folder().glob("*.toml"))
+    paths = copy_configs(copy) if copy else shipped()
     sys.stdout.write("".join(f"{path}\n" for path in paths))
 
 
@@ -360,50 +361,6 @@ def bench(
     _show(found, f"Report: {out / 'report.html'}", as_json)
 
 
-@app.command()
-def power(
-    config: Annotated[str, typer.Argument(help="File or name of a shipped config.")],
-    participants: Annotated[
-        str | None, typer.Option(metavar="N,N-N", help="How many people, such as 8,10,14-20.")
-    ] = None,
-    trials: Annotated[
-        str | None, typer.Option(metavar="N,N-N", help="Trials of a method; the config's own unless given.")
-    ] = None,
-    methods: Annotated[
-        list[str] | None, typer.Option(metavar="NAME,NAME", help="Compare these alone; may be given again.")
-    ] = None,
-    effect: Annotated[
-        str | None, typer.Option(metavar="FACTOR,FACTOR", help="Factors on what people feel; 1 is the config.")
-    ] = None,
-    studies: Annotated[int, typer.Option(min=1, max=10_000_000, help="Simulated studies of each design.")] = 10_000,
-    target: Annotated[float, typer.Option(help="Power that a design is to reach.")] = 0.8,
-    null: Annotated[bool, typer.Option("--null", help="People who feel no difference: false positives.")] = False,
-    seed: Annotated[int, typer.Option(min=0, max=2**63 - 1, help="Seed of the studies.")] = 1,
-    paper: Annotated[str, typer.Option(help="Published numbers whose pattern may recur.")] = "paper",
-    workers: Annotated[int | None, typer.Option(min=1, help="Processes; as many as cores unless given.")] = None,
-    scheduler: Annotated[str | None, typer.Option(metavar="ADDRESS", help="Work on this Dask cluster instead.")] = None,
-    out: Annotated[Path, typer.Option(help="Folder for power.json, figures and report.")] = Path("results/power"),
-    as_json: AsJson = False,
-) -> None:
-    """Simulated power and precision: how many people and trials does it take, and what does it cost?"""
-    from experiments.roof import power as roof
-
-    request = roof.Request(
-        config=config,
-        participants=participants,
-        trials=trials,
-        methods=tuple(methods or ()),
-        effects=effect,
-        studies=studies,
-        target=target,
-        null=null,
-        seed=seed,
-        paper=paper,
-    )
-    found = roof.power(request, roof.Where(workers=workers, scheduler=scheduler), out, _progress)
-    _show(found, f"{roof.as_text(found)}\nReport: {out / 'report.html'}", as_json)
-
-
 def _tracked(files: Sequence[Path]) -> Iterable[Path]:
     """The files one by one, with a progress bar on stderr."""
     from rich.console import Console
@@ -422,3 +379,6 @@ def _progress(what: str, total: int) -> Iterator[Callable[[str], None]]:
     with Progress(*columns, console=Console(stderr=True), transient=False) as progress:
         task = progress.add_task(what, total=total)
         yield lambda done: progress.update(task, advance=1, description=f"{what}: {done}")
+
+
+app.command("power")(power_command.command(_show, _progress))

@@ -24,14 +24,19 @@ Logs go to `results/`; it is readable by its owner only. Use codes for participa
 """
 
 
+def shipped() -> list[Path]:
+    """The shipped configs, and the examples of what else can be given as a file."""
+    return sorted(shipped_folder().glob("*.toml")) + sorted(shipped_folder().glob("examples/*.toml"))
+
+
 def copy_configs(folder: Path) -> list[Path]:
-    """Copy the shipped configs. `PlaceError` if one is there already; then nothing is copied."""
-    copies = [(source, folder / source.name) for source in sorted(shipped_folder().glob("*.toml"))]
+    """Copy the shipped configs and examples. `PlaceError` if one is there already; then nothing is copied."""
+    copies = [(source, folder / source.relative_to(shipped_folder())) for source in shipped()]
     there = [str(target) for _, target in copies if target.exists()]
     if there:
         raise PlaceError(f"{', '.join(there)}: already there; nothing is overwritten, so copy to another folder")
-    folder.mkdir(parents=True, exist_ok=True)
     for source, target in copies:
+        target.parent.mkdir(parents=True, exist_ok=True)
         target.write_bytes(source.read_bytes())
     return [target for _, target in copies]
 
