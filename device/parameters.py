@@ -13,8 +13,14 @@ DriveOff = Literal["shorted", "open"]
 Emf = Literal["printed", "reciprocal"]
 
 
+class _Remembers:
+    """Room for what the physics makes of a gun's numbers, beside its fields: shots are asked for by the million."""
+
+    __slots__ = ("_packed",)
+
+
 @dataclass(frozen=True, slots=True, kw_only=True)
-class GunParameters:
+class GunParameters(_Remembers):
     """The voice-coil gun of equations (1) to (3) and its drive pulse. Defaults: the paper's gun without damper.
 
     `drive_off` is what the coil does after the pulse: `shorted` keeps equation (3) with u = 0 (assumed default),
@@ -39,12 +45,13 @@ class GunParameters:
     emf: Emf = "printed"  # paper
 
     def __post_init__(self) -> None:
-        _numbers_are_valid(self, above_zero=_ABOVE_ZERO, not_numbers=("drive_off", "emf"))
+        _numbers_are_valid(self, above_zero=ABOVE_ZERO, not_numbers=("drive_off", "emf"))
         _is_one_of("drive_off", self.drive_off, get_args(DriveOff))
         _is_one_of("emf", self.emf, get_args(Emf))
 
 
-_ABOVE_ZERO = ("magnet_mass_kg", "resistance_ohm", "inductance_H", "coil_reach_m", "contact_depth_m")
+ABOVE_ZERO = ("magnet_mass_kg", "resistance_ohm", "inductance_H", "coil_reach_m", "contact_depth_m")
+"""What the equations divide by; the other numbers may be 0."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

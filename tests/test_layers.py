@@ -13,7 +13,12 @@ ROOMS = ("device", "experiments", "analysis")
 READERS = ("experiments.columns", "experiments.journal", "experiments.register")
 """What the analysis may know of the experiments: the names of columns, and the readers of what runs leave."""
 PURE = {
-    "device": {"words", "parameters", "limits", "methods", "physics", "vibration"},
+    "device": {
+        *("words", "parameters", "limits", "methods", "physics", "vibration"),
+        *("wire.errors", "wire.frame", "wire.records"),
+        *("twin.budget", "twin.machine", "twin.core", "twin.scripts", "twin.faults", "twin.body"),
+        *("serial_gun.address", "serial_gun.asked", "serial_gun.clocks", "serial_gun.outcomes"),
+    },
     "experiments": {
         "canonical",
         "columns",
@@ -33,6 +38,7 @@ HEAVY = {
     "PyQt6": ("experiments.screens.console", "experiments.doctor.programs"),
     "matplotlib": "analysis.figures",
     "jinja2": "analysis.report",
+    "serial": "device.serial_gun",
     "rich": "experiments.roof",
     "typer": "experiments.roof",
 }

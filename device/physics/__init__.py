@@ -1,0 +1,32 @@
+"""One shot of the haptic gun, predicted: its summary and its course over time.
+
+    m d2x/dt2 = F_m - k (x + x_0) - F_f sign(dx/dt)    (1), the spring pre-loaded against the rear stop at x = 0
+    F_m = (x_c - x)/x_c k_m i inside the coil, else 0  (2)
+    u = k_e dx/dt + i R + L di/dt                      (3)
+
+All times count from the onset of the pulse. The force on the hand F = m d2x/dt2 is positive in the direction of
+recoil; the collision with the stop is apart from it.
+"""
+
+from __future__ import annotations
+
+from device.parameters import DriveOff, Emf, GunParameters
+from device.physics.batch import ShotBatch, simulate_batch, warm
+from device.physics.results import ShotSummary, ShotTrace, Status
+from device.physics.single import FIDELITIES, simulate
+from device.physics.traces import trace
+
+__all__ = [
+    "FIDELITIES",
+    "DriveOff",
+    "Emf",
+    "GunParameters",
+    "ShotBatch",
+    "ShotSummary",
+    "ShotTrace",
+    "Status",
+    "simulate",
+    "simulate_batch",
+    "trace",
+    "warm",
+]

@@ -1,0 +1,178 @@
+"""A gun that is held, not fixed: its mass on a spring and damper, the hand (the paper's other future work).
+
+    m (x'' - X'') = F,   M X'' = F - k_h X - c_h X',   F = F_m - k (x + x_0) -/+ F_f
+
+X is the enclosure's way back, in the direction of recoil; x the magnet's displacement in the enclosure. The impact
+on the stop is inelastic: both go on together. Integrated by scipy from event to event (DOP853, relative 1e-10).
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.integrate import solve_ivp
+
+from device.parameters import GunParameters
+
+_RTOL, _ATOL = 1e-10, 1e-13
+_MAX_PHASES = 200
+_SLACK = 1e-9  # relative: what friction does not hold by less than this, it holds
+
+Vector = NDArray[np.float64]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Hand:
+    """The enclosure and what holds it. The whole gun weighs 340.2 g (paper); the hand's numbers are assumed."""
+
+    enclosure_mass_kg: float = 0.3402 - 0.114
+    stiffness_N_m: float = 500.0  # assumed: a firm grip, along the forearm
+    damping_N_s_m: float = 10.0  # assumed
+
+    def __post_init__(self) -> None:
+        numbers = (self.enclosure_mass_kg, self.stiffness_N_m, self.damping_N_s_m)
+        if not (all(0 <= number < math.inf for number in numbers) and self.enclosure_mass_kg > 0):
+            raise ValueError(f"{self}; the numbers must be finite and at least 0, and the mass above 0")
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class HeldShot:
+    """One shot of a held gun over the time asked for."""
+
+    peak_hand_force_N: float  # of k_h X + c_h X', what the skin feels
+    peak_kick_m: float  # largest way back of the enclosure
+    max_displacement_m: float
+    reset_end_s: float | None  # first landing after the pulse
+    impact_speed_m_s: float | None  # of magnet and enclosure against each other
+    residual_impulse_Ns: float  # momentum less the impulse of the hand: integration error
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class _Phase:
+    gun: GunParameters
+    hand: Hand
+    way: int
+    drive_V: float
+    live: bool
+
+    def rates(self, _t: float, y: Vector) -> list[float]:
+        """Of x, x', i, X, X' and of the hand's impulse."""
+        x, v, i, X, V, _ = y.tolist()
+        gun, hand = self.gun, self.hand
+        held_N = hand.stiffness_N_m * X + hand.damping_N_s_m * V
+        hold = self.hold(x)
+        emf_V = gun.back_emf_V_s_m * v * (hold if gun.emf == "reciprocal" else 1.0)
+        current = (self.drive_V - emf_V - gun.resistance_ohm * i) / gun.inductance_H if self.live else 0.0
+        if self.way == 0:
+            return [0.0, 0.0, current, V, -held_N / (gun.magnet_mass_kg + hand.enclosure_mass_kg), held_N]
+        force_N = self.force(x, i)
+        back = (force_N - held_N) / hand.enclosure_mass_kg
+        return [v, force_N / gun.magnet_mass_kg + back, current, V, back, held_N]
+
+    def hold(self, x: float) -> float:
+        """The coil's hold, 0 outside."""
+        return max(0.0, 1 - x / self.gun.coil_reach_m)
+
+    def force(self, x: float, i: float) -> float:
+        """F in N."""
+        gun = self.gun
+        motor_N = gun.motor_constant_N_A * self.hold(x) * i if self.live else 0.0
+        return motor_N - gun.stiffness_N_m * (x + gun.preload_length_m) - self.way * gun.friction_N
+
+    def pull(self, y: Vector) -> float:
+        """At rest: the force in N with which friction and stop must hold the magnet in the enclosure."""
+        x, _, i, X, V, _ = y.tolist()
+        gun, hand = self.gun, self.hand
+        held_N = hand.stiffness_N_m * X + hand.damping_N_s_m * V
+        share = gun.magnet_mass_kg / (gun.magnet_mass_kg + hand.enclosure_mass_kg)
+        free = self.force(x, i) + self.way * gun.friction_N
+        return float(free - share * held_N)
+
+
+def simulate_held(gun: GunParameters, hand: Hand | None = None, until_s: float = 0.4) -> HeldShot:
+    """One shot from rest of a gun in a hand, to `until_s`. `ValueError`: a time that is not above 0.
+
+    `RuntimeError`: the integration did not get there.
+    """
+    if not 0 < until_s < math.inf:
+        raise ValueError(f"until_s is {until_s}; it must be a finite time above 0")
+    hand = hand or Hand()
+    t, y, paths, landing = 0.0, np.zeros(6), [], None
+    for _ in range(_MAX_PHASES):
+        phase = _phase(gun, hand, t, y)
+        limit_s = gun.pulse_s if t < gun.pulse_s < until_s else until_s
+        found: Any = solve_ivp(
+            phase.rates, (t, limit_s), y, "DOP853", rtol=_RTOL, atol=_ATOL, events=_events(phase), max_step=2e-3
+        )
+        if found.status < 0:
+            raise RuntimeError(f"the held shot stopped at {found.t[-1]:g} s: {found.message}")
+        paths.append(found.y)
+        t, y = float(found.t[-1]), found.y[:, -1].copy()
+        if found.status == 1 and phase.way < 0 and len(found.t_events[1]):
+            landing = landing if landing or t < gun.pulse_s else (t, -float(y[1]))
+        if t >= until_s:
+            break
+        _settle(phase, found, t, y)
+    return _held(gun, hand, np.concatenate(paths, axis=1), landing)
+
+
+def _phase(gun: GunParameters, hand: Hand, t: float, y: Vector) -> _Phase:
+    live = gun.drive_off == "shorted" or t < gun.pulse_s
+    drive_V = gun.voltage_V if t < gun.pulse_s else 0.0
+    rest = _Phase(gun=gun, hand=hand, way=0, drive_V=drive_V, live=live)
+    way = int(np.sign(y[1]))
+    if way == 0:
+        pull_N = rest.pull(y)
+        if abs(pull_N) > gun.friction_N * (1 + _SLACK) and (pull_N > 0 or y[0] > 0):
+            way = 1 if pull_N > 0 else -1
+    return _Phase(gun=gun, hand=hand, way=way, drive_V=drive_V, live=live)
+
+
+def _events(phase: _Phase) -> list[Any]:
+    """Break-away at rest (outwards, homewards); in motion turn, and stop or coil edge."""
+    friction_N = phase.gun.friction_N * (1 + 2 * _SLACK) + 1e-12
+    if phase.way == 0:
+        return [
+            _ends(lambda _t, y: phase.pull(y) - friction_N, 1),
+            _ends(lambda _t, y: phase.pull(y) + friction_N if y[0] > 0 else 1.0, -1),
+        ]
+    return [_ends(lambda _t, y: phase.way * y[1], -1), _ends(lambda _t, y: y[0] if phase.way < 0 else 1.0, -1)]
+
+
+def _ends(function: Callable[[float, Vector], float], direction: int) -> Any:
+    def event(t: float, y: Vector) -> float:
+        return float(function(t, y))
+
+    event.terminal, event.direction = True, direction  # type: ignore[attr-defined]
+    return event
+
+
+def _settle(phase: _Phase, found: Any, t: float, y: Vector) -> None:
+    """What an event does to the state: turn and stop take the velocity, an open drive the current."""
+    gun, hand = phase.gun, phase.hand
+    if found.status == 1 and phase.way != 0:
+        if phase.way < 0 and len(found.t_events[1]):
+            y[4] -= gun.magnet_mass_kg * y[1] / (gun.magnet_mass_kg + hand.enclosure_mass_kg)
+            y[0] = 0.0
+        y[1] = 0.0
+    if gun.drive_off == "open" and t >= gun.pulse_s:
+        y[2] = 0.0
+
+
+def _held(gun: GunParameters, hand: Hand, path: Vector, landing: tuple[float, float] | None) -> HeldShot:
+    x, v, _, X, V, impulse = path
+    felt = hand.stiffness_N_m * X + hand.damping_N_s_m * V
+    momentum = (gun.magnet_mass_kg + hand.enclosure_mass_kg) * V[-1] - gun.magnet_mass_kg * v[-1]
+    return HeldShot(
+        peak_hand_force_N=float(np.abs(felt).max()),
+        peak_kick_m=float(X.max()),
+        max_displacement_m=float(x.max()),
+        reset_end_s=landing[0] if landing else None,
+        impact_speed_m_s=landing[1] if landing else None,
+        residual_impulse_Ns=float(momentum + impulse[-1]),
+    )

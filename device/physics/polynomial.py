@@ -1,0 +1,142 @@
+"""Roots of the series over one step, s from 0 to 1: none is missed.
+
+In the Bernstein basis a polynomial has at most as many roots in an interval as its coefficients change sign, so no
+change means no root and one change exactly one (Descartes' rule of signs; Farouki, CAGD 29 (2012) 379, section 3.5).
+Where there are more, the interval is halved.
+"""
+
+from __future__ import annotations
+
+import math
+
+from device.physics.kernel import Floats, kernel
+from device.physics.layout import BS, ORDER
+
+PER_BINOMIAL = tuple(1.0 / math.comb(ORDER, k) for k in range(ORDER + 1))
+_SMALLEST = 2.0**-46  # of the step: two roots closer than this are one touch, which ends nothing
+
+
+@kernel
+def value(w: Floats, c: int, s: float) -> float:
+    """The polynomial at s (Horner)."""
+    y = w[c + ORDER]
+    for j in range(ORDER - 1, -1, -1):
+        y = y * s + w[c + j]
+    return y
+
+
+@kernel
+def value_at_end(w: Floats, c: int) -> float:
+    """The polynomial of even order at s = 1, the small coefficients first."""
+    even, odd = 0.0, 0.0
+    for j in range(ORDER, 0, -2):
+        even += w[c + j]
+        odd += w[c + j - 1]
+    return even + odd + w[c]
+
+
+@kernel
+def lowest(w: Floats, c: int, sign: float) -> float:
+    """A bound from below for what the polynomial, times `sign`, adds to its first coefficient on [0, 1]."""
+    even, odd = 0.0, 0.0
+    for j in range(1, ORDER, 2):
+        even += min(sign * w[c + j], 0.0)
+        odd += min(sign * w[c + j + 1], 0.0)
+    return even + odd
+
+
+@kernel
+def to_bernstein(w: Floats, c: int) -> None:
+    """The Bernstein coefficients over [0, 1]: b_j = sum over k <= j of C(j, k)/C(n, k) c_k."""
+    for k in range(ORDER + 1):
+        w[BS + k] = w[c + k] * PER_BINOMIAL[k]
+    for low in range(1, ORDER + 1):
+        for j in range(ORDER, low - 1, -1):
+            w[BS + j] += w[BS + j - 1]
+
+
+@kernel
+def restrict(w: Floats, low: float, high: float) -> None:
+    """The Bernstein coefficients over [low, high] in place of those over [0, 1] (de Casteljau, twice)."""
+    for r in range(1, ORDER + 1):
+        for j in range(ORDER, r - 1, -1):
+            w[BS + j] = (1.0 - high) * w[BS + j - 1] + high * w[BS + j]
+    t = low / high
+    for r in range(1, ORDER + 1):
+        for j in range(ORDER + 1 - r):
+            w[BS + j] = (1.0 - t) * w[BS + j] + t * w[BS + j + 1]
+
+
+@kernel
+def sign_changes(w: Floats) -> int:
+    """How often the coefficients change sign, zeros left out."""
+    changes, last = 0, 0.0
+    for j in range(ORDER + 1):
+        if w[BS + j] * last < 0.0:
+            changes += 1
+        if w[BS + j] != 0.0:
+            last = math.copysign(1.0, w[BS + j])
+    return changes
+
+
+@kernel
+def changes_between(w: Floats, c: int, low: float, high: float) -> int:
+    """The changes of sign over [low, high]: an upper bound for the number of roots there, and exact for 0 and 1."""
+    to_bernstein(w, c)
+    if low > 0.0 or high < 1.0:
+        restrict(w, low, high)
+    return sign_changes(w)
+
+
+@kernel
+def bracketed_root(w: Floats, c: int, low: float, high: float) -> float:
+    """The one root between `low` and `high`: Newton's method, kept inside the bracket by halving it.
+
+    `b` holds the Bernstein coefficients over the bracket: the polygon of them crosses 0 near the root.
+    """
+    sign = 1.0 if w[BS] > 0.0 or (w[BS] == 0.0 and w[BS + ORDER] < 0.0) else -1.0
+    s = low + (high - low) * polygon_root(w)
+    for _ in range(80):
+        y, slope = w[c + ORDER], 0.0
+        for j in range(ORDER - 1, -1, -1):
+            slope = slope * s + y
+            y = y * s + w[c + j]
+        if y == 0.0:
+            return s
+        if y * sign > 0.0:
+            low = s
+        else:
+            high = s
+        step = y / slope if slope != 0.0 else math.inf
+        nearer = s - step
+        if not low < nearer < high:
+            nearer = 0.5 * (low + high)
+        if abs(nearer - s) <= 2.3e-16 * s or nearer in (low, high):
+            return nearer
+        s = nearer
+    return s
+
+
+@kernel
+def polygon_root(w: Floats) -> float:
+    """Where the control polygon first changes sign, between 0 and 1."""
+    for j in range(ORDER):
+        if (w[BS + j] > 0.0) != (w[BS + j + 1] > 0.0) and w[BS + j] != w[BS + j + 1]:
+            return (j + w[BS + j] / (w[BS + j] - w[BS + j + 1])) / ORDER
+    return 0.5
+
+
+@kernel
+def first_crossing(w: Floats, c: int) -> float:
+    """The first s in (0, 1] where a polynomial that is above 0 just after s = 0 falls below it; 2 if none."""
+    low, width = 0.0, 1.0
+    while low < 1.0:
+        high = min(low + width, 1.0)
+        changes = changes_between(w, c, low, high)
+        if changes == 1 or (changes > 1 and width <= _SMALLEST and w[BS + ORDER] < 0.0):
+            return bracketed_root(w, c, low, high)
+        if changes == 0 or width <= _SMALLEST:
+            low, width = high, 2.0 * width
+        else:
+            width = 0.5 * width
+    return 2.0

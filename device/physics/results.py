@@ -1,0 +1,77 @@
+"""What one shot comes to: its summary, and its course over time."""
+
+# ruff: noqa: PLR0124 - NaN is what does not equal itself, and this runs a million times a minute
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from device.physics.layout import STATUSES
+
+Status = Literal["home", "no-break-away", "stuck", "not-home"]
+_STATUS: dict[str, Status] = {
+    "home": "home",
+    "no-break-away": "no-break-away",
+    "stuck": "stuck",
+    "not-home": "not-home",
+}
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ShotSummary:
+    """What one shot comes to. What was not reached is None.
+
+    The recoil stage lasts from the first rise of F_m until F_m falls to 0 (or, if that is earlier, until the magnet
+    turns while the coil still pushes: there is no bullet firing stage then). Firing ends at the first dx/dt = 0,
+    resetting when the magnet meets its stop at x = 0. The current that a shorted coil still carries may then lift it
+    off once more, by micrometres; the summary leaves that hop out, the trace shows it. `max_displacement_m` is 0 if
+    the magnet never broke away.
+
+    Status: `home`; `no-break-away`; `stuck` (friction holds the magnet off its stop); `not-home` (still moving or
+    held by the coil after 10 s, or beyond what floats can express).
+    """
+
+    status: Status
+    peak_force_N: float | None  # largest F in the recoil stage
+    recoil_end_s: float | None
+    recoil_impulse_Ns: float | None  # integral of F over the recoil stage = m v at its end
+    firing_end_s: float | None
+    max_displacement_m: float | None
+    reset_end_s: float | None
+    impact_speed_m_s: float | None  # at the landing that ends the resetting stage
+    collision_force_N: float | None  # equation (4): m v^2 / x_k
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class ShotTrace:
+    """One shot over time, arrays of one length, and its summary. `force_N` is F, without the collision."""
+
+    time_s: NDArray[np.float64]
+    displacement_m: NDArray[np.float64]
+    velocity_m_s: NDArray[np.float64]
+    current_A: NDArray[np.float64]
+    motor_force_N: NDArray[np.float64]
+    force_N: NDArray[np.float64]
+    drive_V: NDArray[np.float64]
+    summary: ShotSummary
+
+
+def summary_of(row: Sequence[float]) -> ShotSummary:
+    """The kernel's row of results as a summary; NaN, which equals nothing, is what was not reached."""
+    status, peak, recoil, impulse, firing, top, reset, impact, collision = row[:9]
+    return ShotSummary(
+        status=_STATUS[STATUSES[int(status)]],
+        peak_force_N=peak if peak == peak else None,
+        recoil_end_s=recoil if recoil == recoil else None,
+        recoil_impulse_Ns=impulse if impulse == impulse else None,
+        firing_end_s=firing if firing == firing else None,
+        max_displacement_m=top if top == top else None,
+        reset_end_s=reset if reset == reset else None,
+        impact_speed_m_s=impact if impact == impact else None,
+        collision_force_N=collision if collision == collision else None,
+    )

@@ -1,0 +1,181 @@
+"""The motion inside the coil as Taylor series over one step, in s = (t - t_start)/span.
+
+    m v' = k_m g i - k (x + x_0) -/+ F_f,  L i' = u - R i - k_e v (printed) or k_e g v (reciprocal),  g = 1 - x/x_c
+
+Products of series are Cauchy products (Jorba & Zou, Experimental Mathematics 14 (2005) 99, section 2), and so is the
+choice of the step from the last two coefficients (section 3). Where the current's own time constant L/R is far below
+all others and its transient is over, the current follows the motion (the slow manifold), and the step no longer
+depends on the inductance.
+"""
+
+from __future__ import annotations
+
+import math
+
+from device.physics.kernel import Floats, kernel
+from device.physics.layout import (
+    BACK_EMF,
+    FRICTION_BACK,
+    FRICTION_OUT,
+    GS,
+    INDUCTANCE,
+    IS,
+    MASS,
+    MOTOR,
+    ORDER,
+    PRELOAD,
+    REACH,
+    RECIPROCAL,
+    RESISTANCE,
+    STIFFNESS,
+    VS,
+    XS,
+)
+
+TOLERANCE = 1e-12
+"""Of the first coefficient left out, relative to the largest of the leading ones."""
+_LONGEST = 3.0  # how far past its scale a series may reach
+_NEGLIGIBLE = 1e-30  # a last coefficient as small as this ends no step
+_SWEEPS = 12
+_PER = (0.0, *(1.0 / n for n in range(1, ORDER + 2)))
+
+
+@kernel
+def friction(p: Floats, heading: float) -> float:
+    """The friction's push, signed: against the way the magnet goes."""
+    return -p[FRICTION_OUT] if heading > 0.0 else p[FRICTION_BACK]
+
+
+@kernel
+def product(w: Floats, a: int, b: int, n: int) -> float:
+    """The n-th coefficient of a product of series."""
+    total = 0.0
+    for j in range(n + 1):
+        total += w[a + n - j] * w[b + j]
+    return total
+
+
+@kernel
+def expand(p: Floats, u: float, heading: float, span: float, w: Floats) -> None:
+    """The series of x, v, i and g from their first coefficients, w[XS], w[VS] and w[IS]."""
+    spread, per_mass, per_inductance = -1.0 / p[REACH], span / p[MASS], span / p[INDUCTANCE]
+    motor, emf, k, R = p[MOTOR], p[BACK_EMF], p[STIFFNESS], p[RESISTANCE]
+    push, reciprocal = friction(p, heading) - k * p[PRELOAD], p[RECIPROCAL] != 0.0
+    w[GS] = (p[REACH] - w[XS]) / p[REACH]
+    for n in range(ORDER):
+        seen = product(w, GS, VS, n) if reciprocal else w[VS + n]
+        w[XS + n + 1] = span * w[VS + n] * _PER[n + 1]
+        w[GS + n + 1] = spread * w[XS + n + 1]
+        w[VS + n + 1] = (motor * product(w, GS, IS, n) - k * w[XS + n] + push) * per_mass * _PER[n + 1]
+        w[IS + n + 1] = (u - R * w[IS + n] - emf * seen) * per_inductance * _PER[n + 1]
+        push, u = 0.0, 0.0
+
+
+@kernel
+def expand_slaved(p: Floats, u: float, heading: float, span: float, w: Floats) -> None:
+    """The same on the slow manifold, R i = u - emf - L i': w[IS] follows from w[XS] and w[VS].
+
+    The sum of all derivatives of the emf that this stands for is one pass from the last coefficient down; a few
+    passes settle what the current does to the motion.
+    """
+    follow(p, u, heading, span, w, True)
+    for _ in range(_SWEEPS):
+        change = slave(p, u, span, w)
+        follow(p, u, heading, span, w, False)
+        if change <= 1e-16:
+            break
+
+
+@kernel
+def follow(p: Floats, u: float, heading: float, span: float, w: Floats, algebraic: bool) -> None:
+    """x, v and g from the series of the current; if `algebraic`, from the current that L = 0 would give."""
+    push = friction(p, heading) - p[STIFFNESS] * p[PRELOAD]
+    w[GS] = (p[REACH] - w[XS]) / p[REACH]
+    for n in range(ORDER):
+        if algebraic:
+            w[IS + n] = (u - p[BACK_EMF] * seen_speed(p, w, n)) / p[RESISTANCE]
+        w[XS + n + 1] = span * w[VS + n] * _PER[n + 1]
+        w[GS + n + 1] = -w[XS + n + 1] / p[REACH]
+        force = p[MOTOR] * product(w, GS, IS, n) - p[STIFFNESS] * w[XS + n] + push
+        w[VS + n + 1] = force * span / p[MASS] * _PER[n + 1]
+        push, u = 0.0, 0.0
+    if algebraic:
+        w[IS + ORDER] = -p[BACK_EMF] * seen_speed(p, w, ORDER) / p[RESISTANCE]
+
+
+@kernel
+def seen_speed(p: Floats, w: Floats, n: int) -> float:
+    """The n-th coefficient of the speed that the back-EMF sees."""
+    return product(w, GS, VS, n) if p[RECIPROCAL] != 0.0 else w[VS + n]
+
+
+@kernel
+def slave(p: Floats, u: float, span: float, w: Floats) -> float:
+    """The current that R i = u - emf - L i' gives for this motion; how much it changed, relative to its size."""
+    lag = p[INDUCTANCE] / p[RESISTANCE] / span
+    above, change, size = 0.0, 0.0, 1e-300
+    for n in range(ORDER, -1, -1):
+        drive = u if n == 0 else 0.0
+        above = (drive - p[BACK_EMF] * seen_speed(p, w, n)) / p[RESISTANCE] - lag * (n + 1) * above
+        change = max(change, abs(above - w[IS + n]))
+        size = max(size, abs(above))
+        w[IS + n] = above
+    return change / size
+
+
+@kernel
+def leading(w: Floats, c: int, floor: float) -> float:
+    """The size of a series over a step of its scale, at least `floor`."""
+    return max(abs(w[c]), abs(w[c + 1]), abs(w[c + 2]), abs(w[c + 3]), floor)
+
+
+@kernel
+def radius(p: Floats, u: float, span: float, w: Floats) -> float:
+    """How far the three series reach, in steps: where the last two coefficients come down to the tolerance.
+
+    The floors keep what cancels in a force or a voltage from being asked to more digits than it has.
+    """
+    held = p[STIFFNESS] * (p[PRELOAD] + abs(w[XS])) + p[FRICTION_OUT] + p[MOTOR] * abs(w[IS])
+    v_size = leading(w, VS, 1e-6 * held / p[MASS] * span)
+    x_size = leading(w, XS, v_size * span)
+    i_size = leading(w, IS, 1e-2 * (abs(u) + p[BACK_EMF] * abs(w[VS])) / p[RESISTANCE])
+    last = max(ratio(w[XS + ORDER], x_size), ratio(w[VS + ORDER], v_size), ratio(w[IS + ORDER], i_size))
+    other = max(ratio(w[XS + ORDER - 1], x_size), ratio(w[VS + ORDER - 1], v_size), ratio(w[IS + ORDER - 1], i_size))
+    last = max(last, other)
+    if last <= _NEGLIGIBLE:
+        return _LONGEST
+    return min(_LONGEST, (TOLERANCE / last) ** (1.0 / ORDER)) if last < math.inf else 0.0
+
+
+@kernel
+def ratio(a: float, b: float) -> float:
+    """|a|/b, 0 for 0/0, infinite for what is not a number."""
+    if a == 0.0:
+        return 0.0
+    part = abs(a) / b if b > 0.0 else math.inf
+    return part if part >= 0.0 else math.inf
+
+
+@kernel
+def rescale(w: Floats, factor: float) -> None:
+    """The series over a step `factor` times as long."""
+    power = 1.0
+    for n in range(1, ORDER + 1):
+        power *= factor
+        w[XS + n] *= power
+        w[VS + n] *= power
+        w[IS + n] *= power
+
+
+@kernel
+def fit(p: Floats, u: float, span: float, w: Floats) -> float:
+    """The span over which the series hold to the tolerance; they are rescaled to it. 0 if there is none."""
+    for _ in range(8):
+        factor = radius(p, u, span, w)
+        if factor <= 0.0:
+            return 0.0
+        rescale(w, factor)
+        span *= factor
+        if factor > 0.5:
+            break
+    return span

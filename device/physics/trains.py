@@ -1,0 +1,131 @@
+"""Trains of shots, each from the state that the last one left, and how fast a gun may shoot.
+
+Onsets are whole microseconds, as the limits count them: a float time would drop a shot here and there.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from itertools import pairwise
+
+from scipy.optimize import brentq
+
+from device.parameters import GunParameters
+from device.physics.layout import (
+    END,
+    HORIZON_S,
+    RESULT_SIZE,
+    STATE_SIZE,
+    WORK_SIZE,
+    I,
+    V,
+    X,
+    pack,
+)
+from device.physics.results import ShotSummary, summary_of
+from device.physics.shot import shoot_on
+from device.physics.single import simulate
+
+TICKS = 1_000_000
+"""A second in ticks."""
+
+_FRICTIONS = 64  # looked at before the boundary of the allowed ones is solved for
+_CREEP_S = 5.0  # a return slower than this is no shooting
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class State:
+    """The magnet and the coil at the onset of a shot; at rest at the stop by default."""
+
+    displacement_m: float = 0.0
+    velocity_m_s: float = 0.0
+    current_A: float = 0.0
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class TrainShot:
+    """One shot of a train. The summary's times count from its own onset, and end at the next one."""
+
+    onset_tick: int
+    start: State
+    summary: ShotSummary
+
+
+def train(gun: GunParameters, onset_ticks: Sequence[int], start: State | None = None) -> tuple[TrainShot, ...]:
+    """The shots whose pulses begin at these ticks. A pulse is cut short by the next one.
+
+    `ValueError`: the ticks do not rise, or the magnet is not between its stop and infinity.
+    """
+    if any(b <= a for a, b in pairwise(onset_ticks)):
+        raise ValueError(f"onset_ticks are {list(onset_ticks)}; they must rise")
+    packed, state, shots = pack(gun), _row_of(start or State()), []
+    work = [0.0] * WORK_SIZE
+    for onset, following in zip(onset_ticks, (*onset_ticks[1:], None), strict=True):
+        begin = State(displacement_m=state[X], velocity_m_s=state[V], current_A=state[I])
+        state[END] = HORIZON_S if following is None else min((following - onset) / TICKS, HORIZON_S)
+        found = [0.0] * RESULT_SIZE
+        shoot_on(packed, state, work, found)
+        shots.append(TrainShot(onset_tick=onset, start=begin, summary=summary_of(found)))
+    return tuple(shots)
+
+
+def _row_of(start: State) -> list[float]:
+    values = (start.displacement_m, start.velocity_m_s, start.current_A)
+    if not all(map(math.isfinite, values)) or start.displacement_m < 0:
+        raise ValueError(f"start is {start}; it must be finite, and displacement_m at least 0")
+    row = [0.0] * STATE_SIZE
+    row[X], row[V], row[I] = values
+    return row
+
+
+def repeated(gun: GunParameters, rate_Hz: float, shots: int) -> tuple[TrainShot, ...]:
+    """So many shots from rest at a steady rate, rounded to whole ticks. `ValueError`: a rate that is none."""
+    if not 0 < rate_Hz <= TICKS:
+        raise ValueError(f"rate_Hz is {rate_Hz}; it must be above 0 and at most {TICKS}")
+    period = round(TICKS / rate_Hz)
+    return train(gun, range(0, period * shots, period))
+
+
+def shortest_period_ticks(gun: GunParameters) -> int | None:
+    """The shortest period that lets the magnet home before the next pulse; None if it does not come home."""
+    summary = simulate(gun)
+    if summary.status != "home" or summary.reset_end_s is None:
+        return None
+    return math.ceil(max(summary.reset_end_s, gun.pulse_s) * TICKS)
+
+
+def highest_rate_Hz(gun: GunParameters) -> float:  # noqa: N802 - the unit ends the name
+    """The highest rate at which every shot starts from home; 0 if the magnet does not come home."""
+    period = shortest_period_ticks(gun)
+    return TICKS / period if period else 0.0
+
+
+def gentlest_friction_N(gun: GunParameters, rate_Hz: float) -> float | None:  # noqa: N802 - the unit
+    """The damper's friction at which the magnet lands most gently while the gun can shoot at `rate_Hz`.
+
+    More friction lands more gently and, beyond an optimum, later: the answer is where the rate is just met. None if
+    no friction allows that rate. Looked for from none to what the pre-load can overcome.
+    """
+    if not 1 / _CREEP_S < rate_Hz < math.inf:
+        raise ValueError(f"rate_Hz is {rate_Hz}; it must be a finite rate above {1 / _CREEP_S:g}")
+    most = gun.stiffness_N_m * gun.preload_length_m
+    frictions = [most * n / _FRICTIONS for n in range(_FRICTIONS + 1)]
+    spare = [_spare_s(gun, friction_N, rate_Hz) for friction_N in frictions]
+    allowed = [n for n, seconds in enumerate(spare) if seconds >= 0]
+    if not allowed:
+        return None
+    last = allowed[-1]
+    if last == _FRICTIONS:
+        return most
+    edge = brentq(lambda f: _spare_s(gun, f, rate_Hz), frictions[last], frictions[last + 1], xtol=1e-12)
+    while _spare_s(gun, edge, rate_Hz) < 0:  # the root's own rounding
+        edge = math.nextafter(edge - 1e-13, 0.0)
+    return float(edge)
+
+
+def _spare_s(gun: GunParameters, friction_N: float, rate_Hz: float) -> float:
+    """How much earlier than needed the magnet is home."""
+    summary = simulate(replace(gun, friction_N=friction_N))
+    return 1 / rate_Hz - (summary.reset_end_s if summary.reset_end_s is not None else 2 * _CREEP_S)

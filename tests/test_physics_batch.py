@@ -1,0 +1,105 @@
+"""Batches give the digits of single shots, compiled or not, and one bad gun spoils no other."""
+
+import dataclasses
+import math
+import time
+
+import numpy as np
+import pytest
+
+from device.physics import GunParameters, ShotBatch, batch, simulate, simulate_batch, single, warm
+from device.physics.kernel import kernel
+
+NUMBERS = [field.name for field in dataclasses.fields(ShotBatch) if field.name != "status"]
+
+
+@pytest.fixture(params=["compiled", "interpreted"])
+def engine(request, monkeypatch):
+    if request.param == "interpreted":
+        monkeypatch.setattr(batch, "find_spec", lambda _name: None)
+    else:
+        pytest.importorskip("numba")
+    return request.param
+
+
+@pytest.mark.parametrize("drive_off", ["shorted", "open"])
+def test_a_batch_gives_the_digits_of_single_shots(engine, drive_off):
+    rng = np.random.default_rng(3)
+    arrays = {
+        "friction_N": rng.uniform(0, 2, 40),
+        "voltage_V": rng.uniform(0, 24, 40),
+        "pulse_s": rng.uniform(0, 0.03, 40),
+    }
+    found = simulate_batch(GunParameters(drive_off=drive_off), **arrays)
+    for n, values in enumerate(zip(*(column.tolist() for column in arrays.values()), strict=True)):
+        alone = simulate(GunParameters(drive_off=drive_off, **dict(zip(arrays, values, strict=True))))
+        assert found.names()[n] == alone.status
+        for name in NUMBERS:
+            expected = getattr(alone, name)
+            assert getattr(found, name)[n] == pytest.approx(
+                math.nan if expected is None else expected, rel=1e-13, abs=0, nan_ok=True
+            )
+
+
+def test_what_is_no_gun_is_invalid_and_spoils_no_other(engine):
+    found = simulate_batch(magnet_mass_kg=[0.114, 0.0, math.nan, -1.0, math.inf], friction_N=0.21)
+    assert found.names().tolist() == ["home", *["invalid"] * 4]
+    assert all(np.isnan(getattr(found, name)[1:]).all() for name in NUMBERS)
+
+
+def test_options_and_models_may_differ_within_a_batch(engine):
+    found = simulate_batch(drive_off=["open", "shorted", "ajar"], emf="reciprocal", fidelity="no-inductance")
+    assert found.names().tolist() == ["home", "home", "invalid"]
+    alone = simulate(GunParameters(drive_off="open", emf="reciprocal"), "no-inductance")
+    assert found.impact_speed_m_s[0] == pytest.approx(alone.impact_speed_m_s, rel=1e-13)
+
+
+def test_arrays_are_broadcast_and_progress_is_told():
+    told = []
+    found = simulate_batch(friction_N=np.linspace(0.2, 1.0, 3)[:, None], voltage_V=[15.0, 16.0], progress=told.append)
+    assert len(found.status) == sum(told) == 6
+    with pytest.raises(ValueError, match="no such parameter: colour"):
+        simulate_batch(colour=[1.0])
+    with pytest.raises(ValueError, match="fidelity is 'best'"):
+        simulate_batch(fidelity="best")
+
+
+def test_a_warm_process_gives_the_digits_of_a_cold_one(monkeypatch):
+    pytest.importorskip("numba")
+    guns = [GunParameters(friction_N=f, drive_off=off) for f in (0.21, 1.12, 1.7) for off in ("open", "shorted")]
+    cold = [simulate(gun) for gun in guns]
+    monkeypatch.setattr(single, "_engine", dataclasses.replace(single._engine))
+    assert warm()
+    for gun, expected in zip(guns, cold, strict=True):
+        found = simulate(gun)
+        assert found.status == expected.status
+        for name in NUMBERS:
+            ours, theirs = (getattr(summary, name) for summary in (found, expected))
+            assert (ours is None and theirs is None) or ours == pytest.approx(theirs, rel=1e-13)
+
+
+def test_without_the_compiler_nothing_is_warm(monkeypatch):
+    monkeypatch.setattr(batch, "find_spec", lambda _name: None)
+    assert not warm()
+
+
+def test_a_session_never_loads_the_compiler():
+    import subprocess
+    import sys
+
+    code = "import sys; from device.physics import *; simulate(GunParameters()); sys.exit('numba' in sys.modules)"
+    assert subprocess.run([sys.executable, "-c", code], check=False).returncode == 0
+
+
+def test_an_interpreted_shot_takes_milliseconds():
+    gun, best = GunParameters(), math.inf
+    for _ in range(5):
+        begun = time.process_time()
+        simulate(gun)
+        best = min(best, time.process_time() - begun)
+    assert best < 0.02
+
+
+def test_a_name_of_the_kernel_stands_for_one_function():
+    with pytest.raises(ValueError, match="shoot already"):
+        kernel(single.shoot)

@@ -1,0 +1,130 @@
+"""The audit, the damper, the contact and the hand."""
+
+import math
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from device.physics import GunParameters, simulate
+from device.physics.audit import audit
+from device.physics.contact import compliant_collision, rigid_collision
+from device.physics.damper import damper_friction, strip_stiffness
+from device.physics.hand import Hand, simulate_held
+
+VARIANTS = [(f, off, emf) for f in (0.21, 1.12) for off in ("shorted", "open") for emf in ("printed", "reciprocal")]
+
+guns = st.builds(
+    GunParameters,
+    magnet_mass_kg=st.floats(0.02, 0.5),
+    inductance_H=st.floats(2e-4, 5e-3),
+    stiffness_N_m=st.floats(0.0, 100.0),
+    preload_length_m=st.floats(0.0, 0.2),
+    friction_N=st.floats(0.0, 2.0),
+    voltage_V=st.floats(0.0, 24.0),
+    pulse_s=st.floats(0.0, 0.03),
+    drive_off=st.sampled_from(["shorted", "open"]),
+    emf=st.sampled_from(["printed", "reciprocal"]),
+)
+
+
+@pytest.mark.parametrize(("friction_N", "drive_off", "emf"), VARIANTS)
+def test_energy_and_momentum_add_up(friction_N, drive_off, emf):
+    found = audit(GunParameters(friction_N=friction_N, drive_off=drive_off, emf=emf))
+    assert abs(found.residual_J) < 1e-12
+    assert abs(found.residual_impulse_Ns) < 1e-12
+    assert found.force_impulse_Ns + found.collision_impulse_Ns == pytest.approx(0.0, abs=1e-12)
+    if emf == "reciprocal":
+        assert found.created_J == pytest.approx(0.0, abs=1e-12)
+
+
+def test_the_printed_back_emf_swallows_energy_in_the_recoil_and_makes_it_in_a_shorted_return():
+    assert audit(GunParameters(drive_off="open")).created_J < -0.05
+    assert audit(GunParameters(drive_off="shorted")).created_J > 0.5
+
+
+@given(gun=guns)
+@settings(max_examples=30, deadline=None, derandomize=True)
+def test_the_audit_of_any_gun_closes(gun):
+    found = audit(gun)
+    size = max(found.supplied_J, 1e-6)
+    assert abs(found.residual_J) < 1e-9 * size
+    assert abs(found.residual_impulse_Ns) < 1e-10
+    if gun.emf == "reciprocal":
+        assert abs(found.created_J) < 1e-9 * size
+
+
+def test_a_damper_for_the_way_back_only_leaves_the_recoil_alone():
+    bare = simulate(GunParameters(drive_off="open"))
+    braked = simulate(GunParameters(drive_off="open"), return_friction_N=1.12)
+    for name in ("peak_force_N", "recoil_end_s", "recoil_impulse_Ns", "firing_end_s", "max_displacement_m"):
+        assert getattr(braked, name) == pytest.approx(getattr(bare, name), rel=1e-13)
+    lost = (1.12 - 0.21) * bare.max_displacement_m  # the work that the damper adds
+    energy = 0.114 / 2 * (bare.impact_speed_m_s**2 - braked.impact_speed_m_s**2)
+    assert energy == pytest.approx(lost, rel=1e-12)
+
+
+@pytest.mark.parametrize("friction_N", [-1.0, math.nan, math.inf])
+def test_a_friction_that_physics_has_not_is_refused(friction_N):
+    with pytest.raises(ValueError, match="return_friction_N is"):
+        simulate(GunParameters(), return_friction_N=friction_N)
+
+
+def test_equation_5():
+    assert damper_friction(0.21, 0.7, strip_stiffness(1.5e6, 2.6e-6, 0.003), 0.0005) == pytest.approx(1.12)
+    with pytest.raises(ValueError, match="coefficient is -1"):
+        damper_friction(0.21, -1.0, 1.0, 1.0)
+    with pytest.raises(ValueError, match="thickness_m is 0"):
+        strip_stiffness(1.0, 1.0, 0.0)
+
+
+@pytest.mark.parametrize(("depth_m", "peak", "impulse"), [(1e-3, 0.0081, 0.0127), (5e-4, 0.00404, 0.00635)])
+def test_the_spring_works_on_while_a_soft_stop_gives_way(depth_m, peak, impulse):
+    gun = GunParameters(drive_off="open", contact_depth_m=depth_m)
+    speed = simulate(gun).impact_speed_m_s
+    rigid, soft = rigid_collision(gun, speed), compliant_collision(gun, speed)
+    assert rigid.peak_force_N == pytest.approx(simulate(gun).collision_force_N)
+    assert soft.peak_force_N / rigid.peak_force_N - 1 == pytest.approx(peak, rel=0.01)  # by stiff integration
+    assert soft.impulse_Ns / rigid.impulse_Ns - 1 == pytest.approx(impulse, rel=0.01)
+
+
+def test_the_soft_stop_agrees_with_its_sampled_equation():
+    gun, v = GunParameters(contact_depth_m=2e-3), 0.7
+    soft = compliant_collision(gun, v)
+    stiff = 0.114 * (v / 2e-3) ** 2
+    t = np.linspace(0.0, soft.duration_s, 200_001)
+    w, c = math.sqrt((stiff + 14) / 0.114), (1.4 - 0.21) / (stiff + 14)
+    depth = c - c * np.cos(w * t) + v / w * np.sin(w * t)
+    assert soft.peak_force_N == pytest.approx(stiff * depth[-1])
+    assert soft.impulse_Ns == pytest.approx(np.trapezoid(stiff * depth, t))
+
+
+def test_a_collision_at_no_speed_is_none():
+    for collide in (rigid_collision, compliant_collision):
+        assert collide(GunParameters(), 0.0).impulse_Ns == 0.0
+        with pytest.raises(ValueError, match="impact_speed_m_s is -1"):
+            collide(GunParameters(), -1.0)
+
+
+@pytest.mark.parametrize(("friction_N", "drive_off", "emf"), VARIANTS)
+def test_a_gun_too_heavy_to_move_is_the_fixed_gun(friction_N, drive_off, emf):
+    gun = GunParameters(friction_N=friction_N, drive_off=drive_off, emf=emf)
+    held, fixed = simulate_held(gun, Hand(enclosure_mass_kg=1e7)), simulate(gun)
+    for name in ("max_displacement_m", "reset_end_s", "impact_speed_m_s"):
+        assert getattr(held, name) == pytest.approx(getattr(fixed, name), rel=2e-7), name
+
+
+@pytest.mark.parametrize(("friction_N", "drive_off", "emf"), VARIANTS)
+def test_a_held_gun_kicks_and_keeps_its_momentum(friction_N, drive_off, emf):
+    held = simulate_held(GunParameters(friction_N=friction_N, drive_off=drive_off, emf=emf))
+    assert abs(held.residual_impulse_Ns) < 1e-9
+    assert 1e-3 < held.peak_kick_m < 1e-2
+    assert held.max_displacement_m < simulate(GunParameters(friction_N=friction_N)).max_displacement_m
+
+
+def test_a_hand_that_physics_has_not_is_refused():
+    with pytest.raises(ValueError, match="mass above 0"):
+        Hand(enclosure_mass_kg=0.0)
+    with pytest.raises(ValueError, match="until_s is 0"):
+        simulate_held(GunParameters(), until_s=0)

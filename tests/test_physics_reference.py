@@ -1,0 +1,23 @@
+"""The full model against 50 digits by another method: tests/golden/make_physics.py, which imports nothing of ours."""
+
+import json
+from pathlib import Path
+
+import pytest
+
+from device.physics import GunParameters, simulate
+
+SHOTS = json.loads((Path(__file__).parent / "golden" / "physics.json").read_text(encoding="utf-8"))["shots"]
+
+
+def name_of(shot):
+    return f"{shot['friction_N']}-{shot['drive_off']}-{shot['emf']}"
+
+
+@pytest.mark.parametrize("shot", SHOTS, ids=name_of)
+def test_every_number_of_the_summary_agrees_with_fifty_digits_to_a_part_in_a_million_million(shot):
+    gun = GunParameters(friction_N=shot["friction_N"], drive_off=shot["drive_off"], emf=shot["emf"])
+    found = simulate(gun)
+    assert found.status == "home"
+    for name, digits in shot["summary"].items():
+        assert getattr(found, name) == pytest.approx(float(digits), rel=1e-12, abs=0.0), name
