@@ -1,0 +1,1 @@
+"""Choices and their times: the diffusion model's densities and fits, and measures of the speed-accuracy trade-off."""
