@@ -20,6 +20,7 @@ from device.words import (
     Pulse,
     Shot,
     ShotReport,
+    ShotTiming,
 )
 
 if TYPE_CHECKING:
@@ -37,6 +38,7 @@ __all__ = [
     "Pulse",
     "Shot",
     "ShotReport",
+    "ShotTiming",
     "open_gun",
 ]
 
@@ -47,7 +49,7 @@ def open_gun(
     *,
     clock: Callable[[], float] = time.monotonic,
 ) -> Gun:
-    """A disarmed gun at `address`, "simulated" or "serial:PORT".
+    """A disarmed gun at `address`, "simulated" or "serial:PORT"; "serial:auto" looks for the one that answers.
 
     `parameters`: the rendering methods by name, or a gun from which the paper's three are made (the paper's gun if
     None). `LinkError`: the gun does not answer. `ValueError`: no such form of address.
@@ -58,16 +60,27 @@ def open_gun(
     'rendered'
     """
     if address.startswith("serial:"):
-        raise LinkError(f"cannot open {address!r}: this version of Recoil drives the simulated gun only")
+        return _serial(address, parameters, clock)
     if address != "simulated":
         raise ValueError(f'address is {address!r}; it must be "simulated" or "serial:PORT"')
     return _simulated(parameters, clock)
 
 
-def _simulated(parameters: GunParameters | Mapping[str, Method] | None, clock: Callable[[], float]) -> Gun:
+def _serial(address: str, parameters: GunParameters | Mapping[str, Method] | None, clock: Callable[[], float]) -> Gun:
+    from device.serial_gun.gun import open_serial  # noqa: PLC0415 - pyserial and the physics wait until they are wanted
+
+    return open_serial(address, _methods(parameters), clock)
+
+
+def _methods(parameters: GunParameters | Mapping[str, Method] | None) -> Mapping[str, Method]:
     from device.methods import paper_methods  # noqa: PLC0415 - importing the words alone stays cheap
-    from device.simulated import SimulatedGun  # noqa: PLC0415
 
     if isinstance(parameters, Mapping):
-        return SimulatedGun(parameters, clock)
-    return SimulatedGun(paper_methods() if parameters is None else paper_methods(parameters), clock)
+        return parameters
+    return paper_methods() if parameters is None else paper_methods(parameters)
+
+
+def _simulated(parameters: GunParameters | Mapping[str, Method] | None, clock: Callable[[], float]) -> Gun:
+    from device.simulated import SimulatedGun  # noqa: PLC0415 - the heavy imports wait until they are wanted
+
+    return SimulatedGun(_methods(parameters), clock)

@@ -71,9 +71,31 @@ class Shot:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
+class ShotTiming:
+    """How a shot over a line came about: host's times in seconds, the gun's in whole microseconds of its own clock.
+
+    `accepted_s` and the pulse's times are the gun's put on the host's clock, true to within `uncertainty_s`. `asked` is
+    how often the trigger was written until its outcome was known.
+    """
+
+    requested_s: float
+    written_s: float
+    acknowledged_s: float
+    accepted_s: float
+    pulse_start_s: float
+    pulse_end_s: float
+    uncertainty_s: float
+    gun_accepted_us: int
+    gun_start_us: int
+    gun_end_us: int
+    asked: int
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
 class ShotReport:
     """What was rendered and when. Times are seconds on the host's monotonic clock.
 
+    `timing`: how it came about, where that takes time at all.
     `home_predicted_s` is when the magnet is back at its stop by the model (there is no position sensor).
     `motion` is the model's status of the shot (`home`, `stuck`, ...), `rendered` for a vibration.
     """
@@ -84,6 +106,7 @@ class ShotReport:
     pulse_end_s: float
     home_predicted_s: float
     motion: str
+    timing: ShotTiming | None = None
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

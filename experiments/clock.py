@@ -23,13 +23,15 @@ class Clock(Protocol):
 
 
 class RealClock:
-    """The machine's monotonic clock."""
+    """The machine's monotonic clock; with a twin in a hurry, as many times faster as the twin lives."""
 
-    name = "real"
+    def __init__(self, speed: float = 1.0) -> None:
+        self.name = "real" if speed == 1 else f"real x {speed:g}"
+        self._speed = speed
 
     def now(self) -> float:
         """Monotonic time in seconds."""
-        return time.monotonic()
+        return time.monotonic() * self._speed
 
     def utc(self) -> str:
         """Date and time in UTC."""
@@ -38,7 +40,7 @@ class RealClock:
     def sleep(self, seconds: float) -> None:
         """Wait for real."""
         if seconds > 0:
-            time.sleep(seconds)
+            time.sleep(seconds / self._speed)
 
 
 class VirtualClock:

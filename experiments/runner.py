@@ -184,6 +184,7 @@ def _fire(step: Fire, desk: Desk) -> Fired | Failed:
         pulse_end_s=report.pulse_end_s,
         home_predicted_s=report.home_predicted_s,
         motion=report.motion,
+        timing=report.timing,
     )
 
 
@@ -199,24 +200,24 @@ def _present(step: Present, desk: Desk) -> Presented | Failed:
     try:
         desk.gun.arm()
         onset_utc, first = _shoot(step.trial, desk)
-        shots = 1
-        while not desk.screen.said_next(step, first.pulse_start_s + shots * step.repeat_every_s):
-            if shots == step.max_shots:
-                return _presented(desk, onset_utc, first, shots, "limit")
-            _shoot(step.trial, desk)
-            shots += 1
+        reports = [first]
+        while not desk.screen.said_next(step, first.pulse_start_s + len(reports) * step.repeat_every_s):
+            if len(reports) == step.max_shots:
+                return _presented(desk, onset_utc, reports, "limit")
+            reports.append(_shoot(step.trial, desk)[1])
     except DeviceError as error:
         return Failed(cause=str(error))
     finally:
         disarm(desk.gun)
-    return _presented(desk, onset_utc, first, shots, "next")
+    return _presented(desk, onset_utc, reports, "next")
 
 
-def _presented(desk: Desk, onset_utc: str, first: ShotReport, shots: int, ended_by: str) -> Presented:
+def _presented(desk: Desk, onset_utc: str, reports: list[ShotReport], ended_by: str) -> Presented:
     return Presented(
         gun=desk.gun_name,
         onset_utc=onset_utc,
-        shots=shots,
-        exposure_s=desk.clock.now() - first.pulse_start_s,
+        shots=len(reports),
+        exposure_s=desk.clock.now() - reports[0].pulse_start_s,
         ended_by="next" if ended_by == "next" else "limit",
+        timings=tuple(report.timing for report in reports if report.timing),
     )

@@ -11,7 +11,7 @@ from typing import Annotated, Any, Literal
 
 from pydantic import Field, TypeAdapter
 
-from device.words import Direction
+from device.words import Direction, ShotTiming
 from experiments.plan import Trial
 
 
@@ -98,7 +98,10 @@ class Prepared:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Fired:
-    """One shot was fired. Times are on the host's monotonic clock; home is predicted by the model."""
+    """One shot was fired. Times are on the host's monotonic clock; home is predicted by the model.
+
+    `timing` tells how it came about, where a gun on a line was asked.
+    """
 
     gun: str
     onset_utc: str
@@ -107,6 +110,7 @@ class Fired:
     pulse_end_s: float
     home_predicted_s: float
     motion: str
+    timing: ShotTiming | None = None
     kind: Literal["fired"] = "fired"
 
 
@@ -132,13 +136,17 @@ class Rested:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Presented:
-    """The stimulus was felt until next was said, or until the most shots were fired."""
+    """The stimulus was felt until next was said, or until the most shots were fired.
+
+    `timings` tell how each shot came about, where a gun on a line was asked.
+    """
 
     gun: str
     onset_utc: str
     shots: int
     exposure_s: float
     ended_by: Literal["next", "limit"]
+    timings: tuple[ShotTiming, ...] = ()
     kind: Literal["presented"] = "presented"
 
 
@@ -204,13 +212,14 @@ class Standing:
     history: History
 
 
+_WHERE_KNOWN = ("timing", "timings")
 _STEP: TypeAdapter[Step] = TypeAdapter(Annotated[Step, Field(discriminator="kind")])
 _OUTCOME: TypeAdapter[Outcome] = TypeAdapter(Annotated[Outcome, Field(discriminator="kind")])
 
 
 def record(word: Step | Outcome) -> dict[str, Any]:
-    """A step or outcome as plain JSON values."""
-    return asdict(word)
+    """A step or outcome as plain JSON values; how a shot came about only where that is known."""
+    return {key: value for key, value in asdict(word).items() if key not in _WHERE_KNOWN or value}
 
 
 def step_from(body: object) -> Step:

@@ -144,9 +144,9 @@ def test_a_gun_takes_the_papers_methods_from_a_gun_or_methods_by_name(clock):
     assert own.fire(a_shot("buzz", Effect(effect=1))).home_predicted_s == 100.1
 
 
-def test_a_serial_gun_is_not_driven_by_this_version():
-    with pytest.raises(LinkError, match=r"'serial:COM3'.*simulated gun only"):
-        open_gun("serial:COM3")
+def test_a_serial_port_that_is_not_there_is_a_link_error_that_names_it():
+    with pytest.raises(LinkError, match=r"cannot open /dev/no-such-port"):
+        open_gun("serial:/dev/no-such-port")
 
 
 @pytest.mark.parametrize("address", ["", "usb", "Simulated", "COM3"])

@@ -7,6 +7,8 @@ from contextlib import closing, suppress
 from pathlib import Path
 
 from device import open_gun
+from device.serial_gun.address import speed_of
+from experiments.clock import RealClock
 from experiments.doctor.figures import Adapter, Link
 from experiments.doctor.measures import timed_ms
 from experiments.doctor.spread import spread
@@ -24,7 +26,7 @@ def link(address: str) -> Link:
     `DeviceError` if it does not answer; `PlaceError` if there is no such form of address.
     """
     try:
-        gun = open_gun(address)
+        gun = open_gun(address, clock=RealClock(speed_of(address) or 1.0).now)
     except ValueError as error:
         raise PlaceError(f"--gun {address}: {error}") from error
     with closing(gun):

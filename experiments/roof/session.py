@@ -8,6 +8,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from device.serial_gun.address import speed_of
 from experiments import storage
 from experiments.clock import Clock, RealClock, VirtualClock
 from experiments.load import load_setup
@@ -67,12 +68,21 @@ def _check_screen(asked: Asked) -> None:
 
 def _at_terminal(request: Request, asked: Asked) -> Finished:
     del asked
-    return run(request, _terminal, RealClock())
+    return run(request, _terminal, RealClock(_speed(request.gun) or 1.0))
 
 
 def _synthetic(request: Request, asked: Asked) -> Finished:
+    """On a virtual clock; with a gun on a line, whose shots take their time, on the real one."""
     del asked
-    return run(request, synthetic_screen, VirtualClock())
+    speed = _speed(request.gun)
+    return run(request, synthetic_screen, VirtualClock() if speed is None else RealClock(speed))
+
+
+def _speed(gun: str) -> float | None:
+    try:
+        return speed_of(gun)
+    except ValueError as error:
+        raise PlaceError(f"--gun {gun}: {error}") from error
 
 
 def _at_console(request: Request, asked: Asked) -> Finished:

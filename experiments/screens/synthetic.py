@@ -83,9 +83,9 @@ class SyntheticScreen:
         return Rested(rested_s=step.duration_s)
 
     def said_next(self, step: Present, until_s: float) -> bool:
-        """Say next once the observer has felt enough; drawn when the stimulus begins."""
+        """Say next once the observer has felt enough since the first onset; drawn when the stimulus begins."""
         if self._next_at_s is None:
-            self._next_at_s = self._clock.now() + self._observer.exposure_s(step.trial)
+            self._next_at_s = until_s - step.repeat_every_s + self._observer.exposure_s(step.trial)
         self._clock.sleep(min(self._next_at_s, until_s) - self._clock.now())
         return self._next_at_s <= until_s
 

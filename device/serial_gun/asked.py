@@ -1,0 +1,82 @@
+"""From a shot to what is said of it on the wire, and back. Pure: what cannot be said is refused before a byte is."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Final
+
+from device.limits import Load, load_of
+from device.methods import Method, Rendering, rendering_of
+from device.parameters import GunParameters
+from device.wire.records import METHOD, Setting, ShotRecord, Way
+from device.words import Direction, Drive, Effect, LimitError, LinkError, Pulse, Shot
+
+FLOORS_US: Final = {"PULS": 50_000, "EFF": 10_000}
+"""The firmware's least time from onset to onset (`PROTOCOL.md`)."""
+WAYS: Final[dict[Direction, Way]] = {"forward": "FORW", "backward": "BACK"}
+_MILLI, _MICRO = 1e3, 1e6
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Asked:
+    """A shot in whole millivolts and microseconds, what the model says of it, and what it asks of the coil."""
+
+    shot: Shot
+    setting: Setting
+    rendering: Rendering
+    load: Load
+
+    @property
+    def rest_s(self) -> float:
+        """Least time from its onset to the next."""
+        return self.setting.rest_us / _MICRO
+
+
+def asked(shot: Shot, methods: Mapping[str, Method]) -> Asked:
+    """A shot as it can be said. `LimitError`: no such method, a drive of another kind, or no way home by the model."""
+    if shot.method not in methods:
+        raise LimitError(f"method is {shot.method!r}; this gun renders {', '.join(methods)}")
+    if METHOD.fullmatch(shot.method) is None:
+        raise LimitError(f"method is {shot.method!r}; on the wire it must be 1 to 24 of a-z, 0-9 and -")
+    method = methods[shot.method]
+    drive = _sayable(shot.drive)
+    rendering = rendering_of(method, drive)
+    return Asked(
+        shot=Shot(method=shot.method, direction=shot.direction, drive=drive),
+        setting=_setting(shot, drive, rendering),
+        rendering=rendering,
+        load=load_of(drive, method.resistance_ohm if isinstance(method, GunParameters) else 0.0),
+    )
+
+
+def _sayable(drive: Drive) -> Drive:
+    """The nearest drive of whole millivolts and microseconds."""
+    if isinstance(drive, Effect):
+        return drive
+    return Pulse(voltage_V=round(drive.voltage_V * _MILLI) / _MILLI, pulse_s=round(drive.pulse_s * _MICRO) / _MICRO)
+
+
+def _setting(shot: Shot, drive: Drive, rendering: Rendering) -> Setting:
+    pulse = isinstance(drive, Pulse)
+    kind = "PULS" if pulse else "EFF"
+    length_us = round((drive.pulse_s if isinstance(drive, Pulse) else rendering.settle_s) * _MICRO)
+    settle_us = -int(-rendering.settle_s * _MICRO // 1)
+    return Setting(
+        method=shot.method,
+        way=WAYS[shot.direction],
+        kind="PULS" if pulse else "EFF",
+        amount=round(drive.voltage_V * _MILLI) if isinstance(drive, Pulse) else drive.effect,
+        length_us=length_us,
+        rest_us=max(settle_us, length_us, FLOORS_US[kind]),
+    )
+
+
+def check_record(record: ShotRecord, mark: int, wanted: Asked) -> None:
+    """`LinkError`, unless the record tells of just the shot that was asked for, driven to its end."""
+    setting = wanted.setting
+    if record.mark != mark or record.setting != setting:
+        raise LinkError(f"asked for {mark} {setting.text()}, the gun rendered {record.mark} {record.setting.text()}")
+    driven_us = record.end_us - record.start_us
+    if record.ending != "DONE" or driven_us != setting.length_us:
+        raise LinkError(f"the shot was fired and cut short: driven for {driven_us} of {setting.length_us} microseconds")

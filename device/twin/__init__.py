@@ -1,0 +1,1 @@
+"""The gun's twin: what the firmware does, without a gun. The core is pure; only `ports` and `twin` touch the system."""

@@ -1,0 +1,242 @@
+"""The firmware's core: bytes and the time go in, bytes and drive events come out. It waits for nothing.
+
+`PROTOCOL.md` says what it does; the C core must say the same, byte for byte, for the same calls.
+"""
+
+from __future__ import annotations
+
+from typing import Final
+
+from device.twin.machine import Drive, Machine
+from device.wire import errors
+from device.wire.errors import message
+from device.wire.frame import Frame, Garbled, Splitter, decode, encode, is_newer
+from device.wire.records import WIRE_VERSION, Named, Setting, number
+
+QUEUE_SIZE: Final = 16
+WATCHDOG_MS: Final = 30_000
+"""At boot, for a hand at a terminal; `SerialGun` asks for a shorter one."""
+MIN_WATCHDOG_MS, MAX_WATCHDOG_MS = 100, 60_000
+
+IDENTITY: Final = Named(model="haptic-gun", serial="TWIN-1", wire=WIRE_VERSION, firmware="1.0.0")
+
+Said = str | int | None
+"""What a command comes to: an answer, an error's number, or nothing to say but that it is done."""
+
+
+class Core:
+    """One gun from its boot at `now_us` on. Calls come with times that never run back."""
+
+    def __init__(self, identity: Named = IDENTITY, now_us: int = 0) -> None:
+        self.machine = Machine(now_us)
+        self.strict = False
+        self._identity = identity
+        self._splitter = Splitter()
+        self._errors: list[int] = []
+        self._out = bytearray()
+        self._last = 0  # sequence number
+        self._token = 0
+        self._pending = 0  # sequence number of the trigger that waits for its answer, 0 if none does
+        self._heard_us = now_us
+        self._watchdog_us = 1000 * WATCHDOG_MS
+
+    def wake_us(self) -> int | None:
+        """When `step` must be called at the latest even if no byte comes; None if nothing is due."""
+        times = [self.machine.due_us(), self._watchdog_due_us()]
+        return min((time for time in times if time is not None), default=None)
+
+    def step(self, data: bytes, now_us: int) -> tuple[bytes, list[Drive]]:
+        """What is due by now happens, each at its own time; then the bytes are taken. Bytes to send; drive events."""
+        self._run_due(now_us)
+        for line in self._splitter.feed(data):
+            self._take(line, now_us)
+            self._run_due(now_us)
+        return self._taken()
+
+    def fail(self, fault: int, now_us: int) -> tuple[bytes, list[Drive]]:
+        """The board's driver reports a fault, by its number above 0."""
+        self._run_due(now_us)
+        if self.machine.fail(fault, now_us):
+            self._answer_trigger()
+        self._queue(errors.FAULT)
+        return self._taken()
+
+    def _taken(self) -> tuple[bytes, list[Drive]]:
+        out, drives = bytes(self._out), self.machine.drives
+        self._out.clear()
+        self.machine.drives = []
+        return out, drives
+
+    def _watchdog_due_us(self) -> int | None:
+        watched = self.strict or self.machine.state in {"ARMED", "WAITING", "FIRING"}
+        return self._heard_us + self._watchdog_us if watched else None
+
+    def _run_due(self, now_us: int) -> None:
+        """At the same microsecond the gun's own event comes before the watchdog."""
+        while (time_us := self.wake_us()) is not None and time_us <= now_us:
+            if time_us == self.machine.due_us():
+                if self.machine.run_due():
+                    self._answer_trigger()
+            else:
+                self._abort(time_us)
+                self._queue(errors.WATCHDOG)
+                self.strict = False
+
+    def _take(self, line: bytes | None, now_us: int) -> None:
+        """A line, or None for one that was too long."""
+        if line is not None and (line.startswith(b">") or self.strict):
+            self._take_frame(line, now_us)
+        elif self.strict:
+            self._send(0, "NAK")
+        elif line is None:
+            self._queue(errors.OVERRUN)
+        else:
+            said = self._do(_text(line), now_us)
+            self._heard_us = self._heard_us if isinstance(said, int) else now_us
+            self._say(said)
+
+    def _take_frame(self, line: bytes, now_us: int) -> None:
+        try:
+            frame = decode(line, "host")
+        except Garbled:
+            if line == b"*IDN?":
+                self._say(self._identity.text())
+            else:
+                self._send(0, "NAK")
+            return
+        if frame.body.startswith("SYST:STRI "):
+            self._enter(frame, now_us)
+        elif not self.strict:
+            self._send(frame.number, f"ERR {message(errors.NO_SESSION)}")
+        elif is_newer(frame.number, self._last):
+            self._last, self._heard_us = frame.number, now_us
+            self._answer(frame, now_us)
+
+    def _enter(self, frame: Frame, now_us: int) -> None:
+        """A session of the strict mode begins: disarmed, numbered from this frame on. It tells the token before."""
+        try:
+            token = number(frame.body.removeprefix("SYST:STRI "))
+        except Garbled:
+            self._send(frame.number, f"ERR {message(errors.BAD_TYPE)}")
+            return
+        self._pending = 0
+        self._abort(now_us)
+        self._send(frame.number, f"STRI {self._token}")
+        self.strict, self._token, self._last, self._heard_us = True, token, frame.number, now_us
+
+    def _answer(self, frame: Frame, now_us: int) -> None:
+        if frame.body == "SYST:PLAI":
+            self._abort(now_us)
+            self._send(frame.number, "OK")
+            self.strict = False
+            return
+        said = self._do(frame.body, now_us)
+        if isinstance(said, int):
+            self._send(frame.number, f"ERR {message(said)}")
+        elif frame.body.startswith("TRIG"):
+            self._pending = frame.number
+        else:
+            self._send(frame.number, said or "OK")
+
+    def _answer_trigger(self) -> None:
+        """Tell what became of the shot that waits for its answer."""
+        if self._pending:
+            ended = self.machine.shot.ending != "NONE"
+            self._send(self._pending, self.machine.shot.text() if ended else f"ERR {message(errors.CANCELLED)}")
+        self._pending = 0
+
+    def _do(self, text: str, now_us: int) -> Said:
+        """Carry a command out: header, blank, parameters."""
+        header, blank, rest = text.partition(" ")
+        parameters = rest.split(",") if blank else []
+        if header in _WITHOUT:
+            return errors.NOT_ALLOWED if parameters else self._simple(header, now_us)
+        try:
+            return self._with(header, rest, [] if header == "CONF" else [number(text) for text in parameters], now_us)
+        except Garbled:
+            return errors.BAD_TYPE if header in _WITH else errors.UNDEFINED
+
+    def _simple(self, header: str, now_us: int) -> Said:
+        match header:
+            case "ARM":
+                return self.machine.arm() or None
+            case "ABOR" | "*RST":
+                self._abort(now_us)
+                if header == "*RST":
+                    self.machine.clear()
+                return None
+            case "*CLS":
+                self._errors.clear()
+                return None
+            case _:
+                return self._question(header, now_us)
+
+    def _question(self, header: str, now_us: int) -> Said:
+        match header:
+            case "*IDN?":
+                return self._identity.text()
+            case "TIME?":
+                return f"TIME {now_us}"
+            case "STAT?":
+                return self.machine.standing(now_us).text()
+            case "SHOT?":
+                return self.machine.shot.text()
+            case "CONF?":
+                setting = self.machine.setting
+                return errors.NOT_CONFIGURED if setting is None else f"CONF {setting.text()}"
+            case "SYST:WATC?":
+                return f"WATC {self._watchdog_us // 1000}"
+            case _:
+                return message(self._errors.pop(0) if self._errors else errors.NONE)
+
+    def _with(self, header: str, rest: str, numbers: list[int], now_us: int) -> Said:
+        match header:
+            case "CONF":
+                return (self.machine.configure(Setting.parse(rest)) if rest else errors.MISSING) or None
+            case "TRIG" if len(numbers) <= 3:
+                mark, at_us, before_us = [*numbers, 0, 0, 0][:3]
+                return self.machine.trigger(mark, at_us, before_us, now_us) or None
+            case "SYST:WATC" if len(numbers) == 1:
+                if not MIN_WATCHDOG_MS <= numbers[0] <= MAX_WATCHDOG_MS:
+                    return errors.OUT_OF_RANGE
+                self._watchdog_us = 1000 * numbers[0]
+                return None
+            case _:
+                return _wrong_count(header, len(numbers))
+
+    def _abort(self, now_us: int) -> None:
+        if self.machine.abort(now_us):
+            self._answer_trigger()
+
+    def _say(self, said: Said) -> None:
+        """In the plain mode questions are answered, errors queued, and everything else is silent."""
+        if isinstance(said, int):
+            self._queue(said)
+        elif said is not None:
+            self._out.extend(f"{said}\n".encode("ascii"))
+
+    def _send(self, sequence: int, body: str) -> None:
+        self._out.extend(encode(Frame(number=sequence, body=body), "gun"))
+
+    def _queue(self, error: int) -> None:
+        if len(self._errors) < QUEUE_SIZE:
+            self._errors.append(error)
+        else:
+            self._errors[-1] = errors.QUEUE_OVERFLOW
+
+
+_WITHOUT: Final = frozenset(
+    ("ARM", "ABOR", "*RST", "*CLS", "*IDN?", "TIME?", "STAT?", "SHOT?", "CONF?", "SYST:WATC?", "SYST:ERR?")
+)
+_WITH: Final = frozenset(("CONF", "TRIG", "SYST:WATC"))
+
+
+def _wrong_count(header: str, count: int) -> int:
+    if header not in _WITH:
+        return errors.UNDEFINED
+    return errors.MISSING if count == 0 else errors.NOT_ALLOWED
+
+
+def _text(line: bytes) -> str:
+    """A line as text; a byte that is no printable ASCII makes it a line that means nothing."""
+    return line.decode("latin-1") if all(0x20 <= byte <= 0x7E for byte in line) else "?"

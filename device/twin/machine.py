@@ -1,0 +1,170 @@
+"""The gun's state machine, as the firmware has it: integers in, integers out, no bytes and no port.
+
+States and what each command may do in them stand in `REFUSED`; everything timed happens at its own microsecond.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import Final, Literal
+
+from device.twin.budget import Budget, out_of_range
+from device.wire import errors
+from device.wire.records import Ending, Setting, ShotRecord, Standing, State
+
+BOOT_REST_US: Final = 1_000_000
+"""No shot in the first second: what was driven before a reset is not known."""
+MAX_AHEAD_US: Final = 2_000_000
+"""A shot can be asked for so long ahead."""
+MAX_MARK: Final = 0xFFFF_FFFF
+
+Guarded = Literal["CONF", "ARM", "TRIG"]
+REFUSED: Final[dict[tuple[Guarded, State], int]] = {
+    ("CONF", "WAITING"): errors.BUSY,
+    ("CONF", "FIRING"): errors.BUSY,
+    ("ARM", "WAITING"): errors.BUSY,
+    ("ARM", "FIRING"): errors.BUSY,
+    ("ARM", "FAULT"): errors.FAULT,
+    ("TRIG", "DISARMED"): errors.DISARMED,
+    ("TRIG", "WAITING"): errors.BUSY,
+    ("TRIG", "FIRING"): errors.BUSY,
+    ("TRIG", "FAULT"): errors.FAULT,
+}
+"""What is refused in which state; everything else is taken. ABOR, *RST and questions are taken in every state."""
+
+UNSET: Final = Setting(method="none", way="FORW", kind="EFF", amount=1, length_us=0, rest_us=0)
+NO_SHOT: Final = ShotRecord(
+    count=0, mark=0, ending="NONE", accepted_us=0, start_us=0, end_us=0, home_predicted_us=0, setting=UNSET
+)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Drive:
+    """What the board is told at a time: a pulse of so many mV, an effect by its number, or off."""
+
+    time_us: int
+    kind: Literal["PULS", "EFF", "OFF"]
+    amount: int = 0
+
+
+class Machine:
+    """One gun from its boot on. Times never run back; `drives` is what the board was told and has not taken yet."""
+
+    def __init__(self, boot_us: int = 0) -> None:
+        self.state: State = "DISARMED"
+        self.setting: Setting | None = None
+        self.shot: ShotRecord = NO_SHOT
+        self.drives: list[Drive] = []
+        self._fault = 0
+        self._ready_us = boot_us + BOOT_REST_US
+        self._budget = Budget()
+
+    def due_us(self) -> int | None:
+        """When the next thing happens by itself: a pulse begins or ends."""
+        return {"WAITING": self.shot.start_us, "FIRING": self.shot.end_us}.get(self.state)
+
+    def run_due(self) -> bool:
+        """Let the next thing happen; true if a shot ended by it."""
+        if self.state == "WAITING":
+            self._begin()
+            return False
+        self._end("DONE", self.shot.end_us)
+        self.state = "ARMED"
+        return True
+
+    def configure(self, setting: Setting) -> int:
+        """Make the next shots of this. The error, or 0."""
+        error = REFUSED.get(("CONF", self.state), errors.NONE)
+        if not error and out_of_range(setting):
+            error = errors.OUT_OF_RANGE
+        if not error:
+            self.setting = setting
+        return error
+
+    def arm(self) -> int:
+        """Allow shots. The error, or 0."""
+        error = REFUSED.get(("ARM", self.state), errors.NONE)
+        if not error:
+            self.state = "ARMED"
+        return error
+
+    def trigger(self, mark: int, at_us: int, before_us: int, now_us: int) -> int:
+        """Accept a shot: now if `at_us` is over, else then; never after `before_us`, unless that is 0. Error, or 0."""
+        start_us = max(at_us, now_us)
+        error = self._forbidden(mark, start_us, before_us, now_us)
+        if error or self.setting is None:
+            return error
+        self.shot = ShotRecord(
+            count=self.shot.count,
+            mark=mark,
+            ending="WAIT",
+            accepted_us=now_us,
+            start_us=start_us,
+            end_us=start_us + self.setting.length_us,
+            home_predicted_us=start_us + self.setting.rest_us,
+            setting=self.setting,
+        )
+        self.state = "WAITING"
+        return errors.NONE
+
+    def _forbidden(self, mark: int, start_us: int, before_us: int, now_us: int) -> int:
+        """The first rule that a trigger breaks, in this order; or 0."""
+        error = REFUSED.get(("TRIG", self.state), errors.NONE)
+        if error:
+            return error
+        if self.setting is None:
+            return errors.NOT_CONFIGURED
+        if mark > MAX_MARK or start_us - now_us > MAX_AHEAD_US:
+            return errors.OUT_OF_RANGE
+        if mark != 0 and mark == self.shot.mark:
+            return errors.ALREADY_FIRED
+        if before_us != 0 and start_us > before_us:
+            return errors.TOO_LATE
+        if start_us < self._ready_us:
+            return errors.NOT_HOME
+        return self._budget.refusal(self.setting, start_us)
+
+    def abort(self, now_us: int) -> bool:
+        """Switch off and disarm, from every state; true if a shot ended by it."""
+        ended = self.state in {"WAITING", "FIRING"}
+        if self.state == "FIRING":
+            self._end("CUT", now_us)
+        elif self.state == "WAITING":
+            self.shot = replace(self.shot, ending="NONE")
+        if self.state != "FAULT":
+            self.state = "DISARMED"
+        return ended
+
+    def clear(self) -> None:
+        """Forget the setting and the fault of a gun that was aborted; limits and shots stay."""
+        self.setting, self._fault, self.state = None, 0, "DISARMED"
+
+    def fail(self, fault: int, now_us: int) -> bool:
+        """The driver reports a fault; true if a shot ended by it."""
+        ended = self.abort(now_us)
+        self._fault, self.state = fault, "FAULT"
+        return ended
+
+    def standing(self, now_us: int) -> Standing:
+        """How the gun stands; an armed one is resetting while its magnet is on its way home, by prediction."""
+        resetting = self.state == "ARMED" and now_us < self._ready_us
+        return Standing(
+            state="RESETTING" if resetting else self.state,
+            count=self.shot.count,
+            clock_us=now_us,
+            ready_us=self._ready_us,
+            coil_mC=self._budget.coil_millicelsius(now_us),
+            fault=self._fault,
+        )
+
+    def _begin(self) -> None:
+        self.state = "FIRING"
+        self.shot = replace(self.shot, count=self.shot.count + 1, ending="DRIV")
+        self._ready_us = self.shot.home_predicted_us
+        self._budget.spend(self.shot.setting, self.shot.start_us)
+        setting = self.shot.setting
+        self.drives.append(Drive(time_us=self.shot.start_us, kind=setting.kind, amount=setting.amount))
+
+    def _end(self, ending: Ending, time_us: int) -> None:
+        self.shot = replace(self.shot, ending=ending, end_us=time_us)
+        self.drives.append(Drive(time_us=time_us, kind="OFF"))

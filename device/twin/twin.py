@@ -1,0 +1,176 @@
+"""The twin: the firmware's core, plugged in, on a clock of its own, driving the physics, with troubles to order."""
+
+from __future__ import annotations
+
+import time
+from collections import deque
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field, replace
+from random import Random
+from threading import Event, Thread
+from typing import Self
+
+from device.methods import Method
+from device.twin.body import Body
+from device.twin.core import IDENTITY, Core
+from device.twin.faults import Troubles
+from device.twin.machine import Drive
+from device.twin.ports import Socket
+from device.wire.records import Named
+
+LONGEST_WAIT_S = 0.02
+BUSY_US = 2_000_000
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Make:
+    """What kind of twin: who it says it is, how many times faster than the world it lives, and its crystal's error."""
+
+    identity: Named = IDENTITY
+    speed: float = 1.0
+    drift_ppm: float = 0.0
+    troubles: Troubles = field(default_factory=Troubles)
+    seed: int = 1
+
+
+class Twin:
+    """A gun at a socket. `serve` runs it; as a context it runs in a thread of its own.
+
+    `body.ledger` is what was truly rendered, in seconds of `world_s`: the machine's monotonic clock times the speed.
+    """
+
+    def __init__(self, socket: Socket, methods: Mapping[str, Method], make: Make | None = None) -> None:
+        self.body = Body(methods)
+        self.accidents: list[str] = []
+        self._socket = socket
+        self._make = make or Make()
+        self._draw = Random(self._make.seed)  # noqa: S311 - troubles, no secrets
+        self._boot_s = self.world_s()
+        self._core = Core(self._make.identity)
+        self._coming: deque[tuple[float, bytes]] = deque()
+        self._going: deque[tuple[float, bytes]] = deque()
+        self._planned: list[tuple[float, Callable[[], None]]] = []
+        self._hangs_until_s = 0.0
+        self._stop = Event()
+        self._thread: Thread | None = None
+
+    def world_s(self) -> float:
+        """The twin's world: monotonic seconds times the speed."""
+        return time.monotonic() * self._make.speed
+
+    def clock_us(self) -> int:
+        """The gun's own clock: from its boot on, with its crystal's error."""
+        return int((self.world_s() - self._boot_s) * (1e6 + self._make.drift_ppm))
+
+    def world_of(self, clock_us: int) -> float:
+        """When the gun's clock read this since its last boot."""
+        return self._boot_s + clock_us / (1e6 + self._make.drift_ppm)
+
+    def __enter__(self) -> Self:
+        self._socket.plug()
+        self._thread = Thread(target=self.serve, name="twin", daemon=True)
+        self._thread.start()
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self._stop.set()
+        if self._thread is not None:
+            self._thread.join()
+        self._socket.unplug()
+
+    def serve(self) -> None:
+        """Be a gun until stopped."""
+        while not self._stop.is_set():
+            self.once()
+
+    def once(self) -> None:
+        """Wait until something may happen, at most 20 ms, and let it happen."""
+        data = self._socket.read(self._wait_s())
+        if data:
+            self._post(self._coming, data)
+        now_s = time.monotonic()
+        for due_s, act in [plan for plan in self._planned if plan[0] <= now_s]:
+            self._planned.remove((due_s, act))
+            act()
+        hangs = now_s < self._hangs_until_s  # its timers go on
+        self._step(b"" if hangs else b"".join(_due(self._coming, now_s)))
+        for piece in _due(self._going, now_s):
+            self._socket.write(piece)
+
+    def order(self, act: Callable[[], None]) -> None:
+        """Have something done by the thread that serves: `unplug` or `reset`, now."""
+        self._planned.append((0.0, act))
+
+    def unplug(self) -> None:
+        """Be unplugged, and plugged in again after the time that is set."""
+        self.accidents.append("unplug")
+        self._socket.unplug()
+        self._coming.clear()
+        self._going.clear()
+        self._planned.append((time.monotonic() + self._make.troubles.replug_s, self._socket.plug))
+
+    def reset(self) -> None:
+        """The firmware boots anew; the magnet flies on."""
+        self.accidents.append("reset")
+        self.body.stop(self.world_s())
+        self._boot_s = self.world_s()
+        self._core = Core(self._make.identity)
+        self._coming.clear()
+
+    def _wait_s(self) -> float:
+        now_s, wake_us = time.monotonic(), self._core.wake_us()
+        times = [plan[0] for plan in self._planned] + [queue[0][0] for queue in (self._coming, self._going) if queue]
+        if wake_us is not None:
+            times.append(self.world_of(wake_us) / self._make.speed)
+        return min(max(min(times, default=now_s + 1) - now_s, 0.0), LONGEST_WAIT_S)
+
+    def _post(self, queue: deque[tuple[float, bytes]], data: bytes) -> None:
+        """Put bytes on their way; they stay in order."""
+        troubles = self._make.troubles
+        due_s = time.monotonic() + troubles.delay_s(self._draw)
+        queue.append((max(due_s, queue[-1][0]) if queue else due_s, troubles.damaged(data, self._draw)))
+
+    def _step(self, data: bytes) -> None:
+        out, drives = self._core.step(data, self.clock_us())
+        for drive in drives:
+            self.body.drive(drive, self._core.machine.shot, self.world_of(drive.time_us))
+            if drive.kind != "OFF":
+                self._mishap(drive)
+        if out:
+            self._post(self._going, out)
+            self._pull_out()
+
+    def _mishap(self, drive: Drive) -> None:
+        """What befalls a shot."""
+        troubles, shot = self._make.troubles, self._core.machine.shot
+        middle_s = self.world_of(drive.time_us + int(shot.setting.length_us * self._draw.random()))
+        real_s = middle_s / self._make.speed
+        if self._happens(troubles.reset):
+            self._planned.append((real_s, self.reset))
+        elif self._happens(troubles.unplug):
+            self._planned.append((real_s, self.unplug))
+        elif self._happens(troubles.busy):
+            self.accidents.append("busy")
+            self._core.machine.shot = replace(shot, end_us=shot.end_us + BUSY_US)
+        elif self._happens(troubles.hang):
+            self.accidents.append("hang")
+            self._hangs_until_s = time.monotonic() + troubles.hang_s
+
+    def _pull_out(self) -> None:
+        """What befalls an answer."""
+        if self._happens(self._make.troubles.unplug_reply):
+            _, piece = self._going.pop()
+            self._socket.write(piece[: len(piece) // 2])
+            self._planned.append((time.monotonic() + 0.001, self.unplug))
+        elif self._happens(self._make.troubles.unplug_idle):
+            self._planned.append((time.monotonic() + 0.01, self.unplug))
+
+    def _happens(self, rate: float) -> bool:
+        return rate > 0 and self._draw.random() < rate
+
+
+def _due(queue: deque[tuple[float, bytes]], now_s: float) -> list[bytes]:
+    found = []
+    while queue and queue[0][0] <= now_s:
+        found.append(queue.popleft()[1])
+    return found

@@ -1,0 +1,202 @@
+"""The records on the wire: who answers, what a shot is made of, what it came to, how the gun stands. All integers.
+
+Each reads itself with `parse`, which gives a record or raises `Garbled`, and writes itself with `text`.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Final, Literal, Self, cast, get_args
+
+from device.wire.frame import Garbled
+
+WIRE_VERSION: Final = 1
+"""Counts up whenever a host of the version before would be misunderstood."""
+
+Way = Literal["FORW", "BACK"]
+Kind = Literal["PULS", "EFF"]
+Ending = Literal["NONE", "WAIT", "DRIV", "DONE", "CUT"]
+"""No shot yet; accepted and waiting; being driven; driven to its end; cut short."""
+State = Literal["DISARMED", "ARMED", "RESETTING", "WAITING", "FIRING", "FAULT"]
+
+METHOD: Final = re.compile(r"[a-z0-9-]{1,24}")
+_NUMBER: Final = re.compile(r"0|[1-9][0-9]{0,15}")
+_NAME: Final = re.compile(r"[A-Za-z0-9._-]{1,24}")
+_VERSION: Final = re.compile(r"wire ([0-9]{1,4}) firmware ([A-Za-z0-9._-]{1,24})")
+_ERROR: Final = re.compile(r'ERR (-?[0-9]{1,4}),"([ !#-~]{1,60})"')
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Named:
+    """Who answers, and which version of the language it speaks."""
+
+    model: str
+    serial: str
+    wire: int
+    firmware: str
+
+    def text(self) -> str:
+        """As `*IDN?` is answered."""
+        return f"Recoil,{self.model},{self.serial},wire {self.wire} firmware {self.firmware}"
+
+    @classmethod
+    def parse(cls, text: str) -> Self:
+        """From the answer to `*IDN?`.
+
+        >>> Named.parse("Recoil,haptic-gun,TWIN,wire 1 firmware 1.0").serial
+        'TWIN'
+        """
+        fields = _fields(text, 4)
+        version = _VERSION.fullmatch(fields[3])
+        if fields[0] != "Recoil" or version is None or not all(map(_NAME.fullmatch, fields[1:3])):
+            raise Garbled(f"not a Recoil gun: {text[:80]!r}")
+        return cls(model=fields[1], serial=fields[2], wire=int(version[1]), firmware=version[2])
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Setting:
+    """What the next shots are made of. `amount` is mV of a pulse or the number of an effect."""
+
+    method: str
+    way: Way
+    kind: Kind
+    amount: int
+    length_us: int
+    rest_us: int
+
+    def text(self) -> str:
+        """As it stands behind `CONF` and in a shot's record."""
+        return f"{self.method},{self.way},{self.kind},{self.amount},{self.length_us},{self.rest_us}"
+
+    @classmethod
+    def parse(cls, text: str) -> Self:
+        """From the parameters of `CONF`; their ranges are the gun's to judge."""
+        fields = _fields(text, 6)
+        if METHOD.fullmatch(fields[0]) is None:
+            raise Garbled(f"not the name of a method: {fields[0][:40]!r}")
+        amount, length_us, rest_us = _numbers(fields[3:])
+        return cls(
+            method=fields[0],
+            way=cast("Way", _one_of(fields[1], get_args(Way))),
+            kind=cast("Kind", _one_of(fields[2], get_args(Kind))),
+            amount=amount,
+            length_us=length_us,
+            rest_us=rest_us,
+        )
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ShotRecord:
+    """What became of the last shot that was accepted, on the gun's clock. Home is predicted, not measured."""
+
+    count: int
+    mark: int
+    ending: Ending
+    accepted_us: int
+    start_us: int
+    end_us: int
+    home_predicted_us: int
+    setting: Setting
+
+    def text(self) -> str:
+        """As `SHOT?` and a trigger are answered."""
+        times = f"{self.accepted_us},{self.start_us},{self.end_us},{self.home_predicted_us}"
+        return f"SHOT {self.count},{self.mark},{self.ending},{times},{self.setting.text()}"
+
+    @classmethod
+    def parse(cls, text: str) -> Self:
+        """From the answer to `SHOT?` or to a trigger."""
+        fields = _fields(text.removeprefix("SHOT ") if text.startswith("SHOT ") else "", 13)
+        count, mark = _numbers(fields[:2])
+        accepted_us, start_us, end_us, home_us = _numbers(fields[3:7])
+        return cls(
+            count=count,
+            mark=mark,
+            ending=cast("Ending", _one_of(fields[2], get_args(Ending))),
+            accepted_us=accepted_us,
+            start_us=start_us,
+            end_us=end_us,
+            home_predicted_us=home_us,
+            setting=Setting.parse(",".join(fields[7:])),
+        )
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Standing:
+    """How the gun stands. `fault` is 0, or the number that the driver's fault was given."""
+
+    state: State
+    count: int
+    clock_us: int
+    ready_us: int
+    coil_mC: int
+    fault: int
+
+    def text(self) -> str:
+        """As `STAT?` is answered."""
+        return f"STAT {self.state},{self.count},{self.clock_us},{self.ready_us},{self.coil_mC},{self.fault}"
+
+    @classmethod
+    def parse(cls, text: str) -> Self:
+        """From the answer to `STAT?`."""
+        fields = _fields(text.removeprefix("STAT ") if text.startswith("STAT ") else "", 6)
+        count, clock_us, ready_us, coil_mC, fault = _numbers(fields[1:])
+        return cls(
+            state=cast("State", _one_of(fields[0], get_args(State))),
+            count=count,
+            clock_us=clock_us,
+            ready_us=ready_us,
+            coil_mC=coil_mC,
+            fault=fault,
+        )
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Refusal:
+    """A gun's no: the number and the text of its error."""
+
+    code: int
+    reason: str
+
+
+def refusal(text: str) -> Refusal | None:
+    """The refusal that an answer is, or None if it is another answer.
+
+    >>> refusal('ERR 101,"Disarmed"')
+    Refusal(code=101, reason='Disarmed')
+    """
+    found = _ERROR.fullmatch(text)
+    return None if found is None else Refusal(code=int(found[1]), reason=found[2])
+
+
+def number(text: str) -> int:
+    """A whole number of at most 16 digits, without sign and leading zeros. `Garbled`: anything else."""
+    if _NUMBER.fullmatch(text) is None:
+        raise Garbled(f"not a whole number: {text[:40]!r}")
+    return int(text)
+
+
+def value(text: str, name: str) -> int:
+    """The number behind a name: `TIME 123`. `Garbled`: anything else."""
+    if not text.startswith(f"{name} "):
+        raise Garbled(f"not {name}: {text[:40]!r}")
+    return number(text[len(name) + 1 :])
+
+
+def _fields(text: str, count: int) -> list[str]:
+    fields = text.split(",", count)
+    if len(fields) != count:
+        raise Garbled(f"not {count} fields: {text[:80]!r}")
+    return fields
+
+
+def _numbers(fields: Sequence[str]) -> list[int]:
+    return [number(field) for field in fields]
+
+
+def _one_of(text: str, words: Sequence[str]) -> str:
+    if text not in words:
+        raise Garbled(f"{text[:40]!r} is none of {', '.join(words)}")
+    return text

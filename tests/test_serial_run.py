@@ -1,0 +1,186 @@
+"""Whole runs on a gun over a serial line: as on the simulated gun but for times; on a bad line nothing goes wrong."""
+
+import csv
+import json
+import re
+import signal
+import subprocess
+import time
+from pathlib import Path
+
+import pytest
+
+from experiments.journal import read
+from experiments.places import PlaceError
+from experiments.replay import told
+from experiments.roof.twin import troubles_of
+from experiments.steps import Presented
+from tests.conftest import RECOIL
+from tests.serial_runs import check, hasty, one_run, resumed, run_all
+from tests.twins import Troubles, a_twin
+
+SPEED = 40.0
+TROUBLES = Troubles(
+    jitter_s=0.002,
+    lose=0.004,
+    double=0.004,
+    corrupt=0.004,
+    partial=0.004,
+    reset=0.01,
+    busy=0.01,
+    hang=0.01,
+    unplug=0.01,
+    unplug_reply=0.002,
+    unplug_idle=0.002,
+    hang_s=0.3,
+    replug_s=0.1,
+)
+TIMES = ("onset_utc", "response_time_s", "gun", "exposure_s")
+
+
+def test_two_hundred_trials_on_a_bad_line_are_each_done_once_or_marked_and_offered_again(tmp_path, quick_configs):
+    with a_twin(tmp_path, TROUBLES, speed=SPEED, drift_ppm=60.0) as (twin, socket):
+        gun = f"serial:{socket.address}?speed={SPEED:g}"
+        tally = run_all(hasty(quick_configs), tmp_path / "results", gun, range(1, 5))
+        figures = check(tally, twin, slack_s=1e-4)
+    assert figures["trials"] == 240
+    assert len(set(twin.accidents)) >= 3
+    assert figures["marked"] > 0
+
+
+def test_trains_on_a_bad_line_are_whole_and_never_too_soon(tmp_path, quick_configs):
+    """A train that was broken is presented again; of one that was not, each shot is in the journal as it was."""
+    noise = Troubles(jitter_s=0.001, lose=0.003, double=0.003, corrupt=0.003, partial=0.003, unplug=0.01, replug_s=0.05)
+    config = quick_configs / "preference.toml"
+    config.write_text(re.sub(r"hand_over_s = [\d.]+", "hand_over_s = 0.3", config.read_text()))
+    with a_twin(tmp_path, noise, speed=SPEED) as (twin, socket):
+        gun = f"serial:{socket.address}?speed={SPEED:g}"
+        done = resumed(lambda again: one_run(config, tmp_path / "results", gun, "P01", again))
+    presented = [outcome for _, outcome in told(read(done.journal)) if isinstance(outcome, Presented)]
+    assert len(presented) == 3
+    for train in presented:
+        assert len(train.timings) == train.shots
+        for timing in train.timings:
+            true = min(twin.body.ledger, key=lambda one: abs(one.start_s - timing.pulse_start_s))
+            assert abs(true.start_s - timing.pulse_start_s) <= timing.uncertainty_s + 1e-4
+    assert not any(true.too_soon for true in twin.body.ledger)
+
+
+@pytest.fixture
+def plugged(tmp_path):
+    """The command `recoil twin` in a process of its own; gives what to say to --gun."""
+    command = [str(RECOIL), "twin", "--json", "--link", str(tmp_path / "port"), "--speed", "40"]
+    with subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True) as program:
+        text = ""
+        while not text.rstrip().endswith("}"):
+            line = program.stdout.readline()
+            assert line, program.stderr.read()
+            text += line
+        yield json.loads(text)["gun"]
+        program.send_signal(signal.SIGINT)
+        assert program.wait(10) == 130
+    assert not (tmp_path / "port").is_symlink()
+
+
+def rows(path: Path) -> list[dict[str, str]]:
+    with path.open(encoding="utf-8", newline="") as file:
+        return [{key: cell for key, cell in row.items() if key not in TIMES} for row in csv.DictReader(file)]
+
+
+@pytest.mark.parametrize("name", ["direction", "preference"])
+def test_a_run_on_the_twin_logs_what_one_on_the_simulated_gun_does_but_for_times(
+    recoil, tmp_path, quick_configs, plugged, name
+):
+    hasty(quick_configs)
+    words = (
+        "run",
+        quick_configs / f"{name}.toml",
+        "--participant",
+        "P01",
+        "--screen",
+        "synthetic",
+        "--seed",
+        3,
+        "--json",
+    )
+    logs = []
+    for folder, gun in (("simulated", "simulated"), ("twin", plugged)):
+        done = recoil(*words, "--gun", gun, "--results", folder)
+        assert done.returncode == 0, done.stderr
+        logs.append({key: tmp_path / path for key, path in json.loads(done.stdout).items()})
+    simulated, twin = (rows(log["table"]) for log in logs)
+    assert twin == simulated
+    outcomes = [record["body"] for record in read(logs[1]["journal"]).records if record["kind"] == "outcome"]
+    timings = [body["timing"] for body in outcomes if body["kind"] == "fired"]
+    timings += [timing for body in outcomes for timing in body.get("timings", ())]
+    assert len(timings) == sum(int(row.get("shots", 1)) for row in twin)
+    assert all(one["requested_s"] <= one["written_s"] <= one["acknowledged_s"] for one in timings)
+    assert all("timing" not in str(record["body"]) for record in read(logs[0]["journal"]).records if "body" in record)
+
+
+@pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGKILL])
+def test_a_run_that_is_killed_leaves_the_gun_disarmed(tmp_path, quick_configs, number):
+    words = ("run", quick_configs / "preference.toml", "--participant", "P01", "--screen", "synthetic", "--seed", "3")
+    quick = re.sub(
+        r"(hand_over|instruction)_s = [\d.]+", r"\1_s = 0.3", (quick_configs / "preference.toml").read_text()
+    )
+    (quick_configs / "preference.toml").write_text(quick)
+    with a_twin(tmp_path, speed=1.0) as (twin, socket):
+        command = [str(RECOIL), *map(str, words), "--gun", f"serial:{socket.address}"]
+        program = subprocess.Popen(command, cwd=tmp_path, stderr=subprocess.DEVNULL)
+        try:
+            wait(lambda: len(twin.body.ledger) >= 2, 30)
+            assert twin._core.machine.state != "DISARMED"
+            program.send_signal(number)
+            program.wait(10)
+        finally:
+            program.kill()
+            program.wait()
+        start_s = time.monotonic()
+        wait(lambda: twin._core.machine.state == "DISARMED", 1.5)
+        assert number == signal.SIGKILL or time.monotonic() - start_s < 0.1  # it was disarmed, not left to the watchdog
+        fired = len(twin.body.ledger)
+        time.sleep(1.0)
+        assert len(twin.body.ledger) == fired
+
+
+def wait(until, seconds):
+    end_s = time.monotonic() + seconds
+    while not until():
+        assert time.monotonic() < end_s
+        time.sleep(0.005)
+
+
+def test_the_doctor_measures_the_way_to_a_gun_on_a_line(recoil, plugged):
+    done = recoil("doctor", "--json", "--gun", plugged)
+    (gun,) = [row for row in json.loads(done.stdout)["checks"] if row["check"] == "gun"]
+    assert gun["verdict"] == "good"
+    assert gun["measured"].startswith("haptic-gun:TWIN-1, disarmed; round trip median")
+    trip = gun["figures"]["round_trip_ms"]
+    assert trip["n"] == 200
+    assert 0 < trip["median"] <= trip["p95"] <= trip["worst"]
+
+
+def test_the_twin_refuses_what_it_cannot_be(recoil):
+    for words, part in (
+        (("--trouble", "rain=1"), "known are"),
+        (("--trouble", "lose=2"), "lose is 2"),
+        (("--trouble", "unplug=1"), "--link"),
+        (("--speed", "0"), "--speed"),
+        (("--tcp", "1", "--link", "x"), "give one"),
+        (("--link", "no/such/folder/gun"), "cannot be plugged in"),
+    ):
+        done = recoil("twin", *words)
+        assert done.returncode == 2
+        assert part in done.stderr
+    with pytest.raises(PlaceError, match="could not convert"):
+        troubles_of(["lose=much"])
+
+
+def test_the_twin_on_a_tcp_port_is_opened_by_url(recoil, tmp_path):
+    with a_twin(tmp_path, tcp=True, speed=1.0) as (_, socket):
+        start_s = time.monotonic()
+        done = recoil("doctor", "--json", "--gun", f"serial:{socket.address}")
+        assert time.monotonic() - start_s < 60
+    (gun,) = [row for row in json.loads(done.stdout)["checks"] if row["check"] == "gun"]
+    assert gun["verdict"] == "good"

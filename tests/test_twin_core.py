@@ -1,0 +1,405 @@
+"""The gun's core, as `PROTOCOL.md` says it: by hand, in frames, within its limits, and left alone."""
+
+from itertools import pairwise
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from device import limits, words
+from device.twin import budget
+from device.twin.core import Core
+from device.twin.machine import REFUSED, Drive
+from device.twin.scripts import random_script, transcript
+from device.wire import errors
+from device.wire.frame import MAX_LINE, Frame, Splitter, decode, encode, following
+from device.wire.records import ShotRecord, Standing, refusal
+
+PULSE = "CONF asymmetric-1,FORW,PULS,16000,10000,211000"
+READY = 1_000_000
+
+
+class Hand:
+    """A hand at a terminal: says lines in the plain mode, and reads what the gun says."""
+
+    def __init__(self):
+        self.core, self.now_us, self.drives = Core(), 0, []
+
+    def say(self, text, after_us=0):
+        self.now_us += after_us
+        out, drives = self.core.step(f"{text}\n".encode() if text else b"", self.now_us)
+        self.drives += drives
+        return out.decode("ascii").splitlines()
+
+    def error(self):
+        return self.say("SYST:ERR?")[0]
+
+    def standing(self):
+        return Standing.parse(self.say("STAT?")[0])
+
+    def shot(self):
+        return ShotRecord.parse(self.say("SHOT?")[0])
+
+
+class Strict(Hand):
+    """A host in the strict mode: frames, each with its answer."""
+
+    def __init__(self, token=7):
+        super().__init__()
+        self.number = 0
+        assert self.say(f"SYST:STRI {token}") == ["STRI 0"]
+
+    def say(self, text, after_us=0):
+        self.now_us += after_us
+        self.number = following(self.number)
+        return self.send(encode(Frame(number=self.number, body=text), "host") if text else b"")
+
+    def send(self, data):
+        out, drives = self.core.step(data, self.now_us)
+        self.drives += drives
+        return [decode(line, "gun").body for line in Splitter().feed(out)]
+
+    def standing(self):
+        return Standing.parse(self.say("STAT?")[-1])
+
+
+@pytest.fixture
+def hand():
+    hand = Hand()
+    assert hand.say(PULSE, READY) == hand.say("ARM") == []
+    return hand
+
+
+@pytest.fixture
+def strict():
+    strict = Strict()
+    assert strict.say(PULSE, READY) == strict.say("ARM") == ["OK"]
+    return strict
+
+
+def test_it_boots_disarmed_plain_and_silent():
+    hand = Hand()
+    assert hand.say("") == []
+    assert hand.say("*IDN?\r") == ["Recoil,haptic-gun,TWIN-1,wire 1 firmware 1.0.0"]
+    assert hand.standing().state == "DISARMED"
+    assert (hand.error(), hand.say("TRIG"), hand.error()) == ('0,"No error"', [], '101,"Disarmed"')
+
+
+def test_a_shot_by_hand_is_driven_to_the_microsecond_and_kept(hand):
+    assert hand.say("TRIG 5", 17) == []
+    assert hand.say("", 50_000) == []
+    start = READY + 17
+    assert hand.drives == [
+        Drive(time_us=start, kind="PULS", amount=16_000),
+        Drive(time_us=start + 10_000, kind="OFF"),
+    ]
+    assert hand.say("SHOT?") == [
+        f"SHOT 1,5,DONE,{start},{start},{start + 10_000},{start + 211_000},asymmetric-1,FORW,PULS,16000,10000,211000"
+    ]
+    assert hand.standing().state == "RESETTING"
+
+
+def test_a_trigger_in_a_frame_is_answered_when_the_shot_has_ended(strict):
+    assert strict.say("TRIG 9") == []
+    assert strict.say("TIME?", 9_999) == [f"TIME {READY + 9_999}"]
+    (answer,) = strict.say("", 1)
+    assert ShotRecord.parse(answer).ending == "DONE"
+
+
+def test_a_shot_waits_for_its_tick(strict):
+    assert strict.say(f"TRIG 9,{READY + 5_000}") == []
+    assert strict.standing().state == "WAITING"
+    assert strict.drives == []
+    strict.say("", 100_000)
+    assert [drive.time_us for drive in strict.drives] == [READY + 5_000, READY + 15_000]
+
+
+def test_a_train_refires_at_its_rest_and_not_a_tick_sooner(hand):
+    for shot in range(12):
+        hand.say("TRIG")
+        assert hand.error() == '0,"No error"', shot
+        hand.say("TRIG", 210_999)
+        assert hand.error() == '102,"Magnet not home"'
+        hand.say("", 1)
+    assert [drive.time_us for drive in hand.drives[::2]] == [READY + 211_000 * shot for shot in range(12)]
+
+
+def test_a_mark_is_never_fired_twice(hand):
+    for _ in range(3):
+        hand.say("TRIG 4", 300_000)
+    assert hand.shot().count == 1
+    assert hand.error() == hand.error() == '113,"Already fired"'
+
+
+def test_a_late_trigger_does_not_fire(strict):
+    assert strict.say(f"TRIG 3,0,{READY + 10}", 11) == ['ERR 107,"Too late"']
+    assert strict.drives == []
+
+
+def test_abort_cuts_a_pulse_and_disarms(strict):
+    strict.say("TRIG 3")
+    shot, done = strict.say("ABOR", 4_000)
+    found = ShotRecord.parse(shot)
+    assert (done, found.ending, found.end_us - found.start_us) == ("OK", "CUT", 4_000)
+    assert strict.drives[-1] == Drive(time_us=READY + 4_000, kind="OFF")
+    assert strict.standing().state == "DISARMED"
+
+
+def test_abort_cancels_a_shot_that_waits(strict):
+    strict.say(f"TRIG 3,{READY + 5_000}")
+    assert strict.say("ABOR") == ['ERR 112,"Cancelled"', "OK"]
+    assert strict.say("", 10_000) == []
+    assert strict.drives == []
+
+
+@pytest.mark.parametrize("strict_mode", [False, True])
+def test_left_alone_it_disarms_at_its_watchdogs_time(strict_mode):
+    gun = Strict() if strict_mode else Hand()
+    gun.say(PULSE, READY // 2)
+    gun.say("SYST:WATC 500")
+    gun.say("ARM")
+    armed_us = gun.now_us
+    assert gun.core.wake_us() == armed_us + 500_000
+    gun.core.step(b"", armed_us + 499_999)
+    assert gun.core.machine.state == "ARMED"
+    gun.core.step(b"", armed_us + 500_000)
+    assert gun.core.machine.state == "DISARMED"
+    assert not gun.core.strict
+    out, _ = gun.core.step(b"SYST:ERR?\n", armed_us + 500_000)
+    assert out == b'109,"Watchdog"\n'
+
+
+def test_the_watchdog_cuts_a_pulse_even_when_it_is_called_late():
+    gun = Strict()
+    gun.say(PULSE, READY)
+    gun.say("SYST:WATC 100")
+    gun.say("ARM")
+    gun.say(f"TRIG 1,{gun.now_us + 95_000}")
+    gun.say("", 5_000_000)
+    assert [drive.kind for drive in gun.drives] == ["PULS", "OFF"]
+    assert gun.drives[1].time_us - gun.drives[0].time_us == 5_000
+    assert gun.core.machine.shot.ending == "CUT"
+
+
+def test_noise_does_not_feed_the_watchdog(strict):
+    strict.say("SYST:WATC 100")
+    for _ in range(20):
+        assert set(strict.send(b">0001 noise\n")) <= {"NAK"}
+        strict.now_us += 10_000
+    assert strict.core.machine.state == "DISARMED"
+
+
+def test_a_doubled_or_older_frame_does_nothing(strict):
+    line = encode(Frame(number=following(strict.number), body="TRIG"), "host")
+    assert strict.send(line + line) == []
+    assert len(strict.send(b"")) == 0
+    strict.now_us += 300_000
+    assert len(strict.send(b"")) == 1
+    assert strict.send(line) == []
+    assert strict.core.machine.shot.count == 1
+
+
+def test_frames_without_a_session_are_told_so_and_a_new_session_tells_the_token_before(strict):
+    assert strict.say("SYST:STRI 8") == ["STRI 7"]
+    assert strict.standing().state == "DISARMED"
+    assert strict.say("SYST:PLAI") == ["OK"]
+    assert strict.say("ARM") == ['ERR 111,"No session"']
+    strict.core = Core(now_us=strict.now_us)
+    assert strict.say("SYST:STRI 9") == ["STRI 0"]
+
+
+def test_a_gun_in_the_strict_mode_still_says_who_it_is(strict):
+    out, _ = strict.core.step(b"*IDN?\nARM\n", strict.now_us)
+    assert out.splitlines()[0].startswith(b"Recoil,")
+    assert decode(out.splitlines()[1], "gun").body == "NAK"
+
+
+def test_a_driver_fault_cuts_and_stays_until_reset(strict):
+    strict.say("TRIG 1")
+    out, drives = strict.core.fail(3, strict.now_us + 2_000)
+    strict.now_us += 2_000
+    assert drives == [Drive(time_us=READY + 2_000, kind="OFF")]
+    assert ShotRecord.parse(decode(out.strip(), "gun").body).ending == "CUT"
+    assert (strict.standing().state, strict.standing().fault) == ("FAULT", 3)
+    for text in ("ARM", "TRIG"):
+        assert strict.say(text) == ['ERR 110,"Driver fault"']
+    assert strict.say("ABOR") == ["OK"]
+    assert strict.standing().state == "FAULT"
+    assert strict.say("*RST") == ["OK"]
+    assert strict.standing().state == "DISARMED"
+
+
+@pytest.mark.parametrize(("command", "state"), REFUSED)
+def test_the_table_of_states_is_kept(command, state):
+    gun = Strict()
+    gun.say(PULSE, READY)
+    ways = {
+        "DISARMED": [],
+        "WAITING": ["ARM", f"TRIG 1,{READY + 50_000}"],
+        "FIRING": ["ARM", "TRIG 1"],
+        "FAULT": [],
+    }
+    for text in ways[state]:
+        gun.say(text)
+    if state == "FAULT":
+        gun.core.fail(1, gun.now_us)
+    assert gun.standing().state == state
+    (answer,) = gun.say({"CONF": PULSE, "ARM": "ARM", "TRIG": "TRIG 2"}[command])
+    assert refusal(answer).code == REFUSED[command, state]
+    assert gun.standing().state == state
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        "CONF a,FORW,PULS,24001,10000,211000",
+        "CONF a,FORW,PULS,16000,20001,211000",
+        "CONF a,FORW,PULS,16000,10000,49999",
+        "CONF a,FORW,PULS,16000,10000,10000001",
+        "CONF a,FORW,EFF,0,24000,24000",
+        "CONF a,FORW,EFF,124,24000,24000",
+        "CONF a,FORW,EFF,1,24000,23999",
+        "SYST:WATC 99",
+        "SYST:WATC 60001",
+    ],
+)
+def test_what_is_beyond_a_range_is_refused_and_changes_nothing(strict, text):
+    assert strict.say(text) == ['ERR -222,"Data out of range"']
+    assert strict.say("CONF?") == [PULSE]
+    assert strict.say("SYST:WATC?") == ["WATC 30000"]
+
+
+@pytest.mark.parametrize(
+    ("text", "code"),
+    [
+        ("FOO", -113),
+        ("FOO x", -113),
+        ("arm", -113),
+        ("ARM 1", -108),
+        ("TRIG x", -104),
+        ("TRIG -1", -104),
+        ("TRIG 01", -104),
+        ("TRIG 1,2,3,4", -108),
+        ("SYST:WATC", -109),
+        ("CONF", -109),
+        ("CONF a", -104),
+        ("CONF A,FORW,PULS,1,1,60000", -104),
+    ],
+)
+def test_what_is_no_command_is_refused_by_its_number(strict, text, code):
+    assert [refusal(answer).code for answer in strict.say(text)] == [code]
+
+
+def test_the_error_queue_is_bounded_and_says_so():
+    hand = Hand()
+    for _ in range(100):
+        hand.say("FOO")
+    found = [hand.error() for _ in range(17)]
+    assert found == ['-113,"Undefined header"'] * 15 + ['-350,"Queue overflow"', '0,"No error"']
+    hand.say("FOO")
+    hand.say("*CLS")
+    assert hand.error() == '0,"No error"'
+
+
+def shots_until(hand, code, every_us):
+    for shot in range(1000):
+        if shot:
+            hand.say("", every_us)
+        (answer,) = [text for text in [*hand.say("TRIG"), *hand.say("SYST:ERR?")] if '"' in text]
+        if not answer.startswith("0,"):
+            assert answer == errors.message(code)
+            return shot
+    raise AssertionError
+
+
+def test_ten_pulses_of_10_ms_a_second_and_no_more():
+    hand = Hand()
+    hand.say("CONF a,FORW,PULS,1000,10000,50000", READY)
+    hand.say("ARM")
+    assert shots_until(hand, errors.DUTY, 50_000) == 10
+    hand.say("TRIG", 499_999)
+    assert hand.error() == errors.message(errors.DUTY)
+    hand.say("TRIG", 1)  # the second that ends with the new pulse now begins with the first one's end
+    assert hand.error() == '0,"No error"'
+
+
+def test_three_hundred_shots_a_minute_and_no_more():
+    hand = Hand()
+    hand.say("CONF a,FORW,EFF,1,10000,10000", READY)
+    hand.say("ARM")
+    assert shots_until(hand, errors.RATE, 100_000) == 300
+    assert hand.now_us == READY + 300 * 100_000
+
+
+def test_the_coil_stays_below_80_degrees_and_cools_as_the_host_thinks_or_slower():
+    hand = Hand()
+    hand.say("CONF a,FORW,PULS,24000,20000,210000", READY)
+    hand.say("ARM")
+    history, load = limits.DriveHistory(), limits.load_of(words.Pulse(voltage_V=24.0, pulse_s=0.020), 2.9)
+    for shot in range(shots_until(hand, errors.HOT, 210_000)):
+        start_s = 1.0 + 0.21 * shot
+        history = history.record(load, start_s, start_s)
+    assert hand.standing().coil_mC / 1000 == pytest.approx(history.coil_celsius(hand.now_us / 1e6), abs=0.05)
+    for _ in range(10):
+        hand.say("", 60_000_000)
+        warmer_K = hand.standing().coil_mC / 1000 - history.coil_celsius(hand.now_us / 1e6)
+        assert -0.001 <= warmer_K < 0.05
+
+
+def test_the_firmwares_limits_are_the_hosts():
+    assert budget.MAX_MILLIVOLTS == 1000 * words.MAX_VOLTAGE_V
+    assert budget.MAX_PULSE_US == 1e6 * words.MAX_PULSE_S
+    assert budget.DUTY_US / budget.SECOND_US == limits.MAX_DUTY
+    assert budget.MAX_SHOTS == limits.MAX_SHOTS_PER_MINUTE
+    assert budget.MAX_WARMTH_NJ / 1e9 == (limits.MAX_COIL_C - limits.AMBIENT_C) * limits.HEAT_CAPACITY_J_K
+
+
+def test_after_a_boot_nothing_is_fired_for_a_second():
+    hand = Hand()
+    hand.say(PULSE)
+    hand.say("ARM")
+    hand.say("TRIG", READY - 1)
+    assert hand.error() == '102,"Magnet not home"'
+    hand.say("TRIG", 1)
+    assert hand.error() == '0,"No error"'
+
+
+@pytest.mark.parametrize("seed", range(25))
+def test_whatever_is_said_each_pulse_ends_in_time_and_none_comes_too_soon(seed):
+    starts, on = [], None
+    for line in transcript(random_script(seed)):
+        word, time, *rest = line.split()
+        on = None if word == "boot" else on
+        if word != "drive":
+            continue
+        if rest[0] == "OFF":
+            assert on is not None
+            assert int(time) - on[0] <= (20_000 if on[1] == "PULS" else 1_000_000)
+            on = None
+        else:
+            assert on is None
+            on = (int(time), rest[0])
+            starts.append(on[0])
+    assert all(later - sooner >= 10_000 for sooner, later in pairwise(starts))
+
+
+def test_a_script_gives_the_same_transcript_again_and_reaches_every_error():
+    seen = set()
+    for seed in range(150):
+        lines = list(transcript(random_script(seed)))
+        assert seed > 3 or lines == list(transcript(random_script(seed)))
+        for out in (bytes.fromhex(line.split()[2]) for line in lines if line.startswith("out")):
+            seen |= {code for code in errors.TEXTS if errors.message(code).encode() in out}
+    assert seen >= set(errors.TEXTS) - {errors.QUEUE_OVERFLOW}
+
+
+@given(st.lists(st.tuples(st.binary(max_size=400), st.integers(0, 3_000_000)), max_size=8), st.booleans())
+def test_whatever_bytes_come_the_core_answers_in_bounds_and_still_knows_its_name(pieces, strict):
+    gun = Strict() if strict else Hand()
+    now_us = gun.now_us
+    for data, after_us in pieces:
+        now_us += after_us
+        out, _ = gun.core.step(data, now_us)
+        assert len(out) <= (MAX_LINE + 1) * (data.count(b"\n") + 1)
+    out, _ = gun.core.step(b"\n*IDN?\n", now_us)
+    assert out.endswith(b"Recoil,haptic-gun,TWIN-1,wire 1 firmware 1.0.0\n")

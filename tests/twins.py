@@ -1,0 +1,72 @@
+"""Twins to test with: each on a real pseudo-terminal or TCP port, opened by real pyserial."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from device import Pulse, Shot
+from device.methods import paper_methods
+from device.serial_gun.gun import SerialGun, open_serial
+from device.twin.core import IDENTITY
+from device.twin.faults import Troubles
+from device.twin.ports import Pty, Socket, Tcp
+from device.twin.twin import Make, Twin
+
+PULSE = Pulse(voltage_V=16.0, pulse_s=0.010)
+
+
+def a_shot(method: str = "asymmetric-2", direction: Any = "forward", drive: Any = PULSE) -> Shot:
+    return Shot(method=method, direction=direction, drive=drive)
+
+
+@dataclass(frozen=True, kw_only=True)
+class Pair:
+    """A twin and the gun that drives it; `clock` is both's."""
+
+    twin: Twin
+    gun: SerialGun
+    socket: Socket
+    speed: float
+
+    def clock(self) -> float:
+        return time.monotonic() * self.speed
+
+    def ready(self) -> None:
+        """Armed, and the magnet home."""
+        self.gun.arm()
+        time.sleep(max(0.0, (self.gun.status().ready_at_s - self.clock()) / self.speed))
+
+    def wait(self, until: Any, seconds: float = 5.0) -> None:
+        end_s = time.monotonic() + seconds
+        while not until():
+            assert time.monotonic() < end_s
+            time.sleep(0.002)
+
+
+@contextmanager
+def a_twin(
+    folder: Path, troubles: Troubles | None = None, *, speed: float = 20.0, tcp: bool = False, **make: Any
+) -> Iterator[tuple[Twin, Socket]]:
+    socket: Socket = Tcp() if tcp else Pty(folder / "gun")
+    made = Make(speed=speed, troubles=troubles or Troubles(), **make)
+    with Twin(socket, paper_methods(), made) as twin:
+        yield twin, socket
+
+
+@contextmanager
+def a_pair(folder: Path, troubles: Troubles | None = None, *, speed: float = 20.0, **more: Any) -> Iterator[Pair]:
+    with a_twin(folder, troubles, speed=speed, **more) as (twin, socket):
+        address = f"serial:{socket.address}?speed={speed:g}"
+        gun = open_serial(address, paper_methods(), lambda: time.monotonic() * speed)
+        try:
+            yield Pair(twin=twin, gun=gun, socket=socket, speed=speed)
+        finally:
+            gun.close()
+
+
+__all__ = ["IDENTITY", "PULSE", "Pair", "Troubles", "a_pair", "a_shot", "a_twin"]
