@@ -78,12 +78,8 @@ class Budget:
     def _driven_too_long(self, on_us: int, start_us: int) -> bool:
         """A second is fullest when it ends with the new pulse; what of older pulses lies in it counts."""
         begin_us = start_us + on_us - SECOND_US
-        for start, driven in reversed(self._pulses):
-            inside_us = min(start + driven - begin_us, driven)
-            if inside_us <= 0:
-                break
-            on_us += inside_us
-        return on_us > DUTY_US
+        inside_us = (min(start + driven - begin_us, driven) for start, driven in self._pulses)
+        return on_us + sum(max(0, inside) for inside in inside_us) > DUTY_US
 
     def _warmth_at(self, now_us: int) -> int:
         warmth = self._warmth_nJ

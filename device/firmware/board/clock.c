@@ -1,0 +1,37 @@
+#include "clock.h"
+
+#include "board.h"
+
+/* TIM2 runs free at 1 MHz; SysTick wakes the main loop each millisecond. */
+void clock_start(void)
+{
+    TIM2->PSC = BOARD.timer_MHz - 1;
+    TIM2->ARR = UINT32_MAX;
+    TIM2->EGR = TIM_EGR_UG;
+    TIM2->CNT = 0;
+    TIM2->CR1 = TIM_CR1_CEN;
+    SYSTICK->LOAD = BOARD.processor_MHz * 1000 - 1;
+    SYSTICK->VAL = 0;
+    SYSTICK->CTRL = SYSTICK_ENABLE | SYSTICK_TICKINT | SYSTICK_CLKSOURCE;
+}
+
+uint32_t clock_stamp(void)
+{
+    return TIM2->CNT;
+}
+
+uint64_t clock_us(void)
+{
+    static uint32_t last, turns;
+    uint32_t stamp = clock_stamp();
+    if (stamp < last)
+        turns++;
+    last = stamp;
+    return (uint64_t)turns << 32 | stamp;
+}
+
+uint64_t clock_of(uint32_t stamp)
+{
+    uint64_t now_us = clock_us();
+    return now_us - ((uint32_t)now_us - stamp);
+}

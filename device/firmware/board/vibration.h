@@ -1,0 +1,14 @@
+/* The vibration driver, a DRV2605 on I2C1 that plays an effect of its library by itself. */
+#ifndef RECOIL_VIBRATION_H
+#define RECOIL_VIBRATION_H
+
+#include <stdbool.h>
+#include <stdint.h>
+
+void vibration_start(void);
+void vibration_on(uint8_t effect);
+void vibration_off(void);
+/* Whether it did not answer since this was asked last. */
+bool vibration_failed(void);
+
+#endif

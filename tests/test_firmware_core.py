@@ -1,0 +1,207 @@
+"""The firmware's core in C says and does what the twin does: compiled for this machine, and for the emulated chip.
+
+Scripts and transcripts are those of `device.twin.scripts`; the times are the scripts', so nothing needs to be masked.
+"""
+
+from __future__ import annotations
+
+import atexit
+import re
+import shutil
+import subprocess
+import tempfile
+from collections.abc import Iterable, Iterator
+from functools import cache
+from pathlib import Path
+
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from device.twin.scripts import random_script, transcript
+from device.wire import errors
+from device.wire.errors import TEXTS, message
+from device.wire.frame import Frame, encode
+
+ROOT = Path(__file__).parent.parent
+EMULATOR = "qemu-system-arm"
+COMPILERS = {"host": "cc", "chip": "arm-none-eabi-gcc"}
+
+
+@cache
+def built(which: str) -> Path:
+    """The folder of what `scripts/firmware` builds; the test is left out where a program for it is missing."""
+    for program in [COMPILERS[which]] + [EMULATOR] * (which == "chip"):
+        if shutil.which(program) is None:
+            pytest.skip(f"{program} is not installed; scripts/system-packages installs it")
+    folder = Path(tempfile.mkdtemp(prefix="recoil-firmware-"))
+    atexit.register(shutil.rmtree, folder, ignore_errors=True)
+    subprocess.run([ROOT / "scripts" / "firmware", f"--{which}", folder], check=True)
+    return folder
+
+
+def command(core: str) -> list[str]:
+    """The program that turns scripts into transcripts by this core."""
+    if core == "host":
+        return [str(built("host") / "filter")]
+    image = str(built("chip") / "filter.elf")
+    quiet = ["-display", "none", "-monitor", "none", "-serial", "none"]
+    return [EMULATOR, "-M", "netduinoplus2", "-kernel", image, *quiet, "-semihosting-config", "enable=on,target=native"]
+
+
+def told(core: str, script: Iterable[str]) -> list[str]:
+    """A core's transcript of a script."""
+    text = "".join(f"{line}\n" for line in script)
+    return subprocess.run(
+        command(core), input=text, capture_output=True, text=True, check=True, timeout=600
+    ).stdout.splitlines()
+
+
+def one_after_the_other(seeds: Iterable[int]) -> Iterator[str]:
+    """Random scripts as one: each begins with a gun that boots at 0."""
+    for seed in seeds:
+        yield "reset 0"
+        yield from random_script(seed)
+
+
+def differences(core: str, script: list[str]) -> list[tuple[str, str]]:
+    """Where a core's transcript differs from the twin's, as far as both go."""
+    found, expected = told(core, script), list(transcript(script))
+    length = [] if len(found) == len(expected) else [(f"{len(expected)} lines", f"{len(found)} lines")]
+    return [pair for pair in zip(expected, found, strict=False) if pair[0] != pair[1]] + length
+
+
+def said(lines: Iterable[str]) -> str:
+    """The bytes of a transcript as text."""
+    return "".join(bytes.fromhex(line.split()[2]).decode() for line in lines if line.startswith("out "))
+
+
+def by_hand(*lines: tuple[int, str]) -> list[str]:
+    return [f"in {time_us} {text.encode().hex().upper()}0A" for time_us, text in lines]
+
+
+CORES = ("host", "chip")
+
+
+@pytest.mark.parametrize("core", CORES)
+def test_a_hundred_random_scripts_have_the_twins_transcript(core):
+    assert differences(core, list(one_after_the_other(range(100)))) == []
+
+
+def test_these_scripts_meet_every_error_that_the_gun_knows():
+    answers = said(transcript(one_after_the_other(range(100))))
+    assert {code for code in TEXTS if message(code) in answers} == set(TEXTS) - {errors.QUEUE_OVERFLOW}  # the next
+
+
+@pytest.mark.parametrize("core", CORES)
+def test_the_last_place_of_a_full_queue_tells_of_the_overflow(core):
+    script = by_hand(*[(0, "FOO")] * 15, (0, "TRIG"), (0, "FOO"), *[(1, "SYST:ERR?")] * 18)
+    assert differences(core, script) == []
+    assert said(told(core, script)).splitlines()[14:] == [message(code) for code in (-113, -350, 0, 0)]
+
+
+CALLS = st.tuples(
+    st.sampled_from((0, 0, 1, 999, 50_000, 211_000, 1_000_000, 30_000_000)),
+    st.one_of(
+        st.binary(max_size=250),
+        st.text("ARMTRIGCONF?*,:~>0129 \r\n", max_size=40).map(str.encode),
+        st.sampled_from((b"\n", b"\r\n", b"\r\r\n", b"*IDN?\n", b"*IDN?\r\n", b"ARM\n", b"TRIG 1,2,3\nSTAT?\n")),
+        st.builds(
+            lambda number, body: encode(Frame(number=number, body=body), "host"),
+            st.sampled_from((0, 1, 2, 3, 0x7FFF, 0x8000, 0x8001, 0xFFFE, 0xFFFF)),
+            st.sampled_from(("SYST:STRI 7", "SYST:STRI 07", "ARM", "TRIG", "TIME?", "SYST:PLAI", "~", "A" * 185)),
+        ),
+    ),
+)
+
+
+@settings(max_examples=100)
+@given(calls=st.lists(CALLS, max_size=20))
+def test_whatever_bytes_come_the_core_in_c_says_what_the_twin_says(calls):
+    time_us, script = 0, []
+    for gap_us, data in calls:
+        time_us += gap_us
+        script.append(f"in {time_us} {data.hex().upper()}")
+    assert differences("host", script) == []
+
+
+def errors_after(core: str, lines: list[tuple[int, str]]) -> list[str]:
+    end_us = lines[-1][0] + 1_000_000
+    script = by_hand(*lines, *[(end_us, "SYST:ERR?")] * 2, (end_us, "SHOT?"))
+    return said(told(core, script)).splitlines()[-3:]
+
+
+@pytest.mark.parametrize("core", CORES)
+@pytest.mark.parametrize(
+    "setting",
+    [
+        "a,FORW,PULS,24001,10000,211000",
+        "a,FORW,PULS,16000,20001,211000",
+        "a,FORW,PULS,16000,10000,49999",
+        "a,FORW,PULS,16000,10000,10000001",
+        "a,FORW,EFF,0,10000,20000",
+        "a,FORW,EFF,124,10000,20000",
+        "a,FORW,EFF,1,1000001,2000000",
+        "a,FORW,EFF,1,30000,20000",
+    ],
+)
+def test_what_no_shot_may_be_made_of_is_refused_by_the_firmware_itself(core, setting):
+    lines = [(2_000_000, f"CONF {setting}"), (2_000_000, "ARM"), (2_000_000, "TRIG")]
+    first, second, shot = errors_after(core, lines)
+    assert (first, second) == ('-222,"Data out of range"', '106,"Not configured"')
+    assert shot.startswith("SHOT 0,0,NONE")
+
+
+@pytest.mark.parametrize("core", CORES)
+@pytest.mark.parametrize(
+    ("rest_us", "length_us", "error", "fired"),
+    [(50_000, 20_000, 103, 5), (199_000, 1_000, 104, 300)],
+    ids=["duty over a second", "shots a minute"],
+)
+def test_a_train_beyond_a_limit_is_refused_by_the_firmware_itself(core, rest_us, length_us, error, fired):
+    lines = [(2_000_000, f"CONF a,FORW,PULS,16000,{length_us},{rest_us}"), (2_000_000, "ARM")]
+    lines += [(2_000_000 + shot * rest_us, "TRIG") for shot in range(fired + 1)]
+    first, second, shot = errors_after(core, lines)
+    assert (first, second) == (message(error), message(0))
+    assert shot.startswith(f"SHOT {fired},")
+
+
+@pytest.mark.parametrize("core", CORES)
+def test_a_coil_that_would_be_too_hot_is_not_driven(core):
+    """55 K at 20 J/K are 1100 J, 3.97 J a pulse of 24 V and 20 ms: 277 shots, and more as it cools meanwhile."""
+    lines = [(2_000_000, "CONF a,FORW,PULS,24000,20000,200000"), (2_000_000, "ARM")]
+    lines += [(2_000_000 + shot * 200_000, "TRIG") for shot in range(450)]
+    script = by_hand(*lines)
+    refused = said(told(core, [*script, *by_hand(*[(92_000_000, "SYST:ERR?")] * 3)])).splitlines()
+    assert refused[0] == '105,"Coil too hot"'
+    shots = sum(line.startswith("drive") and "PULS" in line for line in told(core, script))
+    assert 277 < shots < 450
+
+
+@pytest.mark.parametrize("core", CORES)
+def test_a_vibration_between_pulses_hides_none_of_them_from_the_duty_limit(core):
+    effect, pulse = "CONF v,FORW,EFF,1,0,10000", "CONF a,FORW,PULS,16000,20000,50000"
+    lines = [(2_000_000, pulse), (2_000_000, "ARM")]
+    lines += [(2_000_000 + shot * 50_000, "TRIG") for shot in range(5)]
+    lines += [(2_250_000, effect), (2_250_000, "TRIG"), (2_260_000, pulse), (2_260_000, "TRIG")]
+    first, second, shot = errors_after(core, lines)
+    assert (first, second) == ('103,"Duty limit"', '0,"No error"')
+    assert shot.startswith("SHOT 6,")
+
+
+@pytest.mark.parametrize("core", CORES)
+def test_left_alone_in_mid_shot_it_switches_off_at_the_watchdogs_microsecond(core):
+    lines = ["CONF v,FORW,EFF,1,1000000,1000000", "SYST:WATC 100", "ARM", "TRIG 5"]
+    script = by_hand(*[(2_000_000, line) for line in lines])
+    found = told(core, [*script, "tick 9000000", *by_hand((9_000_000, "STAT?"), (9_000_000, "SYST:ERR?"))])
+    assert [line for line in found if line.startswith("drive")] == ["drive 2000000 EFF 1", "drive 2100000 OFF"]
+    assert re.match(r'STAT DISARMED,.*\n109,"Watchdog"\n', said(found))
+
+
+def test_the_image_holds_no_floating_point_and_no_heap():
+    """What the compiler would call for floats (Arm's run-time ABI names them) or a heap is not in it."""
+    names = subprocess.run(
+        ["arm-none-eabi-nm", built("chip") / "gun-f446.elf"], capture_output=True, text=True, check=True
+    ).stdout
+    assert "core_step" in names
+    assert re.findall(r"__aeabi_(?:[fd]\w+|\w+2[fd])|malloc|sbrk", names) == []

@@ -1,0 +1,322 @@
+"""The firmware on an emulated chip, in real time: its own clock, its own interrupts, on a port that pyserial opens.
+
+The image keeps a record of every call of its core and of every drive; the twin, given the same calls, must say and do
+the same, to the byte and the microsecond.
+"""
+
+from __future__ import annotations
+
+import os
+import re
+import select
+import statistics
+import subprocess
+import time
+import tty
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+
+import pytest
+import serial
+
+from device.twin.core import IDENTITY
+from device.twin.scripts import random_script, transcript
+from device.wire.frame import Frame, encode
+from device.wire.records import ShotRecord, Standing
+from tests.test_firmware_core import EMULATOR, built, message
+
+NAME = re.compile(rb"QEMU-1")
+SCRIPTS = 6
+LONGEST_WAIT_S = 0.003
+"""Between the calls of a random script, whose times are too long to wait for."""
+
+
+@dataclass(frozen=True)
+class Call:
+    """A drive as the chip carried it out: when it was due, and when it was done."""
+
+    text: str
+    due_us: int
+    done_us: int
+
+
+class Emulated:
+    """An emulated chip that runs; `port` is where the gun answers, a byte to `faults` is a fault of its driver."""
+
+    def __init__(self, process: subprocess.Popen[str], record: Path) -> None:
+        self.process, self._record = process, record
+        self.port, self.faults = (_next_port(process) for _ in range(2))
+        # Held open: QEMU drops what is said while nobody holds the other end, and looks only once a second.
+        self._held = [_opened(name) for name in (self.port, self.faults)]
+        self._greet()
+        self.greetings = len(self.calls()) - 1
+
+    def close(self) -> None:
+        self.process.kill()
+        self.process.wait()
+        assert self.process.stdout is not None
+        self.process.stdout.close()
+        for descriptor in self._held:
+            os.close(descriptor)
+
+    def _greet(self) -> None:
+        """Until the firmware has booted, QEMU has seen that somebody holds the other end, and all is answered."""
+        end_s, quiet = time.monotonic() + 30, False
+        heard = b""
+        while not (heard.endswith(b"\n") and quiet):
+            assert time.monotonic() < end_s, "the firmware does not answer"
+            if not heard and self.calls():
+                os.write(self._held[0], b"*IDN?\n")
+            quiet = not select.select(self._held[:1], [], [], 0.05)[0]
+            heard += b"" if quiet else os.read(self._held[0], 4096)
+
+    def fail(self, number: int) -> None:
+        os.write(self._held[1], bytes([number]))
+
+    def calls(self) -> list[str]:
+        """What the core was called with, as a script."""
+        return [line for line in self._lines() if not line.startswith("drive")]
+
+    def drives(self) -> list[Call]:
+        """What was driven; without the last field a line reads as in a transcript."""
+        found = []
+        for line in self._lines():
+            if line.startswith("drive"):
+                word, due, kind, amount, done = line.split()
+                text = f"{word} {due} {kind}" + ("" if kind == "OFF" else f" {amount}")
+                found.append(Call(text, int(due), int(done)))
+        return found
+
+    def _lines(self) -> list[str]:
+        return self._record.read_text().split("\n")[:-1]
+
+
+def _opened(port: str) -> int:
+    descriptor = os.open(port, os.O_RDWR | os.O_NOCTTY)
+    tty.setraw(descriptor)
+    return descriptor
+
+
+def _next_port(process: subprocess.Popen[str]) -> str:
+    assert process.stdout is not None
+    line = process.stdout.readline()
+    found = re.search(r"redirected to (\S+)", line)
+    assert found, line
+    return found[1]
+
+
+@contextmanager
+def emulated(folder: Path, image: str = "gun-qemu.elf") -> Iterator[Emulated]:
+    record = folder / "record"
+    quiet = ["-display", "none", "-monitor", "none", "-chardev", f"file,id=record,path={record}"]
+    ports = ["-serial", "pty", "-serial", "chardev:record", "-serial", "pty"]
+    words = [EMULATOR, "-M", "netduinoplus2", "-kernel", str(built("chip") / image), *quiet, *ports]
+    with subprocess.Popen(words, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True) as process:
+        chip = Emulated(process, record)
+        try:
+            yield chip
+        finally:
+            chip.close()
+
+
+class Hand:
+    """A hand at a terminal: pyserial, and a note of all that came."""
+
+    def __init__(self, chip: Emulated) -> None:
+        self.chip = chip
+        self.line = serial.Serial(chip.port, 460_800, timeout=5)
+        self.heard = b""
+
+    def close(self) -> None:
+        self.line.close()
+
+    def say(self, *lines: str) -> None:
+        self.line.write("".join(f"{line}\n" for line in lines).encode())
+
+    def ask(self, line: str) -> str:
+        self.say(line)
+        return self.read().decode().strip()
+
+    def read(self) -> bytes:
+        line = self.line.readline()
+        self.heard += line
+        return line
+
+    def standing(self) -> Standing:
+        return Standing.parse(self.ask("STAT?"))
+
+    def shot(self) -> ShotRecord:
+        return ShotRecord.parse(self.ask("SHOT?"))
+
+    def wait_until_driven(self) -> None:
+        end_s = time.monotonic() + 10
+        while self.shot().ending != "DONE":
+            assert time.monotonic() < end_s
+            time.sleep(0.001)
+
+    def wait_for_boot_rest(self) -> None:
+        """No shot in the first second after a boot."""
+        standing = self.standing()
+        time.sleep(max(0, standing.ready_us - standing.clock_us) / 1e6)
+
+
+@pytest.fixture
+def hand(tmp_path):
+    with emulated(tmp_path) as chip:
+        hand = Hand(chip)
+        yield hand
+        hand.close()
+
+
+def play(hand: Hand, script: Iterator[str]) -> None:
+    """Says what a script says, as fast as may be; power is not switched off."""
+    before_us = 0
+    for line in script:
+        word, time_us, *rest = line.split()
+        time.sleep(min((int(time_us) - before_us) / 1e6, LONGEST_WAIT_S))
+        before_us = int(time_us)
+        if word == "in":
+            hand.line.write(bytes.fromhex("".join(rest)))
+        elif word == "fault":
+            hand.chip.fail(int(rest[0]))
+        hand.heard += hand.line.read(hand.line.in_waiting)
+
+
+def finish(hand: Hand, mark: str) -> None:
+    """Everything that was said is answered: the answer to a question in both modes is the last."""
+    hand.line.write(b"\n*IDN?\n" + encode(Frame(number=0, body=f"SYST:STRI {mark}"), "host"))
+    while b"<0000 STRI" not in hand.read():
+        pass
+
+
+def as_the_twin_would(chip: Emulated) -> tuple[bytes, list[str]]:
+    """What the twin says and does for the chip's calls, but for what it says to the greetings."""
+    calls = chip.calls()
+    assert calls[0].startswith("reset ")
+    lines = list(transcript(calls))
+    answers = [bytes.fromhex(line.split()[2]) for line in lines if line.startswith("out")]
+    said = b"".join(answers[chip.greetings :])
+    return said, [line for line in lines if line.startswith("drive")]
+
+
+def agree(hand: Hand) -> int:
+    """Chip and twin agree on all that the chip was told. How many bytes it said."""
+    said, drives = as_the_twin_would(hand.chip)
+    heard = _renamed(hand.heard)
+    assert heard[: len(said)] == said
+    assert [call.text for call in hand.chip.drives()][: len(drives)] == drives
+    return len(said)
+
+
+def _renamed(heard: bytes) -> bytes:
+    """The chip under the twin's name; it is said in plain lines and in frames, whose checksums it changes."""
+    lines = []
+    for line in heard.splitlines(keepends=True):
+        if line.startswith(b"<") and NAME.search(line):
+            body = NAME.sub(IDENTITY.serial.encode(), line[6:-10]).decode()
+            lines.append(encode(Frame(number=int(line[1:5], 16), body=body), "gun"))
+        else:
+            lines.append(NAME.sub(IDENTITY.serial.encode(), line))
+    return b"".join(lines)
+
+
+def play_all(hand: Hand, seeds: range) -> int:
+    for seed in seeds:
+        play(hand, random_script(seed))
+        finish(hand, str(seed))
+    return agree(hand)
+
+
+def test_the_chip_in_real_time_says_and_does_what_the_twin_does_for_the_same_calls(hand):
+    hand.wait_for_boot_rest()
+    assert play_all(hand, range(SCRIPTS)) > 10_000
+    assert len(hand.chip.drives()) > 10
+
+
+def test_it_says_who_it_is(hand):
+    assert hand.ask("*IDN?") == "Recoil,haptic-gun,QEMU-1,wire 1 firmware 1.0.0"
+
+
+def test_its_clock_goes_as_the_worlds(hand):
+    times = []
+    for _ in range(2):
+        begin_s = time.monotonic()
+        gun_us = int(hand.ask("TIME?").split()[1])
+        times.append((begin_s, time.monotonic(), gun_us / 1e6))
+        time.sleep(0.5)
+    (begin, first, gun), (later, last, gun_later) = times
+    assert later - first - 0.001 < gun_later - gun < last - begin + 0.001
+
+
+def test_a_train_at_its_rest_is_driven_to_the_microsecond(hand):
+    hand.wait_for_boot_rest()
+    hand.say("CONF asymmetric-2,FORW,PULS,16000,10000,200000", "ARM")
+    start_us = hand.standing().clock_us + 200_000
+    for shot in range(6):
+        hand.say(f"TRIG {shot + 1},{start_us + 200_000 * shot}")
+        hand.wait_until_driven()
+    starts = [call.due_us for call in hand.chip.drives() if "PULS" in call.text]
+    assert starts == [start_us + 200_000 * shot for shot in range(6)]
+    assert statistics.median(call.done_us - call.due_us for call in hand.chip.drives()) < 20_000
+    assert agree(hand)
+
+
+def test_left_alone_it_switches_off_and_disarms_in_the_stated_time(hand):
+    hand.wait_for_boot_rest()
+    hand.say("CONF vibration,FORW,EFF,1,1000000,1000000", "SYST:WATC 300", "ARM", "TRIG 1")
+    time.sleep(0.4)
+    standing, shot = hand.standing(), hand.shot()
+    assert (standing.state, hand.ask("SYST:ERR?")) == ("DISARMED", message(109))
+    assert (shot.ending, shot.end_us - shot.accepted_us) == ("CUT", 300_000)
+    off = hand.chip.drives()[-1]
+    assert off.text == f"drive {shot.end_us} OFF"
+    assert off.done_us - off.due_us < 100_000
+    assert agree(hand)
+
+
+def test_a_driver_that_fails_in_mid_shot_is_switched_off_until_reset(hand):
+    hand.wait_for_boot_rest()
+    hand.say("CONF vibration,FORW,EFF,1,1000000,1000000", "ARM", "TRIG 1")
+    assert hand.standing().state == "FIRING"
+    hand.chip.fail(7)
+    while (standing := hand.standing()).state == "FIRING":
+        time.sleep(0.001)
+    assert (standing.state, standing.fault, hand.shot().ending) == ("FAULT", 7, "CUT")
+    hand.say("ARM", "*RST")
+    assert [hand.ask("SYST:ERR?") for _ in range(2)] == [message(110)] * 2
+    assert hand.standing().state == "DISARMED"
+    assert agree(hand)
+
+
+@pytest.mark.parametrize(
+    "setting", ["a,FORW,PULS,24001,10000,211000", "a,FORW,PULS,16000,20001,211000", "a,FORW,PULS,16000,10000,49999"]
+)
+def test_a_setting_beyond_the_limits_is_refused_and_nothing_driven(hand, setting):
+    hand.wait_for_boot_rest()
+    hand.say(f"CONF {setting}", "ARM", "TRIG")
+    assert [hand.ask("SYST:ERR?") for _ in range(2)] == [message(-222), message(106)]
+    assert hand.chip.drives() == []
+
+
+def test_a_shot_before_the_magnet_is_home_is_refused(hand):
+    hand.wait_for_boot_rest()
+    hand.say("CONF a,FORW,PULS,24000,20000,5000000", "ARM", "TRIG")
+    hand.wait_until_driven()
+    hand.say("TRIG")
+    assert hand.ask("SYST:ERR?") == message(102)
+    assert agree(hand)
+
+
+def test_a_sixth_pulse_in_a_second_that_is_full_is_refused(hand):
+    hand.wait_for_boot_rest()
+    hand.say("CONF a,FORW,PULS,24000,20000,50000", "ARM")
+    for _ in range(5):
+        hand.say("TRIG")
+        hand.wait_until_driven()
+        while hand.standing().state == "RESETTING":
+            time.sleep(0.001)
+    hand.say("TRIG")
+    assert hand.ask("SYST:ERR?") == message(103)
+    assert agree(hand)
