@@ -4,8 +4,8 @@ from device.twin.budget import DUTY_US, Budget
 from device.wire import errors
 from device.wire.records import Setting
 
-PULSE = Setting(method="M", way="forward", kind="PULS", amount=16_000, length_us=20_000, rest_us=50_000)
-EFFECT = Setting(method="M", way="forward", kind="EFF", amount=1, length_us=24_000, rest_us=50_000)
+PULSE = Setting(method="M", way="FORW", kind="PULS", amount=16_000, length_us=20_000, rest_us=50_000)
+EFFECT = Setting(method="M", way="FORW", kind="EFF", amount=1, length_us=24_000, rest_us=50_000)
 
 
 def spent(*settings: Setting) -> Budget:
