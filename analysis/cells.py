@@ -35,6 +35,17 @@ class TrialCells:
         return pd.DataFrame(shares[there], index=[self.participants[i] for i in there], columns=list(self.methods))
 
 
+class Finite(dict[str, Any]):
+    """Numbers by name, finite all of them: so many that they were looked at as an array, not one by one."""
+
+
+def by_name(codes: Sequence[str], names: Sequence[str], values: FloatArray) -> dict[str, Any]:
+    """Rows of numbers by code and name, `Finite` if they are."""
+    rows = zip(*(column.tolist() for column in values.T), strict=True)
+    found = {code: dict(zip(names, row, strict=True)) for code, row in zip(codes, rows, strict=True)}
+    return Finite(found) if np.isfinite(values).all() else found
+
+
 def coded(table: pd.DataFrame) -> pd.DataFrame:
     """The keys and measures of `table`, the keys as categories: only those that occur, in the order of their names.
 
@@ -49,9 +60,9 @@ def trial_cells(trials: pd.DataFrame, methods: Sequence[str]) -> TrialCells:
     people = trials["participant_id"].cat.categories
     shape = (len(people), len(methods), len(DIRECTIONS))
     keys = (
-        _codes(trials["participant_id"]),
-        _places(trials["method"], methods),
-        _places(trials["direction"], DIRECTIONS),
+        codes_of(trials["participant_id"]),
+        places_among(trials["method"], methods),
+        places_among(trials["direction"], DIRECTIONS),
     )
     cell = np.ravel_multi_index(keys, shape)
     size = int(np.prod(shape))
@@ -66,21 +77,23 @@ def trial_cells(trials: pd.DataFrame, methods: Sequence[str]) -> TrialCells:
 
 def _category(column: pd.Series) -> pd.Series:
     """Codes in the order of the names that occur; the names as plain strings, which are quick to walk through."""
-    found = column.astype("category").cat.remove_unused_categories()
-    names = [str(name) for name in found.cat.categories.tolist()]
-    order = sorted(range(len(names)), key=names.__getitem__)
-    rank = np.append(np.argsort(order), -1)  # the last one stands for a missing value, code -1
+    found = column.astype("category").cat
+    codes, names = found.codes.to_numpy(), [str(name) for name in found.categories.tolist()]
+    occur = np.flatnonzero(np.bincount(codes + np.intp(1), minlength=len(names) + 1)[1:])
+    order = sorted(occur.tolist(), key=names.__getitem__)
+    rank = np.full(len(names) + 1, -1, dtype=np.int32)  # the last one stands for a missing value, code -1
+    rank[order] = np.arange(len(order))
     categories = pd.Index([names[i] for i in order], dtype=object)
-    codes = rank[found.cat.codes.to_numpy()]
-    return pd.Series(pd.Categorical.from_codes(codes, categories), index=column.index)
+    return pd.Series(pd.Categorical.from_codes(rank[codes], categories), index=column.index)
 
 
-def _codes(column: pd.Series) -> NDArray[np.intp]:
+def codes_of(column: pd.Series) -> NDArray[np.intp]:
+    """For each row the place of its value among the categories of a coded column."""
     return np.asarray(column.cat.codes, dtype=np.intp)
 
 
-def _places(column: pd.Series, names: Sequence[str]) -> NDArray[np.intp]:
-    """For each row the place of its value among `names`."""
+def places_among(column: pd.Series, names: Sequence[str]) -> NDArray[np.intp]:
+    """For each row of a coded column the place of its value among `names`."""
     places: NDArray[np.intp] = np.array([names.index(str(name)) for name in column.cat.categories], dtype=np.intp)
-    found: NDArray[np.intp] = np.take(places, _codes(column))
+    found: NDArray[np.intp] = np.take(places, codes_of(column))
     return found

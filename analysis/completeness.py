@@ -4,7 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 
+import numpy as np
 import pandas as pd
+
+from analysis.cells import codes_of, places_among
 
 _MEASURES = {"direction": ("correct", "trials unanswered"), "preference": ("rating", "ratings missing")}
 
@@ -14,7 +17,8 @@ def complete_rows(
 ) -> tuple[pd.DataFrame, list[dict[str, str]]]:
     """The rows of the participants who answered everything, and the others: experiment, participant, reason.
 
-    Every method must be there; for direction with forward trials, because these are what the measure counts.
+    Every method must be there; for direction with forward trials, because these are what the measure counts. `table` is
+    coded.
     """
     reasons = _reasons(table, experiment, methods)
     left_out = [
@@ -38,15 +42,17 @@ def tidied(table: pd.DataFrame) -> pd.DataFrame:
 def _reasons(table: pd.DataFrame, experiment: str, methods: Sequence[str]) -> dict[str, str]:
     """Why participants are left out, by code."""
     measure, noun = _MEASURES[experiment]
-    people = table.groupby("participant_id", sort=True, observed=True)[measure]
-    rows, missing = people.size(), people.size() - people.count()
-    lacking = {str(code): f"{missing[code]} of {rows[code]} {noun}" for code in missing.index[missing > 0]}
-    counted = table[table["direction"] == "forward"] if experiment == "direction" else table
-    seen = counted.groupby(["participant_id", "method"], observed=True).size().unstack("method")
-    seen = seen.reindex(index=rows.index, columns=list(methods)).fillna(0)
+    codes = table["participant_id"].cat.categories.tolist()
+    person, method = codes_of(table["participant_id"]), places_among(table["method"], methods)
+    rows = np.bincount(person, minlength=len(codes))
+    missing = np.bincount(person[table[measure].isna()], minlength=len(codes))
+    lacking = {codes[i]: f"{missing[i]} of {rows[i]} {noun}" for i in np.flatnonzero(missing)}
+    counted = np.asarray(table["direction"] == "forward") if experiment == "direction" else slice(None)
+    seen = np.zeros((len(codes), len(methods)), dtype=np.bool_)
+    seen[person[counted], method[counted]] = True
     what = "no forward trials with" if experiment == "direction" else "no rating of"
     absent = {
-        str(code): f"{what} {', '.join(method for method in methods if not seen.loc[code, method])}"
-        for code in seen.index[(seen == 0).any(axis=1)]
+        codes[i]: f"{what} {', '.join(name for name, there in zip(methods, seen[i], strict=True) if not there)}"
+        for i in np.flatnonzero(~seen.all(axis=1))
     }
     return absent | lacking

@@ -18,7 +18,8 @@
     code = "P03"
     reason = "left-handed"
 
-Every key may be missing; `configs/examples/rules.toml` is there to copy. Trials are dropped first, of both experiments where they have the columns; then participants.
+Every key may be missing; `configs/examples/rules.toml` is there to copy. Trials are dropped first, of both experiments
+where they have the columns; then participants.
 """
 
 from __future__ import annotations

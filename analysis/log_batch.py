@@ -7,49 +7,56 @@ here (trials in the order 1, 2, 3, ...).
 
 from __future__ import annotations
 
-import re
-from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
+import pyarrow as pa
 from numpy.typing import NDArray
 
 from analysis import log_cells
-from analysis.log_cells import Flags, Grid, Integers
-from analysis.log_frames import Block, Coded, is_category
-from analysis.log_records import records
+from analysis.log_frames import Block, Cells, Coded, Texts, chosen, is_category
 from analysis.log_rules import BadLogError, Cell, experiment_of, is_code, parse_cell
 from experiments import columns
 from experiments.columns import Column
 
-_HEADER = re.compile(rb"[A-Za-z0-9_, ]+\r?\n")
-_STAND_INS = re.compile(rb"[\x01-\x04]")
-_LONG_BYTES = 16
-"""Text longer than that is not expected to come again."""
+Flags = NDArray[np.bool_]
+Integers = NDArray[np.int64]
+
+_NO_ROWS: Integers = np.empty(0, dtype=np.int64)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Source:
-    """A file's content, and the participant's code in its name."""
+class _Group:
+    """Files with the same header: their numbers, contents and rows, and the participants' codes in their names."""
 
-    content: bytes
-    code_in_name: str | None
+    header: bytes
+    quoted: bool
+    number: list[int] = field(default_factory=list)
+    content: list[bytes] = field(default_factory=list)
+    rows: list[int] = field(default_factory=list)
+    code_in_name: list[str | None] = field(default_factory=list)
+
+    def part(self, chosen: slice) -> _Group:
+        """Some of the files."""
+        lists = ("number", "content", "rows", "code_in_name")
+        return replace(self, **{name: getattr(self, name)[chosen] for name in lists})
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class _Cells:
+class _Column:
     """A parsed column, and the rows whose cell is not surely right."""
 
-    column: Coded | NDArray[Any]
-    doubted: Flags
+    cells: Cells
+    doubted: Integers
 
     @property
     def coded(self) -> Coded:
-        """The column as numbers of its values; numbers and long text are not coded."""
-        if not isinstance(self.column, Coded):
+        """The column as numbers of its values; numbers and text are not coded."""
+        if not isinstance(self.cells, Coded):
             raise TypeError("this column has no codes")
-        return self.column
+        return self.cells
 
     def numbers(self) -> Integers:
         """The values as whole numbers, -1 for none."""
@@ -57,81 +64,89 @@ class _Cells:
         return np.array(values, dtype=np.int64)[self.coded.codes]
 
 
-def _rows(column: Coded | NDArray[Any], rows: Flags) -> Coded | NDArray[Any]:
-    return replace(column, codes=column.codes[rows]) if isinstance(column, Coded) else column[rows]
-
-
-def read_batch(sources: Sequence[Source]) -> tuple[list[Block], dict[int, str]]:
-    """Blocks of the files that surely keep every rule, numbered as in `sources`, and each one's participant."""
-    groups: dict[tuple[bytes, bool], list[int]] = {}
-    texts = [_plain(source.content) for source in sources]
-    for number, (text, quoted) in enumerate(texts):
-        if match := _HEADER.match(text):
-            groups.setdefault((match[0], quoted), []).append(number)
+def read_batch(contents: Sequence[bytes], codes_in_names: Sequence[str | None]) -> tuple[list[Block], dict[int, str]]:
+    """Blocks of the files that surely keep every rule, numbered as in `contents`, and each one's participant."""
     blocks: list[Block] = []
     codes: dict[int, str] = {}
-    for (header, quoted), numbers in groups.items():
-        bodies = [texts[number][0][len(header) :] for number in numbers]
-        block, found = _read_group(header, bodies, [sources[n].code_in_name for n in numbers], quoted=quoted)
-        if block is not None:
-            places = np.array(numbers)
-            blocks.append(replace(block, log=places[block.log]))
-            codes |= {numbers[place]: code for place, code in found.items()}
+    for group in _groups(contents, codes_in_names):
+        for block, found in _read_group(group):
+            blocks.append(block)
+            codes |= found
     return blocks, codes
 
 
-def _plain(content: bytes) -> tuple[bytes, bool]:
-    """The content without quotes, and whether it had some; nothing if it surely is to be read with care."""
-    try:
-        if b'"' not in content:
-            return (content if content.isascii() or content.decode("utf-8") else b""), False
-        if _STAND_INS.search(content):
-            return b"", False
-        return log_cells.plain(cells for _, cells in records(content)).encode(), True
-    except (UnicodeDecodeError, BadLogError):
-        return b"", False
+def _groups(contents: Sequence[bytes], codes_in_names: Sequence[str | None]) -> Iterable[_Group]:
+    groups: dict[tuple[bytes, bool], _Group] = {}
+    for number, (content, code) in enumerate(zip(contents, codes_in_names, strict=True)):
+        if layout := log_cells.layout(content):
+            header, quoted, rows = layout
+            group = groups.get((header, quoted)) or groups.setdefault(
+                (header, quoted), _Group(header=header, quoted=quoted)
+            )
+            group.number.append(number)
+            group.content.append(content)
+            group.rows.append(rows)
+            group.code_in_name.append(code)
+    return groups.values()
 
 
-def _read_group(
-    header: bytes, bodies: Sequence[bytes], codes_in_names: Sequence[str | None], *, quoted: bool
-) -> tuple[Block | None, dict[int, str]]:
-    line_end = b"\r\n" if header.endswith(b"\r\n") else b"\n"
-    names = header.removesuffix(line_end).decode("ascii").split(",")
+def _read_group(group: _Group) -> Iterator[tuple[Block, dict[int, str]]]:
+    """The files of a group; if not all have rows as they should be, each half by itself."""
     try:
-        experiment = experiment_of(names, 1)
+        experiment = experiment_of(log_cells.names_in(group.header), 1)
     except BadLogError:
-        return None, {}
-    grid, kept = log_cells.grid(bodies, len(names), line_end, quoted=quoted)
-    if not kept:
-        return None, {}
-    table = {column.name: _cells(column, grid, names) for column in columns.TABLES[experiment]}
-    codes = _participants(table["participant_id"], grid)
-    good = np.array([codes_in_names[number] in (None, codes[place]) for place, number in enumerate(kept)])
-    good[grid.text[_doubted(experiment, table, grid)]] = False
-    rows = good[grid.text]
-    found = {name: cells.column if rows.all() else _rows(cells.column, rows) for name, cells in table.items()}
-    block = Block(experiment=experiment, columns=found, log=np.array(kept)[grid.text[rows]])
-    return block, {kept[place]: codes[place] for place in np.flatnonzero(good).tolist()}
+        return
+    many = [column.name for column in columns.TABLES[experiment] if _has_many_values(column)]
+    table = log_cells.table(group.header, group.content, sum(group.rows), many, quoted=group.quoted)
+    if table is not None:
+        yield _checked(experiment, table, group)
+    elif len(group.number) > 1:
+        half = len(group.number) // 2
+        yield from _read_group(group.part(slice(half)))
+        yield from _read_group(group.part(slice(half, None)))
 
 
-def _cells(column: Column, grid: Grid, names: list[str]) -> _Cells:
-    count = len(grid.text)
-    if column.name not in names:
-        return _coded(column, np.zeros(count, dtype=np.int64), [columns.MISSING])
-    place = names.index(column.name)
+def _has_many_values(column: Column) -> bool:
+    return column.type == "number" or (column.type == "text" and not is_category(column))
+
+
+def _checked(experiment: str, table: pa.Table, group: _Group) -> tuple[Block, dict[int, str]]:
+    """The rows of the good files, and each one's participant."""
+    number, rows = np.array(group.number, dtype=np.int64), np.array(group.rows, dtype=np.int64)
+    first = np.cumsum(rows) - rows
+    found = {column.name: _parsed_column(column, table) for column in columns.TABLES[experiment]}
+    participant = found["participant_id"].coded
+    codes = [str(participant.values[code]) for code in participant.codes[first].tolist()]
+    good = np.array([given in (None, code) for given, code in zip(group.code_in_name, codes, strict=True)])
+    good[np.searchsorted(first, _doubted(experiment, found, first), side="right") - 1] = False
+    kept = None if good.all() else np.flatnonzero(np.repeat(good, rows))
+    block = Block(
+        experiment=experiment,
+        columns={name: column.cells if kept is None else chosen(column.cells, kept) for name, column in found.items()},
+        log=number[good],
+        rows=rows[good],
+    )
+    return block, {group.number[place]: codes[place] for place in np.flatnonzero(good).tolist()}
+
+
+def _parsed_column(column: Column, table: pa.Table) -> _Column:
+    if column.name not in table.column_names:
+        return _coded(column, np.zeros(table.num_rows, dtype=np.int32), [columns.MISSING])
+    cells = table.column(column.name).chunk(0)
     if column.type == "number":
-        return _decimals(column, grid, place)
-    if column.type == "text" and not is_category(column) and int(grid.lengths[place].max()) > _LONG_BYTES:
-        return _long_text(column, grid, place)
-    return _coded(column, *log_cells.distinct(grid, place))
+        return _numbers(column, cells)
+    if _has_many_values(column):
+        empty = np.flatnonzero(cells.is_null()) if column.required else _NO_ROWS
+        return _Column(cells=log_cells.unguarded(cells), doubted=empty)
+    return _coded(column, *log_cells.few(cells))
 
 
-def _coded(column: Column, codes: Integers, cells: list[str]) -> _Cells:
+def _coded(column: Column, codes: NDArray[np.int32], texts: list[str]) -> _Column:
     """A column of few values, each parsed once."""
-    parsed = [_parsed(column, cell) for cell in cells]
+    parsed = [_parsed(column, text) for text in texts]
+    doubtful = np.array([doubt for _, doubt in parsed])
     values = tuple(value for value, _ in parsed)
-    doubted = np.array([doubt for _, doubt in parsed])[codes]
-    return _Cells(column=Coded(codes=codes, values=values), doubted=doubted)
+    return _Column(cells=Coded(codes=codes, values=values), doubted=np.flatnonzero(doubtful[codes]))
 
 
 def _parsed(column: Column, cell: str) -> tuple[Cell, bool]:
@@ -145,48 +160,31 @@ def _parsed(column: Column, cell: str) -> tuple[Cell, bool]:
     return value, False
 
 
-def _decimals(column: Column, grid: Grid, place: int) -> _Cells:
-    numbers, odd = log_cells.decimals(grid, place)
-    rows = np.flatnonzero(odd)
-    doubted = np.zeros(len(odd), dtype=np.bool_)
-    for row, cell in zip(rows.tolist(), log_cells.cells(grid, place, rows), strict=True):
-        value, doubted[row] = _parsed(column, cell)
-        numbers[row] = np.nan if value is None else value
-    return _Cells(column=numbers, doubted=doubted)
+def _numbers(column: Column, cells: Texts) -> _Column:
+    numbers, odd = log_cells.decimals(cells)
+    if not odd.size:
+        return _Column(cells=numbers, doubted=odd)
+    numbers = numbers.copy()
+    parsed = [_parsed(column, cell) for cell in cells.take(pa.array(odd)).to_pylist()]
+    numbers[odd] = [np.nan if value is None else value for value, _ in parsed]
+    return _Column(cells=numbers, doubted=odd[[doubt for _, doubt in parsed]])
 
 
-def _long_text(column: Column, grid: Grid, place: int) -> _Cells:
-    """A column of text that differs from row to row."""
-    lengths = grid.lengths[place]
-    rows = np.flatnonzero(lengths)
-    texts = np.full(len(lengths), None, dtype=object)
-    cells = log_cells.cells(grid, place, rows)
-    guarded = (grid.data[grid.starts[place, rows]] == ord("'")).any()
-    texts[rows] = [columns.unguard(cell) for cell in cells] if guarded else cells
-    doubted = (lengths == 0) & column.required
-    return _Cells(column=texts, doubted=doubted)
-
-
-def _participants(cells: _Cells, grid: Grid) -> list[str]:
-    """The participant in the first row of each file."""
-    first = np.flatnonzero(np.diff(grid.text, prepend=-1))
-    return [str(cells.coded.values[code]) for code in cells.coded.codes[first].tolist()]
-
-
-def _doubted(experiment: str, table: dict[str, _Cells], grid: Grid) -> Flags:
-    """The rows that may break a rule, alone or with the row before."""
-    doubted = np.logical_or.reduce([cells.doubted for cells in table.values()])
-    begins = np.diff(grid.text, prepend=-1) > 0
-    doubted |= ~begins & _changes(table["participant_id"].coded.codes)
+def _doubted(experiment: str, table: Mapping[str, _Column], first: Integers) -> Integers:
+    """The rows that may break a rule, alone or with the row before. `first` is each file's first row."""
     trial = table["trial"].numbers()
+    begins = np.zeros(len(trial), dtype=np.bool_)
+    begins[first] = True
+    off = ~begins & _changes(table["participant_id"].coded.codes)
     if experiment == "direction":
-        return np.asarray(doubted | _wrong_answers(table) | ~_in_order(table, trial, begins))
-    rating = np.asarray(table["rating"].column, dtype=np.float64)
-    off = (rating < 0.0) | (rating > 10.0) | (trial != np.where(begins, 1, _before(trial) + 1))
-    return np.asarray(doubted | off)
+        off |= _wrong_answers(table) | ~_in_order(table, trial, begins)
+    else:
+        rating = np.asarray(table["rating"].cells, dtype=np.float64)
+        off |= (rating < 0.0) | (rating > 10.0) | (trial != np.where(begins, 1, _before(trial) + 1))
+    return np.concatenate([np.flatnonzero(off), *(column.doubted for column in table.values())])
 
 
-def _wrong_answers(table: dict[str, _Cells]) -> Flags:
+def _wrong_answers(table: Mapping[str, _Column]) -> Flags:
     """Rows where `correct` does not say whether the response is the direction."""
     direction, response = table["direction"].coded, table["response"].coded
     due = np.array(
@@ -195,7 +193,7 @@ def _wrong_answers(table: dict[str, _Cells]) -> Flags:
     return np.asarray(due[direction.codes, response.codes] != table["correct"].numbers())
 
 
-def _in_order(table: dict[str, _Cells], trial: Integers, begins: Flags) -> Flags:
+def _in_order(table: Mapping[str, _Column], trial: Integers, begins: Flags) -> Flags:
     """Rows that begin a session with trial 1, or go on with the next trial of the same method."""
     session = table["session"].numbers()
     goes_on = (session == _before(session)) & (trial == _before(trial) + 1) & ~_changes(table["method"].coded.codes)
@@ -203,9 +201,9 @@ def _in_order(table: dict[str, _Cells], trial: Integers, begins: Flags) -> Flags
     return np.asarray(np.where(begins, first, first | goes_on))
 
 
-def _before(numbers: Integers) -> Integers:
+def _before(numbers: NDArray[Any]) -> NDArray[Any]:
     return np.concatenate([numbers[:1], numbers[:-1]])
 
 
-def _changes(codes: Integers) -> Flags:
+def _changes(codes: NDArray[Any]) -> Flags:
     return np.asarray(codes != _before(codes))

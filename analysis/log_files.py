@@ -15,6 +15,10 @@ from analysis.log_rules import BadLogError
 from experiments import columns
 
 ENDINGS = tuple(f"_{suffix}.csv" for suffix in columns.FILE_SUFFIX.values())
+_BEHIND_STEM = re.compile(rf"(_({'|'.join(columns.FILE_SUFFIX.values())}))?\.[^.]*$")
+_CODE = re.compile(r"sub-([^_]+)_")
+_READ_ONLY = os.O_RDONLY | getattr(os, "O_BINARY", 0)
+_PIECE_BYTES = 1 << 16
 _TAIL_BYTES = (1 << 12, 1 << 16)
 """As much of a journal as mostly, and as surely, holds its last record."""
 
@@ -39,17 +43,12 @@ class Problem:
         return f"{place}: {self.message}"
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Found:
-    """A log file and the folder that stands for its study."""
+def find_logs(paths: Sequence[Path], endings: tuple[str, ...] = ENDINGS) -> tuple[dict[str, str], list[Problem]]:
+    """The files in `paths`, each once, with the folder that stands for its study; files in folders by their endings.
 
-    path: str
-    study: str
-
-
-def find_logs(paths: Sequence[Path], endings: tuple[str, ...] = ENDINGS) -> tuple[list[Found], list[Problem]]:
-    """The files in `paths`, each once; files in folders by their endings. Practice is left out."""
-    found: dict[str, Found] = {}
+    Practice is left out.
+    """
+    found: dict[str, tuple[str, str]] = {}
     problems: list[Problem] = []
     for path in paths:
         logs = _in_folder(path, endings, problems) if path.is_dir() else {os.path.realpath(path): str(path)}
@@ -60,15 +59,18 @@ def find_logs(paths: Sequence[Path], endings: tuple[str, ...] = ENDINGS) -> tupl
             continue
         top = os.path.realpath(path if path.is_dir() else path.parent)
         for real, log in logs.items():
-            found.setdefault(real, Found(path=log, study=_study(real, top)))
-    return [log for log in found.values() if "practice" not in os.path.basename(log.path).lower()], problems  # noqa: PTH119 - many
+            found.setdefault(real, (log, _study(real, top)))
+    return {log: study for log, study in found.values() if "practice" not in _name(log).lower()}, problems
+
+
+def _name(path: str) -> str:
+    return path.rpartition(os.sep)[2]
 
 
 def _study(real: str, top: str) -> str:
     """The results folder that holds the file's `sub-<ID>` folder; without one, the folder that was asked for."""
-    folder = os.path.dirname(real)  # noqa: PTH120 - of many thousands
-    results, name = os.path.split(folder)
-    return results if name.startswith("sub-") else top
+    results, _, name = real.rpartition(os.sep)[0].rpartition(os.sep)
+    return results or os.sep if name.startswith("sub-") else top
 
 
 def _in_folder(folder: Path, endings: tuple[str, ...], problems: list[Problem]) -> dict[str, str]:
@@ -100,25 +102,35 @@ def code_in_name(path: str) -> str | None:
     >>> code_in_name("results/sub-P01/sub-P01_task-direction_trials.csv"), code_in_name("log.csv")
     ('P01', None)
     """
-    match = re.match(r"sub-([^_]+)_", path.rpartition(os.sep)[2])
+    match = _CODE.match(_name(path))
     return match[1] if match else None
 
 
 def read_content(path: str) -> bytes:
     """A file's bytes; `BadLogError` if it cannot be read or is not the one that its finished run left."""
     try:
-        with open(path, "rb", buffering=0) as stream:  # noqa: PTH123 - of many thousands
-            content = stream.read()
+        content = _bytes(path)
     except OSError as error:
         raise BadLogError(f"cannot be read: {error.strerror or error}") from error
     _check_unedited(path, content)
     return content
 
 
+def _bytes(path: str) -> bytes:
+    """A file's bytes with as few calls as can be: a log is mostly one piece."""
+    descriptor = os.open(path, _READ_ONLY)
+    try:
+        content = os.read(descriptor, _PIECE_BYTES)
+        while piece := os.read(descriptor, _PIECE_BYTES):
+            content += piece
+    finally:
+        os.close(descriptor)
+    return content
+
+
 def _check_unedited(path: str, content: bytes) -> None:
     """If the journal beside the file says that the run was finished, the file is still the one it finished with."""
-    stem = re.sub(rf"(_({'|'.join(columns.FILE_SUFFIX.values())}))?\.[^.]*$", "", path)
-    journal = f"{stem}_journal.jsonl"
+    journal = f"{_BEHIND_STEM.sub('', path)}_journal.jsonl"
     finished = _last_record(journal)
     expected = finished.get("table_sha256") if finished.get("kind") == "finished" else None
     if expected is not None and expected != hashlib.sha256(content).hexdigest():
@@ -127,6 +139,8 @@ def _check_unedited(path: str, content: bytes) -> None:
 
 def _last_record(journal: str) -> dict[str, object]:
     """The last record of a journal, or nothing if there is no journal or its last line is torn."""
+    if not os.access(journal, os.F_OK):
+        return {}
     try:
         with open(journal, "rb", buffering=0) as stream:  # noqa: PTH123 - of many thousands
             record = json.loads(next(filter(None, _last_lines(stream)), b"{}"))

@@ -3,17 +3,18 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Callable, Iterable, Sequence
+from collections import deque
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from concurrent.futures import Future, ThreadPoolExecutor
 from dataclasses import dataclass, field, replace
 from functools import lru_cache
 from pathlib import Path
 
-import numpy as np
 import pandas as pd
 
 from analysis.column_map import ColumnMap
-from analysis.log_batch import Source, read_batch
-from analysis.log_files import ENDINGS, Found, Problem, code_in_name, find_logs, read_content
+from analysis.log_batch import read_batch
+from analysis.log_files import ENDINGS, Problem, code_in_name, find_logs, read_content
 from analysis.log_frames import Block, block_of_rows, joined
 from analysis.log_records import records
 from analysis.log_rules import BadLogError, check_table
@@ -23,13 +24,18 @@ from experiments import register
 
 __all__ = ["Logs", "Problem", "Track", "read_logs"]
 
-_BATCH_BYTES = 2 << 20
-"""So much is read before it is checked: enough for speed, and little enough for the cache."""
+_BATCH_BYTES = 4 << 20
+"""So much is checked at once: enough for speed, and little enough for the cache."""
+
+_BATCHES_AHEAD = 4
+"""So many are read from disk while others are checked."""
 
 _LOGS_A_FILE = 1 << 20
 """Numbers of logs are so far apart from file to file: a mapped file may hold several."""
 
 Track = Callable[[Sequence[Path]], Iterable[Path]]
+Quick = tuple[list[Block], dict[int, str]]
+"""What `read_batch` gives back."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -46,26 +52,12 @@ class Logs:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class _Log:
-    """One participant's log of an experiment, as far as it tells who was where."""
-
-    file: Path
-    study: str
-    experiment: str
-    code: str
-
-    @property
-    def key(self) -> tuple[str, str, str]:
-        """There may be one such log."""
-        return self.study, self.experiment, self.code.casefold()
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
 class _Waiting:
-    """A file's content, or why there is none."""
+    """A file, the folder that stands for its study, and its content, or why there is none."""
 
-    log: Found
     file: Path
+    path: str
+    study: str
     content: bytes | BadLogError
 
     @property
@@ -81,23 +73,38 @@ class _Reading:
     problems: list[Problem]
     mapping: ColumnMap | None
     blocks: list[Block] = field(default_factory=list)
-    good: dict[int, _Log] = field(default_factory=dict)
-    keys: dict[tuple[str, str, str], _Log] = field(default_factory=dict)
+    studies: dict[int, str] = field(default_factory=dict)
+    """The study's folder of each good log."""
+    codes: dict[int, str] = field(default_factory=dict)
+    firsts: dict[tuple[str, str, str], int] = field(default_factory=dict)
+    """The first log of each study, experiment and code, upper and lower case alike."""
+    files: dict[int, Path] = field(default_factory=dict)
+    """The files of good logs, numbered."""
     count: int = 0
 
     def refuse(self, file: Path, bad: BadLogError) -> None:
         """Note why a file is left out."""
         self.problems.append(Problem(file=file, line=bad.line, column=bad.column, message=bad.message))
 
-    def admit(self, number: int, log: _Log) -> None:
-        """Take a log, or note why it is left out."""
+    def admit(self, number: int, one: _Waiting, study: str, experiment: str, code: str) -> None:
+        """Take a participant's log of an experiment, or note why it is left out."""
         try:
-            _check_admitted(log)
-            _check_new(log, self.keys.setdefault(log.key, log))
+            _check_admitted(one, code)
+            self._check_new(study, experiment, code, number)
         except BadLogError as bad:
-            self.refuse(log.file, bad)
+            self.refuse(one.file, bad)
         else:
-            self.good[number] = log
+            self.studies[number], self.codes[number] = study, code
+            self.files[number // _LOGS_A_FILE] = one.file
+
+    def _check_new(self, study: str, experiment: str, code: str, number: int) -> None:
+        first = self.firsts.setdefault((study, experiment, code.casefold()), number)
+        if first != number:
+            there = self.codes[first]
+            name = f"participant {code!r}" if code == there else f"participant {code!r} (there {there!r})"
+            rule = "(rule: one log a participant and experiment, upper and lower case alike)"
+            message = f"{name} has a {experiment} log already in {self.files[first // _LOGS_A_FILE]} {rule}"
+            raise BadLogError(message, None, "participant_id")
 
 
 def read_logs(paths: Iterable[str | Path], track: Track = iter, mapping: ColumnMap | None = None) -> Logs:
@@ -111,50 +118,63 @@ def read_logs(paths: Iterable[str | Path], track: Track = iter, mapping: ColumnM
     endings = mapping.files_end_with if mapping else ()
     found, problems = find_logs([Path(path) for path in paths], (*ENDINGS, *endings))
     reading = _Reading(problems=problems, mapping=mapping)
-    waiting: list[_Waiting] = []
-    size = 0
-    for log, file in zip(found, track([Path(log.path) for log in found]), strict=True):
-        waiting.append(_Waiting(log=log, file=file, content=_content(log)))
-        size += len(waiting[-1].whole)
-        if size >= _BATCH_BYTES:
-            _check(reading, waiting)
-            waiting, size = [], 0
-    _check(reading, waiting)
+    for waiting, (blocks, codes) in _quickly_checked(_batches(found, track)):
+        _admit(reading, waiting, blocks, codes)
     return _logs(reading)
 
 
+def _batches(found: Mapping[str, str], track: Track) -> Iterator[list[_Waiting]]:
+    """The files' contents, read in turn."""
+    waiting: list[_Waiting] = []
+    size = 0
+    for (path, study), file in zip(found.items(), track([Path(path) for path in found]), strict=True):
+        waiting.append(_Waiting(file=file, path=path, study=study, content=_content(path)))
+        size += len(waiting[-1].whole)
+        if size >= _BATCH_BYTES:
+            yield waiting
+            waiting, size = [], 0
+    yield waiting
+
+
+def _quickly_checked(batches: Iterable[list[_Waiting]]) -> Iterator[tuple[list[_Waiting], Quick]]:
+    """Each batch with what is surely right of it; on all processors, for Arrow keeps none of them to itself."""
+    ahead: deque[tuple[list[_Waiting], Future[Quick]]] = deque()
+    with ThreadPoolExecutor(os.cpu_count()) as pool:
+        for waiting in batches:
+            names = [code_in_name(one.path) for one in waiting]
+            ahead.append((waiting, pool.submit(read_batch, [one.whole for one in waiting], names)))
+            if len(ahead) > _BATCHES_AHEAD:
+                batch, quick = ahead.popleft()
+                yield batch, quick.result()
+        yield from ((batch, quick.result()) for batch, quick in ahead)
+
+
 def _logs(reading: _Reading) -> Logs:
-    folders = {log.study for log in reading.good.values()}
-    names = study_names(folder for folder in folders if Path(folder).is_absolute())
-    studies = {number: names.get(log.study, log.study) for number, log in reading.good.items()}
+    names = study_names(folder for folder in set(reading.studies.values()) if Path(folder).is_absolute())
+    studies = {number: names.get(study, study) for number, study in reading.studies.items()}
     return Logs(
         trials=joined("direction", reading.blocks, studies),
         ratings=joined("preference", reading.blocks, studies),
         problems=tuple(reading.problems),
-        files=tuple({str(log.file): log.file for log in reading.good.values()}.values()),
+        files=tuple(reading.files.values()),
     )
 
 
-def _content(log: Found) -> bytes | BadLogError:
+def _content(path: str) -> bytes | BadLogError:
     try:
-        return read_content(log.path)
+        return read_content(path)
     except BadLogError as bad:
         return bad
 
 
-def _check(reading: _Reading, waiting: Sequence[_Waiting]) -> None:
-    """Add files to what was read: all that surely are right at once, the others one by one."""
-    sources = [Source(content=one.whole, code_in_name=code_in_name(one.log.path)) for one in waiting]
-    blocks, codes = read_batch(sources)
-    experiments = {number: block.experiment for block in blocks for number in np.unique(block.log).tolist()}
-    for block in blocks:
-        logs = (block.log + reading.count) * _LOGS_A_FILE
-        reading.blocks.append(replace(block, log=logs))
+def _admit(reading: _Reading, waiting: Sequence[_Waiting], blocks: Sequence[Block], codes: Mapping[int, str]) -> None:
+    """Add files to what was read: those that surely are right with their participants' codes, the others with care."""
+    experiments = {number: block.experiment for block in blocks for number in block.log.tolist()}
+    reading.blocks += (replace(block, log=(block.log + reading.count) * _LOGS_A_FILE) for block in blocks)
     for number, one in enumerate(waiting):
         if number in codes:
             place = (reading.count + number) * _LOGS_A_FILE
-            sure = _Log(file=one.file, study=one.log.study, experiment=experiments[number], code=codes[number])
-            reading.admit(place, sure)
+            reading.admit(place, one, one.study, experiments[number], codes[number])
         else:
             _check_carefully(reading, one, reading.count + number)
     reading.count += len(waiting)
@@ -171,8 +191,7 @@ def _check_carefully(reading: _Reading, one: _Waiting, number: int) -> None:
             reading.refuse(one.file, log.table)
             continue
         reading.blocks.append(block_of_rows(log.table.experiment, log.table.rows, place))
-        study = log.study or one.log.study
-        reading.admit(place, _Log(file=one.file, study=study, experiment=log.table.experiment, code=log.code))
+        reading.admit(place, one, log.study or one.study, log.table.experiment, log.code)
 
 
 def _careful(one: _Waiting, mapping: ColumnMap | None) -> list[MappedLog]:
@@ -181,16 +200,16 @@ def _careful(one: _Waiting, mapping: ColumnMap | None) -> list[MappedLog]:
         raise one.content
     if mapping is not None and not is_recoils(one.content):
         return read_mapped(one.content, one.file.name, mapping)
-    table = check_table(records(one.content), code_in_name(one.log.path))
+    table = check_table(records(one.content), code_in_name(one.path))
     return [MappedLog(study=None, code=str(table.rows[0]["participant_id"]), table=table)]
 
 
-def _check_admitted(log: _Log) -> None:
+def _check_admitted(one: _Waiting, code: str) -> None:
     """An exclusion in the register beside the participants' folders keeps their logs out, with its reason."""
-    results = str(log.file).rpartition(os.sep)[0].rpartition(os.sep)[0] or str(log.file.parent.parent)
-    reason = _exclusions(results).get(log.code)
+    results = one.path.rpartition(os.sep)[0].rpartition(os.sep)[0] or str(one.file.parent.parent)
+    reason = _exclusions(results).get(code)
     if reason is not None:
-        raise BadLogError(f"participant {log.code} is excluded: {reason} (`recoil study` readmits them)")
+        raise BadLogError(f"participant {code} is excluded: {reason} (`recoil study` readmits them)")
 
 
 @lru_cache(maxsize=64)
@@ -198,14 +217,3 @@ def _exclusions(results: str) -> dict[str, str]:
     """Who is excluded in a results folder, as far as its register can be read."""
     members = register.read(Path(results)).members
     return {code: member.excluded for code, member in members.items() if member.excluded is not None}
-
-
-def _check_new(log: _Log, first: _Log) -> None:
-    if first is not log:
-        name = (
-            f"participant {log.code!r}"
-            if log.code == first.code
-            else f"participant {log.code!r} (there {first.code!r})"
-        )
-        rule = "(rule: one log a participant and experiment, upper and lower case alike)"
-        raise BadLogError(f"{name} has a {log.experiment} log already in {first.file} {rule}", None, "participant_id")

@@ -5,7 +5,7 @@ from __future__ import annotations
 import tomllib
 from decimal import Decimal
 from pathlib import Path
-from typing import Annotated, Literal
+from typing import Annotated, Any, Literal
 
 from pydantic import AfterValidator, BaseModel, ConfigDict, Field, StringConstraints, ValidationError, model_validator
 
@@ -26,6 +26,14 @@ Count = Annotated[int, Field(ge=1)]
 
 class _Section(BaseModel):
     model_config = ConfigDict(extra="forbid", frozen=True, strict=True)
+
+
+class PaperHead(_Section):
+    """Which paper it is."""
+
+    title: str = ""
+    source: str = ""
+    field: str = ""
 
 
 class Participants(_Section):
@@ -132,11 +140,13 @@ class PublishedPreference(PublishedExperiment):
 
 
 class Paper(_Section):
-    """All published numbers."""
+    """All published numbers. `claims` are for the audit, which checks them (`analysis.audit.paper_file`)."""
 
+    paper: PaperHead = PaperHead()
     participants: Participants
     direction: PublishedDirection
     preference: PublishedPreference
+    claims: list[dict[str, Any]] = []
 
 
 def load_paper(path: str | Path) -> Paper:

@@ -3,19 +3,35 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from decimal import Decimal
 from typing import Any, Literal
 
+from analysis import quantities
 from analysis.paper import Paper, PublishedDirection, PublishedExperiment, PublishedPreference, TukeyClaim
 
-Verdict = Literal["agrees", "differs", "not published", "not obtained"]
+Verdict = Literal[
+    "agrees",
+    "differs",
+    "differs as predicted",
+    "not published",
+    "not obtained",
+    "attainable",
+    "only under a reading",
+    "not attainable",
+    "undecided",
+]
+AUDITED: tuple[Verdict, ...] = ("attainable", "only under a reading", "not attainable", "undecided")
+"""The audit's verdicts, of numbers that no log holds; the others are of numbers that were obtained or could be."""
 Statistics = Mapping[str, Any]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Row:
-    """One quantity: `published` as the paper prints it, `obtained` unrounded in the same unit."""
+    """One quantity: `published` as the paper prints it, `obtained` unrounded in the same unit.
+
+    `audit`: what the audit says of the published number; empty if it was not asked.
+    """
 
     experiment: str
     quantity: str
@@ -23,18 +39,48 @@ class Row:
     obtained: float | None
     verdict: Verdict
     note: str = ""
+    audit: str = ""
 
 
-def compare(statistics: Statistics, paper: Paper) -> tuple[Row, ...]:
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Prediction:
+    """What the audit says of a published number: its verdict, the nearest attainable values, and that in words."""
+
+    verdict: str
+    nearest: tuple[float, ...] = ()
+    note: str = ""
+
+
+def compare(statistics: Statistics, paper: Paper, predicted: Mapping[str, Prediction] | None = None) -> tuple[Row, ...]:
     """Every published number against `statistics` (the content of `statistics.json`).
 
     A number agrees if it rounds to the printed digits; a bound or an order, if it is true of the obtained numbers. What
-    the paper draws but does not print is listed as not published.
+    the paper draws but does not print is listed as not published. `predicted`: by `quantities.named_in`, what the audit
+    says; a difference to one of the nearest attainable values is the one that it predicts.
     """
     direction, preference = statistics.get("direction"), statistics.get("preference")
     rows = [*_common("direction", paper.direction, direction), *_direction(paper.direction, direction)]
     rows += [*_common("preference", paper.preference, preference), *_preference(paper.preference, preference)]
-    return tuple(rows)
+    known = predicted or {}
+    return tuple(_beside(row, known.get(quantities.named_in(row.experiment, row.quantity))) for row in rows)
+
+
+def _beside(row: Row, prediction: Prediction | None) -> Row:
+    """The row with what the audit says of its number."""
+    if prediction is None or row.verdict == "not published":
+        return row
+    printed = row.published.split(" ", maxsplit=1)[0]
+    obtained = row.obtained
+    nearest = obtained is not None and any(_alike(obtained, value, printed) for value in prediction.nearest)
+    verdict: Verdict = "differs as predicted" if row.verdict == "differs" and nearest else row.verdict
+    note = "; ".join(text for text in (row.note, prediction.note) if text)
+    return replace(row, verdict=verdict, note=note, audit=prediction.verdict)
+
+
+def _alike(one: float, other: float, printed: str) -> bool:
+    """Do both print alike, with the digits of `printed`?"""
+    digits = len(printed.partition(".")[2])
+    return abs(one - other) < 1e-9 or f"{one:.{digits}f}" == f"{other:.{digits}f}"
 
 
 def rounds_to(value: float, printed: str) -> bool:
@@ -98,19 +144,19 @@ def _float(value: float | None) -> float | None:
 
 
 def _common(name: str, published: PublishedExperiment, statistics: Statistics | None) -> Iterator[Row]:
-    yield _number(name, "participants", str(published.n), _found(statistics, "n"))
+    yield _number(name, quantities.PARTICIPANTS, str(published.n), _found(statistics, "n"))
     for i, (df, kind) in enumerate(zip(published.anova.df, ("effect", "error"), strict=True)):
-        yield _number(name, f"ANOVA df of the {kind}", str(df), _found(statistics, "anova", "df", i))
-    yield _number(name, "ANOVA F", published.anova.F, _found(statistics, "anova", "F"))
+        yield _number(name, quantities.anova_df(kind), str(df), _found(statistics, "anova", "df", i))
+    yield _number(name, quantities.ANOVA_F, published.anova.F, _found(statistics, "anova", "F"))
     p = _found(statistics, "anova", "p")
     bound = published.anova.p_below
-    yield _claim(name, "ANOVA p", f"< {bound}", p, truth=p is not None and p < float(bound))
+    yield _claim(name, quantities.ANOVA_P, f"< {bound}", p, truth=p is not None and p < float(bound))
     for claim in published.tukey:
         yield _tukey(name, claim, statistics)
 
 
 def _tukey(name: str, claim: TukeyClaim, statistics: Statistics | None) -> Row:
-    quantity = f"Tukey p, {claim.higher} above {claim.lower}"
+    quantity = quantities.tukey_p(claim)
     pair = {claim.higher, claim.lower}
     comparisons = _found(statistics, "tukey") or []
     found = next((c for c in comparisons if {c["a"], c["b"]} == pair), None)
@@ -127,10 +173,10 @@ def _direction(published: PublishedDirection, statistics: Statistics | None) -> 
     for method, printed in published.means.items():
         mean = _found(statistics, "means", method)
         percent = None if mean is None else 100.0 * mean
-        yield _number(name, f"mean correct rate forward, {method}", printed, percent, "%")
+        yield _number(name, quantities.mean_rate(method), printed, percent, "%")
     for claim in published.binomial:
         p = _found(statistics, "binomial", claim.method, claim.direction, "p")
-        yield _number(name, f"binomial p, {claim.method} {claim.direction}", claim.p, p)
+        yield _number(name, quantities.binomial_p(claim), claim.p, p)
     for method in published.methods:
         sd = _found(statistics, "sds", method)
         yield _unpublished(name, f"SD of the correct rate, {method} (%)", _percent(sd), "drawn in Fig. 8 (a) only")
@@ -150,13 +196,13 @@ def _preference(published: PublishedPreference, statistics: Statistics | None) -
     lowest, same = published.lowest, published.same_score
     yield _number(
         name,
-        f"participants who rated {lowest.method} lowest",
+        quantities.rated_lowest(lowest),
         str(lowest.participants),
         None if ratings is None else sum(_is_lowest(row, lowest.method) for row in ratings.values()),
     )
     yield _number(
         name,
-        f"participants with one score for {' and '.join(same.methods)}",
+        quantities.one_score(same),
         str(same.participants),
         None if ratings is None else sum(_is_same(row, same.methods) for row in ratings.values()),
     )

@@ -15,7 +15,10 @@ from analysis.report_sections import sections
 
 __all__ = ["Picture", "ReportData", "Section", "Table", "write_page", "write_report"]
 
-VERDICTS = ("agrees", "differs", "not published", "not obtained")
+VERDICTS = (
+    *("agrees", "differs", "differs as predicted", "not published", "not obtained"),
+    *("attainable", "only under a reading", "not attainable", "undecided"),
+)
 
 _MARKDOWN_MARKS = re.compile(r"[\\`*|~]|<(?=[a-zA-Z/!?])|(?<![a-zA-Z0-9])_|_(?![a-zA-Z0-9])|](?=[(\[:])|^[#>+-]")
 """What Markdown would take for its own: `<` before a tag, `_` at the edge of a word, `]` before an address."""

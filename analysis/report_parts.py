@@ -23,7 +23,8 @@ SHOWN = 50
 class ReportData:
     """What a report tells. `statistics` is the content of `statistics.json`; `comparison` None without a paper.
 
-    `files` are the logs used; `provenance` is label -> text; `notes` are the assumptions behind the numbers.
+    `files` are the logs used; `provenance` is label -> text; `notes` are the assumptions behind the numbers; `extra`
+    are finished sections that follow the statistics.
     """
 
     title: str
@@ -35,6 +36,7 @@ class ReportData:
     files: tuple[Path, ...] = ()
     provenance: Mapping[str, str] = field(default_factory=dict)
     notes: tuple[str, ...] = ()
+    extra: tuple[Section, ...] = ()
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

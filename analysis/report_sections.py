@@ -11,7 +11,7 @@ from typing import Any
 from analysis import apa
 from analysis.figures import ShotPanel, named
 from analysis.odds import Odds
-from analysis.published import Row
+from analysis.published import AUDITED, Row
 from analysis.report_experiments import direction_section, preference_section
 from analysis.report_parts import EXPERIMENTS, LISTED, SHOWN, ReportData, Section, Table, analysed, shortened
 from analysis.report_pictures import results_picture, shot_picture
@@ -39,6 +39,7 @@ def sections(report: ReportData) -> tuple[Section, ...]:
         direction_section(statistics["direction"]) if analysed(statistics, "direction") else None,
         preference_section(statistics["preference"]) if analysed(statistics, "preference") else None,
         *supplement_sections(statistics),
+        *report.extra,
         _odds(report.odds) if report.odds else None,
         _shot(report.panels) if report.panels else None,
         _left_out(report),
@@ -84,29 +85,51 @@ def _excluded(statistics: Mapping[str, Any], experiment: str) -> int:
 
 
 def _verdicts(comparison: tuple[Row, ...]) -> Section:
-    counts = {verdict: sum(row.verdict == verdict for row in comparison) for verdict in ("agrees", "differs")}
-    missing = sum(row.verdict == "not obtained" for row in comparison)
-    told = f"{counts['agrees']} published numbers and claims agree, {counts['differs']} differ"
-    told += f", {missing} were not obtained." if missing else "."
-    told += " A number agrees if it rounds to the printed digits, a bound or an order if it is true here."
     experiments = dict.fromkeys(row.experiment for row in comparison)
     return Section(
         title="Published and obtained",
-        paragraphs=(told,),
+        paragraphs=(_agreement(comparison), *_audited(comparison)),
         tables=tuple(_verdict_table(experiment, comparison) for experiment in experiments),
     )
 
 
-def _verdict_table(experiment: str, comparison: tuple[Row, ...]) -> Table:
-    rows = (
-        (named(row.quantity), row.published or apa.NONE, obtained_text(row), row.verdict, row.note)
-        for row in comparison
-        if row.experiment == experiment
+def _agreement(comparison: tuple[Row, ...]) -> str:
+    words = ("agrees", "differs", "differs as predicted", "not obtained")
+    agrees, differs, predicted, missing = (sum(row.verdict == verdict for row in comparison) for verdict in words)
+    told = f"{agrees} published numbers and claims agree, {differs} differ"
+    told += f", {predicted} {'differs' if predicted == 1 else 'differ'} as the audit predicted" if predicted else ""
+    told += f", {missing} were not obtained." if missing else "."
+    return told + " A number agrees if it rounds to the printed digits, a bound or an order if it is true here."
+
+
+def _audited(comparison: tuple[Row, ...]) -> tuple[str, ...]:
+    """What the audit's column says, where there is one."""
+    if not any(row.audit for row in comparison):
+        return ()
+    return (
+        "The audit asks beforehand whether any data could give the published number beside the others. What differs as "
+        "predicted is the nearest value that data can have. Numbers that no log holds carry the audit's verdict alone.",
     )
+
+
+def _verdict_table(experiment: str, comparison: tuple[Row, ...]) -> Table:
+    rows = [row for row in comparison if row.experiment == experiment]
+    if any(row.verdict in AUDITED for row in rows):
+        header: tuple[str, ...] = ("Quantity", "Published", "Verdict", "Note")
+        cells = [(row.quantity, row.published, row.verdict, row.note) for row in rows]
+        return Table(caption="Published numbers that no log holds, by the audit", header=header, rows=tuple(cells))
+    header, audited = ("Quantity", "Published", "Obtained", "Verdict"), any(row.audit for row in rows)
     return Table(
         caption=f"{EXPERIMENTS.get(experiment, experiment).capitalize()}, every published number beside the obtained",
-        header=("Quantity", "Published", "Obtained", "Verdict", "Note"),
-        rows=tuple(rows),
+        header=(*header, *(("Audit",) if audited else ()), "Note"),
+        rows=tuple(
+            (
+                *(named(row.quantity), row.published or apa.NONE, obtained_text(row), row.verdict),
+                *((row.audit or apa.NONE,) if audited else ()),
+                row.note,
+            )
+            for row in rows
+        ),
     )
 
 

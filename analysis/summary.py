@@ -15,12 +15,12 @@ import pandas as pd
 from analysis.anova import rm_anova
 from analysis.assumptions import assumptions
 from analysis.binomial import binomial_test
-from analysis.cells import DIRECTIONS, TrialCells, coded, trial_cells
+from analysis.cells import DIRECTIONS, Finite, TrialCells, by_name, coded, trial_cells
 from analysis.clustering import METHOD as CLUSTERING_NOTE
 from analysis.completeness import complete_rows
 from analysis.detection import yes_no
 from analysis.logs import Logs
-from analysis.response_times import response_times
+from analysis.response_times import response_times, valid_times
 from analysis.supplement import model, pooled_clustering, within_supplement
 from analysis.tukey import rm_tukey_hsd
 from analysis.within_subject import cousineau_morey
@@ -75,24 +75,16 @@ def methods_in(table: pd.DataFrame) -> list[str]:
 
 def json_safe(value: Any, place: str, warnings: list[str]) -> Any:
     """`value` in plain Python types; NaN and infinities become None, and their place is appended to `warnings`."""
+    if isinstance(value, Finite):
+        return value
     if isinstance(value, dict):
-        if all(map(_is_safe, value.values())):
-            return value
-        return {
-            str(key): item if _is_safe(item) else json_safe(item, f"{place}.{key}".lstrip("."), warnings)
-            for key, item in value.items()
-        }
+        return {str(key): json_safe(item, f"{place}.{key}".lstrip("."), warnings) for key, item in value.items()}
     if isinstance(value, list | tuple):
         return [json_safe(item, f"{place}[{i}]", warnings) for i, item in enumerate(value)]
     if isinstance(value, float | np.floating) and not math.isfinite(value):
         warnings.append(f"{place} is {_not_finite(float(value))}; written as null")
         return None
     return value.item() if isinstance(value, np.generic) else value
-
-
-def _is_safe(value: Any) -> bool:
-    """Is it a leaf as it should be? Asked first: of tens of thousands of scores nearly all are."""
-    return math.isfinite(value) if type(value) is float else type(value) is str or value is None
 
 
 def _not_finite(value: float) -> str:
@@ -136,7 +128,7 @@ def _direction(complete: pd.DataFrame, methods: list[str]) -> Json:
         "clustering_note": CLUSTERING_NOTE,
         "model": model(cells),
         "sensitivity": {method: _sensitivity(cells, method) for method in methods},
-        "response_time": {method: _response_time(complete[complete["method"] == method]) for method in methods},
+        "response_time": _median_times(complete, methods),
         "response_times": response_times(complete, methods),
     }
 
@@ -195,10 +187,9 @@ def _by_method(row: pd.Series) -> dict[str, float]:
     return {str(method): float(value) for method, value in row.items()}
 
 
-def _by_participant(scores: pd.DataFrame) -> dict[str, dict[str, float]]:
-    names = [str(method) for method in scores.columns]
-    rows = scores.to_numpy(dtype="float64").tolist()
-    return {str(code): dict(zip(names, row, strict=True)) for code, row in zip(scores.index, rows, strict=True)}
+def _by_participant(scores: pd.DataFrame) -> Json:
+    codes, names = map(str, scores.index), [str(method) for method in scores.columns]
+    return by_name(list(codes), names, scores.to_numpy(dtype="float64"))
 
 
 def _binomials(cells: TrialCells, method: str) -> Json:
@@ -223,10 +214,10 @@ def _sensitivity(cells: TrialCells, method: str) -> Json | None:
     (hits, rejections), (signals, noises) = cells.correct[both, column].T, cells.trials[both, column].T
     found = yes_no(hits, signals, noises - rejections, noises)
     measures = {"d_prime": np.atleast_1d(found.d_prime), "criterion": np.atleast_1d(found.criterion)}
-    people = zip((cells.participants[i] for i in both), *measures.values(), strict=True)
+    people = [cells.participants[i] for i in both]
     return {
         **{name: _mean_sd(values) for name, values in measures.items()},
-        "participants": {code: {"d_prime": float(d), "criterion": float(c)} for code, d, c in people},
+        "participants": by_name(people, list(measures), np.column_stack(list(measures.values()))),
     }
 
 
@@ -235,7 +226,10 @@ def _mean_sd(values: float | np.ndarray[Any, Any]) -> dict[str, float]:
     return {"mean": float(array.mean()), "sd": float(array.std(ddof=1)) if array.size > 1 else math.nan}
 
 
-def _response_time(trials: pd.DataFrame) -> Json:
-    """Median over the times that are the participant's own."""
-    times = trials.loc[(trials["response_time_valid"] == 1).fillna(False), "response_time_s"].dropna()
-    return {"median": float(times.median()) if len(times) else None, "n": len(times)}
+def _median_times(trials: pd.DataFrame, methods: list[str]) -> Json:
+    """Median over the times that are the participant's own, by method."""
+    valid = valid_times(trials)
+    times = {method: trials["response_time_s"][valid & (trials["method"] == method)] for method in methods}
+    return {
+        method: {"median": float(own.median()) if len(own) else None, "n": len(own)} for method, own in times.items()
+    }

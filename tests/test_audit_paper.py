@@ -14,16 +14,13 @@ from analysis.audit.claims import AnyClaim
 from tests.exact import exact_rm_F
 
 ROOT = Path(__file__).parent
-GOLDEN = ROOT / "golden" / "audit"
+EXAMPLE = ROOT.parent / "configs" / "examples" / "audit.toml"
 RATES = ["55.7%", "79.3%", "92.9%"]
 
 
 @pytest.fixture(scope="module")
 def findings() -> tuple[Finding, ...]:
-    text = (ROOT.parent / "configs" / "paper.toml").read_text(encoding="utf-8")
-    if "[[claims]]" not in text:
-        text += (GOLDEN / "paper_claims.toml").read_text(encoding="utf-8")
-    return audit(parse_paper(text))
+    return audit(load_paper_file(ROOT.parent / "configs" / "paper.toml"))
 
 
 def one(findings: tuple[Finding, ...], check: str, quote: str) -> Finding:
@@ -93,12 +90,12 @@ def test_the_shipped_file_loads_as_it_is() -> None:
 
 
 def test_an_example_from_another_field_gets_the_verdicts_its_notes_announce() -> None:
-    for finding in audit(load_paper_file(GOLDEN / "example.toml")):
+    for finding in audit(load_paper_file(EXAMPLE)):
         assert finding.note.startswith(finding.result.verdict), finding
 
 
 def test_the_example_has_every_kind_of_claim() -> None:
-    text = (GOLDEN / "example.toml").read_text(encoding="utf-8")
+    text = EXAMPLE.read_text(encoding="utf-8")
     missing = [kind for kind in [*CHECKS, "stated", "unpublished"] if f'kind = "{kind}"' not in text]
     assert not missing
 

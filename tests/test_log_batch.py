@@ -8,12 +8,13 @@ from collections.abc import Callable
 from pathlib import Path
 
 import pandas as pd
+import pyarrow as pa
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from analysis import log_cells, logs
-from analysis.log_batch import Source, read_batch
+from analysis.log_batch import read_batch
 from analysis.log_files import find_logs
 from analysis.log_frames import Block, joined
 from analysis.log_records import records
@@ -90,10 +91,14 @@ def _quickly(block: Block, number: int) -> pd.DataFrame:
     return joined(block.experiment, [block], {number: "study"})
 
 
+def _read(contents: list[bytes]) -> tuple[list[Block], dict[int, str]]:
+    return read_batch(contents, ["P01"] * len(contents))
+
+
 @settings(max_examples=300)
 @given(st.lists(_spoilt(), min_size=1, max_size=5))
 def test_what_the_quick_reader_takes_the_careful_one_takes_with_equal_values(contents: list[bytes]) -> None:
-    blocks, codes = read_batch([Source(content=content, code_in_name="P01") for content in contents])
+    blocks, codes = _read(contents)
     taken = {number: block for block in blocks for number in set(block.log.tolist())}
     assert set(taken) == set(codes)
     for number, block in taken.items():
@@ -114,7 +119,7 @@ def test_both_ways_of_reading_a_folder_give_equal_tables_and_problems(
         path.write_bytes(content.replace(b"P01", f"P{number:02d}x".encode()))
     quick = read_logs([folder])
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(logs, "read_batch", lambda _: ([], {}))
+        patch.setattr(logs, "read_batch", lambda *_: ([], {}))
         careful = read_logs([folder])
     assert quick.problems == careful.problems
     assert quick.files == careful.files
@@ -122,16 +127,15 @@ def test_both_ways_of_reading_a_folder_give_equal_tables_and_problems(
     pd.testing.assert_frame_equal(quick.ratings, careful.ratings)
 
 
-def _source(rows: Rows, header: list[str] | None = None, line_end: str = "\r\n") -> Source:
-    content = _bytes(rows, header or columns.names(rows[0]["experiment"]), line_end)
-    return Source(content=content, code_in_name="P01")
+def _file(rows: Rows, line_end: str = "\r\n") -> bytes:
+    return _bytes(rows, columns.names(rows[0]["experiment"]), line_end)
 
 
 @pytest.mark.parametrize("line_end", ["\r\n", "\n"])
 def test_logs_as_recoil_writes_them_take_the_quick_way(line_end: str) -> None:
     rows = trial_rows()
     rows[3].update(note="ünruhig, gähnt".replace(",", ""), flags="interrupted repeated", response="", correct="")
-    _, codes = read_batch([_source(rows, line_end=line_end), _source(rating_rows(), line_end=line_end)])
+    _, codes = _read([_file(rows, line_end=line_end), _file(rating_rows(), line_end=line_end)])
     assert codes == {0: "P01", 1: "P01"}
 
 
@@ -139,7 +143,7 @@ def test_quoted_notes_take_the_quick_way_and_come_back_as_they_were() -> None:
     rows = trial_rows()
     said = 'he said "no",\r\nthen left; \'=1'
     rows[3]["note"] = columns.guard(said)
-    blocks, codes = read_batch([_source(rows), _source(trial_rows())])
+    blocks, codes = _read([_file(rows), _file(trial_rows())])
     assert codes == {0: "P01", 1: "P01"}
     assert _quickly(blocks[0], 0)["note"][3] == said
 
@@ -147,39 +151,52 @@ def test_quoted_notes_take_the_quick_way_and_come_back_as_they_were() -> None:
 def test_a_guarded_code_is_left_to_the_careful_reader() -> None:
     rows = trial_rows()
     rows[0]["participant_id"] = "'P01"
-    assert set(read_batch([_source(trial_rows()), _source(rows)])[1]) == {0}
+    assert set(_read([_file(trial_rows()), _file(rows)])[1]) == {0}
 
 
 def test_a_bad_file_among_many_leaves_the_others_on_the_quick_way() -> None:
     rows = trial_rows()
     rows[5]["response"] = "left"
-    cut = _source(trial_rows())
-    sources = [_source(trial_rows()), _source(rows), Source(content=cut.content[:-40], code_in_name="P01"), cut]
-    assert set(read_batch(sources)[1]) == {0, 3}
+    cut = _file(trial_rows())
+    sources = [_file(trial_rows()), _file(rows), cut[:-40], cut]
+    assert set(_read(sources)[1]) == {0, 3}
 
 
-def test_contents_that_mix_to_one_number_are_still_told_apart(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(log_cells, "_mixed", lambda words: words[:, 0])
-    lines = b"asymmetric-1\r\nasymmetric-2\r\nasymmetric-1\r\n"
-    grid, _ = log_cells.grid([lines.replace(b"\r\n", b",x\r\n")], 2, b"\r\n")
-    codes, texts = log_cells.distinct(grid, 0)
-    assert [texts[code] for code in codes] == ["asymmetric-1", "asymmetric-2", "asymmetric-1"]
+def test_files_with_bad_rows_among_many_leave_the_others_on_the_quick_way() -> None:
+    good, ragged = _file(trial_rows()), _file(trial_rows()).replace(b",forward,", b",forward,,", 1)
+    not_text, cr = good.replace(b"synthetic", b"synth\xe9tic", 1), good.replace(b"\r\n", b"\r", 3)
+    assert set(_read([ragged, good, not_text, good, good, cr])[1]) == {1, 3, 4}
+
+
+@pytest.mark.parametrize("bom_at", ["content", "first row"])
+def test_a_byte_order_mark_is_left_to_the_careful_reader(bom_at: str) -> None:
+    content = _file(trial_rows())
+    bad = b"\xef\xbb\xbf" + content if bom_at == "content" else content.replace(b"\nP01", b"\n\xef\xbb\xbfP01", 1)
+    assert set(_read([bad, content])[1]) == {1}
+
+
+@pytest.mark.parametrize("name", ["note", "mood"])
+def test_cells_too_long_for_the_careful_reader_are_left_to_it(name: str) -> None:
+    rows = trial_rows()
+    rows[3][name] = "x" * (csv.field_size_limit() + 1)
+    header = [*columns.names("direction"), "mood"]
+    assert set(_read([_bytes(rows, header), _bytes(trial_rows(), header)])[1]) == {1}
 
 
 _DECIMALS = st.one_of(
     st.floats(0, 1e6).map(repr),
     st.decimals(0, 99, places=6).map(str),
     st.from_regex("[0-9.]{0,26}", fullmatch=True),
+    st.sampled_from(["1" * 400, "nan", "inf", "-1", " 1", "1e00005", "+1"]),
 )
 
 
 @settings(max_examples=300)
 @given(st.lists(_DECIMALS, min_size=1))
 def test_decimals_are_read_to_the_last_bit_or_doubted(texts: list[str]) -> None:
-    grid, _ = log_cells.grid(["".join(f"{text},x\n" for text in texts).encode()], 2, b"\n")
-    numbers, doubted = log_cells.decimals(grid, 0)
-    for text, number, doubt in zip(texts, numbers.tolist(), doubted.tolist(), strict=True):
-        assert doubt or (number == float(text) if text else number != number)  # noqa: PLR0124 - NaN
+    numbers, odd = log_cells.decimals(pa.array([text or None for text in texts], log_cells.TEXT))
+    for row, (text, number) in enumerate(zip(texts, numbers.tolist(), strict=True)):
+        assert row in odd or (number == float(text) if text else number != number)  # noqa: PLR0124 - NaN
 
 
 def test_files_are_found_in_the_order_of_their_paths_and_links_once(tmp_path: Path) -> None:
@@ -191,4 +208,4 @@ def test_files_are_found_in_the_order_of_their_paths_and_links_once(tmp_path: Pa
     found, problems = find_logs([tmp_path])
     expected = sorted([*tmp_path.rglob("*_trials.csv"), *tmp_path.rglob("*_ratings.csv")])
     assert problems == []
-    assert [Path(log.path) for log in found] == [path for path in expected if path != linked]
+    assert [Path(log) for log in found] == [path for path in expected if path != linked]

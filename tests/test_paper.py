@@ -28,6 +28,20 @@ def test_the_shipped_protocol_adds_up() -> None:
     assert paper.participants.female + paper.participants.male == paper.participants.n
 
 
+def test_the_shipped_paper_also_carries_the_claims_for_the_audit() -> None:
+    paper = load_paper(SHIPPED)
+    assert paper.paper.title.startswith("Design and Modeling of an Ungrounded Haptic Gun")
+    assert len(paper.claims) > 30
+    assert all({"place", "quote", "kind"} <= set(claim) for claim in paper.claims)
+
+
+def test_a_paper_without_claims_and_head_is_read_as_before(tmp_path: Path) -> None:
+    text = SHIPPED.read_text(encoding="utf-8").partition("# Everything else")[0]
+    path = tmp_path / "paper.toml"
+    path.write_text(text[: text.index("[paper]")] + text[text.index("[participants]") :], encoding="utf-8")
+    assert load_paper(path).claims == []
+
+
 @pytest.mark.parametrize(
     ("old", "new", "words"),
     [

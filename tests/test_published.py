@@ -10,7 +10,7 @@ from scipy import stats
 from analysis import rm_anova, rm_tukey_hsd
 from analysis.odds import WHOLE_PATTERN, chance_recurs, odds_of, recurs, wilson_interval
 from analysis.paper import Paper, load_paper
-from analysis.published import Row, compare, rounds_to
+from analysis.published import Prediction, Row, compare, rounds_to
 
 METHODS = ("vibration", "asymmetric-1", "asymmetric-2")
 
@@ -73,6 +73,27 @@ def test_a_significant_difference_in_the_other_direction_is_no_agreement(paper: 
     tukey = [{"a": "asymmetric-1", "b": "vibration", "difference": -0.2, "p": 1e-6}]
     row = _row(compare(_direction(tukey=tukey), paper), "Tukey p, asymmetric-1 above vibration")
     assert (row.verdict, row.note) == ("differs", "asymmetric-1 is not above vibration")
+
+
+def test_a_difference_that_the_audit_predicted_is_said_to_be_one(paper: Paper) -> None:
+    """28.51 is what the audit says the published means leave; 28.60 is not, and 28.45 agrees all the same."""
+    predicted = {
+        "direction: ANOVA F": Prediction(
+            verdict="only under a reading", nearest=(28.0968, 28.5121), note="off the lattice"
+        )
+    }
+    for obtained, verdict in ((28.51214, "differs as predicted"), (28.60, "differs"), (28.451, "agrees")):
+        anova = {"F": obtained, "df": [2, 26], "p": 1e-7}
+        row = _row(compare(_direction(anova=anova), paper, predicted), "ANOVA F")
+        assert (row.verdict, row.audit, row.note) == (verdict, "only under a reading", "off the lattice")
+
+
+def test_what_the_audit_says_of_a_mean_is_compared_in_percent(paper: Paper) -> None:
+    name = "mean correct rate forward, vibration"
+    predicted = {f"direction: {name}": Prediction(verdict="not attainable", nearest=(55.0, 55.714))}
+    means = dict.fromkeys(METHODS, 0.55)
+    assert _row(compare(_direction(means=means), paper, predicted), name).verdict == "differs as predicted"
+    assert _row(compare(_direction(means=means), paper), name).audit == ""
 
 
 def test_what_was_not_run_or_not_testable_is_not_obtained(paper: Paper) -> None:

@@ -14,6 +14,7 @@ from statsmodels.stats.anova import AnovaRM
 
 from analysis.logs import read_logs
 from experiments.load import load_setup
+from experiments.roof import reproduce
 from experiments.roof.odds import direction_counts, preference_scores
 from tests.conftest import RECOIL
 
@@ -23,9 +24,10 @@ METHODS = ["vibration", "asymmetric-1", "asymmetric-2"]
 
 @pytest.fixture(scope="module")
 def reproduction(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """`recoil reproduce` in an empty folder."""
+    """`recoil reproduce` in an empty folder; what it printed lies beside it."""
     folder = tmp_path_factory.mktemp("reproduction")
-    subprocess.run([RECOIL, "reproduce", "--out", "out"], cwd=folder, check=True, capture_output=True)
+    done = subprocess.run([RECOIL, "reproduce", "--out", "out"], cwd=folder, check=True, capture_output=True)
+    (folder / "said.txt").write_bytes(done.stdout)
     return folder / "out"
 
 
@@ -88,6 +90,66 @@ def test_tukeys_p_is_the_studentized_range_of_the_repeated_measures_error(reprod
         assert pair["p"] == pytest.approx(float(studentized_range.sf(q, 3, 26)), rel=1e-6, abs=1e-12)
 
 
+def test_reconstructed_participants_give_the_published_statistics_back(reproduction: Path) -> None:
+    """Counts and ratings from the logs alone; F of experiment 1 is the nearest that its means leave."""
+    logs = read_logs([reproduction / "logs"])
+    vibration = logs.trials[logs.trials.method == "vibration"]
+    right = {way: int(vibration[vibration.direction == way].correct.sum()) for way in ("forward", "backward")}
+    assert right == {"forward": 78, "backward": 67}
+    ratings = scores(reproduction, "preference").pivot_table(index="participant_id", columns="method", values="score")
+    assert (ratings["vibration"] < ratings[METHODS[1:]].min(axis=1)).all()
+    assert (ratings["asymmetric-1"] == ratings["asymmetric-2"]).sum() == 2
+    found = statistics(reproduction)
+    assert {method: round(100 * mean, 1) for method, mean in found["direction"]["means"].items()} == {
+        "vibration": 55.7,
+        "asymmetric-1": 79.3,
+        "asymmetric-2": 92.9,
+    }
+    assert f"{found['direction']['anova']['F']:.2f}" == "28.51"
+    assert f"{found['preference']['anova']['F']:.3f}" == "33.810"
+
+
+def test_every_published_number_carries_its_verdict_on_the_page_and_on_the_terminal(reproduction: Path) -> None:
+    said = (reproduction.parent / "said.txt").read_text(encoding="utf-8")
+    lines = [line.split("  ")[0] for line in said.splitlines() if ": " in line and "  " in line]
+    assert lines.count("differs") == 0
+    assert lines.count("not obtained") == 0
+    assert lines.count("differs as predicted") == 1
+    assert lines.count("agrees") == 22
+    assert lines.count("not attainable") == 2
+    assert "published 28.45: not attainable beside the other numbers, nearest 28.10 and 28.51" in said
+    page = (reproduction / "report.md").read_text(encoding="utf-8")
+    assert "22 published numbers and claims agree, 0 differ, 1 differs as the audit predicted" in page
+    assert "| ANOVA F | 28.45 | 28.51 | differs as predicted | only under a reading |" in page
+    assert "They are not the paper's participants" in page
+
+
+def test_the_tables_of_reconstructed_answers_seat_the_same_people_again(reproduction: Path, tmp_path: Path) -> None:
+    subprocess.run([RECOIL, "configs", "--copy", tmp_path], check=True, capture_output=True)
+    for name in EXPERIMENTS:
+        config, table = tmp_path / f"{name}.toml", f"reconstructed_{name}.csv"
+        text = config.read_text(encoding="utf-8")
+        drawn = next(f'observer = "{word}"' for word in ("rates", "ratings") if f'observer = "{word}"' in text)
+        config.write_text(text.replace(drawn, f'observer = "table"\ntable = "{table}"'), encoding="utf-8")
+        (tmp_path / table).write_bytes((reproduction / table).read_bytes())
+    words = [RECOIL, "reproduce", "--study", tmp_path / "study.toml", "--out", tmp_path / "out"]
+    subprocess.run(words, check=True, capture_output=True)
+    ours = statistics(reproduction)
+    assert {name: statistics(tmp_path / "out")[name]["anova"] for name in EXPERIMENTS} == {
+        name: ours[name]["anova"] for name in EXPERIMENTS
+    }
+
+
+def test_participants_drawn_by_the_configs_stay_an_option() -> None:
+    """Loaded, not run: they are the setups of the configs themselves."""
+    study = reproduce.load("study", 1, "rates")
+    assert study.seated == study.setups
+    assert "other participants were asked for" in study.notes[0]
+    assert reproduce.load("study", 1).manifest() == reproduce.load("study", 1, "reconstructed").manifest()
+    assert reproduce.load("study", 1).manifest() != study.manifest()
+    assert [setup.config.synthetic.observer for setup in reproduce.load("study", 2).seated] == ["table", "table"]
+
+
 def test_the_same_seed_gives_the_same_answers_and_another_seed_others(reproduction: Path, tmp_path: Path) -> None:
     for seed in (1, 2):
         words = [RECOIL, "reproduce", "--seed", str(seed), "--out", tmp_path / str(seed)]
@@ -118,6 +180,10 @@ def test_another_study_in_the_folder_is_set_aside_and_a_strangers_folder_is_refu
         subprocess.run(words, check=True, capture_output=True)
     assert (tmp_path / "out.aside-1" / "report.html").exists()
     assert (tmp_path / "out" / "report.html").exists()
+    assert "the study has 2 participants, the paper 14" in (tmp_path / "out" / "report.md").read_text(encoding="utf-8")
+    asked = [RECOIL, "reproduce", "--study", study, "--out", tmp_path / "no", "--observer", "reconstructed"]
+    refused = subprocess.run(asked, check=False, capture_output=True, text=True)
+    assert (refused.returncode, "the study has 2 participants" in refused.stderr) == (2, True)
     done = subprocess.run([RECOIL, "reproduce", "--out", quick], check=False, capture_output=True, text=True)
     assert done.returncode == 2
     assert "is no reproduction" in done.stderr

@@ -11,9 +11,13 @@ from pathlib import Path
 
 import pytest
 
-from analysis.audit import Result, audit, debit, grim, grimmer, p_against_statistic, parse_paper
+from analysis.audit import Result, audit, debit, grim, grimmer, load_paper_file, p_against_statistic
+from analysis.audit.participants import forward_counts, rating_grains
+from analysis.audit.reconstruct import meets, reconstruct
+from analysis.paper import load_paper
 from tests import test_audit_brute as brute
 from tests import test_audit_golden as golden
+from tests import test_audit_reconstruct as rebuilt
 from tests.conftest import Soak
 
 pytestmark = pytest.mark.soak
@@ -103,12 +107,49 @@ def test_agreement_with_other_programs(soak: Soak) -> None:
 
 
 def test_the_whole_audit_of_the_paper(soak: Soak) -> None:
-    root = Path(__file__).parent
-    text = (root.parent / "configs" / "paper.toml").read_text(encoding="utf-8")
-    if "[[claims]]" not in text:
-        text += (root / "golden" / "audit" / "paper_claims.toml").read_text(encoding="utf-8")
     start = time.perf_counter()
-    findings = audit(parse_paper(text))
+    findings = audit(load_paper_file(Path(__file__).parent.parent / "configs" / "paper.toml"))
     seconds = time.perf_counter() - start
     soak("the whole audit of the paper", f"{seconds:.1f} s", "10 s", f"{len(findings)} numbers, one process")
     assert seconds < 10
+
+
+@pytest.mark.parametrize(("k", "with_sds"), rebuilt.DESIGNS)
+def test_samples_that_existed_are_found_again(soak: Soak, k: int, with_sds: bool) -> None:
+    """A thousand samples a design, each summarised to two decimals and searched for."""
+    found = starts = succeeded = 0
+    slowest = 0.0
+    for seed, wanted in enumerate(rebuilt.cases(k, with_sds, 1_000, seed=k)):
+        start = time.perf_counter()
+        one = reconstruct(wanted, seed)
+        seconds = time.perf_counter() - start
+        slowest = max(slowest, seconds)
+        found += bool(one.data) and meets(one.data[0], wanted) and seconds < 1
+        starts += one.starts
+        succeeded += one.succeeded
+    printed = "means" + (", SDs" if with_sds else "") + (" and F" if k > 1 else "")
+    soak(
+        f"samples that existed, found again within 1 s: {k} conditions, {printed}",
+        f"{found / 10:.1f} %",
+        "99 %",
+        f"n = 5..30, scales to 100; slowest {slowest:.2f} s; {succeeded} of {starts} starts succeeded",
+    )
+    assert found >= 990
+
+
+def test_participants_of_this_paper(soak: Soak) -> None:
+    """Every published number that can be met, by 500 seeds."""
+    paper = load_paper(Path(__file__).parent.parent / "configs" / "paper.toml")
+    searches = {
+        "forward answers of experiment 1": lambda seed: forward_counts(paper.direction, seed).search,
+        "ratings of experiment 2": lambda seed: rating_grains(paper.preference, rebuilt.MEANS, "0.1", 0.6, seed).search,
+    }
+    for name, search in searches.items():
+        start = time.perf_counter()
+        found = [search(seed) for seed in range(500)]
+        seconds = (time.perf_counter() - start) / 500
+        different = len({tuple(sorted(one.data[0])) for one in found})
+        share = 500 / sum(one.starts for one in found)
+        detail = f"{100 * share:.1f} % of the starts succeed, {seconds:.3f} s each"
+        soak(f"{name} rebuilt by 500 seeds: different data sets", different, "500", detail)
+        assert different == 500

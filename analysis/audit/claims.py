@@ -35,12 +35,16 @@ class Strict(BaseModel):
 
 
 class Claim(Strict):
-    """One printed number: `place` in the paper, a short `quote`, and a `note` on how the file reads it."""
+    """One printed number: `place` in the paper, a short `quote`, and a `note` on how the file reads it.
+
+    `about`: the numbers of Recoil's own comparison that it is about, such as "direction: ANOVA F".
+    """
 
     place: str
     quote: str
     note: str = ""
-    not_arguments: ClassVar[frozenset[str]] = frozenset({"place", "quote", "note", "kind"})
+    about: list[str] = []
+    not_arguments: ClassVar[frozenset[str]] = frozenset({"place", "quote", "note", "about", "kind"})
 
     def run(self) -> Result:
         """The check of this kind with this claim's numbers; `ValueError` where they make no such claim."""

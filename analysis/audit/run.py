@@ -12,12 +12,16 @@ from analysis.audit.words import Result
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Finding:
-    """What the audit found of one number: where the paper prints it, in which words, and the check's result."""
+    """What the audit found of one number: where the paper prints it, in which words, and the check's result.
+
+    `about`: the numbers of Recoil's own comparison that it is about.
+    """
 
     place: str
     quote: str
     note: str
     result: Result
+    about: tuple[str, ...] = ()
 
 
 def audit(paper: PaperFile) -> tuple[Finding, ...]:
@@ -33,4 +37,4 @@ def _finding(claim: Claim) -> Finding:
         result = claim.run()
     except ValueError as error:
         raise ValueError(f"{claim.place}, “{claim.quote}”: {error}") from error
-    return Finding(place=claim.place, quote=claim.quote, note=claim.note, result=result)
+    return Finding(place=claim.place, quote=claim.quote, note=claim.note, result=result, about=tuple(claim.about))

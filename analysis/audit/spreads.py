@@ -10,7 +10,7 @@ from itertools import islice
 from analysis.audit.means import Scale, check_count, scale_of
 from analysis.audit.power_sums import BudgetError, greatest_squares, least_squares, numbers_with_sums
 from analysis.audit.printed import Interval, PrintedNumber, Rounding, decimal, read
-from analysis.audit.words import NONE_EXISTS, UNKNOWN, Attempt, Found, Result, decide
+from analysis.audit.words import NONE_EXISTS, UNKNOWN, Attempt, Found, Result, decide, listed
 
 Divisor = Callable[[int], int]
 """What n the sum of squared deviations is divided by to give the square of the printed number."""
@@ -43,8 +43,7 @@ def grimmer(
         check="grimmer",
         printed=f"M = {means.text}, SD = {spread.text}",
         verdict=decision.verdict,
-        reason=f"{n} scores in steps of {decimal(scale.grain)}: neighbouring sums of squares of one mean are 2 steps "
-        "apart; below and above are squares of SDs",
+        reason=f"{n} scores in steps of {decimal(scale.grain)} with one mean have sums of squares 2 steps apart",
         source="Anaya 2016, PeerJ Preprints 4, e2400v1; Allard 2018",
         step=2 * scale.grain**2 / (n - 1),
         below=below,
@@ -148,7 +147,7 @@ def debit(mean: str, sd: str, n: int) -> Result:
         check="debit",
         printed=f"M = {means.text}, SD = {spread.text}",
         verdict=decision.verdict,
-        reason=f"{len(ones)} counts of ones give the mean; below and above are squares of their SDs",
+        reason=f"the mean fixes the SD of answers of 0 and 1, here with {listed(ones) or 'no whole number of'} ones",
         source="Heathers & Brown 2019, https://osf.io/5vb3u/",
         step=Fraction(1, n),
         below=max((value for value in squares if value <= spread.value**2), default=None),

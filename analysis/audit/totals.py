@@ -8,10 +8,11 @@ from fractions import Fraction
 from math import prod
 from typing import Literal
 
-from analysis.audit.printed import Interval, Rounding, read
+from analysis.audit.printed import Interval, Rounding, decimal, read
 from analysis.audit.words import NONE_EXISTS, Attempt, Found, Result, decide
 
 Bound = Literal["equals", "at least", "at most"]
+_BOUNDS = {"equals": "that", "at least": "at least that", "at most": "at most that"}
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -42,7 +43,7 @@ def total(printed: str, terms: Sequence[Term], bound: Bound = "equals") -> Resul
         check="total",
         printed=number.text,
         verdict=decision.verdict,
-        reason=f"the terms add up to {sums[0]}; {bound} is asked",
+        reason=f"{' + '.join(map(_text, terms))} make {_shown(sums[0])}, and it is to be {_BOUNDS[bound]}",
         source="Moore, Kearfott & Cloud 2009, chapter 2",
         below=middle if middle <= number.value else None,
         above=middle if middle >= number.value else None,
@@ -114,6 +115,12 @@ def _value(term: Term) -> Fraction:
     return prod((read(v).value for v in term.times), start=Fraction(1)) / prod(
         (read(v).value for v in term.over), start=Fraction(1)
     )
+
+
+def _shown(sums: Interval) -> str:
+    """A number, or the range of a rounded one."""
+    low, high = _ends(sums)
+    return decimal(low) if low == high else f"{decimal(low)} to {decimal(high)}"
 
 
 def _text(term: Term) -> str:

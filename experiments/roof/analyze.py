@@ -7,12 +7,16 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, TypeVar
 
+from analysis import remarks_coding
+from analysis.audit import audit
+from analysis.audit.paper_file import PaperFile, load_paper_file
+from analysis.audit.predictions import predictions
 from analysis.by_study import by_study
 from analysis.column_map import ColumnMap
 from analysis.exclusions import Effect, Rules, apply_rules
 from analysis.logs import Logs, Problem, Track, read_logs
 from analysis.paper import load_paper
-from analysis.published import compare
+from analysis.published import Prediction, compare
 from analysis.report import ReportData, write_report
 from analysis.summary import summarize
 from analysis.tables_out import result_tables
@@ -36,6 +40,7 @@ class Request:
     paper: Path | None = None
     columns: Path | None = None
     rules: Path | None = None
+    codebook: Path | None = None
 
 
 def analyze(request: Request, track: Track = iter) -> tuple[dict[str, Any], tuple[Problem, ...]]:
@@ -46,6 +51,7 @@ def analyze(request: Request, track: Track = iter) -> tuple[dict[str, Any], tupl
     published = _loaded(load_paper, request.paper)
     mapping = _loaded(lambda path: load_model(ColumnMap, path), request.columns)
     rules = _loaded(lambda path: load_model(Rules, path), request.rules)
+    book = _loaded(remarks_coding.load_codebook, request.codebook)
     logs = read_logs(request.paths, track, mapping)
     if not logs.files:
         reasons = "\n".join(str(problem) for problem in logs.problems)
@@ -55,15 +61,19 @@ def analyze(request: Request, track: Track = iter) -> tuple[dict[str, Any], tupl
     statistics = summarize(used) | _by_study(used)
     if effect is not None and rules is not None and request.rules is not None:
         statistics = _with_rules(statistics, effect, rules, request.rules)
+    coded = None if book is None else _coded(used, statistics, book)
+    if coded is not None:
+        statistics = statistics | {"remarks": remarks_coding.as_json(coded)}
     storage.make_folder(request.out)
     report = ReportData(
         title="Statistics of " + ", ".join(path.name or str(path) for path in request.paths),
         statistics=statistics,
         problems=logs.problems,
-        comparison=compare(statistics, published) if published else None,
+        comparison=compare(statistics, published, _predicted(request.paper)) if published else None,
         files=logs.files,
         provenance=provenance() | _read_by(request.columns, mapping),
         notes=tuple(_notes(effect)),
+        extra=() if coded is None else (remarks_coding.section(coded),),
     )
     write_report(request.out, report)
     write_tables(request.out, used, statistics)
@@ -74,6 +84,25 @@ def write_tables(out: Path, logs: Logs, statistics: Mapping[str, Any]) -> None:
     """Write each experiment's results by participant, long and wide, as CSV."""
     for name, content in result_tables(logs, statistics).items():
         storage.write_whole(out / name, content)
+
+
+def _predicted(paper: Path | None) -> dict[str, Prediction]:
+    """What the audit says of the published numbers."""
+    return {} if paper is None else predictions(audit(_loaded(load_paper_file, paper) or PaperFile()))
+
+
+def _coded(logs: Logs, statistics: dict[str, Any], book: remarks_coding.Codebook) -> remarks_coding.CodedRemarks:
+    """The descriptions of experiment 2, coded. `ConfigError` if the codebook does not fit them."""
+    ratings = logs.ratings
+    columns = ratings["participant_id"].astype(str), ratings["method"].astype(str), ratings["comment"].fillna("")
+    remarks = [
+        remarks_coding.Remark(participant=who, method=method, text=text)
+        for who, method, text in zip(*columns, strict=True)
+    ]
+    try:
+        return remarks_coding.code_remarks(remarks, list(statistics["preference"]["participants"]), book)
+    except (KeyError, ValueError) as error:
+        raise ConfigError(f"the codebook: {error if isinstance(error, ValueError) else 'no ratings here'}") from error
 
 
 def _by_study(logs: Logs) -> dict[str, Any]:

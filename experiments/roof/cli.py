@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from experiments.roof import power_command
+from experiments.roof import audit_command, power_command
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Sequence
@@ -32,6 +32,13 @@ app = typer.Typer(
 
 AsJson = Annotated[bool, typer.Option("--json", help="Print the machine-readable result.")]
 Seed = Annotated[int | None, typer.Option(min=0, max=2**63 - 1, help="Seed of the random streams.")]
+
+
+class ObserverName(StrEnum):
+    """Who answers in a reproduction."""
+
+    reconstructed = "reconstructed"
+    rates = "rates"
 
 
 class ScreenName(StrEnum):
@@ -93,15 +100,19 @@ def reproduce(
     ),
     seed: Annotated[int, typer.Option(min=0, max=2**63 - 1, help="Seed of the study.")] = 1,
     study: Annotated[str, typer.Option(help="Config of a study, or the name of a shipped one.")] = "study",
+    observer: Annotated[
+        ObserverName | None,
+        typer.Option(help="Who answers: rebuilt from the published numbers where they fit, or drawn by the configs."),
+    ] = None,
     as_json: AsJson = False,
 ) -> None:
     """Both experiments with synthetic participants on the simulated gun: logs, statistics, figures, report."""
     from experiments.roof import reproduce as roof
 
-    loaded = roof.load(study, seed)
+    loaded = roof.load(study, seed, observer.value if observer else None)
     with _progress("reproduce", len(loaded.runs) + 3) as tell:
-        statistics = roof.reproduce(loaded, out, tell)
-    _show(statistics, f"Report: {out / 'report.html'}", as_json)
+        done = roof.reproduce(loaded, out, tell)
+    _show(done.statistics, f"{roof.as_text(done.comparison)}\n\nReport: {out / 'report.html'}", as_json)
 
 
 @app.command()
@@ -243,12 +254,13 @@ def analyze(
         Path | None, typer.Option(metavar="RULES.toml", help="Which trials and participants to leave out.")
     ] = None,
     paper: Annotated[Path | None, typer.Option(help="Published numbers to compare with.")] = None,
+    codebook: Annotated[Path | None, typer.Option(metavar="CODES.toml", help="Codes of free descriptions.")] = None,
     as_json: AsJson = False,
 ) -> None:
     """Statistics, tables, figures and report of any number of logs."""
     from experiments.roof import analyze as roof
 
-    asked = roof.Request(paths=paths, out=out, paper=paper, columns=columns, rules=rules)
+    asked = roof.Request(paths=paths, out=out, paper=paper, columns=columns, rules=rules, codebook=codebook)
     statistics, problems = roof.analyze(asked, _tracked)
     for problem in problems:
         _say(f"recoil: left out: {problem}")
@@ -381,4 +393,5 @@ def _progress(what: str, total: int) -> Iterator[Callable[[str], None]]:
         yield lambda done: progress.update(task, advance=1, description=f"{what}: {done}")
 
 
+app.command("audit")(audit_command.command(_show, lambda wrong: typer.Exit(EXCEPTIONS if wrong else DONE)))
 app.command("power")(power_command.command(_show, _progress))

@@ -7,15 +7,21 @@ from __future__ import annotations
 
 import json
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any
+from typing import Any, Literal
 
+from analysis.audit import audit
+from analysis.audit.paper_file import load_paper_file
+from analysis.audit.predictions import ELSEWHERE, other_rows, predictions
+from analysis.audit.run import Finding
+from analysis.audit.sentences import ATTENTION
 from analysis.logs import Logs, read_logs
 from analysis.odds import Odds
 from analysis.paper import Paper, load_paper
 from analysis.published import Row, compare
 from analysis.report import ReportData, write_report
+from analysis.report_sections import obtained_text
 from analysis.summary import summarize
 from device.parameters import GunParameters
 from experiments import places, storage
@@ -30,11 +36,15 @@ from experiments.preference.config import PreferenceConfig
 from experiments.provenance import git_commit, provenance, recoil_version
 from experiments.roof.odds import direction_odds, preference_odds
 from experiments.roof.pictures import shot_panel
+from experiments.roof.reconstructed import misfit, seat, table_bytes, table_name
 from experiments.run import Request, rebuild, run
 from experiments.screens.synthetic import synthetic_screen
 from experiments.setup import Setup
 
 MANIFEST = "reproduction.json"
+
+Observer = Literal["reconstructed", "rates"]
+"""Who answers: participants rebuilt from the published numbers, or those that the configs describe."""
 
 Tell = Callable[[str], None]
 """Told what was done, once a run and once a part of the analysis."""
@@ -42,21 +52,32 @@ Tell = Callable[[str], None]
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Study:
-    """A study ready to run: its config, its experiments' setups, the seed and the published numbers."""
+    """A study ready to run: its config, its experiments' setups, the seed and the published numbers.
+
+    `seated`: the setups with the participants who answer; `findings`: the audit of the published numbers.
+    """
 
     config: StudyConfig
     setups: tuple[Setup[Any], ...]
+    seated: tuple[Setup[Any], ...]
     seed: int
     paper: Paper | None
+    findings: tuple[Finding, ...] = ()
+    notes: tuple[str, ...] = ()
+
+    @property
+    def reconstructed(self) -> bool:
+        """Are the participants rebuilt from the published numbers?"""
+        return self.seated != self.setups
 
     @property
     def runs(self) -> list[tuple[Setup[Any], str]]:
         """Each experiment with each participant."""
-        return [(setup, code) for code in self.config.codes() for setup in self.setups]
+        return [(setup, code) for code in self.config.codes() for setup in self.seated]
 
     def manifest(self) -> dict[str, object]:
         """What makes one reproduction the same as another."""
-        setups = sha256([setup.record() for setup in self.setups])
+        setups = sha256([setup.record() for setup in self.seated])
         return {
             "seed": self.seed,
             "participants": self.config.codes(),
@@ -66,19 +87,38 @@ class Study:
         }
 
 
-def load(name: str, seed: int) -> Study:
-    """A study from its config."""
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Reproduced:
+    """The statistics of a reproduction, and every published number beside what was obtained."""
+
+    statistics: dict[str, Any]
+    comparison: tuple[Row, ...]
+
+
+def load(name: str, seed: int, observer: Observer | None = None) -> Study:
+    """A study from its config, with reconstructed participants unless others are asked for or those do not fit it.
+
+    `ConfigError` for configs that cannot be used, and if reconstructed participants are asked for and do not fit.
+    """
     config, folder = load_study(name)
+    setups = tuple(load_setup(str(folder / experiment)) for experiment in config.experiments)
     try:
         paper = load_paper(folder / config.paper) if config.paper else None
+        findings = audit(load_paper_file(folder / config.paper)) if config.paper else ()
     except ValueError as error:
         raise ConfigError(str(error)) from error
-    setups = tuple(load_setup(str(folder / experiment)) for experiment in config.experiments)
-    return Study(config=config, setups=setups, seed=seed, paper=paper)
+    study = Study(config=config, setups=setups, seated=setups, seed=seed, paper=paper, findings=findings)
+    reason = "other participants were asked for" if observer == "rates" else misfit(config, setups, paper)
+    if observer == "reconstructed" and reason:
+        raise ConfigError(f"{name}: no reconstructed participants: {reason}")
+    if paper is None or reason:
+        return replace(study, notes=(f"The participants are those of the configs: {reason}.",))
+    seated = seat(config, setups, paper, seed)
+    return replace(study, seated=seated.setups, notes=seated.notes)
 
 
-def reproduce(study: Study, out: Path, tell: Tell) -> dict[str, Any]:
-    """Run, log, analyse and report a study into `out`; the statistics are returned.
+def reproduce(study: Study, out: Path, tell: Tell) -> Reproduced:
+    """Run, log, analyse and report a study into `out`.
 
     An unfinished reproduction of the same study is gone on with; another one in `out` is set aside.
     """
@@ -91,9 +131,43 @@ def reproduce(study: Study, out: Path, tell: Tell) -> dict[str, Any]:
     tell("statistics")
     odds = tuple(_odds(study))
     tell("odds of the published pattern")
-    write_report(out, _report(study, logs, statistics, odds))
+    comparison = tuple(_compared(study, statistics))
+    write_report(out, _report(study, logs, statistics, odds, comparison))
     tell("report")
-    return statistics
+    return Reproduced(statistics=statistics, comparison=comparison)
+
+
+def as_text(comparison: tuple[Row, ...]) -> str:
+    """Every published number with its verdict, for the terminal."""
+    if not comparison:
+        return "No published numbers to compare with."
+    rows = [("verdict", "published", "obtained", "number"), *map(_cells, comparison)]
+    widths = [max(len(row[column]) for row in rows) for column in range(3)]
+    lines = ["  ".join([*map(str.ljust, row, widths), row[3]]) for row in rows]
+    notes = [f"{row.quantity}, published {row.published}: {row.note}" for row in comparison if _remarkable(row)]
+    return "\n".join([*lines, *([""] if notes else []), *notes])
+
+
+def _cells(row: Row) -> tuple[str, str, str, str]:
+    apart = row.experiment == ELSEWHERE
+    name = row.quantity if apart else f"{row.experiment}: {row.quantity}"
+    return row.verdict, _shortened(row.published, 20), "" if apart else obtained_text(row), _shortened(name, 72)
+
+
+def _shortened(text: str, most: int) -> str:
+    return text if len(text) <= most else f"{text[: most - 1]}…"
+
+
+def _remarkable(row: Row) -> bool:
+    """Does the verdict call for its reason?"""
+    return bool(row.note) and row.verdict in {"differs", "differs as predicted", *ATTENTION}
+
+
+def _compared(study: Study, statistics: dict[str, Any]) -> Iterator[Row]:
+    """Every published number: those that logs hold beside the obtained, the others with the audit's verdict."""
+    if study.paper is not None:
+        yield from compare(statistics, study.paper, predictions(study.findings))
+        yield from other_rows(study.findings)
 
 
 def _claim(study: Study, out: Path) -> None:
@@ -106,6 +180,8 @@ def _claim(study: Study, out: Path) -> None:
     elif out.exists() and (not out.is_dir() or any(out.iterdir())):
         raise places.PlaceError(f"{out}: exists and is no reproduction of a study; choose another --out")
     storage.make_folder(out)
+    for setup in study.seated if study.reconstructed else ():
+        storage.write_whole(out / table_name(setup), table_bytes(setup))
     storage.write_whole(manifest, (json.dumps(wanted, indent=1) + "\n").encode())
 
 
@@ -134,17 +210,19 @@ def _odds(study: Study) -> Iterator[Odds]:
             yield preference_odds(setup.config, study.paper, study.config.replications, study.seed)
 
 
-def _report(study: Study, logs: Logs, statistics: dict[str, Any], odds: tuple[Odds, ...]) -> ReportData:
-    comparison: tuple[Row, ...] | None = compare(statistics, study.paper) if study.paper else None
+def _report(
+    study: Study, logs: Logs, statistics: dict[str, Any], odds: tuple[Odds, ...], comparison: tuple[Row, ...]
+) -> ReportData:
+    people = "synthetic, reconstructed from the published numbers" if study.reconstructed else "synthetic"
     return ReportData(
         title=study.config.title,
         statistics=statistics,
         problems=logs.problems,
-        comparison=comparison,
+        comparison=comparison or None,
         odds=odds,
         panels=tuple(_panels(study.setups[0])),
         files=logs.files,
-        provenance=provenance() | {"seed": str(study.seed), "participants": "synthetic", "gun": "simulated"},
+        provenance=provenance() | {"seed": str(study.seed), "participants": people, "gun": "simulated"},
         notes=tuple(_notes(study)),
     )
 
@@ -159,6 +237,7 @@ def _panels(setup: Setup[Any]) -> Iterator[Any]:
 
 def _notes(study: Study) -> Iterator[str]:
     """What the numbers rest on beyond the paper."""
+    yield from study.notes
     gun = study.setups[0].gun
     coil = GunParameters(**gun.voice_coil)
     yield f"The coil after the pulse is {coil.drive_off}, its back-EMF is {coil.emf}; the paper leaves both open."

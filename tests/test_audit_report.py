@@ -1,0 +1,144 @@
+"""`recoil audit` and its report: two sentences a finding, exit codes, what is written."""
+
+from __future__ import annotations
+
+import json
+import re
+from fractions import Fraction
+from pathlib import Path
+
+import pytest
+
+from analysis.audit import audit, binomial_p, debit, degrees_of_freedom, grim, grimmer, load_paper_file
+from analysis.audit.page import as_json, as_text, counts, page
+from analysis.audit.predictions import ELSEWHERE, other_rows, predictions
+from analysis.audit.run import Finding
+from analysis.audit.sentences import nearest_text, sentences
+from analysis.audit.words import Result
+from tests.conftest import Recoil
+
+CONFIGS = Path(__file__).parent.parent / "configs"
+
+
+@pytest.fixture(scope="module")
+def findings() -> tuple[Finding, ...]:
+    return audit(load_paper_file(CONFIGS / "paper.toml"))
+
+
+def of(result: Result) -> Finding:
+    return Finding(place="Results", quote="as printed", note="", result=result)
+
+
+def text_of(findings: tuple[Finding, ...], printed: str) -> str:
+    (found,) = [finding for finding in findings if finding.result.printed == printed]
+    return " ".join(sentences(found))
+
+
+def test_every_finding_is_told_in_two_sentences(findings: tuple[Finding, ...]) -> None:
+    for finding in findings:
+        said = sentences(finding)
+        assert len(said) == 2
+        assert all(sentence.endswith(".") and not re.search(r"[.] [A-Z]", sentence) for sentence in said), said
+
+
+def test_the_finding_on_f_says_what_it_would_have_to_be_and_what_rescues_it(findings: tuple[Finding, ...]) -> None:
+    text = text_of(findings, "F = 28.45")
+    assert "28.10 and 28.51" in text
+    assert "arcsine transform" in text
+    assert "steps of 0.05 with other means" in text
+
+
+def test_a_wrong_percentage_is_told_with_the_count_that_has_it(findings: tuple[Finding, ...]) -> None:
+    assert "5 of 14 people are 35.7 %, not 33.7%; no count of them has that" in text_of(findings, "5 of 14, 33.7%")
+    assert "4 of 14 people are 28.6 %, not 35.7%; that is the percentage of 5" in text_of(findings, "4 of 14, 35.7%")
+
+
+@pytest.mark.parametrize(
+    ("result", "nearest"),
+    [
+        (grim("5.19", 28), "5.179 and 5.214"),
+        (grimmer("5.21", "1.63", 28), "SD 1.618 and SD 1.641"),
+        (debit("0.35", "0.18", 20), "SD 0.489"),
+        (binomial_p(".117", 20), "0.115 and 0.263"),
+        (degrees_of_freedom(["2", "39"], "repeated", [14, 3]), ""),
+    ],
+)
+def test_neighbours_are_shown_in_the_unit_of_what_is_printed(result: Result, nearest: str) -> None:
+    """5.179 is 145 / 28 and 5.214 is 146 / 28; 7 of 20 ones have SD sqrt(91 / 380) = 0.489; p(6 of 20) = 0.115."""
+    assert nearest_text(result) == nearest
+    assert nearest.partition(" ")[0] in sentences(of(result))[0]
+
+
+def test_the_page_names_all_numbers_and_is_fair(findings: tuple[Finding, ...]) -> None:
+    parts = page(findings, [("file", "paper.toml")])
+    assert [part.title for part in parts] == [
+        "Verdicts", "Numbers to ask about", "Every number", "Proofs", "Provenance",
+    ]  # fmt: skip
+    assert "not how it came about" in parts[0].paragraphs[0]
+    assert len(parts[1].items) == 3
+    assert len(parts[2].tables[0].rows) == len(findings)
+    assert "Numbers to ask about" not in [part.title for part in page([f for f in findings if not f.note][:3], [])]
+
+
+def test_json_keeps_the_exact_fractions(findings: tuple[Finding, ...]) -> None:
+    (found,) = [one for one in as_json(findings) if one["printed"] == "F = 28.45"]
+    assert Fraction(found["above"]["exact"]) == Fraction(27001, 947)
+    assert found["readings"] == ["arcsine transform", "scores in steps of 0.05 with other means"]
+    assert json.loads(json.dumps(found)) == found
+
+
+def test_the_terminal_ends_with_the_counts_and_what_to_ask_about(findings: tuple[Finding, ...]) -> None:
+    text = as_text(findings)
+    assert f"{len(findings)} numbers: {counts(findings)['attainable']} attainable" in text
+    assert text.count("“F(2,26)=28.45") == 1
+
+
+def test_predictions_are_named_as_the_comparison_names_its_rows(findings: tuple[Finding, ...]) -> None:
+    known = predictions(findings)
+    assert known["direction: ANOVA F"].nearest == pytest.approx((28.0968, 28.5121), abs=1e-4)
+    assert known["direction: mean correct rate forward, vibration"].verdict == "attainable"
+    others = list(other_rows(findings))
+    assert {row.experiment for row in others} == {ELSEWHERE}
+    assert [row.quantity for row in others if row.verdict == "not attainable"] == [
+        "III.B, Results: does not like shooting with a gun (5 people, 33.7%)",
+        "III.B, Results: Shooting becomes more stable (4 people, 35.7%)",
+    ]
+
+
+def test_the_command_writes_report_and_json_and_ends_with_1_for_this_paper(recoil: Recoil, tmp_path: Path) -> None:
+    done = recoil("audit", "--out", tmp_path / "out")
+    assert (done.returncode, done.stderr) == (1, "")
+    assert "2 not attainable" in done.stdout
+    found = json.loads((tmp_path / "out" / "audit.json").read_text(encoding="utf-8"))
+    assert found["verdicts"]["not attainable"] == 2
+    assert "33.7%" in (tmp_path / "out" / "report.html").read_text(encoding="utf-8")
+    assert "## Proofs" in (tmp_path / "out" / "report.md").read_text(encoding="utf-8")
+    shown = recoil("audit", "paper", "--json", "--out", tmp_path / "again")
+    assert json.loads(shown.stdout)["findings"] == found["findings"]
+
+
+def test_a_sound_paper_ends_with_0_and_an_example_of_another_field_is_told(recoil: Recoil, tmp_path: Path) -> None:
+    text = (CONFIGS / "examples" / "audit.toml").read_text(encoding="utf-8")
+    sound = tmp_path / "sound.toml"
+    sound.write_text(text.replace('mean = "7.19"', 'mean = "7.18"'), encoding="utf-8")
+    assert recoil("audit", sound).returncode == 0
+    done = recoil("audit", CONFIGS / "examples" / "audit.toml")
+    assert done.returncode == 1
+    assert "7.19 is not attainable" in done.stdout
+
+
+@pytest.mark.parametrize(
+    ("content", "words"),
+    [
+        ('[[claims]]\nplace = "I"\nquote = "x"\nkind = "grim"\nmean = "5.2x"\nn = 28', "claims.0"),
+        ('[[claims]]\nplace = "I"\nquote = "x"\nkind = "percent"\npercent = "5%"\ncount = 3\nn = 2', "I, “x”"),
+        ("", "makes no claims"),
+    ],
+)
+def test_bad_input_is_one_message_and_exit_code_2(recoil: Recoil, tmp_path: Path, content: str, words: str) -> None:
+    (tmp_path / "bad.toml").write_text(content, encoding="utf-8")
+    done = recoil("audit", "bad.toml")
+    assert done.returncode == 2
+    assert words in done.stderr
+    assert "bad.toml" in done.stderr
+    assert "Traceback" not in done.stderr

@@ -1,0 +1,318 @@
+"""`recoil power` as a user calls it: files, costs, refusals, and the same bytes however it is worked out."""
+
+from __future__ import annotations
+
+import contextlib
+import json
+import os
+import signal
+import subprocess
+import time
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import psutil
+import pytest
+
+from analysis.power.planned import ALL_PAIRS, ANOVA
+from experiments.config import leaves
+from experiments.load import ConfigError, load_setup, shipped_folder
+from experiments.roof import power as roof
+from experiments.roof.jobs import JobError, on_cluster, on_processes
+from experiments.roof.power_grid import Request, make_grid
+from tests.conftest import RECOIL, Recoil
+
+SMALL = ("--participants", "8,14", "--effect", "0.75,1", "--studies", "300")
+CONFIG = load_setup("direction").config
+
+
+def files(folder: Path) -> dict[str, bytes]:
+    return {str(path.relative_to(folder)): path.read_bytes() for path in sorted(folder.rglob("*")) if path.is_file()}
+
+
+@pytest.fixture(scope="module")
+def done(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The small grid, on one process; in the environment of `recoil`, which has no settings of git."""
+    folder = tmp_path_factory.mktemp("power")
+    environment = {"PATH": os.environ["PATH"], "HOME": str(folder)}
+    words = [RECOIL, "power", "direction", *SMALL, "--workers", "1", "--out", folder / "out"]
+    subprocess.run(words, check=True, capture_output=True, env=environment)
+    return folder / "out"
+
+
+@pytest.fixture
+def found(done: Path) -> Any:
+    return json.loads((done / "power.json").read_text(encoding="utf-8"))
+
+
+def test_the_page_tells_what_was_found(done: Path, found: Any) -> None:
+    page = (done / "report.md").read_text(encoding="utf-8")
+    pattern = found["published_pattern"]
+    assert f"{100 * pattern['share']:.1f} %" in page.replace("\N{NO-BREAK SPACE}", " ")
+    assert {"power.png", "power.svg", "power.pdf"} == {path.name for path in (done / "figures").iterdir()}
+    assert "data:image/png;base64," in (done / "report.html").read_text(encoding="utf-8")
+    assert not list(done.glob("unfinished*"))
+    assert all(path.stat().st_mode & 0o077 == 0 for path in done.iterdir())
+
+
+def test_every_design_has_its_claims_with_intervals_and_its_cost(found: Any) -> None:
+    assert [(one["participants"], one["effect"]) for one in found["designs"]] == [
+        (8, 0.75),
+        (14, 0.75),
+        (8, 1.0),
+        (14, 1.0),
+    ]
+    for one in found["designs"]:
+        assert one["lab_hours"] == pytest.approx(one["participants"] * CONFIG.duration_s / 3600)
+        assert all(0 <= c["ci_low"] <= c["share"] == c["held"] / 300 <= c["ci_high"] <= 1 for c in one["claims"])
+        assert all(p["half_width"] > p["mc_error"] > 0 for p in one["precision"])
+
+
+def test_more_people_and_a_larger_effect_find_more(found: Any) -> None:
+    share = {
+        (one["participants"], one["effect"]): next(c["share"] for c in one["claims"] if c["claim"] == ALL_PAIRS)
+        for one in found["designs"]
+    }
+    assert share[8, 0.75] < share[8, 1.0] < share[14, 1.0]
+    assert share[8, 0.75] < share[14, 0.75] < share[14, 1.0]
+
+
+def test_the_smallest_design_is_the_cheapest_that_reaches_the_target(found: Any) -> None:
+    for row in found["smallest"]:
+        reaching = [
+            one
+            for one in found["designs"]
+            if one["effect"] == row["effect"]
+            and next(c["ci_low"] for c in one["claims"] if c["claim"] == row["claim"]) >= 0.8
+        ]
+        if row["design"] is None:
+            assert not reaching
+        else:
+            assert row["design"]["lab_hours"] == min(one["lab_hours"] for one in reaching)
+    assert any(row["design"] for row in found["smallest"])
+
+
+def test_the_same_seed_gives_the_same_bytes_on_two_processes(done: Path, recoil: Recoil, tmp_path: Path) -> None:
+    again = recoil("power", "direction", *SMALL, "--workers", "2", "--out", "two")
+    assert again.returncode == 0, again.stderr
+    assert files(tmp_path / "two") == files(done)
+
+
+def test_another_seed_gives_other_studies(done: Path, recoil: Recoil, tmp_path: Path) -> None:
+    again = recoil("power", "direction", *SMALL, "--seed", "2", "--workers", "1", "--out", "other", "--json")
+    found = json.loads(again.stdout)
+    assert found == json.loads((tmp_path / "other" / "power.json").read_text(encoding="utf-8"))
+    assert found["designs"] != json.loads((done / "power.json").read_text(encoding="utf-8"))["designs"]
+
+
+@pytest.fixture
+def cluster() -> Iterator[str]:
+    """A Dask scheduler with two workers, each a process of its own: its address."""
+    distributed = pytest.importorskip("distributed")
+    with distributed.LocalCluster(
+        n_workers=2, threads_per_worker=1, processes=True, dashboard_address=None, silence_logs="CRITICAL"
+    ) as running:
+        yield running.scheduler_address
+
+
+def test_two_dask_workers_give_the_same_bytes_as_one_process(
+    done: Path, cluster: str, recoil: Recoil, tmp_path: Path
+) -> None:
+    again = recoil("power", "direction", *SMALL, "--scheduler", cluster, "--out", "dask")
+    assert again.returncode == 0, again.stderr
+    assert files(tmp_path / "dask") == files(done)
+
+
+def test_an_interrupted_job_goes_on_where_it_was(tmp_path: Path) -> None:
+    words = [RECOIL, "power", "direction", "--participants", "14", "--effect", "1", "--studies", "60000"]
+    words += ["--workers", "1", "--out"]
+    whole, cut = tmp_path / "whole", tmp_path / "cut"
+    subprocess.run([*words, whole], check=True, capture_output=True)
+    with subprocess.Popen([*words, cut], stderr=subprocess.PIPE) as running:
+        until = time.monotonic() + 60
+        while not [kept for kept in cut.glob("unfinished*") if kept.stat().st_size] and time.monotonic() < until:
+            time.sleep(0.01)
+        running.send_signal(signal.SIGINT)
+        _, errors = running.communicate(timeout=60)
+    assert running.returncode == 130, errors
+    assert b"Traceback" not in errors
+    kept = next(cut.glob("unfinished*"))
+    begun = len(kept.read_bytes().splitlines())
+    assert 0 < begun < 12
+    with kept.open("ab") as file:
+        file.write(b'[11, {"studies": 50')  # as a kill in the middle of a line leaves it
+    subprocess.run([*words, cut], check=True, capture_output=True)
+    assert files(cut) == files(whole)
+
+
+def test_an_interrupted_job_on_processes_ends_soon_and_leaves_none(tmp_path: Path) -> None:
+    words = [RECOIL, "power", "direction", "--participants", "14", "--effect", "1", "--studies", "400000"]
+    words += ["--workers", "2", "--out", tmp_path / "out"]
+    with subprocess.Popen(words, stderr=subprocess.PIPE, start_new_session=True) as running:
+        until = time.monotonic() + 60
+        while not list((tmp_path / "out").glob("unfinished*")) and time.monotonic() < until:
+            time.sleep(0.05)
+        os.killpg(running.pid, signal.SIGINT)  # as a terminal does: to everybody
+        _, errors = running.communicate(timeout=60)
+    assert running.returncode == 130, errors
+    assert b"Traceback" not in errors
+    until = time.monotonic() + 20  # the interpreter's own tracker of resources ends a moment later
+    while alive_in(running.pid) and time.monotonic() < until:
+        time.sleep(0.1)
+    assert not alive_in(running.pid), subprocess.run(
+        ["ps", "-eo", "pid,ppid,pgid,stat,cmd"], capture_output=True, check=False
+    ).stdout
+
+
+def alive_in(group: int) -> list[int]:
+    found = []
+    for process in psutil.process_iter(["status"]):
+        with contextlib.suppress(ProcessLookupError):
+            if process.info["status"] != psutil.STATUS_ZOMBIE and os.getpgid(process.pid) == group:
+                found.append(process.pid)
+    return found
+
+
+def test_null_participants_find_what_is_not_there_in_five_percent(recoil: Recoil, tmp_path: Path) -> None:
+    again = recoil(
+        "power", "preference", "--null", "--participants", "14", "--studies", "20000", "--json", "--out", "n"
+    )
+    assert again.returncode == 0, again.stderr
+    (design,) = json.loads(again.stdout)["designs"]
+    anova = next(c for c in design["claims"] if c["claim"] == ANOVA)
+    assert anova["ci_low"] - 0.003 < 0.05 < anova["ci_high"] + 0.003
+    assert (tmp_path / "n" / "figures" / "false-positives.png").is_file()
+
+
+BAD = {
+    "--participants 0": "--participants 0: 0 must be from 2 to 999",
+    "--participants 1": "from 2 to 999",
+    "--participants 20-8": "ranges upwards",
+    "--participants eight": "'eight' is no whole number",
+    "--effect -1": "--effect -1: '-1' must be a number from 0",
+    "--effect nan": "must be a number from 0",
+    "--trials 15": "15 is no multiple of 10",
+    "--trials 11-19": "holds no multiple of 10",
+    "--methods vibration": "two or more different ones of vibration, asymmetric-1, asymmetric-2",
+    "--methods vibration,hammer": "two or more different ones",
+    "--target 1.5": "--target 1.5: must lie between 0 and 1",
+    "--null --effect 1": "--null has no effect",
+    "--paper nowhere": "nowhere: no such file",
+    "--scheduler nowhere": "--scheduler nowhere: must be host and port",
+    "--scheduler foo://host:8786": "must be host and port",
+    "--scheduler tcp://127.0.0.1:1": "--scheduler tcp://127.0.0.1:1: no Dask scheduler answers there",
+}
+
+
+@pytest.mark.parametrize("words", BAD)
+def test_what_cannot_be_is_refused_in_one_message(
+    words: str, tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    from experiments.roof import cli, jobs
+
+    monkeypatch.setattr(jobs, "CONNECT_S", 1)
+    monkeypatch.setattr("sys.argv", ["recoil", "power", "direction", *words.split(), "--out", str(tmp_path / "out")])
+    handlers = {number: signal.getsignal(number) for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)}
+    umask = os.umask(0o077)
+    try:
+        with pytest.raises(SystemExit) as end:
+            cli.main()
+    finally:
+        os.umask(umask)
+        for number, handler in handlers.items():
+            signal.signal(number, handler)
+    said = capsys.readouterr().err
+    assert end.value.code == 2
+    assert BAD[words] in said
+    assert said.startswith("recoil: ")
+    assert len(said.splitlines()) == 1
+    assert not (tmp_path / "out").exists()
+
+
+def test_experiment_2_has_one_trial_a_method() -> None:
+    with pytest.raises(ConfigError, match="one trial a method"):
+        make_grid(Request(config="preference", trials="5"))
+
+
+def test_answers_from_a_table_have_no_power(tmp_path: Path) -> None:
+    for source in shipped_folder().glob("*.toml"):
+        (tmp_path / source.name).write_bytes(source.read_bytes())
+    config = tmp_path / "direction.toml"
+    config.write_text(config.read_text().replace('observer = "rates"', 'observer = "table"\ntable = "answers.csv"'))
+    (tmp_path / "answers.csv").write_text("participant_id,method,forward_correct,backward_correct\n")
+    with pytest.raises(ConfigError, match='observer = "table" has no power'):
+        make_grid(Request(config=str(config)))
+
+
+def test_trials_keep_the_sets_and_the_share_of_forward_trials() -> None:
+    grid = make_grid(Request(config="direction", participants="8", trials="10-40", effects="1"))
+    designs = {cell.design.trials: cell.config.design for cell in grid.cells}
+    assert list(designs) == [10, 20, 30, 40]
+    for trials, design in designs.items():
+        assert design.trials_per_session == trials
+        assert design.forward_per_session == design.backward_per_session == trials // 2
+    assert designs[20] == CONFIG.design
+
+
+def test_a_design_that_keeps_people_too_long_is_shown_and_never_proposed(tmp_path: Path) -> None:
+    request = Request(config="direction", participants="14", trials="20,40", effects="1", studies=200, target=0.75)
+    with on_processes(1):
+        found = roof.power(request, roof.Where(workers=1), tmp_path, _silent)
+    short, long = found["designs"]
+    assert short["too_long"] == ""
+    assert long["too_long"] == "3060 s a participant exceed fatigue.max_planned_s = 2700 s"
+    chosen = next(row["design"] for row in found["smallest"] if row["claim"] == ALL_PAIRS)
+    assert chosen is None or chosen["trials"] == 20
+
+
+def test_methods_can_be_compared_in_sets(tmp_path: Path) -> None:
+    request = Request(
+        config="direction",
+        participants="8",
+        methods=("asymmetric-2,vibration", "asymmetric-1,asymmetric-2"),
+        effects="1",
+        studies=100,
+    )
+    found = roof.power(request, roof.Where(workers=1), tmp_path, _silent)
+    assert [one["methods"] for one in found["designs"]] == [
+        ["vibration", "asymmetric-2"],
+        ["asymmetric-1", "asymmetric-2"],
+    ]
+    assert found["designs"][0]["duration_s"] < CONFIG.duration_s
+    assert found["published_pattern"]["participants"] == 14
+    assert (tmp_path / "figures" / "power-2.png").is_file()
+
+
+def test_a_worker_without_this_recoil_is_named() -> None:
+    """The check itself, on what a worker might say."""
+    from experiments.provenance import versions
+    from experiments.roof import jobs
+
+    class Client:
+        def wait_for_workers(self, number: int, timeout: float) -> None: ...
+
+        def run(self, _: Any) -> dict[str, dict[str, str]]:
+            return {"tcp://w:1": versions() | {"numpy": "1.0"}}
+
+    with pytest.raises(JobError, match=r"worker tcp://w:1 has numpy 1\.0, not"):
+        jobs._check_workers(Client(), "tcp://s:1")
+
+
+def test_a_missing_dask_is_named(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setitem(__import__("sys").modules, "distributed", None)
+    with pytest.raises(JobError, match=r"recoil\[dask\]"), on_cluster("tcp://127.0.0.1:1"):
+        pass
+
+
+def test_assumptions_are_told(found: Any) -> None:
+    told = " ".join(found["assumptions"])
+    assert "0.557" in told
+    assert "ability of SD 0.2" in told
+    assert "synthetic.rates.ability_sd" in set(leaves(CONFIG))
+
+
+def _silent(_: str, __: int) -> Any:
+    from contextlib import nullcontext
+
+    return nullcontext(lambda _: None)
