@@ -273,5 +273,5 @@ def _normal_mass(middle: FloatArray, width: FloatArray) -> FloatArray:
     narrow = half[:, 0] < 0.5  # there the difference cancels
     points, weights = GAUSS_LEGENDRE
     at = distance[narrow][..., None] + half[narrow][..., None] * points
-    mass[narrow] = half[narrow] * (np.exp(-np.square(at) / 2.0) @ weights) / np.sqrt(2.0 * np.pi)
+    mass[narrow] = half[narrow] * np.sum(np.exp(-np.square(at) / 2.0) * weights, axis=-1) / np.sqrt(2.0 * np.pi)
     return mass
