@@ -125,16 +125,21 @@ class Watcher:
         now_s, window = time.perf_counter(), self._console.window
         if window is None or (window.state.waiting is None and self._last_s is None):
             return  # from the first step on: opening a window takes its time
-        if self._last_s is not None:
+        if self._last_s is None:
+            window.closed.connect(lambda: self._read(window))  # the last words may stand for less than a tick
+        else:
             self.seen["longest_ms"] = max(self.seen["longest_ms"], 1000 * (now_s - self._last_s))
         self._last_s = now_s
         self.seen["ticks"] += 1
-        for name, text in (("titles", window.title.text()), ("lines", window.saved.text())):
-            if text not in self.seen[name]:
-                self.seen[name].append(text)
+        self._read(window)
         if self._presses and self._guns[0].hangs.is_set():
             self._presses = False
             self._press_in_a_moment(window)
+
+    def _read(self, window: Any) -> None:
+        for name, text in (("titles", window.title.text()), ("lines", window.saved.text())):
+            if text not in self.seen[name]:
+                self.seen[name].append(text)
 
     def _press_in_a_moment(self, window: Any) -> None:
         from PyQt6.QtCore import Qt, QTimer

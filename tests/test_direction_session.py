@@ -1,6 +1,7 @@
 import json
 from collections import Counter
 from dataclasses import fields
+from types import NoneType, UnionType
 from typing import Any, Literal, get_args, get_origin, get_type_hints
 
 import pytest
@@ -205,9 +206,11 @@ words = st.text(st.characters(codec="utf-8"))
 def of_type(hint: Any) -> st.SearchStrategy[Any]:
     if get_origin(hint) is Literal:
         return st.sampled_from(get_args(hint))
-    if hint == float | None:
-        return st.none() | finite
-    known = {str: words, int: st.integers(), float: finite, bool: st.booleans()}
+    if get_origin(hint) is UnionType:
+        return st.one_of([of_type(part) for part in get_args(hint)])
+    if get_origin(hint) is tuple:
+        return st.lists(of_type(get_args(hint)[0]), max_size=2).map(tuple)
+    known = {NoneType: st.none(), str: words, int: st.integers(), float: finite, bool: st.booleans()}
     return known[hint] if hint in known else facts(hint)
 
 
