@@ -11,11 +11,11 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy import special
 
-from analysis.anova import check_scores, rm_anova
-from analysis.binomial import binomial_test
+from analysis.core.anova import check_scores, rm_anova
+from analysis.core.binomial import binomial_test
+from analysis.core.studentized_range import studentized_range_isf
+from analysis.core.tukey import PairStatistics, pairs_of, pooled_pairs
 from analysis.paper import PublishedDirection, PublishedExperiment, TukeyClaim
-from analysis.studentized_range import studentized_range_isf
-from analysis.tukey import PairStatistics, pairs_of, pooled_pairs
 
 WHOLE_PATTERN = "whole pattern"
 SIGNIFICANT = 0.05

@@ -7,8 +7,8 @@ from dataclasses import dataclass, replace
 from decimal import Decimal
 from typing import Any, Literal
 
-from analysis import quantities
 from analysis.paper import Paper, PublishedDirection, PublishedExperiment, PublishedPreference, TukeyClaim
+from analysis.report import quantities
 
 Verdict = Literal[
     "agrees",

@@ -27,9 +27,9 @@ from typing import Annotated, Any, Self
 
 from pydantic import AfterValidator, Field, model_validator
 
-from analysis import apa
-from analysis.report_parts import Section, Table
-from analysis.toml_model import Model, load_model
+from analysis.logs.toml_model import Model, load_model
+from analysis.report import apa
+from analysis.report.parts import Section, Table
 
 
 def _compiles(text: str) -> str:

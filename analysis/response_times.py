@@ -9,8 +9,8 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
-from analysis.arrays import FloatArray
-from analysis.cells import Finite
+from analysis.core.arrays import FloatArray
+from analysis.core.cells import Finite
 
 Json = dict[str, Any]
 Flags = NDArray[np.bool_]

@@ -12,18 +12,18 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
-from analysis.anova import rm_anova
-from analysis.assumptions import assumptions
-from analysis.binomial import binomial_test
-from analysis.cells import DIRECTIONS, Finite, TrialCells, by_name, coded, trial_cells
-from analysis.clustering import METHOD as CLUSTERING_NOTE
-from analysis.completeness import complete_rows
-from analysis.detection import yes_no
-from analysis.logs import Logs
+from analysis.around.assumptions import assumptions
+from analysis.around.clustering import METHOD as CLUSTERING_NOTE
+from analysis.around.supplement import model, pooled_clustering, within_supplement
+from analysis.around.within_subject import cousineau_morey
+from analysis.core.anova import rm_anova
+from analysis.core.binomial import binomial_test
+from analysis.core.cells import DIRECTIONS, Finite, TrialCells, by_name, coded, trial_cells
+from analysis.core.detection import yes_no
+from analysis.core.tukey import rm_tukey_hsd
+from analysis.logs.completeness import complete_rows
+from analysis.logs.reading import Logs
 from analysis.response_times import response_times, valid_times
-from analysis.supplement import model, pooled_clustering, within_supplement
-from analysis.tukey import rm_tukey_hsd
-from analysis.within_subject import cousineau_morey
 
 Json = dict[str, Any]
 

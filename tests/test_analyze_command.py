@@ -14,10 +14,10 @@ from typing import Any
 
 import pytest
 
-from analysis.logs import read_logs
-from analysis.studies import study_names
+from analysis.logs.reading import read_logs
+from analysis.logs.studies import study_names
+from analysis.logs.tables_out import MAX_NAME, short_names
 from analysis.summary import summarize
-from analysis.tables_out import MAX_NAME, short_names
 from tests.conftest import RECOIL, Recoil
 from tests.log_files import METHODS, trial_rows, trials_path, write_rows, write_study
 

@@ -19,7 +19,7 @@ from analysis.audit.means import scale_of
 from analysis.audit.participants import attainable_f, backward_counts, forward_counts, rating_grains
 from analysis.audit.printed import Interval, read
 from analysis.audit.reconstruct import Column, Constraints, meets, printed_constraints, reconstruct
-from analysis.binomial import binomial_test
+from analysis.core.binomial import binomial_test
 from analysis.paper import Paper, load_paper
 from tests.exact import exact_rm_F
 

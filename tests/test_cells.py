@@ -6,9 +6,9 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from analysis.cells import coded, trial_cells
-from analysis.completeness import complete_rows
-from analysis.logs import read_logs
+from analysis.core.cells import coded, trial_cells
+from analysis.logs.completeness import complete_rows
+from analysis.logs.reading import read_logs
 from tests.log_files import METHODS, trial_rows, trials_path, write_rows, write_study
 
 

@@ -7,10 +7,10 @@ from pathlib import Path
 
 import pytest
 
-from analysis.column_map import ColumnMap
-from analysis.logs import Logs, read_logs
+from analysis.logs.column_map import ColumnMap
+from analysis.logs.reading import Logs, read_logs
+from analysis.logs.toml_model import load_model
 from analysis.summary import summarize
-from analysis.toml_model import load_model
 from tests.log_files import TextRow, trial_rows, write_study
 
 EXAMPLE = Path(__file__).parent.parent / "configs" / "examples" / "columns.toml"

@@ -5,8 +5,8 @@ import math
 import numpy as np
 import pytest
 
-from analysis.anova import rm_anova
-from analysis.effect_sizes import NO_VARIANCE, TOO_LARGE, effect_size, partial_eta_squared_interval
+from analysis.around.effect_sizes import NO_VARIANCE, TOO_LARGE, effect_size, partial_eta_squared_interval
+from analysis.core.anova import rm_anova
 from tests.test_sphericity import RIGHT
 
 

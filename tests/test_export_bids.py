@@ -14,9 +14,9 @@ from typing import Any
 import pandas as pd
 import pytest
 
-from analysis import bids as data_set
-from analysis import bids_words as words
-from analysis.logs import read_logs
+from analysis.bids import files as data_set
+from analysis.bids import words
+from analysis.logs.reading import read_logs
 from experiments import columns
 from experiments.clock import RealClock, VirtualClock
 from experiments.load import load_setup, shipped_folder

@@ -10,7 +10,8 @@ from typing import Any
 import numpy as np
 import pytest
 
-from analysis.figures import (
+from analysis.logs.reading import read_logs
+from analysis.report.figures import (
     ShotPanel,
     display_name,
     figure_5,
@@ -19,7 +20,6 @@ from analysis.figures import (
     figure_response_times,
     stars,
 )
-from analysis.logs import read_logs
 from analysis.summary import summarize
 from tests.log_files import write_study
 
@@ -173,7 +173,7 @@ def test_importing_analysis_loads_numpy_and_scipy_alone_and_drawing_leaves_pyplo
     code = """
 import sys, analysis
 assert not {"matplotlib", "pandas", "jinja2", "pydantic", "experiments", "device"} & set(sys.modules)
-import analysis.figures
+import analysis.report.figures
 assert "matplotlib.pyplot" not in sys.modules
 """
     subprocess.run([sys.executable, "-c", code], check=True)

@@ -36,8 +36,8 @@ PURE = {
 HEAVY = {
     "psychopy": ("experiments.screens.participant", "experiments.doctor.programs"),
     "PyQt6": ("experiments.screens.console", "experiments.doctor.programs"),
-    "matplotlib": "analysis.figures",
-    "jinja2": "analysis.report",
+    "matplotlib": "analysis.report.figures",
+    "jinja2": "analysis.report.page",
     "serial": "device.serial_gun",
     "rich": "experiments.roof",
     "typer": "experiments.roof",
@@ -84,10 +84,10 @@ def test_a_room_imports_only_what_the_design_allows(name: str) -> None:
     ("importer", "imported"),
     [
         ("device.words", "experiments.plan"),
-        ("experiments.plan", "analysis.anova"),
+        ("experiments.plan", "analysis.core.anova"),
         ("experiments.session", "experiments.roof.cli"),
-        ("analysis.logs", "experiments.plan"),
-        ("analysis.logs", "device.words"),
+        ("analysis.logs.reading", "experiments.plan"),
+        ("analysis.logs.reading", "device.words"),
     ],
 )
 def test_a_forbidden_import_would_be_noticed(importer: str, imported: str) -> None:

@@ -13,13 +13,14 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from analysis import log_cells, logs
-from analysis.log_batch import read_batch
-from analysis.log_files import find_logs
-from analysis.log_frames import Block, joined
-from analysis.log_records import records
-from analysis.log_rules import BadLogError
-from analysis.logs import read_logs
+from analysis.logs import cells as log_cells
+from analysis.logs import reading as logs
+from analysis.logs.batch import read_batch
+from analysis.logs.files import find_logs
+from analysis.logs.frames import Block, joined
+from analysis.logs.reading import read_logs
+from analysis.logs.records import records
+from analysis.logs.rules import BadLogError
 from experiments import columns
 from tests.log_files import TextRow, rating_rows, trial_rows, trials_path, write_rows, write_study
 

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from analysis.logs import read_logs
+from analysis.logs.reading import read_logs
 from analysis.power import Findings, analysed_directions, analysed_ratings
 from analysis.power.planned import ANOVA, ANY_PAIR
 from analysis.summary import summarize

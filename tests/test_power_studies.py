@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 from scipy import stats
 
+from analysis.core.tukey import rm_tukey_hsd
 from analysis.odds import WHOLE_PATTERN
 from analysis.paper import load_paper
 from analysis.power import (
@@ -24,7 +25,6 @@ from analysis.power import (
     tallied,
 )
 from analysis.power.planned import ALL_PAIRS, ANOVA, ANY_PAIR
-from analysis.tukey import rm_tukey_hsd
 from experiments.direction.observer import RatesObserver
 from experiments.direction.plan import make_plan
 from experiments.load import find, load_setup

@@ -5,7 +5,7 @@ from pathlib import Path
 
 import pytest
 
-from analysis.logs import read_logs
+from analysis.logs.reading import read_logs
 from experiments.clock import VirtualClock
 from experiments.direction.plan import make_practice
 from experiments.load import load_setup

@@ -9,11 +9,11 @@ from typing import Any
 import numpy as np
 import pytest
 
-from analysis.logs import Logs, Problem, read_logs
+from analysis.logs.reading import Logs, Problem, read_logs
 from analysis.odds import odds_of
 from analysis.paper import Paper, load_paper
 from analysis.published import compare
-from analysis.report import ReportData, write_report
+from analysis.report.page import ReportData, write_report
 from analysis.summary import summarize
 from tests.log_files import trial_rows, trials_path, write_rows, write_study
 from tests.test_figures import shot_panel

@@ -12,7 +12,7 @@ import pytest
 from scipy.stats import studentized_range
 from statsmodels.stats.anova import AnovaRM
 
-from analysis.logs import read_logs
+from analysis.logs.reading import read_logs
 from experiments.load import load_setup
 from experiments.roof import reproduce
 from experiments.roof.odds import direction_counts, preference_scores

@@ -5,7 +5,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from analysis.logs import read_logs
+from analysis.logs.reading import read_logs
 from analysis.response_times import response_times
 from tests.log_files import METHODS, TextRow, trial_rows, trials_path, write_rows
 

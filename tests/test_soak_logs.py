@@ -25,7 +25,7 @@ BOTH_WAYS = """
 import json, sys, time
 from pathlib import Path
 import pandas as pd
-from analysis.logs import read_logs
+from analysis.logs.reading import read_logs
 from analysis.summary import summarize
 folder = Path(sys.argv[1])
 files = sorted(folder.rglob("*_trials.csv"))
@@ -47,7 +47,7 @@ print(json.dumps({name: found[1:] for name, found in times.items()}))
 ALONE = """
 import resource, sys
 from pathlib import Path
-from analysis.logs import read_logs
+from analysis.logs.reading import read_logs
 from analysis.summary import summarize
 summarize(read_logs([Path(sys.argv[1])]))
 print(resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024)

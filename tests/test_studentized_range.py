@@ -14,7 +14,7 @@ from hypothesis import strategies as st
 from scipy import special, stats
 
 from analysis import studentized_range_isf, studentized_range_logsf, studentized_range_sf
-from analysis.studentized_tail import TABLE_PAYS
+from analysis.core.studentized_tail import TABLE_PAYS
 
 GOLDEN = json.loads((Path(__file__).parent / "golden" / "studentized_range.json").read_text())["rows"]
 K, DF, Q, P, LOG_P = np.array(GOLDEN, dtype=np.float64).T
@@ -171,5 +171,7 @@ def test_ten_thousand_values_take_no_longer_than_a_hundred_of_scipy() -> None:
 
 
 def test_importing_it_loads_neither_scipy_stats_nor_scipy_linalg() -> None:
-    code = "import sys, analysis.studentized_tail; sys.exit(bool({'scipy.stats', 'scipy.linalg'} & set(sys.modules)))"
+    code = (
+        "import sys, analysis.core.studentized_tail; sys.exit(bool({'scipy.stats', 'scipy.linalg'} & set(sys.modules)))"
+    )
     assert subprocess.run([sys.executable, "-c", code], check=False).returncode == 0

@@ -11,12 +11,12 @@ import pandas as pd
 import pytest
 
 from analysis import rm_tukey_hsd_paired
-from analysis.assumptions import assumptions
-from analysis.bayes import SCALE, jzs_paired
-from analysis.logs import Logs, read_logs
-from analysis.report_supplement import supplement_sections
+from analysis.around.assumptions import assumptions
+from analysis.around.bayes import SCALE, jzs_paired
+from analysis.around.supplement import WITHIN, within_supplement
+from analysis.logs.reading import Logs, read_logs
+from analysis.report.supplement import supplement_sections
 from analysis.summary import summarize
-from analysis.supplement import WITHIN, within_supplement
 from tests.log_files import METHODS, rating_rows, ratings_path, trial_rows, trials_path, write_rows, write_study
 from tests.test_sphericity import RIGHT
 

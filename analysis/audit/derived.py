@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
-from analysis import quantities
 from analysis.audit.claims import (
     BinomialClaim,
     Claim,
@@ -23,7 +22,8 @@ from analysis.audit.means import scale_of
 from analysis.audit.paper_file import PaperFile
 from analysis.audit.printed import Rounding, read
 from analysis.paper import Participants, PublishedDirection, PublishedExperiment, PublishedPreference
-from analysis.quantities import named_in
+from analysis.report import quantities
+from analysis.report.quantities import named_in
 
 RATE_GRAIN, RATING_GRAIN = "0.1", "0.1"
 """Of the correct rate, cor / 10; of the continuous rating scale, assumed: it has no printed grain."""

@@ -9,7 +9,7 @@ from typing import Any, get_args
 from analysis.audit.run import Finding
 from analysis.audit.sentences import ATTENTION, FAIRNESS, nearest_text, sentences
 from analysis.audit.words import Result, Verdict
-from analysis.report_parts import Section, Table
+from analysis.report.parts import Section, Table
 
 Json = dict[str, Any]
 VERDICTS: tuple[Verdict, ...] = get_args(Verdict)

@@ -20,8 +20,8 @@ from analysis.audit.reconstruct import Column, Constraints, Reconstruction, Sums
 from analysis.audit.repeated_lattice import Rows, effect
 from analysis.audit.variance_ratios import repeated_f
 from analysis.audit.words import Result
+from analysis.core.studentized_range import studentized_range_isf
 from analysis.paper import PublishedDirection, PublishedExperiment, PublishedPreference, TukeyClaim
-from analysis.studentized_range import studentized_range_isf
 
 MEAN_SLACK = Fraction(3, 10)
 """How far an assumed mean rating may be off in a data set, in units of the scale; assumed."""

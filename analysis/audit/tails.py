@@ -10,7 +10,7 @@ import numpy as np
 from scipy import special
 
 from analysis.audit.printed import Interval
-from analysis.studentized_range import studentized_range_sf
+from analysis.core.studentized_range import studentized_range_sf
 
 Statistic = Literal["t", "F", "chi2", "r", "z", "Q", "q"]
 Sides = Literal["two-sided", "one-sided"]

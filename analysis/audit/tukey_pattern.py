@@ -19,7 +19,7 @@ from analysis.audit.printed import Interval, PrintedNumber, Rounding, read
 from analysis.audit.repeated_lattice import column_choices
 from analysis.audit.tails import p_range
 from analysis.audit.words import NONE_EXISTS, UNKNOWN, Attempt, Found, Result, decide
-from analysis.studentized_range import studentized_range_isf
+from analysis.core.studentized_range import studentized_range_isf
 
 OWN_ERROR = "each pair's own error term"
 _SOURCE = "Tukey 1953; Kramer 1956, Biometrics 12, 307; Winer 1971, chapter 4"

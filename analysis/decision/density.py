@@ -18,7 +18,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from analysis.arrays import FloatArray, Values, plain
+from analysis.core.arrays import FloatArray, Values, plain
 
 CUT = 0.3
 """Scaled time t / a^2 where the series meet: at most 7 exp(-60) and 36 exp(-51) of the sums are left out there."""

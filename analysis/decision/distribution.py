@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 from scipy import special
 
-from analysis.arrays import FloatArray, Values, plain
+from analysis.core.arrays import FloatArray, Values, plain
 from analysis.decision.density import CUT, WAVES, check_bounds
 from analysis.decision.moments import lower_probability
 

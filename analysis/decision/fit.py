@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy import optimize, special
 
-from analysis.arrays import FloatArray, share
+from analysis.core.arrays import FloatArray, share
 from analysis.decision.ez import ez_from_summary
 from analysis.decision.likelihood import (
     Model,

@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy import special
 
-from analysis.arrays import FloatArray
+from analysis.core.arrays import FloatArray
 from analysis.decision.density import with_slopes
 from analysis.decision.own_times import answers, own_times
 

@@ -20,7 +20,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy import special
 
-from analysis.arrays import FloatArray, Values, plain
+from analysis.core.arrays import FloatArray, Values, plain
 from analysis.decision.density import check_bounds
 
 _TERMS = 20

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import ArrayLike
 
-from analysis.arrays import FloatArray, numbers
+from analysis.core.arrays import FloatArray, numbers
 
 OWN = ("participant", "synthetic")
 """The values of `response_source` whose times are the answerer's own."""

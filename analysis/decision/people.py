@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy import special
 
-from analysis.arrays import share
+from analysis.core.arrays import share
 from analysis.decision.fit import DiffusionFit, fit
 from analysis.decision.likelihood import Range, Trials
 

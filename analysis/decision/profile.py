@@ -7,7 +7,7 @@ import math
 import numpy as np
 from scipy import optimize, special
 
-from analysis.arrays import FloatArray, share
+from analysis.core.arrays import FloatArray, share
 from analysis.decision.fit import best, starts
 from analysis.decision.likelihood import Model, Range, Trials, model_of, natural
 

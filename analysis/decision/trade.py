@@ -11,7 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from analysis.arrays import FloatArray, numbers
+from analysis.core.arrays import FloatArray, numbers
 from analysis.decision.own_times import answers, own_times
 
 QUANTILES = (0.1, 0.3, 0.5, 0.7, 0.9)

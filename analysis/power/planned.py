@@ -15,13 +15,13 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy import special
 
-from analysis.anova import check_scores, rm_anova
-from analysis.arrays import FloatArray
-from analysis.binomial import binomial_test
-from analysis.detection import yes_no
+from analysis.core.anova import check_scores, rm_anova
+from analysis.core.arrays import FloatArray
+from analysis.core.binomial import binomial_test
+from analysis.core.detection import yes_no
+from analysis.core.studentized_range import studentized_range_isf
+from analysis.core.tukey import pairs_of, pooled_pairs
 from analysis.odds import SIGNIFICANT, Recurrence
-from analysis.studentized_range import studentized_range_isf
-from analysis.tukey import pairs_of, pooled_pairs
 
 ANOVA = "ANOVA"
 ALL_PAIRS = "Tukey, all pairs"

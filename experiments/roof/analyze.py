@@ -11,16 +11,16 @@ from analysis import remarks_coding
 from analysis.audit import audit
 from analysis.audit.paper_file import PaperFile, load_paper_file
 from analysis.audit.predictions import predictions
-from analysis.by_study import by_study
-from analysis.column_map import ColumnMap
-from analysis.exclusions import Effect, Rules, apply_rules
-from analysis.logs import Logs, Problem, Track, read_logs
+from analysis.logs.by_study import by_study
+from analysis.logs.column_map import ColumnMap
+from analysis.logs.exclusions import Effect, Rules, apply_rules
+from analysis.logs.reading import Logs, Problem, Track, read_logs
+from analysis.logs.tables_out import result_tables
+from analysis.logs.toml_model import load_model
 from analysis.paper import load_paper
 from analysis.published import Prediction, compare
-from analysis.report import ReportData, write_report
+from analysis.report.page import ReportData, write_report
 from analysis.summary import summarize
-from analysis.tables_out import result_tables
-from analysis.toml_model import load_model
 from experiments import storage
 from experiments.canonical import sha256
 from experiments.load import ConfigError

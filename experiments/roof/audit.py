@@ -11,7 +11,7 @@ from analysis.audit import audit
 from analysis.audit.page import as_json, as_text, counts, page
 from analysis.audit.paper_file import PaperFile, load_paper_file
 from analysis.audit.run import Finding
-from analysis.report import write_page
+from analysis.report.page import write_page
 from experiments import storage
 from experiments.canonical import sha256
 from experiments.load import ConfigError, find

@@ -9,8 +9,9 @@ from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
 
-from analysis import apa, operating
-from analysis.report import Section, Table, write_page
+from analysis.around import operating
+from analysis.report import apa
+from analysis.report.page import Section, Table, write_page
 from experiments import storage
 from experiments.provenance import provenance
 

@@ -14,8 +14,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from analysis import bids
-from analysis.logs import Logs, Track, read_logs
+from analysis.bids import files as bids
+from analysis.logs.reading import Logs, Track, read_logs
 from experiments import places, register, storage
 from experiments.load import load_study
 from experiments.places import PlaceError

@@ -13,7 +13,7 @@ from typing import Any
 
 from analysis.odds import SIGNIFICANT, WHOLE_PATTERN
 from analysis.power import Option, Tally, merged, precisions, shares, smallest
-from analysis.report import write_page
+from analysis.report.page import write_page
 from experiments import storage
 from experiments.canonical import sha256
 from experiments.provenance import provenance

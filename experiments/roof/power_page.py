@@ -6,10 +6,10 @@ from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
 from typing import Any
 
-from analysis import apa
-from analysis.figures.power import Curve, Panel, Rate, figure_false_positives, figure_power
 from analysis.power.planned import ANY_PAIR
-from analysis.report import Picture, Section, Table
+from analysis.report import apa
+from analysis.report.figures.power import Curve, Panel, Rate, figure_false_positives, figure_power
+from analysis.report.page import Picture, Section, Table
 from experiments.roof.power_studies import PUBLISHED
 from experiments.roof.power_words import (
     HEADLINES,

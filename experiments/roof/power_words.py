@@ -5,9 +5,9 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator
 from typing import Any
 
-from analysis import apa
 from analysis.odds import WHOLE_PATTERN
 from analysis.power.planned import ALL_PAIRS, ANOVA, ANY_PAIR
+from analysis.report import apa
 from experiments.direction.config import DirectionConfig, Rates
 from experiments.preference.config import Ratings
 from experiments.roof.power_grid import Grid

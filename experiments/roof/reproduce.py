@@ -16,12 +16,12 @@ from analysis.audit.paper_file import load_paper_file
 from analysis.audit.predictions import ELSEWHERE, other_rows, predictions
 from analysis.audit.run import Finding
 from analysis.audit.sentences import ATTENTION
-from analysis.logs import Logs, read_logs
+from analysis.logs.reading import Logs, read_logs
 from analysis.odds import Odds
 from analysis.paper import Paper, load_paper
 from analysis.published import Row, compare
-from analysis.report import ReportData, write_report
-from analysis.report_sections import obtained_text
+from analysis.report.page import ReportData, write_report
+from analysis.report.sections import obtained_text
 from analysis.summary import summarize
 from device.parameters import GunParameters
 from experiments import places, storage

@@ -9,7 +9,7 @@ from dataclasses import asdict, fields, replace
 from pathlib import Path
 from typing import Any
 
-from analysis.figures import figure_5
+from analysis.report.figures import figure_5
 from device.parameters import GunParameters
 from device.physics import simulate, trace
 from experiments import storage

@@ -1,0 +1,1 @@
+"""Logs as a BIDS data set."""
