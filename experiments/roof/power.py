@@ -17,8 +17,8 @@ from analysis.report.page import write_page
 from experiments import storage
 from experiments.canonical import sha256
 from experiments.provenance import provenance
+from experiments.roof.commands.speaking import Progress
 from experiments.roof.jobs import Run, cores, on_cluster, on_processes
-from experiments.roof.power_command import Progress
 from experiments.roof.power_grid import Cell, Grid, Request, make_grid
 from experiments.roof.power_page import sections
 from experiments.roof.power_studies import PUBLISHED, Chunk, run_chunk
