@@ -39,7 +39,9 @@ def compiled() -> tuple[Callable[..., None], Callable[..., None]]:
     for name, function in (*KERNEL.items(), ("_many", _many)):
         twin, space = _twin(function, f"{name}_{digest}")
         entry = name in ("shoot", "_many")
-        twins[name] = numba.njit(error_model="numpy", cache=entry, nogil=entry)(twin)
+        # all that is called is copied in: half the time, since a call counts the references to each row;
+        # a single shot keeps Python's lock, as all of them share one desk
+        twins[name] = numba.njit(error_model="numpy", cache=entry, nogil=name == "_many", forceinline=not entry)(twin)
         spaces.append(space)
     for space in spaces:
         space.update({name: twin for name, twin in twins.items() if name in space})
@@ -56,7 +58,7 @@ def _twin(function: Callable[..., object], name: str) -> tuple[FunctionType, dic
 
 
 def _digest() -> str:
-    """Of the kernel's text: the compiler's own cache looks at one file only."""
-    text = "".join(inspect.getsource(function) for function in KERNEL.values())
+    """Of the kernel's text and of how it is compiled: the compiler's own cache looks at one file only."""
+    text = "".join(inspect.getsource(function) for function in (*KERNEL.values(), compiled.__wrapped__))
     sizes = f"{RESULT_SIZE} {STATE_SIZE} {WORK_SIZE}"
     return hashlib.sha256((text + sizes).encode()).hexdigest()[:16]

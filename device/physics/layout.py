@@ -23,8 +23,7 @@ FULL, NO_INDUCTANCE, CLOSED_FORM, BALLISTIC = 0.0, 1.0, 2.0, 3.0  # models; with
 TIME, X, V, I, KIND, BEGAN, HEADING, DRIVE, LIVE, LIMIT, SPAN, STEP, USED, TRANSIENT_END, END = range(15)  # noqa: E741 - the field's symbol
 STATE_SIZE = 15
 
-# work: the series of one step (position, velocity, current, grip), and room for two polynomials; all in one row, as
-# the compiler counts references for every row that is handed on
+# work: the series of one step (position, velocity, current, grip), and room for two polynomials; one row to hand on
 ROW = ORDER + 1
 XS, VS, IS, GS, QS, BS = (ROW * n for n in range(6))
 WORK_SIZE = 6 * ROW

@@ -18,11 +18,12 @@ _SMALLEST = 2.0**-46  # of the step: two roots closer than this are one touch, w
 
 @kernel
 def value(w: Floats, c: int, s: float) -> float:
-    """The polynomial at s (Horner)."""
-    y = w[c + ORDER]
-    for j in range(ORDER - 1, -1, -1):
-        y = y * s + w[c + j]
-    return y
+    """The polynomial of even order at s: Horner's scheme in s^2 for the even and the odd powers side by side."""
+    q, even, odd = s * s, w[c + ORDER], w[c + ORDER - 1]
+    for j in range(ORDER - 2, 0, -2):
+        even = even * q + w[c + j]
+        odd = odd * q + w[c + j - 1]
+    return (even * q + odd * s) + w[c]
 
 
 @kernel
@@ -97,10 +98,15 @@ def bracketed_root(w: Floats, c: int, low: float, high: float) -> float:
     sign = 1.0 if w[BS] > 0.0 or (w[BS] == 0.0 and w[BS + ORDER] < 0.0) else -1.0
     s = low + (high - low) * polygon_root(w)
     for _ in range(80):
-        y, slope = w[c + ORDER], 0.0
-        for j in range(ORDER - 1, -1, -1):
-            slope = slope * s + y
-            y = y * s + w[c + j]
+        q, even, odd, even_slope, odd_slope = s * s, w[c + ORDER], w[c + ORDER - 1], 0.0, 0.0
+        for j in range(ORDER - 2, 0, -2):
+            even_slope = even_slope * q + even
+            odd_slope = odd_slope * q + odd
+            even = even * q + w[c + j]
+            odd = odd * q + w[c + j - 1]
+        even_slope = even_slope * q + even
+        y = (even * q + odd * s) + w[c]
+        slope = odd + 2.0 * (s * even_slope + q * odd_slope)
         if y == 0.0:
             return s
         if y * sign > 0.0:

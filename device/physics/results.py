@@ -11,15 +11,9 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from device.physics.layout import STATUSES
-
 Status = Literal["home", "no-break-away", "stuck", "not-home"]
-_STATUS: dict[str, Status] = {
-    "home": "home",
-    "no-break-away": "no-break-away",
-    "stuck": "stuck",
-    "not-home": "not-home",
-}
+_STATUS: tuple[Status, ...] = ("home", "no-break-away", "stuck", "not-home")
+"""By their number in the kernel's results, as `STATUSES`; `invalid` parameters come to no summary."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -65,7 +59,7 @@ def summary_of(row: Sequence[float]) -> ShotSummary:
     """The kernel's row of results as a summary; NaN, which equals nothing, is what was not reached."""
     status, peak, recoil, impulse, firing, top, reset, impact, collision = row[:9]
     return ShotSummary(
-        status=_STATUS[STATUSES[int(status)]],
+        status=_STATUS[int(status)],
         peak_force_N=peak if peak == peak else None,
         recoil_end_s=recoil if recoil == recoil else None,
         recoil_impulse_Ns=impulse if impulse == impulse else None,

@@ -48,10 +48,11 @@ def friction(p: Floats, heading: float) -> float:
 
 @kernel
 def product(w: Floats, a: int, b: int, n: int) -> float:
-    """The n-th coefficient of a product of series."""
-    total = 0.0
-    for j in range(n + 1):
-        total += w[a + n - j] * w[b + j]
+    """The n-th coefficient of a product of series: two terms at a time, first those that were known first."""
+    half = (n + 1) // 2
+    total = w[a + half] * w[b + half] if n % 2 == 0 else 0.0
+    for j in range(half - 1, -1, -1):
+        total += w[a + n - j] * w[b + j] + w[a + j] * w[b + n - j]
     return total
 
 
