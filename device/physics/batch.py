@@ -69,10 +69,9 @@ def warm() -> bool:
     from device.physics.compiled import compiled  # noqa: PLC0415 - only here is the compiler wanted
 
     one, _ = compiled()
-    state, work = np.empty(STATE_SIZE), np.empty(WORK_SIZE)
+    state, work, found = np.empty(STATE_SIZE), np.empty(WORK_SIZE), np.empty(RESULT_SIZE)
 
     def run(row: NDArray[np.float64]) -> list[float]:
-        found = np.empty(RESULT_SIZE)
         one(row, state, work, found)
         return found.tolist()
 
