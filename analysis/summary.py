@@ -21,9 +21,11 @@ from analysis.core.binomial import binomial_test
 from analysis.core.cells import DIRECTIONS, Finite, TrialCells, by_name, coded, trial_cells
 from analysis.core.detection import yes_no
 from analysis.core.tukey import rm_tukey_hsd
+from analysis.decision.own_trials import INSTRUCTION
 from analysis.logs.completeness import complete_rows
 from analysis.logs.reading import Logs
 from analysis.response_times import response_times, valid_times
+from analysis.speed_accuracy import speed_accuracy
 
 Json = dict[str, Any]
 
@@ -40,11 +42,12 @@ BINOMIAL_NOTE = (
 )
 
 
-def summarize(logs: Logs) -> Json:
+def summarize(logs: Logs, *, trade: bool = True) -> Json:
     """The statistics of `logs`, in the layout of `statistics.json`: rates 0 to 1, SD with n - 1, JSON-safe.
 
-    An experiment without a log is left out. Participants who miss an answer or a method are left out of that experiment
-    and listed in `excluded`. What is not finite becomes None and is named in `warnings`.
+    `trade`: with the measures of speed and accuracy. An experiment without a log is left out. Participants who miss an
+    answer or a method are left out of that experiment and listed in `excluded`. What is not finite becomes None and is
+    named in `warnings`.
     """
     tables = {"direction": (logs.trials, _direction), "preference": (logs.ratings, _preference)}
     excluded: list[dict[str, str]] = []
@@ -52,12 +55,22 @@ def summarize(logs: Logs) -> Json:
     for experiment, (table, describe) in tables.items():
         if len(table):
             methods = methods_in(table)
-            complete, left_out = complete_rows(coded(table), experiment, methods)
+            complete, left_out = complete_rows(_coded(table), experiment, methods)
             result[experiment] = _with_assumptions(describe(complete, methods))
+            if trade and experiment == "direction":
+                result[experiment]["speed_accuracy"] = speed_accuracy(complete, methods)
             excluded += left_out
     warnings = [warning for experiment, found in result.items() for warning in _warnings(experiment, found)]
     finite = json_safe(result, "", warnings)
     return {**finite, "excluded": excluded, "warnings": warnings, "versions": versions()}
+
+
+def _coded(table: pd.DataFrame) -> pd.DataFrame:
+    """The coded table, with the instructions if the table has them."""
+    found = coded(table)
+    if INSTRUCTION in table:
+        found[INSTRUCTION] = table[INSTRUCTION]
+    return found
 
 
 def versions() -> dict[str, str]:

@@ -18,6 +18,8 @@ MAX_SHOTS_PER_MINUTE = 300
 """Assumed: the paper's 5 Hz."""
 MAX_COIL_C = 80.0
 """Assumed: well below what enamelled wire and adhesives of such coils stand."""
+MAX_AHEAD_S = 2.0
+"""So long ahead a shot may be asked for: a gun that waits is one that will fire. Assumed."""
 AMBIENT_C = 25.0
 """Assumed."""
 HEAT_CAPACITY_J_K = 20.0
@@ -42,6 +44,15 @@ class Load:
         for name, value in (("on_s", self.on_s), ("heat_J", self.heat_J)):
             if not 0 <= value < math.inf:
                 raise LimitError(f"{name} is {value}; it must be a finite number of at least 0")
+
+
+def planned_start_s(now_s: float, at_s: float | None) -> float:
+    """When a shot starts that is asked for now: at a time, or at once. `LimitError`: a time too far ahead, or none."""
+    if at_s is None:
+        return now_s
+    if not at_s - now_s <= MAX_AHEAD_S:  # NaN compares false, so it is refused as well
+        raise LimitError(f"at_s is {at_s - now_s:.6f} s ahead; it must be at most {MAX_AHEAD_S:g} s ahead")
+    return max(now_s, at_s)
 
 
 def load_of(drive: Drive, resistance_ohm: float) -> Load:

@@ -26,7 +26,8 @@ class GunParameters(_Remembers):
     `drive_off` is what the coil does after the pulse: `shorted` keeps equation (3) with u = 0 (assumed default),
     `open` lets no current flow from the end of the pulse on. `emf` is the back-EMF: `printed` is k_e dx/dt
     everywhere, `reciprocal` fades with the coil's force, (1 - x/x_c) k_e dx/dt inside the coil and 0 outside, so
-    that energy balances. `ValueError` names the field, its value and the rule.
+    that energy balances. `return_friction_N` is that of a damper which brakes the way back otherwise than the way out
+    (the paper's future work). `ValueError` names the field, its value and the rule.
     """
 
     magnet_mass_kg: float = 0.114  # m, paper
@@ -43,11 +44,17 @@ class GunParameters(_Remembers):
     contact_depth_m: float = 0.0005  # x_k, assumed: the paper says "submillimeter"
     drive_off: DriveOff = "shorted"  # assumed
     emf: Emf = "printed"  # paper
+    return_friction_N: float | None = None  # None: friction_N on both ways
 
     def __post_init__(self) -> None:
         _numbers_are_valid(self, above_zero=ABOVE_ZERO, not_numbers=("drive_off", "emf"))
         _is_one_of("drive_off", self.drive_off, get_args(DriveOff))
         _is_one_of("emf", self.emf, get_args(Emf))
+
+    @property
+    def homeward_friction_N(self) -> float:  # noqa: N802 - the unit ends the name
+        """The friction on the way back."""
+        return self.friction_N if self.return_friction_N is None else self.return_friction_N
 
 
 ABOVE_ZERO = ("magnet_mass_kg", "resistance_ohm", "inductance_H", "coil_reach_m", "contact_depth_m")
@@ -79,6 +86,8 @@ def _numbers_are_valid(
 ) -> None:
     for name in (field.name for field in fields(parameters) if field.name not in not_numbers):
         value = getattr(parameters, name)
+        if value is None:
+            continue
         strict = name in above_zero
         if not (math.isfinite(value) and (value > 0 if strict else value >= 0)):
             raise ValueError(

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 
-from device.limits import DriveHistory, Load, load_of
+from device.limits import DriveHistory, Load, load_of, planned_start_s
 from device.methods import Method, rendering_of
 from device.parameters import GunParameters
 from device.words import GunState, GunStatus, Identity, LimitError, LinkError, Shot, ShotReport
@@ -35,8 +35,8 @@ class SimulatedGun:
         self._is_open()
         self._armed = True
 
-    def fire(self, shot: Shot) -> ShotReport:
-        """Fire once and report at once, the return of the magnet included.
+    def fire(self, shot: Shot, at_s: float | None = None) -> ShotReport:
+        """Fire once, now or at a time that comes, and report at once, the return of the magnet included.
 
         `LimitError`: disarmed, no such method, a drive of another kind, or beyond a limit; nothing was rendered.
         `LinkError` after `close`.
@@ -48,14 +48,15 @@ class SimulatedGun:
         rendering = rendering_of(method, shot.drive)
         load = _load(method, shot)
         now_s = self._clock()
-        self._history = self._history.record(load, now_s, now_s + rendering.settle_s)
+        onset_s = planned_start_s(now_s, at_s)
+        self._history = self._history.record(load, onset_s, onset_s + rendering.settle_s)
         self._shots += 1
         return ShotReport(
             shot=shot,
             requested_s=now_s,
-            pulse_start_s=now_s,
-            pulse_end_s=now_s + (load.on_s or rendering.settle_s),
-            home_predicted_s=now_s + rendering.settle_s,
+            pulse_start_s=onset_s,
+            pulse_end_s=onset_s + (load.on_s or rendering.settle_s),
+            home_predicted_s=onset_s + rendering.settle_s,
             motion=rendering.motion,
         )
 

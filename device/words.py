@@ -141,8 +141,11 @@ class Gun(Protocol):
     def arm(self) -> None:
         """Allow the next shots."""
 
-    def fire(self, shot: Shot) -> ShotReport:
-        """Fire once. `LimitError`: refused, nothing was sent. `LinkError`: the outcome is unknown."""
+    def fire(self, shot: Shot, at_s: float | None = None) -> ShotReport:
+        """Fire once: now, or at a time on the host's clock, at most 2 s ahead; `disarm` calls a shot off that waits.
+
+        `LimitError`: refused, nothing was sent. `LinkError`: the outcome is unknown.
+        """
 
     def disarm(self) -> None:
         """Forbid shots, from every state."""

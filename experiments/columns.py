@@ -79,6 +79,12 @@ TRIALS: tuple[Column, ...] = (
     _NOTE,
     _ONSET,
     _GUN,
+    _level(
+        "instruction",
+        (),
+        "what the participant was told for this set (`speed`, `accuracy`, ...), as the config names it; empty if "
+        "nothing. Synthetic observers `rates` and `table` do not heed it, `felt` does",
+    ),
 )
 
 RATINGS: tuple[Column, ...] = (
@@ -100,6 +106,9 @@ RATINGS: tuple[Column, ...] = (
 
 TABLES: dict[str, tuple[Column, ...]] = {"direction": TRIALS, "preference": RATINGS}
 """The table of each experiment."""
+
+LATER = ("instruction",)
+"""Columns that tables from before they came do not have."""
 
 FILE_SUFFIX: dict[str, str] = {"direction": "trials", "preference": "ratings"}
 """How the table's file name ends: `sub-P01_task-direction_trials.csv`."""

@@ -6,9 +6,17 @@ Unknown keys, wrong types, infinities and contradictions are refused here, at th
 from __future__ import annotations
 
 from collections.abc import Iterator
-from typing import Annotated, Any, Literal, Self, TypeVar
+from typing import Annotated, Any, ClassVar, Literal, Self, TypeVar
 
-from pydantic import AfterValidator, BaseModel, ConfigDict, Field, model_validator
+from pydantic import (
+    AfterValidator,
+    BaseModel,
+    ConfigDict,
+    Field,
+    SerializerFunctionWrapHandler,
+    model_serializer,
+    model_validator,
+)
 
 Order = Literal["random", "williams", "latin-square"]
 Fact = Literal["age_years", "sex", "handedness"]
@@ -43,10 +51,22 @@ Methods = Annotated[tuple[Text, ...], Field(min_length=1, max_length=26), AfterV
 
 
 class SyntheticConfig(Model):
-    """Who answers when nobody sits there: an observer, or the answers of a table."""
+    """Who answers when nobody sits there: an observer, or the answers of a table.
+
+    `OF_FELT` names the sections of the observer "felt".
+    """
+
+    OF_FELT: ClassVar[tuple[str, ...]] = ()
 
     observer: str
     table: Text | None = None
+
+    @model_serializer(mode="wrap")
+    def _as_it_is_hashed(self, handler: SerializerFunctionWrapHandler) -> dict[str, Any]:
+        """What is felt only where it is used or given: other setups keep the hash from before it could be."""
+        table: dict[str, Any] = handler(self)
+        unused = set() if self.observer == "felt" else set(self.OF_FELT) - self.model_fields_set
+        return {key: value for key, value in table.items() if key not in unused}
 
     @model_validator(mode="after")
     def _table_is_named(self) -> Self:
@@ -76,7 +96,8 @@ AgeYears = Annotated[int, Field(ge=1, le=120)]
 Some = TypeVar("Some", bound=str)
 
 
-def _once(levels: tuple[Some, ...]) -> tuple[Some, ...]:
+def once(levels: tuple[Some, ...]) -> tuple[Some, ...]:
+    """The levels; `ValueError` if one stands there twice."""
     doubled = sorted({level for level in levels if levels.count(level) > 1})
     if doubled:
         raise ValueError(f"{', '.join(doubled)} stands there more than once; name each once")
@@ -86,9 +107,9 @@ def _once(levels: tuple[Some, ...]) -> tuple[Some, ...]:
 class EligibilityConfig(Model):
     """What is asked of a participant before a run, and who may take part. Empty levels and missing ages: any."""
 
-    ask: Annotated[tuple[Fact, ...], AfterValidator(_once)] = ()
-    handedness: Annotated[tuple[Handedness, ...], AfterValidator(_once)] = ()
-    sex: Annotated[tuple[Sex, ...], AfterValidator(_once)] = ()
+    ask: Annotated[tuple[Fact, ...], AfterValidator(once)] = ()
+    handedness: Annotated[tuple[Handedness, ...], AfterValidator(once)] = ()
+    sex: Annotated[tuple[Sex, ...], AfterValidator(once)] = ()
     age_years_min: AgeYears | None = None
     age_years_max: AgeYears | None = None
 
@@ -158,6 +179,11 @@ def _inner_leaves(value: Any, prefix: str) -> Iterator[str]:
         for key, inner in value.items():
             yield f"{prefix}{key}"
             yield from _inner_leaves(inner, f"{prefix}{key}.")
+
+
+def where_told(table: dict[str, Any]) -> dict[str, Any]:
+    """A table without `instructions` where there are none: such a setup keeps the hash from before there were any."""
+    return {key: value for key, value in table.items() if key != "instructions" or value}
 
 
 def check_covered(where: str, values: dict[str, float], methods: tuple[str, ...]) -> None:

@@ -35,7 +35,7 @@ that clock was real or virtual (synthetic participants: breaks take no time).
 | key | in | meaning |
 | --- | --- | --- |
 | `n` | every record | number of the record, from 0 |
-| `kind` | every record | `run`, `step`, `outcome`, `remark`, `stopped`, `resumed` or `finished` |
+| `kind` | every record | `run`, `step`, `outcome`, `shot`, `remark`, `stopped`, `resumed` or `finished` |
 | `monotonic_s`, `utc` | every record | when it was written |
 | `link` | every record | first 16 digits of the SHA-256 of the line before: a record changed by hand breaks the chain |
 | `synced_s` | every record | when the record before it was on the disk |
@@ -44,6 +44,9 @@ that clock was real or virtual (synthetic participants: breaks take no time).
 | `provenance`, `gun`, `clock` | `run`, `resumed` | versions, commit, system; who renders; which clock |
 | `experimenter_knows` | `run`, `resumed` | what the experimenter could not be kept from knowing: direction, dampers |
 | `body` | `step`, `outcome`, `remark` | what should happen, what did, what was said beside it; its `kind` says which |
+| `body` | `shot` | one shot of a train, from 1, with its times; kept also if the train fails or is stopped |
+| `body.timing` | `outcome`, `shot` | of a gun on a line: request, write, acknowledgement, pulse, on both clocks |
+| `body.key_time_s` | `outcome` | when a synthetic participant's key went down (`--visual`), in s since the onset |
 | `shown_s` | `outcome` | when the console had painted the step, where there was a console |
 | `reason` | `stopped` | why the run stopped before its end |
 | `cut_bytes`, `stopped_utc` | `resumed` | bytes of a record cut off at the end, and when the run had stopped |
@@ -92,6 +95,8 @@ or a line in `warnings` that says why. Under `direction` and `preference`:
 | `binomial` | pooled exact tests: `p`, `log_p`, Clopper-Pearson and Wilson intervals, `clustering` |
 | `model` | logistic GEE of the forward answers with a bias-reduced sandwich (direction only) |
 | `response_time`, `response_times` | of times from the participant's own hand alone (direction only) |
+| `speed_accuracy` | of these, by method and instruction: `methods`, `instruction_effects`, `diffusion` |
+| `speed_accuracy.refused` | answered trials whose times are nobody's own, by reason; `caveats`: what each number is |
 
 Beside them: `excluded` (who, where, why), `rules` (what was dropped by which rule), `studies` (each study's own
 statistics, where there are several), `warnings`, `versions`.

@@ -20,7 +20,7 @@ from experiments import storage
 from experiments.canonical import canonical_json, sha256
 from experiments.clock import Clock
 
-Kind = Literal["run", "step", "outcome", "remark", "resumed", "stopped", "finished"]
+Kind = Literal["run", "step", "outcome", "shot", "remark", "resumed", "stopped", "finished"]
 _KINDS = get_args(Kind)
 
 

@@ -22,6 +22,17 @@ class Trial:
     set: int
     trial: int
     direction: Direction
+    instruction: str = ""
+    """The name of what the participant was told for this set; empty if nothing."""
+
+
+def where_given(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
+    """A `dict_factory` that leaves out an instruction where there is none: a plan without any keeps its old hash.
+
+    >>> where_given([("set", 1), ("instruction", "")]), where_given([("instruction", "speed")])
+    ({'set': 1}, {'instruction': 'speed'})
+    """
+    return {key: value for key, value in pairs if key != "instruction" or value}
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -43,9 +54,13 @@ class Plan:
         """The methods in the order in which they are met."""
         return tuple(dict.fromkeys(trial.method for trial in self.trials))
 
+    def opens_set(self, trial: Trial) -> bool:
+        """Whether a trial is the first of its set."""
+        return trial == next(t for t in self.trials if (t.session, t.set) == (trial.session, trial.set))
+
     def record(self) -> dict[str, Any]:
-        """The plan as plain JSON values."""
-        return asdict(self)
+        """The plan as plain JSON values, without instructions where there are none."""
+        return asdict(self, dict_factory=where_given)
 
     @classmethod
     def from_record(cls, record: object) -> Plan:

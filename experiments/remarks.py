@@ -11,7 +11,7 @@ from typing import Annotated, Any, Literal
 from pydantic import Field, TypeAdapter
 
 from device.words import Direction
-from experiments.plan import Trial
+from experiments.plan import Trial, where_given
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -72,7 +72,7 @@ _REMARK: TypeAdapter[Remark] = TypeAdapter(Annotated[Remark, Field(discriminator
 
 def record(remark: Remark) -> dict[str, Any]:
     """A remark as plain JSON values."""
-    return asdict(remark)
+    return asdict(remark, dict_factory=where_given)
 
 
 def remark_from(body: object) -> Remark:

@@ -15,7 +15,7 @@ from pydantic import ValidationError
 from device import Gun, open_gun
 from experiments import catalogue, limits, orders, places, register, replay, storage
 from experiments.clock import Clock
-from experiments.columns import FILE_SUFFIX
+from experiments.columns import FILE_SUFFIX, LATER
 from experiments.journal import Contents, Journal, JournalError, hold, is_empty
 from experiments.journal import read as read_journal
 from experiments.places import Place, PlaceError
@@ -248,19 +248,30 @@ def _to_the_end(session: Session, desk: Desk, standing: Standing, place: Place) 
         storage.write_whole(place.table, table(read_journal(place.journal)))
         raise
     data = table(read_journal(place.journal))
-    desk.journal.append("finished", table_sha256=hashlib.sha256(data).hexdigest())
+    desk.journal.append("finished", table_sha256=_sha256(data))
     storage.write_whole(place.table, data)
 
 
 def table(contents: Contents) -> bytes:
-    """The CSV that a journal makes. `JournalError` if this version does not know its plan."""
+    """The CSV that a journal makes. `JournalError` if this version does not know its plan.
+
+    A run that was finished before some columns came gets the table that it finished with.
+    """
     plan = plan_of(contents)
     if plan.experiment not in catalogue.CATALOGUE:
         raise JournalError(
             f"{contents.path}: line 1: experiment {plan.experiment!r} is not known to this version of Recoil"
         )
     rows = catalogue.CATALOGUE[plan.experiment].rows(plan, replay.told(contents))
-    return table_bytes(plan.experiment, rows)
+    data, finished = table_bytes(plan.experiment, rows), contents.records[-1].get("table_sha256")
+    if finished not in (None, _sha256(data)):
+        older = table_bytes(plan.experiment, rows, without=LATER)
+        return older if _sha256(older) == finished else data
+    return data
+
+
+def _sha256(data: bytes) -> str:
+    return hashlib.sha256(data).hexdigest()
 
 
 def plan_of(contents: Contents) -> Plan:

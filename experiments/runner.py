@@ -1,14 +1,16 @@
 """The one loop that carries steps out: it tells the journal, lets gun, person or clock do it, and acknowledges.
 
 Console, terminal and synthetic participant differ only in the `Screen` they hand over.
+A train's shots are asked for a little ahead, each for its own tick, and the gun waits for it by its own clock: neither
+the line nor this machine delays them. Each is in the journal before the next is asked for.
 """
 
 from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass
-from typing import Protocol
+from dataclasses import dataclass, fields, replace
+from typing import Any, Literal, Protocol
 
 from device import DeviceError, Gun, LimitError, LinkError, Shot, ShotReport
 from device.words import Drive, Identity
@@ -37,11 +39,19 @@ from experiments.steps import (
     Session,
     Standing,
     Step,
+    TrainShot,
     record,
 )
 
 MAX_FAILURES = 3
 """Failures of the gun in a row after which a run stops and can be resumed."""
+
+
+LEAD_S = 0.03
+"""How long before its tick a shot of a train is asked for; a `next` within that time comes too late for it.
+
+Assumed: twice what the doctor lets pass, 5 ms that a sleep overruns and 10 ms to the gun and back.
+"""
 
 
 class RunStopped(Exception):  # noqa: N818 - a stop is not an error
@@ -65,8 +75,8 @@ class Screen(Protocol):
     def rest(self, step: Rest) -> Rested:
         """Have the break taken."""
 
-    def said_next(self, step: Present, until_s: float) -> bool:
-        """Wait until the participant says next or until a time; true if they said it."""
+    def said_next(self, step: Present, onset_s: float, until_s: float) -> bool:
+        """Wait until the participant says next or until a time; true if they said it. `onset_s`: the first pulse."""
 
     def rate(self, step: Rate) -> Rated:
         """Have a stimulus rated."""
@@ -152,7 +162,7 @@ def _count(failures: int, outcome: Outcome) -> int:
 def _do(step: Step, desk: Desk, onset_s: float) -> Outcome:
     match step:
         case Prepare():
-            return desk.screen.prepare(step)
+            return _confirmed(step, desk.screen.prepare(step))
         case Fire():
             return _fire(step, desk)
         case Ask():
@@ -167,57 +177,74 @@ def _do(step: Step, desk: Desk, onset_s: float) -> Outcome:
             return desk.screen.describe(step)
 
 
+def _confirmed(step: Prepare, outcome: Prepared | Repeat) -> Prepared | Repeat:
+    """The outcome of a hand-over, with the damper that was asked for and so confirmed."""
+    return replace(outcome, damper=step.damper or None) if isinstance(outcome, Prepared) else outcome
+
+
 def _fire(step: Fire, desk: Desk) -> Fired | Failed:
     """One shot, armed for it alone."""
     try:
-        desk.gun.arm()
-        onset_utc, report = _shoot(step.trial, desk)
+        onset_utc, report = _first(step.trial, desk)
     except (LimitError, LinkError) as error:
         return Failed(cause=str(error))
     finally:
         disarm(desk.gun)
-    return Fired(
-        gun=desk.gun_name,
-        onset_utc=onset_utc,
-        requested_s=report.requested_s,
-        pulse_start_s=report.pulse_start_s,
-        pulse_end_s=report.pulse_end_s,
-        home_predicted_s=report.home_predicted_s,
-        motion=report.motion,
-        timing=report.timing,
-    )
+    return Fired(gun=desk.gun_name, onset_utc=onset_utc, **_times(report))
 
 
-def _shoot(trial: Trial, desk: Desk) -> tuple[str, ShotReport]:
+def _times(report: ShotReport) -> dict[str, Any]:
+    """What the journal keeps of a shot's report, beside what was asked for."""
+    return {field.name: getattr(report, field.name) for field in fields(report) if field.name != "shot"}
+
+
+def _first(trial: Trial, desk: Desk) -> tuple[str, ShotReport]:
+    """The first shot of a stimulus, as soon as the magnet is home, and its date and time."""
+    desk.gun.arm()
     desk.clock.sleep(desk.gun.status().ready_at_s - desk.clock.now())
+    return desk.clock.utc(), _shoot(trial, desk)
+
+
+def _shoot(trial: Trial, desk: Desk, at_s: float | None = None) -> ShotReport:
     shot = Shot(method=trial.method, direction=trial.direction, drive=desk.drives[trial.method])
-    onset_utc = desk.clock.utc()
-    return onset_utc, desk.gun.fire(shot)
+    return desk.gun.fire(shot, at_s)
 
 
 def _present(step: Present, desk: Desk) -> Presented | Failed:
     """Shots at whole multiples of the interval since the first, until next is said."""
     try:
-        desk.gun.arm()
-        onset_utc, first = _shoot(step.trial, desk)
-        reports = [first]
-        while not desk.screen.said_next(step, first.pulse_start_s + len(reports) * step.repeat_every_s):
-            if len(reports) == step.max_shots:
-                return _presented(desk, onset_utc, reports, "limit")
-            reports.append(_shoot(step.trial, desk)[1])
+        onset_utc, first = _first(step.trial, desk)
+        shots = _journal(1, first, desk)
+        while not desk.screen.said_next(step, first.pulse_start_s, (at_s := _due_s(step, first, shots, desk)) - LEAD_S):
+            if shots == step.max_shots:
+                return _presented(desk, onset_utc, first, shots, "limit")
+            shots = _journal(shots + 1, _shoot(step.trial, desk, at_s), desk)
     except DeviceError as error:
         return Failed(cause=str(error))
     finally:
         disarm(desk.gun)
-    return _presented(desk, onset_utc, reports, "next")
+    return _presented(desk, onset_utc, first, shots, "next")
 
 
-def _presented(desk: Desk, onset_utc: str, reports: list[ShotReport], ended_by: str) -> Presented:
+def _due_s(step: Present, first: ShotReport, shots: int, desk: Desk) -> float:
+    """The next shot's tick, whole microseconds after the first; later if the magnet is not home by then."""
+    tick_s = first.pulse_start_s + shots * round(step.repeat_every_s * 1e6) / 1e6
+    return max(tick_s, desk.gun.status().ready_at_s)
+
+
+def _journal(shot: int, report: ShotReport, desk: Desk) -> int:
+    """Have a train's shot on the disk before the next is asked for; its number."""
+    desk.journal.append("shot", body=record(TrainShot(shot=shot, **_times(report))))
+    return shot
+
+
+def _presented(
+    desk: Desk, onset_utc: str, first: ShotReport, shots: int, ended_by: Literal["next", "limit"]
+) -> Presented:
     return Presented(
         gun=desk.gun_name,
         onset_utc=onset_utc,
-        shots=len(reports),
-        exposure_s=desk.clock.now() - reports[0].pulse_start_s,
-        ended_by="next" if ended_by == "next" else "limit",
-        timings=tuple(report.timing for report in reports if report.timing),
+        shots=shots,
+        exposure_s=desk.clock.now() - first.pulse_start_s,
+        ended_by=ended_by,
     )

@@ -12,16 +12,20 @@ from typing import Annotated, Any, Literal
 from pydantic import Field, TypeAdapter
 
 from device.words import Direction, ShotTiming
-from experiments.plan import Trial
+from experiments.plan import Trial, where_given
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Prepare:
-    """Take the gun, turn it to the trial's direction, set the damper if one is named, hand it over."""
+    """Take the gun, turn it to the trial's direction, set the damper if one is named, hand it over.
+
+    `instruction` is the text of what the participant is told for this set, empty if nothing.
+    """
 
     trial: Trial
     attempt: int
     damper: str
+    instruction: str = ""
     kind: Literal["prepare"] = "prepare"
 
 
@@ -91,8 +95,12 @@ class Describe:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Prepared:
-    """The gun is in the participant's hand."""
+    """The gun is in the participant's hand, with the damper set as it was asked for: whoever fires confirms it.
 
+    `damper` is `None` where none is set by hand, and in journals from before it was kept.
+    """
+
+    damper: str | None = None
     kind: Literal["prepared"] = "prepared"
 
 
@@ -116,12 +124,17 @@ class Fired:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Answered:
-    """The participant said which way. The time is valid if it came from the participant's own hand."""
+    """The participant said which way. The time is valid if it came from the participant's own hand.
+
+    `key_time_s` is when the key for it went down, since the onset, where the response time is not that of the key: a
+    synthetic participant's is the observer's.
+    """
 
     response: Direction
     response_time_s: float
     response_source: Literal["participant", "experimenter", "synthetic"]
     response_time_valid: bool
+    key_time_s: float | None = None
     kind: Literal["answered"] = "answered"
 
 
@@ -138,7 +151,7 @@ class Rested:
 class Presented:
     """The stimulus was felt until next was said, or until the most shots were fired.
 
-    `timings` tell how each shot came about, where a gun on a line was asked.
+    `timings`: how each shot came about, in journals from before each had a record of its own (`TrainShot`).
     """
 
     gun: str
@@ -148,6 +161,23 @@ class Presented:
     ended_by: Literal["next", "limit"]
     timings: tuple[ShotTiming, ...] = ()
     kind: Literal["presented"] = "presented"
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class TrainShot:
+    """One shot of a train, recorded as soon as it was fired: of a train that breaks off it is known what was felt.
+
+    `shot` counts from 1; times and `timing` as in `Fired`.
+    """
+
+    shot: int
+    requested_s: float
+    pulse_start_s: float
+    pulse_end_s: float
+    home_predicted_s: float
+    motion: str
+    timing: ShotTiming | None = None
+    kind: Literal["train-shot"] = "train-shot"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -212,14 +242,15 @@ class Standing:
     history: History
 
 
-_WHERE_KNOWN = ("timing", "timings")
+_WHERE_KNOWN = ("damper", "timing", "timings", "key_time_s")
 _STEP: TypeAdapter[Step] = TypeAdapter(Annotated[Step, Field(discriminator="kind")])
 _OUTCOME: TypeAdapter[Outcome] = TypeAdapter(Annotated[Outcome, Field(discriminator="kind")])
 
 
-def record(word: Step | Outcome) -> dict[str, Any]:
-    """A step or outcome as plain JSON values; how a shot came about only where that is known."""
-    return {key: value for key, value in asdict(word).items() if key not in _WHERE_KNOWN or value}
+def record(word: Step | Outcome | TrainShot) -> dict[str, Any]:
+    """A step, outcome or shot as plain JSON values; an instruction, and what is not always known, only where it is."""
+    words = asdict(word, dict_factory=where_given)
+    return {key: value for key, value in words.items() if key not in _WHERE_KNOWN or value not in (None, ())}
 
 
 def step_from(body: object) -> Step:

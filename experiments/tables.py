@@ -85,11 +85,14 @@ def _flags(story: Story) -> list[str]:
     return list(dict.fromkeys([flag for flag, there in found.items() if there] + own))
 
 
-def table_bytes(experiment: str, rows: Iterable[Row]) -> bytes:
-    """The table as RFC 4180 CSV in UTF-8: CRLF, quotes doubled, text guarded, an empty cell for what is missing."""
+def table_bytes(experiment: str, rows: Iterable[Row], without: Sequence[str] = ()) -> bytes:
+    """The table as RFC 4180 CSV in UTF-8: CRLF, quotes doubled, text guarded, an empty cell for what is missing.
+
+    Columns `without` are left out.
+    """
     text = io.StringIO(newline="")
     writer = csv.writer(text, lineterminator="\r\n")
-    table = columns.TABLES[experiment]
+    table = [column for column in columns.TABLES[experiment] if column.name not in without]
     writer.writerow(column.name for column in table)
     writer.writerows([_cell(column, row.get(column.name)) for column in table] for row in rows)
     return text.getvalue().encode()

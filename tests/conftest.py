@@ -49,14 +49,15 @@ def recoil(tmp_path: Path) -> Recoil:
 
 @pytest.fixture
 def quick_configs(tmp_path: Path) -> Path:
-    """The shipped configs in a folder of their own, experiment 1 without breaks, for runs on a real clock."""
+    """The shipped configs in a folder of their own, experiment 1 without breaks and with quick synthetic answers."""
     folder = tmp_path / "configs"
     folder.mkdir()
     for source in shipped_folder().glob("*.toml"):
         (folder / source.name).write_bytes(source.read_bytes())
     config = folder / "direction.toml"
     text = re.sub(r"between_(sets|sessions)_s = [\d.]+", r"between_\1_s = 0.0", config.read_text())
-    config.write_text(text.replace("max_trials_without_break = 10", "max_trials_without_break = 60"))
+    text = text.replace("max_trials_without_break = 10", "max_trials_without_break = 60")
+    config.write_text(text.replace("shift_s = 0.35", "shift_s = 0.01").replace("median_s = 0.75", "median_s = 0.02"))
     return folder
 
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 from collections import Counter
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -16,7 +16,7 @@ from device.twin.body import Rendered
 from device.twin.twin import Twin
 from experiments import run as runs
 from experiments.clock import RealClock
-from experiments.journal import read
+from experiments.journal import Contents, read
 from experiments.load import load_setup
 from experiments.places import Place, place
 from experiments.replay import told
@@ -133,3 +133,26 @@ def _agree(trial: Any, fired: Fired, true: Rendered, slack_s: float) -> bool:
 
 def _nearest(ledger: list[Rendered], time_s: float) -> Rendered:
     return min(ledger, key=lambda true: abs(true.start_s - time_s))
+
+
+def of_trains(contents: Contents) -> Iterator[tuple[list[dict[str, Any]], dict[str, Any] | None]]:
+    """The shots of each presentation, and its outcome if it has one."""
+    shots: list[dict[str, Any]] | None = None
+    for entry in contents.records:
+        if entry["kind"] == "step":
+            if shots is not None:
+                yield shots, None
+            shots = [] if entry["body"]["kind"] == "present" else None
+        elif entry["kind"] == "shot" and shots is not None:
+            shots.append(entry["body"])
+        elif entry["kind"] == "outcome" and shots is not None:
+            yield shots, entry["body"]
+            shots = None
+    if shots is not None:
+        yield shots, None
+
+
+def timings_of(contents: Contents) -> list[dict[str, Any]]:
+    """How every shot in a journal came about that was done, in order."""
+    bodies = [entry["body"] for entry in contents.records if entry["kind"] in ("outcome", "shot")]
+    return sorted((body["timing"] for body in bodies if "timing" in body), key=lambda one: one["requested_s"])

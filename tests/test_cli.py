@@ -209,7 +209,7 @@ def test_simulate_tells_of_a_shot_and_draws_it(recoil: Recoil, tmp_path: Path) -
         (("--set", "voltage_V"), "key=value"),
         (("--set", "voltage_V=high"), "'high' is not a number"),
         (("--set", "magnet_mass_kg=-1"), "magnet_mass_kg"),
-        (("--method", "vibration"), "no force"),
+        (("--method", "vibration", "--audit"), "no force"),
         (("--method", "laser"), "laser"),
         (("--fidelity", "perfect"), "perfect"),
         (("--gun", "none.toml"), "none.toml"),

@@ -53,6 +53,28 @@ def test_psychopys_files_give_the_statistics_of_the_same_answers_in_recoils_own(
     assert found["origin"]["guns"] == {"not stated": 180}
 
 
+def test_what_was_told_is_read_by_the_map_and_kept_where_it_does_not_say(tmp_path: Path) -> None:
+    told = ("fast", "exact", "as you like")
+    rows = [[*row, told[k % 3]] for k, row in enumerate(_psychopy(trial_rows("P01")))]
+    text = EXAMPLE.read_text(encoding="utf-8")
+    for line in ('instruction = "told"', "[values.instruction]", 'fast = "speed"', 'exact = "accuracy"'):
+        text = text.replace(f"# {line}", line)
+    logs = _read(_write(tmp_path / "all.csv", rows, (*HEADER, "told")), text)
+    assert logs.problems == ()
+    assert logs.trials["instruction"].value_counts().to_dict() == {"speed": 20, "accuracy": 20, "as you like": 20}
+    found = summarize(logs)["direction"]["speed_accuracy"]
+    assert found["instructions"] == ["accuracy", "as you like", "speed"]
+
+
+def test_times_that_the_map_says_are_the_experimenters_are_nobodys_own(tmp_path: Path) -> None:
+    text = EXAMPLE.read_text(encoding="utf-8").replace(
+        'response_source = "participant"', 'response_source = "experimenter"'
+    )
+    found = summarize(_read(_write(tmp_path / "all.csv", _psychopy(trial_rows("P01"))), text))["direction"]
+    assert (found["response_times"]["n"], found["speed_accuracy"]["n"]) == (0, 0)
+    assert found["speed_accuracy"]["refused"]["experimenter"]["trials"] == 60
+
+
 def test_a_long_table_of_several_people_and_sites_is_taken_apart(tmp_path: Path) -> None:
     rows = [[*row, site] for site in ("kyoto", "oslo") for row in _psychopy(trial_rows("P01", len(site)))]
     text = EXAMPLE.read_text(encoding="utf-8").replace('# study = "site"', 'study = "site"')

@@ -55,11 +55,11 @@ class FaultyGun:
         self.hangs = threading.Event()
         self.disarmed_s: list[float] = []
 
-    def fire(self, shot: Shot) -> ShotReport:
+    def fire(self, shot: Shot, at_s: float | None = None) -> ShotReport:
         self.shots += 1
         if self.shots == 2:
             self._trouble()
-        return self._gun.fire(shot)
+        return self._gun.fire(shot, at_s)
 
     def _trouble(self) -> None:
         match self._case:
@@ -163,12 +163,12 @@ def program(case: str, folder: Path) -> dict[str, Any]:
 
     def watch(console: Any) -> None:
         watchers.append(Watcher(console, guns, case))
-        drivers.append(VisualParticipant(setup, console))
+        drivers.append(VisualParticipant(console, clock))
 
-    setup = short_direction(sets=1, trials=3, set_break_s=0.0)
+    setup, clock = short_direction(sets=1, trials=3, set_break_s=0.0), RealClock()
     request = Request(setup=setup, participant_id="P01", results=folder, seed=1)
     try:
-        run_console(request, RealClock(), hand="synthetic", watch=watch)
+        run_console(request, clock, hand="synthetic", watch=watch)
     except RunStopped as stop:
         stopped = str(stop)
     return watchers[0].seen | {"stopped": stopped, "disarmed_s": guns[0].disarmed_s, "shots": guns[0].shots}

@@ -92,11 +92,11 @@ class FailsOnce:
     def __init__(self, gun: Gun) -> None:
         self._gun, self.shots = gun, 0
 
-    def fire(self, shot: Shot) -> ShotReport:
+    def fire(self, shot: Shot, at_s: float | None = None) -> ShotReport:
         self.shots += 1
         if self.shots == 1:
             raise LinkError("no answer")
-        return self._gun.fire(shot)
+        return self._gun.fire(shot, at_s)
 
     def __getattr__(self, name: str) -> Any:
         return getattr(self._gun, name)

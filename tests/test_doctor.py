@@ -33,6 +33,7 @@ from experiments.doctor.link import adapters
 from experiments.doctor.measures import APPENDS, appends, ticks
 from experiments.doctor.spread import Spread, percentile, spread
 from experiments.journal import Journal
+from experiments.load import ConfigError, find, load_gun
 from experiments.places import PlaceError
 from experiments.roof.doctor import as_text
 from tests.conftest import RECOIL, Recoil
@@ -154,10 +155,12 @@ KEYS = Keys(injected=2, to_event_ms=[0.4, 0.5], to_painted_ms=[0.8, 0.9])
         (verdicts.of_disk(replace(DISK, append_ms=SLOW)), "warning", "local disk"),
         (verdicts.of_disk(replace(DISK, free_bytes=10**6)), "warning", "make room"),
         (verdicts.of_disk_failure("results", "Read-only file system"), "fails", "--results"),
-        (verdicts.of_link(LINK), "good", ""),
-        (verdicts.of_link(replace(LINK, round_trip_ms=SLOW)), "warning", "latency timer"),
-        (verdicts.of_link(replace(LINK, state="armed")), "fails", "switch off"),
-        (verdicts.of_link(replace(LINK, fault="coil open")), "fails", "switch off"),
+        (verdicts.of_link(LINK, 0.010), "good", ""),
+        (verdicts.of_link(LINK, 0.0002), "warning", "above the limit of 0.2 ms"),
+        (verdicts.of_link(replace(LINK, round_trip_ms=SLOW), 0.010), "warning", "latency timer"),
+        (verdicts.of_link(replace(LINK, round_trip_ms=SLOW), 0.5), "good", ""),
+        (verdicts.of_link(replace(LINK, state="armed"), 0.010), "fails", "switch off"),
+        (verdicts.of_link(replace(LINK, fault="coil open"), 0.010), "fails", "switch off"),
         (verdicts.of_link_failure("no answer"), "fails", "cable"),
         (verdicts.of_adapters([]), "not there", "nothing"),
         (verdicts.of_adapters([ADAPTER]), "good", ""),
@@ -322,9 +325,21 @@ def test_what_the_libraries_of_a_child_print_and_raise_does_not_spoil_its_answer
 def test_a_check_that_breaks_off_is_a_finding_and_an_impossible_wish_is_refused() -> None:
     (finding,) = carry_out(Check(name="gun", look=lose_the_gun))
     assert (finding.verdict, finding.check, finding.measured) == ("fails", "gun", "gone")
-    gun = next(check for check in checks(Path("results"), "water") if check.name == "gun")
+    gun = next(check for check in checks(Path("results"), "water", 0.01) if check.name == "gun")
     with pytest.raises(PlaceError, match="water"):
         carry_out(gun)
+
+
+def test_the_limit_of_the_line_is_the_guns_and_no_part_of_a_run(tmp_path: Path) -> None:
+    shipped = find("gun").read_text(encoding="utf-8")
+    own = tmp_path / "gun.toml"
+    own.write_text(f"{shipped}\n[serial]\nround_trip_limit_s = 0.004\n", encoding="utf-8")
+    assert load_gun(find("gun")).serial.round_trip_limit_s == 0.010
+    assert load_gun(own).serial.round_trip_limit_s == 0.004
+    assert load_gun(own).model_dump() == load_gun(find("gun")).model_dump()
+    own.write_text(f"{shipped}\n[serial]\nround_trip_limit_s = 0\n", encoding="utf-8")
+    with pytest.raises(ConfigError, match=r"gun\.toml:\d+: serial\.round_trip_limit_s = 0.*greater than 0"):
+        load_gun(own)
 
 
 # the command

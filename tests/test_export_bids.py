@@ -95,7 +95,7 @@ def real(tmp_path_factory: pytest.TempPathFactory) -> Path:
     trials = [row | {"response_source": "participant", "flags": "late"} for row in trial_rows("Z9")]
     trials[0] |= {"response": "", "correct": "", "response_time_s": "", "response_source": "", "attempts": ""}
     trials[1] |= {"note": NASTY, "onset_utc": "2026-03-01T09:30:00.250000Z"}
-    trials[2] |= {"onset_utc": "2026-03-01T09:30:17.500000Z", "gun": "RG-2 0007"}
+    trials[2] |= {"onset_utc": "2026-03-01T09:30:17.500000Z", "gun": "RG-2 0007", "instruction": "speed"}
     ratings = [row | {"rating_by": "participant"} for row in rating_rows("Z9")]
     ratings[0] |= {"rating": "0", "comment": NASTY}
     write_rows(trials_path(results, "Z9"), trials)
@@ -168,6 +168,11 @@ def test_missing_is_na_and_zero_is_a_value(exported: Path) -> None:
     first = table(exported, "sub-Z9/beh/sub-Z9_task-direction_beh.tsv")[0]
     assert (first["response"], first["correct"], first["response_time"], first["attempts"]) == ("n/a",) * 4
     assert table(exported, "sub-Z9/beh/sub-Z9_task-preference_beh.tsv")[0]["rating"] == "0.0"
+
+
+def test_what_the_participant_was_told_is_in_the_data_set(exported: Path) -> None:
+    told = [row["instruction"] for row in table(exported, "sub-Z9/beh/sub-Z9_task-direction_beh.tsv")]
+    assert told[:4] == ["n/a", "n/a", "speed", "n/a"]
 
 
 def test_onset_counts_from_the_first_pulse_and_no_date_is_told(exported: Path) -> None:

@@ -4,6 +4,7 @@ import json
 import re
 import subprocess
 import sys
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -63,6 +64,46 @@ def test_figure_5_is_written_as_png_svg_and_pdf_and_names_the_stages(tmp_path: P
 def test_a_shot_that_does_not_come_home_is_drawn_without_a_collision(landing_s: float, tmp_path: Path) -> None:
     _, svg, _ = figure_5([shot_panel(np.nan if np.isnan(landing_s) else 1.0, landing_s)], tmp_path / "shot")
     assert ("collision" in svg.read_text(encoding="utf-8")) is not np.isnan(landing_s)
+
+
+def still_panel() -> ShotPanel:
+    time, still = np.linspace(0.0, 0.02, 100), np.zeros(100)
+    return ShotPanel(
+        title="0.3 V",
+        time_s=time,
+        force_N=still,
+        displacement_m=still,
+        velocity_m_s=still,
+        drive_V=np.where(time < 0.01, 0.3, 0.0),
+        stage_ends_s=(np.nan, np.nan, np.nan),
+        collision_force_N=np.nan,
+        status="no-break-away",
+    )
+
+
+def test_a_magnet_that_never_moved_is_at_rest_and_the_figure_says_why(tmp_path: Path) -> None:
+    _, svg, _ = figure_5([still_panel()], tmp_path / "shot")
+    text = svg.read_text(encoding="utf-8")
+    assert "at rest" in text
+    assert "no break away" in text
+    assert "recoil" not in text
+
+
+def test_a_shot_that_stuck_ends_in_its_resetting_stage(tmp_path: Path) -> None:
+    _, svg, _ = figure_5([replace(shot_panel(np.nan, np.nan), status="stuck")], tmp_path / "shot")
+    text = svg.read_text(encoding="utf-8")
+    assert "stuck" in text
+    assert "resetting" in text
+    assert "ready" not in text
+
+
+@pytest.mark.parametrize(("last_s", "logarithmic"), [(0.25, False), (10.0, True)])
+def test_time_is_logarithmic_where_a_stage_would_be_too_narrow_to_see(
+    last_s: float, logarithmic: bool, tmp_path: Path
+) -> None:
+    panel = shot_panel()
+    _, svg, _ = figure_5([replace(panel, time_s=panel.time_s * last_s / 0.25)], tmp_path / "shot")
+    assert ("$\\mathdefault{10^{2}}$" in svg.read_text(encoding="utf-8")) is logarithmic
 
 
 def test_figure_8_shows_both_experiments_or_the_one_there_is(statistics: dict[str, Any], tmp_path: Path) -> None:

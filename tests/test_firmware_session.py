@@ -11,7 +11,7 @@ import pytest
 from device.serial_gun.asked import WAYS
 from experiments.journal import read
 from tests.conftest import Recoil
-from tests.serial_runs import hasty
+from tests.serial_runs import hasty, timings_of
 from tests.test_firmware_emulated import Emulated, emulated
 from tests.test_serial_run import rows
 
@@ -26,19 +26,12 @@ def fast_chip(tmp_path):
 
 
 def logs_of(recoil: Recoil, folder: Path, config: Path, gun: str) -> tuple[list[dict[str, str]], list[dict]]:
-    """A run's table but for its times, and the outcomes in its journal."""
+    """A run's table but for its times, and how each shot in its journal came about."""
     words = ("--participant", "P01", "--screen", "synthetic", "--seed", 3, "--json", "--results", folder)
     done = recoil("run", config, *words, "--gun", gun)
     assert done.returncode == 0, done.stderr
     paths = {key: config.parent.parent / path for key, path in json.loads(done.stdout).items()}
-    outcomes = [record["body"] for record in read(paths["journal"]).records if record["kind"] == "outcome"]
-    return rows(paths["table"]), outcomes
-
-
-def timings_of(outcomes: list[dict]) -> list[dict]:
-    """Every shot's own times: one in an outcome of experiment 1, a train's in one of experiment 2."""
-    single = [body["timing"] for body in outcomes if body["kind"] == "fired"]
-    return single + [timing for body in outcomes for timing in body.get("timings", ())]
+    return rows(paths["table"]), timings_of(read(paths["journal"]))
 
 
 def driven(chip: Emulated) -> list[int]:
@@ -49,9 +42,9 @@ def driven(chip: Emulated) -> list[int]:
 def as_on_the_simulated_gun(recoil: Recoil, config: Path, chip: Emulated, speed: int) -> int:
     """The logs are the same but for times, and every shot in them was driven, once, when they say. How many."""
     simulated, _ = logs_of(recoil, Path("simulated"), config, "simulated")
-    emulated_rows, outcomes = logs_of(recoil, Path("emulated"), config, f"serial:{chip.port}?speed={speed}")
+    emulated_rows, timings = logs_of(recoil, Path("emulated"), config, f"serial:{chip.port}?speed={speed}")
     assert emulated_rows == simulated
-    starts = [timing["gun_start_us"] for timing in timings_of(outcomes)]
+    starts = [timing["gun_start_us"] for timing in timings]
     assert starts == driven(chip)
     if config.stem == "direction":
         ways = [WAYS[row["direction"]] for row in simulated]

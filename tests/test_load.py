@@ -237,7 +237,7 @@ BROKEN = {
     ),
     "unknown observer": Broken(
         DIRECTION, DIRECTION, 'observer = "rates"', 'observer = "ratings"',
-        ("synthetic.observer = 'ratings'", "'rates' or 'table'"), 'observer = "ratings"',
+        ("synthetic.observer = 'ratings'", "'rates', 'table' or 'felt'"), 'observer = "ratings"',
     ),
 }  # fmt: skip
 
@@ -294,7 +294,8 @@ BROKEN_GUNS = {
         DIRECTION, GUN, "voice_coil.friction_N = 1.12", "voice_coil.friction_N = 1.7",
         ("methods.asymmetric-2: ", "friction_N 1.7", "does not come home (stuck)"),
     ),
-    "not TOML": Broken(DIRECTION, GUN, "[methods.vibration]", "[methods.vibration", ("not TOML", "line 32")),
+    "not TOML": Broken(DIRECTION, GUN, "[methods.vibration]", "[methods.vibration",
+        ("not TOML", f"line {line(shipped_folder() / GUN, '[methods.vibration]')}")),
 }  # fmt: skip
 
 

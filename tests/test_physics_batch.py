@@ -103,3 +103,14 @@ def test_an_interpreted_shot_takes_milliseconds():
 def test_a_name_of_the_kernel_stands_for_one_function():
     with pytest.raises(ValueError, match="shoot already"):
         kernel(single.shoot)
+
+
+def test_a_return_friction_of_its_own_is_the_guns_and_an_arrays():
+    alone = [simulate(GunParameters(friction_N=f, return_friction_N=r)) for f in (0.21, 0.5) for r in (0.3, 1.12)]
+    out, back = [0.21, 0.21, 0.5, 0.5], [0.3, 1.12, 0.3, 1.12]
+    expected = [shot.reset_end_s for shot in alone]
+    assert simulate_batch(friction_N=out, return_friction_N=back).reset_end_s.tolist() == expected
+    assert simulate_batch(return_friction_N=back, friction_N=out).reset_end_s.tolist() == expected
+    kept = simulate_batch(GunParameters(return_friction_N=1.12), friction_N=[0.21, 0.5])
+    assert kept.reset_end_s.tolist() == expected[1::2]
+    assert simulate_batch(return_friction_N=[math.nan, 1.0]).names().tolist() == ["invalid", "home"]

@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from device.physics import GunParameters, simulate
+from device.physics import GunParameters, hand, simulate
 from device.physics.audit import audit
 from device.physics.contact import compliant_collision, rigid_collision
 from device.physics.damper import damper_friction, strip_stiffness
@@ -57,7 +57,7 @@ def test_the_audit_of_any_gun_closes(gun):
 
 def test_a_damper_for_the_way_back_only_leaves_the_recoil_alone():
     bare = simulate(GunParameters(drive_off="open"))
-    braked = simulate(GunParameters(drive_off="open"), return_friction_N=1.12)
+    braked = simulate(GunParameters(drive_off="open", return_friction_N=1.12))
     for name in ("peak_force_N", "recoil_end_s", "recoil_impulse_Ns", "firing_end_s", "max_displacement_m"):
         assert getattr(braked, name) == pytest.approx(getattr(bare, name), rel=1e-13)
     lost = (1.12 - 0.21) * bare.max_displacement_m  # the work that the damper adds
@@ -68,7 +68,7 @@ def test_a_damper_for_the_way_back_only_leaves_the_recoil_alone():
 @pytest.mark.parametrize("friction_N", [-1.0, math.nan, math.inf])
 def test_a_friction_that_physics_has_not_is_refused(friction_N):
     with pytest.raises(ValueError, match="return_friction_N is"):
-        simulate(GunParameters(), return_friction_N=friction_N)
+        simulate(GunParameters(return_friction_N=friction_N))
 
 
 def test_equation_5():
@@ -113,6 +113,20 @@ def test_a_gun_too_heavy_to_move_is_the_fixed_gun(friction_N, drive_off, emf):
     held, fixed = simulate_held(gun, Hand(enclosure_mass_kg=1e7)), simulate(gun)
     for name in ("max_displacement_m", "reset_end_s", "impact_speed_m_s"):
         assert getattr(held, name) == pytest.approx(getattr(fixed, name), rel=2e-7), name
+
+
+@pytest.mark.parametrize("inductance_H", [1e-5, 1e-9, 1e-12])
+def test_a_held_coil_of_hardly_any_inductance_is_the_fixed_one_when_it_cannot_move(inductance_H):
+    gun = GunParameters(inductance_H=inductance_H, drive_off="open")
+    held, fixed = simulate_held(gun, Hand(enclosure_mass_kg=1e7)), simulate(gun)
+    for name in ("max_displacement_m", "reset_end_s", "impact_speed_m_s"):
+        assert getattr(held, name) == pytest.approx(getattr(fixed, name), rel=2e-7), name
+
+
+def test_a_held_shot_that_is_not_followed_to_its_end_is_said(monkeypatch):
+    monkeypatch.setattr(hand, "_MAX_PHASES", 2)
+    with pytest.raises(RuntimeError, match="2 stretches"):
+        simulate_held(GunParameters())
 
 
 @pytest.mark.parametrize(("friction_N", "drive_off", "emf"), VARIANTS)

@@ -10,7 +10,7 @@ from device.physics.batch import simulate_batch
 from device.physics.tiers import FRICTION_N, NEAR, OUTPUTS, stated_error
 
 OPTIONS = [(off, emf) for off in ("shorted", "open") for emf in ("printed", "reciprocal")]
-FIXED = ("friction_N", "pulse_s", "contact_depth_m", "drive_off", "emf")
+FIXED = ("friction_N", "return_friction_N", "pulse_s", "contact_depth_m", "drive_off", "emf")
 VARIED = [field.name for field in dataclasses.fields(GunParameters) if field.name not in FIXED]
 PLAIN = GunParameters()
 

@@ -31,7 +31,6 @@ from experiments.load import find, load_setup
 from experiments.preference.config import RatingScale
 from experiments.preference.observer import draw_ratings
 from experiments.preference.scale import on_scale as one_on_scale
-from experiments.roof.odds import direction_counts as counts_of_odds
 from experiments.roof.odds import direction_odds, preference_odds
 from experiments.roof.power_grid import Request, make_grid
 from experiments.roof.power_studies import (
@@ -56,11 +55,6 @@ def draws(number: int = 1) -> np.random.Generator:
 
 
 # people
-
-
-def test_at_effect_one_the_answers_are_those_behind_the_odds() -> None:
-    ours = direction_counts(DIRECTION, 14, 50, generator(3, "odds", "direction"))
-    assert (ours == counts_of_odds(DIRECTION, list(METHODS), 14, 50, 3)).all()
 
 
 def test_the_answers_are_distributed_as_those_of_the_observer_step_by_step() -> None:

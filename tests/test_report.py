@@ -58,7 +58,7 @@ def _text(html: str) -> str:
 
 def test_everything_that_the_contract_names_is_written(full: Path) -> None:
     names = sorted(str(path.relative_to(full)) for path in full.rglob("*") if path.is_file())
-    stems = ("5", "8", "directions", "response-times")
+    stems = ("5", "8", "conditional-accuracy", "directions", "quantile-probability", "response-times")
     figures = [f"figures/figure-{stem}.{kind}" for stem in stems for kind in ("pdf", "png", "svg")]
     assert names == [*figures, "report.html", "report.md", "statistics.json"]
 
@@ -102,7 +102,7 @@ def test_the_html_stands_alone(full: Path) -> None:
     assert all(address.startswith(("data:image/png;base64,", "#")) for address in addresses)
     assert "url(" not in html
     assert "@import" not in html
-    assert len(re.findall(r'<img [^>]*alt="[^"]{40,}"', html)) == 4
+    assert len(re.findall(r'<img [^>]*alt="[^"]{40,}"', html)) == 6
     for words in ("prefers-color-scheme: dark", "@media print", 'name="viewport"', 'class="scroll'):
         assert words in html
 

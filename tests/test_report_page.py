@@ -49,7 +49,7 @@ def test_nothing_sticks_out_and_every_figure_is_there(page: Path, tmp_path: Path
     measured = tmp_path / "report.html"
     measured.write_text(page.read_text(encoding="utf-8") + MEASURE, encoding="utf-8")
     shown = browse(measured, tmp_path, "--dump-dom", f"--window-size={width},2000")
-    assert "<title>wide: broken:0 images:4</title>" in shown
+    assert "<title>wide: broken:0 images:6</title>" in shown
 
 
 def test_the_page_is_painted_in_more_than_two_colours(page: Path, tmp_path: Path) -> None:

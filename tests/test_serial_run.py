@@ -6,17 +6,17 @@ import re
 import signal
 import subprocess
 import time
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
 
 from experiments.journal import read
 from experiments.places import PlaceError
-from experiments.replay import told
+from experiments.roof.session import check_pace
 from experiments.roof.twin import troubles_of
-from experiments.steps import Presented
 from tests.conftest import RECOIL
-from tests.serial_runs import check, hasty, one_run, resumed, run_all
+from tests.serial_runs import check, hasty, of_trains, one_run, resumed, run_all, timings_of
 from tests.twins import Troubles, a_twin
 
 SPEED = 40.0
@@ -39,7 +39,8 @@ TIMES = ("onset_utc", "response_time_s", "gun", "exposure_s")
 
 
 def test_two_hundred_trials_on_a_bad_line_are_each_done_once_or_marked_and_offered_again(tmp_path, quick_configs):
-    with a_twin(tmp_path, TROUBLES, speed=SPEED, drift_ppm=60.0) as (twin, socket):
+    often = replace(TROUBLES, reset=0.025, busy=0.025, hang=0.025)  # so few trials see each of them
+    with a_twin(tmp_path, often, speed=SPEED, drift_ppm=60.0) as (twin, socket):
         gun = f"serial:{socket.address}?speed={SPEED:g}"
         tally = run_all(hasty(quick_configs), tmp_path / "results", gun, range(1, 5))
         figures = check(tally, twin, slack_s=1e-4)
@@ -49,20 +50,20 @@ def test_two_hundred_trials_on_a_bad_line_are_each_done_once_or_marked_and_offer
 
 
 def test_trains_on_a_bad_line_are_whole_and_never_too_soon(tmp_path, quick_configs):
-    """A train that was broken is presented again; of one that was not, each shot is in the journal as it was."""
+    """A train that was broken is presented again; of both, each shot that was done is in the journal as it was."""
     noise = Troubles(jitter_s=0.001, lose=0.003, double=0.003, corrupt=0.003, partial=0.003, unplug=0.01, replug_s=0.05)
     config = quick_configs / "preference.toml"
     config.write_text(re.sub(r"hand_over_s = [\d.]+", "hand_over_s = 0.3", config.read_text()))
     with a_twin(tmp_path, noise, speed=SPEED) as (twin, socket):
         gun = f"serial:{socket.address}?speed={SPEED:g}"
         done = resumed(lambda again: one_run(config, tmp_path / "results", gun, "P01", again))
-    presented = [outcome for _, outcome in told(read(done.journal)) if isinstance(outcome, Presented)]
-    assert len(presented) == 3
-    for train in presented:
-        assert len(train.timings) == train.shots
-        for timing in train.timings:
-            true = min(twin.body.ledger, key=lambda one: abs(one.start_s - timing.pulse_start_s))
-            assert abs(true.start_s - timing.pulse_start_s) <= timing.uncertainty_s + 1e-4
+    contents = read(done.journal)
+    whole = [(shots, body) for shots, body in of_trains(contents) if body and body["kind"] == "presented"]
+    assert [len(shots) for shots, _ in whole] == [body["shots"] for _, body in whole]
+    assert len(whole) == 3
+    for timing in timings_of(contents):
+        true = min(twin.body.ledger, key=lambda one: abs(one.start_s - timing["pulse_start_s"]))
+        assert abs(true.start_s - timing["pulse_start_s"]) <= timing["uncertainty_s"] + 1e-4
     assert not any(true.too_soon for true in twin.body.ledger)
 
 
@@ -110,9 +111,7 @@ def test_a_run_on_the_twin_logs_what_one_on_the_simulated_gun_does_but_for_times
         logs.append({key: tmp_path / path for key, path in json.loads(done.stdout).items()})
     simulated, twin = (rows(log["table"]) for log in logs)
     assert twin == simulated
-    outcomes = [record["body"] for record in read(logs[1]["journal"]).records if record["kind"] == "outcome"]
-    timings = [body["timing"] for body in outcomes if body["kind"] == "fired"]
-    timings += [timing for body in outcomes for timing in body.get("timings", ())]
+    timings = timings_of(read(logs[1]["journal"]))
     assert len(timings) == sum(int(row.get("shots", 1)) for row in twin)
     assert all(one["requested_s"] <= one["written_s"] <= one["acknowledged_s"] for one in timings)
     assert all("timing" not in str(record["body"]) for record in read(logs[0]["journal"]).records if "body" in record)
@@ -177,10 +176,25 @@ def test_the_twin_refuses_what_it_cannot_be(recoil):
         troubles_of(["lose=much"])
 
 
-def test_the_twin_on_a_tcp_port_is_opened_by_url(recoil, tmp_path):
+def test_the_twin_on_a_tcp_port_is_opened_by_url_and_measured_against_its_own_limit(recoil, tmp_path, quick_configs):
+    strict = quick_configs / "gun.toml"
+    strict.write_text(f"{strict.read_text()}\n[serial]\nround_trip_limit_s = 1e-6\n")
     with a_twin(tmp_path, tcp=True, speed=1.0) as (_, socket):
         start_s = time.monotonic()
-        done = recoil("doctor", "--json", "--gun", f"serial:{socket.address}")
+        done = recoil("doctor", "--json", "--gun", f"serial:{socket.address}", "--gun-config", strict)
         assert time.monotonic() - start_s < 60
     (gun,) = [row for row in json.loads(done.stdout)["checks"] if row["check"] == "gun"]
-    assert gun["verdict"] == "good"
+    assert gun["verdict"] == "warning"
+    assert "above the limit of 0.001 ms (the gun's serial.round_trip_limit_s)" in gun["advice"]
+
+
+@pytest.mark.parametrize("who", [("--participant", "P01"), ()], ids=["run", "lab day"])
+def test_a_twin_in_a_hurry_is_refused_where_people_answer(recoil, who):
+    done = recoil("run", "direction", *who, "--screen", "console", "--gun", "serial:/dev/pts/9?speed=20")
+    assert done.returncode == 2
+    assert "--screen console is for people, who live no faster than the world" in done.stderr
+    assert "Traceback" not in done.stderr
+    with pytest.raises(PlaceError, match="--screen terminal is for people"):
+        check_pace("terminal", "serial:/dev/pts/9?speed=20")
+    check_pace("terminal", "serial:/dev/pts/9")
+    check_pace("synthetic", "serial:/dev/pts/9?speed=20")

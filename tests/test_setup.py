@@ -39,7 +39,7 @@ def test_comments_and_the_order_of_keys_do_not_matter(folder: Path) -> None:
     [
         ("direction.toml", "between_sets_s = 20.0", "between_sets_s = 20.5"),
         ("direction.toml", "Which way did", "Which way, please, did"),
-        ("gun.toml", "friction_N = 1.12", "friction_N = 1.13"),
+        ("gun.toml", "voice_coil.friction_N = 1.12", "voice_coil.friction_N = 1.13"),
         ("gun.toml", 'damper = "on"', 'damper = "off"'),
     ],
 )

@@ -11,7 +11,8 @@ from typing import Any
 
 from device import Pulse, Shot
 from device.methods import paper_methods
-from device.serial_gun.gun import SerialGun, open_serial
+from device.serial_gun.gun import SerialGun
+from device.serial_gun.opening import open_serial
 from device.twin.core import IDENTITY
 from device.twin.faults import Troubles
 from device.twin.ports import Pty, Socket, Tcp

@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
+from numpy.typing import ArrayLike
 from scipy import special
 
 from analysis.core.arrays import share
@@ -46,22 +48,31 @@ class PeopleFit:
 
 
 def fit_people(
-    trials: Trials, *, bias: bool = True, lapses: bool | Range = False, confidence: float = 0.95
+    trials: Trials,
+    *,
+    bias: bool = True,
+    lapses: bool | Range = False,
+    confidence: float = 0.95,
+    track: Callable[[Sequence[int]], Iterable[int]] = iter,
+    together: DiffusionFit | None = None,
 ) -> PeopleFit:
     """Fit each person alone, then the mean over people with Student's t on people - 1 degrees of freedom.
 
     Two stages: right when people differ, which the fit of all trials together is not; but each person's fit has the
-    bias of few trials (with 60: t0 about +10 ms, drifts some percent too large), which the mean keeps. A person who
-    lacks a condition or instruction, or whose fit has no clear peak, is left out and named by place. `ValueError`:
-    confidence outside 0..1.
+    bias of few trials (with 60: t0 about +10 ms, drifts some percent too large), which the mean keeps. Each climbs from
+    the peak of all trials `together`, a fit of the same model, which is made if not given. A person who lacks a
+    condition or instruction, or whose fit has no clear peak, is left out and named by place. `track` is given the
+    places and gives them back one by one: for a progress bar. `ValueError`: confidence outside 0..1.
     """
     alpha = 1.0 - share(confidence, "confidence")
-    fits = [fit(of_person(trials, code), bias=bias, lapses=lapses) for code in range(int(trials.person.max()) + 1)]
+    places = track(range(int(trials.person.max()) + 1))
+    near = together or fit(trials, bias=bias, lapses=lapses)
+    fits = [fit(of_person(trials, place), bias=bias, lapses=lapses, near=near) for place in places]
     names = max((tuple(e.name for e in one.estimates) for one in fits), key=len)
     whole = [one.reason is None and tuple(e.name for e in one.estimates) == names for one in fits]
     kept = [one for one, good in zip(fits, whole, strict=True) if good]
     return PeopleFit(
-        means=tuple(_mean(name, [one[name].value for one in kept], alpha) for name in names),
+        means=tuple(mean_estimate(name, [one[name].value for one in kept], alpha) for name in names),
         fits=tuple(fits),
         left_out=tuple(place for place, good in enumerate(whole) if not good),
     )
@@ -85,11 +96,12 @@ def of_person(trials: Trials, person: int) -> Trials:
     )
 
 
-def _mean(name: str, values: list[float], alpha: float) -> MeanEstimate:
-    """NaN for the spread of fewer than two people."""
-    n = len(values)
-    value = float(np.mean(values)) if n else math.nan
-    sd = float(np.std(values, ddof=1)) if n > 1 else math.nan
+def mean_estimate(name: str, values: ArrayLike, alpha: float = 0.05) -> MeanEstimate:
+    """The mean over people with Student's t on people - 1 degrees of freedom; NaN for the spread of fewer than two."""
+    own = np.asarray(values, dtype=np.float64)
+    n = own.size
+    value = float(own.mean()) if n else math.nan
+    sd = float(own.std(ddof=1)) if n > 1 else math.nan
     se = sd / math.sqrt(n) if n > 1 else math.nan
     half = -float(special.stdtrit(n - 1, alpha / 2.0)) * se if n > 1 else math.nan
     return MeanEstimate(name=name, value=value, se=se, ci_low=value - half, ci_high=value + half, sd=sd, people=n)

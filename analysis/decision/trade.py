@@ -12,6 +12,8 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from analysis.core.arrays import FloatArray, numbers
+from analysis.decision.by_person import Ordered, ordered
+from analysis.decision.by_person import quantiles as own_quantiles
 from analysis.decision.own_times import answers, own_times
 
 QUANTILES = (0.1, 0.3, 0.5, 0.7, 0.9)
@@ -54,16 +56,26 @@ def conditional_accuracy(
         raise ValueError(f"bins is {bins}; it must be at least 1")
     times = own_times(time_s, sources)
     right = answers(correct, "correct", times.size)
-    rows = by_person(people, times.size)
-    enough = [np.sort(row) for row in rows if row.size >= bins]
-    ordered = [row[np.argsort(times[row], kind="stable")] for row in enough]
-    cut = [np.array_split(row, bins) for row in ordered]
-    mean = [[[values[part].mean() for part in row] for row in cut] for values in (times, right)]
-    by_bin = np.array(mean, dtype=np.float64).reshape(2, len(cut), bins)
-    averages = by_bin.mean(axis=1) if cut else np.full((2, bins), np.nan)
+    everybody = ordered(people, times)
+    enough = everybody.of_at_least(bins)
+    cell = enough.person * bins + _bins(enough, bins)
+    shape = enough.people, bins
+    trials = np.bincount(cell, minlength=enough.people * bins).reshape(shape)
+    sums = [np.bincount(cell, weights=v[enough.rows], minlength=trials.size).reshape(shape) for v in (times, right)]
+    mean_time_s, accuracy = ((s / trials).mean(axis=0) if enough.people else np.full(bins, np.nan) for s in sums)
     return ConditionalAccuracy(
-        mean_time_s=averages[0], accuracy=averages[1], people=len(cut), left_out=len(rows) - len(cut)
+        mean_time_s=mean_time_s,
+        accuracy=accuracy,
+        people=enough.people,
+        left_out=everybody.people - enough.people,
     )
+
+
+def _bins(by: Ordered, bins: int) -> NDArray[np.intp]:
+    """The bin of each row: of n trials the first n mod bins hold one more."""
+    size, more = np.repeat(by.count // bins, by.count), np.repeat(by.count % bins, by.count)
+    larger = more * (size + 1)
+    return np.asarray(np.where(by.rank < larger, by.rank // (size + 1), more + (by.rank - larger) // size))
 
 
 def quantile_probability(
@@ -84,25 +96,17 @@ def quantile_probability(
     """
     times = own_times(time_s, sources)
     right = answers(correct, "correct", times.size)
-    rows = by_person(people, times.size)
-    share = float(np.mean([right[row].mean() for row in rows])) if rows else np.nan
+    everybody = ordered(people, times)
+    share = float(everybody.means(right).mean()) if everybody.people else np.nan
     points, counts = [], []
     for kind in (0.0, 1.0):
-        own = [times[row][right[row] == kind] for row in rows]
-        found = [np.quantile(kept, quantiles) for kept in own if kept.size >= max(fewest, 1)]
-        points.append(np.mean(found, axis=0) if found else np.full(len(quantiles), np.nan))
-        counts.append(len(found))
+        enough = everybody.only(right == kind).of_at_least(max(fewest, 1))
+        nobody = np.full(len(quantiles), np.nan)
+        points.append(own_quantiles(times, enough, quantiles).mean(axis=0) if enough.people else nobody)
+        counts.append(enough.people)
     return QuantileProbability(
         probability=np.array([1.0 - share, share]), quantiles_s=np.array(points), people=np.array(counts, dtype=np.intp)
     )
-
-
-def by_person(people: ArrayLike, count: int) -> list[NDArray[np.intp]]:
-    """The rows of each person, in the codes' sorted order. `ValueError`: not one code a row."""
-    codes = np.asarray(people)
-    if codes.shape != (count,):
-        raise ValueError(f"people must be {count} codes, one a row, not {codes.shape}")
-    return [np.flatnonzero(codes == code) for code in np.unique(codes)]
 
 
 def balanced_integration(correct_rate: ArrayLike, mean_correct_s: ArrayLike) -> FloatArray:

@@ -8,6 +8,7 @@
 - `[participant]`: the `column` with the code, or `file_name`, a pattern whose one group is the code;
 - `[columns]`: for `method`, `direction`, `response`, `rating`, ... the name of the column that holds it. Without
   `session` a session is all trials with one method, without `trial` they are numbered in the order of rows;
+  `instruction` is what the participant was told, as speed or accuracy;
 - `[values.NAME]`: what a cell of NAME's column means ("f" = "forward");
 - `[response_time]`: the `unit`, s or ms; `[rating]`: `scale_min` and `scale_max`, mapped to 0 and 10;
 - `[[skip]]`: rows to leave out, where a `column` is one of `values`, or `empty`.
@@ -66,6 +67,7 @@ class Columns(Model):
     direction: Text | None = None
     response: Text | None = None
     response_time: Text | None = None
+    instruction: Text | None = None
     rating: Text | None = None
     study: Text | None = None
     session: Text | None = None
@@ -116,6 +118,7 @@ class Values(Model):
     method: dict[str, str] = Field(default_factory=dict)
     direction: dict[str, Literal["forward", "backward"]] = Field(default_factory=dict)
     response: dict[str, Literal["forward", "backward"]] = Field(default_factory=dict)
+    instruction: dict[str, str] = Field(default_factory=dict)
 
 
 class ColumnMap(Model):

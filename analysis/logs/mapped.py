@@ -158,8 +158,20 @@ def _trial(line: _Line, mapping: ColumnMap) -> _Row:
         "correct": str(int(response == direction)) if response else columns.MISSING,
         "response_time_s": time,
         "response_source": mapping.response_source if response else columns.MISSING,
-        "response_time_valid": "1" if time else columns.MISSING,
+        "response_time_valid": _valid(mapping) if time else columns.MISSING,
+        "instruction": _instruction(line, mapping),
     }
+
+
+def _valid(mapping: ColumnMap) -> str:
+    """Whether a time is the answerer's own."""
+    return str(int(mapping.response_source != "experimenter"))
+
+
+def _instruction(line: _Line, mapping: ColumnMap) -> str:
+    """The instruction; one that the map does not name keeps its name."""
+    cell = line.cells[mapping.columns.instruction] if mapping.columns.instruction else columns.MISSING
+    return mapping.values.instruction.get(cell, cell)
 
 
 def _rating(line: _Line, mapping: ColumnMap) -> _Row:

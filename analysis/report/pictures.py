@@ -11,12 +11,17 @@ from analysis.report.figures import (
     ShotPanel,
     figure_5,
     figure_8,
+    figure_conditional_accuracy,
     figure_directions,
+    figure_quantile_probability,
     figure_response_times,
+    has_curve,
+    has_points,
     named,
     people,
 )
 from analysis.report.parts import EXPERIMENTS, Picture, ReportData, analysed
+from analysis.report.trade import CONDITIONAL_ACCURACY, QUANTILE_PROBABILITY
 
 FIGURE_5, FIGURE_8 = "figure-5", "figure-8"
 DIRECTIONS, RESPONSE_TIMES = "figure-directions", "figure-response-times"
@@ -37,8 +42,16 @@ def write_figures(folder: Path, report: ReportData) -> None:
         figure_directions(statistics["direction"], folder / DIRECTIONS)
         if statistics["direction"]["response_times"]["n"]:
             figure_response_times(statistics["direction"], folder / RESPONSE_TIMES)
+        _write_trade(folder, statistics["direction"])
     if report.panels:
         figure_5(report.panels, folder / FIGURE_5)
+
+
+def _write_trade(folder: Path, found: Statistics) -> None:
+    if has_curve(found):
+        figure_conditional_accuracy(found, folder / CONDITIONAL_ACCURACY)
+    if has_points(found):
+        figure_quantile_probability(found, folder / QUANTILE_PROBABILITY)
 
 
 def results_picture(statistics: Statistics) -> Picture:

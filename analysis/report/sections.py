@@ -16,6 +16,7 @@ from analysis.report.figures import ShotPanel, named
 from analysis.report.parts import EXPERIMENTS, LISTED, SHOWN, ReportData, Section, Table, analysed, shortened
 from analysis.report.pictures import results_picture, shot_picture
 from analysis.report.supplement import supplement_sections
+from analysis.report.trade import trade_section
 
 _HANDS = {
     "participant": "the participant's own hand",
@@ -37,6 +38,7 @@ def sections(report: ReportData) -> tuple[Section, ...]:
         _glance(statistics) if any(analysed(statistics, name) for name in EXPERIMENTS) else None,
         _verdicts(report.comparison) if report.comparison else None,
         direction_section(statistics["direction"]) if analysed(statistics, "direction") else None,
+        trade_section(statistics["direction"]) if analysed(statistics, "direction") else None,
         preference_section(statistics["preference"]) if analysed(statistics, "preference") else None,
         *supplement_sections(statistics),
         *report.extra,

@@ -13,18 +13,22 @@ from __future__ import annotations
 from device.parameters import DriveOff, Emf, GunParameters
 from device.physics.batch import ShotBatch, simulate_batch, warm
 from device.physics.results import ShotSummary, ShotTrace, Status
+from device.physics.scenes import SCENES, Scene, choose
 from device.physics.single import FIDELITIES, simulate
 from device.physics.traces import trace
 
 __all__ = [
     "FIDELITIES",
+    "SCENES",
     "DriveOff",
     "Emf",
     "GunParameters",
+    "Scene",
     "ShotBatch",
     "ShotSummary",
     "ShotTrace",
     "Status",
+    "choose",
     "simulate",
     "simulate_batch",
     "trace",

@@ -20,6 +20,8 @@ from device.physics.arcs import grip
 from device.physics.layout import (
     BACK_EMF,
     COIL,
+    FRICTION_BACK,
+    FRICTION_OUT,
     INDUCTANCE,
     RECIPROCAL,
     RESISTANCE,
@@ -57,7 +59,7 @@ def audit(gun: GunParameters) -> ShotAudit:
     """The audit of one shot from rest."""
     shot = list(segments(pack(gun)))
     supplied, heat, motor, emf, force = (math.fsum(row) for row in zip(*map(_integrals, shot), strict=True))
-    friction = math.fsum(gun.friction_N * abs(segment.end[0] - segment.start[0]) for segment in shot)
+    friction = math.fsum(_friction_work(segment) for segment in shot)
     impacts = [gun.magnet_mass_kg * segment.end[1] for segment in shot if segment.ended_by == STOP]
     lost = math.fsum(impulse**2 / gun.magnet_mass_kg / 2 for impulse in impacts)
     cut = math.fsum(gun.inductance_H / 2 * (a.end[2] ** 2 - b.start[2] ** 2) for a, b in pairwise(shot))
@@ -77,6 +79,11 @@ def audit(gun: GunParameters) -> ShotAudit:
         collision_impulse_Ns=-math.fsum(impacts),
         residual_impulse_Ns=force - math.fsum(impacts) - gun.magnet_mass_kg * v,
     )
+
+
+def _friction_work(segment: Segment) -> float:
+    place = FRICTION_BACK if segment.heading < 0 else FRICTION_OUT
+    return segment.packed[place] * abs(segment.end[0] - segment.start[0])
 
 
 def _integrals(segment: Segment) -> tuple[float, ...]:

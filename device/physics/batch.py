@@ -34,10 +34,10 @@ from device.physics.single import interpret, model_of, use
 _CHUNK = 4096  # shots between two words of progress
 _FIELDS = tuple(field.name for field in fields(GunParameters))
 _OPTIONS = {"drive_off": ("shorted", "open"), "emf": ("printed", "reciprocal")}  # 0 and 1 in the kernel's row
-_PLACES = {name: [place + (place > FRICTION_OUT)] for place, name in enumerate(_FIELDS)} | {
-    "friction_N": [FRICTION_OUT, FRICTION_BACK]
+_PLACES = {name: place + (place > FRICTION_OUT) for place, name in enumerate(_FIELDS)} | {
+    "return_friction_N": FRICTION_BACK
 }
-"""Where the kernel's row holds each parameter; the friction stands for both ways."""
+"""Where the kernel's row holds each parameter."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -116,7 +116,9 @@ def _rows(
     for name, column in zip(arrays, columns, strict=True):
         valid &= _is_allowed(name, column)
         numbers = column == _OPTIONS[name][1] if name in _OPTIONS else column
-        rows[:, _PLACES[name]] = numbers.astype(np.float64)[:, None]
+        rows[:, _PLACES[name]] = numbers.astype(np.float64)
+    if gun.return_friction_N is None and "return_friction_N" not in arrays:
+        rows[:, FRICTION_BACK] = rows[:, FRICTION_OUT]
     _reduce(rows, model_of(fidelity))
     return rows, valid
 

@@ -41,7 +41,7 @@ from device.physics.polynomial import first_crossing, lowest, value, value_at_en
 from device.physics.series import expand, expand_slaved, fit, follow, rescale
 
 _TRANSIENT = 40.0  # time constants of the current, after which exp(-40) of it is left
-_SLAVED = 0.01  # the current follows the motion if L/R is at most this part of the motion's own time
+_SLAVED = 0.005  # the current follows the motion if L/R is at most this part of the motion's own time
 
 
 @kernel

@@ -28,16 +28,20 @@ def rigid_collision(gun: GunParameters, impact_speed_m_s: float) -> Collision:
     return Collision(impulse_Ns=gun.magnet_mass_kg * speed, peak_force_N=peak_N, duration_s=duration_s)
 
 
-def compliant_collision(gun: GunParameters, impact_speed_m_s: float) -> Collision:
-    """The same through a stop of stiffness m v^2/x_k^2 under which the pre-loaded spring and friction work on.
+def compliant_collision(gun: GunParameters, impact_speed_m_s: float, stop_N_m: float | None = None) -> Collision:
+    """The same through a stop that gives way, under which the pre-loaded spring and friction work on.
 
-    m y'' = k (x_0 - y) - F_f - k_c y for the depth y, until y' = 0. The peak is that of the stop's push.
+    m y'' = k (x_0 - y) - F_f - k_c y for the depth y, until y' = 0. The peak is that of the stop's push. Without a
+    stiffness k_c in N/m the stop is as stiff as equation (4) takes it to be: k_c = m v^2/x_k^2. `ValueError`: a
+    stiffness that is not above 0.
     """
     speed = _checked(impact_speed_m_s)
+    if stop_N_m is not None and not 0 < stop_N_m < math.inf:
+        raise ValueError(f"stop_N_m is {stop_N_m}; it must be a finite number above 0")
     if speed == 0:
         return Collision(impulse_Ns=0.0, peak_force_N=0.0, duration_s=0.0)
-    m, push_N = gun.magnet_mass_kg, gun.stiffness_N_m * gun.preload_length_m - gun.friction_N
-    stop_N_m = m * (speed / gun.contact_depth_m) ** 2
+    m, push_N = gun.magnet_mass_kg, gun.stiffness_N_m * gun.preload_length_m - gun.homeward_friction_N
+    stop_N_m = m * (speed / gun.contact_depth_m) ** 2 if stop_N_m is None else stop_N_m
     total_N_m = stop_N_m + gun.stiffness_N_m
     omega = math.sqrt(total_N_m / m)
     centre_m = push_N / total_N_m

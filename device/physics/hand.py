@@ -3,7 +3,8 @@
     m (x'' - X'') = F,   M X'' = F - k_h X - c_h X',   F = F_m - k (x + x_0) -/+ F_f
 
 X is the enclosure's way back, in the direction of recoil; x the magnet's displacement in the enclosure. The impact
-on the stop is inelastic: both go on together. Integrated by scipy from event to event (DOP853, relative 1e-10).
+on the stop is inelastic: both go on together. Integrated by scipy from event to event (DOP853, relative 1e-10; Radau
+where the coil's time constant is below 20 us).
 """
 
 from __future__ import annotations
@@ -11,7 +12,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -21,6 +22,7 @@ from device.parameters import GunParameters
 
 _RTOL, _ATOL = 1e-10, 1e-13
 _MAX_PHASES = 200
+_STIFF_S = 2e-5  # of the coil's time constant
 _SLACK = 1e-9  # relative: what friction does not hold by less than this, it holds
 
 Vector = NDArray[np.float64]
@@ -82,7 +84,11 @@ class _Phase:
         """F in N."""
         gun = self.gun
         motor_N = gun.motor_constant_N_A * self.hold(x) * i if self.live else 0.0
-        return motor_N - gun.stiffness_N_m * (x + gun.preload_length_m) - self.way * gun.friction_N
+        return motor_N - gun.stiffness_N_m * (x + gun.preload_length_m) - self.way * self.friction()
+
+    def friction(self) -> float:
+        """What opposes this way in N."""
+        return self.gun.homeward_friction_N if self.way < 0 else self.gun.friction_N
 
     def pull(self, y: Vector) -> float:
         """At rest: the force in N with which friction and stop must hold the magnet in the enclosure."""
@@ -90,24 +96,24 @@ class _Phase:
         gun, hand = self.gun, self.hand
         held_N = hand.stiffness_N_m * X + hand.damping_N_s_m * V
         share = gun.magnet_mass_kg / (gun.magnet_mass_kg + hand.enclosure_mass_kg)
-        free = self.force(x, i) + self.way * gun.friction_N
+        free = self.force(x, i) + self.way * self.friction()
         return float(free - share * held_N)
 
 
 def simulate_held(gun: GunParameters, hand: Hand | None = None, until_s: float = 0.4) -> HeldShot:
     """One shot from rest of a gun in a hand, to `until_s`. `ValueError`: a time that is not above 0.
 
-    `RuntimeError`: the integration did not get there.
+    `RuntimeError`: the integration did not get there, or not in 200 stretches.
     """
     if not 0 < until_s < math.inf:
         raise ValueError(f"until_s is {until_s}; it must be a finite time above 0")
     hand = hand or Hand()
-    t, y, paths, landing = 0.0, np.zeros(6), [], None
+    t, y, paths, landing, broke = 0.0, np.zeros(6), [], None, 0
     for _ in range(_MAX_PHASES):
-        phase = _phase(gun, hand, t, y)
+        phase = _phase(gun, hand, t, y, broke)
         limit_s = gun.pulse_s if t < gun.pulse_s < until_s else until_s
         found: Any = solve_ivp(
-            phase.rates, (t, limit_s), y, "DOP853", rtol=_RTOL, atol=_ATOL, events=_events(phase), max_step=2e-3
+            phase.rates, (t, limit_s), y, _method(gun), rtol=_RTOL, atol=_ATOL, events=_events(phase), max_step=2e-3
         )
         if found.status < 0:
             raise RuntimeError(f"the held shot stopped at {found.t[-1]:g} s: {found.message}")
@@ -116,30 +122,40 @@ def simulate_held(gun: GunParameters, hand: Hand | None = None, until_s: float =
         if found.status == 1 and phase.way < 0 and len(found.t_events[1]):
             landing = landing if landing or t < gun.pulse_s else (t, -float(y[1]))
         if t >= until_s:
-            break
+            return _held(gun, hand, np.concatenate(paths, axis=1), landing)
+        broke = (1 if len(found.t_events[0]) else -1) if found.status == 1 and phase.way == 0 else 0
         _settle(phase, found, t, y)
-    return _held(gun, hand, np.concatenate(paths, axis=1), landing)
+    raise RuntimeError(f"the held shot came to {t:g} s in {_MAX_PHASES} stretches; the magnet hardly moves or rests")
 
 
-def _phase(gun: GunParameters, hand: Hand, t: float, y: Vector) -> _Phase:
+def _method(gun: GunParameters) -> Literal["DOP853", "Radau"]:
+    """An implicit one where the current follows the motion at once."""
+    return "DOP853" if gun.inductance_H / gun.resistance_ohm > _STIFF_S else "Radau"
+
+
+def _phase(gun: GunParameters, hand: Hand, t: float, y: Vector, broke: int) -> _Phase:
+    """The stretch from here on; a magnet that just broke away goes the way of `broke`."""
     live = gun.drive_off == "shorted" or t < gun.pulse_s
     drive_V = gun.voltage_V if t < gun.pulse_s else 0.0
     rest = _Phase(gun=gun, hand=hand, way=0, drive_V=drive_V, live=live)
-    way = int(np.sign(y[1]))
+    way = int(np.sign(y[1])) or broke
     if way == 0:
         pull_N = rest.pull(y)
-        if abs(pull_N) > gun.friction_N * (1 + _SLACK) and (pull_N > 0 or y[0] > 0):
+        held_N = gun.friction_N if pull_N > 0 else gun.homeward_friction_N
+        if abs(pull_N) > held_N * (1 + _SLACK) and (pull_N > 0 or y[0] > 0):
             way = 1 if pull_N > 0 else -1
     return _Phase(gun=gun, hand=hand, way=way, drive_V=drive_V, live=live)
 
 
 def _events(phase: _Phase) -> list[Any]:
     """Break-away at rest (outwards, homewards); in motion turn, and stop or coil edge."""
-    friction_N = phase.gun.friction_N * (1 + 2 * _SLACK) + 1e-12
+    out_N, back_N = (
+        friction_N * (1 + 2 * _SLACK) + 1e-12 for friction_N in (phase.gun.friction_N, phase.gun.homeward_friction_N)
+    )
     if phase.way == 0:
         return [
-            _ends(lambda _t, y: phase.pull(y) - friction_N, 1),
-            _ends(lambda _t, y: phase.pull(y) + friction_N if y[0] > 0 else 1.0, -1),
+            _ends(lambda _t, y: phase.pull(y) - out_N, 1),
+            _ends(lambda _t, y: phase.pull(y) + back_N if y[0] > 0 else 1.0, -1),
         ]
     return [_ends(lambda _t, y: phase.way * y[1], -1), _ends(lambda _t, y: y[0] if phase.way < 0 else 1.0, -1)]
 

@@ -43,7 +43,7 @@ STATUSES = ("home", "no-break-away", "stuck", "not-home", "invalid")
 """By their number in the results."""
 
 
-def pack(gun: GunParameters, model: float = FULL, return_friction_N: float | None = None) -> list[float]:
+def pack(gun: GunParameters, model: float = FULL) -> list[float]:
     """The parameters as the kernel's row. A model without back-EMF has no current but in the pulse."""
     driven = model == CLOSED_FORM
     return [
@@ -56,7 +56,7 @@ def pack(gun: GunParameters, model: float = FULL, return_friction_N: float | Non
         gun.stiffness_N_m,
         gun.preload_length_m,
         gun.friction_N,
-        gun.friction_N if return_friction_N is None else return_friction_N,
+        gun.homeward_friction_N,
         gun.voltage_V,
         gun.pulse_s,
         gun.contact_depth_m,

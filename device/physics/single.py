@@ -34,27 +34,16 @@ speeds by energy and its times under the mean of the spring's force. `device.phy
 """
 
 
-def simulate(
-    parameters: GunParameters, fidelity: str = "full", *, return_friction_N: float | None = None
-) -> ShotSummary:
-    """The summary of one shot from rest. `return_friction_N` is that on the way back, if it differs.
-
-    `ValueError`: no such fidelity, or a friction that physics has not.
+def simulate(parameters: GunParameters, fidelity: str = "full") -> ShotSummary:
+    """The summary of one shot from rest. `ValueError`: no such fidelity.
 
     >>> shot = simulate(GunParameters(friction_N=1.12))
     >>> shot.status, round(shot.peak_force_N, 2), round(shot.reset_end_s, 3)
     ('home', 35.14, 0.211)
     """
-    if fidelity == "full" and return_friction_N is None:
+    if fidelity == "full":
         return summary_of(_engine.run(_remembered(parameters)))
-    return summary_of(interpret(packed(parameters, fidelity, return_friction_N)))
-
-
-def packed(parameters: GunParameters, fidelity: str, return_friction_N: float | None) -> list[float]:
-    """The kernel's row of parameters. Raises as `simulate`."""
-    if return_friction_N is not None and not 0 <= return_friction_N < math.inf:
-        raise ValueError(f"return_friction_N is {return_friction_N}; it must be a finite number of at least 0")
-    return pack(parameters, model_of(fidelity), return_friction_N)
+    return summary_of(_engine.run(_engine.row(pack(parameters, model_of(fidelity)))))
 
 
 def model_of(fidelity: str) -> float:

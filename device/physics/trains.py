@@ -60,7 +60,8 @@ def train(gun: GunParameters, onset_ticks: Sequence[int], start: State | None = 
     """
     if any(b <= a for a, b in pairwise(onset_ticks)):
         raise ValueError(f"onset_ticks are {list(onset_ticks)}; they must rise")
-    packed, state, shots = pack(gun), _row_of(start or State()), []
+    packed = pack(gun)
+    state, shots = _row_of(start or State()), list[TrainShot]()
     work = [0.0] * WORK_SIZE
     for onset, following in zip(onset_ticks, (*onset_ticks[1:], None), strict=True):
         begin = State(displacement_m=state[X], velocity_m_s=state[V], current_A=state[I])
@@ -106,7 +107,8 @@ def gentlest_friction_N(gun: GunParameters, rate_Hz: float) -> float | None:  # 
     """The damper's friction at which the magnet lands most gently while the gun can shoot at `rate_Hz`.
 
     More friction lands more gently and, beyond an optimum, later: the answer is where the rate is just met. None if
-    no friction allows that rate. Looked for from none to what the pre-load can overcome.
+    no friction allows that rate. Looked for from none to what the pre-load can overcome. A gun with a friction of its
+    own on the way back keeps that one.
     """
     if not 1 / _CREEP_S < rate_Hz < math.inf:
         raise ValueError(f"rate_Hz is {rate_Hz}; it must be a finite rate above {1 / _CREEP_S:g}")

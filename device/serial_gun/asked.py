@@ -33,6 +33,16 @@ class Asked:
         return self.setting.rest_us / _MICRO
 
 
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Order:
+    """A shot that was asked for, once: the mark that names it on the wire, when it was asked for, and for when."""
+
+    mark: int
+    wanted: Asked
+    requested_s: float
+    at_s: float | None
+
+
 def asked(shot: Shot, methods: Mapping[str, Method]) -> Asked:
     """A shot as it can be said. `LimitError`: no such method, a drive of another kind, or no way home by the model."""
     if shot.method not in methods:
@@ -72,11 +82,12 @@ def _setting(shot: Shot, drive: Drive, rendering: Rendering) -> Setting:
     )
 
 
-def check_record(record: ShotRecord, mark: int, wanted: Asked) -> None:
+def check_record(record: ShotRecord, order: Order) -> None:
     """`LinkError`, unless the record tells of just the shot that was asked for, driven to its end."""
-    setting = wanted.setting
-    if record.mark != mark or record.setting != setting:
-        raise LinkError(f"asked for {mark} {setting.text()}, the gun rendered {record.mark} {record.setting.text()}")
+    setting = order.wanted.setting
+    if record.mark != order.mark or record.setting != setting:
+        asked_for, rendered = f"{order.mark} {setting.text()}", f"{record.mark} {record.setting.text()}"
+        raise LinkError(f"asked for {asked_for}, the gun rendered {rendered}")
     driven_us = record.end_us - record.start_us
     if record.ending != "DONE" or driven_us != setting.length_us:
         raise LinkError(f"the shot was fired and cut short: driven for {driven_us} of {setting.length_us} microseconds")

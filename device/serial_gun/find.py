@@ -33,7 +33,10 @@ def find(ports: Iterable[str], serial: str | None = None, open_port: OpenPort = 
         guns = ", ".join(f"{named.serial} at {port}" for port, named in found.items())
         raise LinkError(f"more than one gun answers: {guns}; choose one with --gun serial:PORT")
     wanted = f"gun {serial}" if serial else "gun"
-    raise LinkError(f"no {wanted} answers; looked at {', '.join(looked) or 'no port: the system shows none'}")
+    raise LinkError(
+        f"no {wanted} answers; looked at {', '.join(looked) or 'no port: the system shows none'}; "
+        "check power and cable, or name its port with --gun serial:PORT (a twin's is never looked for)"
+    )
 
 
 def probe(port: str, open_port: OpenPort = SerialPort) -> Named | None:

@@ -7,19 +7,17 @@ import time
 from collections.abc import Callable, Mapping
 from contextlib import suppress
 
-from device.limits import DriveHistory
+from device.limits import DriveHistory, planned_start_s
 from device.methods import Method
-from device.serial_gun.address import parse
-from device.serial_gun.asked import Asked, asked, check_record
-from device.serial_gun.find import find, system_ports
+from device.serial_gun.asked import Asked, Order, asked, check_record
 from device.serial_gun.link import PATIENCE_S, Link, Reply
 from device.serial_gun.outcomes import Disconnected, Refused, TimedOut
+from device.serial_gun.reports import Told, report
 from device.wire import errors
 from device.wire.frame import Garbled
 from device.wire.records import ShotRecord, Standing
-from device.words import GunState, GunStatus, Identity, LimitError, LinkError, Shot, ShotReport, ShotTiming
+from device.words import GunState, GunStatus, Identity, LimitError, LinkError, Shot, ShotReport
 
-OPEN_S = 5.0
 RECONNECT_S = 5.0
 """So long a command waits for a gun that was unplugged."""
 TRIES = 4
@@ -39,24 +37,6 @@ _STATES: dict[str, GunState] = {
 }
 
 
-def open_serial(address: str, methods: Mapping[str, Method], clock: Callable[[], float]) -> SerialGun:
-    """The gun at an address of the form `serial:...`. `ValueError`: another form; `LinkError`: no gun there."""
-    where = parse(address)
-    known: list[str] = []  # the serial number, once a gun was found
-
-    def look() -> str:
-        return where.port or find(system_ports(), known[0] if known else None)
-
-    link = Link(look, clock, where.speed)
-    try:
-        link.start(OPEN_S)
-    except LinkError as error:
-        raise LinkError(f"{address}: {error}") from error
-    gun = SerialGun(link, methods, clock, where.speed)
-    known.append(gun.identify().serial)
-    return gun
-
-
 class SerialGun:
     """A `Gun` on a link that is up. It is born disarmed; `clock` gives seconds, as fast as the gun lives.
 
@@ -70,6 +50,7 @@ class SerialGun:
         self._history = DriveHistory()
         self._mark = time.time_ns() // 1_000_000 % 2**31 + 1
         self._armed_in = 0  # the link's session; 0 if disarmed
+        self._first: tuple[int, float] | None = None  # onset of the first shot since `arm`, on the gun's clock and ours
         self._set = (0, "")  # the session and the setting that the gun has
         self._closed = False
 
@@ -86,11 +67,13 @@ class SerialGun:
         self._is_open()
         with self._turn:
             self._ask("ARM")
-            self._armed_in = self.link.session
+            self._armed_in, self._first = self.link.session, None
 
     def fire(self, shot: Shot, at_s: float | None = None) -> ShotReport:
         """Fire once, at once or at a time on the host's clock, and report when the pulse has ended.
 
+        From the second shot since `arm` on, the time counts from the first one by the gun's own clock, so that the
+        shots of a train are whole ticks apart; the two clocks drift apart by less than 0.1 ms a second.
         `LimitError`: refused, nothing was rendered; beyond the host's own limits nothing was written either.
         `LinkError` says whether the shot was fired, was not, or may have been. It is never fired later.
         """
@@ -99,10 +82,11 @@ class SerialGun:
             if not self._armed_in:
                 raise LimitError("the gun is disarmed; arm it before it may fire")
             wanted = asked(shot, self._methods)
-            requested_s = self._clock()
-            self._history.check(wanted.load, max(requested_s, at_s or requested_s))
+            now_s = self._clock()
+            self._history.check(wanted.load, planned_start_s(now_s, at_s))
             self._configure(wanted)
-            return self._fire(wanted, requested_s, at_s)
+            self._mark = self._mark % (2**32 - 1) + 1
+            return self._fire(Order(mark=self._mark, wanted=wanted, requested_s=now_s, at_s=at_s))
 
     def disarm(self) -> None:
         """Forbid shots, from every state and thread. If the gun cannot be told, wait until its watchdog has done it."""
@@ -178,57 +162,66 @@ class SerialGun:
                 raise LimitError(f"{error}; nothing was fired") from error
             self._set = (self.link.session, text)
 
-    def _fire(self, wanted: Asked, requested_s: float, at_s: float | None) -> ShotReport:
+    def _fire(self, order: Order) -> ShotReport:
         """Trigger until the outcome is known. Only a shot that was surely not fired is triggered again."""
-        self._mark = mark = self._mark % (2**32 - 1) + 1
-        session, trouble = self._set[0], LinkError("no answer")
+        session, trouble = self._set[0], LinkError()
         for tries in range(1, TRIES + 1):
             if not session == self._armed_in == self.link.session:
-                raise Disconnected(f"not fired: the line was lost, so the gun has disarmed itself ({trouble})")
+                why = f" ({trouble})" if str(trouble) else ""
+                raise Disconnected(f"not fired: the line was lost, so the gun has disarmed itself{why}")
             try:
-                reply = self._trigger(mark, wanted, at_s)
-                return self._report(ShotRecord.parse(reply.body), mark, wanted, (requested_s, reply, tries))
+                reply = self._trigger(order)
+                return self._report(ShotRecord.parse(reply.body), order, reply, tries)
             except Refused as error:
                 if error.code != errors.TOO_LATE:
-                    raise self._refusal(error, wanted) from error
+                    raise self._refusal(error, order.wanted) from error
                 trouble = error
             except (TimedOut, Garbled, Disconnected) as error:
                 trouble = error
-                found = self._look(mark, wanted, session, error)
+                found = self._look(order, session, error)
                 if found is not None:
-                    return self._report(found[0], mark, wanted, (requested_s, found[1], tries))
+                    return self._report(*found, tries)
         self.disarm()
         raise TimedOut(f"not fired: {trouble}, {TRIES} times")
 
-    def _trigger(self, mark: int, wanted: Asked, at_s: float | None) -> Reply:
-        now_s = self._clock()
-        start_us = 0 if at_s is None else self.link.gun_us(at_s)
-        before_us = self.link.gun_us(max(now_s, at_s or now_s) + LATEST_S * self._speed)
-        ahead_s = 0.0 if at_s is None else max(at_s - now_s, 0.0)
-        patience_s = PATIENCE_S + (ahead_s + wanted.setting.length_us / 1e6) / self._speed
-        return self.link.ask(f"TRIG {mark},{start_us},{before_us}", patience_s)
+    def _trigger(self, order: Order) -> Reply:
+        start_us = 0 if order.at_s is None else self._tick(order.at_s)
+        before_us = max(start_us, self.link.gun_us(self._clock())) + round(LATEST_S * self._speed * 1e6)
+        return self.link.ask(f"TRIG {order.mark},{start_us},{before_us}", self._patience_s(order))
 
-    def _look(self, mark: int, wanted: Asked, session: int, trouble: LinkError) -> tuple[ShotRecord, Reply] | None:
+    def _patience_s(self, order: Order) -> float:
+        """How long from now on a shot may take to end, in seconds of the real world."""
+        ahead_s = 0.0 if order.at_s is None else max(order.at_s - self._clock(), 0.0)
+        return PATIENCE_S + (ahead_s + order.wanted.setting.length_us / 1e6) / self._speed
+
+    def _tick(self, at_s: float) -> int:
+        """A time on the gun's clock: from the first shot since `arm`, where there was one."""
+        if self._first is None:
+            return max(0, self.link.gun_us(at_s))
+        first_us, first_s = self._first
+        return max(0, first_us + round((at_s - first_s) * 1e6))
+
+    def _look(self, order: Order, session: int, trouble: LinkError) -> tuple[ShotRecord, Order, Reply] | None:
         """What became of a shot of a session whose answer was lost: its record; None if it was surely not fired.
 
         `LinkError`: it may have been fired, or was cut short.
         """
-        end_s = time.monotonic() + PATIENCE_S + wanted.setting.length_us / 1e6 / self._speed
+        end_s = time.monotonic() + self._patience_s(order)
         try:
             while True:
                 reply = self._ask("SHOT?")
                 if self.link.session != session and not self._remembers(session):
                     break
                 record = ShotRecord.parse(reply.body)
-                if record.mark != mark or record.ending == "NONE":
+                if record.mark != order.mark or record.ending == "NONE":
                     return None
                 if record.ending in {"DONE", "CUT"}:
-                    return record, reply
+                    return record, order, reply
                 if time.monotonic() > end_s:
                     self.disarm()
         except LinkError as error:
             trouble = error
-        self._spend(wanted, self._clock())
+        self._spend(order.wanted, self._clock())
         raise Disconnected(f"the shot may have been fired: {trouble}, and the gun cannot tell any more") from trouble
 
     def _remembers(self, session: int) -> bool:
@@ -241,33 +234,13 @@ class SerialGun:
             return Disconnected("the shot was fired, and its answer was lost")
         return LimitError(f"{error}; not fired") if error.code in _LIMITS else error
 
-    def _report(self, record: ShotRecord, mark: int, wanted: Asked, asked_how: tuple[float, Reply, int]) -> ShotReport:
-        requested_s, reply, tries = asked_how
-        start, end, accepted = self.link.host(record.start_us, record.end_us, record.accepted_us)
-        if record.mark == mark:
-            self._spend(wanted, max(start.time_s + start.uncertainty_s, requested_s))
-        check_record(record, mark, wanted)
-        return ShotReport(
-            shot=wanted.shot,
-            requested_s=requested_s,
-            pulse_start_s=start.time_s,
-            pulse_end_s=end.time_s,
-            home_predicted_s=start.time_s + wanted.rendering.settle_s,
-            motion=wanted.rendering.motion,
-            timing=ShotTiming(
-                requested_s=requested_s,
-                written_s=reply.written_s,
-                acknowledged_s=reply.received_s,
-                accepted_s=accepted.time_s,
-                pulse_start_s=start.time_s,
-                pulse_end_s=end.time_s,
-                uncertainty_s=start.uncertainty_s,
-                gun_accepted_us=record.accepted_us,
-                gun_start_us=record.start_us,
-                gun_end_us=record.end_us,
-                asked=tries,
-            ),
-        )
+    def _report(self, record: ShotRecord, order: Order, reply: Reply, tries: int) -> ShotReport:
+        accepted, start, end = self.link.host(record.accepted_us, record.start_us, record.end_us)
+        if record.mark == order.mark:
+            self._first = self._first or (record.start_us, start.time_s)
+            self._spend(order.wanted, max(start.time_s + start.uncertainty_s, order.requested_s))
+        check_record(record, order)
+        return report(record, order, Told(reply=reply, tries=tries, accepted=accepted, start=start, end=end))
 
     def _spend(self, wanted: Asked, start_s: float) -> None:
         """Take a shot into account that was fired, or may have been."""

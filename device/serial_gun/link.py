@@ -210,7 +210,7 @@ class Link:
         if named.wire != WIRE_VERSION:
             raise WrongVersion(
                 f"{named.model} {named.serial} (firmware {named.firmware}) speaks version {named.wire} of the wire, "
-                f"this Recoil version {WIRE_VERSION}; flash the firmware that came with it"
+                f"this Recoil version {WIRE_VERSION}; flash the firmware of this Recoil (device/firmware)"
             )
         if self.named is not None and named.serial != self.named.serial:
             raise LinkError(f"another gun is there now: {named.serial}, not {self.named.serial}")

@@ -55,7 +55,7 @@ class SerialPort:
             )
             self._port.reset_input_buffer()
         except _BROKEN as error:
-            raise LinkError(f"cannot open {address}: {error}") from error
+            raise LinkError(f"cannot open {address}: {_reason(error)}") from error
         self._late = serial.SerialTimeoutException
 
     def read(self) -> bytes:
@@ -88,3 +88,9 @@ class SerialPort:
             raise
         except _BROKEN as error:
             raise Disconnected(f"the line is gone: {error}") from error
+
+
+def _reason(error: Exception) -> str:
+    """What went wrong, in the system's words: pyserial's own repeat address and number."""
+    number = getattr(error, "errno", None)
+    return os.strerror(number) if isinstance(number, int) else str(error)

@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from typing import Annotated, Literal, Self
+from typing import Annotated, Any, ClassVar, Literal, Self
 
-from pydantic import Field, model_validator
+from pydantic import AfterValidator, Field, SerializerFunctionWrapHandler, model_serializer, model_validator
 
 from experiments.config import (
     Count,
@@ -19,9 +19,16 @@ from experiments.config import (
     Text,
     check_covered,
     check_duration,
+    once,
+    where_told,
 )
+from experiments.direction.felt_config import DiffusionConfig, PeopleConfig
+from experiments.percept_config import PerceptConfig
 
 Balance = Literal["session", "set", "set-exact"]
+InstructionName = Annotated[str, Field(pattern=r"^[A-Za-z0-9][A-Za-z0-9_-]{0,31}$")]
+Instructions = Annotated[tuple[InstructionName, ...], Field(max_length=26), AfterValidator(once)]
+"""The names of instructions, each once."""
 
 
 class Design(Model):
@@ -34,6 +41,7 @@ class Design(Model):
     forward_per_session: Annotated[int, Field(ge=0)]
     backward_per_session: Annotated[int, Field(ge=0)]
     balance: Balance = "session"
+    instructions: Instructions = ()
 
     @property
     def order(self) -> Order:
@@ -50,6 +58,10 @@ class Design(Model):
         """Trials of the whole run."""
         return len(self.methods) * self.trials_per_session
 
+    @model_serializer(mode="wrap")
+    def _as_it_is_hashed(self, handler: SerializerFunctionWrapHandler) -> dict[str, Any]:
+        return where_told(handler(self))
+
     @model_validator(mode="after")
     def _counts_fit(self) -> Self:
         forward, backward, planned = self.forward_per_session, self.backward_per_session, self.trials_per_session
@@ -62,6 +74,16 @@ class Design(Model):
             raise ValueError(
                 f'balance = "set-exact" is impossible: {forward} forward trials cannot be shared equally among '
                 f'{self.sets_per_session} sets of {self.trials_per_set}; use "set" for as even as it gets'
+            )
+        return self
+
+    @model_validator(mode="after")
+    def _instructions_share_the_sets(self) -> Self:
+        count = len(self.instructions)
+        if count and self.sets_per_session % count:
+            raise ValueError(
+                f"sets_per_session = {self.sets_per_session} cannot be shared equally among {count} instructions, "
+                f"one a set; make it a multiple of {count}"
             )
         return self
 
@@ -84,6 +106,12 @@ class Fatigue(Model):
 
     max_trials_without_break: Count
     max_planned_s: Seconds
+
+
+class InstructionConfig(Model):
+    """What is read out to the participant before a set."""
+
+    text: Annotated[str, Field(min_length=1, max_length=300)]
 
 
 class Question(Model):
@@ -123,9 +151,14 @@ class ResponseTime(Model):
 class Synthetic(SyntheticConfig):
     """Who answers when nobody sits there."""
 
-    observer: Literal["rates", "table"]
+    OF_FELT: ClassVar[tuple[str, ...]] = ("percept", "diffusion", "people")
+
+    observer: Literal["rates", "table", "felt"]
     rates: Rates
     response_time: ResponseTime
+    percept: PerceptConfig = PerceptConfig()
+    diffusion: DiffusionConfig = DiffusionConfig()
+    people: PeopleConfig = PeopleConfig()
 
 
 class DirectionConfig(ExperimentConfig):
@@ -137,8 +170,13 @@ class DirectionConfig(ExperimentConfig):
     practice: Practice = Practice()
     fatigue: Fatigue
     question: Question
+    instructions: dict[str, InstructionConfig] = Field(default_factory=dict)
     timing: Timing
     synthetic: Synthetic
+
+    @model_serializer(mode="wrap")
+    def _as_it_is_hashed(self, handler: SerializerFunctionWrapHandler) -> dict[str, Any]:
+        return where_told(handler(self))
 
     @property
     def break_s(self) -> float:
@@ -179,3 +217,28 @@ class DirectionConfig(ExperimentConfig):
         check_covered("synthetic.rates.forward", rates.forward, self.design.methods)
         check_covered("synthetic.rates.backward", rates.backward, self.design.methods)
         return self
+
+    @model_validator(mode="after")
+    def _instructions_are_worded(self) -> Self:
+        for name in self.design.instructions:
+            if name not in self.instructions:
+                raise ValueError(
+                    f"design.instructions names {name}, but there is no table [instructions.{name}]; add it with a text"
+                )
+        return self
+
+    @model_validator(mode="after")
+    def _instructions_have_boundaries(self) -> Self:
+        if self.synthetic.observer == "felt":
+            boundaries = self.synthetic.diffusion.boundaries
+            missing = [name for name in self.design.instructions if name not in boundaries]
+            if missing:
+                raise ValueError(
+                    f"synthetic.diffusion.boundaries has no value for {', '.join(missing)}; "
+                    "give one for each of design.instructions"
+                )
+        return self
+
+    def instruction_text(self, name: str) -> str:
+        """What is read out under an instruction; nothing where there is none."""
+        return self.instructions[name].text if name else ""

@@ -1,5 +1,6 @@
-"""Synthetic participants of experiment 1: from the published rates with differences and bias, or from a table.
+"""Synthetic participants of experiment 1: from the published rates, from a table, or from what the gun does (`felt`).
 
+The observers of rates and tables do not heed instructions; whoever feels the gun is hurried or made careful by them.
 In probit units, with z the probit of the mean correct rate of a method and direction, a person answers "forward" with
 probability Phi(S z_forward + ability + bias) to a forward shot and Phi(-S z_backward - ability + bias) to a backward
 one; S = sqrt(1 + ability_sd^2 + bias_sd^2) keeps the mean over people at the given rates.
@@ -15,6 +16,8 @@ from statistics import NormalDist
 
 from device.words import DIRECTIONS, Direction
 from experiments.direction.config import DirectionConfig, Rates, ResponseTime
+from experiments.direction.felt import NEUTRAL, FeltParticipant, Mind, mind_of
+from experiments.direction.percept import Percept, percepts_of
 from experiments.plan import Plan, Trial
 from experiments.setup import Setup
 from experiments.streams import Stream
@@ -33,10 +36,15 @@ class Answer:
     response_time_s: float
 
 
-def observer(setup: Setup[DirectionConfig], plan: Plan) -> RatesObserver | TableObserver:
-    """The synthetic participant that a setup asks for."""
-    if setup.config.synthetic.observer == "table":
+def observer(setup: Setup[DirectionConfig], plan: Plan) -> RatesObserver | TableObserver | FeltObserver:
+    """The synthetic participant that a setup asks for. `ValueError`: a table or numbers that make none."""
+    kind = setup.config.synthetic.observer
+    if kind == "table":
         return TableObserver(setup.config, plan, setup.answers)
+    if kind == "felt":
+        mind = mind_of(setup.config)
+        methods = setup.gun.renderings(setup.config.design.methods)
+        return FeltObserver(mind, percepts_of(methods, mind.percept.leak_s), plan)
     return RatesObserver(setup.config, plan)
 
 
@@ -96,6 +104,22 @@ class TableObserver:
         )
 
 
+class FeltObserver:
+    """A person who feels each shot by the full model and decides by a diffusion, as hurried as the trial's instruction.
+
+    Raises as `FeltParticipant` does.
+    """
+
+    def __init__(self, mind: Mind, percepts: Mapping[str, Percept], plan: Plan) -> None:
+        self._participant = FeltParticipant(mind, percepts, plan)
+
+    def answer(self, trial: Trial) -> Answer:
+        """The answer to a shot of this trial's method and direction."""
+        decision = self._participant.decide(trial, trial.instruction or NEUTRAL)
+        response: Direction = "forward" if decision.upper else "backward"
+        return Answer(response=response, response_time_s=_as_boxed(decision.time_s))
+
+
 def _trial_stream(seed: int, who: tuple[str, str], trial: Trial) -> Stream:
     return Stream(seed, "answer", *who, str(trial.session), str(trial.trial))
 
@@ -123,5 +147,10 @@ def _cell(answers: Sequence[Mapping[str, str]], participant: str, method: str, d
 
 
 def _response_time(law: ResponseTime, draws: Stream) -> float:
-    """A shifted log-normal time, in whole milliseconds as a response box gives it."""
-    return round(law.shift_s + law.median_s * math.exp(law.sigma * draws.normal()), 3)
+    """A shifted log-normal time."""
+    return _as_boxed(law.shift_s + law.median_s * math.exp(law.sigma * draws.normal()))
+
+
+def _as_boxed(time_s: float) -> float:
+    """A time in whole milliseconds as a response box gives it, at least one."""
+    return max(round(time_s, 3), 0.001)

@@ -37,6 +37,7 @@ __all__ = [
     "felt_course",
     "forward_rate",
     "percept_of",
+    "percept_of_course",
     "percept_of_summary",
     "percept_of_trace",
     "percepts_of",
@@ -73,6 +74,8 @@ class Percept:
     second: float
 
 
+_SAME_S = 1e-9  # a shot's times and its course come from two runs of the model, compiled or not
+
 SILENT = Percept(first=0.0, reaction=0.0, second=0.0)
 """What a vibration gives."""
 
@@ -91,14 +94,20 @@ def felt_course(time_s: list[float], force_N: list[float], leak_s: float) -> lis
 
 def percept_of_trace(trace: ShotTrace, magnet_mass_kg: float, leak_s: float) -> Percept:
     """The percept of a shot's full course; the collision is a blow of m v at the landing, far shorter than the leak."""
-    times, shot = trace.time_s.tolist(), trace.summary
-    course = felt_course(times, trace.force_N.tolist(), leak_s)
+    return percept_of_course(trace.time_s.tolist(), trace.force_N.tolist(), trace.summary, magnet_mass_kg, leak_s)
+
+
+def percept_of_course(
+    times: list[float], force_N: list[float], shot: ShotSummary, magnet_mass_kg: float, leak_s: float
+) -> Percept:
+    """As `percept_of_trace`, of the force at any times; a time that comes twice is a jump of the force."""
+    course = felt_course(times, force_N, leak_s)
     parts = [shot.firing_end_s, shot.reset_end_s]
     border_s = min((part for part in parts if part is not None), default=math.inf)
-    early = [x for t, x in zip(times, course, strict=True) if t <= border_s]
-    late = [x for t, x in zip(times, course, strict=True) if t > border_s]
+    early = [x for t, x in zip(times, course, strict=True) if t <= border_s + _SAME_S]
+    late = [x for t, x in zip(times, course, strict=True) if t > border_s + _SAME_S]
     if shot.reset_end_s is not None and shot.impact_speed_m_s is not None:
-        before = max((i for i, t in enumerate(times) if t <= shot.reset_end_s), default=0)
+        before = max((i for i, t in enumerate(times) if t <= shot.reset_end_s + _SAME_S), default=0)
         late.append(course[before] + magnet_mass_kg * shot.impact_speed_m_s / leak_s)
     reaction = -min([*early, *late])
     return Percept(first=max(0.0, *early), reaction=max(0.0, reaction), second=max([0.0, *late]))
@@ -109,12 +118,14 @@ def percept_of_summary(shot: ShotSummary, magnet_mass_kg: float, leak_s: float) 
 
     For the paper's two shots and the default leak `first` is within 2 % of the full course's and `reaction` within 8 %;
     `second` leaves out the coil's braking before the landing, so it is too small where a shorted coil brakes.
-    A shot that was not fired to its end gives `SILENT`.
+    A shot without a stage of bullet firing gives `SILENT`.
     """
     if shot.recoil_impulse_Ns is None or not shot.recoil_end_s or shot.firing_end_s is None:
         return SILENT
     pulse_s, firing_s = shot.recoil_end_s, shot.firing_end_s - shot.recoil_end_s
     first = shot.recoil_impulse_Ns / pulse_s * -math.expm1(-pulse_s / leak_s)
+    if firing_s <= 0.0:  # the magnet turned while the coil still pushed: the rectangles have nothing to say
+        return SILENT
     pull = shot.recoil_impulse_Ns / firing_s * -math.expm1(-firing_s / leak_s)
     blow = magnet_mass_kg * (shot.impact_speed_m_s or 0.0) / leak_s
     reaction = max(0.0, pull - first * math.exp(-firing_s / leak_s))

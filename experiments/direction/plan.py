@@ -16,7 +16,13 @@ def make_plan(config: DirectionConfig, participant_id: str, seed: int, order_row
     trials = [
         trial
         for session, method in enumerate(methods, start=1)
-        for trial in _session(design, session, method, Stream(seed, "directions", *who, str(session)))
+        for trial in _session(
+            design,
+            session,
+            method,
+            ways=_directions(design, Stream(seed, "directions", *who, str(session))),
+            told=_instructions(design, seed, (*who, str(session))),
+        )
     ]
     return Plan(
         experiment=config.experiment,
@@ -28,7 +34,10 @@ def make_plan(config: DirectionConfig, participant_id: str, seed: int, order_row
 
 
 def make_practice(config: DirectionConfig, participant_id: str, seed: int) -> Plan | None:
-    """The plan of a practice: some trials of each method, mixed, in one set. `None` if the config has none."""
+    """The plan of a practice: some trials of each method, mixed, in one set. `None` if the config has none.
+
+    A practice is of the gun: it has no instruction.
+    """
     who, each = (config.experiment, participant_id), config.practice.trials_per_method
     methods = Stream(seed, "practice-methods", *who).shuffled([*config.design.methods] * each)
     forward = len(methods) // 2
@@ -44,11 +53,27 @@ def make_practice(config: DirectionConfig, participant_id: str, seed: int) -> Pl
     )
 
 
-def _session(design: Design, session: int, method: str, stream: Stream) -> list[Trial]:
+def _session(design: Design, session: int, method: str, *, ways: list[Direction], told: list[str]) -> list[Trial]:
+    """The trials of a session; `ways` has one direction a trial, `told` one instruction a set."""
     return [
-        Trial(session=session, method=method, set=1 + place // design.trials_per_set, trial=1 + place, direction=way)
-        for place, way in enumerate(_directions(design, stream))
+        Trial(
+            session=session,
+            method=method,
+            set=1 + place // design.trials_per_set,
+            trial=1 + place,
+            direction=way,
+            instruction=told[place // design.trials_per_set],
+        )
+        for place, way in enumerate(ways)
     ]
+
+
+def _instructions(design: Design, seed: int, session: tuple[str, ...]) -> list[str]:
+    """The instruction of each set: each equally often, in random order; empty where the design has none."""
+    if not design.instructions:
+        return [""] * design.sets_per_session
+    each = design.sets_per_session // len(design.instructions)
+    return Stream(seed, "instructions", *session).shuffled([*design.instructions] * each)
 
 
 def _directions(design: Design, stream: Stream) -> list[Direction]:

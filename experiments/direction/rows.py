@@ -21,6 +21,7 @@ def rows(plan: Plan, told: Told) -> list[Row]:
             "direction": trial.direction,
             **_answer(trial, story),
             **presentation(story, Fired),
+            "instruction": trial.instruction,
         }
         for trial, story in stories(plan.trials, told).items()
     ]

@@ -31,7 +31,12 @@ def _rest(before: Trial, trial: Trial, breaks: Breaks) -> Session:
 def _steps(setup: Setup[DirectionConfig], trial: Trial, attempt: int) -> tuple[Step, ...]:
     question = setup.config.question
     return (
-        Prepare(trial=trial, attempt=attempt, damper=setup.gun.methods[trial.method].damper),
+        Prepare(
+            trial=trial,
+            attempt=attempt,
+            damper=setup.gun.methods[trial.method].damper,
+            instruction=setup.config.instruction_text(trial.instruction),
+        ),
         Fire(trial=trial, attempt=attempt),
         Ask(
             trial=trial,

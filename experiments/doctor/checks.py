@@ -34,13 +34,13 @@ class Check:
     look: Callable[[], tuple[Finding, ...]]
 
 
-def checks(results: Path, gun: str) -> tuple[Check, ...]:
-    """What there is to look at, for a results folder and a gun's address."""
+def checks(results: Path, gun: str, limit_s: float) -> tuple[Check, ...]:
+    """What there is to look at, for a results folder and a gun's address; `limit_s` is its line's, there and back."""
     looks: dict[str, Callable[[], tuple[Finding, ...]]] = {
         "machine": lambda: (verdicts.of_machine(measures.machine()),),
         "clock": lambda: (verdicts.of_clock(measures.ticks()),),
         "disk": partial(_disk, results),
-        "gun": partial(_gun, gun),
+        "gun": partial(_gun, gun, limit_s),
         "USB adapter": lambda: (verdicts.of_adapters(link.adapters()),),
         "display": partial(_on_display, "display", "display", _display),
         "PsychoPy": partial(_on_display, "PsychoPy", "stage", _stage, PSYCHOPY_DEADLINE_S),
@@ -79,9 +79,9 @@ def _disk(results: Path) -> tuple[Finding, ...]:
         return (verdicts.of_disk_failure(str(results), error.strerror or str(error)),)
 
 
-def _gun(address: str) -> tuple[Finding, ...]:
+def _gun(address: str, limit_s: float) -> tuple[Finding, ...]:
     try:
-        return (verdicts.of_link(within(DEADLINE_S, partial(link.link, address))),)
+        return (verdicts.of_link(within(DEADLINE_S, partial(link.link, address)), limit_s),)
     except (DeviceError, OSError) as error:
         return (verdicts.of_link_failure(str(error)),)
 

@@ -1,8 +1,8 @@
 """How fast a console was, read from the stamps in journals. Pure: records in, times out.
 
 Step to screen: from a step's record to `shown_s` of its outcome, when the console had painted it.
-Key to disk: from the key, which is the shot's `pulse_start_s` plus the answer's `response_time_s`, to the `synced_s`
-of the answer's record, which stands in the record after it.
+Key to disk: from the key, which is the shot's `pulse_start_s` plus the answer's `response_time_s` (or its `key_time_s`,
+where that is another), to the `synced_s` of the answer's record, which stands in the record after it.
 """
 
 from __future__ import annotations
@@ -73,7 +73,8 @@ def _key_to_disk_ms(records: Sequence[Record]) -> Iterator[float]:
         elif _kind(record) == "fired":
             pulse_start_s = record["body"]["pulse_start_s"]
         elif _shown(record) and _kind(record) == "answered" and None not in (pulse_start_s, following["synced_s"]):
-            key_s = pulse_start_s + record["body"]["response_time_s"]
+            body = record["body"]
+            key_s = pulse_start_s + body.get("key_time_s", body["response_time_s"])
             yield 1000 * (following["synced_s"] - key_s)
 
 

@@ -19,8 +19,6 @@ MAX_OVERSLEEP_MS = 5.0
 """Assumed: half of what a key may take to the disk."""
 MAX_STEP_S = 0.001
 """Assumed: response times are read to the millisecond."""
-MAX_ROUND_TRIP_MS = 10.0
-"""Assumed: beyond it the adapter keeps bytes back, 16 ms as it leaves the factory."""
 MAX_KEY_MS = 10.0
 """Assumed: as long as the way on to the disk may take."""
 MIN_FREE_BYTES = 100_000_000
@@ -77,8 +75,8 @@ def of_disk_failure(folder: str, reason: str) -> Finding:
     return Finding(check="disk", verdict="fails", measured=f"{folder}: {reason}", advice=advice)
 
 
-def of_link(found: Link) -> Finding:
-    """The gun and the way to it."""
+def of_link(found: Link, limit_s: float) -> Finding:
+    """The gun and the way to it, whose 95th percentile is to keep a limit."""
     measured = f"{found.gun}, {found.state}; round trip {_tail(found.round_trip_ms)}"
     if found.fault is not None or found.state != "disarmed":
         return Finding(
@@ -88,8 +86,11 @@ def of_link(found: Link) -> Finding:
             advice="switch off the gun's power, remove the cause, and look again before anybody holds it",
             figures=asdict(found),
         )
-    slow = found.round_trip_ms.p95 > MAX_ROUND_TRIP_MS
-    return _judged("gun", measured, "set the USB adapter's latency timer to 1 ms, see below" if slow else "", found)
+    advice = (
+        f"95th percentile above the limit of {1000 * limit_s:g} ms (the gun's serial.round_trip_limit_s): set the USB "
+        "adapter's latency timer to 1 ms, see below; close other programs"
+    )
+    return _judged("gun", measured, advice if found.round_trip_ms.p95 > 1000 * limit_s else "", found)
 
 
 def of_link_failure(reason: str) -> Finding:

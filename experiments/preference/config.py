@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Annotated, Literal, Self
+from typing import Annotated, ClassVar, Literal, Self
 
 from pydantic import Field, model_validator
 
@@ -21,6 +21,10 @@ from experiments.config import (
     check_covered,
     check_duration,
 )
+from experiments.percept_config import PerceptConfig
+
+Points = Annotated[float, Field(ge=-100, le=100)]
+"""Points of the rating scale, and beyond its ends."""
 
 
 class Design(Model):
@@ -109,11 +113,29 @@ class Ratings(Model):
         return (*((self.lowest,) if self.lowest else ()), *(self.same or ()))
 
 
+class Appeal(Model):
+    """How a shot that is felt appeals: the numbers of `experiments.preference.appeal`, all of them assumed.
+
+    `base` and `gain` meet the assumed means of `[synthetic.ratings]` to 0.2, `jnd` the published 2 of 14 who tied, and
+    `criterion_sd` the published F in half of all studies. Points of the scale but for `jnd`, a Weber fraction.
+    """
+
+    base: Points = 2.3
+    gain: Annotated[float, Field(ge=0, le=100)] = 4.9
+    jnd: Annotated[float, Field(ge=0, le=10)] = 0.33
+    person_sd: Spread = 0.6
+    criterion_sd: Spread = 1.9
+
+
 class Synthetic(SyntheticConfig):
     """Who rates when nobody sits there."""
 
-    observer: Literal["ratings", "table"]
+    OF_FELT: ClassVar[tuple[str, ...]] = ("percept", "appeal")
+
+    observer: Literal["ratings", "table", "felt"]
     ratings: Ratings
+    percept: PerceptConfig = PerceptConfig()
+    appeal: Appeal = Appeal()
 
 
 class PreferenceConfig(ExperimentConfig):

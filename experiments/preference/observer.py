@@ -1,11 +1,13 @@
-"""Synthetic participants of experiment 2: from assumed means with two published habits, or from a table."""
+"""Synthetic participants of experiment 2: from assumed means with two habits, from a table, or from what is felt."""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
 
+from experiments.direction.percept import evidence, percepts_of
 from experiments.plan import Plan, Trial
+from experiments.preference.appeal import felt_ratings
 from experiments.preference.config import PreferenceConfig, RatingScale
 from experiments.preference.config import Ratings as RatingsLaw
 from experiments.preference.scale import on_scale
@@ -21,11 +23,22 @@ _EXPOSURE_SIGMA = 0.3
 
 def observer(setup: Setup[PreferenceConfig], plan: Plan) -> RatingsObserver:
     """The synthetic participant that a setup asks for."""
-    config = setup.config
-    if config.synthetic.observer == "table":
+    config, kind = setup.config, setup.config.synthetic.observer
+    if kind == "table":
         return RatingsObserver(config, plan, _from_table(config, plan, setup.answers))
     stream = Stream(plan.seed, "ratings", plan.experiment, plan.participant_id)
-    return RatingsObserver(config, plan, draw_ratings(config.synthetic.ratings, config.rating, plan.methods, stream))
+    if kind == "felt":
+        ratings = felt_ratings(config.synthetic.appeal, config.rating, strengths(setup), stream)
+    else:
+        ratings = draw_ratings(config.synthetic.ratings, config.rating, plan.methods, stream)
+    return RatingsObserver(config, plan, ratings)
+
+
+def strengths(setup: Setup[PreferenceConfig]) -> dict[str, float]:
+    """How strongly each method's shot is felt: its evidence, whichever way it points."""
+    parameters = setup.config.synthetic.percept.own
+    percepts = percepts_of(setup.gun.renderings(setup.config.design.methods), parameters.leak_s)
+    return {name: abs(evidence(percept, parameters)) for name, percept in percepts.items()}
 
 
 def draw_ratings(law: RatingsLaw, scale: RatingScale, methods: Sequence[str], stream: Stream) -> dict[str, float]:

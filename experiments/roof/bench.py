@@ -4,8 +4,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Callable
-from contextlib import AbstractContextManager
-from dataclasses import asdict, dataclass
+from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
@@ -14,37 +13,28 @@ from analysis.report import apa
 from analysis.report.page import Section, Table, write_page
 from experiments import storage
 from experiments.provenance import provenance
-
-Progress = Callable[[str, int], AbstractContextManager[Callable[[str], None]]]
-"""Given what is done and in how many parts, takes the name of each part that is done."""
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Measured:
-    """What a part found: plain JSON values, and the section that tells it."""
-
-    values: Any
-    section: Section
+from experiments.roof.bench_part import Asked, Measured
+from experiments.roof.bench_physics import physics
 
 
-def bench(out: Path, seed: int, chosen: list[str], progress: Progress) -> dict[str, Any]:
-    """Measure the chosen parts (all of `PARTS` if none is named), write JSON and report, give the JSON back."""
-    names = chosen or list(PARTS)
-    found: dict[str, Measured] = {}
-    with progress("bench", len(names)) as tell:
-        for name in names:
-            found[name] = PARTS[name](seed)
-            tell(name)
-    result = {"seed": seed, "provenance": provenance()} | {name: one.values for name, one in found.items()}
+def bench(out: Path, chosen: list[str], asked: Asked) -> tuple[dict[str, Any], tuple[str, ...]]:
+    """Measure the chosen parts (all of `PARTS` if none is named); the JSON, and lines for the terminal.
+
+    `out` gets `bench.json`, the report and its figures.
+    """
     storage.make_folder(out)
+    found = {name: PARTS[name](asked) for name in chosen or PARTS}
+    result = {"seed": asked.seed, "provenance": provenance()} | {name: one.values for name, one in found.items()}
     storage.write_whole(out / "bench.json", (json.dumps(result, indent=1, ensure_ascii=False) + "\n").encode())
-    write_page(out, "Measured trades of Recoil", (*(one.section for one in found.values()), _origin(seed)))
-    return result
+    write_page(out, "Measured trades of Recoil", (*(one.section for one in found.values()), _origin(asked.seed)))
+    return result, tuple(line for one in found.values() for line in one.lines)
 
 
-def post_hocs(seed: int) -> Measured:
+def post_hocs(asked: Asked) -> Measured:
     """Error rates and power of the post-hoc tests at three departures from sphericity."""
-    rows = operating.characteristics(seed)
+    with asked.progress("bench post-hocs", 1) as tell:
+        rows = operating.characteristics(asked.seed)
+        tell("data sets")
     table = Table(
         caption=(
             f"Shares of {rows[0].data_sets} simulated data sets of {operating.PARTICIPANTS} participants by three "
@@ -90,4 +80,4 @@ def _origin(seed: int) -> Section:
     return Section(title="Provenance", tables=(table,))
 
 
-PARTS: dict[str, Callable[[int], Measured]] = {"post-hocs": post_hocs}
+PARTS: dict[str, Callable[[Asked], Measured]] = {"post-hocs": post_hocs, "physics": physics}

@@ -12,9 +12,12 @@ from device.words import MAX_PULSE_S, MAX_VOLTAGE_V, Pulse
 from experiments import catalogue
 from experiments.config import participant_codes
 from experiments.direction.config import DirectionConfig
+from experiments.direction.felt import NEUTRAL, forward_rates, mind_of
+from experiments.direction.percept import percepts_of
 from experiments.limits import MethodLimits, check_limits
 from experiments.load import ConfigError, find, load_gun, load_setup, load_study, read_toml
 from experiments.orders import next_row
+from experiments.screens.synthetic import observer_of
 from experiments.setup import Setup
 
 EXAMPLE_SEED = 1
@@ -62,6 +65,7 @@ def setup_facts(setup: Setup[Any], seed: int | None, codes: list[str]) -> Facts:
         "experiment": config.experiment,
         "title": config.title,
         "design": config.design.model_dump(mode="json"),
+        "instructions": _instructions(config),
         "trials": config.design.trials,
         "duration_s": config.duration_s,
         "break_s": config.break_s,
@@ -71,6 +75,7 @@ def setup_facts(setup: Setup[Any], seed: int | None, codes: list[str]) -> Facts:
         "orders": orders(setup, EXAMPLE_SEED if chosen is None else chosen, codes),
         "gun": setup.gun.title,
         "methods": [_method_facts(setup, limit) for limit in limits],
+        "felt_forward_rates": _felt(setup),
         "limits": device_limits(),
         "assumed": [*config.assumed, *(f"{config.gun}: {key}" for key in setup.gun.assumed)],
     }
@@ -82,6 +87,34 @@ def _breaks(config: Any) -> str:
     sessions, sets = len(config.design.methods), config.design.sets_per_session
     between = config.breaks
     return f"{sessions * (sets - 1)} x {between.between_sets_s:g} s + {sessions - 1} x {between.between_sessions_s:g} s"
+
+
+def _instructions(config: Any) -> dict[str, str]:
+    """What is read out before the sets, by instruction."""
+    if not isinstance(config, DirectionConfig):
+        return {}
+    return {name: config.instruction_text(name) for name in config.design.instructions}
+
+
+def _felt(setup: Setup[Any]) -> dict[str, dict[str, float]]:
+    """The forward rates that participants who feel the gun will have, by method and instruction. Empty for others.
+
+    `ConfigError`: numbers that make nobody.
+    """
+    config = setup.config
+    if config.synthetic.observer != "felt":
+        return {}
+    row = next_row(config.design.order, len(config.design.methods), [])
+    observer_of(setup, catalogue.experiment(setup).make_plan(config, "P01", EXAMPLE_SEED, row))
+    if not isinstance(config, DirectionConfig):
+        return {}
+    mind = mind_of(config)
+    percepts = percepts_of(setup.gun.renderings(config.design.methods), mind.percept.leak_s)
+    told = config.design.instructions or (NEUTRAL,)
+    return {
+        method: {name: rate for name, rate in forward_rates(mind, percept).items() if name in told}
+        for method, percept in percepts.items()
+    }
 
 
 def orders(setup: Setup[Any], seed: int, codes: list[str]) -> dict[str, list[str]]:
@@ -131,18 +164,29 @@ def as_text(facts: Facts) -> str:
         return "\n\n".join([head, *parts])
     if "experiment" not in facts:
         return "\n".join(f"{key}: {value}" for key, value in facts.items())
-    return "\n".join([*_design_lines(facts), *_order_lines(facts), *_drive_lines(facts), *_assumed_lines(facts)])
+    chapters = (_design_lines, _instruction_lines, _order_lines, _drive_lines, _felt_lines, _assumed_lines)
+    return "\n".join(line for chapter in chapters for line in chapter(facts))
 
 
 def _design_lines(facts: Facts) -> list[str]:
     minutes, stated = facts["duration_s"] / 60, facts["stated_duration_s"] / 60
-    design = ", ".join(f"{key} {value}" for key, value in facts["design"].items() if key != "methods")
+    apart = ("methods", "instructions")
+    design = ", ".join(f"{key} {value}" for key, value in facts["design"].items() if key not in apart)
     return [
         f"{facts['title']} ({facts['experiment']})",
         f"  Design    {facts['trials']} trials; {design}",
         f"  Duration  {minutes:.1f} min planned ({stated:g} min stated), of which breaks {facts['break_s']:g} s "
         f"({facts['breaks']})",
     ]
+
+
+def _instruction_lines(facts: Facts) -> list[str]:
+    told = facts["instructions"]
+    if not told:
+        return []
+    sets = facts["design"]["sets_per_session"]
+    head = f"one a set, each in {sets // len(told)} of a session's {sets} sets, in random order"
+    return [f"  Told      {head}", *(f"    {name:14} “{text}”" for name, text in told.items())]
 
 
 def _order_lines(facts: Facts) -> list[str]:
@@ -174,6 +218,17 @@ def _drive(method: Facts) -> str:
         f"peak force {method['peak_force_N']:.1f} N on the hand, home after {1000 * method['settle_s']:.0f} ms "
         "(by the model)"
     )
+
+
+def _felt_lines(facts: Facts) -> list[str]:
+    rates = facts["felt_forward_rates"]
+    if not rates:
+        return []
+    lines = [
+        f"    {method:14} {', '.join(f'{100 * rate:.1f} % ({name})' for name, rate in found.items())}"
+        for method, found in rates.items()
+    ]
+    return ["  Felt      right answers to forward shots, of synthetic participants (by the model)", *lines]
 
 
 def _assumed_lines(facts: Facts) -> list[str]:

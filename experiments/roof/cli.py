@@ -8,7 +8,7 @@ import sys
 
 import typer
 
-from experiments.roof.commands import guns, numbers, power, sessions
+from experiments.roof.commands import design, fit, guns, numbers, power, sessions
 from experiments.roof.commands.speaking import INTERRUPTED, UNUSABLE, say
 
 app = typer.Typer(
@@ -30,6 +30,7 @@ COMMANDS = (
     numbers.analyze,
     numbers.audit,
     power.power,
+    design.design,
     guns.simulate,
     sessions.configs,
     sessions.new,
@@ -41,6 +42,7 @@ for command in COMMANDS:
     app.command()(command)
 export.command()(numbers.bids)
 app.add_typer(export, name="export")
+app.add_typer(fit.app, name="fit")
 
 
 def main() -> None:

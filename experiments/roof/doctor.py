@@ -20,6 +20,7 @@ from experiments.clock import RealClock
 from experiments.doctor.checks import carry_out, checks
 from experiments.doctor.finding import Finding
 from experiments.doctor.verdicts import overall
+from experiments.load import find, load_gun
 
 _WIDTH = 160
 """Columns of the table where it does not go to a terminal."""
@@ -29,9 +30,12 @@ Progress = Callable[[str, int], AbstractContextManager[Callable[[str], None]]]
 """Given what is done and in how many parts, takes the name of each part that is done."""
 
 
-def examine(results: Path, gun: str, progress: Progress) -> list[Finding]:
-    """What every check found. `PlaceError`: the gun's address has no such form."""
-    findings, planned = list[Finding](), checks(results, gun)
+def examine(results: Path, gun: str, config: str, progress: Progress) -> list[Finding]:
+    """What every check found; `config` is the gun's, with the limit of its line.
+
+    `PlaceError`: the gun's address has no such form; `ConfigError`: the config cannot be used.
+    """
+    findings, planned = list[Finding](), checks(results, gun, load_gun(find(config)).serial.round_trip_limit_s)
     with progress("doctor", len(planned)) as tell:
         for check in planned:
             findings += carry_out(check)

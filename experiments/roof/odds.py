@@ -7,15 +7,13 @@ from __future__ import annotations
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.special import ndtr
 
 from analysis.odds import Odds, chance_recurs, odds_of, recurs
 from analysis.paper import Paper
-from device.words import DIRECTIONS
 from experiments.direction.config import DirectionConfig
-from experiments.direction.observer import probit_of_forward
 from experiments.preference.config import PreferenceConfig
 from experiments.preference.observer import draw_ratings
+from experiments.roof import power_studies
 from experiments.streams import Stream, generator
 
 Scores = NDArray[np.float64]
@@ -24,14 +22,8 @@ Counts = NDArray[np.int64]
 
 def direction_counts(config: DirectionConfig, methods: list[str], n: int, replications: int, seed: int) -> Counts:
     """Correct answers, (replications, n, methods, 2 directions), of people drawn as `RatesObserver` draws them."""
-    rates, design = config.synthetic.rates, config.design
-    draws = generator(seed, "odds", config.experiment)
-    ability = rates.ability_sd * draws.standard_normal((replications, n, 1, 1))
-    bias = rates.bias_sd * draws.standard_normal((replications, n, 1, 1))
-    says_forward = [[probit_of_forward(rates, method, way) for way in DIRECTIONS] for method in methods]
-    towards = np.array([1.0, -1.0])  # a correct answer is "forward" on forward trials, not "forward" on backward ones
-    correct = ndtr(towards * (np.array(says_forward) + bias) + ability)
-    return draws.binomial([design.forward_per_session, design.backward_per_session], correct)
+    counts = power_studies.direction_counts(config, n, replications, generator(seed, "odds", config.experiment))
+    return counts[:, :, [config.design.methods.index(method) for method in methods]]
 
 
 def preference_scores(config: PreferenceConfig, methods: list[str], n: int, replications: int, seed: int) -> Scores:

@@ -8,10 +8,15 @@ from analysis.report.figures import ShotPanel
 from device.parameters import GunParameters
 from device.physics import ShotSummary, trace
 
+_COARSE_S = 0.0005  # steps above which a curve is drawn with corners
+_MOST_POINTS = 40_000
+
 
 def shot_panel(title: str, parameters: GunParameters) -> ShotPanel:
     """The panel of one shot by the model."""
     shot = trace(parameters)
+    if shot.time_s[-1] - shot.time_s[-2] > _COARSE_S:
+        shot = trace(parameters, min(int(2 * shot.time_s[-1] / _COARSE_S), _MOST_POINTS))
     return ShotPanel(
         title=title,
         time_s=shot.time_s,
@@ -22,6 +27,7 @@ def shot_panel(title: str, parameters: GunParameters) -> ShotPanel:
         stage_ends_s=_ends(shot.summary),
         collision_force_N=_or_nan(shot.summary.collision_force_N),
         contact_depth_m=parameters.contact_depth_m,
+        status=shot.summary.status,
     )
 
 

@@ -59,7 +59,10 @@ def power(request: Request, where: Where, out: Path, progress: Progress) -> Fact
 def job_of(grid: Grid) -> str:
     """The hash of all that the tallies depend on."""
     published = grid.published.model_dump(mode="json") if grid.published else None
-    chunks = [(c.design.key, c.number, c.studies, c.config.design.model_dump(mode="json")) for c in grid.chunks()]
+    chunks = [
+        (c.design.key, c.number, c.studies, c.config.design.model_dump(mode="json"), c.felt and asdict(c.felt))
+        for c in grid.chunks()
+    ]
     config = grid.config.model_dump(mode="json")
     return sha256([provenance(), grid.request.seed, grid.request.null, config, published, chunks])
 

@@ -1,46 +1,39 @@
-"""What `recoil power` is asked for, checked at the door and spelled out as a grid of designs with their costs."""
+"""What `recoil power` is asked for, spelled out as a grid of designs with their costs."""
 
 from __future__ import annotations
 
-import math
-import re
-from collections.abc import Iterator
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
 from analysis.paper import PublishedExperiment, load_paper
 from experiments.direction.config import DirectionConfig
-from experiments.load import ConfigError, find, load_setup
+from experiments.direction.percept import Percept
+from experiments.load import find
 from experiments.preference.config import PreferenceConfig
+from experiments.roof.power_felt import Felt, felt_of, null_felt, percepts_of_setup
+from experiments.roof.power_request import (
+    FELT,
+    GridError,
+    Request,
+    check_scalars,
+    checked_setup,
+    factors,
+    method_sets_of,
+    numbers,
+    trials_of,
+)
 from experiments.roof.power_studies import Chunk, Config, Design, People, null_rates, null_ratings
+
+__all__ = ["Cell", "Grid", "Request", "make_grid"]
 
 DEFAULT_PARTICIPANTS = "6,8,10,12,14,16,18,20,24,28,32,40"
 NULL_PARTICIPANTS = "8,14,24"
 DEFAULT_EFFECTS = "0.5,0.75,1"
 PEOPLE_A_CHUNK = 70_000
 """Participants drawn together: 5000 studies of 14. It is part of what a seed means, so it never depends on workers."""
-_MOST_PEOPLE, _LARGEST_EFFECT = 999, 10.0
-
-
-class GridError(ConfigError):
-    """A grid that cannot be worked out; the message names option, value and rule."""
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Request:
-    """What the command line asks for. Lists are text, as in `8,10,14-20`."""
-
-    config: str
-    participants: str | None = None
-    trials: str | None = None
-    methods: tuple[str, ...] = ()
-    effects: str | None = None
-    studies: int = 10_000
-    target: float = 0.8
-    null: bool = False
-    seed: int = 1
-    paper: str = "paper"
+_MOST_PEOPLE = 999
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -60,13 +53,17 @@ class Cell:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Grid:
-    """All cells in their order; `reference` is the paper's own design, with the published claims."""
+    """All cells in their order; `reference` is the paper's own design, with the published claims.
+
+    `percepts`: what the gun's shots give to feel, by method, if the participants feel it.
+    """
 
     config: Config
     cells: tuple[Cell, ...]
     reference: Cell | None
     published: PublishedExperiment | None
     request: Request
+    percepts: Mapping[str, Percept] | None = None
 
     @property
     def all_cells(self) -> tuple[Cell, ...]:
@@ -90,22 +87,29 @@ class Grid:
                 seed=self.request.seed,
                 number=number,
                 studies=min(each, self.request.studies - first),
+                felt=self._felt(cell),
             )
             for number, first in enumerate(range(0, self.request.studies, each))
         ]
 
+    def _felt(self, cell: Cell) -> Felt | None:
+        if self.percepts is None or not isinstance(cell.config, DirectionConfig):
+            return None
+        return felt_of(cell.config, self.percepts, cell.design.methods, cell.design.effect)
+
 
 def make_grid(request: Request) -> Grid:
     """The grid of a request. `ConfigError` with a message for people for whatever is wrong with it."""
-    _check_scalars(request)
-    config = _config(request.config)
+    check_scalars(request)
+    setup = checked_setup(request.config)
+    config: Config = setup.config
     people = request.participants or (NULL_PARTICIPANTS if request.null else DEFAULT_PARTICIPANTS)
     participants = numbers(people, "--participants", 2, _MOST_PEOPLE)
     effects = [0.0] if request.null else factors(request.effects or DEFAULT_EFFECTS)
     designs = [
         (_varied(config, methods, trials), Design(participants=n, trials=trials, methods=methods, effect=effect))
-        for methods in _method_sets(request.methods, config)
-        for trials in _trials(request.trials, config)
+        for methods in method_sets_of(request.methods, config)
+        for trials in trials_of(request.trials, config)
         for effect in effects
         for n in participants
     ]
@@ -118,99 +122,8 @@ def make_grid(request: Request) -> Grid:
         reference=_reference(config, published),
         published=published,
         request=request,
+        percepts=percepts_of_setup(setup) if config.synthetic.observer == FELT else None,
     )
-
-
-def numbers(text: str, option: str, low: int, high: int) -> list[int]:
-    """Whole numbers and ranges, in order and once each. `GridError` for others, or outside `low`..`high`.
-
-    >>> numbers("14, 8-10", "--participants", 2, 999)
-    [8, 9, 10, 14]
-    """
-    found = set[int]()
-    for part in text.split(","):
-        match = re.fullmatch(r"\s*([0-9]{1,9})\s*(?:-\s*([0-9]{1,9})\s*)?", part)
-        if not match:
-            raise GridError(f"{option} {text}: {part.strip()!r} is no whole number and no range such as 8-20")
-        first, last = int(match[1]), int(match[2] or match[1])
-        if not low <= first <= last <= high:
-            raise GridError(f"{option} {text}: {part.strip()} must be from {low} to {high}, ranges upwards")
-        found |= set(range(first, last + 1))
-    return sorted(found)
-
-
-def factors(text: str) -> list[float]:
-    """Effect factors, in order and once each. `GridError` for what is not a number from 0 to 10.
-
-    >>> factors("1,0.5")
-    [0.5, 1.0]
-    """
-    found = set[float]()
-    for part in text.split(","):
-        try:
-            value = float(part)
-        except ValueError:
-            value = math.nan
-        if not 0.0 <= value <= _LARGEST_EFFECT:
-            raise GridError(f"--effect {text}: {part.strip()!r} must be a number from 0 (none) to {_LARGEST_EFFECT:g}")
-        found.add(value)
-    return sorted(found)
-
-
-def _check_scalars(request: Request) -> None:
-    if not 0.0 < request.target < 1.0:
-        raise GridError(f"--target {request.target:g}: must lie between 0 and 1, such as 0.8")
-    if request.null and request.effects is not None:
-        raise GridError(f"--null has no effect at all; leave --effect {request.effects} out")
-
-
-def _config(name: str) -> Config:
-    """The config, if its synthetic participants follow a law that studies can be drawn from."""
-    config = load_setup(name).config
-    laws = {"direction": "rates", "preference": "ratings"}
-    observer, law = config.synthetic.observer, laws.get(config.experiment)
-    if not isinstance(config, DirectionConfig | PreferenceConfig) or observer != law:
-        raise GridError(f'{find(name)}: synthetic.observer = "{observer}" has no power; studies are drawn from "{law}"')
-    if isinstance(config, DirectionConfig) and not config.design.forward_per_session:
-        raise GridError(f"{find(name)}: design.forward_per_session = 0; the planned analysis is of forward trials")
-    return config
-
-
-def _method_sets(asked: tuple[str, ...], config: Config) -> list[tuple[str, ...]]:
-    """The sets of methods to compare: the config's own unless some are named."""
-    known, sets = config.design.methods, []
-    for text in asked or (",".join(known),):
-        names = [name.strip() for name in text.split(",")]
-        strangers = [name for name in names if name not in known]
-        if strangers or len(set(names)) != len(names) or len(names) < 2:
-            raise GridError(f"--methods {text}: must be two or more different ones of {', '.join(known)}")
-        sets.append(tuple(method for method in known if method in names))
-    return list(dict.fromkeys(sets))
-
-
-def _trials(asked: str | None, config: Config) -> list[int]:
-    """The trials of one method: the config's own unless some are named."""
-    if isinstance(config, PreferenceConfig):
-        if asked is not None:
-            raise GridError(f"--trials {asked}: {config.title!r} has one trial a method; leave the option out")
-        return [1]
-    design = config.design
-    if asked is None:
-        return [design.trials_per_session]
-    whole = design.trials_per_session // math.gcd(design.trials_per_session, design.forward_per_session)
-    step = math.lcm(design.trials_per_set, whole)
-    found = numbers(asked, "--trials", 1, 10_000)
-    uneven = [trials for trials in found if trials % step]
-    if uneven and "-" not in asked:
-        raise GridError(
-            f"--trials {asked}: {uneven[0]} is no multiple of {step}, so it makes no sets of {design.trials_per_set} "
-            f"with forward and backward trials as the config has them ({design.forward_per_session} to "
-            f"{design.backward_per_session})"
-        )
-    fitting = [trials for trials in found if trials % step == 0]
-    if not fitting:
-        raise GridError(f"--trials {asked}: holds no multiple of {step}")
-    return fitting
 
 
 def _varied(config: Config, methods: tuple[str, ...], trials: int) -> Config:
@@ -235,12 +148,16 @@ def _null_people(config: Config) -> tuple[People, ...]:
 
 def _null(config: Config, design: Design, people: People) -> tuple[Config, Design]:
     """The design with null participants."""
-    if isinstance(config, DirectionConfig):
-        law: Any = {"rates": null_rates(config.synthetic.rates, biased="bias" in people)}
-    else:
-        law = {"ratings": null_ratings(config.synthetic.ratings)}
-    synthetic = config.synthetic.model_copy(update=law)
-    return config.model_copy(update={"synthetic": synthetic}), replace(design, people=people)
+    config = config.model_copy(update={"synthetic": _null_synthetic(config, people)})
+    return config, replace(design, people=people)
+
+
+def _null_synthetic(config: Config, people: People) -> Any:
+    if isinstance(config, PreferenceConfig):
+        return config.synthetic.model_copy(update={"ratings": null_ratings(config.synthetic.ratings)})
+    if config.synthetic.observer == FELT:
+        return null_felt(config.synthetic, biased="bias" in people)
+    return config.synthetic.model_copy(update={"rates": null_rates(config.synthetic.rates, biased="bias" in people)})
 
 
 def _cell(config: Config, design: Design) -> Cell:
@@ -270,10 +187,5 @@ def _reference(config: Config, published: PublishedExperiment | None) -> Cell | 
     """The paper's own number of people with the config's trials and effects."""
     if published is None:
         return None
-    trials = next(iter(_trials(None, config)))
+    trials = next(iter(trials_of(None, config)))
     return _cell(config, Design(participants=published.n, trials=trials, methods=config.design.methods))
-
-
-def method_sets(cells: tuple[Cell, ...]) -> Iterator[tuple[str, ...]]:
-    """The different sets of methods, in their order."""
-    yield from dict.fromkeys(cell.design.methods for cell in cells)

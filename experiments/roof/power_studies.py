@@ -20,6 +20,7 @@ from experiments.canonical import canonical_json
 from experiments.direction.config import DirectionConfig, Rates
 from experiments.direction.observer import probit_of_forward
 from experiments.preference.config import PreferenceConfig, Ratings, RatingScale
+from experiments.roof.power_felt import Felt, felt_counts
 from experiments.streams import generator
 
 Scores = NDArray[np.float64]
@@ -51,7 +52,7 @@ class Design:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Chunk:
-    """So many studies of a design. `config` is that of the design: its methods and trials."""
+    """So many studies of a design. `config` is that of the design: its methods and trials; `felt` who feel the gun."""
 
     config: Config
     design: Design
@@ -59,6 +60,7 @@ class Chunk:
     seed: int
     number: int
     studies: int
+    felt: Felt | None = None
 
 
 def run_chunk(chunk: Chunk) -> Tally:
@@ -137,27 +139,34 @@ def on_scale(values: Scores, scale: RatingScale) -> Scores:
 
 
 def _directions(config: DirectionConfig, design: Design, chunk: Chunk, draws: np.random.Generator) -> Findings:
-    rates, protocol = config.synthetic.rates, config.design
-    correct = direction_counts(config, design.participants, chunk.studies, draws, design.effect)
-    trials = protocol.forward_per_session, protocol.backward_per_session
-    felt = [
-        [design.effect * (probit_of_forward(rates, m, way) - rates.bias_mean) for way in DIRECTIONS]
-        for m in design.methods
-    ]
-    found = analysed_directions(
-        correct, trials, design.methods, [row[0] for row in felt], [row[0] - row[1] for row in felt]
-    )
+    trials = config.design.forward_per_session, config.design.backward_per_session
+    if chunk.felt is None:
+        correct = direction_counts(config, design.participants, chunk.studies, draws, design.effect)
+        expected, expected_d = _expected(config.synthetic.rates, design)
+    else:
+        correct = felt_counts(chunk.felt, trials, design.participants, chunk.studies, draws)
+        expected = expected_d = list(chunk.felt.log_odds)  # rates rise with the evidence, and d' has its sign
+    found = analysed_directions(correct, trials, design.methods, expected, expected_d)
     if isinstance(chunk.published, PublishedDirection):
         places = [design.methods.index(method) for method in chunk.published.methods]
-        claims = _published_directions(correct[:, :, places], trials, chunk.published)
+        claims = published_directions(correct[:, :, places], trials, chunk.published)
         return _with_published(found, claims)
     return found
 
 
-def _published_directions(
+def _expected(rates: Rates, design: Design) -> tuple[list[float], list[float]]:
+    """What is expected of the correct rates on forward shots (their order), and of d' (its sign), by method."""
+    felt = [
+        [design.effect * (probit_of_forward(rates, m, way) - rates.bias_mean) for way in DIRECTIONS]
+        for m in design.methods
+    ]
+    return [row[0] for row in felt], [row[0] - row[1] for row in felt]
+
+
+def published_directions(
     correct: Counts, trials: tuple[int, int], published: PublishedDirection
 ) -> dict[str, Recurrence]:
-    """Which published claims recur; `correct` has the methods in the published order."""
+    """Which published claims recur; `correct` (studies, n, methods, 2) has the methods in the published order."""
     claims = recurs(correct[..., 0] / trials[0], published)
     pooled, n = correct.sum(axis=1), correct.shape[1]
     # one direction at a time: there may be more trials of the one than of the other

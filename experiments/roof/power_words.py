@@ -9,8 +9,9 @@ from analysis.odds import WHOLE_PATTERN
 from analysis.power.planned import ALL_PAIRS, ANOVA, ANY_PAIR
 from analysis.report import apa
 from experiments.direction.config import DirectionConfig, Rates
-from experiments.preference.config import Ratings
+from experiments.preference.config import PreferenceConfig, Ratings
 from experiments.roof.power_grid import Grid
+from experiments.roof.power_request import FELT
 from experiments.roof.power_studies import PUBLISHED
 
 Facts = dict[str, Any]
@@ -23,10 +24,12 @@ HEADLINES = (ANOVA, ALL_PAIRS, PATTERN)
 def assumptions(grid: Grid) -> list[str]:
     """What the numbers rest on."""
     config, null = grid.config, grid.request.null
-    if isinstance(config, DirectionConfig):
-        law = list(_null_rates(config.synthetic.rates) if null else _rates(config.synthetic.rates))
-    else:
+    if isinstance(config, PreferenceConfig):
         law = list(_null_ratings(config.synthetic.ratings) if null else _ratings(config.synthetic.ratings))
+    elif config.synthetic.observer == FELT:
+        law = list(_felt(config, null=null))
+    else:
+        law = list(_null_rates(config.synthetic.rates) if null else _rates(config.synthetic.rates))
     return [
         *law,
         "All tests are at 5 %, two-sided; Tukey's test is on the pooled repeated-measures error. A comparison counts "
@@ -133,6 +136,33 @@ def _null_rates(rates: Rates) -> Iterator[str]:
         "independent and rejects them more often than 5 %: trials come in people. The exact test of plain guessers "
         "stays at or below 5 %, as counts are whole numbers."
     )
+
+
+def _felt(config: DirectionConfig, *, null: bool) -> Iterator[str]:
+    percept, people, lapses = config.synthetic.percept, config.synthetic.people, config.synthetic.diffusion.lapses
+    yield (
+        f"People answer from what the gun does: exponent {percept.exponent:g}, leak {percept.leak_s:g} s, sensitivity "
+        f"{percept.sensitivity:g}, confusion {percept.confusion:g}, start {percept.start:g} (`recoil fit`): a model's "
+        "guess, not a measurement."
+    )
+    yield (
+        f"They differ by SD {people.drift_factor_sd:g} of the factor on the drift, {people.log_boundary_sd:g} of the "
+        f"log boundary, {people.logit_start_sd:g} of the logit of the start; lapses {lapses.rate:g}."
+    )
+    if config.design.instructions:
+        yield (
+            f"Instructions {', '.join(config.design.instructions)}: each takes an equal part of a session's sets and "
+            "has its own boundary; the planned analysis counts all trials together."
+        )
+    if null:
+        yield (
+            "Null participants feel nothing: the evidence is 0, so each answers “forward” at the chance of their own "
+            "start: 0.5 for those who guess, the config's and its spread for those with the config's bias. The pooled "
+            "binomial test of the latter rejects as often as the bias is found, which is no false positive of a "
+            "direction felt; the exact test of plain guessers stays at or below 5 %, as counts are whole numbers."
+        )
+    else:
+        yield "The effect is a factor on the evidence (log odds of a right answer): 1 is the config, 0 nothing felt."
 
 
 def _ratings(law: Ratings) -> Iterator[str]:

@@ -42,6 +42,7 @@ class Asked:
 def run_session(asked: Asked) -> Place:
     """Carry out what was asked for. `PlaceError` for what cannot be done here; a stop raises `KeyboardInterrupt`."""
     _check_screen(asked)
+    check_pace(asked.screen, asked.gun)
     request = Request(
         setup=load_setup(asked.config),
         participant_id=asked.participant_id,
@@ -66,9 +67,18 @@ def _check_screen(asked: Asked) -> None:
         raise PlaceError("--visual, --participant-screen, --participant-keys and --noise go with --screen console")
 
 
+def check_pace(screen: str, gun: str) -> None:
+    """`PlaceError`, if people were to answer on a clock that goes faster than they live: a twin's in a hurry."""
+    if screen != "synthetic" and (_speed(gun) or 1.0) != 1.0:
+        raise PlaceError(
+            f"--gun {gun}: --screen {screen} is for people, who live no faster than the world; start `recoil twin` "
+            "without --speed and leave out ?speed, or use --screen synthetic"
+        )
+
+
 def _at_terminal(request: Request, asked: Asked) -> Finished:
     del asked
-    return run(request, _terminal, RealClock(_speed(request.gun) or 1.0))
+    return run(request, _terminal, RealClock())
 
 
 def _synthetic(request: Request, asked: Asked) -> Finished:
@@ -99,6 +109,7 @@ def _at_console(request: Request, asked: Asked) -> Finished:
 
 def run_lab_day(config: str, results: Path, gun: str, seed: int | None) -> None:
     """The start window at the console, and one run after the other from it."""
+    check_pace("console", gun)
     request = Request(setup=load_setup(config), participant_id="", results=results, gun=gun, seed=seed)
     _console().lab_day(request)
 

@@ -30,13 +30,23 @@ from experiments.steps import (
 )
 
 
-def synthetic_screen(setup: Setup[Any], plan: Plan, clock: Clock) -> SyntheticScreen:
-    """The screen of the synthetic participant that a setup asks for. `ConfigError` if its table does not fit."""
+def observer_of(setup: Setup[Any], plan: Plan) -> Any:
+    """The synthetic participant that a setup asks for, the same in data mode and in visual mode.
+
+    `ConfigError` if its table does not fit, or its numbers make nobody.
+    """
     try:
-        observer = catalogue.experiment(setup).observer(setup, plan)
+        return catalogue.experiment(setup).observer(setup, plan)
     except ValueError as error:
-        raise ConfigError(f"{setup.source.parent / str(setup.config.synthetic.table)}: {error}") from error
-    return SyntheticScreen(setup.config, observer, clock)
+        synthetic = setup.config.synthetic
+        if synthetic.observer == "table":
+            raise ConfigError(f"{setup.source.parent / synthetic.table}: {error}") from error
+        raise ConfigError(f"{setup.source}: the numbers of [synthetic.*] make nobody: {error}") from error
+
+
+def synthetic_screen(setup: Setup[Any], plan: Plan, clock: Clock) -> SyntheticScreen:
+    """The screen of the synthetic participant that a setup asks for. Raises as `observer_of` does."""
+    return SyntheticScreen(setup.config, observer_of(setup, plan), clock)
 
 
 class SyntheticScreen:
@@ -82,10 +92,10 @@ class SyntheticScreen:
         self._clock.sleep(step.duration_s)
         return Rested(rested_s=step.duration_s)
 
-    def said_next(self, step: Present, until_s: float) -> bool:
+    def said_next(self, step: Present, onset_s: float, until_s: float) -> bool:
         """Say next once the observer has felt enough since the first onset; drawn when the stimulus begins."""
         if self._next_at_s is None:
-            self._next_at_s = until_s - step.repeat_every_s + self._observer.exposure_s(step.trial)
+            self._next_at_s = onset_s + self._observer.exposure_s(step.trial)
         self._clock.sleep(min(self._next_at_s, until_s) - self._clock.now())
         return self._next_at_s <= until_s
 

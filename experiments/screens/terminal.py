@@ -60,10 +60,10 @@ class TerminalScreen:
         """Nothing to take over: every step says all."""
 
     def prepare(self, step: Prepare) -> Prepared:
-        """Say where to turn the gun and which damper to set; Enter fires."""
+        """Say what to tell the participant, where to turn the gun and which damper to set; Enter fires."""
         again = f" (attempt {step.attempt}: the trial is presented again)" if step.attempt > 1 else ""
         damper = f"\n  Set the damper: {step.damper.upper()}." if step.damper else ""
-        self._say(f"\n{self._where(step.trial)}{again}{damper}")
+        self._say(f"\n{self._where(step.trial)}{again}{self._told(step)}{damper}")
         self._line(f"  Turn the gun to {step.trial.direction.upper()} and hand it over. Enter fires: ")
         return Prepared()
 
@@ -97,9 +97,9 @@ class TerminalScreen:
                 self._say("  To end the break early type `skip` and the reason.")
         return ""
 
-    def said_next(self, step: Present, until_s: float) -> bool:
+    def said_next(self, step: Present, onset_s: float, until_s: float) -> bool:
         """Enter means that the participant said next."""
-        del step
+        del step, onset_s
         return (
             self._poll(max(0.0, until_s - self._clock.now()), "\r  Enter when the participant says next: ") is not None
         )
@@ -136,6 +136,13 @@ class TerminalScreen:
         sets, sessions = in_session[-1].set, self._plan.trials[-1].session
         place = f"Trial {trial.trial} of {len(in_session)}"
         return f"{place}, set {trial.set} of {sets}, session {trial.session} of {sessions}."
+
+    def _told(self, step: Prepare) -> str:
+        """The instruction: to be read out before a set, and as a reminder at its other trials."""
+        if not step.instruction:
+            return ""
+        how = "READ OUT" if self._plan.opens_set(step.trial) else "Instruction of this set"
+        return f"\n  {how}: {step.instruction}"
 
     def _ordinal(self, trial: Trial) -> str:
         return f"Feedback {trial.trial} of {len(self._plan.trials)}, in order of presentation"

@@ -8,14 +8,27 @@ from analysis.report.figures.names import display_name, named, people, stars
 from analysis.report.figures.results import figure_8
 from analysis.report.figures.shot import ShotPanel, figure_5
 from analysis.report.figures.times import figure_response_times
+from analysis.report.figures.trade import (
+    figure_conditional_accuracy,
+    figure_quantile_probability,
+    has_curve,
+    has_points,
+)
+from analysis.report.figures.vibration import VibrationPanel, figure_vibration
 
 __all__ = [
     "ShotPanel",
+    "VibrationPanel",
     "display_name",
     "figure_5",
     "figure_8",
+    "figure_conditional_accuracy",
     "figure_directions",
+    "figure_quantile_probability",
     "figure_response_times",
+    "figure_vibration",
+    "has_curve",
+    "has_points",
     "named",
     "people",
     "stars",

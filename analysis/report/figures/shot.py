@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -15,6 +15,10 @@ from analysis.core.arrays import FloatArray
 from analysis.report.figures.style import BLACK, BLUE, GREEN, PURPLE, VERMILION, light_grid, new_figure, save, style
 
 STAGES = ("recoil", "bullet firing", "resetting", "ready")
+_WIDE = 200.0  # the longest shot in ends of its first stage, from which on time is shown logarithmic
+_PANEL_IN = 4.1
+_SHOWN_PT = 0.8 * 72.0 * _PANEL_IN  # of a panel's width, its axis
+_APART_PT = 17.0  # least distance of two stages' names
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -22,7 +26,7 @@ class ShotPanel:
     """One shot to draw. Arrays (samples,); `stage_ends_s` are the ends of recoil, bullet firing and resetting.
 
     `collision_force_N` = m v^2 / x_k is apart from `force_N`; `contact_depth_m` is x_k (0.5 mm, assumed). An end that
-    was not reached is NaN, and so is the collision's force then.
+    was not reached is NaN, and so is the collision's force then; `status` says why the magnet is not home.
     """
 
     title: str
@@ -34,6 +38,7 @@ class ShotPanel:
     stage_ends_s: tuple[float, float, float]
     collision_force_N: float
     contact_depth_m: float = 0.0005
+    status: str = "home"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -46,22 +51,23 @@ class _Trace:
 def figure_5(panels: Sequence[ShotPanel], path_stem: Path) -> tuple[Path, Path, Path]:
     """A column (a), (b), ... for each shot; rows F, x, dx/dt, u over time in ms; PNG, SVG and PDF are written.
 
-    Stage borders are lines with open circles on the traces. The collision is an arrow at the end of the reset, cut at
-    the top of the axis where it is larger. `ValueError` without a panel.
+    Stage borders are lines with open circles on the traces, at the values just before. The collision is an arrow at the
+    end of the reset, cut at the top of the axis where it is larger. Where a stage would be too narrow to see, time is
+    logarithmic. `ValueError` without a panel.
     """
     if not panels:
         raise ValueError("figure 5 needs at least one shot")
     with mpl.rc_context(style()):  # type: ignore[arg-type]
-        figure = new_figure(0.8 + 4.1 * len(panels), 7.4)
+        figure = new_figure(0.8 + _PANEL_IN * len(panels), 7.4)
         grid = figure.subplots(4, len(panels), sharex=True, sharey="row", squeeze=False)
         for column, panel in enumerate(panels):
             _draw_column(list(grid[:, column]), panel, chr(ord("a") + column))
-        ends = [float(at) * 1e3 for panel in panels for at in (panel.time_s[0], panel.time_s[-1])]
-        grid[0, 0].set_xlim(min(ends), max(ends))
+        _scale_time(grid[0, 0], panels)
         for row, label in enumerate(trace.label for trace in _traces(panels[0])):
             grid[row, 0].set_ylabel(label)
         _leave_room(grid[0, 0], panels)
         for column, panel in enumerate(panels):
+            _name_stages(grid[0, column], panel)
             _draw_collision(grid[0, column], panel)
         figure.align_ylabels(grid[:, 0])
         return save(figure, path_stem)
@@ -86,26 +92,55 @@ def _draw_column(column: Sequence[Axes], panel: ShotPanel, letter: str) -> None:
             axes.plot([time_ms[-1], 1e4], [trace.values[-1]] * 2, color=trace.colour, linewidth=1.3, scalex=False)
         for end_ms in _borders_ms(panel):
             axes.axvline(end_ms, color="#777777", linewidth=0.8, linestyle=(0, (4, 3)), zorder=1)
-            height = float(np.interp(end_ms, time_ms, trace.values))
+            height = float(trace.values[max(int(np.searchsorted(time_ms, end_ms)) - 1, 0)])
             axes.plot([end_ms], [height], "o", markersize=5.0, mfc="white", mec=BLACK, mew=1.0, zorder=4)
+        if not np.ptp(trace.values):
+            axes.set_ylim(trace.values[0] - 1.0, trace.values[0] + 1.0)
     column[0].set_title(f"({letter}) {panel.title}", loc="left", pad=54.0, fontweight="bold")
     column[-1].set_xlabel("time [ms]")
-    _name_stages(column[0], panel)
 
 
 def _borders_ms(panel: ShotPanel) -> list[float]:
     return [end * 1e3 for end in panel.stage_ends_s if math.isfinite(end)]
 
 
+def _scale_time(axes: Axes, panels: Sequence[ShotPanel]) -> None:
+    """From the first sample to the last of all; logarithmic, from well within the first stage, if that is narrow."""
+    first_ms, last_ms = (pick(float(panel.time_s[at]) * 1e3 for panel in panels) for pick, at in ((min, 0), (max, -1)))
+    shortest_ms = min((border for panel in panels for border in _borders_ms(panel)), default=last_ms)
+    if last_ms > _WIDE * shortest_ms > 0:
+        axes.set_xscale("log")
+        first_ms = shortest_ms / 30.0
+    axes.set_xlim(first_ms, last_ms)
+
+
+def _stages_ms(panel: ShotPanel) -> Iterator[tuple[str, float, float]]:
+    """The stages that there were: name, begin and end. The first one that did not end lasts as long as the panel."""
+    begin_ms, last_ms = float(panel.time_s[0]) * 1e3, float(panel.time_s[-1]) * 1e3
+    if math.isnan(panel.stage_ends_s[0]) and panel.status != "home":
+        yield "at rest" if not np.any(panel.velocity_m_s) else panel.status, begin_ms, last_ms
+        return
+    for name, end_s in zip(STAGES, (*panel.stage_ends_s, math.nan), strict=True):
+        end_ms = end_s * 1e3 if math.isfinite(end_s) else last_ms
+        if end_ms > begin_ms:
+            yield name, begin_ms, end_ms
+        if not math.isfinite(end_s):
+            return
+        begin_ms = end_ms
+
+
 def _name_stages(axes: Axes, panel: ShotPanel) -> None:
-    """Slanted, because the first stages are a few milliseconds wide."""
-    borders = [float(panel.time_s[0]) * 1e3, *_borders_ms(panel), float(panel.time_s[-1]) * 1e3]
-    for name, start, end in zip(STAGES, borders, borders[1:], strict=False):
+    """Slanted and apart from each other, because the first stages may be narrow."""
+    before_pt = -math.inf
+    for name, start_ms, end_ms in _stages_ms(panel):
+        low, high = (_share(axes, at_ms) for at_ms in (start_ms, end_ms))
+        wanted_pt = _SHOWN_PT * (low + high) / 2.0
+        before_pt = max(wanted_pt, before_pt + _APART_PT)
         axes.annotate(
             name,
-            xy=((start + end) / 2.0, 1.0),
-            xycoords=axes.get_xaxis_transform(),
-            xytext=(-2.0, 3.0),
+            xy=((low + high) / 2.0, 1.0),
+            xycoords="axes fraction",
+            xytext=(before_pt - wanted_pt - 2.0, 3.0),
             textcoords="offset points",
             rotation=35.0,
             rotation_mode="anchor",
@@ -113,16 +148,33 @@ def _name_stages(axes: Axes, panel: ShotPanel) -> None:
         )
 
 
+def _share(axes: Axes, at_ms: float) -> float:
+    """Where on the axis a time stands, from 0 to 1."""
+    first, last = axes.get_xlim()
+    if axes.get_xscale() == "log":
+        at_ms, first, last = (math.log(max(number, first)) for number in (at_ms, first, last))
+    return min(max((at_ms - first) / (last - first), 0.0), 1.0)
+
+
 def _leave_room(axes: Axes, panels: Sequence[ShotPanel]) -> None:
     """A little more than the traces need, for the arrows of the collisions."""
     low = min(float(panel.force_N.min()) for panel in panels)
     high = max(float(panel.force_N.max()) for panel in panels)
+    if low == high:
+        return
     axes.set_ylim(low - 0.08 * (high - low), high + 0.15 * (high - low))
+
+
+def _say_status(axes: Axes, panel: ShotPanel) -> None:
+    if panel.status != "home":
+        text = panel.status.replace("-", " ")
+        axes.annotate(text, xy=(0.98, 0.92), xycoords="axes fraction", ha="right", va="top", fontsize=8.0)
 
 
 def _draw_collision(axes: Axes, panel: ShotPanel) -> None:
     end_s = panel.stage_ends_s[-1]
     if not math.isfinite(end_s) or not math.isfinite(panel.collision_force_N):
+        _say_status(axes, panel)
         return
     bottom, top = axes.get_ylim()
     tip = min(panel.collision_force_N, top)
@@ -131,7 +183,7 @@ def _draw_collision(axes: Axes, panel: ShotPanel) -> None:
     if tip > 0.05 * (top - bottom):
         axes.annotate("", xy=(end_s * 1e3, tip), xytext=(end_s * 1e3, 0.0), arrowprops=arrow)
     text = f"collision\n{panel.collision_force_N:.3g} N{cut}\n($x_k$ = {panel.contact_depth_m * 1e3:g} mm)"
-    to_the_left = end_s > (panel.time_s[0] + panel.time_s[-1]) / 2.0
+    to_the_left = _share(axes, end_s * 1e3) > 0.5
     axes.annotate(
         text,
         xy=(end_s * 1e3, bottom + 0.92 * (top - bottom)),

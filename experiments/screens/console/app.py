@@ -26,6 +26,7 @@ from experiments.screens.console.messages import Ended
 from experiments.screens.console.screen import ConsoleScreen, Hand
 from experiments.screens.console.state import State
 from experiments.screens.console.window import Bridge, ConsoleWindow
+from experiments.screens.synthetic import observer_of
 from experiments.setup import Setup
 
 WAKE_MS = 100
@@ -49,7 +50,10 @@ def _only_application() -> QApplication:
 
 
 class Console:
-    """One run at the console. `Finished` or the reason it ended stands in `result` or `error` afterwards."""
+    """One run at the console. `Finished` or the reason it ended stands in `result` or `error` afterwards.
+
+    `observer` is the synthetic participant, where one works it, from when the window is there.
+    """
 
     def __init__(self, request: Request, clock: Clock, hand: Hand, beside: ParticipantSide | None) -> None:
         self._request, self._clock = request, clock
@@ -58,6 +62,7 @@ class Console:
         self._opened = threading.Event()
         self.closed: Callable[[], None] = lambda: None
         self.window: ConsoleWindow | None = None
+        self.observer: Any = None
         self.result: Finished | None = None
         self.error: BaseException | None = None
         self._bridge.message.connect(self._first)
@@ -88,7 +93,15 @@ class Console:
             self._opened.set()
 
     def _make_screen(self, setup: Setup[Any], plan: Plan, clock: Clock) -> Screen:
-        screen = ConsoleScreen(clock, self._bridge.message.emit, setup=setup, hand=self._hand, beside=self._beside)
+        self.observer = observer_of(setup, plan) if self._hand == "synthetic" else None
+        screen = ConsoleScreen(
+            clock,
+            self._bridge.message.emit,
+            setup=setup,
+            hand=self._hand,
+            beside=self._beside,
+            observer=self.observer,
+        )
         self._bridge.message.emit(_Open(State(setup=setup, plan=plan), screen))
         self._opened.wait()
         return screen

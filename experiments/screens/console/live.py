@@ -66,6 +66,7 @@ def run_live(request: Request, sides: Sides) -> Finished:
 
 def _carry_out(request: Request, sides: Sides) -> Finished:
     driver: list[VisualParticipant] = []
+    clock = RealClock()
 
     with ExitStack() as stack:
         rater = _rater(stack) if sides.visual and sides.screen else None
@@ -73,10 +74,10 @@ def _carry_out(request: Request, sides: Sides) -> Finished:
 
         def watch(console: Console) -> None:
             if sides.visual:
-                driver.append(VisualParticipant(request.setup, console, rater, beside))
+                driver.append(VisualParticipant(console, clock, rater, beside))
 
         hand: Hand = "synthetic" if sides.visual else "experimenter"
-        return run_console(request, RealClock(), hand=hand, beside=beside, watch=watch)
+        return run_console(request, clock, hand=hand, beside=beside, watch=watch)
 
 
 def lab_day(request: Request) -> None:

@@ -72,7 +72,8 @@ OwnHand = Literal["participant", "synthetic"]
 class ConsoleScreen:
     """Carries steps out through a window. `tell` takes messages to it; it replies through `reply`, from any thread.
 
-    `hand` is whose hand is at the console; `beside` is the participant's own screen, where there is one.
+    `hand` is whose hand is at the console; `beside` is the participant's own screen, where there is one; `observer` is
+    the synthetic participant, where it answers.
     """
 
     def __init__(
@@ -83,9 +84,10 @@ class ConsoleScreen:
         setup: Setup[Any],
         hand: Hand = "experimenter",
         beside: ParticipantSide | None = None,
+        observer: Any = None,
     ) -> None:
         self._clock, self._tell, self._setup = clock, tell, setup
-        self._hand, self._beside = hand, beside
+        self._hand, self._beside, self._observer = hand, beside, observer
         self._own_hand: OwnHand = "synthetic" if hand == "synthetic" else "participant"
         self._replies: queue.Queue[Reply] = queue.Queue()
         self._stop_looking = threading.Event()
@@ -128,16 +130,28 @@ class ConsoleScreen:
         return Prepared()
 
     def ask(self, step: Ask, onset_s: float) -> Answered | Repeat:
-        """Wait for the answer. A time from the experimenter's hand is marked so: it is no response time."""
+        """Wait for the answer. A time from the experimenter's hand is marked so: it is no response time.
+
+        A synthetic participant's time is its observer's, as in data mode; when its key went down is kept beside it.
+        """
         if self._beside is not None:
             self._beside.judge(step, onset_s)
         reply = self._ask(step, Answer, ParticipantAnswered, Again)
         if isinstance(reply, Again):
             return Repeat(trial=reply.trial, reason=reply.reason)
-        own = isinstance(reply, ParticipantAnswered)
+        own, key_time_s = isinstance(reply, ParticipantAnswered), round(reply.at_s - onset_s, 6)
+        synthetic = self._observer.answer(step.trial) if self._observer is not None else None
+        if synthetic is not None and reply.response == synthetic.response:
+            return Answered(
+                response=reply.response,
+                response_time_s=synthetic.response_time_s,
+                response_source="synthetic",
+                response_time_valid=True,
+                key_time_s=key_time_s,
+            )
         return Answered(
             response=reply.response,
-            response_time_s=round(reply.at_s - onset_s, 6),
+            response_time_s=key_time_s,
             response_source=self._own_hand if own else self._hand,
             response_time_valid=own,
         )
@@ -151,8 +165,9 @@ class ConsoleScreen:
         rested_s = round(self._clock.now() - start_s, 6)
         return Rested(rested_s=rested_s, cut_reason=reply.reason if reply else "")
 
-    def said_next(self, step: Present, until_s: float) -> bool:
+    def said_next(self, step: Present, onset_s: float, until_s: float) -> bool:
         """Wait until next is said or the next shot is due."""
+        del onset_s
         if self._presenting is not step:
             self._presenting = step
             self._show(Waiting(step=step, since_s=self._clock.now()))

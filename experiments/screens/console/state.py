@@ -207,8 +207,16 @@ def _prepare(state: State, step: Prepare) -> Instruction:
     again = f"Presented again, for the {_nth(step.attempt)} time.\n" if step.attempt > 1 else ""
     return Instruction(
         title=f"Turn the gun to {step.trial.direction.upper()}\nand hand it over",
-        detail=f"{again}{damper if step.damper else ''}Then fire with Space.",
+        detail=f"{_told(state, step)}{again}{damper if step.damper else ''}Then fire with Space.",
     )
+
+
+def _told(state: State, step: Prepare) -> str:
+    """What the participant is told: to be read out before a set, and as a reminder at its other trials."""
+    if not step.instruction:
+        return ""
+    how = "READ OUT" if state.plan.opens_set(step.trial) else "Instruction"
+    return f"{how}: “{step.instruction}”\n"
 
 
 def ordinal(state: State, trial: Trial) -> str:
@@ -243,6 +251,8 @@ def coming(state: State, count: int = 3) -> list[str]:
     for before, trial in zip(trials[after - 1 :], trials[after : after + count], strict=False):
         if lines or not isinstance(state.step, Rest):  # a break that is taken now is not still to come
             lines += _break_between(state, before, trial)
+        if trial.instruction and state.plan.opens_set(trial):
+            lines.append(f"instruction: {trial.instruction}")
         damper = state.setup.gun.methods[trial.method].damper
         lines.append(f"{trial.direction.upper()}{f', damper {damper.upper()}' if damper else ''}")
     if len(lines) < count and state.plan.experiment == "preference":

@@ -1,7 +1,7 @@
 """A synthetic participant in visual mode: it works the real console by key events, as an experimenter would for it.
 
-It rates on the participant's own screen where there is one. Its answers are those of data mode for the same seed; times
-are real, but for breaks, which it ends early for a recorded reason.
+It rates on the participant's own screen where there is one. Answers, response times and ratings are those of data mode
+for the same seed; an answer comes after its response time, and breaks end early for a recorded reason.
 """
 
 from __future__ import annotations
@@ -12,13 +12,12 @@ from PyQt6.QtCore import Qt, QTimer
 from PyQt6.QtTest import QTest
 from PyQt6.QtWidgets import QApplication, QWidget
 
-from experiments import catalogue
+from experiments.clock import Clock
 from experiments.screens.console.app import Console
 from experiments.screens.console.beside import ParticipantSide
 from experiments.screens.console.messages import Waiting
 from experiments.screens.console.rater import Rater
 from experiments.screens.console.window import ConsoleWindow
-from experiments.setup import Setup
 from experiments.steps import Ask, Describe, Prepare, Present, Rate, Rest
 
 LOOK_MS = 10
@@ -31,14 +30,13 @@ class VisualParticipant:
 
     def __init__(
         self,
-        setup: Setup[Any],
         console: Console,
+        clock: Clock,
         rater: Rater | None = None,
         beside: ParticipantSide | None = None,
     ) -> None:
-        self._setup, self._console = setup, console
+        self._console, self._clock = console, clock
         self._rater, self._beside = rater, beside
-        self._observer: Any = None
         self._done: Waiting | None = None
         self._timer = QTimer()
         self._timer.timeout.connect(self._look)
@@ -56,7 +54,7 @@ class VisualParticipant:
             window.close()
             return
         waiting = window.state.waiting
-        if waiting is None or waiting is self._done:
+        if waiting is None or waiting is self._done or self._thinks(waiting):
             return
         self._done = waiting
         self._press(window, waiting)
@@ -66,18 +64,24 @@ class VisualParticipant:
         step = window.state.step
         if self._rater is None or self._beside is None or not isinstance(step, Rate):
             return False
-        rating = self._seen(window).rate(step.trial)
+        rating = self._observer.rate(step.trial)
         if rating is None:
             return False
         if self._beside.asking:  # only then: what comes later would be done to the next question
             self._rater.rate(step, rating)
         return True
 
-    def _seen(self, window: ConsoleWindow) -> Any:
-        """The observer, made when the plan is known."""
-        if self._observer is None:
-            self._observer = catalogue.experiment(self._setup).observer(self._setup, window.state.plan)
-        return self._observer
+    @property
+    def _observer(self) -> Any:
+        """The observer, which is there once the window is."""
+        return self._console.observer
+
+    def _thinks(self, waiting: Waiting) -> bool:
+        """Whether the response time is not over yet."""
+        if not isinstance(waiting.step, Ask):
+            return False
+        answer_s = waiting.since_s + self._observer.answer(waiting.step.trial).response_time_s
+        return bool(self._clock.now() < answer_s)
 
     def _press(self, window: ConsoleWindow, waiting: Waiting) -> None:
         step = waiting.step
@@ -85,12 +89,12 @@ class VisualParticipant:
             case Prepare() | Present():
                 _key(window, Qt.Key.Key_Space)
             case Ask():
-                _key(window, _KEYS[self._seen(window).answer(step.trial).response])
+                _key(window, _KEYS[self._observer.answer(step.trial).response])
             case Rest():
                 _key(window, Qt.Key.Key_E)
                 _type(BREAK_REASON, window)
             case Rate():
-                rating = self._seen(window).rate(step.trial)
+                rating = self._observer.rate(step.trial)
                 if rating is None:
                     _key(window, Qt.Key.Key_X, Qt.KeyboardModifier.ControlModifier)
                 else:

@@ -1,0 +1,220 @@
+"""Speed against accuracy: conditional accuracy functions, and quantile-probability plots."""
+
+from __future__ import annotations
+
+import textwrap
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, Protocol
+
+import matplotlib as mpl
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.lines import Line2D
+
+from analysis.report.figures.names import display_name
+from analysis.report.figures.style import (
+    BLACK,
+    INK,
+    METHOD_LINES,
+    light_grid,
+    method_colour,
+    new_figure,
+    reference_line,
+    save,
+    style,
+)
+
+Statistics = Mapping[str, Any]
+
+_MARKERS = ("o", "s", "D", "^", "v", "P", "X")
+_ACROSS = 3
+"""So many panels stand side by side."""
+
+
+class _Draw(Protocol):
+    def __call__(self, axes: Axes, cells: Statistics, found: Statistics, *, last: bool) -> None:
+        """Draw one instruction's cells, by method; `last` of its row of panels."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class _Panel:
+    """What is drawn in each panel, and how far the axes go that all share."""
+
+    draw: _Draw
+    limit: Callable[[Axes, Statistics], None]
+    across: str
+    upward: str
+    lines: bool
+
+
+def figure_conditional_accuracy(found: Statistics, path_stem: Path) -> tuple[Path, Path, Path]:
+    """Accuracy over response time, a line a method, a panel an instruction; PNG, SVG and PDF are written.
+
+    `found` is `direction` of `statistics.json`. `ValueError` if nobody has a trial in every bin.
+    """
+    if not has_curve(found):
+        raise ValueError("the figure of conditional accuracy needs somebody with a trial in every bin")
+    return _panels(found, path_stem, _CURVES)
+
+
+def figure_quantile_probability(found: Statistics, path_stem: Path) -> tuple[Path, Path, Path]:
+    """Quantiles of the times of errors and correct answers over their probabilities; PNG, SVG and PDF are written.
+
+    `found` is `direction` of `statistics.json`. `ValueError` if nobody has enough answers of a kind.
+    """
+    if not has_points(found):
+        raise ValueError("the quantile-probability plot needs somebody with five answers of a kind")
+    return _panels(found, path_stem, _POINTS)
+
+
+def has_curve(found: Statistics) -> bool:
+    """Whether there is a conditional accuracy function to draw."""
+    return any(cell["conditional_accuracy"]["people"] for cell in _cells_of(found.get("speed_accuracy", {})))
+
+
+def has_points(found: Statistics) -> bool:
+    """Whether there is a point of a quantile-probability plot."""
+    return any(any(cell["quantile_probability"]["people"]) for cell in _cells_of(found.get("speed_accuracy", {})))
+
+
+def _cells_of(trade: Statistics) -> list[Statistics]:
+    return [cell for by_instruction in trade.get("methods", {}).values() for cell in by_instruction.values()]
+
+
+def _panels(found: Statistics, path_stem: Path, panel: _Panel) -> tuple[Path, Path, Path]:
+    """A panel an instruction on shared axes, the methods' legend above all."""
+    trade = found["speed_accuracy"]
+    instructions = [i for i in trade["instructions"] if any(i in one for one in trade["methods"].values())]
+    columns = min(_ACROSS, len(instructions))
+    rows = -(-len(instructions) // columns)
+    with mpl.rc_context(style()):  # type: ignore[arg-type]
+        figure = new_figure(5.8 if columns == 1 else 0.6 + 3.3 * columns, 0.5 + 3.7 * rows)
+        grid = figure.subplots(rows, columns, squeeze=False, sharex=True, sharey=True).ravel()
+        for spare in grid[len(instructions) :]:
+            spare.set_visible(False)
+        for k, (axes, instruction) in enumerate(zip(grid, instructions, strict=False)):
+            light_grid(axes)
+            cells = {m: one[instruction] for m, one in trade["methods"].items() if instruction in one}
+            panel.draw(axes, cells, found, last=(k + 1) % columns == 0)
+            axes.tick_params(labelbottom=True)
+            axes.set_xlabel(panel.across)
+            axes.set_ylabel("" if k % columns else panel.upward)
+            if len(instructions) > 1:
+                title = textwrap.shorten(f"({chr(ord('a') + k)}) {instruction}", 36, placeholder=" ...")
+                axes.set_title(title, loc="left", fontweight="bold", parse_math=False)
+        panel.limit(grid[0], trade)
+        figure.legend(handles=_handles(found, lines=panel.lines), loc="outside upper center", ncols=3, frameon=False)
+        return save(figure, path_stem)
+
+
+def _handles(found: Statistics, *, lines: bool) -> list[Line2D]:
+    """The methods by colour, mark and, where there are lines, line."""
+    return [
+        Line2D(
+            [],
+            [],
+            color=method_colour(i),
+            linestyle=METHOD_LINES[i % len(METHOD_LINES)] if lines else "none",  # type: ignore[arg-type]
+            marker=_MARKERS[i % len(_MARKERS)],
+            markersize=5.5,
+            label=display_name(method),
+        )
+        for i, method in enumerate(found["methods"])
+        if method in found["speed_accuracy"]["methods"]
+    ]
+
+
+def _draw_curves(axes: Axes, cells: Statistics, found: Statistics, *, last: bool) -> None:
+    for method, cell in cells.items():
+        curve, i = cell["conditional_accuracy"], found["methods"].index(method)
+        if curve["people"]:
+            axes.plot(
+                curve["mean_time_s"],
+                100.0 * np.array(curve["accuracy"]),
+                color=method_colour(i),
+                linestyle=METHOD_LINES[i % len(METHOD_LINES)],
+                marker=_MARKERS[i % len(_MARKERS)],
+                markersize=5.5,
+                linewidth=1.7,
+                zorder=3.0,
+                clip_on=False,
+            )
+    reference_line(axes, 50.0, "chance" if last else "")
+
+
+def _limit_curves(axes: Axes, trade: Statistics) -> None:
+    times = [t for cell in _cells_of(trade) for t in cell["conditional_accuracy"]["mean_time_s"] if t is not None]
+    axes.set_xlim(0.0, 1.05 * max(times))
+    axes.set_ylim(0.0, 100.0)
+
+
+def _draw_points(axes: Axes, cells: Statistics, found: Statistics, *, last: bool) -> None:
+    """Each kind of answer of each method as a column of quantiles; grey lines join equal quantiles."""
+    columns: list[tuple[float, Sequence[float]]] = []
+    for method, cell in cells.items():
+        i, points = found["methods"].index(method), cell["quantile_probability"]
+        for kind, fill in ((0, "white"), (1, method_colour(i))):
+            if points["people"][kind]:
+                probability, quantiles = points["probability"][kind], points["quantiles_s"][kind]
+                columns.append((probability, quantiles))
+                axes.plot(
+                    [probability] * len(quantiles),
+                    quantiles,
+                    linestyle="none",
+                    marker=_MARKERS[i % len(_MARKERS)],
+                    markersize=5.5,
+                    mfc=fill,
+                    mec=method_colour(i),
+                    mew=1.2,
+                    zorder=3.0,
+                    clip_on=False,
+                )
+    _join(axes, columns, found["speed_accuracy"]["quantiles"])
+    axes.axvline(0.5, color="#666666", linewidth=0.9, linestyle=(0, (4, 3)), zorder=1.5)
+    if last:
+        kinds = (("white", "errors"), (INK, "correct answers"))
+        handles = [Line2D([], [], ls="none", marker="o", ms=5.5, mec=INK, mfc=fill, label=name) for fill, name in kinds]
+        axes.legend(handles=handles, loc="lower left", fontsize=8.0, framealpha=0.9)
+
+
+def _limit_points(axes: Axes, trade: Statistics) -> None:
+    rows = [row for cell in _cells_of(trade) for row in cell["quantile_probability"]["quantiles_s"]]
+    axes.set_xlim(0.0, 1.0)
+    axes.set_ylim(0.0, 1.05 * max(t for row in rows for t in row if t is not None))
+
+
+def _join(axes: Axes, columns: Sequence[tuple[float, Sequence[float]]], shares: Sequence[float]) -> None:
+    """Lines through equal quantiles in the order of their probabilities; the first and the last are named."""
+    ordered = sorted(columns, key=lambda column: column[0])
+    for k, share in enumerate(shares):
+        heights = [quantiles[k] for _, quantiles in ordered]
+        axes.plot([probability for probability, _ in ordered], heights, color="#999999", linewidth=0.8, zorder=2.0)
+        if heights and k in (0, len(shares) - 1):
+            axes.annotate(
+                f"{100.0 * share:.0f} %",
+                xy=(ordered[-1][0], heights[-1]),
+                xytext=(6.0, 0.0),
+                textcoords="offset points",
+                va="center",
+                fontsize=7.5,
+                color=BLACK,
+                annotation_clip=False,
+            )
+
+
+_CURVES = _Panel(
+    draw=_draw_curves,
+    limit=_limit_curves,
+    across="mean response time of the bin [s]",
+    upward="correct answers of the bin [%]",
+    lines=True,
+)
+_POINTS = _Panel(
+    draw=_draw_points,
+    limit=_limit_points,
+    across="probability of the answer",
+    upward="response time quantile [s]",
+    lines=False,
+)

@@ -1,0 +1,141 @@
+"""The critical contour: 75 % where it says so, inside its band, and a band that means what it claims."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from device.methods import paper_methods
+from experiments.direction.percept import percept_of
+from experiments.direction.percept_fit import PAPER_RATES, PerceptFit, fit_percept, predicted_rate
+from experiments.roof.design_critical import (
+    LEVEL,
+    Contour,
+    band_of,
+    contour_of,
+    crossings,
+    drawn_contours,
+    rate_at,
+)
+from experiments.roof.design_rates import Floats
+from experiments.roof.design_shots import Layer, layers, rows_of, simulate_rows
+from experiments.roof.design_space import Request, Space, make_space
+from experiments.roof.jobs import on_processes
+
+SPACE = make_space(Request(grid=9, voltage="1-24", pulse="0.01"))
+
+
+@pytest.fixture(scope="module")
+def layer() -> Layer:
+    rows = rows_of(SPACE, (0.01,), (0.02,))
+    with on_processes(1) as run:
+        return layers(SPACE, rows, simulate_rows(rows, run, lambda _done: None))[0.01]
+
+
+@pytest.fixture(scope="module")
+def fit() -> PerceptFit:
+    return fit_percept(PAPER_RATES, paper_methods())
+
+
+@pytest.fixture(scope="module")
+def contour(layer: Layer, fit: PerceptFit) -> Contour:
+    return contour_of(SPACE, layer, fit, 1)
+
+
+def points(contour: Contour, space: Space = SPACE) -> list[tuple[float, float]]:
+    return [(f, v) for f, v in zip(space.friction_N, contour.voltage_V.tolist(), strict=True) if math.isfinite(v)]
+
+
+def test_on_the_contour_three_of_four_are_right_when_simulated_alone(contour: Contour, fit: PerceptFit) -> None:
+    """By the sweep's own sampling to a thousandth; by the fit's route, another sampling of the force, to 0.005."""
+    for friction_N, voltage_V in points(contour):
+        gun = replace(SPACE.gun, friction_N=friction_N, voltage_V=voltage_V)
+        assert rate_at(gun, fit.parameters) == pytest.approx(LEVEL, abs=1e-3)
+        assert predicted_rate(fit, percept_of(gun, 0.02)).value == pytest.approx(LEVEL, abs=5e-3)
+    assert len(points(contour)) >= 6
+
+
+def test_where_no_voltage_brings_the_magnet_home_there_is_no_contour(contour: Contour) -> None:
+    assert math.isnan(contour.voltage_V[-1])
+    assert math.isnan(contour.band.low_V[-1])
+
+
+def test_the_damper_lowers_the_critical_voltage(contour: Contour) -> None:
+    by_friction = dict(points(contour))
+    assert by_friction[1.12] < by_friction[0.21] - 3.0
+
+
+def test_the_contour_lies_in_its_band(contour: Contour) -> None:
+    some = np.isfinite(contour.voltage_V)
+    band = contour.band
+    assert (band.low_V[some] < contour.voltage_V[some]).all()
+    assert (contour.voltage_V[some] < band.high_V[some]).all()
+    assert (band.low_V[some] <= band.alone_low_V[some]).all()
+    assert (band.alone_high_V[some] <= band.high_V[some]).all()
+
+
+def test_a_surer_fit_has_a_narrower_band(contour: Contour, layer: Layer, fit: PerceptFit) -> None:
+    surer = replace(fit, covariance=tuple(tuple(x / 25.0 for x in row) for row in fit.covariance))
+    narrow = contour_of(SPACE, layer, surer, 1)
+    some = np.isfinite(contour.voltage_V) & np.isfinite(contour.band.high_V)
+    width, before = (one.band.high_V[some] - one.band.low_V[some] for one in (narrow, contour))
+    assert (width < 0.5 * before).all()
+    assert (width > 0).all()
+    assert narrow.voltage_V[some].tolist() == contour.voltage_V[some].tolist()
+
+
+def test_a_fit_without_covariance_has_no_band(layer: Layer, fit: PerceptFit) -> None:
+    unknown = replace(fit, covariance=((math.nan,) * 3,) * 3)
+    band = band_of(drawn_contours(layer.felt[0.02], np.array(SPACE.voltage_V), unknown, 1, draws=10))
+    assert np.isnan([band.low_V, band.high_V]).all()
+
+
+def test_the_draws_are_those_of_the_seed(layer: Layer, fit: PerceptFit) -> None:
+    felt, volts = layer.felt[0.02], np.array(SPACE.voltage_V)
+    one, again, other = (drawn_contours(felt, volts, fit, seed, draws=50) for seed in (7, 7, 8))
+    assert np.array_equal(one, again, equal_nan=True)
+    assert not np.array_equal(one, other, equal_nan=True)
+
+
+def curves(count: int, length: int) -> Floats:
+    """Random walks: what is extreme in one place need not be so in another."""
+    return np.cumsum(np.random.default_rng(3).normal(size=(count, length)), axis=1)
+
+
+def test_95_percent_of_the_contours_lie_wholly_in_the_band() -> None:
+    drawn = curves(2000, 12)
+    band = band_of(drawn)
+    wholly = ((drawn >= band.low_V) & (drawn <= band.high_V)).all(axis=1).mean()
+    alone = ((drawn >= band.alone_low_V) & (drawn <= band.alone_high_V)).all(axis=1).mean()
+    assert 0.95 <= wholly < 0.965
+    assert alone < 0.93  # the quantiles of each place alone would claim too much
+
+
+def test_at_one_place_the_band_is_the_central_95_percent() -> None:
+    band = band_of(curves(10_000, 1))
+    assert [band.low_V[0], band.high_V[0]] == pytest.approx([-1.96, 1.96], abs=0.06)
+
+
+def test_a_contour_beyond_the_range_opens_the_band() -> None:
+    drawn = np.array([[5.0, 6.0 + n / 100] for n in range(100)])
+    drawn[90:, 1] = math.inf
+    assert band_of(drawn).high_V.tolist() == [5.0, math.inf]
+
+
+def test_a_crossing_is_the_first_one_and_says_when_there_is_none() -> None:
+    volts = np.array([0.0, 1.0, 2.0, 3.0])
+    nan = math.nan
+    grid = np.array(
+        [
+            [nan, 0.5, 1.0, 0.7],
+            [nan, 0.8, 0.9, 1.0],
+            [0.5, 0.6, 0.7, 0.74],
+            [nan] * 4,
+        ]
+    )
+    found = crossings(grid, volts)
+    assert found[:3].tolist() == [1.5, -math.inf, math.inf]
+    assert math.isnan(found[3])

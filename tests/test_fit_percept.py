@@ -1,0 +1,248 @@
+"""`recoil fit percept`: the fit as a user gets it, and the judgement of it by what was not fitted."""
+
+from __future__ import annotations
+
+import json
+import re
+import tomllib
+from collections.abc import Callable
+from contextlib import AbstractContextManager, nullcontext
+from dataclasses import asdict
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from scipy import stats
+
+from analysis.paper import load_paper
+from device.methods import paper_methods
+from experiments.direction.diffusion import People
+from experiments.direction.percept import PerceptParameters
+from experiments.direction.percept_fit import PAPER_RATES, PAPER_TRIALS
+from experiments.load import ConfigError, find, load_setup, shipped_folder
+from experiments.roof.fit_percept import percept
+from experiments.roof.fit_request import ASSUMED_SPREAD, Request, read
+from experiments.roof.fit_studies import Case, Judged, cases_of, judge, place_of
+from experiments.roof.fit_words import fragment, verdict_sentence
+from tests.conftest import Recoil
+
+METHODS = paper_methods()
+PUBLISHED = load_paper(find("paper")).direction
+
+
+@pytest.fixture(scope="module")
+def cases() -> list[Case]:
+    return cases_of(PAPER_RATES, METHODS, PAPER_TRIALS, PerceptParameters())
+
+
+@pytest.fixture(scope="module")
+def found(tmp_path_factory: pytest.TempPathFactory) -> Any:
+    """What the command made of the shipped paper, with its folder under `folder`."""
+    out = tmp_path_factory.mktemp("fit")
+    return percept(Request(studies=300), out, silent) | {"folder": out}
+
+
+def silent(_: str, __: int) -> AbstractContextManager[Callable[[str], None]]:
+    return nullcontext(lambda _: None)
+
+
+def judged(case: Case, studies: int = 300, seed: int = 1) -> Judged:
+    return judge(case, METHODS, PUBLISHED, studies=studies, seed=seed, tell=lambda _: None)
+
+
+def pasted(text: str, folder: Path) -> Any:
+    """`synthetic` of the shipped config whose own sections are replaced by those of a fragment."""
+    for source in shipped_folder().glob("*.toml"):
+        (folder / source.name).write_bytes(source.read_bytes())
+    path = folder / "direction.toml"
+    shipped = path.read_text(encoding="utf-8")
+    for section in tomllib.loads(text)["synthetic"]:
+        shipped = re.sub(rf"\[synthetic\.{section}\].*?(?=\n\[|\Z)", "", shipped, flags=re.DOTALL)
+    path.write_text(f"{shipped}\n{text}", encoding="utf-8")
+    return load_setup(str(path)).config.synthetic
+
+
+# what it leaves
+
+
+def test_the_fit_to_the_shipped_paper_has_intervals_around_the_shipped_numbers(found: Any) -> None:
+    for name, one in found["fitted"].items():
+        assert one["ci_low"] < one["value"] < one["ci_high"]
+        assert one["value"] == pytest.approx(getattr(PerceptParameters(), name), rel=5e-3)
+    assert {name: one["observed"] for name, one in found["rates"].items()} == pytest.approx(PAPER_RATES)
+    assert found["trials"] == PAPER_TRIALS
+    assert json.loads((found["folder"] / "fit.json").read_text(encoding="utf-8")) == {
+        key: value for key, value in found.items() if key != "folder"
+    }
+
+
+def test_it_says_what_is_assumed_and_what_cannot_be_told(found: Any) -> None:
+    assert found["assumed"] == {"exponent": 1.7, "leak_s": 0.02}
+    assert found["untold"]["boundary"] == pytest.approx(1.0)
+    page = (found["folder"] / "report.md").read_text(encoding="utf-8").replace("\N{NO-BREAK SPACE}", " ")
+    for words in (
+        "no response times from the participant's own hand, so drift and boundary cannot be told apart",
+        "A prediction, not a measurement",
+        "no evidence for the model",
+    ):
+        assert words in page
+
+
+def test_the_same_rates_are_met_under_other_assumptions(found: Any) -> None:
+    for one in found["other_assumptions"]:
+        assert one["deviance"] == pytest.approx(0.0, abs=1e-6)
+    assert len({round(one["sensitivity"], 3) for one in found["other_assumptions"]}) == len(found["other_assumptions"])
+
+
+def test_the_curve_over_friction_runs_through_the_fitted_points(found: Any) -> None:
+    (curve,) = found["friction"]
+    for name, friction in curve["methods"].items():
+        rate = np.interp(friction, curve["friction_N"], curve["fit"]["value"])
+        assert rate == pytest.approx(found["rates"][name]["observed"], abs=0.005)
+    low, value, high = (np.array(curve["fit"][key]) for key in ("ci_low", "value", "ci_high"))
+    assert ((low < value) & (value < high)).all()
+
+
+def test_a_backward_shot_is_the_forward_one_s_mirror_but_for_the_bias(found: Any) -> None:
+    vibration = found["rates"]["vibration"]
+    assert vibration["forward"]["value"] + vibration["backward"]["value"] == pytest.approx(1.0)
+    for one in found["rates"].values():
+        assert one["backward"]["value"] < one["forward"]["value"]
+
+
+def test_the_page_and_the_figures_are_there(found: Any) -> None:
+    folder = found["folder"]
+    assert {path.stem for path in (folder / "figures").iterdir()} == {"percept", "places"}
+    assert "data:image/png;base64," in (folder / "report.html").read_text(encoding="utf-8")
+
+
+def test_the_fragment_loads_back_through_the_config(found: Any, tmp_path: Path) -> None:
+    synthetic = pasted((found["folder"] / "percept.toml").read_text(encoding="utf-8"), tmp_path)
+    for name, one in found["fitted"].items():
+        assert getattr(synthetic.percept.own, name) == pytest.approx(one["value"], rel=1e-5)
+    assert synthetic.people.own == People()
+
+
+def test_with_a_spread_the_fragment_brings_the_people_too(found: Any, tmp_path: Path) -> None:
+    text = fragment(found | {"people": asdict(ASSUMED_SPREAD)})
+    assert pasted(text, tmp_path).people.own == ASSUMED_SPREAD
+
+
+def test_the_command_without_a_name_fits_the_percept(recoil: Recoil, tmp_path: Path) -> None:
+    rates = "vibration=0.5,asymmetric-1=0.7,asymmetric-2=0.9"
+    done = recoil("fit", "--rates", rates, "--trials", "50", "--out", "out", "--json")
+    assert done.returncode == 0, done.stderr
+    found = json.loads(done.stdout)
+    assert (found["trials"], found["fitted"]["start"]["value"]) == (50, pytest.approx(0.5, abs=1e-6))
+    assert found["judged"] is None
+    assert (tmp_path / "out" / "percept.toml").exists()
+
+
+@pytest.mark.parametrize("rates", [(0.5, 1.0, 1.0), (0.0, 0.0, 0.0), (1.0, 0.1, 0.6)])
+def test_rates_at_the_ends_are_fitted_with_what_intervals_there_are(
+    rates: tuple[float, float, float], tmp_path: Path
+) -> None:
+    text = ",".join(f"{name}={rate}" for name, rate in zip(METHODS, rates, strict=True))
+    percept(Request(rates=text, trials=20), tmp_path, silent)
+    text = (tmp_path / "percept.toml").read_text(encoding="utf-8")
+    assert pasted(text, tmp_path).percept.own.sensitivity >= 0.0
+
+
+def test_a_fit_too_unsure_to_draw_from_is_not_drawn_from() -> None:
+    rates = {"vibration": 0.1, "asymmetric-1": 1.0, "asymmetric-2": 1.0}
+    assert not any(case.drawn for case in cases_of(rates, METHODS, PAPER_TRIALS, PerceptParameters()))
+
+
+# the judgement
+
+
+def test_the_studies_have_the_published_mean_rates_whoever_the_people_are(cases: list[Case]) -> None:
+    """The fit is to those, so their counts lie around the published ones: the forward one is the middle."""
+    for case in cases:
+        (forward,) = (place for place in judged(case, 4000).places if place.fitted)
+        assert forward.quantiles[2] == pytest.approx(0.205, abs=0.08), case.name
+
+
+def test_the_backward_count_of_people_alike_is_binomial(cases: list[Case]) -> None:
+    """By theory: 140 answers, right with the chance of the mirrored start."""
+    found = {place.published[:2]: place for place in judged(cases[0], 4000).places if "correct of" in place.quantity}
+    assert set(found) == {"67", "73"}
+    for text, place in found.items():
+        count = int(text)
+        law = stats.binom(140, 1.0 - cases[0].fit.parameters.start)
+        expected = law.cdf(count - 1) + 0.5 * law.pmf(count)
+        assert place.percentile == pytest.approx(expected, abs=4 * np.sqrt(expected * (1 - expected) / 4000))
+        assert place.ci_low < place.percentile < place.ci_high
+
+
+def test_percentiles_are_those_of_the_seed(cases: list[Case]) -> None:
+    one, same, other = judged(cases[1]), judged(cases[1]), judged(cases[1], seed=2)
+    assert (one.places, one.claims) == (same.places, same.claims)
+    assert one.places != other.places
+
+
+def test_more_different_people_give_a_smaller_f(cases: list[Case]) -> None:
+    medians = [judged(case, 3000).places[0].quantiles[2] for case in cases[:3]]
+    assert medians[0] > medians[1] > medians[2]
+
+
+def test_the_error_of_the_fit_widens_the_places(cases: list[Case]) -> None:
+    plain, drawn = (judged(case, 3000).places[0].quantiles for case in (cases[1], cases[3]))
+    assert drawn[0] < plain[0]
+    assert drawn[-1] > plain[-1]
+
+
+def test_the_pattern_needs_every_pair(cases: list[Case]) -> None:
+    shares = {claim.claim: claim.share for claim in judged(cases[1], 1000).claims}
+    pairs = [share for name, share in shares.items() if " above " in name]
+    assert len(pairs) == 3
+    assert shares["whole pattern"] <= shares["Tukey, all pairs as published"] <= min(pairs)
+
+
+def test_a_percentile_counts_those_below_and_half_of_those_that_print_alike() -> None:
+    values = np.array([1.0, 2.0, 2.04, 3.0, np.inf, np.nan])
+    place = place_of("F", ("2.0", 1.95, 2.05), values, False)
+    assert place.percentile == pytest.approx((1 + 0.5 * 2) / 6)
+    assert place.outside == pytest.approx(2 * place.percentile)
+
+
+def test_a_number_beyond_the_central_95_percent_is_called_at_odds(found: Any) -> None:
+    case = found["judged"]["cases"][found["judged"]["main"]]
+    assert verdict_sentence(case).startswith("Every number that was not fitted lies within")
+    far = case | {"places": [case["places"][0] | {"outside": 0.01}, *case["places"][1:]]}
+    places = [place | ({"outside": 0.01} if place["published"].startswith("73") else {}) for place in case["places"]]
+    odd_count = case | {"places": places}
+    assert verdict_sentence(odd_count) == verdict_sentence(case)  # 67 gives the same printed p
+    assert verdict_sentence(far).startswith(
+        "At odds with the paper (outside the central 95 % of the studies): F(2, 26)"
+    )
+
+
+# refusals
+
+
+@pytest.mark.parametrize(
+    ("request_", "words"),
+    [
+        (Request(rates="vibration=0.5,asymmetric-1=0.7"), "at least 3"),
+        (Request(rates="vibration=0.5,asymmetric-1=70,asymmetric-2=0.9"), "asymmetric-1=70"),
+        (Request(rates="vibration=0.5,vibration=0.7,asymmetric-2=0.9"), "vibration stands there twice"),
+        (Request(rates="vibration=0.5,ramp=0.7,asymmetric-2=0.9"), "no such method"),
+        (Request(trials=20), "--trials 20"),
+        (Request(spread=-1.0), "--spread -1"),
+        (Request(paper="nowhere"), "nowhere"),
+        (Request(gun="paper"), "paper.toml"),
+    ],
+)
+def test_what_cannot_be_fitted_is_refused_in_words(request_: Request, words: str) -> None:
+    with pytest.raises(ConfigError, match=re.escape(words)):
+        read(request_)
+
+
+def test_a_paper_of_which_a_mean_is_missing_is_refused(tmp_path: Path) -> None:
+    text = find("paper").read_text(encoding="utf-8")
+    path = tmp_path / "paper.toml"
+    path.write_text(text.replace('vibration = "55.7"\n', "", 1), encoding="utf-8")
+    with pytest.raises(ConfigError, match="has no rate of vibration"):
+        read(Request(paper=str(path)))

@@ -1,0 +1,219 @@
+"""Instructions, one a set: balanced in the plan, told by the screens, kept in journal and table."""
+
+from __future__ import annotations
+
+import csv
+import hashlib
+import io
+import math
+from collections import Counter
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from experiments.canonical import canonical_json
+from experiments.clock import VirtualClock
+from experiments.columns import LATER
+from experiments.direction.config import DirectionConfig
+from experiments.direction.plan import make_plan, make_practice
+from experiments.direction.session import session
+from experiments.journal import read
+from experiments.load import load_setup, shipped_folder
+from experiments.plan import Plan
+from experiments.replay import told
+from experiments.run import Request, run, table
+from experiments.screens.console.messages import Waiting
+from experiments.screens.console.state import State, coming, instruction
+from experiments.screens.synthetic import synthetic_screen
+from experiments.screens.terminal import TerminalScreen
+from experiments.setup import Setup
+from experiments.steps import Prepare, outcome_from, record, step_from
+
+HURRY = load_setup(str(shipped_folder() / "examples" / "hurry.toml"))
+PLAIN = load_setup("direction")
+NAMES = ("speed", "neutral", "accuracy", "whisper")
+
+
+def with_instructions(config: DirectionConfig, names: tuple[str, ...], sets: int) -> DirectionConfig:
+    values = config.model_dump()
+    values["design"] |= {"instructions": names, "sets_per_session": sets, "trials_per_set": 2}
+    values["design"] |= {"forward_per_session": sets, "backward_per_session": sets}
+    values["instructions"] = {name: {"text": f"{name}!"} for name in names}
+    return DirectionConfig.model_validate(values)
+
+
+def by_set(plan: Plan) -> dict[tuple[int, int], set[str]]:
+    found: dict[tuple[int, int], set[str]] = {}
+    for trial in plan.trials:
+        found.setdefault((trial.session, trial.set), set()).add(trial.instruction)
+    return found
+
+
+# the plan
+
+
+@settings(deadline=None, max_examples=60)
+@given(st.integers(1, 4), st.integers(1, 3), st.integers(0, 2**63 - 1))
+def test_each_instruction_comes_equally_often_in_every_session_one_a_set(count: int, each: int, seed: int) -> None:
+    config = with_instructions(PLAIN.config, NAMES[:count], count * each)
+    sets = by_set(make_plan(config, "P01", seed, None))
+    assert all(len(names) == 1 for names in sets.values())
+    for number in (1, 2, 3):
+        found = Counter(next(iter(names)) for (session, _), names in sets.items() if session == number)
+        assert found == dict.fromkeys(NAMES[:count], each)
+
+
+@settings(deadline=None, max_examples=30)
+@given(st.integers(0, 2**63 - 1))
+def test_instructions_change_nothing_else_of_a_plan(seed: int) -> None:
+    names = ("speed", "accuracy")
+    instructed = make_plan(with_instructions(PLAIN.config, names, 4), "P01", seed, None)
+    plain = make_plan(with_instructions(PLAIN.config, (), 4), "P01", seed, None)
+    assert tuple(replace(trial, instruction="") for trial in instructed.trials) == plain.trials
+
+
+def test_every_order_of_instructions_comes_as_often_as_each_other() -> None:
+    # six orders of three, in 3 x 400 sessions; chi-square with 5 degrees of freedom, p = 1e-4
+    config = with_instructions(PLAIN.config, NAMES[:3], 3)
+    plans = [by_set(make_plan(config, "P01", seed, None)) for seed in range(400)]
+    orders = Counter(
+        tuple(next(iter(sets[session, place])) for place in (1, 2, 3)) for sets in plans for session in (1, 2, 3)
+    )
+    assert len(orders) == 6
+    assert sum((count - 200) ** 2 for count in orders.values()) / 200 < 25.74
+
+
+def test_a_plan_without_instructions_says_nothing_of_them() -> None:
+    plan = make_plan(PLAIN.config, "P01", 1, None)
+    assert b"instruction" not in canonical_json(plan.record())
+    assert Plan.from_record(plan.record()) == plan
+
+
+def test_a_plan_with_instructions_is_read_back_and_has_a_hash_of_its_own() -> None:
+    plan = make_plan(HURRY.config, "P01", 1, 0)
+    assert {trial.instruction for trial in plan.trials} == {"speed", "neutral", "accuracy"}
+    assert Plan.from_record(plan.record()) == plan
+    bare = replace(plan, trials=tuple(replace(trial, instruction="") for trial in plan.trials))
+    assert bare.sha256() != plan.sha256()
+
+
+def test_a_practice_has_no_instruction() -> None:
+    practice = make_practice(HURRY.config, "P01", 1)
+    assert practice is not None
+    assert {trial.instruction for trial in practice.trials} == {""}
+
+
+# the screens
+
+
+def prepares(setup: Setup[Any]) -> list[Prepare]:
+    """The hand-overs of a run's first trials, as its session yields them."""
+    plan = make_plan(setup.config, "P01", 1, None)
+    return [next(session(replace(plan, trials=plan.trials[place:]), setup)) for place in range(7)]
+
+
+def test_a_hand_over_carries_the_text_of_its_sets_instruction() -> None:
+    for step in prepares(HURRY):
+        assert step.instruction == HURRY.config.instructions[step.trial.instruction].text
+        assert step_from(record(step)) == step
+
+
+def test_a_hand_over_without_an_instruction_is_recorded_as_before_there_were_any() -> None:
+    step = prepares(PLAIN)[0]
+    assert set(record(step)) == {"trial", "attempt", "damper", "kind"}
+    assert set(record(step)["trial"]) == {"session", "method", "set", "trial", "direction"}
+
+
+def test_the_console_has_it_read_out_before_a_set_and_shows_it_at_its_other_trials() -> None:
+    plan = make_plan(HURRY.config, "P01", 1, None)
+    for step in prepares(HURRY):
+        state = State(setup=HURRY, plan=plan)
+        state.take(Waiting(step=step, since_s=0.0), 0.0)
+        how = "READ OUT" if step.trial.trial in (1, 6) else "Instruction"
+        assert instruction(state, 0.0).detail.startswith(f"{how}: “{step.instruction}”\n")
+        if step.trial.trial == 4:
+            assert f"instruction: {plan.trials[5].instruction}" in coming(state, 5)
+
+
+def test_the_console_and_the_terminal_say_nothing_where_there_is_none() -> None:
+    step, plan = prepares(PLAIN)[0], make_plan(PLAIN.config, "P01", 1, None)
+    state = State(setup=PLAIN, plan=plan)
+    state.take(Waiting(step=step, since_s=0.0), 0.0)
+    shown = [instruction(state, 0.0).detail, *coming(state), typed(plan, step)]
+    assert not any("READ OUT" in text or "nstruction" in text for text in shown)
+
+
+def typed(plan: Plan, step: Prepare) -> str:
+    """What the terminal says at a hand-over."""
+    out = io.StringIO()
+    TerminalScreen(plan, VirtualClock(), io.StringIO("\n"), out).prepare(step)
+    return out.getvalue()
+
+
+def test_the_terminal_has_it_read_out_before_a_set_and_shows_it_at_its_other_trials() -> None:
+    plan = make_plan(HURRY.config, "P01", 1, None)
+    for step in prepares(HURRY):
+        how = "READ OUT" if step.trial.trial in (1, 6) else "Instruction of this set"
+        assert f"\n  {how}: {step.instruction}\n" in typed(plan, step)
+
+
+# journal and table
+
+
+@pytest.fixture(scope="module")
+def done(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, Path]:
+    """A run of the example: its journal and its table."""
+    request = Request(setup=HURRY, participant_id="P01", results=tmp_path_factory.mktemp("results"), seed=1)
+    finished = run(request, synthetic_screen, VirtualClock())
+    return finished.place.journal, finished.place.table
+
+
+def test_the_first_record_and_the_table_hold_each_trials_instruction(done: tuple[Path, Path]) -> None:
+    contents = read(done[0])
+    planned = [trial["instruction"] for trial in contents.header["plan"]["trials"]]
+    with done[1].open(newline="", encoding="utf-8") as file:
+        rows = list(csv.DictReader(file))
+    assert [row["instruction"] for row in rows] == planned
+    assert Counter(planned) == {"speed": 30, "neutral": 30, "accuracy": 30}
+    read_out = [step.instruction for step, _ in told(contents) if isinstance(step, Prepare)]
+    assert read_out == [HURRY.config.instructions[name].text for name in planned]
+
+
+def test_the_answers_of_the_hurried_are_quicker(done: tuple[Path, Path]) -> None:
+    with done[1].open(newline="", encoding="utf-8") as file:
+        rows = list(csv.DictReader(file))
+    means = {}
+    for name in HURRY.config.design.instructions:
+        times = [float(row["response_time_s"]) for row in rows if row["instruction"] == name]
+        means[name] = sum(times) / len(times)
+    assert means["speed"] < means["neutral"] < means["accuracy"]
+    assert {(row["response_source"], row["response_time_valid"]) for row in rows} == {("synthetic", "1")}
+
+
+def test_a_run_that_was_finished_before_the_column_came_keeps_the_table_it_finished_with(tmp_path: Path) -> None:
+    request = Request(setup=PLAIN, participant_id="P01", results=tmp_path, seed=1)
+    finished = run(request, synthetic_screen, VirtualClock())
+    contents, data = read(finished.place.journal), finished.place.table.read_bytes()
+    rows = list(csv.reader(io.StringIO(data.decode(), newline="")))
+    assert tuple(rows[0][-1:]) == LATER
+    assert {row[-1] for row in rows[1:]} == {""}
+    older = "".join(f"{','.join(row[:-1])}\r\n" for row in rows).encode()
+    *before, last = contents.records
+    then = replace(contents, records=[*before, dict(last) | {"table_sha256": hashlib.sha256(older).hexdigest()}])
+    assert table(contents) == data
+    assert table(then) == older
+
+
+def test_an_answer_from_before_key_times_were_kept_is_read_as_it_was() -> None:
+    body = {
+        "kind": "answered", "response": "forward", "response_time_s": 0.5, "response_source": "synthetic",
+        "response_time_valid": True,
+    }  # fmt: skip
+    answered = outcome_from(body)
+    assert record(answered) == body
+    assert record(replace(answered, key_time_s=0.0))["key_time_s"] == 0.0
+    assert math.isclose(outcome_from(body | {"key_time_s": 0.51}).key_time_s, 0.51)

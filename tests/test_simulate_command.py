@@ -1,0 +1,70 @@
+"""What `recoil simulate` tells beyond a shot's summary."""
+
+import json
+
+import pytest
+
+from device.physics import GunParameters, simulate
+from device.physics.audit import audit
+from device.physics.contact import compliant_collision
+from device.physics.hand import Hand, simulate_held
+
+
+def test_audit_hand_and_stop_are_those_of_the_physics(recoil):
+    words = ("--set", "friction_N=0.5", "--audit", "--hand", "stiffness_N_m=800", "--contact-stiffness", "2e5")
+    found = json.loads(recoil("simulate", *words, "--json").stdout)
+    gun = GunParameters(friction_N=0.5)
+    assert found["audit"]["created_J"] == audit(gun).created_J
+    held = simulate_held(gun, Hand(stiffness_N_m=800.0), gun.pulse_s + 0.4)
+    assert found["hand"]["peak_hand_force_N"] == pytest.approx(held.peak_hand_force_N)
+    assert found["hand"]["stiffness_N_m"] == 800.0
+    stop = compliant_collision(gun, simulate(gun).impact_speed_m_s, 2e5)
+    assert found["contact"]["compliant"]["peak_force_N"] == pytest.approx(stop.peak_force_N)
+    assert found["contact"]["rigid"]["peak_force_N"] == pytest.approx(found["summary"]["collision_force_N"])
+
+
+def test_a_person_is_told_what_the_emf_creates_and_what_was_not_reached(recoil):
+    said = recoil("simulate", "--set", "friction_N=1.7", "--audit", "--contact-stiffness", "1e5").stdout
+    assert "created_J" in said
+    assert "not reciprocal" in said
+    assert "net over the cycle" in said
+    assert "the magnet does not come home" in said
+
+
+def test_the_friction_of_the_return_can_be_set(recoil):
+    found = json.loads(recoil("simulate", "--set", "return_friction_N=1.12", "--json").stdout)
+    expected = simulate(GunParameters(return_friction_N=1.12))
+    assert found["parameters"]["return_friction_N"] == 1.12
+    assert found["summary"]["reset_end_s"] == expected.reset_end_s
+
+
+def test_a_vibration_is_told_traced_and_drawn(recoil, tmp_path):
+    done = recoil("simulate", "--method", "vibration", "--trace", "v.csv", "--plot", "v.png", "--json")
+    found = json.loads(done.stdout)["summary"]
+    assert found["peak_m_s2"] == pytest.approx(1000.0, rel=1e-6)
+    assert found["rms_m_s2"] == pytest.approx(257.54)
+    lines = (tmp_path / "v.csv").read_text().splitlines()
+    assert lines[0] == "time_s,acceleration_m_s2"
+    assert max(abs(float(line.split(",")[1])) for line in lines[1:]) == pytest.approx(1000.0, rel=1e-3)
+    assert "257.54" in (tmp_path / "v.svg").read_text()
+
+
+@pytest.mark.parametrize(
+    ("words", "said"),
+    [
+        (("--hand", "soft"), "`assumed`"),
+        (("--hand", "stiffness_N_m=hard"), "'hard' is not a number"),
+        (("--hand", "enclosure_mass_kg=0"), "mass above 0"),
+        (("--contact-stiffness", "nan"), "--contact-stiffness nan"),
+        (("--contact-stiffness", "-1"), "above 0"),
+        (("--set", "return_friction_N=-1"), "return_friction_N is -1.0"),
+        (("--method", "vibration", "--set", "voltage_V=1"), "no force"),
+        (("--vary", "friction_N=1,2"), "--table"),
+        (("--vary", "friction_N=1,2", "--table", "t.csv", "--audit"), "--audit tells of a single one"),
+    ],
+)
+def test_what_cannot_be_told_is_refused(recoil, words, said):
+    done = recoil("simulate", *words)
+    assert done.returncode == 2
+    assert said in done.stderr
+    assert "Traceback" not in done.stderr

@@ -1,0 +1,200 @@
+"""`recoil simulate --vary`: tables of shots over a full factorial, whole or not at all."""
+
+import csv
+import json
+import os
+import signal
+import subprocess
+import time
+from contextlib import contextmanager
+
+import numpy as np
+import pyarrow.parquet as pq
+import pytest
+
+from device.physics import GunParameters, simulate
+from experiments.load import ConfigError
+from experiments.roof import sweep, sweep_table
+from tests.conftest import RECOIL
+
+GUN = GunParameters()
+
+
+@contextmanager
+def silent(_what, _total):
+    yield lambda _done: None
+
+
+def asked(table, *vary, **others):
+    return sweep.Asked(**{"gun": GUN, "fidelity": "full", "vary": vary, "changes": (), "table": table} | others)
+
+
+def rows_of(path):
+    with path.open(newline="") as file:
+        return list(csv.DictReader(file))
+
+
+def test_every_combination_is_shot_the_last_parameter_fastest(tmp_path):
+    table = tmp_path / "shots.csv"
+    found = sweep.sweep(asked(table, "friction_N=0.21:1.12:2", "drive_off=open,shorted", "voltage_V=12,16,20"), silent)
+    rows = rows_of(table)
+    assert found["rows"] == len(rows) == 12
+    assert [row["voltage_V"] for row in rows[:4]] == ["12", "16", "20", "12"]
+    assert [row["drive_off"] for row in rows[:6]] == ["open"] * 3 + ["shorted"] * 3
+    for row in rows:
+        gun = GunParameters(
+            friction_N=float(row["friction_N"]), drive_off=row["drive_off"], voltage_V=float(row["voltage_V"])
+        )
+        alone = simulate(gun)
+        assert row["status"] == alone.status
+        assert float(row["reset_end_s"]) == pytest.approx(alone.reset_end_s, rel=1e-12)
+
+
+def test_parquet_and_csv_hold_the_same(tmp_path):
+    words = ("friction_N=0.2,1.7", "emf=printed,reciprocal")
+    for name in ("a.csv", "b.parquet"):
+        sweep.sweep(asked(tmp_path / name, *words), silent)
+    table = pq.read_table(tmp_path / "b.parquet").to_pylist()
+    for one, other in zip(rows_of(tmp_path / "a.csv"), table, strict=True):
+        assert list(one) == list(other)
+        for key, value in other.items():
+            words = "" if value is None else str(value)
+            assert one[key] == words.removesuffix(".0")
+
+
+def test_what_was_not_reached_is_missing_and_statuses_are_words(tmp_path):
+    table = tmp_path / "b.parquet"
+    found = sweep.sweep(asked(table, "friction_N=0.21,1.7,1000"), silent)
+    assert found["statuses"] == {"home": 1, "no-break-away": 1, "stuck": 1}
+    columns = pq.read_table(table).to_pydict()
+    assert columns["status"] == ["home", "stuck", "no-break-away"]
+    assert columns["reset_end_s"][1:] == [None, None]
+    assert columns["peak_force_N"][2] is None
+
+
+def test_a_table_says_where_it_comes_from(tmp_path):
+    for name in ("a.csv", "b.parquet"):
+        sweep.sweep(asked(tmp_path / name, "friction_N=0.2,0.3", fidelity="no-inductance"), silent)
+    beside = json.loads((tmp_path / "a.csv.json").read_text())
+    inside = json.loads(pq.read_schema(tmp_path / "b.parquet").metadata[b"recoil"])
+    assert beside == inside
+    assert beside["vary"] == {"friction_N": "0.2,0.3"}
+    assert beside["fidelity"] == "no-inductance"
+    assert beside["parameters"]["voltage_V"] == 16.0
+    assert "friction_N" not in beside["parameters"]
+    assert beside["provenance"]["numpy"] == np.__version__
+
+
+def test_blocks_make_the_table_of_one_piece(tmp_path, monkeypatch):
+    words = ("friction_N=0.1:1.2:7", "voltage_V=12:24:5")
+    sweep.sweep(asked(tmp_path / "whole.csv", *words), silent)
+    monkeypatch.setattr(sweep, "_BLOCK", 4)
+    monkeypatch.setattr(sweep_table, "_GROUP", 10)
+    sweep.sweep(asked(tmp_path / "pieces.csv", *words), silent)
+    assert (tmp_path / "pieces.csv").read_bytes() == (tmp_path / "whole.csv").read_bytes()
+    sweep.sweep(asked(tmp_path / "pieces.parquet", *words), silent)
+    assert pq.ParquetFile(tmp_path / "pieces.parquet").num_row_groups == 3
+
+
+def test_without_the_compiler_the_numbers_are_the_same_and_it_is_said(tmp_path, monkeypatch):
+    from device.physics import batch
+
+    sweep.sweep(asked(tmp_path / "fast.parquet", "friction_N=0.1:1.2:5"), silent)
+    for module in (sweep, batch):
+        monkeypatch.setattr(module, "find_spec", lambda _name: None)
+    sweep.sweep(asked(tmp_path / "slow.parquet", "friction_N=0.1:1.2:5"), silent)
+    fast, slow = (pq.read_table(tmp_path / f"{name}.parquet").to_pydict() for name in ("fast", "slow"))
+    assert slow["impact_speed_m_s"] == pytest.approx(fast["impact_speed_m_s"], rel=1e-12)
+    assert "recoil[fast]" in sweep.interpreted_note()
+
+
+@pytest.mark.parametrize(
+    ("words", "values"),
+    [
+        ("friction_N=0.5:1:3", [0.5, 0.75, 1.0]),
+        ("friction_N=1:0.5:2", [1.0, 0.5]),
+        ("pulse_s=log:1e-3:1e-1:3", [1e-3, 1e-2, 1e-1]),
+        ("friction_N=0.3, 0.1", [0.3, 0.1]),
+        ("emf=reciprocal", ["reciprocal"]),
+    ],
+)
+def test_values_are_ranges_logarithmic_ranges_or_lists(words, values):
+    found = sweep.axis_of(words, GUN).values.tolist()
+    assert found == (pytest.approx(values, rel=1e-14) if words[0] != "e" else values)
+
+
+@pytest.mark.parametrize(
+    ("words", "said"),
+    [
+        ("mass=1,2", "with a key of magnet_mass_kg"),
+        ("friction_N", "must be KEY="),
+        ("friction_N=", "must be KEY="),
+        ("friction_N=0.1:1.2", "must be KEY="),
+        ("friction_N=0.1:1.2:2.5", "must be KEY="),
+        ("friction_N=0.1:1.2:1", "COUNT is 1"),
+        ("friction_N=0.1:1.2:20000000", "COUNT is 20000000"),
+        ("friction_N=0.1:nan:3", "finite"),
+        ("friction_N=0.1:0.1:3", "differ"),
+        ("friction_N=nan,1", "friction_N is nan"),
+        ("friction_N=1,inf", "friction_N is inf"),
+        ("friction_N=-1:1:3", "friction_N is -1.0"),
+        ("magnet_mass_kg=0:1:3", "magnet_mass_kg is 0.0"),
+        ("friction_N=log:0:1:3", "above 0"),
+        ("friction_N=1,1", "twice"),
+        ("drive_off=ajar", "drive_off is 'ajar'"),
+    ],
+)
+def test_values_that_make_no_sense_are_refused(words, said):
+    with pytest.raises(ConfigError, match=said) as raised:
+        sweep.axis_of(words, GUN)
+    assert f"--vary {words}" in str(raised.value)
+
+
+@pytest.mark.parametrize(
+    ("changed", "said"),
+    [
+        ({"vary": ()}, "go together"),
+        ({"table": None}, "go together"),
+        ({"table": "shots.xlsx"}, "must end with"),
+        ({"fidelity": "perfect"}, "--fidelity perfect"),
+        ({"instead": ("--audit",)}, "--audit tells of a single one"),
+        ({"changes": ("friction_N=1",)}, "set or varied twice"),
+        ({"vary": ("friction_N=1,2", "friction_N=3,4")}, "set or varied twice"),
+        ({"vary": ("friction_N=1:2:4000", "voltage_V=1:2:4000")}, "16,000,000 shots; more than 10,000,000 need --yes"),
+    ],
+)
+def test_a_table_that_makes_no_sense_is_refused_before_it_is_begun(tmp_path, changed, said):
+    request = asked(tmp_path / "shots.csv", "friction_N=0.1,0.2")
+    values = {name: getattr(request, name) for name in sweep.Asked.__slots__} | changed
+    if isinstance(values["table"], str):
+        values["table"] = tmp_path / values["table"]
+    with pytest.raises(ConfigError, match=said):
+        sweep.sweep(sweep.Asked(**values), silent)
+    assert not list(tmp_path.iterdir())
+
+
+def test_a_table_that_fails_leaves_the_old_one(tmp_path, monkeypatch):
+    table = tmp_path / "shots.csv"
+    sweep.sweep(asked(table, "friction_N=0.2,0.3"), silent)
+    before = table.read_bytes()
+    monkeypatch.setattr(sweep, "simulate_batch", lambda *_, **__: 1 / 0)
+    with pytest.raises(ZeroDivisionError):
+        sweep.sweep(asked(table, "friction_N=0.2,0.4"), silent)
+    assert table.read_bytes() == before
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["shots.csv", "shots.csv.json"]
+
+
+def test_an_interrupted_table_leaves_nothing_and_ends_with_130(tmp_path):
+    part = tmp_path / ".shots.parquet.part"
+    words = ("--vary", "friction_N=0.1:1.2:3000", "--vary", "voltage_V=12:24:3000", "--table", "shots.parquet")
+    process = subprocess.Popen(
+        [RECOIL, "simulate", *words], cwd=tmp_path, stderr=subprocess.PIPE, text=True, env=os.environ
+    )
+    while not part.exists():
+        time.sleep(0.05)
+        assert process.poll() is None
+    process.send_signal(signal.SIGINT)
+    _, said = process.communicate(timeout=60)
+    assert process.returncode == 130
+    assert "Traceback" not in said
+    assert not list(tmp_path.iterdir())
