@@ -122,9 +122,10 @@ def finish_step(p: Floats, s: Floats, w: Floats, span: float, event: int) -> int
 @kernel
 def first_turn(w: Floats, heading: float) -> float:
     """Where the velocity first falls to 0, 2 if it does not. From rest v/s is looked at."""
-    if heading * w[VS] + lowest(w, VS, heading) > 0.0:
-        return 2.0
     shift = 1 if w[VS] == 0.0 else 0
+    begins = heading * w[VS + shift]
+    if begins + lowest(w, VS, heading) - min(shift * begins, 0.0) > 0.0:
+        return 2.0
     for n in range(ORDER + 1 - shift):
         w[QS + n] = heading * w[VS + n + shift]
     if shift == 1:

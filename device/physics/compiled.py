@@ -7,7 +7,6 @@ processes load it in about a second. No session calls this.
 from __future__ import annotations
 
 import hashlib
-import inspect
 from collections.abc import Callable
 from functools import lru_cache
 from types import FunctionType
@@ -58,7 +57,8 @@ def _twin(function: Callable[..., object], name: str) -> tuple[FunctionType, dic
 
 
 def _digest() -> str:
-    """Of the kernel's text and of how it is compiled: the compiler's own cache looks at one file only."""
-    text = "".join(inspect.getsource(function) for function in (*KERNEL.values(), compiled.__wrapped__))
+    """Of the kernel's code and of how it is compiled: the compiler's own cache looks at one file only."""
+    codes = (cast("FunctionType", function).__code__ for function in (*KERNEL.values(), compiled.__wrapped__))
+    text = "".join(f"{code.co_code.hex()}{code.co_consts}{code.co_names}" for code in codes)
     sizes = f"{RESULT_SIZE} {STATE_SIZE} {WORK_SIZE}"
     return hashlib.sha256((text + sizes).encode()).hexdigest()[:16]

@@ -31,8 +31,9 @@ from device.physics.layout import (
     VS,
     XS,
 )
+from device.physics.recurrence import expand_printed, expand_reciprocal
 
-TOLERANCE = 1e-12
+TOLERANCE = 2e-12
 """Of the first coefficient left out, relative to the largest of the leading ones."""
 _LONGEST = 3.0  # how far past its scale a series may reach
 _NEGLIGIBLE = 1e-30  # a last coefficient as small as this ends no step
@@ -59,17 +60,11 @@ def product(w: Floats, a: int, b: int, n: int) -> float:
 @kernel
 def expand(p: Floats, u: float, heading: float, span: float, w: Floats) -> None:
     """The series of x, v, i and g from their first coefficients, w[XS], w[VS] and w[IS]."""
-    spread, per_mass, per_inductance = -1.0 / p[REACH], span / p[MASS], span / p[INDUCTANCE]
-    motor, emf, k, R = p[MOTOR], p[BACK_EMF], p[STIFFNESS], p[RESISTANCE]
-    push, reciprocal = friction(p, heading) - k * p[PRELOAD], p[RECIPROCAL] != 0.0
-    w[GS] = (p[REACH] - w[XS]) / p[REACH]
-    for n in range(ORDER):
-        seen = product(w, GS, VS, n) if reciprocal else w[VS + n]
-        w[XS + n + 1] = span * w[VS + n] * _PER[n + 1]
-        w[GS + n + 1] = spread * w[XS + n + 1]
-        w[VS + n + 1] = (motor * product(w, GS, IS, n) - k * w[XS + n] + push) * per_mass * _PER[n + 1]
-        w[IS + n + 1] = (u - R * w[IS + n] - emf * seen) * per_inductance * _PER[n + 1]
-        push, u = 0.0, 0.0
+    push = friction(p, heading) - p[STIFFNESS] * p[PRELOAD]
+    if p[RECIPROCAL] != 0.0:
+        expand_reciprocal(p, u, push, span, w)
+    else:
+        expand_printed(p, u, push, span, w)
 
 
 @kernel
@@ -160,12 +155,16 @@ def ratio(a: float, b: float) -> float:
 @kernel
 def rescale(w: Floats, factor: float) -> None:
     """The series over a step `factor` times as long."""
-    power = 1.0
-    for n in range(1, ORDER + 1):
-        power *= factor
-        w[XS + n] *= power
-        w[VS + n] *= power
-        w[IS + n] *= power
+    square, odd = factor * factor, factor
+    for n in range(1, ORDER, 2):
+        even = odd * factor
+        w[XS + n] *= odd
+        w[VS + n] *= odd
+        w[IS + n] *= odd
+        w[XS + n + 1] *= even
+        w[VS + n + 1] *= even
+        w[IS + n + 1] *= even
+        odd *= square
 
 
 @kernel

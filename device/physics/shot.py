@@ -65,7 +65,7 @@ from device.physics.layout import (
     V,
     X,
 )
-from device.physics.polynomial import bracketed_root, changes_between, value
+from device.physics.polynomial import bracketed_root, changes_between, lowest, value
 from device.physics.segments import advance, enter, pulse_off, pulse_on
 from device.physics.series import friction
 
@@ -139,13 +139,15 @@ def force_on_hand(p: Floats, heading: float, x: float, i: float) -> float:
 
 @kernel
 def peak_force(p: Floats, s: Floats, w: Floats, best: float) -> float:
-    """The largest force of a step, if above `best`: every top of it lies at a root of dF/dt."""
+    """The largest force of a step, if above `best`, which is at least that of its ends: a top is a root of dF/dt."""
     used = s[USED]
     if not rises_above(p, s, w, best):
         return best
     for n in range(ORDER - 1):
         w[QS + n] = (n + 1) * (n + 2) * w[VS + n + 2]
     w[QS + ORDER - 1], w[QS + ORDER] = 0.0, 0.0
+    if abs(w[QS]) + lowest(w, QS, math.copysign(1.0, w[QS])) > 0.0:
+        return best  # the force only rises or only falls
     low, width = 0.0, used
     while low < used:
         high = min(low + width, used)
@@ -153,8 +155,9 @@ def peak_force(p: Floats, s: Floats, w: Floats, best: float) -> float:
         if changes > 1 and width > _NARROWEST:
             width *= 0.5
             continue
-        top = bracketed_root(w, QS, low, high) if changes == 1 else high
-        best = max(best, force_on_hand(p, s[HEADING], value(w, XS, top), value(w, IS, top)))
+        if changes > 0 or high < used:
+            top = bracketed_root(w, QS, low, high) if changes == 1 else high
+            best = max(best, force_on_hand(p, s[HEADING], value(w, XS, top), value(w, IS, top)))
         low, width = high, 2.0 * width
     return best
 
