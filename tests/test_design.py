@@ -22,9 +22,9 @@ from device.words import Pulse
 from experiments.direction.percept import PerceptParameters
 from experiments.direction.percept_fit import PAPER_RATES
 from experiments.load import ConfigError
-from experiments.roof import design as roof
-from experiments.roof.design_critical import rate_at
-from experiments.roof.design_space import axis, make_space, span
+from experiments.roof.design import run as roof
+from experiments.roof.design.critical import rate_at
+from experiments.roof.design.space import axis, make_space, span
 from tests.conftest import RECOIL, Recoil
 
 PAPER = GunParameters()

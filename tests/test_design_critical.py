@@ -11,7 +11,7 @@ import pytest
 from device.methods import paper_methods
 from experiments.direction.percept import percept_of
 from experiments.direction.percept_fit import PAPER_RATES, PerceptFit, fit_percept, predicted_rate
-from experiments.roof.design_critical import (
+from experiments.roof.design.critical import (
     LEVEL,
     Contour,
     band_of,
@@ -20,9 +20,9 @@ from experiments.roof.design_critical import (
     drawn_contours,
     rate_at,
 )
-from experiments.roof.design_rates import Floats
-from experiments.roof.design_shots import Layer, layers, rows_of, simulate_rows
-from experiments.roof.design_space import Request, Space, make_space
+from experiments.roof.design.rates import Floats
+from experiments.roof.design.shots import Layer, layers, rows_of, simulate_rows
+from experiments.roof.design.space import Request, Space, make_space
 from experiments.roof.jobs import on_processes
 
 SPACE = make_space(Request(grid=9, voltage="1-24", pulse="0.01"))

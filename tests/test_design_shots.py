@@ -26,11 +26,11 @@ from experiments.direction.percept import (
     percept_of_trace,
 )
 from experiments.direction.percept_fit import PAPER_RATES, fit_percept, predicted_rate
-from experiments.roof import design_shots
-from experiments.roof.design_assumed import both_ways
-from experiments.roof.design_limits import DUTY, HEAT, PULSE, VOLTAGE, broken_limit, steady_coil_C
-from experiments.roof.design_rates import evidences, logits, predict, rates
-from experiments.roof.design_shots import COIL_POINTS, FREE_POINTS, HOME, Row, felt_of, shots, summarised
+from experiments.roof.design import shots as design_shots
+from experiments.roof.design.assumed import both_ways
+from experiments.roof.design.limits import DUTY, HEAT, PULSE, VOLTAGE, broken_limit, steady_coil_C
+from experiments.roof.design.rates import evidences, logits, predict, rates
+from experiments.roof.design.shots import COIL_POINTS, FREE_POINTS, HOME, Row, felt_of, shots, summarised
 
 DEFAULT = PerceptParameters()
 GUN = GunParameters()

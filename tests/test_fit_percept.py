@@ -21,10 +21,10 @@ from experiments.direction.diffusion import People
 from experiments.direction.percept import PerceptParameters
 from experiments.direction.percept_fit import PAPER_RATES, PAPER_TRIALS
 from experiments.load import ConfigError, find, load_setup, shipped_folder
-from experiments.roof.fit_percept import percept
-from experiments.roof.fit_request import ASSUMED_SPREAD, Request, read
-from experiments.roof.fit_studies import Case, Judged, cases_of, judge, place_of
-from experiments.roof.fit_words import fragment, verdict_sentence
+from experiments.roof.fit.percept import percept
+from experiments.roof.fit.request import ASSUMED_SPREAD, Request, read
+from experiments.roof.fit.studies import Case, Judged, cases_of, judge, place_of
+from experiments.roof.fit.words import fragment, verdict_sentence
 from tests.conftest import Recoil
 
 METHODS = paper_methods()

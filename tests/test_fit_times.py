@@ -14,7 +14,7 @@ from analysis.decision.fit import fit
 from analysis.decision.predicted import answered_by
 from experiments.direction.diffusion_batch import decide_all
 from experiments.load import ConfigError
-from experiments.roof.fit_times import lapse_range
+from experiments.roof.fit.times import lapse_range
 from experiments.streams import generator
 from tests.conftest import Recoil
 from tests.log_files import METHODS, TextRow, trial_rows, trials_path, write_rows

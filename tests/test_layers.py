@@ -41,7 +41,7 @@ HEAVY = {
     "serial": "device.serial_gun",
     "rich": "experiments.roof",
     "typer": "experiments.roof",
-    "numba": ("device.physics.compiled", "experiments.roof.bench_peers"),
+    "numba": ("device.physics.compiled", "experiments.roof.bench.peers"),
 }
 
 

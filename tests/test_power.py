@@ -18,9 +18,9 @@ import pytest
 from analysis.power.planned import ALL_PAIRS, ANOVA
 from experiments.config import leaves
 from experiments.load import ConfigError, load_setup, shipped_folder
-from experiments.roof import power as roof
 from experiments.roof.jobs import JobError, on_cluster, on_processes
-from experiments.roof.power_grid import Request, make_grid
+from experiments.roof.power import run as roof
+from experiments.roof.power.grid import Request, make_grid
 from tests.conftest import RECOIL, Recoil
 
 SMALL = ("--participants", "8,14", "--effect", "0.75,1", "--studies", "300")

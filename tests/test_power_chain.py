@@ -16,8 +16,8 @@ from analysis.summary import summarize
 from experiments.clock import VirtualClock
 from experiments.config import participant_codes
 from experiments.load import load_setup
-from experiments.roof.power_grid import Request as PowerRequest
-from experiments.roof.power_grid import make_grid
+from experiments.roof.power.grid import Request as PowerRequest
+from experiments.roof.power.grid import make_grid
 from experiments.run import Request, run
 from experiments.screens.synthetic import synthetic_screen
 from experiments.setup import Setup

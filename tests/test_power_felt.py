@@ -19,9 +19,9 @@ from experiments.direction.felt import FeltParticipant, mind_of
 from experiments.direction.percept_batch import forward_rates
 from experiments.direction.plan import make_plan
 from experiments.load import load_setup
-from experiments.roof.power_felt import Felt, felt_counts, felt_of, percepts_of_setup
-from experiments.roof.power_grid import Request, make_grid
-from experiments.roof.power_studies import run_chunk
+from experiments.roof.power.felt import Felt, felt_counts, felt_of, percepts_of_setup
+from experiments.roof.power.grid import Request, make_grid
+from experiments.roof.power.studies import run_chunk
 from experiments.streams import generator
 from tests.conftest import Recoil
 from tests.felt_configs import felt_text, written

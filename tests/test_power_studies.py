@@ -32,8 +32,8 @@ from experiments.preference.config import RatingScale
 from experiments.preference.observer import draw_ratings
 from experiments.preference.scale import on_scale as one_on_scale
 from experiments.roof.odds import direction_odds, preference_odds
-from experiments.roof.power_grid import Request, make_grid
-from experiments.roof.power_studies import (
+from experiments.roof.power.grid import Request, make_grid
+from experiments.roof.power.studies import (
     Chunk,
     Design,
     direction_counts,

@@ -16,7 +16,7 @@ import pytest
 from device.parameters import GunParameters
 from device.physics.trains import highest_rate_Hz
 from experiments.direction.percept import PerceptParameters
-from experiments.roof.design_critical import LEVEL, rate_at
+from experiments.roof.design.critical import LEVEL, rate_at
 from experiments.roof.jobs import cores
 from tests.conftest import RECOIL, Soak
 from tests.test_power import files

@@ -14,7 +14,7 @@ import pytest
 
 from device.physics import GunParameters, simulate
 from experiments.load import ConfigError
-from experiments.roof import sweep, sweep_table
+from experiments.roof.simulate import sweep, sweep_table
 from tests.conftest import RECOIL
 
 GUN = GunParameters()

@@ -13,7 +13,7 @@ from analysis.paper import Paper
 from experiments.direction.config import DirectionConfig
 from experiments.preference.config import PreferenceConfig
 from experiments.preference.observer import draw_ratings
-from experiments.roof import power_studies
+from experiments.roof.power import studies as power_studies
 from experiments.streams import Stream, generator
 
 Scores = NDArray[np.float64]

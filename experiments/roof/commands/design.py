@@ -35,7 +35,7 @@ def design(
     as_json: AsJson = False,
 ) -> None:
     """Which damper, voltage and pulse would be felt best, and where a direction begins to be felt. Predictions."""
-    from experiments.roof import design as roof
+    from experiments.roof.design import run as roof
 
     request = roof.Request(
         config=config,

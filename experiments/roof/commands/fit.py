@@ -55,7 +55,7 @@ def percept(
     as_json: AsJson = False,
 ) -> None:
     """The percept fitted to forward rates, what they cannot tell, and studies of it against what else is published."""
-    from experiments.roof import fit_percept as roof
+    from experiments.roof.fit import percept as roof
 
     asked = roof.Request(paper=paper, rates=rates, trials=trials, gun=gun, spread=spread, studies=studies, seed=seed)
     found = roof.percept(asked, out, progress)
@@ -75,7 +75,7 @@ def times(
     as_json: AsJson = False,
 ) -> None:
     """The diffusion model (drift, boundary, start, non-decision time) fitted to people's own response times."""
-    from experiments.roof import fit_times as roof
+    from experiments.roof.fit import times as roof
 
     asked = roof.Request(paths=logs, lapses=lapses, bias=bias, profiled=profile)
     found, problems = roof.times(asked, out, tracked, progress)

@@ -47,7 +47,9 @@ def simulate(
 ) -> None:
     """One shot by the model (summary, trace, figure), a table of shots over parameters that vary, or a vibration."""
     from experiments.load import find
-    from experiments.roof import shot, shot_more, shot_scene
+    from experiments.roof.simulate import more as shot_more
+    from experiments.roof.simulate import scene as shot_scene
+    from experiments.roof.simulate import shot
 
     single: dict[str, object] = {"--audit": audit or None, "--hand": hand, "--contact-stiffness": contact_stiffness}
     models: dict[str, object] = {"--fidelity": fidelity, "--scene": scene, "--need": need, "--set": changes}
@@ -89,7 +91,7 @@ def _vibration(
     gun_file: Path, method: str | None, trace: Path | None, plot: Path | None, others: list[str], as_json: bool
 ) -> bool:
     """Whether the method is a vibration, which is then told of."""
-    from experiments.roof import shot_vibration
+    from experiments.roof.simulate import vibration as shot_vibration
 
     parameters = shot_vibration.vibration_of(gun_file, method)
     if parameters is None:
@@ -100,7 +102,8 @@ def _vibration(
 
 
 def _sweep(told: dict[str, Any], as_json: bool, **asked: Any) -> None:
-    from experiments.roof import shot_scene, sweep
+    from experiments.roof.simulate import scene as shot_scene
+    from experiments.roof.simulate import sweep
 
     if note := sweep.interpreted_note():
         say(note)
@@ -165,8 +168,8 @@ def bench(
     as_json: AsJson = False,
 ) -> None:
     """Measure our own methods: error rates of the post-hoc tests, error against time of a simulated shot."""
-    from experiments.roof import bench as roof
-    from experiments.roof.bench_part import Asked
+    from experiments.roof.bench import run as roof
+    from experiments.roof.bench.part import Asked
 
     unknown = set(parts or []) - set(roof.PARTS)
     if unknown:

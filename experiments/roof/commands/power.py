@@ -39,7 +39,7 @@ def power(
     as_json: AsJson = False,
 ) -> None:
     """Simulated power and precision: how many people and trials does it take, and what does it cost?"""
-    from experiments.roof import power as roof
+    from experiments.roof.power import run as roof
 
     request = roof.Request(
         config=config,

@@ -1,0 +1,1 @@
+"""Measured trades: `recoil bench`."""

@@ -1,0 +1,85 @@
+"""The shots that all solve, the numbers they are asked for, and how far these are from fifty digits."""
+
+from __future__ import annotations
+
+import json
+import math
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+from device.methods import FRICTION_I_N, FRICTION_II_N
+from device.parameters import DriveOff, GunParameters
+from device.physics.tiers import OUTPUTS
+
+Outputs = tuple[float, ...]
+"""The numbers of `OUTPUTS`, in their order."""
+Shoot = Callable[[GunParameters], Outputs]
+"""One shot of a gun; `PeerError` or an error of the package if it gets nowhere."""
+
+OFF_STATES: tuple[DriveOff, ...] = ("open", "shorted")
+
+
+class PeerError(RuntimeError):
+    """A peer that missed an event or gave up."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Peer:
+    """One solver at one setting. `build` prepares it (and compiles, where it does) for an off-state of the coil."""
+
+    family: str
+    setting: str
+    package: str
+    models: str
+    build: Callable[[DriveOff], Shoot]
+
+
+def guns(drive_off: DriveOff) -> tuple[GunParameters, ...]:
+    """The paper's gun without and with its damper, back-EMF as printed."""
+    return tuple(GunParameters(friction_N=friction, drive_off=drive_off) for friction in (FRICTION_I_N, FRICTION_II_N))
+
+
+def reference_file() -> Path:
+    """Where the fifty digits lie: beside the tests in a checkout, beside this module in a wheel."""
+    here = Path(__file__).resolve()
+    installed = here.with_name("reference.json")
+    return installed if installed.is_file() else here.parents[4] / "tests" / "golden" / "physics.json"
+
+
+def reference(drive_off: DriveOff) -> tuple[dict[str, str], ...]:
+    """The outputs of `guns(drive_off)` in fifty digits, made by tests/golden/make_physics.py (mpmath)."""
+    shots = json.loads(reference_file().read_text(encoding="utf-8"))["shots"]
+    known = {(shot["friction_N"], shot["drive_off"], shot["emf"]): shot["summary"] for shot in shots}
+    return tuple(known[gun.friction_N, gun.drive_off, gun.emf] for gun in guns(drive_off))
+
+
+def errors(found: Sequence[Outputs], exact: Sequence[dict[str, str]]) -> dict[str, float]:
+    """The largest relative error of each output over the guns. Not a number counts as infinite."""
+    return {
+        name: max(_error(one[place], float(digits[name])) for one, digits in zip(found, exact, strict=True))
+        for place, name in enumerate(OUTPUTS)
+    }
+
+
+def _error(found: float, exact: float) -> float:
+    error = abs(found - exact) / exact
+    return math.inf if math.isnan(error) else error
+
+
+def break_away(gun: GunParameters) -> tuple[float, float]:
+    """When the resting magnet breaks away, and the current then: i(t) = V/R (1 - exp(-t R/L)) meets k x_0 + F_f."""
+    current = (gun.stiffness_N_m * gun.preload_length_m + gun.friction_N) / gun.motor_constant_N_A
+    steady = gun.voltage_V / gun.resistance_ohm
+    return -gun.inductance_H / gun.resistance_ohm * math.log1p(-current / steady), current
+
+
+def force_on_hand(gun: GunParameters, x: float, i: float) -> float:
+    """F = m d2x/dt2 of equation (1) inside the coil, on the way out."""
+    motor = gun.motor_constant_N_A * (1.0 - x / gun.coil_reach_m) * i
+    return motor - gun.stiffness_N_m * (x + gun.preload_length_m) - gun.friction_N
+
+
+def without_friction(gun: GunParameters) -> GunParameters:
+    """The gun's numbers but for its friction: what solvers that take friction as an argument are built for."""
+    return replace(gun, friction_N=0.0)

@@ -1,0 +1,1 @@
+"""The design search and the critical conditions: `recoil design`."""

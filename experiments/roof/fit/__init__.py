@@ -1,0 +1,1 @@
+"""Fits of percept and response times: `recoil fit`."""

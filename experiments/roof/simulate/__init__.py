@@ -1,0 +1,1 @@
+"""Shots by the model: `recoil simulate`."""
