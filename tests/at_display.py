@@ -76,12 +76,13 @@ class AtDisplay:
 
 
 def last_record(journal: Path) -> dict[str, Any]:
-    """The last whole record of a journal that is being written; empty if there is none yet."""
+    """The last whole record of a journal that is being written, but for a train's shots; empty if there is none yet."""
     try:
         lines = journal.read_bytes().split(b"\n")[:-1]
     except FileNotFoundError:
         return {}
-    return json.loads(lines[-1]) if lines else {}
+    records = map(json.loads, reversed(lines))
+    return next((record for record in records if record["kind"] != "shot"), {})
 
 
 def work_console(

@@ -139,7 +139,7 @@ def test_an_interrupt_ends_at_once_with_130(tmp_path: Path) -> None:
     for number in range(4000):
         (tmp_path / f"{number}_trials.csv").write_bytes(lines)
     words = [str(RECOIL), "analyze", str(tmp_path), "--out", str(tmp_path / "out")]
-    with subprocess.Popen(words, stderr=subprocess.PIPE, stdout=subprocess.DEVNULL, env={**os.environ}) as running:
+    with subprocess.Popen(words, stderr=subprocess.DEVNULL, stdout=subprocess.DEVNULL, env={**os.environ}) as running:
         time.sleep(1.5)
         if running.poll() is None:
             running.send_signal(signal.SIGINT)

@@ -96,9 +96,15 @@ def simulate_batch(
     ['home', 'invalid', 'stuck']
     """
     rows, valid = _rows(gun or GunParameters(), fidelity, arrays)
-    found = np.full((len(rows), RESULT_SIZE), np.nan)
-    found[:, 0] = INVALID
-    found[valid] = _run(rows[valid], cores or os.cpu_count() or 1, progress or (lambda _count: None))
+    found = np.empty((len(rows), RESULT_SIZE))
+    cores, progress = cores or os.cpu_count() or 1, progress or (lambda _count: None)
+    if valid.all():
+        _run(rows, found, cores, progress)
+    else:
+        found[:], found[:, 0] = np.nan, INVALID
+        among = np.empty((int(valid.sum()), RESULT_SIZE))
+        _run(rows[valid], among, cores, progress)
+        found[valid] = among
     numbers = {name: np.ascontiguousarray(found[:, n]) for n, name in enumerate(ShotBatch.__slots__[1:], start=1)}
     return ShotBatch(status=found[:, 0].astype(np.int8), **numbers)
 
@@ -140,8 +146,7 @@ def _reduce(rows: NDArray[np.float64], model: float) -> None:
         rows[:, BACK_EMF], rows[:, OPEN] = 0.0, 1.0
 
 
-def _run(rows: NDArray[np.float64], cores: int, progress: Callable[[int], object]) -> NDArray[np.float64]:
-    found = np.empty((len(rows), RESULT_SIZE))
+def _run(rows: NDArray[np.float64], found: NDArray[np.float64], cores: int, progress: Callable[[int], object]) -> None:
     run = _compiled_chunk() if find_spec("numba") else _interpreted_chunk
 
     def one(start: int) -> int:
@@ -152,7 +157,6 @@ def _run(rows: NDArray[np.float64], cores: int, progress: Callable[[int], object
     with ThreadPoolExecutor(cores) as pool:  # the compiled kernel holds no lock
         for count in pool.map(one, range(0, len(rows), _CHUNK)):
             progress(count)
-    return found
 
 
 def _compiled_chunk() -> Callable[[NDArray[np.float64], NDArray[np.float64]], None]:
