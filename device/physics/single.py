@@ -1,4 +1,4 @@
-"""One shot: interpreted in half a millisecond to one, or in microseconds once `device.physics.batch.warm` was called."""
+"""One shot: interpreted in about half a millisecond, or in microseconds once `device.physics.batch.warm` was called."""
 
 from __future__ import annotations
 
