@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import threading
 import time
 from datetime import UTC, datetime, timedelta
 from typing import Protocol
@@ -20,6 +21,9 @@ class Clock(Protocol):
 
     def sleep(self, seconds: float) -> None:
         """Wait; not at all if the time is over."""
+
+    def wait(self, news: threading.Condition, seconds: float | None) -> None:
+        """Wait for news, at most for so long; the condition's lock is held before and after."""
 
 
 class RealClock:
@@ -42,6 +46,10 @@ class RealClock:
         if seconds > 0:
             time.sleep(seconds / self._speed)
 
+    def wait(self, news: threading.Condition, seconds: float | None) -> None:
+        """Wait for news for real."""
+        news.wait(None if seconds is None else max(0.0, seconds / self._speed))
+
 
 class VirtualClock:
     """A clock that moves only when someone waits. It starts at 0 s on the date and time of its making."""
@@ -63,6 +71,13 @@ class VirtualClock:
     def sleep(self, seconds: float) -> None:
         """Move on at once."""
         self._elapsed_s += max(0.0, seconds)
+
+    def wait(self, news: threading.Condition, seconds: float | None) -> None:
+        """Move on at once; without an end, wait for real."""
+        if seconds is None:
+            news.wait()
+        else:
+            self.sleep(seconds)
 
 
 def _iso(moment: datetime) -> str:

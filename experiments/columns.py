@@ -50,8 +50,13 @@ def _flag(name: str, description: str) -> Column:
 
 _PARTICIPANT = _text("participant_id", "participant's code, letters and digits", required=True)
 _METHOD = _level("method", (), "rendering method, as the config names it", required=True)
-_ATTEMPTS = _integer("attempts", "how often the stimulus was presented; more than 1 after a fault or a repeat")
-_FLAGS = _text("flags", "marks set on the trial, separated by a blank (`interrupted`, `device-error`, ...)")
+_ATTEMPTS = _integer("attempts", "how often the stimulus was presented; more than 1 after a fault, pause or repeat")
+_FLAGS = _text(
+    "flags",
+    "marks set on the trial, separated by a blank: `device-error`, `interrupted` (the run broke off), `paused`, "
+    "`repeated`, `corrected`, `anticipation` (the participant's key within 0.1 s of the onset), and the experimenter's "
+    "own",
+)
 _NOTE = _text("note", "the experimenter's note")
 _ONSET = _text(
     "onset_utc",
@@ -96,7 +101,13 @@ RATINGS: tuple[Column, ...] = (
     _level("rating_by", ("participant", "experimenter", "synthetic"), "whose hand entered the rating"),
     _text("comment", "the participant's own words"),
     _integer("shots", "shots presented until the participant said next"),
-    _number("exposure_s", "s", "from the first pulse until the participant said next"),
+    _number("exposure_s", "s", "from the first pulse until the participant said next, at the last presentation"),
+    _number(
+        "earlier_exposure_s",
+        "s",
+        "how long the same trial was felt before, at presentations that a pause ended or that were repeated; empty if "
+        "it was not",
+    ),
     _ATTEMPTS,
     _FLAGS,
     _NOTE,

@@ -75,14 +75,41 @@ class SyntheticConfig(Model):
         return self
 
 
+class ConsoleConfig(Model):
+    """What the experimenter's screen does.
+
+    `guard_s`: for so long after a change of what is on the screen nothing is taken that answers, fires or goes on; 0
+    switches the guard off. `response_times`: a strip of the participant's own response times, never of correctness.
+    """
+
+    guard_s: Annotated[float, Field(ge=0, le=5)] = 0.25
+    response_times: bool = False
+
+
 class ExperimentConfig(Model):
     """What every experiment's config says."""
 
     experiment: str
     title: Text
     gun: Text
+    console: ConsoleConfig = ConsoleConfig()
     assumed: tuple[Text, ...] = ()
     seed: Annotated[int, Field(ge=0, le=2**63 - 1)] | None = None
+
+    @property
+    def trial_s(self) -> float:
+        """Planned time of a trial; 0 where none is planned."""
+        return 0.0
+
+    @property
+    def break_s(self) -> float:
+        """All planned breaks together; there are none unless an experiment has them."""
+        return 0.0
+
+    @property
+    def rating_s(self) -> float:
+        """Planned time of what is asked of a trial after all were felt."""
+        return 0.0
 
     @model_validator(mode="after")
     def _assumed_exists(self) -> Self:

@@ -28,6 +28,10 @@ class JournalError(Exception):
     """A journal that cannot be written or read; the message says what is safe."""
 
 
+class JournalGone(JournalError):  # noqa: N818 - what is so, not what went wrong
+    """A journal that was deleted or moved while it was written; the message says where it is now, if anywhere."""
+
+
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Contents:
     """What a journal holds: its whole records, their length in bytes, and what stands behind them cut off."""
@@ -125,6 +129,21 @@ class Journal:
         self._count += 1
         self._length += len(line)
         self._link = link(line)
+        if not storage.is_at(self._descriptor, self.path):
+            raise JournalGone(self._rescue())
+
+    def _rescue(self) -> str:
+        """Write a journal again that was deleted, from what is open; where it is now, and what to do."""
+        what, upto = f"{self.path}: the journal", f"Everything up to record {self._count - 1} is"
+        moved = storage.moved_to(self._descriptor)
+        if moved is not None:
+            return f"{what} was moved to {moved} during the run. {upto} there; resume it there"
+        data = storage.read_open(self._descriptor, self._length)
+        for path in (self.path, Path.cwd() / self.path.name, Path.home() / self.path.name):
+            if _written_again(path, data):
+                how = "go on with --resume" if path == self.path else f"put it back as {self.path}, then resume"
+                return f"{what} was deleted during the run. {upto} written again to {path}; {how}"
+        return f"{what} was deleted during the run, and cannot be written anywhere else: this run is lost"
 
     def _take_back(self) -> None:
         """Remove a record that was not acknowledged, so that the journal ends with a whole one."""
@@ -141,6 +160,23 @@ class Journal:
 
     def __exit__(self, *_: object) -> None:
         self.close()
+
+
+def _written_again(path: Path, data: bytes) -> bool:
+    """Whether a file could be made of this, where none was."""
+    try:
+        storage.make_folder(path.parent)
+        descriptor = storage.create(path)
+    except OSError:
+        return False
+    try:
+        storage.write_all(descriptor, data)
+        storage.sync(descriptor)
+    except OSError:
+        return False
+    finally:
+        os.close(descriptor)
+    return True
 
 
 def hold(path: Path) -> int:

@@ -6,7 +6,7 @@ from collections import Counter
 from collections.abc import Callable, Generator
 
 from experiments.plan import Trial
-from experiments.steps import Failed, Interrupted, Outcome, Repeat, Session, Step
+from experiments.steps import Close, Failed, Interrupted, Outcome, Repeat, Session, Step
 
 StepsOf = Callable[[Trial, int], tuple[Step, ...]]
 """The steps of one presentation of a trial, by its number."""
@@ -30,6 +30,16 @@ class Presenter:
             if not isinstance(outcome, Failed | Interrupted | Repeat):
                 return
 
+    def until_done(self, step: Step) -> Session:
+        """A step that a break-off only delays, and before which a trial can be presented again."""
+        while isinstance(outcome := (yield step), Interrupted | Repeat):
+            if isinstance(outcome, Repeat):
+                yield from self.present(outcome.trial)
+
+    def close(self) -> Session:
+        """The end of a run, at which the last trials can still be corrected or presented again."""
+        yield from self.until_done(Close())
+
 
 def _attempt(steps: tuple[Step, ...]) -> Generator[Step, Outcome, Outcome]:
     """One presentation: its last outcome, or the first that breaks it off."""
@@ -38,9 +48,3 @@ def _attempt(steps: tuple[Step, ...]) -> Generator[Step, Outcome, Outcome]:
         if isinstance(outcome, Failed | Interrupted | Repeat):
             break
     return outcome
-
-
-def until_done(step: Step) -> Session:
-    """A step that a break-off only delays."""
-    while isinstance((yield step), Interrupted):
-        pass

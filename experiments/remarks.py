@@ -33,6 +33,15 @@ class RatingCorrected:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
+class DescriptionCorrected:
+    """A description was entered wrongly; these were the participant's words."""
+
+    trial: Trial
+    comment: str
+    kind: Literal["description-corrected"] = "description-corrected"
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
 class Flagged:
     """A trial is marked, with a word such as `noise` or `late`."""
 
@@ -52,8 +61,9 @@ class Noted:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Paused:
-    """The experimenter paused the run."""
+    """The run was paused by the experimenter, or for the cause that is named."""
 
+    cause: str = ""
     kind: Literal["paused"] = "paused"
 
 
@@ -65,7 +75,76 @@ class Continued:
     kind: Literal["continued"] = "continued"
 
 
-Remark = AnswerCorrected | RatingCorrected | Flagged | Noted | Paused | Continued
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Refused:
+    """Something was pressed that would have carried the run on, and was not taken; why."""
+
+    event: str
+    state: str
+    because: str
+    by: Literal["experimenter", "participant"]
+    kind: Literal["refused"] = "refused"
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Halted:
+    """The emergency stop: from here on this run arms and fires no more. `by` is at whose screen."""
+
+    by: Literal["experimenter", "participant"]
+    kind: Literal["halted"] = "halted"
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class HaltReason:
+    """Why there was an emergency stop."""
+
+    text: str
+    kind: Literal["halt-reason"] = "halt-reason"
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class TestShot:
+    """A shot that nobody judged, after a key was held for so long: the gun may be armed again after an emergency stop.
+
+    `held_s` is `None` where words were typed instead. Empty `cause`: it was fired, at a time on the host's monotonic
+    clock.
+    """
+
+    method: str
+    held_s: float | None
+    cause: str = ""
+    pulse_start_s: float | None = None
+    motion: str = ""
+    kind: Literal["test-shot"] = "test-shot"
+
+
+Remark = (
+    AnswerCorrected
+    | RatingCorrected
+    | DescriptionCorrected
+    | Flagged
+    | Noted
+    | Paused
+    | Continued
+    | Refused
+    | Halted
+    | HaltReason
+    | TestShot
+)
+
+MAX_FLAG = 32
+
+
+def flag_word(typed: str) -> str | None:
+    """The flag that was typed, as it is kept; `None` if it is no word.
+
+    >>> flag_word("Door slam"), flag_word("9 lives"), flag_word("-")
+    ('door-slam', None, None)
+    """
+    flag = "-".join(typed.lower().split())
+    plain = flag.isascii() and flag.replace("-", "").isalnum() and flag[0].isalpha()
+    return flag if plain and len(flag) <= MAX_FLAG else None
+
 
 _REMARK: TypeAdapter[Remark] = TypeAdapter(Annotated[Remark, Field(discriminator="kind")])
 

@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import dataclass
 from typing import Any
 
 from pydantic import ValidationError
 
 from experiments.journal import Contents, JournalError
-from experiments.remarks import Remark, remark_from
+from experiments.remarks import Halted, Remark, TestShot, remark_from
 from experiments.steps import (
     Ask,
     Fire,
@@ -17,13 +18,33 @@ from experiments.steps import (
     Outcome,
     Present,
     Session,
-    Standing,
     Step,
     outcome_from,
     record,
     step_from,
 )
 from experiments.tables import Told
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Standing:
+    """Where a run stands: its next step, `None` at the end, and what was told before.
+
+    `halted`: an emergency stop ended it, and no test shot was fired since.
+    """
+
+    step: Step | None
+    told: Told = ()
+
+    @property
+    def halted(self) -> bool:
+        """Whether a test shot must come before anything else."""
+        last = [word for _, word in self.told if isinstance(word, Halted) or _went_well(word)]
+        return bool(last) and isinstance(last[-1], Halted)
+
+
+def _went_well(word: Outcome | Remark) -> bool:
+    return isinstance(word, TestShot) and not word.cause
 
 
 def told(contents: Contents) -> Told:
@@ -50,12 +71,13 @@ def history(contents: Contents) -> History:
 
 def replay(session: Session, contents: Contents) -> Standing:
     """Send a journal's outcomes into a fresh session. `JournalError` if they are not those of this plan."""
-    done = history(contents)
+    tale = told(contents)
+    done = [(step, outcome) for step, outcome in tale if step and not isinstance(outcome, Remark)]
     step = next(session, None)
-    for number, (told, outcome) in enumerate(done, start=1):
-        _compare(contents, number, step, told)
+    for number, (recorded, outcome) in enumerate(done, start=1):
+        _compare(contents, number, step, recorded)
         step = _send(session, outcome)
-    return Standing(step=step, history=done)
+    return Standing(step=step, told=tale)
 
 
 def go_on(session: Session, contents: Contents, standing: Standing, append: Callable[..., None]) -> Standing:
@@ -72,7 +94,7 @@ def go_on(session: Session, contents: Contents, standing: Standing, append: Call
     felt = isinstance(step, Ask) or (announced and isinstance(step, Fire | Present))
     outcome = Interrupted(presented=felt)
     append("outcome", body=record(outcome))
-    return Standing(step=_send(session, outcome), history=[*standing.history, (step, outcome)])
+    return Standing(step=_send(session, outcome), told=[*standing.told, (step, outcome)])
 
 
 def _last_step_is_open(contents: Contents) -> bool:

@@ -18,12 +18,14 @@ from experiments.clock import Clock
 from experiments.columns import FILE_SUFFIX, LATER
 from experiments.journal import Contents, Journal, JournalError, hold, is_empty
 from experiments.journal import read as read_journal
+from experiments.live_run import LiveRun, RunStopped, Screen
 from experiments.places import Place, PlaceError
 from experiments.plan import Plan
 from experiments.provenance import provenance
-from experiments.runner import Desk, RunStopped, Screen, carry_out, gun_name
+from experiments.replay import Standing
+from experiments.runner import Desk, carry_out, gun_name
 from experiments.setup import Setup
-from experiments.steps import Session, Standing
+from experiments.steps import Answered, Rated, Session
 from experiments.streams import draw_seed
 from experiments.tables import table_bytes
 
@@ -53,10 +55,11 @@ class Request:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Finished:
-    """A finished run: its plan and where it lies."""
+    """A finished run: its plan, where it lies, and how many answers were read back from the disk."""
 
     plan: Plan
     place: Place
+    saved: int
 
 
 MakeScreen = Callable[[Setup[Any], Plan, Clock], Screen]
@@ -159,16 +162,26 @@ def _carry_out(job: _Job, gun: Gun, make_screen: MakeScreen) -> Finished:
     session, screen = job.experiment.session(plan, setup), make_screen(setup, plan, job.clock)
     with _open(job) as journal:
         standing = _begin(job, plan, session, journal, gun)
+        live = LiveRun(
+            plan=plan,
+            gun=gun,
+            journal=journal,
+            clock=job.clock,
+            screen=screen,
+            guard_s=setup.config.console.guard_s,
+            told=standing.told,
+        )
         desk = Desk(
             gun=gun,
             gun_name=gun_name(gun.identify()),
             drives=limits.drives(setup),
-            screen=screen,
             journal=journal,
             clock=job.clock,
+            live=live,
         )
-        _to_the_end(session, desk, standing, job.place)
-    return Finished(plan=plan, place=job.place)
+        screen.begin(live)
+        saved = _to_the_end(session, desk, standing, job.place)
+    return Finished(plan=plan, place=job.place, saved=saved)
 
 
 def _plan(job: _Job) -> Plan:
@@ -230,7 +243,7 @@ def _begin(job: _Job, plan: Plan, session: Session, journal: Journal, gun: Gun) 
     setup = job.request.setup
     plan_head = {"plan": plan.record(), "plan_sha256": plan.sha256()}
     journal.append("run", **plan_head, setup=setup.record(), setup_sha256=setup.sha256(), **now)
-    return Standing(step=next(session), history=[])
+    return Standing(step=next(session))
 
 
 def _experimenter_knows(setup: Setup[Any]) -> list[str]:
@@ -239,17 +252,35 @@ def _experimenter_knows(setup: Setup[Any]) -> list[str]:
     return ["direction", *(f"method {name}" for name in by_hand)]
 
 
-def _to_the_end(session: Session, desk: Desk, standing: Standing, place: Place) -> None:
-    """Carry out what is left. If it is stopped, the journal says why and the table holds what was answered."""
+def _to_the_end(session: Session, desk: Desk, standing: Standing, place: Place) -> int:
+    """Carry out what is left. If it is stopped, the journal says why and the table holds what was answered.
+
+    Gives back the number of answers, read back from the disk.
+    """
     try:
         carry_out(session, desk, standing)
     except (KeyboardInterrupt, RunStopped) as stop:
-        desk.journal.append("stopped", reason=str(stop) or "interrupted")
-        storage.write_whole(place.table, table(read_journal(place.journal)))
+        why = str(stop) or "interrupted"
+        desk.live.end(why)
+        desk.journal.append("stopped", reason=why)
+        saved = _write_table(place)
+        if isinstance(stop, RunStopped):
+            stop.saved = saved
         raise
+    except JournalError as error:
+        desk.live.end(str(error))
+        raise
+    desk.live.end("")
     data = table(read_journal(place.journal))
     desk.journal.append("finished", table_sha256=_sha256(data))
-    storage.write_whole(place.table, data)
+    return _write_table(place)
+
+
+def _write_table(place: Place) -> int:
+    """Write the table from the journal as it is read back from the disk; the answers in it."""
+    contents = read_journal(place.journal)
+    storage.write_whole(place.table, table(contents))
+    return sum(isinstance(word, Answered | Rated) for _, word in replay.told(contents))
 
 
 def table(contents: Contents) -> bytes:

@@ -1,6 +1,6 @@
-"""The one loop that carries steps out: it tells the journal, lets gun, person or clock do it, and acknowledges.
+"""The one loop that carries steps out: it tells the journal, waits for what the live run takes, and drives the gun.
 
-Console, terminal and synthetic participant differ only in the `Screen` they hand over.
+Console, terminal and synthetic participant differ only in the `Screen` that is shown the run and offers events to it.
 A train's shots are asked for a little ahead, each for its own tick, and the gun waits for it by its own clock: neither
 the line nor this machine delays them. Each is in the journal before the next is asked for.
 """
@@ -9,23 +9,32 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass, fields, replace
-from typing import Any, Literal, Protocol
+from dataclasses import dataclass, fields
+from typing import Any, Literal
 
-from device import DeviceError, Gun, LimitError, LinkError, Shot, ShotReport
+from device import DeviceError, Gun, LimitError, Shot, ShotReport
 from device.words import Drive, Identity
+from experiments import events
 from experiments.clock import Clock
+from experiments.entries import trial_at
 from experiments.journal import Journal
+from experiments.live_run import Held, LiveRun, RunHalted, RunStopped
 from experiments.plan import Trial
+from experiments.preference.scale import on_scale
+from experiments.remarks import TestShot
+from experiments.replay import Standing
+from experiments.states import State
 from experiments.steps import (
     Answered,
     Ask,
+    Close,
+    Closed,
     Describe,
     Described,
     Failed,
     Fire,
     Fired,
-    History,
+    Interrupted,
     Outcome,
     Prepare,
     Prepared,
@@ -37,7 +46,6 @@ from experiments.steps import (
     Rest,
     Rested,
     Session,
-    Standing,
     Step,
     TrainShot,
     record,
@@ -54,50 +62,20 @@ Assumed: twice what the doctor lets pass, 5 ms that a sleep overruns and 10 ms t
 """
 
 
-class RunStopped(Exception):  # noqa: N818 - a stop is not an error
-    """The run stops here on purpose or for want of a gun; it can be resumed."""
-
-
-class Screen(Protocol):
-    """Where a step meets a person, real or synthetic. `shown_s` is when the step that waits was painted, if known."""
-
-    shown_s: float | None
-
-    def begin(self, desk: Desk, standing: Standing) -> None:
-        """Take the place at the desk, where the run stands so."""
-
-    def prepare(self, step: Prepare) -> Prepared | Repeat:
-        """Have the gun turned, set and handed over; or ask for an earlier trial of the set again."""
-
-    def ask(self, step: Ask, onset_s: float) -> Answered | Repeat:
-        """Have the direction judged; `onset_s` is when the pulse began. Or ask for the stimulus again."""
-
-    def rest(self, step: Rest) -> Rested:
-        """Have the break taken."""
-
-    def said_next(self, step: Present, onset_s: float, until_s: float) -> bool:
-        """Wait until the participant says next or until a time; true if they said it. `onset_s`: the first pulse."""
-
-    def rate(self, step: Rate) -> Rated:
-        """Have a stimulus rated."""
-
-    def describe(self, step: Describe) -> Described:
-        """Have a stimulus described."""
-
-    def acknowledge(self, step: Step, outcome: Outcome) -> None:
-        """Show that an outcome is safe: its record is on the disk."""
+class Unforeseen(TypeError):  # noqa: N818 - a fault of the program
+    """The table took an event for a step that knows none of its kind."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Desk:
-    """All that carries steps out: gun and how each method drives it, screen, journal and clock."""
+    """All that carries steps out: gun and how each method drives it, journal, clock, and the live run."""
 
     gun: Gun
     gun_name: str
     drives: Mapping[str, Drive]
-    screen: Screen
     journal: Journal
     clock: Clock
+    live: LiveRun
 
 
 def gun_name(identity: Identity) -> str:
@@ -113,84 +91,312 @@ def disarm(gun: Gun) -> None:
         raise RunStopped(f"the gun cannot be disarmed ({error}): switch off its power") from error
 
 
-def carry_out(session: Session, desk: Desk, standing: Standing) -> History:
-    """Carry out a session from where it stands to its end, and return all that was done.
+def carry_out(session: Session, desk: Desk, standing: Standing) -> None:
+    """Carry out a session from where it stands to its end.
 
-    `RunStopped`, `JournalError` and interrupts pass through; whatever happens, the gun is disarmed.
+    `RunStopped`, `JournalError` and interrupts pass through; whatever happens, the gun is disarmed. After an emergency
+    stop the run stays where it is until it is closed.
     """
-    step, done, failures, onset_s = standing.step, list(standing.history), 0, math.nan
-    desk.screen.begin(desk, standing)
     try:
-        while step is not None:
-            desk.journal.append("step", body=record(step))
-            desk.screen.shown_s = None
-            outcome = _do(step, desk, onset_s)
-            desk.journal.append("outcome", body=record(outcome), **_shown(desk.screen))
-            desk.screen.acknowledge(step, outcome)
-            done.append((step, outcome))
-            failures = _count(failures, outcome)
-            onset_s = outcome.pulse_start_s if isinstance(outcome, Fired) else onset_s
-            step = _next(session, outcome)
+        _Runner(session, desk).carry_out(standing)
+    except RunHalted as halt:
+        disarm(desk.gun)
+        raise RunStopped(desk.live.stay_halted()) from halt
     finally:
         session.close()
         disarm(desk.gun)
-    return done
 
 
-def _shown(screen: Screen) -> dict[str, float]:
-    """When the step was painted, where that is known."""
-    return {} if screen.shown_s is None else {"shown_s": screen.shown_s}
+class _Runner:
+    """A session that is being carried out, and what one step leaves to the next."""
 
+    def __init__(self, session: Session, desk: Desk) -> None:
+        self._session, self._desk, self._live = session, desk, desk.live
+        self._failures = 0
+        self._onset_s = math.nan
+        self._damper = ""
+        """As it was set in this sitting; unknown at its beginning."""
+        self._comment: str | None = None
+        """What the participant wrote beside their rating."""
 
-def _next(session: Session, outcome: Outcome) -> Step | None:
-    try:
-        return session.send(outcome)
-    except StopIteration:
-        return None
+    def carry_out(self, standing: Standing) -> None:
+        step = standing.step
+        if standing.halted:
+            self._rearm(trial_at(self._live.plan, standing.told, step))
+        while step is not None:
+            self._desk.journal.append("step", body=record(step))
+            outcome = self._do(step)
+            self._desk.journal.append("outcome", body=record(outcome), **self._shown())
+            self._live.keep(step, outcome)
+            self._count(outcome)
+            step = self._send(outcome)
 
+    def _send(self, outcome: Outcome) -> Step | None:
+        try:
+            return self._session.send(outcome)
+        except StopIteration:
+            return None
 
-def _count(failures: int, outcome: Outcome) -> int:
-    if isinstance(outcome, Prepared):
-        return failures
-    if not isinstance(outcome, Failed):
-        return 0
-    if failures + 1 == MAX_FAILURES:
-        raise RunStopped(f"the gun failed {MAX_FAILURES} times in a row, last: {outcome.cause}")
-    return failures + 1
+    def _shown(self) -> dict[str, float]:
+        """When the step was painted, where that is known."""
+        return {} if self._live.shown_s is None else {"shown_s": self._live.shown_s}
 
+    def _count(self, outcome: Outcome) -> None:
+        if isinstance(outcome, Prepared):
+            return
+        self._failures = self._failures + 1 if isinstance(outcome, Failed) else 0
+        if isinstance(outcome, Failed) and self._failures == MAX_FAILURES:
+            raise RunStopped(f"the gun failed {MAX_FAILURES} times in a row, last: {outcome.cause}")
 
-def _do(step: Step, desk: Desk, onset_s: float) -> Outcome:
-    match step:
-        case Prepare():
-            return _confirmed(step, desk.screen.prepare(step))
-        case Fire():
-            return _fire(step, desk)
-        case Ask():
-            return desk.screen.ask(step, onset_s)
-        case Rest():
-            return desk.screen.rest(step)
-        case Present():
-            return _present(step, desk)
-        case Rate():
-            return desk.screen.rate(step)
-        case Describe():
-            return desk.screen.describe(step)
+    def _do(self, step: Step) -> Outcome:  # noqa: C901 - one case a step
+        match step:
+            case Prepare():
+                return self._prepare(step)
+            case Fire():
+                return self._fire(step)
+            case Ask():
+                return self._ask(step)
+            case Rest():
+                return self._rest(step)
+            case Present():
+                return self._present(step)
+            case Rate():
+                return self._rate(step)
+            case Describe():
+                return self._describe(step)
+            case Close():
+                return self._close(step)
 
+    # steps that wait for a person
 
-def _confirmed(step: Prepare, outcome: Prepared | Repeat) -> Prepared | Repeat:
-    """The outcome of a hand-over, with the damper that was asked for and so confirmed."""
-    return replace(outcome, damper=step.damper or None) if isinstance(outcome, Prepared) else outcome
+    def _prepare(self, step: Prepare) -> Prepared | Repeat:
+        to_be_set = step.damper not in ("", self._damper)
+        self._live.enter(State.SETTING if to_be_set else State.PREPARING, step)
+        while True:
+            match self._live.wait():
+                case events.DamperSet():
+                    self._damper = step.damper
+                case events.Fire():
+                    return Prepared(damper=step.damper or None)
+                case events.Repeat(reason=reason):
+                    return self._repeat(reason)
+                case other:
+                    raise Unforeseen(other)
 
+    def _ask(self, step: Ask) -> Answered | Repeat:
+        self._live.enter(State.ASKING, step)
+        match self._live.wait():
+            case events.Answer() | events.ParticipantKey() as answer:
+                return self._answered(answer)
+            case events.Repeat(reason=reason):
+                return self._repeat(reason)
+            case other:
+                raise Unforeseen(other)
 
-def _fire(step: Fire, desk: Desk) -> Fired | Failed:
-    """One shot, armed for it alone."""
-    try:
-        onset_utc, report = _first(step.trial, desk)
-    except (LimitError, LinkError) as error:
+    def _answered(self, answer: events.Answer | events.ParticipantKey) -> Answered:
+        """The answer with its time, which is the participant's own only by their own key, and without a pause."""
+        drawn_s = answer.response_time_s if isinstance(answer, events.Answer) else None
+        key_time_s = None if answer.at_s is None else round(answer.at_s - self._onset_s, 6)
+        time_s = drawn_s if drawn_s is not None else key_time_s
+        if time_s is None:
+            raise TypeError("an answer without a time")
+        own = drawn_s is not None or isinstance(answer, events.ParticipantKey)
+        return Answered(
+            response=answer.response,
+            response_time_s=time_s,
+            response_source=answer.by,
+            response_time_valid=own and not self._live.paused_since(self._onset_s),
+            key_time_s=key_time_s if drawn_s is not None else None,
+        )
+
+    def _rest(self, step: Rest) -> Rested | Repeat:
+        start_s = self._desk.clock.now()
+        self._live.enter(State.RESTING, step, until_s=start_s + step.duration_s)
+        while True:
+            match self._live.wait():
+                case None:
+                    self._live.offer(events.BreakOver())
+                case events.BreakOver():
+                    return self._rested(start_s, "")
+                case events.EndBreak(reason=reason):
+                    return self._rested(start_s, reason)
+                case events.Repeat(reason=reason):
+                    return self._repeat(reason)
+                case other:
+                    raise Unforeseen(other)
+
+    def _rested(self, start_s: float, reason: str) -> Rested:
+        return Rested(rested_s=round(self._desk.clock.now() - start_s, 6), cut_reason=reason)
+
+    def _rate(self, step: Rate) -> Rated | Repeat:
+        self._comment = None
+        self._live.enter(State.RATING, step)
+        match self._live.wait():
+            case events.ParticipantRated() as given:
+                self._comment = given.comment
+                return Rated(rating=_kept(given.rating, step), rating_by=given.by)
+            case events.Rating(rating=rating, by=by):
+                return Rated(rating=None if rating is None else _kept(rating, step), rating_by=by)
+            case events.Repeat(reason=reason):
+                return self._repeat(reason)
+            case other:
+                raise Unforeseen(other)
+
+    def _describe(self, step: Describe) -> Described:
+        if self._comment is not None:
+            return Described(comment=self._comment)
+        self._live.enter(State.DESCRIBING, step)
+        match self._live.wait():
+            case events.Description(text=text):
+                return Described(comment=text)
+            case other:
+                raise Unforeseen(other)
+
+    def _close(self, step: Close) -> Closed | Repeat:
+        self._live.enter(State.CLOSING, step)
+        match self._live.wait():
+            case events.Finish():
+                return Closed()
+            case events.Repeat(reason=reason):
+                return self._repeat(reason)
+            case other:
+                raise Unforeseen(other)
+
+    def _repeat(self, reason: str) -> Repeat:
+        trial = self._live.repeated()
+        if trial is None:
+            raise TypeError("a repeat of no trial was taken")
+        return Repeat(trial=trial, reason=reason)
+
+    # the gun
+
+    def _fire(self, step: Fire) -> Fired | Failed | Interrupted:
+        """One shot, armed for it alone."""
+        try:
+            self._live.enter(State.FIRING, step)
+            onset_utc, report = self._first(step.trial)
+        except Held:
+            return Interrupted(presented=False, cause="pause")
+        except DeviceError as error:
+            return self._failed(error, felt=not isinstance(error, LimitError))
+        finally:
+            disarm(self._desk.gun)
+        self._onset_s = report.pulse_start_s
+        self._live.felt(report.pulse_start_s)
+        return Fired(gun=self._desk.gun_name, onset_utc=onset_utc, **_times(report))
+
+    def _present(self, step: Present) -> Presented | Failed | Interrupted:
+        """Shots at whole multiples of the interval since the first, until next is said."""
+        train = _Train(step, self._desk)
+        try:
+            self._live.enter(State.TRAIN, step)
+            self._live.felt(None)
+            train.began(*self._first(step.trial))
+            while (event := self._live.wait((at_s := train.due_s()) - LEAD_S)) is None:
+                if train.shots == step.max_shots:
+                    return train.presented("limit")
+                self._live.allow_shot()
+                train.fired(self._shoot(step.trial, at_s))
+        except Held:
+            return train.interrupted()
+        except DeviceError as error:
+            return self._failed(error, felt=train.shots > 0 or not isinstance(error, LimitError))
+        finally:
+            disarm(self._desk.gun)
+        return train.presented("next") if isinstance(event, events.Next) else train.interrupted()
+
+    def _first(self, trial: Trial) -> tuple[str, ShotReport]:
+        """The first shot of a stimulus, as soon as the magnet is home, and its date and time. Raises as `allow_shot`.
+
+        Whether it may be fired is looked at after the gun was armed, and again just before it fires: what halts or
+        holds the run is set before the gun is told to disarm.
+        """
+        self._live.settle()
+        self._live.allow_shot()
+        self._desk.gun.arm()
+        self._live.sleep(self._desk.gun.status().ready_at_s)
+        return self._desk.clock.utc(), self._shoot(trial)
+
+    def _shoot(self, trial: Trial, at_s: float | None = None) -> ShotReport:
+        shot = Shot(method=trial.method, direction=trial.direction, drive=self._desk.drives[trial.method])
+        return self._desk.gun.fire(shot, at_s)
+
+    def _failed(self, error: DeviceError, *, felt: bool) -> Failed | Interrupted:
+        """What became of a stimulus at which the gun failed; a pause that disarmed it is no fault of the gun's."""
+        if self._live.taken() is not None:
+            return Interrupted(presented=felt, cause="pause")
+        lost = events.GunFault if isinstance(error, LimitError) else events.LinkLost
+        self._live.offer(lost(cause=str(error)))
         return Failed(cause=str(error))
-    finally:
-        disarm(desk.gun)
-    return Fired(gun=desk.gun_name, onset_utc=onset_utc, **_times(report))
+
+    def _rearm(self, trial: Trial) -> None:
+        """After an emergency stop: a key held, and a test shot that the gun fires, before anything else."""
+        while True:
+            self._live.enter(State.REARMING)
+            match self._live.wait():
+                case events.Rearm(held_s=held_s):
+                    if self._test_shot(trial, held_s):
+                        return
+                case other:
+                    raise Unforeseen(other)
+
+    def _test_shot(self, trial: Trial, held_s: float | None) -> bool:
+        """Fire a shot that nobody judges; whether it was fired."""
+        try:
+            _, report = self._first(trial)
+        except (Held, DeviceError) as error:
+            cause = str(error) or "paused"
+            self._live.remark(TestShot(method=trial.method, held_s=held_s, cause=cause))
+            return False
+        finally:
+            disarm(self._desk.gun)
+        fired = TestShot(method=trial.method, held_s=held_s, pulse_start_s=report.pulse_start_s, motion=report.motion)
+        self._live.remark(fired)
+        return True
+
+
+class _Train:
+    """A stimulus of several shots: each in the journal before the next is asked for."""
+
+    def __init__(self, step: Present, desk: Desk) -> None:
+        self._step, self._desk = step, desk
+        self._onset_utc, self._onset_s = "", math.nan
+        self.shots = 0
+
+    def began(self, onset_utc: str, first: ShotReport) -> None:
+        """Take the first shot; `next` counts after the least exposure."""
+        self._onset_utc, self._onset_s = onset_utc, first.pulse_start_s
+        self._desk.live.felt(first.pulse_start_s, least_s=self._step.least_exposure_s)
+        self.fired(first)
+
+    def fired(self, report: ShotReport) -> None:
+        """Have a shot on the disk."""
+        self.shots += 1
+        self._desk.journal.append("shot", body=record(TrainShot(shot=self.shots, **_times(report))))
+
+    def due_s(self) -> float:
+        """The next shot's tick, whole microseconds after the first; later if the magnet is not home by then."""
+        tick_s = self._onset_s + self.shots * round(self._step.repeat_every_s * 1e6) / 1e6
+        return max(tick_s, self._desk.gun.status().ready_at_s)
+
+    def presented(self, ended_by: Literal["next", "limit"]) -> Presented:
+        """The stimulus as it was felt to its end."""
+        return Presented(
+            gun=self._desk.gun_name,
+            onset_utc=self._onset_utc,
+            shots=self.shots,
+            exposure_s=self._exposure_s(),
+            ended_by=ended_by,
+        )
+
+    def interrupted(self) -> Interrupted:
+        """The stimulus as it was felt until a pause ended it."""
+        if not self.shots:
+            return Interrupted(presented=False, cause="pause")
+        return Interrupted(presented=True, cause="pause", shots=self.shots, exposure_s=self._exposure_s())
+
+    def _exposure_s(self) -> float:
+        return self._desk.clock.now() - self._onset_s
 
 
 def _times(report: ShotReport) -> dict[str, Any]:
@@ -198,53 +404,5 @@ def _times(report: ShotReport) -> dict[str, Any]:
     return {field.name: getattr(report, field.name) for field in fields(report) if field.name != "shot"}
 
 
-def _first(trial: Trial, desk: Desk) -> tuple[str, ShotReport]:
-    """The first shot of a stimulus, as soon as the magnet is home, and its date and time."""
-    desk.gun.arm()
-    desk.clock.sleep(desk.gun.status().ready_at_s - desk.clock.now())
-    return desk.clock.utc(), _shoot(trial, desk)
-
-
-def _shoot(trial: Trial, desk: Desk, at_s: float | None = None) -> ShotReport:
-    shot = Shot(method=trial.method, direction=trial.direction, drive=desk.drives[trial.method])
-    return desk.gun.fire(shot, at_s)
-
-
-def _present(step: Present, desk: Desk) -> Presented | Failed:
-    """Shots at whole multiples of the interval since the first, until next is said."""
-    try:
-        onset_utc, first = _first(step.trial, desk)
-        shots = _journal(1, first, desk)
-        while not desk.screen.said_next(step, first.pulse_start_s, (at_s := _due_s(step, first, shots, desk)) - LEAD_S):
-            if shots == step.max_shots:
-                return _presented(desk, onset_utc, first, shots, "limit")
-            shots = _journal(shots + 1, _shoot(step.trial, desk, at_s), desk)
-    except DeviceError as error:
-        return Failed(cause=str(error))
-    finally:
-        disarm(desk.gun)
-    return _presented(desk, onset_utc, first, shots, "next")
-
-
-def _due_s(step: Present, first: ShotReport, shots: int, desk: Desk) -> float:
-    """The next shot's tick, whole microseconds after the first; later if the magnet is not home by then."""
-    tick_s = first.pulse_start_s + shots * round(step.repeat_every_s * 1e6) / 1e6
-    return max(tick_s, desk.gun.status().ready_at_s)
-
-
-def _journal(shot: int, report: ShotReport, desk: Desk) -> int:
-    """Have a train's shot on the disk before the next is asked for; its number."""
-    desk.journal.append("shot", body=record(TrainShot(shot=shot, **_times(report))))
-    return shot
-
-
-def _presented(
-    desk: Desk, onset_utc: str, first: ShotReport, shots: int, ended_by: Literal["next", "limit"]
-) -> Presented:
-    return Presented(
-        gun=desk.gun_name,
-        onset_utc=onset_utc,
-        shots=shots,
-        exposure_s=desk.clock.now() - first.pulse_start_s,
-        ended_by=ended_by,
-    )
+def _kept(rating: float, step: Rate) -> float:
+    return on_scale(rating, step.minimum, step.maximum, step.grain)

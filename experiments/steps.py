@@ -61,12 +61,13 @@ class Rest:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Present:
-    """Fire a shot every so often until the participant says next."""
+    """Fire a shot every so often until the participant says next, which counts after the least exposure."""
 
     trial: Trial
     attempt: int
     repeat_every_s: float
     max_shots: int
+    least_exposure_s: float
     kind: Literal["present"] = "present"
 
 
@@ -91,6 +92,13 @@ class Describe:
     trial: Trial
     question: str
     kind: Literal["describe"] = "describe"
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Close:
+    """Everything is answered: correct, note and flag what is left, then end the run."""
+
+    kind: Literal["close"] = "close"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -198,6 +206,13 @@ class Described:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
+class Closed:
+    """There was nothing left to correct."""
+
+    kind: Literal["closed"] = "closed"
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
 class Failed:
     """The gun did not do it, or may not have: the trial is presented again."""
 
@@ -207,12 +222,16 @@ class Failed:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Interrupted:
-    """The run broke off before this step was done: the trial is presented again.
+    """The run broke off, or was paused, before this step was done: the trial is presented again.
 
-    `presented` tells whether its stimulus was, or may have been, felt.
+    `presented` tells whether its stimulus was, or may have been, felt. Of a train that a pause ended it is known how
+    long and with how many shots.
     """
 
     presented: bool
+    cause: Literal["break-off", "pause"] = "break-off"
+    shots: int | None = None
+    exposure_s: float | None = None
     kind: Literal["interrupted"] = "interrupted"
 
 
@@ -225,8 +244,10 @@ class Repeat:
     kind: Literal["repeat"] = "repeat"
 
 
-Step = Prepare | Fire | Ask | Rest | Present | Rate | Describe
-Outcome = Prepared | Fired | Answered | Rested | Presented | Rated | Described | Failed | Interrupted | Repeat
+Step = Prepare | Fire | Ask | Rest | Present | Rate | Describe | Close
+Outcome = Prepared | Fired | Answered | Rested | Presented | Rated | Described | Closed | Failed | Interrupted | Repeat
+TrialStep = Prepare | Fire | Ask | Present | Rate | Describe
+"""A step that is about one trial."""
 Session = Generator[Step, Outcome, None]
 """Yields what should happen and is sent what did happen. It opens nothing, waits for nothing and knows no clock."""
 
@@ -234,15 +255,12 @@ History = list[tuple[Step, Outcome]]
 """What was done, in order."""
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Standing:
-    """Where a run stands: its next step, `None` at the end, and what was done before."""
-
-    step: Step | None
-    history: History
+def trial_of(step: Step | None) -> Trial | None:
+    """The trial that a step is about, if it is about one."""
+    return step.trial if isinstance(step, TrialStep) else None
 
 
-_WHERE_KNOWN = ("damper", "timing", "timings", "key_time_s")
+_WHERE_KNOWN = ("damper", "timing", "timings", "key_time_s", "shots", "exposure_s")
 _STEP: TypeAdapter[Step] = TypeAdapter(Annotated[Step, Field(discriminator="kind")])
 _OUTCOME: TypeAdapter[Outcome] = TypeAdapter(Annotated[Outcome, Field(discriminator="kind")])
 

@@ -37,6 +37,32 @@ def reopen(path: Path) -> int:
 _APPEND = os.O_RDWR | os.O_APPEND | getattr(os, "O_BINARY", 0) | getattr(os, "O_CLOEXEC", 0)
 
 
+def is_at(descriptor: int, path: Path) -> bool:
+    """Whether an open file is still the one that a path names: it was neither deleted nor moved."""
+    try:
+        there = path.stat()
+    except OSError:
+        return False
+    here = os.fstat(descriptor)
+    return (here.st_dev, here.st_ino) == (there.st_dev, there.st_ino)
+
+
+def moved_to(descriptor: int) -> Path | None:
+    """Where an open file lies now, where the system tells (Linux); `None` if it was deleted."""
+    try:
+        path = Path(f"/proc/self/fd/{descriptor}").readlink()
+    except OSError:
+        return None
+    return path if is_at(descriptor, path) else None
+
+
+def read_open(descriptor: int, length: int) -> bytes:
+    """The first bytes of an open file, also of one that was deleted."""
+    os.lseek(descriptor, 0, os.SEEK_SET)
+    with os.fdopen(os.dup(descriptor), "rb") as file:
+        return file.read(length)
+
+
 def write_all(descriptor: int, data: bytes) -> None:
     """Write every byte, however many calls it takes."""
     view = memoryview(data)

@@ -10,8 +10,8 @@ from typing import TypeVar
 
 from experiments import columns
 from experiments.plan import Trial
-from experiments.remarks import AnswerCorrected, Flagged, Noted, RatingCorrected, Remark
-from experiments.steps import Failed, Fire, Fired, Interrupted, Outcome, Present, Presented, Repeat, Rest, Step
+from experiments.remarks import AnswerCorrected, DescriptionCorrected, Flagged, Noted, RatingCorrected, Remark
+from experiments.steps import Failed, Fire, Fired, Interrupted, Outcome, Present, Presented, Repeat, Step, trial_of
 
 Row = dict[str, object]
 Word = TypeVar("Word")
@@ -55,31 +55,31 @@ def stories(trials: Sequence[Trial], told: Told) -> dict[Trial, Story]:
 
 def _trial(step: Step | None, word: Outcome | Remark) -> Trial | None:
     """The trial that an event is about, if it is about one."""
-    if step is not None:
-        return None if isinstance(step, Rest) else step.trial
-    return getattr(word, "trial", None)
+    return getattr(word, "trial", None) if step is None else trial_of(step)
 
 
 def presentation(story: Story, shown: type[Fired | Presented]) -> Row:
     """How a trial was presented: attempts, flags, note, onset of the last stimulus, gun. Empty if it never was."""
-    attempts = sum(isinstance(step, Fire | Present) and not _unfelt(word) for step, word in story.events)
+    attempts = sum(is_attempt(step, word) for step, word in story.events)
     notes = "; ".join(remark.text for remark in story.all(Noted))
     row: Row = {"attempts": attempts or None, "flags": " ".join(_flags(story)), "note": notes}
     stimulus = story.last(shown)
     return row | ({"onset_utc": stimulus.onset_utc, "gun": stimulus.gun} if stimulus else {})
 
 
-def _unfelt(word: Outcome | Remark) -> bool:
-    return isinstance(word, Interrupted) and not word.presented
+def is_attempt(step: Step | None, word: Outcome | Remark) -> bool:
+    """Whether a stimulus was felt, or may have been: what `attempts` counts."""
+    return isinstance(step, Fire | Present) and not (isinstance(word, Interrupted) and not word.presented)
 
 
 def _flags(story: Story) -> list[str]:
     """What went wrong with the stimulus on the way, what was changed afterwards, and the experimenter's own marks."""
     found = {
         "device-error": bool(story.all(Failed)),
-        "interrupted": any(outcome.presented for outcome in story.all(Interrupted)),
+        "interrupted": any(one.presented and one.cause == "break-off" for one in story.all(Interrupted)),
+        "paused": any(one.presented and one.cause == "pause" for one in story.all(Interrupted)),
         "repeated": story.repeated,
-        "corrected": bool(story.all(AnswerCorrected) or story.all(RatingCorrected)),
+        "corrected": bool(story.all(AnswerCorrected) or story.all(RatingCorrected) or story.all(DescriptionCorrected)),
     }
     own = [remark.flag for remark in story.all(Flagged)]
     return list(dict.fromkeys([flag for flag, there in found.items() if there] + own))

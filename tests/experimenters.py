@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 
 from device.words import Direction
 from experiments.plan import Trial
-from experiments.runner import RunStopped
+from experiments.live_run import RunStopped
 from experiments.screens.console.messages import Ended, ParticipantAnswered, Waiting
 from experiments.screens.console.state import State
 from experiments.setup import Setup

@@ -21,7 +21,7 @@ from experiments.load import load_setup
 from experiments.places import Place, place
 from experiments.replay import told
 from experiments.run import Request
-from experiments.runner import RunStopped
+from experiments.live_run import RunStopped
 from experiments.screens.synthetic import synthetic_screen
 from experiments.steps import Answered, Failed, Fired
 

@@ -29,7 +29,7 @@ from experiments.places import place
 from experiments.plan import Plan
 from experiments.replay import told
 from experiments.run import Request
-from experiments.runner import RunStopped
+from experiments.live_run import RunStopped
 from experiments.screens.console import theme
 from experiments.steps import Answered, Ask, Failed, Fire, Fired, Prepared, Rate, Rated, Step
 from tests.at_controls import short_direction

@@ -186,6 +186,11 @@ class DirectionConfig(ExperimentConfig):
         return between_sets_s + (sessions - 1) * self.breaks.between_sessions_s
 
     @property
+    def trial_s(self) -> float:
+        """Planned time of a trial, from its hand-over to its answer."""
+        return self.timing.trial_s
+
+    @property
     def duration_s(self) -> float:
         """Planned duration: trials and breaks."""
         return self.design.trials * self.timing.trial_s + self.break_s

@@ -7,6 +7,9 @@ from experiments.remarks import AnswerCorrected
 from experiments.steps import Answered, Fired
 from experiments.tables import Row, Story, Told, presentation, stories
 
+ANTICIPATION_S = 0.1
+"""A key that comes sooner was not pressed for what was felt: simple reactions to touch take longer (assumed)."""
+
 
 def rows(plan: Plan, told: Told) -> list[Row]:
     """One row a planned trial, in order; what was not reached is empty."""
@@ -20,7 +23,7 @@ def rows(plan: Plan, told: Told) -> list[Row]:
             "trial": trial.trial,
             "direction": trial.direction,
             **_answer(trial, story),
-            **presentation(story, Fired),
+            **_marked(presentation(story, Fired), story),
             "instruction": trial.instruction,
         }
         for trial, story in stories(plan.trials, told).items()
@@ -41,3 +44,11 @@ def _answer(trial: Trial, story: Story) -> Row:
         "response_source": given.response_source if as_given else "experimenter",
         "response_time_valid": int(given.response_time_valid and as_given),
     }
+
+
+def _marked(row: Row, story: Story) -> Row:
+    """A presentation whose answer came sooner than anybody reacts is marked: it was kept, and it was guessed."""
+    given = story.last(Answered)
+    if given is None or given.response_source != "participant" or given.response_time_s >= ANTICIPATION_S:
+        return row
+    return row | {"flags": " ".join(filter(None, (str(row["flags"]), "anticipation")))}

@@ -7,25 +7,26 @@ from itertools import pairwise
 
 from experiments.direction.config import Breaks, DirectionConfig
 from experiments.plan import Plan, Trial
-from experiments.presenting import Presenter, until_done
+from experiments.presenting import Presenter
 from experiments.setup import Setup
 from experiments.steps import Ask, Fire, Prepare, Rest, Session, Step
 
 
 def session(plan: Plan, setup: Setup[DirectionConfig]) -> Session:
-    """The steps of a run, from the first hand-over to the last answer."""
+    """The steps of a run, from the first hand-over to its end."""
     presenter = Presenter(partial(_steps, setup))
     yield from presenter.present(plan.trials[0])
     for before, trial in pairwise(plan.trials):
-        yield from _rest(before, trial, setup.config.breaks)
+        yield from _rest(presenter, before, trial, setup.config.breaks)
         yield from presenter.present(trial)
+    yield from presenter.close()
 
 
-def _rest(before: Trial, trial: Trial, breaks: Breaks) -> Session:
+def _rest(presenter: Presenter, before: Trial, trial: Trial, breaks: Breaks) -> Session:
     if trial.session != before.session and breaks.between_sessions_s:
-        yield from until_done(Rest(between="sessions", duration_s=breaks.between_sessions_s))
+        yield from presenter.until_done(Rest(between="sessions", duration_s=breaks.between_sessions_s))
     elif trial.session == before.session and trial.set != before.set and breaks.between_sets_s:
-        yield from until_done(Rest(between="sets", duration_s=breaks.between_sets_s))
+        yield from presenter.until_done(Rest(between="sets", duration_s=breaks.between_sets_s))
 
 
 def _steps(setup: Setup[DirectionConfig], trial: Trial, attempt: int) -> tuple[Step, ...]:

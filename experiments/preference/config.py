@@ -46,9 +46,10 @@ class Design(Model):
 
 
 class Stimulus(Model):
-    """A shot every so often until the participant says next."""
+    """A shot every so often until the participant says next, which is not taken before the least exposure."""
 
     repeat_every_s: Annotated[float, Field(gt=0, le=3_600)]
+    least_exposure_s: Annotated[float, Field(ge=0, le=3_600)] = 1.0
 
 
 class RatingScale(Model):
@@ -151,16 +152,19 @@ class PreferenceConfig(ExperimentConfig):
     synthetic: Synthetic
 
     @property
-    def break_s(self) -> float:
-        """This experiment has no breaks."""
-        return 0.0
+    def trial_s(self) -> float:
+        """Planned time of a trial, from its hand-over to next."""
+        return self.timing.hand_over_s + self.timing.exposure_s
+
+    @property
+    def rating_s(self) -> float:
+        """Planned time of a trial's rating and description, after all were felt."""
+        return self.timing.rating_s + self.timing.description_s
 
     @property
     def duration_s(self) -> float:
         """Planned duration: instruction, trials, ratings and descriptions."""
-        timing = self.timing
-        trial_s = timing.hand_over_s + timing.exposure_s + timing.rating_s + timing.description_s
-        return timing.instruction_s + self.design.trials * trial_s
+        return self.timing.instruction_s + self.design.trials * (self.trial_s + self.rating_s)
 
     @model_validator(mode="after")
     def _fits_together(self) -> Self:

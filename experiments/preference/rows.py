@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 from experiments.plan import Plan
-from experiments.remarks import RatingCorrected
-from experiments.steps import Described, Presented, Rated
+from experiments.remarks import DescriptionCorrected, RatingCorrected
+from experiments.steps import Described, Interrupted, Presented, Rated
 from experiments.tables import Row, Story, Told, presentation, stories
 
 
@@ -25,15 +25,20 @@ def rows(plan: Plan, told: Told) -> list[Row]:
 
 
 def _exposure(story: Story) -> Row:
+    """The last exposure, and how long earlier ones of the same trial were felt before it."""
+    felt = [word.exposure_s for word in story.words if isinstance(word, Presented | Interrupted) and word.exposure_s]
     shown = story.last(Presented)
-    return {"shots": shown.shots, "exposure_s": shown.exposure_s} if shown else {}
+    if shown is None:
+        return {"earlier_exposure_s": sum(felt)} if felt else {}
+    row: Row = {"shots": shown.shots, "exposure_s": shown.exposure_s}
+    return row | ({"earlier_exposure_s": sum(felt[:-1])} if felt[:-1] else {})
 
 
 def _rating(story: Story) -> Row:
     """The rating that counts, the participant's words, and whose hand entered them."""
     entered = [word for word in story.words if isinstance(word, Rated | RatingCorrected)]
-    described = story.last(Described)
-    row: Row = {"comment": described.comment} if described else {}
+    described = [word for word in story.words if isinstance(word, Described | DescriptionCorrected)]
+    row: Row = {"comment": described[-1].comment} if described else {}
     if not entered:
         return row
     counts = entered[-1]

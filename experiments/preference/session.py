@@ -6,19 +6,20 @@ from functools import partial
 
 from experiments.plan import Plan, Trial
 from experiments.preference.config import PreferenceConfig
-from experiments.presenting import Presenter, until_done
+from experiments.presenting import Presenter
 from experiments.setup import Setup
 from experiments.steps import Describe, Prepare, Present, Rate, Session, Step
 
 
 def session(plan: Plan, setup: Setup[PreferenceConfig]) -> Session:
-    """The steps of a run, from the first hand-over to the last description."""
+    """The steps of a run, from the first hand-over to its end."""
     presenter = Presenter(partial(_steps, setup))
     for trial in plan.trials:
         yield from presenter.present(trial)
     for trial in plan.trials:
-        yield from until_done(_rate(trial, setup.config))
-        yield from until_done(Describe(trial=trial, question=setup.config.description.text))
+        yield from presenter.until_done(_rate(trial, setup.config))
+        yield from presenter.until_done(Describe(trial=trial, question=setup.config.description.text))
+    yield from presenter.close()
 
 
 def _steps(setup: Setup[PreferenceConfig], trial: Trial, attempt: int) -> tuple[Step, ...]:
@@ -29,6 +30,7 @@ def _steps(setup: Setup[PreferenceConfig], trial: Trial, attempt: int) -> tuple[
             attempt=attempt,
             repeat_every_s=setup.config.stimulus.repeat_every_s,
             max_shots=setup.config.fatigue.max_shots_per_trial,
+            least_exposure_s=setup.config.stimulus.least_exposure_s,
         ),
     )
 

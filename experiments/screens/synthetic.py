@@ -5,29 +5,18 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Any
 
-from experiments import catalogue
+from device import GunStatus
+from experiments import catalogue, events
 from experiments.clock import Clock
 from experiments.config import ExperimentConfig
+from experiments.events import Event
+from experiments.live_run import EMERGENCY, REARM_HELD_S, LiveRun
 from experiments.load import ConfigError
 from experiments.plan import Plan
-from experiments.runner import Desk
+from experiments.remarks import Remark
 from experiments.setup import Setup
-from experiments.steps import (
-    Answered,
-    Ask,
-    Describe,
-    Described,
-    Outcome,
-    Prepare,
-    Prepared,
-    Present,
-    Rate,
-    Rated,
-    Rest,
-    Rested,
-    Standing,
-    Step,
-)
+from experiments.states import Position, State
+from experiments.steps import Ask, Outcome, Present, Rate, Rest, Step
 
 
 def observer_of(setup: Setup[Any], plan: Plan) -> Any:
@@ -50,12 +39,10 @@ def synthetic_screen(setup: Setup[Any], plan: Plan, clock: Clock) -> SyntheticSc
 
 
 class SyntheticScreen:
-    """Carries steps out as a person would, in as much time as the config plans for them.
+    """Works a run as a person would, in as much time as the config plans for it, in the run's own thread.
 
     `tell` is called with each step after its outcome is on the disk: for a progress bar.
     """
-
-    shown_s: float | None = None
 
     def __init__(
         self, config: ExperimentConfig, observer: Any, clock: Clock, tell: Callable[[Step], None] = lambda _: None
@@ -64,53 +51,79 @@ class SyntheticScreen:
         self._observer = observer
         self._clock = clock
         self._tell = tell
-        self._next_at_s: float | None = None
+        self._live: LiveRun | None = None
+        self._begun: tuple[int, float] = (0, 0.0)
 
-    def begin(self, desk: Desk, standing: Standing) -> None:
-        """Nothing to take over: every step says all."""
+    def begin(self, live: LiveRun) -> None:
+        """Take the place."""
+        self._live = live
 
-    def prepare(self, step: Prepare) -> Prepared:
-        """Take the planned time of a hand-over."""
-        del step
-        self._next_at_s = None
-        self._clock.sleep(self._timing.hand_over_s)
-        return Prepared()
+    def show(self, position: Position) -> None:
+        """Nothing to see."""
 
-    def ask(self, step: Ask, onset_s: float) -> Answered:
+    def act(self, position: Position, until_s: float | None) -> None:
+        """Do what the position asks for, in its time."""
+        event = self._event(position, until_s)
+        if event is not None and self._live is not None:
+            self._live.offer(event)
+
+    def _event(self, position: Position, until_s: float | None) -> Event | None:  # noqa: C901, PLR0911 - one case a state
+        step = position.step
+        match position.state:
+            case State.REARMING:
+                self._clock.sleep(REARM_HELD_S)
+                return events.Rearm(held_s=REARM_HELD_S)
+            case State.SETTING:
+                return events.DamperSet()
+            case State.PREPARING:
+                self._clock.sleep(self._timing.hand_over_s)
+                return events.Fire()
+            case State.TRAIN if isinstance(step, Present):
+                return self._next(position, step, until_s)
+            case State.ASKING if isinstance(step, Ask):
+                return self._answer(position, step)
+            case State.RATING if isinstance(step, Rate):
+                self._clock.sleep(self._timing.rating_s)
+                return events.Rating(rating=self._observer.rate(step.trial), by="synthetic")
+            case State.DESCRIBING:
+                self._clock.sleep(self._timing.description_s)
+                return events.Description(text="")
+            case State.RESTING if isinstance(step, Rest):
+                self._clock.sleep(step.duration_s)
+                return None
+            case State.CLOSING:
+                return events.Finish()
+            case State.HALTED:
+                return events.Stop(reason=EMERGENCY)
+            case _:
+                return None
+
+    def _answer(self, position: Position, step: Ask) -> Event:
         """Answer after the observer's own response time."""
         answer = self._observer.answer(step.trial)
+        onset_s = position.onset_s if position.onset_s is not None else self._clock.now()
         self._clock.sleep(onset_s + answer.response_time_s - self._clock.now())
-        return Answered(
-            response=answer.response,
-            response_time_s=answer.response_time_s,
-            response_source="synthetic",
-            response_time_valid=True,
-        )
+        return events.Answer(response=answer.response, by="synthetic", response_time_s=answer.response_time_s)
 
-    def rest(self, step: Rest) -> Rested:
-        """Rest as long as planned."""
-        self._clock.sleep(step.duration_s)
-        return Rested(rested_s=step.duration_s)
-
-    def said_next(self, step: Present, onset_s: float, until_s: float) -> bool:
+    def _next(self, position: Position, step: Present, until_s: float | None) -> Event | None:
         """Say next once the observer has felt enough since the first onset; drawn when the stimulus begins."""
-        if self._next_at_s is None:
-            self._next_at_s = onset_s + self._observer.exposure_s(step.trial)
-        self._clock.sleep(min(self._next_at_s, until_s) - self._clock.now())
-        return self._next_at_s <= until_s
+        if position.onset_s is None or until_s is None:
+            return None
+        if self._begun[0] != position.number:
+            felt_s = max(self._observer.exposure_s(step.trial), step.least_exposure_s)
+            self._begun = (position.number, position.onset_s + felt_s)
+        next_at_s = self._begun[1]
+        self._clock.sleep(min(next_at_s, until_s) - self._clock.now())
+        return events.Next() if next_at_s <= until_s else None
 
-    def rate(self, step: Rate) -> Rated:
-        """Rate as the observer does."""
-        self._clock.sleep(self._timing.rating_s)
-        return Rated(rating=self._observer.rate(step.trial), rating_by="synthetic")
-
-    def describe(self, step: Describe) -> Described:
-        """Say nothing: a synthetic participant has no words of its own."""
-        del step
-        self._clock.sleep(self._timing.description_s)
-        return Described(comment="")
-
-    def acknowledge(self, step: Step, outcome: Outcome) -> None:
+    def acknowledge(self, step: Step | None, word: Outcome | Remark) -> None:
         """Tell whoever counts."""
-        del outcome
-        self._tell(step)
+        del word
+        if step is not None:
+            self._tell(step)
+
+    def trouble(self, text: str) -> None:
+        """Nobody reads it."""
+
+    def gun_seen(self, status: GunStatus | None, fault: str) -> None:
+        """Nobody looks."""

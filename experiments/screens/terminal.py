@@ -1,188 +1,312 @@
 """The terminal screen: the experimenter reads what to do and types the answers. Nothing but a terminal is needed.
 
-Times come from the experimenter's hand and are logged as such. Neither correctness nor a score is ever shown.
+A line counts for what stood there when it was typed, so what is typed ahead is refused. Times come from the
+experimenter's hand and are logged as such. Neither correctness nor a score is ever shown.
 """
 
 from __future__ import annotations
 
 import io
-import queue
+import math
 import sys
 import threading
 from contextlib import suppress
 from typing import TYPE_CHECKING, TextIO
 
+from device import GunStatus
+from experiments import events
 from experiments.clock import Clock
-from experiments.preference.scale import on_scale
-from experiments.runner import Desk, RunStopped
-from experiments.steps import (
-    Answered,
-    Ask,
-    Describe,
-    Described,
-    Failed,
-    Outcome,
-    Prepare,
-    Prepared,
-    Present,
-    Rate,
-    Rated,
-    Rest,
-    Rested,
-    Standing,
-    Step,
+from experiments.entries import Entry, value
+from experiments.events import Event, Press
+from experiments.live_run import LiveRun
+from experiments.remarks import Remark, flag_word
+from experiments.screens.texts import (
+    FLAG_RULE,
+    again_text,
+    ordinal,
+    place_text,
+    read_out_text,
+    saved_text,
+    typed_number,
+    value_text,
 )
+from experiments.states import Position, State
+from experiments.steps import Ask, Describe, Outcome, Prepare, Rate, Rest, Step
 
 if TYPE_CHECKING:
     from device.words import Direction
-    from experiments.plan import Plan, Trial
+    from experiments.plan import Plan
 
 _DIRECTIONS: dict[str, Direction] = {"f": "forward", "forward": "forward", "b": "backward", "backward": "backward"}
-_HELP = "type `stop` and Enter at any time to stop; the run can be resumed"
+_HELP = """At any time: `!` is the emergency stop, `stop` and a reason stops. `pause`, `undo`, `repeat` and
+a reason; `flag` and a word, `note` and words. Where words are asked for, put a / in front: /stop, /note ..."""
+_COMMANDS = ("stop", "pause", "undo", "repeat", "flag", "note", "skip", "help")
+_TICK_S = 1.0
 
 
 class TerminalScreen:
-    """Asks on a terminal and waits for typed lines."""
-
-    shown_s: float | None = None
+    """Says on a terminal what to do, and offers what is typed."""
 
     def __init__(self, plan: Plan, clock: Clock, lines: TextIO | None = None, out: TextIO | None = None) -> None:
-        self._plan = plan
-        self._clock = clock
+        self._plan, self._clock = plan, clock
         self._out = out or sys.stdout
         if isinstance(sys.stdin, io.TextIOWrapper):
             sys.stdin.reconfigure(errors="replace")  # a byte that is no UTF-8 is not to end the run
-        self._lines: queue.Queue[str | None] = queue.Queue()
-        threading.Thread(target=self._read, args=(lines or sys.stdin,), daemon=True).start()
-        self._say(f"Participant {plan.participant_id}, experiment {plan.experiment}. {_HELP.capitalize()}.")
+        self._source = lines or sys.stdin
+        self._lock = threading.RLock()
+        self._live: LiveRun | None = None
+        self._shown = Position()
 
-    def begin(self, desk: Desk, standing: Standing) -> None:
-        """Nothing to take over: every step says all."""
+    def begin(self, live: LiveRun) -> None:
+        """Say who it is, and begin to read."""
+        self._live = live
+        self._say(f"Participant {self._plan.participant_id}, experiment {self._plan.experiment}.\n{_HELP}")
+        for target in (self._read, self._count_down):
+            threading.Thread(target=target, daemon=True, name="terminal").start()
 
-    def prepare(self, step: Prepare) -> Prepared:
-        """Say what to tell the participant, where to turn the gun and which damper to set; Enter fires."""
-        again = f" (attempt {step.attempt}: the trial is presented again)" if step.attempt > 1 else ""
-        damper = f"\n  Set the damper: {step.damper.upper()}." if step.damper else ""
-        self._say(f"\n{self._where(step.trial)}{again}{self._told(step)}{damper}")
-        self._line(f"  Turn the gun to {step.trial.direction.upper()} and hand it over. Enter fires: ")
-        return Prepared()
+    def act(self, position: Position, until_s: float | None) -> None:
+        """Lines are typed whenever they are."""
 
-    def ask(self, step: Ask, onset_s: float) -> Answered:
-        """Take f or b; anything else is asked again."""
-        prompt = f"  {step.question} f = {step.forward}, b = {step.backward}: "
-        while (response := _DIRECTIONS.get(self._line(prompt).lower())) is None:
-            self._say("  Not an answer: type f or b and Enter.")
-        return Answered(
-            response=response,
-            response_time_s=round(self._clock.now() - onset_s, 6),
-            response_source="experimenter",
-            response_time_valid=False,
-        )
+    def show(self, position: Position) -> None:
+        """Say what is to be done now; from then on a line counts for it."""
+        with self._lock:
+            if self._live is None or position.serial < self._shown.serial:
+                return
+            self._shown = position
+            self._show(self._text(position))
+        self._live.painted(position.serial, self._clock.now())
 
-    def rest(self, step: Rest) -> Rested:
-        """Count down; `skip REASON` cuts the break short, and the reason is recorded."""
-        start_s = self._clock.now()
-        self._say(f"\nBreak between {step.between}: {step.duration_s:g} s. (`skip REASON` ends it early.)")
-        reason = self._count_down(start_s + step.duration_s)
-        self._say("\aThe break is over.")
-        return Rested(rested_s=round(self._clock.now() - start_s, 6), cut_reason=reason)
+    def acknowledge(self, step: Step | None, word: Outcome | Remark) -> None:
+        """Say that something is safe; say what the gun failed at."""
+        text = saved_text(self._plan, step, word)
+        if text:
+            self._say(f"  {text}")
 
-    def _count_down(self, end_s: float) -> str:
-        while (left_s := end_s - self._clock.now()) > 0:
-            self._show(f"\r  {left_s:4.0f} s ")
-            line = self._poll(min(1.0, left_s))
-            if line is not None and line.startswith("skip "):
-                return line.removeprefix("skip ").strip()
-            if line:
-                self._say("  To end the break early type `skip` and the reason.")
-        return ""
+    def trouble(self, text: str) -> None:
+        """Say what went wrong."""
+        self._say(f"\n  {text}")
 
-    def said_next(self, step: Present, onset_s: float, until_s: float) -> bool:
-        """Enter means that the participant said next."""
-        del step, onset_s
+    def gun_seen(self, status: GunStatus | None, fault: str) -> None:
+        """Say what the gun itself says after it was told to disarm."""
+        if status is None:
+            self._say(f"\n  The gun says nothing ({fault}).")
+        else:
+            self._say(f"\n  The gun says that it is {status.state}.")
+
+    # what is asked for
+
+    def _text(self, position: Position) -> str:  # noqa: C901, PLR0911, PLR0912 - one case a state
+        step = position.step
+        match position.state:
+            case State.REARMING:
+                return (
+                    "\n  There was an emergency stop. Stand clear: a test shot comes first. "
+                    "Type `test shot` and Enter to fire it: "
+                )
+            case State.SETTING if isinstance(step, Prepare):
+                return f"{self._head(step)}\n  Set the damper: {step.damper.upper()}. Then type d and Enter: "
+            case State.PREPARING if isinstance(step, Prepare):
+                damper = f"\n  The damper is {step.damper.upper()}." if step.damper else ""
+                turn = f"Turn the gun to {step.trial.direction.upper()} and hand it over."
+                return f"{self._head(step)}{damper}\n  {turn} Enter fires: "
+            case State.TRAIN:
+                return "\n  Enter when the participant says next: "
+            case State.ASKING if isinstance(step, Ask):
+                return f"\n  {step.question} f = {step.forward}, b = {step.backward}: "
+            case State.RATING if isinstance(step, Rate):
+                ends = f"{step.minimum:g} = {step.minimum_text}, {step.maximum:g} = {step.maximum_text}"
+                return f"\n{ordinal(self._plan, step.trial)}. {step.question}\n  {ends}; `none` for no answer: "
+            case State.DESCRIBING if isinstance(step, Describe):
+                return f"\n  {ordinal(self._plan, step.trial)}. {step.question} "
+            case State.RESTING:
+                return f"\nBreak {_between(position)}. (`skip` and a reason ends it early.)\n"
+            case State.CLOSING:
+                return "\nEverything is answered. `undo` corrects, `note` and `flag` mark; Enter ends the run: "
+            case State.PAUSED:
+                why = f" {position.why}." if position.why else ""
+                return f"\n  Paused.{why} Type `go on` and Enter: "
+            case State.CORRECTING if position.correcting is not None:
+                return self._correction(position.correcting)
+            case State.HALTED:
+                return (
+                    "\n  EMERGENCY STOP. Nothing fires in this run any more.\n"
+                    "  Type why, and Enter; Enter alone closes the run, which can be resumed: "
+                )
+            case _:
+                return ""
+
+    def _head(self, step: Prepare) -> str:
+        told = self._live.told if self._live else ()
+        again = again_text(told, step)
+        return f"\n{place_text(self._plan, step.trial)}.{f' {again}' if again else ''}{read_out_text(self._plan, step)}"
+
+    def _correction(self, entry: Entry) -> str:
+        told = self._live.told if self._live else ()
+        was = value_text(value(told, entry))
+        how = {"answer": "f or b", "rating": "a number, or none", "description": "the words"}[entry.what]
         return (
-            self._poll(max(0.0, until_s - self._clock.now()), "\r  Enter when the participant says next: ") is not None
+            f"\n  Correct the {entry.what} of {place_text(self._plan, entry.trial)} (entered: {was}): {how}; "
+            "`undo` goes further back, Enter leaves it: "
         )
 
-    def rate(self, step: Rate) -> Rated:
-        """Take a number on the scale; `none` if the participant gives none. 0 is a rating."""
-        self._say(f"\n{self._ordinal(step.trial)}. {step.question}")
-        ends = f"{step.minimum:g} = {step.minimum_text}, {step.maximum:g} = {step.maximum_text}"
-        while True:
-            typed = self._line(f"  {ends}; `none` for no answer: ").lower().replace(",", ".")
-            if typed == "none":
-                return Rated(rating=None, rating_by="experimenter")
-            rating = _number(typed)
-            if rating is not None and step.minimum <= rating <= step.maximum:
-                kept = on_scale(rating, step.minimum, step.maximum, step.grain)
-                return Rated(rating=kept, rating_by="experimenter")
-            self._say(f"  Not a rating: type a number from {step.minimum:g} to {step.maximum:g}.")
+    # what is typed
 
-    def describe(self, step: Describe) -> Described:
-        """Take a line of the participant's own words."""
-        return Described(comment=self._line(f"  {self._ordinal(step.trial)}. {step.question} "))
+    def _read(self) -> None:
+        with suppress(OSError):  # a terminal that vanishes ends like one that is closed
+            for line in self._source:
+                self._typed(line.strip())
+        self._offer(events.Stop(reason="the terminal was closed"))
 
-    def acknowledge(self, step: Step, outcome: Outcome) -> None:
-        """Say that an answer is safe; say what the gun failed at."""
-        if isinstance(outcome, Failed):
-            self._say(f"  The gun failed: {outcome.cause}\n  The trial is marked and presented again.")
-        elif isinstance(step, Ask | Rate | Describe):
-            self._say("  Saved.")
-        elif isinstance(step, Present):
-            self._say("  Presented and saved.")
+    def _typed(self, line: str) -> None:
+        with self._lock:
+            position = self._shown
+        now_s = self._clock.now()
+        event = self._meant(line, position, now_s)
+        if isinstance(event, str):
+            self._say(f"  {event}")
+            self._show(self._text(position))
+        elif event is not None:
+            self._offer(event, Press(at_s=now_s, serial=position.serial))
 
-    def _where(self, trial: Trial) -> str:
-        in_session = [other for other in self._plan.trials if other.session == trial.session]
-        sets, sessions = in_session[-1].set, self._plan.trials[-1].session
-        place = f"Trial {trial.trial} of {len(in_session)}"
-        return f"{place}, set {trial.set} of {sets}, session {trial.session} of {sessions}."
+    def _offer(self, event: Event, press: Press | None = None) -> None:
+        if self._live is None:
+            return
+        verdict = self._live.offer(event, press)
+        if verdict.text:
+            self._say(f"  {verdict.text}")
+            self._show(self._text(self._live.position))
 
-    def _told(self, step: Prepare) -> str:
-        """The instruction: to be read out before a set, and as a reminder at its other trials."""
-        if not step.instruction:
-            return ""
-        how = "READ OUT" if self._plan.opens_set(step.trial) else "Instruction of this set"
-        return f"\n  {how}: {step.instruction}"
+    def _meant(self, line: str, position: Position, now_s: float) -> Event | str | None:
+        """The event that a line means there, or what to say about it."""
+        if line == "!":
+            return events.EmergencyStop()
+        word, _, rest = line.removeprefix("/").partition(" ")
+        free = position.state in (State.DESCRIBING, State.HALTED) or _corrects_words(position)
+        if word in _COMMANDS and (line.startswith("/") or not free):
+            return _command(word, rest.strip())
+        return _line(line, position, now_s)
 
-    def _ordinal(self, trial: Trial) -> str:
-        return f"Feedback {trial.trial} of {len(self._plan.trials)}, in order of presentation"
+    # showing
+
+    def _count_down(self) -> None:
+        """Say now and then how long a break still is."""
+        tick = threading.Event()
+        while self._shown.state is not State.STOPPED:
+            tick.wait(_TICK_S)
+            with self._lock:
+                position = self._shown
+                if position.state is State.RESTING and position.until_s is not None:
+                    self._show(f"\r  {max(0.0, position.until_s - self._clock.now()):4.0f} s ")
 
     def _say(self, text: str) -> None:
         self._show(f"{text}\n")
 
     def _show(self, text: str) -> None:
         try:
-            self._out.write(text)
-            self._out.flush()
-        except OSError as error:
-            raise RunStopped("the terminal was closed") from error
-
-    def _line(self, prompt: str) -> str:
-        line = self._poll(None, prompt)
-        return line or ""
-
-    def _poll(self, timeout_s: float | None, prompt: str = "") -> str | None:
-        """The next typed line, or `None` after the time. `RunStopped` on `stop` or a closed terminal."""
-        self._show(prompt)
-        try:
-            line = self._lines.get(timeout=timeout_s)
-        except queue.Empty:
-            return None
-        if line is None:
-            raise RunStopped("the terminal was closed")
-        if line == "stop" or line.startswith("stop "):
-            raise RunStopped(line.removeprefix("stop").strip() or "stopped by the experimenter")
-        return line
-
-    def _read(self, lines: TextIO) -> None:
-        with suppress(OSError):  # a terminal that vanishes ends like one that is closed
-            for line in lines:
-                self._lines.put(line.strip())
-        self._lines.put(None)
+            with self._lock:
+                self._out.write(text)
+                self._out.flush()
+        except (OSError, ValueError):
+            if self._live is not None:
+                self._live.offer(events.Stop(reason="the terminal was closed"))
 
 
-def _number(typed: str) -> float | None:
-    try:
-        return float(typed)
-    except ValueError:
-        return None
+def _corrects_words(position: Position) -> bool:
+    return position.correcting is not None and position.correcting.what == "description"
+
+
+def _between(position: Position) -> str:
+    step = position.step
+    return f"between {step.between}: {step.duration_s:g} s" if isinstance(step, Rest) else ""
+
+
+def _command(word: str, rest: str) -> Event | str:  # noqa: C901, PLR0911 - one case a command
+    match word:
+        case "stop":
+            return events.Stop(reason=rest or "stopped by the experimenter")
+        case "pause":
+            return events.Pause()
+        case "undo":
+            return events.Undo()
+        case "help":
+            return _HELP
+        case "flag":
+            flag = flag_word(rest)
+            return events.Flag(flag=flag) if flag else FLAG_RULE
+        case "skip" if not rest:
+            return "To end the break early type `skip` and the reason."
+        case "repeat" if not rest:
+            return "To present the trial again type `repeat` and the reason."
+        case "note" if not rest:
+            return "Type `note` and the words."
+        case "skip":
+            return events.EndBreak(reason=rest)
+        case "repeat":
+            return events.Repeat(reason=rest)
+        case _:
+            return events.Note(text=rest)
+
+
+def _line(line: str, position: Position, now_s: float) -> Event | str | None:  # noqa: C901, PLR0911, PLR0912 - one case a state
+    """What a line that is no command means: it is for what is asked there."""
+    match position.state:
+        case State.SETTING:
+            return events.DamperSet() if line.lower() == "d" else "Set the damper, then type d and Enter."
+        case State.REARMING:
+            return events.Rearm(held_s=None) if line.lower() == "test shot" else "Type `test shot` and Enter."
+        case State.ASKING:
+            response = _DIRECTIONS.get(line.lower())
+            at = "Not an answer: type f or b and Enter."
+            return at if response is None else events.Answer(response=response, at_s=now_s)
+        case State.RATING:
+            return _rating(line, position)
+        case State.DESCRIBING:
+            return events.Description(text=line)
+        case State.PAUSED:
+            return events.GoOn() if line.lower() == "go on" else "Paused: type `go on` and Enter."
+        case State.CORRECTING:
+            return _correction(line, position)
+        case State.HALTED:
+            return events.Reason(text=line) if line else events.Stop(reason="emergency stop")
+        case State.RESTING:
+            return "To end the break early type `skip` and the reason." if line else None
+        case State.TRAIN | State.CLOSING | State.PREPARING if line:
+            return "Only Enter, or one of the commands (`help`)."
+        case State.TRAIN:
+            return events.Next()
+        case State.CLOSING:
+            return events.Finish()
+        case _:
+            return events.Fire()
+
+
+def _rating(line: str, position: Position) -> Event | str:
+    step = position.step
+    if line.lower() == "none":
+        return events.Rating(rating=None)
+    if not isinstance(step, Rate):
+        return "No rating is asked for."
+    rating = typed_number(line, step.minimum, step.maximum)
+    if rating is None:
+        return f"Not a rating: type a number from {step.minimum:g} to {step.maximum:g}."
+    return events.Rating(rating=rating)
+
+
+def _correction(line: str, position: Position) -> Event | str:
+    """What a line means for the entry that is open."""
+    if not line or position.correcting is None:
+        return events.Leave()
+    what = position.correcting.what
+    if what == "description":
+        return events.Correct(value=line)
+    if what == "rating":
+        return _corrected_rating(line)
+    response = _DIRECTIONS.get(line.lower())
+    return "Not an answer: type f or b and Enter." if response is None else events.Correct(value=response)
+
+
+def _corrected_rating(line: str) -> Event | str:
+    if line.lower() == "none":
+        return events.Correct(value=None)
+    rating = typed_number(line, -math.inf, math.inf)
+    return "Not a rating: type a number." if rating is None else events.Correct(value=rating)

@@ -11,20 +11,23 @@ from contextlib import contextmanager
 from functools import lru_cache
 from typing import Any
 
-from PyQt6.QtCore import QEventLoop, QTimer
+from PyQt6.QtCore import QEventLoop, QObject, QTimer, pyqtSignal
 from PyQt6.QtWidgets import QApplication
 
+from experiments import events
 from experiments.clock import Clock
+from experiments.events import Hand
 from experiments.journal import JournalError
+from experiments.live_run import LiveRun, RunStopped, Screen
 from experiments.load import ConfigError
 from experiments.places import PlaceError
 from experiments.plan import Plan
 from experiments.run import Finished, Request, run
-from experiments.runner import RunStopped, Screen
+from experiments.screens.console import display
 from experiments.screens.console.beside import ParticipantSide
-from experiments.screens.console.messages import Ended
-from experiments.screens.console.screen import ConsoleScreen, Hand
-from experiments.screens.console.state import State
+from experiments.screens.console.messages import Began, Ended, Message
+from experiments.screens.console.screen import ConsoleScreen
+from experiments.screens.console.view import About
 from experiments.screens.console.window import Bridge, ConsoleWindow
 from experiments.screens.synthetic import observer_of
 from experiments.setup import Setup
@@ -32,6 +35,8 @@ from experiments.setup import Setup
 WAKE_MS = 100
 SWITCH_S = 0.0005
 """How soon a thread gets its turn: an answer is not to wait for its journal while the window is painted."""
+END_S = 1.5
+"""How long a run may take to end in order when the display is lost."""
 
 
 def application() -> QApplication:
@@ -46,26 +51,46 @@ def _only_application() -> QApplication:
     """Made once and kept: Qt's windows live only as long as it."""
     made = QApplication(["recoil"])
     made.setQuitOnLastWindowClosed(False)  # one window may follow the other
+    display.listen()
     return made
+
+
+class _Opening(QObject):
+    """Asks Qt's own thread for the window."""
+
+    wanted = pyqtSignal(object)
 
 
 class Console:
     """One run at the console. `Finished` or the reason it ended stands in `result` or `error` afterwards.
 
-    `observer` is the synthetic participant, where one works it, from when the window is there.
+    `observer` is the synthetic participant, where one works it, from when the window is there. `band` says that it is a
+    practice or a training, `last` what comes after it.
     """
 
-    def __init__(self, request: Request, clock: Clock, hand: Hand, beside: ParticipantSide | None) -> None:
+    def __init__(
+        self,
+        request: Request,
+        clock: Clock,
+        hand: Hand,
+        beside: ParticipantSide | None,
+        *,
+        band: str = "",
+        last: str = "Thank the participant.",
+    ) -> None:
         self._request, self._clock = request, clock
         self._hand, self._beside = hand, beside
-        self._bridge = Bridge()
+        self._band, self._last = band, last
+        self._bridge, self._opening = Bridge(), _Opening()
         self._opened = threading.Event()
+        self._screen: ConsoleScreen | None = None
         self.closed: Callable[[], None] = lambda: None
         self.window: ConsoleWindow | None = None
+        self.live: LiveRun | None = None
         self.observer: Any = None
         self.result: Finished | None = None
         self.error: BaseException | None = None
-        self._bridge.message.connect(self._first)
+        self._opening.wanted.connect(self._open)
         self._thread = threading.Thread(target=self._run, name="run")
 
     def start(self) -> None:
@@ -73,56 +98,81 @@ class Console:
         self._thread.start()
 
     def leave(self, reason: str) -> None:
-        """Stop the run and close the window."""
-        if self.window is not None:
-            self.window.controls.stop_for(reason)
+        """Stop the run, and close the window when it has ended."""
+        self._closes = True
+        if self.live is not None:
+            self.live.offer(events.Stop(reason=reason))
+        if self.window is not None and self.window.ended is not None:
             self.window.close()
+
+    _closes = False
+
+    def lose_display(self) -> None:
+        """End the run in order although nobody sees it; within `END_S`."""
+        if self.live is not None:
+            self.live.offer(events.DisplayLost())
+        self._thread.join(END_S)
 
     def finish(self) -> None:
         """Wait until the run has let go of gun and journal."""
         self._thread.join()
 
-    def _first(self, message: object) -> None:
-        """Open the window when the run asks for it. It is made here, in Qt's own thread."""
-        if isinstance(message, _Open):
-            self.window = ConsoleWindow(message.state, message.screen, self._bridge, self._clock)
-            self.window.resize(1280, 800)
-            self.window.closed.connect(self.closed)
-            self.window.show()
-            self.window.activateWindow()
-            self._opened.set()
+    def _open(self, about: About) -> None:
+        """Make the window, in Qt's own thread."""
+        restart = self._beside.restart if self._beside is not None else lambda: None
+        self.window = ConsoleWindow(
+            about, self._bridge, self._clock, hand=self._hand, restart=restart, observer=self.observer
+        )
+        self.window.closed.connect(self.closed)
+        self._bridge.message.connect(self._ends)
+        self.window.showMaximized()
+        self.window.activateWindow()
+        self._opened.set()
+
+    def _ends(self, message: Message) -> None:
+        """When the run has ended: nothing is looked at any more, and a window that was told to close does."""
+        if isinstance(message, Ended):
+            if self._screen is not None:
+                self._screen.end()
+            if self._closes and self.window is not None:
+                self.window.close()
 
     def _make_screen(self, setup: Setup[Any], plan: Plan, clock: Clock) -> Screen:
+        del clock
         self.observer = observer_of(setup, plan) if self._hand == "synthetic" else None
-        screen = ConsoleScreen(
-            clock,
-            self._bridge.message.emit,
+        about = About(
             setup=setup,
-            hand=self._hand,
-            beside=self._beside,
-            observer=self.observer,
+            plan=plan,
+            band=self._band,
+            last=self._last,
+            simulated=self._request.gun == "simulated",
+            participant_rates=self._beside is not None and self._beside.rates,
+            participant_keys=self._beside is not None and self._beside.own_keys,
         )
-        self._bridge.message.emit(_Open(State(setup=setup, plan=plan), screen))
+        self._opening.wanted.emit(about)
         self._opened.wait()
-        return screen
+        self._screen = ConsoleScreen(self._tell, self._beside)
+        return self._screen
+
+    def _tell(self, message: Message) -> None:
+        if isinstance(message, Began):
+            self.live = message.live
+        self._bridge.message.emit(message)
 
     def _run(self) -> None:
+        saved: int | None = None
         try:
             self.result = run(self._request, self._make_screen, self._clock)
+            saved = self.result.saved
         except (RunStopped, JournalError, PlaceError, ConfigError) as error:
             self.error = error
+            saved = error.saved if isinstance(error, RunStopped) else None
         except BaseException as error:
             self.error = error
             raise
         finally:
-            self._bridge.message.emit(Ended(reason=None if self.error is None else str(self.error)))
-
-
-class _Open:
-    """Asks for the window."""
-
-    def __init__(self, state: State, screen: ConsoleScreen) -> None:
-        self.state, self.screen = state, screen
+            reason = None if self.error is None else str(self.error) or type(self.error).__name__
+            self._bridge.message.emit(Ended(reason=reason, saved=saved))
 
 
 def run_console(
@@ -131,6 +181,8 @@ def run_console(
     *,
     hand: Hand = "experimenter",
     beside: ParticipantSide | None = None,
+    band: str = "",
+    last: str = "Thank the participant.",
     watch: Callable[[Console], None] = lambda _: None,
 ) -> Finished:
     """Carry out a run at the console. Raises what `run` raises; `watch` is given the console, to drive it.
@@ -138,17 +190,18 @@ def run_console(
     The window stays open at the end until it is closed. Without a window, an error is raised at once.
     """
     application()
-    sys.setswitchinterval(SWITCH_S)
-    console, loop = Console(request, clock, hand, beside), QEventLoop()
+    console, loop = Console(request, clock, hand, beside, band=band, last=last), QEventLoop()
     console.closed = loop.quit
     wake = QTimer()  # lets Python look at signals such as Ctrl-C while Qt waits
     wake.timeout.connect(lambda: _leave_without_window(loop, console))
     wake.start(WAKE_MS)
-    with _signals_to(console.leave):
+    keep = display.on_loss(console.lose_display)
+    with _signals_to(console.leave), _quick_threads():
         console.start()
         watch(console)
         loop.exec()
         console.finish()
+    keep()
     if console.error is not None:
         raise console.error
     if console.result is None:
@@ -159,6 +212,16 @@ def run_console(
 def _leave_without_window(loop: QEventLoop, console: Console) -> None:
     if console.error is not None and console.window is None:
         loop.quit()
+
+
+@contextmanager
+def _quick_threads() -> Iterator[None]:
+    before = sys.getswitchinterval()
+    sys.setswitchinterval(SWITCH_S)
+    try:
+        yield
+    finally:
+        sys.setswitchinterval(before)
 
 
 @contextmanager

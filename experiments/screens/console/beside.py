@@ -1,104 +1,202 @@
-"""The participant's own screen beside the console: its answers come as replies, its failures as troubles."""
+"""The participant's own screen beside the console: what it is to show follows the run; what is done there is offered.
+
+Nobody waits for it: every question is asked in a thread of its own, and the experimenter can answer instead.
+"""
 
 from __future__ import annotations
 
 import threading
 from collections.abc import Callable
+from typing import Any
 
-from experiments.screens.console.messages import Message, ParticipantAnswered, ParticipantRated, Reply, Trouble
+from device.words import Direction
+from experiments import events
+from experiments.events import OwnHand
+from experiments.live_run import LiveRun
+from experiments.screens.console.messages import Message, ParticipantSeen, Trouble
 from experiments.screens.participant.link import ParticipantLink
 from experiments.screens.participant.mailbox import ParticipantError
-from experiments.screens.participant.words import AskDirection, AskRating, NoiseIs
+from experiments.screens.participant.words import (
+    AskDirection,
+    AskRating,
+    EmergencyPressed,
+    Focused,
+    KeyPressed,
+    NoiseIs,
+)
+from experiments.setup import Setup
+from experiments.states import Position, State
 from experiments.steps import Ask, Rate
+
+KEYS: dict[str, Direction] = {"up": "forward", "down": "backward"}
+"""The participant's keys, by PsychoPy's names, and what they say."""
+WAIT, PAUSED, THANKS = "Please wait.", "Paused. Please wait.", "Thank you."
+
+Desire = tuple[Any, ...]
+"""What is to stand on the participant's screen: a text, or a question by the number of its step."""
 
 
 class ParticipantSide:
-    """Asks on the participant's screen without making anyone wait: the experimenter can always answer instead.
+    """The participant's screen. `open_link` starts its program, again if need be.
 
-    `rates` and `own_keys` say what is asked there; `noise` whether masking noise plays, and why not, if it was wanted.
+    `rates` and `own_keys` say what is asked there; `noise` whether masking noise is wanted; `hand` whose hand it is.
     """
 
-    def __init__(self, link: ParticipantLink, *, rates: bool, own_keys: bool, noise: NoiseIs | None = None) -> None:
-        self._link = link
-        self.rates, self.own_keys, self._noise = rates, own_keys, noise
-        self._called_off = threading.Event()
-        self._reply: Callable[[Reply], None] = lambda _: None
+    def __init__(
+        self,
+        link: ParticipantLink,
+        open_link: Callable[[], ParticipantLink],
+        setup: Setup[Any],
+        *,
+        rates: bool,
+        own_keys: bool,
+        noise: NoiseIs | None = None,
+        hand: OwnHand = "participant",
+    ) -> None:
+        self._link, self._open_link, self._setup = link, open_link, setup
+        self.rates, self.own_keys = rates, own_keys
+        self._noise, self._hand = noise, hand
+        self._lock = threading.RLock()
+        self._live: LiveRun | None = None
         self._tell: Callable[[Message], None] = lambda _: None
+        self._shows: Desire = (WAIT,)
+        self._closed = False
 
-    def sit(self, reply: Callable[[Reply], None], tell: Callable[[Message], None]) -> None:
-        """Take the place beside a console."""
-        self._reply, self._tell = reply, tell
-
-    def begin(self) -> str:
-        """Tell what did not start. Gives back what the record of the run is to say of the noise, if anything."""
+    def begin(self, live: LiveRun, tell: Callable[[Message], None]) -> str:
+        """Take the place beside a console. Gives back what the record is to say of the noise, if anything."""
+        self._live, self._tell = live, tell
+        self._link.listen(self._heard, self._gone)
+        self._tell(ParticipantSeen())
         if self._noise is None:
             return ""
-        if self._noise.on:
-            return "Masking noise plays."
-        self._tell(Trouble(text=self._noise.message))
-        return self._noise.message
+        if not self._noise.on:
+            tell(Trouble(text=self._noise.message))
+            return self._noise.message
+        return "Masking noise plays."
 
     @property
     def asking(self) -> bool:
         """Whether the participant is asked something at this moment."""
         return self._link.asking
 
-    def rate(self, step: Rate, of: int, describe: str) -> None:
-        """Have a stimulus rated and described, if the participant does so on their own screen."""
-        if not self.rates:
-            return
-        question = AskRating(
-            number=step.trial.trial,
-            of=of,
-            question=step.question,
-            minimum=step.minimum,
-            maximum=step.maximum,
-            minimum_text=step.minimum_text,
-            maximum_text=step.maximum_text,
-            grain=step.grain,
-            describe=describe,
+    def follow(self, position: Position) -> None:
+        """Have what belongs to a position on the participant's screen."""
+        with self._lock:
+            desire = self._desire(position)
+            if desire == self._shows or self._closed:
+                return
+            self._shows = desire
+            self._link.cancel()
+            target = self._asks(desire, position)
+        if target is None:
+            told = tuple(KEYS) if self.own_keys and desire == (PAUSED,) else ()
+            self._link.show(str(desire[0]), tell=told)
+        else:
+            threading.Thread(target=target, daemon=True, name="participant").start()
+
+    def _desire(self, position: Position) -> Desire:
+        if position.state is State.PAUSED or State.PAUSED in position.states:
+            return (PAUSED,)
+        if position.base is State.ASKING and self.own_keys:
+            return ("direction", position.number)
+        if position.base is State.RATING and self.rates:
+            return ("rating", position.number)
+        return (THANKS,) if position.base in (State.CLOSING, State.STOPPED) else (WAIT,)
+
+    def _asks(self, desire: Desire, position: Position) -> Callable[[], None] | None:
+        step = position.step
+        if desire[0] == "direction" and isinstance(step, Ask):
+            return lambda: self._carefully(desire, lambda: self._judged(step, position))
+        if desire[0] == "rating" and isinstance(step, Rate):
+            return lambda: self._carefully(desire, lambda: self._rated(step, position))
+        return None
+
+    def _carefully(self, desire: Desire, ask: Callable[[], None]) -> None:
+        """Ask; a question that was called off is over, one that fails otherwise leaves the answer to the console."""
+        try:
+            ask()
+        except ParticipantError as error:
+            if self._shows == desire and self._link.failure is None:
+                self._tell(Trouble(text=f"Enter the answer here: {error}."))
+
+    def _judged(self, step: Ask, position: Position) -> None:
+        onset_s = position.since_s if position.onset_s is None else position.onset_s
+        paused = self._live is not None and self._live.paused_since(onset_s)
+        given = self._link.ask_direction(
+            AskDirection(
+                question=step.question,
+                forward=step.forward,
+                backward=step.backward,
+                forward_key="up",
+                backward_key="down",
+                onset_s=position.since_s if paused else onset_s,  # a key in a pause is no answer
+            )
         )
-        self._beside(lambda: self._rated(question))
+        key = events.ParticipantKey(response=given.response, at_s=given.pressed_s, step=position.number, by=self._hand)
+        self._offer(key)
 
-    def judge(self, step: Ask, onset_s: float) -> None:
-        """Have a direction judged, if the participant has keys of their own."""
-        if not self.own_keys:
-            return
-        question = AskDirection(
-            question=step.question,
-            forward=step.forward,
-            backward=step.backward,
-            forward_key="up",
-            backward_key="down",
-            onset_s=onset_s,
+    def _rated(self, step: Rate, position: Position) -> None:
+        config = self._setup.config
+        given = self._link.ask_rating(
+            AskRating(
+                number=step.trial.trial,
+                of=config.design.trials,
+                question=step.question,
+                minimum=step.minimum,
+                maximum=step.maximum,
+                minimum_text=step.minimum_text,
+                maximum_text=step.maximum_text,
+                grain=step.grain,
+                describe=config.description.text,
+            )
         )
-        self._beside(lambda: self._judged(question))
+        rated = events.ParticipantRated(rating=given.rating, comment=given.comment, step=position.number, by=self._hand)
+        self._offer(rated)
 
-    def _rated(self, question: AskRating) -> None:
-        given = self._link.ask_rating(question)
-        self._reply(ParticipantRated(rating=given.rating, comment=given.comment))
+    def _offer(self, event: events.Event) -> None:
+        if self._live is not None:
+            self._live.offer(event)
 
-    def _judged(self, question: AskDirection) -> None:
-        given = self._link.ask_direction(question)
-        self._reply(ParticipantAnswered(response=given.response, at_s=given.pressed_s))
+    def _heard(self, word: EmergencyPressed | Focused | KeyPressed) -> None:
+        """What comes from there without a question: the emergency stop, whose the keys are, keys in a pause."""
+        match word:
+            case EmergencyPressed():
+                self._offer(events.EmergencyStop(by="participant"))
+            case Focused():
+                self._tell(ParticipantSeen(focused=word.on))
+            case KeyPressed() if self._live is not None and word.name in KEYS:
+                number, now_s = self._live.position.number, self._live.clock.now()
+                self._offer(events.ParticipantKey(response=KEYS[word.name], at_s=now_s, step=number))
 
-    def call_off(self) -> None:
-        """Ask no longer: somebody else answered, or the run stopped."""
-        self._called_off.set()
-        self._link.cancel()
+    def _gone(self, cause: str) -> None:
+        """The program has ended, and was not told to."""
+        if not self._closed:
+            self._tell(ParticipantSeen(failure=cause))
+            self._offer(events.ParticipantLost(cause=cause))
+
+    def restart(self) -> None:
+        """Start the program again, beside everything else; the run ends if that fails."""
+        threading.Thread(target=self._restart, daemon=True, name="participant again").start()
+
+    def _restart(self) -> None:
+        if self._link.failure is None:
+            self._tell(Trouble(text="The participant's screen is there."))
+            return
+        self._tell(Trouble(text="Starting the participant's screen …"))
+        try:
+            link = self._open_link()
+        except ParticipantError as error:
+            self._offer(events.Stop(reason=f"the participant's screen did not start again: {error}"))
+            return
+        with self._lock:
+            self._link, self._shows = link, ("",)
+        link.listen(self._heard, self._gone)
+        self._tell(ParticipantSeen())
+        self._offer(events.ParticipantBack())
+        if self._live is not None:
+            self.follow(self._live.position)
 
     def close(self) -> None:
         """Close the participant's screen."""
+        self._closed = True
         self._link.close()
-
-    def _beside(self, ask: Callable[[], None]) -> None:
-        self._called_off.clear()
-
-        def carry() -> None:
-            try:
-                ask()
-            except ParticipantError as error:
-                if not self._called_off.is_set():
-                    self._tell(Trouble(text=f"Enter the answer here: {error}."))
-
-        threading.Thread(target=carry, daemon=True, name="participant").start()

@@ -12,18 +12,19 @@ from PyQt6.QtGui import QGuiApplication
 
 from device import DeviceError
 from experiments.clock import RealClock
+from experiments.events import Hand
 from experiments.journal import JournalError
+from experiments.live_run import RunStopped
 from experiments.load import ConfigError, load_setup, load_study
 from experiments.places import PlaceError
 from experiments.run import Finished, Request, UnfinishedRun
-from experiments.runner import RunStopped
 from experiments.screens.console.app import Console, application, run_console
-from experiments.screens.console.beside import ParticipantSide
+from experiments.screens.console.beside import WAIT, ParticipantSide
 from experiments.screens.console.rater import Rater
-from experiments.screens.console.screen import Hand
 from experiments.screens.console.start import Choice, choose
 from experiments.screens.console.unfinished import ask
 from experiments.screens.console.visual import VisualParticipant
+from experiments.screens.console.waiting import while_shown
 from experiments.screens.participant.link import ParticipantLink
 from experiments.screens.participant.look import Look
 from experiments.screens.participant.mailbox import ParticipantError
@@ -70,7 +71,7 @@ def _carry_out(request: Request, sides: Sides) -> Finished:
 
     with ExitStack() as stack:
         rater = _rater(stack) if sides.visual and sides.screen else None
-        beside = _participant(stack, sides) if sides.beside else None
+        beside = _participant(stack, request, sides) if sides.beside else None
 
         def watch(console: Console) -> None:
             if sides.visual:
@@ -130,16 +131,29 @@ def _sides(choice: Choice) -> Sides:
     return Sides(screen=choice.participant_screen, own_keys=choice.participant_keys, noise=choice.noise)
 
 
-def _participant(stack: ExitStack, sides: Sides) -> ParticipantSide:
-    """The participant's screen, once it is open: PsychoPy takes its time."""
-    try:
-        link = stack.enter_context(ParticipantLink.start(_look()))
+def _participant(stack: ExitStack, request: Request, sides: Sides) -> ParticipantSide:
+    """The participant's screen, once it is open: PsychoPy takes its time, and a window says so meanwhile."""
+    look = _look()
+
+    def open_link() -> ParticipantLink:
+        link = stack.enter_context(ParticipantLink.start(look))
         link.wait_ready()
-        link.show("Please wait.")
+        link.show(WAIT)
+        return link
+
+    try:
+        link = while_shown("Starting the participant's screen …", open_link)
     except ParticipantError as error:
         raise PlaceError(f"--participant-screen: {error}; look at `recoil doctor`, or run without it") from error
-    noise = _noise(link) if sides.noise else None
-    return ParticipantSide(link, rates=sides.screen, own_keys=sides.own_keys, noise=noise)
+    return ParticipantSide(
+        link,
+        open_link,
+        request.setup,
+        rates=sides.screen,
+        own_keys=sides.own_keys,
+        noise=_noise(link) if sides.noise else None,
+        hand="synthetic" if sides.visual else "participant",
+    )
 
 
 def _look() -> Look:

@@ -1,13 +1,24 @@
-"""How far a run is, and how long it still takes: from the trials that were measured, not from the plan alone."""
+"""How far a run is, and when it will end: from the plan, and ever more from the trials that were measured."""
 
 from __future__ import annotations
 
-import statistics
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
+from datetime import datetime, timedelta
 
 from experiments.config import ExperimentConfig
+from experiments.entries import done, together
 from experiments.plan import Plan, Trial
+from experiments.remarks import Remark
+from experiments.states import Position, State
+from experiments.steps import Answered, Outcome, Presented, Rated, Rest, Rested, Step
+from experiments.tables import Told
+
+PRIOR_TRIALS = 5
+"""The plan counts as much as so many measured trials, so that the estimate does not jump with the first."""
+
+ROUGH_S = 1200.0
+"""With more than this still to go, the end is told to five minutes."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -19,36 +30,88 @@ class Progress:
     in_all: tuple[int, int]
 
 
-def progress(plan: Plan, done: set[Trial], current: Trial) -> Progress:
+def progress(plan: Plan, told: Told, current: Trial) -> Progress:
     """How far the run is, seen from the current trial."""
+    finished = done(told)
 
     def count(trials: Sequence[Trial]) -> tuple[int, int]:
-        return sum(trial in done for trial in trials), len(trials)
+        return sum(trial in finished for trial in trials), len(trials)
 
     session = [trial for trial in plan.trials if trial.session == current.session]
     return Progress(
-        in_set=count([trial for trial in session if trial.set == current.set]),
+        in_set=count([trial for trial in session if together(trial, current)]),
         in_session=count(session),
         in_all=count(plan.trials),
     )
 
 
-def remaining_s(config: ExperimentConfig, trials_left: int, measured_s: Sequence[float], break_left_s: float) -> float:
-    """Seconds still to go: the trials left at the median of those measured, and the breaks left.
+@dataclass(slots=True)
+class Pace:
+    """Measures how long trials take, without the time of pauses."""
 
-    Before anything was measured, a trial takes what the config plans.
+    began_s: float | None = None
+    measured_s: list[float] = field(default_factory=list)
+    _trial_s: float | None = None
+    _paused_s: float = 0.0
+    _pause_began_s: float | None = None
 
-    >>> from experiments.load import load_setup
-    >>> remaining_s(load_setup("direction").config, 10, [20.0, 18.0, 90.0], 20.0)
-    220.0
+    def at(self, position: Position, now_s: float) -> None:
+        """Take a new position."""
+        if self.began_s is None and position.step is not None:
+            self.began_s = now_s
+        if position.state in (State.SETTING, State.PREPARING) and self._trial_s is None:
+            self._trial_s, self._paused_s = now_s, 0.0
+        if position.paused_s is not None:
+            self._pause_began_s = position.paused_s
+        elif self._pause_began_s is not None:
+            self._paused_s += now_s - self._pause_began_s
+            self._pause_began_s = None
+
+    def saved(self, word: Outcome | Remark, now_s: float) -> None:
+        """Take what was saved: a trial is over with its answer, or with its stimulus where answers come at the end."""
+        if isinstance(word, Answered | Presented) and self._trial_s is not None:
+            self.measured_s.append(now_s - self._trial_s - self._paused_s)
+        if isinstance(word, Answered | Presented | Rested):
+            self._trial_s = None
+
+    def elapsed_s(self, now_s: float) -> float:
+        """How long the run has been under way; 0 before it begins."""
+        return 0.0 if self.began_s is None else now_s - self.began_s
+
+    def trial_s(self, planned_s: float) -> float:
+        """How long a trial takes: the mean of those measured and of `PRIOR_TRIALS` as planned."""
+        return (PRIOR_TRIALS * planned_s + sum(self.measured_s)) / (PRIOR_TRIALS + len(self.measured_s))
+
+
+def remaining_s(  # noqa: PLR0917 - each is looked at
+    config: ExperimentConfig, plan: Plan, told: Told, pace: Pace, position: Position, now_s: float
+) -> float:
+    """Seconds still to go: trials left, breaks left, what is left of this one, and the ratings still to come."""
+    left = len(plan.trials) - len(done(told))
+    rated = sum(isinstance(word, Rated) for _, word in told)
+    ratings_s = max(0, len(plan.trials) - rated) * config.rating_s
+    return left * pace.trial_s(config.trial_s) + _breaks_left_s(config, told, position, now_s) + ratings_s
+
+
+def _breaks_left_s(config: ExperimentConfig, told: Told, position: Position, now_s: float) -> float:
+    taken: list[Step | None] = [step for step, word in told if isinstance(step, Rest) and isinstance(word, Rested)]
+    left_s = config.break_s - sum(step.duration_s for step in taken if isinstance(step, Rest))
+    if position.base is State.RESTING and position.until_s is not None and isinstance(position.step, Rest):
+        since_s = now_s if position.paused_s is None else position.paused_s
+        left_s -= position.step.duration_s - max(0.0, position.until_s - since_s)
+    return max(0.0, left_s)
+
+
+def end_text(left_s: float, now: datetime) -> str:
+    """When a run ends, as a time of day: to five minutes if it is far.
+
+    >>> end_text(3000.0, datetime(2026, 11, 22, 13, 43, 20)), end_text(300.0, datetime(2026, 11, 22, 13, 43, 20))
+    ('about 14:35', 'about 13:48')
     """
-    trial_s = statistics.median(measured_s) if measured_s else planned_trial_s(config)
-    return trials_left * trial_s + break_left_s
-
-
-def planned_trial_s(config: ExperimentConfig) -> float:
-    """What the config plans for a trial, breaks apart."""
-    return float((config.duration_s - config.break_s) / config.design.trials)  # type: ignore[attr-defined]
+    end, grain_s = now + timedelta(seconds=left_s), 300 if left_s > ROUGH_S else 60
+    midnight = end.replace(hour=0, minute=0, second=0, microsecond=0)
+    grains = round((end - midnight).total_seconds() / grain_s)
+    return f"about {midnight + timedelta(seconds=grains * grain_s):%H:%M}"
 
 
 def clock_text(seconds: float) -> str:

@@ -4,13 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
-from PyQt6.QtCore import QEvent, Qt
-from PyQt6.QtGui import QKeyEvent, QKeySequence, QShortcut
+from PyQt6.QtCore import Qt
+from PyQt6.QtGui import QKeySequence, QShortcut
 from PyQt6.QtWidgets import (
     QFrame,
     QHBoxLayout,
     QLabel,
-    QLineEdit,
     QListWidget,
     QProgressBar,
     QPushButton,
@@ -19,6 +18,7 @@ from PyQt6.QtWidgets import (
 )
 
 Slot = Callable[[], object]
+NO_FOCUS = Qt.FocusPolicy.NoFocus
 
 
 def label(name: str, text: str = "", *, wrap: bool = True) -> QLabel:
@@ -34,10 +34,15 @@ def set_mood(widget: QWidget, mood: str) -> None:
     """Give a label the colour of a mood; drawn anew only if it changes."""
     if widget.property("mood") != mood:
         widget.setProperty("mood", mood)
-        style = widget.style()
-        if style is not None:
-            style.unpolish(widget)
-            style.polish(widget)
+        restyle(widget)
+
+
+def restyle(widget: QWidget) -> None:
+    """Have a widget drawn anew after a property that the style knows has changed."""
+    style = widget.style()
+    if style is not None:
+        style.unpolish(widget)
+        style.polish(widget)
 
 
 def button(parent: QWidget, text: str, key: str, slot: Slot, *, name: str = "") -> QPushButton:
@@ -50,11 +55,6 @@ def button(parent: QWidget, text: str, key: str, slot: Slot, *, name: str = "") 
 
     QShortcut(QKeySequence(key), parent).activated.connect(pressed)
     return made
-
-
-def main_button(text: str, slot: Slot) -> QPushButton:
-    """The large button of the main key; the window itself listens to the key."""
-    return _button(f"{text}  [Space]", text, slot, "large")
 
 
 def _button(shown: str, spoken: str, slot: Slot, name: str) -> QPushButton:
@@ -94,17 +94,6 @@ def column(*widgets: QWidget) -> QWidget:
     for widget in widgets:
         down.addWidget(widget)
     return made
-
-
-class NumberEdit(QLineEdit):
-    """A line for a number. Letters are no part of one, so that they stay the keys of the window."""
-
-    def event(self, event: QEvent | None) -> bool:
-        """Leave letters to the window."""
-        if isinstance(event, QKeyEvent) and event.text().isalpha() and not event.modifiers():
-            event.ignore()
-            return False
-        return super().event(event)
 
 
 def quiet_list() -> QListWidget:

@@ -6,6 +6,7 @@ from typing import Literal
 
 Theme = Literal["dark", "light"]
 MOODS = ("act", "ask", "rest", "wait", "good", "bad")
+BANDS = ("practice", "simulated")
 """What a line is about, which chooses its colour; the words say it as well."""
 
 _COLOURS: dict[Theme, dict[str, str]] = {
@@ -24,6 +25,10 @@ _COLOURS: dict[Theme, dict[str, str]] = {
         "bad": "#ffb3a7",
         "stop": "#b3261e",
         "stop_text": "#ffffff",
+        "practice": "#5b2a86",
+        "practice_text": "#ffffff",
+        "simulated": "#ffb000",
+        "simulated_text": "#000000",
     },
     "light": {
         "ground": "#ffffff",
@@ -40,6 +45,10 @@ _COLOURS: dict[Theme, dict[str, str]] = {
         "bad": "#8c1d18",
         "stop": "#b3261e",
         "stop_text": "#ffffff",
+        "practice": "#5b2a86",
+        "practice_text": "#ffffff",
+        "simulated": "#ffb000",
+        "simulated_text": "#000000",
     },
 }
 
@@ -63,40 +72,51 @@ def _luminance(hex_colour: str) -> float:
 
 def _with_mood(mood: str) -> str:
     """The labels of a mood. Those that have a colour by their name are named, or that colour would win."""
-    return ", ".join(f'QLabel{name}[mood="{mood}"]' for name in ("", "#saved", "#quiet"))
+    return ", ".join(f'QLabel{name}[mood="{mood}"]' for name in ("", "#saved", "#quiet", "#title", "#damper"))
 
 
-def sheet(theme: Theme) -> str:
-    """The Qt style sheet of a theme."""
+def sheet(theme: Theme, scale: float = 1.0) -> str:
+    """The Qt style sheet of a theme; type and padding grow and shrink with `scale`."""
     c = _COLOURS[theme]
     moods = "\n".join(f"{_with_mood(mood)} {{ color: {c[mood]}; }}" for mood in MOODS)
+    bands = "\n".join(
+        f'QLabel#band[mood="{band}"] {{ background: {c[band]}; color: {c[f"{band}_text"]}; }}' for band in BANDS
+    )
+
+    def px(size: float) -> str:
+        return f"{max(1, round(size * scale))}px"
+
     return f"""
-    QWidget {{ background: {c["ground"]}; color: {c["text"]}; font-size: 17px;
+    QWidget {{ background: {c["ground"]}; color: {c["text"]}; font-size: {px(17)};
         font-family: "DejaVu Sans", "Noto Sans"; }}
     QFrame#panel {{ background: {c["panel"]}; border: 1px solid {c["line"]}; border-radius: 8px; }}
     QFrame#panel QLabel, QFrame#panel QCheckBox, QWidget#form {{ background: transparent; }}
-    QLabel#title {{ font-size: 52px; font-weight: bold; }}
-    QLabel#detail {{ font-size: 26px; }}
-    QLabel#place {{ font-size: 22px; color: {c["quiet"]}; }}
-    QLabel#quiet {{ font-size: 19px; color: {c["quiet"]}; }}
-    QLabel#saved {{ font-size: 22px; color: {c["good"]}; }}
-    QPushButton {{ background: {c["panel"]}; border: 2px solid {c["line"]}; border-radius: 8px; padding: 10px 8px; }}
+    QLabel#place {{ font-size: {px(22)}; color: {c["quiet"]}; }}
+    QLabel#band {{ font-size: {px(20)}; font-weight: bold; padding: {px(4)} {px(10)}; border-radius: 4px; }}
+    QLabel#quiet {{ font-size: {px(18)}; color: {c["quiet"]}; }}
+    QLabel#saved {{ font-size: {px(22)}; color: {c["good"]}; }}
+    QPushButton {{ background: {c["panel"]}; border: 2px solid {c["line"]}; border-radius: 8px;
+        padding: {px(6)} {px(4)}; font-size: {px(16)}; }}
     QPushButton:focus {{ border: 3px solid {c["act"]}; }}
     QPushButton:hover {{ border-color: {c["act"]}; }}
-    QPushButton:disabled {{ color: {c["line"]}; border-style: dashed; }}
-    QPushButton#large {{ font-size: 34px; font-weight: bold; padding: 22px; }}
-    QPushButton#stop {{ background: {c["stop"]}; color: {c["stop_text"]}; font-weight: bold; font-size: 22px; }}
-    QLineEdit, QDoubleSpinBox, QSpinBox, QComboBox {{
-        background: {c["panel"]}; border: 2px solid {c["line"]}; border-radius: 6px; padding: 8px; font-size: 24px; }}
+    QPushButton:disabled, QPushButton[dim="yes"] {{ color: {c["line"]}; border-style: dashed; }}
+    QPushButton#large {{ font-size: {px(26)}; font-weight: bold; padding: {px(18)} {px(4)}; }}
+    QPushButton#stop {{ background: {c["stop"]}; color: {c["stop_text"]}; font-weight: bold; font-size: {px(22)};
+        padding: {px(14)} {px(6)}; }}
+    QLineEdit, QDoubleSpinBox, QSpinBox, QComboBox {{ background: {c["panel"]}; border: 2px solid {c["line"]};
+        border-radius: 6px; padding: {px(8)}; font-size: {px(24)}; }}
     QLineEdit:focus, QDoubleSpinBox:focus, QSpinBox:focus, QComboBox:focus {{ border: 3px solid {c["act"]}; }}
     QProgressBar {{ border: 1px solid {c["line"]}; border-radius: 6px; text-align: center; background: {c["panel"]};
-        color: {c["text"]}; min-height: 26px; }}
+        color: {c["text"]}; min-height: {px(24)}; }}
     QProgressBar::chunk {{ background: {c["filled"]}; }}
     QCheckBox::indicator {{ width: 22px; height: 22px; border: 2px solid {c["line"]}; border-radius: 4px; }}
     QCheckBox::indicator:checked {{ background: {c["act"]}; }}
     QCheckBox:focus {{ color: {c["act"]}; }}
-    QListWidget, QTableWidget {{ background: {c["panel"]}; border: 1px solid {c["line"]}; font-size: 20px; }}
+    QListWidget, QTableWidget, QPlainTextEdit {{ background: {c["panel"]}; border: 1px solid {c["line"]};
+        font-size: {px(19)}; }}
+    QPlainTextEdit {{ font-family: "DejaVu Sans Mono", monospace; }}
     QListWidget::item:selected, QTableWidget::item:selected {{ background: {c["act"]}; color: {c["ground"]}; }}
     QHeaderView::section {{ background: {c["ground"]}; color: {c["quiet"]}; border: none; padding: 6px; }}
     {moods}
+    {bands}
     """

@@ -9,24 +9,26 @@ from __future__ import annotations
 from typing import Any
 
 from PyQt6.QtCore import Qt, QTimer
+from PyQt6.QtGui import QWindow
 from PyQt6.QtTest import QTest
-from PyQt6.QtWidgets import QApplication, QWidget
 
 from experiments.clock import Clock
 from experiments.screens.console.app import Console
 from experiments.screens.console.beside import ParticipantSide
-from experiments.screens.console.messages import Waiting
 from experiments.screens.console.rater import Rater
 from experiments.screens.console.window import ConsoleWindow
-from experiments.steps import Ask, Describe, Prepare, Present, Rate, Rest
+from experiments.states import Position, State
+from experiments.steps import Ask, Rate
 
 LOOK_MS = 10
+AGAIN_S = 0.5
+"""A key that was refused, because it came too soon, is pressed again after so long."""
 BREAK_REASON = "synthetic participant"
 _KEYS = {"forward": Qt.Key.Key_F, "backward": Qt.Key.Key_B}
 
 
 class VisualParticipant:
-    """Watches a console's window and presses a key at every step that waits. Keep it for as long as the run lasts."""
+    """Watches a console's window and presses a key at every position that waits. Keep it as long as the run lasts."""
 
     def __init__(
         self,
@@ -37,35 +39,35 @@ class VisualParticipant:
     ) -> None:
         self._console, self._clock = console, clock
         self._rater, self._beside = rater, beside
-        self._done: Waiting | None = None
+        self._done, self._done_s = -1, 0.0
         self._timer = QTimer()
         self._timer.timeout.connect(self._look)
         self._timer.start(LOOK_MS)
 
     def _look(self) -> None:
         window = self._console.window
-        if window is None or self._rates_beside(window):
+        if window is None or window.live is None or self._rates_beside(window):
             return
         if not window.isActiveWindow():
             window.activateWindow()  # keys reach the window that has the focus
             return
-        if window.state.ended is not None:
+        if window.ended is not None:
             self._timer.stop()
             window.close()
             return
-        waiting = window.state.waiting
-        if waiting is None or waiting is self._done or self._thinks(waiting):
-            return
-        self._done = waiting
-        self._press(window, waiting)
+        position, now_s = window.drawn, self._clock.now()
+        done = position.serial == self._done and now_s - self._done_s < AGAIN_S
+        if not done and window.live.ready_at_s(now_s) and not self._thinks(position, now_s):
+            self._done, self._done_s = position.serial, now_s
+            self._press(window, position)
 
     def _rates_beside(self, window: ConsoleWindow) -> bool:
         """Whether a rating is being given on the participant's screen. No answer has no place there."""
-        step = window.state.step
-        if self._rater is None or self._beside is None or not isinstance(step, Rate):
+        step = window.drawn.step
+        if self._rater is None or self._beside is None or window.drawn.state is not State.RATING:
             return False
-        rating = self._observer.rate(step.trial)
-        if rating is None:
+        rating = self._observer.rate(step.trial) if isinstance(step, Rate) else None
+        if rating is None or not isinstance(step, Rate):
             return False
         if self._beside.asking:  # only then: what comes later would be done to the next question
             self._rater.rate(step, rating)
@@ -76,44 +78,48 @@ class VisualParticipant:
         """The observer, which is there once the window is."""
         return self._console.observer
 
-    def _thinks(self, waiting: Waiting) -> bool:
+    def _thinks(self, position: Position, now_s: float) -> bool:
         """Whether the response time is not over yet."""
-        if not isinstance(waiting.step, Ask):
+        step = position.step
+        if position.state is not State.ASKING or not isinstance(step, Ask):
             return False
-        answer_s = waiting.since_s + self._observer.answer(waiting.step.trial).response_time_s
-        return bool(self._clock.now() < answer_s)
+        onset_s = position.since_s if position.onset_s is None else position.onset_s
+        return bool(now_s < onset_s + self._observer.answer(step.trial).response_time_s)
 
-    def _press(self, window: ConsoleWindow, waiting: Waiting) -> None:
-        step = waiting.step
-        match step:
-            case Prepare() | Present():
-                _key(window, Qt.Key.Key_Space)
-            case Ask():
-                _key(window, _KEYS[self._observer.answer(step.trial).response])
-            case Rest():
-                _key(window, Qt.Key.Key_E)
-                _type(BREAK_REASON, window)
-            case Rate():
-                rating = self._observer.rate(step.trial)
-                if rating is None:
-                    _key(window, Qt.Key.Key_X, Qt.KeyboardModifier.ControlModifier)
-                else:
-                    _type(repr(rating), window)
-            case Describe():
-                _type("", window)
+    def _press(self, window: ConsoleWindow, position: Position) -> None:
+        step, handle = position.step, window.windowHandle()
+        if handle is None:
+            return
+        match position.state:
+            case State.SETTING:
+                _key(handle, Qt.Key.Key_M)
+            case State.PREPARING | State.TRAIN:
+                _key(handle, Qt.Key.Key_Space)
+            case State.ASKING if isinstance(step, Ask):
+                _key(handle, _KEYS[self._observer.answer(step.trial).response])
+            case State.RESTING:
+                _key(handle, Qt.Key.Key_E)
+                _type(BREAK_REASON, handle)
+            case State.RATING if isinstance(step, Rate):
+                self._rate(self._observer.rate(step.trial), window, handle)
+            case State.DESCRIBING | State.CLOSING:
+                _key(handle, Qt.Key.Key_Return)
             case _:
                 pass
 
-
-def _target(window: QWidget) -> QWidget:
-    """Where keys go: the widget with the cursor, else the window."""
-    return QApplication.focusWidget() or window.focusWidget() or window
-
-
-def _key(window: QWidget, key: Qt.Key, modifier: Qt.KeyboardModifier = Qt.KeyboardModifier.NoModifier) -> None:
-    QTest.keyClick(_target(window), key, modifier)  # type: ignore[call-overload] # its stubs take it for a method
+    def _rate(self, rating: float | None, window: ConsoleWindow, handle: QWindow) -> None:
+        if rating is None:
+            _key(handle, Qt.Key.Key_X, Qt.KeyboardModifier.ControlModifier)
+        else:
+            window.rating.clear()
+            _type(repr(rating), handle)
 
 
-def _type(text: str, window: QWidget) -> None:
-    QTest.keyClicks(_target(window), text)  # type: ignore[call-arg,arg-type] # as above
+def _key(window: QWindow, key: Qt.Key, modifier: Qt.KeyboardModifier = Qt.KeyboardModifier.NoModifier) -> None:
+    QTest.keyClick(window, key, modifier)  # type: ignore[call-overload] # its stubs take it for a method
+
+
+def _type(text: str, window: QWindow) -> None:
+    for letter in text:
+        QTest.keyClick(window, letter)  # type: ignore[call-overload] # as above
     _key(window, Qt.Key.Key_Return)

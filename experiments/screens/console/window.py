@@ -1,55 +1,77 @@
-"""The console's window. It shows what the state says, in large type, with the keys that do it; it touches no device."""
+"""The console's window. It draws what the live run says, in large type, with the keys that do something now.
+
+It decides nothing: keys and buttons become events, and the table of states judges them.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Callable
+from datetime import datetime
+from typing import Any
 
 from PyQt6.QtCore import QObject, QTimer, pyqtSignal
-from PyQt6.QtGui import QCloseEvent, QKeySequence, QShortcut
+from PyQt6.QtGui import QCloseEvent, QResizeEvent, QShowEvent
 from PyQt6.QtWidgets import (
     QHBoxLayout,
+    QLabel,
     QLineEdit,
     QListWidget,
     QMainWindow,
-    QPushButton,
+    QPlainTextEdit,
     QStackedWidget,
     QVBoxLayout,
     QWidget,
 )
 
+from experiments import events
 from experiments.clock import Clock
-from experiments.remarks import AnswerCorrected, Flagged, Noted, RatingCorrected, Remark
-from experiments.screens.console import parts, theme, tone
+from experiments.events import Hand, Press
+from experiments.live_run import EMERGENCY, REARM_HELD_S, LiveRun
+from experiments.remarks import Halted
+from experiments.screens.console import parts, theme, tone, view
+from experiments.screens.console.actions import CommandButton, HeldButton, Slots
 from experiments.screens.console.controls import Controls
-from experiments.screens.console.messages import Began, Ended, Message, Saved, Trouble, Waiting
-from experiments.screens.console.pace import clock_text
-from experiments.screens.console.screen import ConsoleScreen
-from experiments.screens.console.state import (
-    Instruction,
-    State,
-    coming,
-    gun_text,
-    instruction,
-    ordinal,
-    place_text,
+from experiments.screens.console.keyboard import Keyboard
+from experiments.screens.console.keys import (
+    BY_NAME,
+    COMMANDS,
+    Name,
+    Typing,
+    command_for,
+    field_of,
+    shown_key,
+    why_not,
 )
-from experiments.steps import (
-    Answered,
-    Ask,
-    Describe,
-    Failed,
-    Outcome,
-    Prepare,
-    Present,
-    Rate,
-    Rated,
-    Repeat,
-    Rest,
-    Rested,
+from experiments.screens.console.messages import (
+    Began,
+    Ended,
+    GunSeen,
+    Message,
+    ParticipantSeen,
+    Saved,
+    Shown,
+    Trouble,
 )
+from experiments.screens.console.pace import Pace, clock_text, end_text, progress, remaining_s
+from experiments.screens.console.strip import Strip
+from experiments.screens.console.view import About, Seen
+from experiments.screens.texts import saved_text
+from experiments.states import Position, State
+from experiments.steps import Failed, Rate, Rated, Rested
 
 REFRESH_MS = 100
-TWO_LINES_PX = 50
+BRIEF_S = 4.0
+"""How long it is shown why something was refused."""
+WIDE_PX, HIGH_PX = 1280.0, 760.0
+"""The size at which type has its own size."""
+SMALLEST, LARGEST = 0.55, 2.2
+"""How far type shrinks and grows with the window."""
+SIZES_PX = {"title": 46, "damper": 34, "detail": 23}
+FITS = (1.0, 0.88, 0.76, 0.66, 0.56)
+"""How far the instruction shrinks until all of it is there."""
+
+_KEY_ROW: tuple[Name, ...] = ("undo", "repeat", "flag", "note", "list", "pause", "stop", "help")
+_PAGE_KEYS: tuple[Name, ...] = ("help", "list", "leave", "emergency", "theme")
 
 
 class Bridge(QObject):
@@ -63,238 +85,477 @@ class ConsoleWindow(QMainWindow):
 
     closed = pyqtSignal()
 
-    def __init__(self, state: State, screen: ConsoleScreen, bridge: Bridge, clock: Clock) -> None:
+    def __init__(
+        self,
+        about: About,
+        bridge: Bridge,
+        clock: Clock,
+        *,
+        hand: Hand = "experimenter",
+        restart: Callable[[], None] = lambda: None,
+        observer: Any = None,
+    ) -> None:
         super().__init__()
-        self.state, self._screen, self._clock = state, screen, clock
-        self.controls = Controls(state, clock, self, screen.reply, bridge.message.emit)
-        self._enter: Callable[[str], None] | None = None
+        self.about, self._clock = about, clock
+        self._hand, self._restart, self._observer = hand, restart, observer
+        self.live: LiveRun | None = None
+        self.controls: Controls | None = None
+        self.drawn = Position()
+        self.gun: GunSeen | None = None
+        self.participant: ParticipantSeen | None = None
+        self.ended: Ended | None = None
+        self._pace = Pace()
+        self._enter: Callable[[str, Press], None] | None = None
+        self._brief_until_s: float | None = None
+        self._lasting = ("", "good")
+        self._field_of: tuple[object, ...] = ()
+        self._hold: Press | None = None
+        self._hold_timer = QTimer(self)
+        self._hold_timer.setSingleShot(True)
+        self._hold_timer.timeout.connect(self._held)
+        self.theme: theme.Theme = "dark"
+        self._scale = 0.0
         self._build()
-        self._set_theme("dark")
+        self._keyboard = Keyboard(self, clock.now)
         bridge.message.connect(self.take)
         self._timer = QTimer(self)
         self._timer.timeout.connect(self.refresh)
         self._timer.start(REFRESH_MS)
-        self.refresh()
 
     # building
 
     def _build(self) -> None:
-        self.setWindowTitle(f"Recoil – {self.state.plan.participant_id}, {self.state.plan.experiment}")
-        self.title, self.detail = parts.label("title"), parts.label("detail")
+        what = self.about.band or self.about.plan.experiment
+        self.setWindowTitle(f"Recoil – {self.about.plan.participant_id}, {what}")
+        self.bands = [parts.label("band", wrap=False) for _ in range(2)]
         self.place, self.saved = parts.label("place"), parts.label("saved")
+        self.title, self.damper, self.detail = (parts.label(name) for name in SIZES_PX)
         self.bars = [parts.bar(what) for what in ("set", "session", "experiment")]
+        self._build_fields()
         self._build_actions()
-        self._build_entry()
-        left = QVBoxLayout(main := QWidget())
-        for line in (self.place, self.title, self.detail):
+        self._main = QWidget()
+        left = QVBoxLayout(self._main)
+        left.setContentsMargins(0, 0, 0, 0)
+        for line in (self.title, self.damper, self.detail):
             left.addWidget(line)
         left.addStretch(1)
-        for below in (self.stack, self.entry_bar, self.saved, *self.bars):
+        for below in (self.fields, self.slots, self.entry_bar, self.saved):
             left.addWidget(below)
         across = QHBoxLayout()
-        across.addWidget(main, 3)
+        across.addWidget(self._main, 3)
         across.addWidget(self._side(), 1)
         down = QVBoxLayout(whole := QWidget())
+        down.setContentsMargins(10, 6, 10, 6)
+        down.addWidget(parts.row(*self.bands))
+        down.addWidget(self.place)
         down.addLayout(across, 1)
-        down.addWidget(self._keys())
-        self.setCentralWidget(whole)
-        QShortcut(QKeySequence("Escape"), self).activated.connect(self._escape)
-        QShortcut(QKeySequence("Space"), self).activated.connect(self._space)
+        down.addWidget(parts.row(*self.bars))
+        self.pages = QStackedWidget()
+        self.pages.addWidget(whole)
+        self.pages.addWidget(self._text_page())
+        outer = QVBoxLayout(central := QWidget())
+        outer.setContentsMargins(0, 0, 0, 4)
+        outer.addWidget(self.pages, 1)
+        outer.addWidget(self._keys())
+        self.setCentralWidget(central)
+        central.setMinimumSize(1, 1)
+        self.setMinimumSize(640, 400)
+        self.resize(1280, 800)
 
-    def _build_actions(self) -> None:
-        """What can be done at each kind of step."""
-        do = self.controls
-        self.rating_ends, self.rating, self.words = parts.label("quiet"), parts.NumberEdit(), QLineEdit()
-        self.rating.setPlaceholderText("type a number")
+    def _build_fields(self) -> None:
+        """What is typed: a number, words, or a line that was asked for."""
+        self.rating_ends, self.rating, self.words = parts.label("quiet"), QLineEdit(), QLineEdit()
+        self.rating.setPlaceholderText("type a number, Enter saves")
         self.rating.setAccessibleName("rating")
-        self.rating.returnPressed.connect(lambda: do.rating(self.rating.text()))
+        self.words.setPlaceholderText("type the participant's words, Enter saves")
         self.words.setAccessibleName("description")
-        self.words.returnPressed.connect(lambda: do.words(self.words.text()))
-        no_answer = parts.button(self, "No answer", "Ctrl+X", do.no_rating)
-        hint = "Type the participant's words; Enter saves. For the keys below, press Tab first."
-        self.areas: dict[type | None, QWidget] = {
-            None: QWidget(),
-            Prepare: parts.main_button("Fire", do.main),
-            Ask: parts.row(
-                parts.button(self, "FORWARD", "F", lambda: do.answer("forward"), name="large"),
-                parts.button(self, "BACKWARD", "B", lambda: do.answer("backward"), name="large"),
-            ),
-            Present: parts.main_button("“Next” was said", do.main),
-            Rest: parts.button(self, "End the break early…", "E", do.end_break),
-            Rate: parts.column(self.rating_ends, self.rating, no_answer),
-            Describe: parts.column(parts.label("quiet", hint), self.words),
-        }
-        self.stack = QStackedWidget()
-        for area in self.areas.values():
-            self.stack.addWidget(area)
-
-    def _build_entry(self) -> None:
-        self.entry_label, self.entry = parts.label("detail"), QLineEdit()
+        self.fields = QStackedWidget()
+        self.fields.addWidget(QWidget())
+        self.fields.addWidget(parts.column(self.rating_ends, self.rating))
+        self.fields.addWidget(parts.column(self.words))
+        self.entry_label, self.entry = parts.label("quiet"), QLineEdit()
         self.entry.setAccessibleName("line of text")
-        self.entry.returnPressed.connect(self._entered)
         self.entry_bar = parts.column(self.entry_label, self.entry)
         self.entry_bar.hide()
 
+    def _build_actions(self) -> None:
+        """The buttons of what can be done, in places of their own."""
+        make = self._button
+        self.forward, self.fire, self.backward = make("forward"), make("fire"), make("backward")
+        self.next, self.end_break, self.damper_set = make("next"), make("end break"), make("damper")
+        self.no_answer, self.finish, self.go_on = make("no answer"), make("enter"), make("go on")
+        self.reason, self.restart = make("reason"), make("restart")
+        self.rearm = HeldButton("rearm", self._press, self._begin_hold, self._end_hold)
+        middle = [self.fire, self.next, self.go_on, self.finish, self.rearm, self.reason]
+        left, right = [self.forward, self.damper_set, self.restart], [self.backward, self.end_break, self.no_answer]
+        self.slots = Slots([*left], [*middle], [*right])
+
+    def _button(self, name: Name, style: str = "large") -> CommandButton:
+        return CommandButton(name, self._press, self.do, style)
+
     def _side(self) -> QWidget:
-        self.gun, self.times = parts.label("quiet"), parts.label("quiet")
-        for lines in (self.gun, self.times):
-            lines.setMinimumHeight(TWO_LINES_PX)
+        self.gun_label, self.times, self.focus = parts.label("quiet"), parts.label("quiet"), parts.label("quiet")
         self.coming, self.answers = parts.quiet_list(), parts.quiet_list()
+        self.strip = Strip()
+        self.strip.setVisible(self.about.setup.config.console.response_times)
         titles = parts.label("quiet", "Coming next"), parts.label("quiet", "Answers of this set")
-        panels = parts.panel(self.gun), parts.panel(self.times)
-        return parts.column(*panels, titles[0], self.coming, titles[1], self.answers)
+        side = parts.column(
+            parts.panel(self.gun_label, self.focus),
+            parts.panel(self.times),
+            titles[0],
+            self.coming,
+            titles[1],
+            self.answers,
+            self.strip,
+        )
+        for lines in (self.coming, self.answers):
+            lines.setMinimumHeight(1)
+        return side
+
+    def _text_page(self) -> QWidget:
+        self.page_title, self.page_text = parts.label("place"), QPlainTextEdit()
+        self.page_text.setReadOnly(True)
+        self.page_text.setFocusPolicy(parts.NO_FOCUS)
+        return parts.column(self.page_title, self.page_text)
 
     def _keys(self) -> QWidget:
-        do = self.controls
-        self.pause_button = parts.button(self, "Pause", "P", do.pause)
-        self.stop_button = parts.button(self, "Stop", "Q", self._stop)
-        return parts.row(
-            parts.button(self, "Undo", "U", do.undo),
-            parts.button(self, "Repeat", "R", do.repeat),
-            parts.button(self, "Flag", "G", do.flag),
-            parts.button(self, "Note", "N", do.note),
-            self.pause_button,
-            self.stop_button,
-            parts.button(self, "Dark/light", "D", self._other_theme),
-            parts.button(self, "EMERGENCY STOP · Esc", "F12", do.emergency_stop, name="stop"),
-        )
+        self.key_buttons = {name: self._button(name, "") for name in _KEY_ROW}
+        stop = self._button("emergency", "stop")
+        holder = QWidget()
+        across = QHBoxLayout(holder)
+        across.setContentsMargins(10, 0, 10, 2)
+        for button in self.key_buttons.values():
+            across.addWidget(button, 2)
+        across.addWidget(stop, 5)
+        return holder
 
     # messages
 
-    def take(self, message: Message) -> None:
+    def take(self, message: Message) -> None:  # noqa: C901 - one case a message
         """Take a message from the run, show it, and say when it was painted."""
-        self.state.take(message, self._clock.now())
         match message:
             case Began():
-                self.controls.desk = message.desk
-            case Waiting():
-                self._arrive(message)
+                self._begin(message.live)
             case Saved():
                 self._acknowledge(message)
+            case GunSeen():
+                self.gun = message
+            case ParticipantSeen():
+                self.participant = message
             case Trouble():
-                self.say(message.text, "bad")
+                self._last(message.text, "bad")
             case Ended():
-                self._screen.end()
-                tone.play()
+                self._end(message)
+            case Shown():
+                self._arrive()
         self.refresh()
-        if isinstance(message, Waiting):
+        if isinstance(message, Shown | Began) and self.live is not None:
             self.repaint()
-            self._screen.shown(self._clock.now())
+            self.live.painted(self.drawn.serial, self._clock.now())
 
-    def _arrive(self, message: Waiting) -> None:
-        """Put the cursor where the step wants it; a line that is being typed keeps it."""
-        step = message.step
-        if isinstance(step, Rate):
-            ends = f"{step.minimum:g} = {step.minimum_text}     {step.maximum:g} = {step.maximum_text}"
-            self.rating_ends.setText(f"{ends}     Enter saves.")
-            self.rating.clear()
-        elif isinstance(step, Describe):
-            self.words.clear()
-        if not self.entry_bar.isVisible():
+    def _begin(self, live: LiveRun) -> None:
+        self.live = live
+        scale = getattr(self.about.setup.config, "rating", None)
+        self.controls = Controls(
+            live, self._clock, self, scale=scale, hand=self._hand, restart=self._restart, observer=self._observer
+        )
+        self._arrive()
+
+    def _end(self, message: Ended) -> None:
+        self.ended = message
+        self._close_entry()
+        tone.play()
+
+    def _arrive(self) -> None:
+        """Draw the newest position: its field, and where the cursor goes; a line that is being typed keeps it."""
+        if self.live is None:
+            return
+        self.drawn = self.live.position
+        self._pace.at(self.drawn, self._clock.now())
+        if self.drawn.state is State.HALTED:
+            self.pages.setCurrentIndex(0)
+        belongs = (field_of(self.drawn), self.drawn.number, self.drawn.correcting)
+        if belongs != self._field_of:
+            self._field_of = belongs
+            self._fill_field()
+        if not self.entry_bar.isVisibleTo(self._main):
             self._focus()
 
+    def _fill_field(self) -> None:
+        said = self.controls.entered_so_far() if self.controls is not None else ""
+        step = self.drawn.step
+        if isinstance(step, Rate):
+            self.rating_ends.setText(
+                f"{step.minimum:g} = {step.minimum_text}     {step.maximum:g} = {step.maximum_text}"
+            )
+        self.rating.setText(said)
+        self.words.setText(said)
+
     def _focus(self) -> None:
-        step = self.state.step
-        wanted = self.rating if isinstance(step, Rate) else self.words if isinstance(step, Describe) else self
-        self._show_action()
-        wanted.setFocus()
+        field = field_of(self.drawn)
+        self.fields.setCurrentIndex({"number": 1, "words": 2}.get(field or "", 0))
+        {"number": self.rating, "words": self.words}.get(field or "", self).setFocus()
 
     def _acknowledge(self, message: Saved) -> None:
         """Say that it is safe; a tone at the end of a break."""
-        text = saved_text(self.state, message)
+        self._pace.saved(message.word, self._clock.now())
+        text = saved_text(self.about.plan, message.step, message.word)
         if text:
-            self.say(text, "bad" if isinstance(message.word, Failed) else "good")
+            self._last(text, "bad" if isinstance(message.word, Failed | Halted) else "good")
         if isinstance(message.word, Rested):
             tone.play()
         if isinstance(message.word, Rated) and message.word.rating_by == "participant":
             self.activateWindow()  # the participant's screen took the keys to be rated on
 
     def say(self, text: str, mood: str) -> None:
-        """Show a line of answer."""
+        """Show a line of answer, for a few seconds."""
+        self._brief_until_s = self._clock.now() + BRIEF_S
+        self._show_line(text, mood)
+
+    def _last(self, text: str, mood: str) -> None:
+        """Show a line until the next."""
+        self._lasting = (text, mood)
+        self._brief_until_s = None
+        self._show_line(text, mood)
+
+    def _show_line(self, text: str, mood: str) -> None:
         self.saved.setText(text)
         parts.set_mood(self.saved, mood)
 
     # showing
 
-    def refresh(self) -> None:
-        """Show what is so now."""
-        now_s, state = self._clock.now(), self.state
-        shown = self._instruction(now_s)
-        self.title.setText(shown.title)
-        self.detail.setText(shown.detail)
-        parts.set_mood(self.title, shown.mood)
-        self.place.setText(place_text(state))
-        self._show_action()
-        self.pause_button.setText("Pause  [P]" if self.controls.paused_at_s is None else "Go on  [P]")
-        self.stop_button.setText("Stop  [Q]" if state.ended is None else "Close  [Q]")
-        found = state.progress()
-        for bar, (done, planned) in zip(self.bars, (found.in_set, found.in_session, found.in_all), strict=True):
-            bar.setMaximum(planned)
-            bar.setValue(done)
-        text, mood = gun_text(state.gun)
-        self.gun.setText(text)
-        parts.set_mood(self.gun, mood)
-        elapsed, left = clock_text(state.elapsed_s(now_s)), clock_text(state.remaining_s())
-        self.times.setText(f"Elapsed {elapsed}\nStill about {left}")
-        _fill(self.coming, coming(state))
-        _fill(self.answers, [f"Trial {t.trial}: {said}" for t in state.answered_in_set() if (said := state.said(t))])
-
-    def _instruction(self, now_s: float) -> Instruction:
-        trial = self.controls.correcting
-        if self.controls.paused_at_s is not None:
-            return Instruction(title="Paused", detail="P goes on.", mood="wait")
-        if trial is None:
-            return instruction(self.state, now_s)
-        return Instruction(
-            title=f"Correct trial {trial.trial}",
-            detail=f"It was entered as {self.state.said(trial)}. Enter what the participant said: F or B.\n"
-            "U goes further back, Esc leaves it.",
-            mood="ask",
+    @property
+    def seen(self) -> Seen:
+        """Everything that is shown now."""
+        return Seen(
+            about=self.about,
+            position=self.drawn,
+            told=() if self.live is None else self.live.told,
+            gun=self.gun,
+            participant=self.participant,
+            ended=self.ended,
         )
 
-    def _show_action(self) -> None:
-        step = self.state.step
-        kind: type | None = None if step is None else type(step)
-        if self.controls.paused_at_s is not None and kind is not Rest:
-            kind = None
-        if self.controls.correcting is not None:
-            kind = Ask
-        area = self.areas.get(kind, self.areas[None])
-        if self.stack.currentWidget() is not area:
-            self.stack.setCurrentWidget(area)
+    def refresh(self) -> None:
+        """Show what is so now."""
+        now_s, seen = self._clock.now(), self.seen
+        shown = view.instruction(seen, now_s)
+        for label, text in ((self.title, shown.title), (self.damper, shown.damper), (self.detail, shown.detail)):
+            if label.text() != text:
+                label.setText(text)
+                label.setVisible(bool(text))
+        parts.set_mood(self.title, shown.mood)
+        parts.set_mood(self.damper, "bad" if shown.mood == "bad" else "act")
+        self.place.setText(view.place_text(seen))
+        self._show_bands(seen)
+        self._show_side(seen, now_s)
+        self._show_buttons()
+        if self._brief_until_s is not None and now_s > self._brief_until_s:
+            self._brief_until_s = None
+            self._show_line(*self._lasting)
+        self._fit()
 
-    # keys that belong to the window
+    def _show_bands(self, seen: Seen) -> None:
+        found = view.bands(seen)
+        for label, (text, name) in zip(self.bands, [*found, *[("", "")] * (2 - len(found))], strict=True):
+            label.setVisible(bool(text))
+            label.setText(text)
+            parts.set_mood(label, name)
 
-    def _space(self) -> None:
-        """The main key; a button reached by Tab is pressed by it, as everywhere."""
-        focused = self.focusWidget()
-        if isinstance(focused, QPushButton):
-            focused.click()
+    def _show_side(self, seen: Seen, now_s: float) -> None:
+        done = progress(seen.about.plan, seen.told, seen.here)
+        for bar, (count, planned) in zip(self.bars, (done.in_set, done.in_session, done.in_all), strict=True):
+            bar.setMaximum(planned)
+            bar.setValue(count)
+        for label, (text, mood) in (
+            (self.gun_label, view.gun_text(seen.gun)),
+            (self.focus, view.focus_text(seen, here=self.isActiveWindow())),
+        ):
+            label.setText(text)
+            label.setVisible(bool(text))
+            parts.set_mood(label, mood)
+        self.times.setText(self._times(seen, now_s))
+        _fill(self.coming, view.coming(seen))
+        _fill(self.answers, view.answers(seen))
+        if self.strip.isVisibleTo(self):
+            self.strip.put(view.response_times(seen))
+
+    def _times(self, seen: Seen, now_s: float) -> str:
+        elapsed = f"Elapsed {clock_text(self._pace.elapsed_s(now_s))}"
+        if seen.ended is not None:
+            return elapsed
+        config = seen.about.setup.config
+        left_s = remaining_s(config, seen.about.plan, seen.told, self._pace, seen.position, now_s)
+        return f"{elapsed}\nEnds {end_text(left_s, datetime.now())}"
+
+    def _show_buttons(self) -> None:
+        """The buttons of what can be done now, and which of the keys below do something."""
+        over, letters, state = self.ended is not None, self._typing().letters, self.drawn.state
+        self.slots.show_only(set() if over else self._actions(state))
+        for button in (self.forward, self.backward, self.no_answer, self.restart, self.end_break, self.reason):
+            button.label(letters=letters)
+        self.finish.label("End the run")
+        for name, button in self.key_buttons.items():
+            held = name == "pause" and state is State.PAUSED
+            button.name = "go on" if held else name
+            button.label("Close" if name == "stop" and over else "", letters=letters)
+            dim = "yes" if self._idle(button.name) else "no"
+            if button.property("dim") != dim:
+                button.setProperty("dim", dim)
+                parts.restyle(button)
+
+    def _actions(self, state: State) -> set[QWidget]:
+        held = self.drawn.state is State.PAUSED and bool(self.drawn.why)
+        shown: dict[State, tuple[QWidget, ...]] = {
+            State.REARMING: (self.rearm,),
+            State.SETTING: (self.damper_set,),
+            State.PREPARING: (self.fire,),
+            State.TRAIN: (self.next,),
+            State.ASKING: (self.forward, self.backward),
+            State.RATING: (self.no_answer,),
+            State.RESTING: (self.end_break,),
+            State.CLOSING: (self.finish,),
+            State.PAUSED: (self.go_on, self.restart) if held else (self.go_on,),
+            State.HALTED: (self.reason,),
+        }
+        if state is State.CORRECTING:
+            field = field_of(self.drawn)
+            return {self.forward, self.backward} if field is None else {self.no_answer} if field == "number" else set()
+        return set(shown.get(state, ()))
+
+    def _idle(self, name: Name) -> bool:
+        """Whether a command does nothing now."""
+        if name in ("help", "list", "theme"):
+            return False
+        if self.ended is not None or self.live is None:
+            return name != "stop"
+        if name == "repeat" and self.live.repeated() is None:
+            return True
+        if name == "undo" and not self.live.undoable:
+            return True
+        return bool(why_not(name, self.drawn))
+
+    # fitting
+
+    def _fit(self) -> None:
+        """Shrink the instruction until all of it is there."""
+        layout = self._main.layout()
+        if layout is None or not self.isVisible():
+            return
+        for fit in FITS:
+            for name, label in (("title", self.title), ("damper", self.damper), ("detail", self.detail)):
+                _size(label, round(SIZES_PX[name] * self._scale * fit), bold=name != "detail")
+            if layout.heightForWidth(self._main.width()) <= self._main.height():
+                return
+
+    def resizeEvent(self, event: QResizeEvent | None) -> None:  # noqa: N802 - Qt's name
+        """Type grows and shrinks with the window."""
+        super().resizeEvent(event)
+        wanted = min(max(min(self.width() / WIDE_PX, self.height() / HIGH_PX), SMALLEST), LARGEST)
+        if abs(wanted - self._scale) > 0.01:
+            self._scale = wanted
+            self._restyle()
+
+    def _restyle(self) -> None:
+        self.setStyleSheet(theme.sheet(self.theme, self._scale))
+
+    def showEvent(self, event: QShowEvent | None) -> None:  # noqa: N802 - Qt's name
+        """Hear the keys before any widget does."""
+        super().showEvent(event)
+        handle = self.windowHandle()
+        if handle is not None:
+            handle.removeEventFilter(self._keyboard)
+            handle.installEventFilter(self._keyboard)
+
+    # keys and buttons
+
+    def _typing(self) -> Typing:
+        return Typing(line=self.entry_bar.isVisibleTo(self._main), field=field_of(self.drawn) is not None)
+
+    def _press(self) -> Press:
+        return Press(at_s=self._clock.now(), serial=self.drawn.serial)
+
+    def command(self, key: str, *, ctrl: bool) -> Name | None:
+        """The command that a key is now."""
+        if key.startswith("#"):
+            return None
+        return command_for(key, ctrl=ctrl, typing=self._typing(), position=self.drawn)
+
+    def down(self, name: Name, at_s: float) -> None:
+        """The key of a command went down."""
+        press = Press(at_s=at_s, serial=self.drawn.serial)
+        if name == "rearm":
+            self._begin_hold(press)
         else:
-            self.controls.main()
+            self.do(name, press)
 
-    def _escape(self) -> None:
-        """Leave what is open; where nothing is, stop for an emergency."""
-        if self.entry_bar.isVisible():
-            self._close_entry()
-        elif not self.controls.leave_correction() and self.state.ended is None:
-            self.controls.emergency_stop()
+    def up(self, key: str) -> None:
+        """A key was let go."""
+        if key == BY_NAME["rearm"].key:
+            self._end_hold()
+
+    def do(self, name: Name, press: Press) -> None:
+        """Carry out a command."""
+        if self.pages.currentIndex() and name not in _PAGE_KEYS:
+            self.say("Leave this page first: Esc.", "wait")
+        elif name in ("help", "list", "theme", "leave", "enter"):
+            {"help": self._help, "list": self._list, "theme": self._other_theme}.get(name, lambda: None)()
+            if name == "leave":
+                self._leave(press)
+            elif name == "enter":
+                self._entered(press)
+        elif name == "stop" and self.ended is not None:
+            self.close()
+        elif self.controls is not None:
+            self._do(name, press, self.controls)
         self.refresh()
 
-    def _stop(self) -> None:
-        if self.state.ended is not None:
-            self.close()
+    def _do(self, name: Name, press: Press, controls: Controls) -> None:
+        if name == "stop" and self.drawn.base is State.HALTED:
+            controls.offer(events.Stop(reason=EMERGENCY))
         else:
-            self.controls.stop()
+            controls.do(name, press)
 
-    def _other_theme(self) -> None:
-        self._set_theme("light" if self._theme == "dark" else "dark")
+    def _entered(self, press: Press) -> None:
+        """Enter: the line, the field, or the end of the run."""
+        if self.controls is None:
+            return
+        if self.entry_bar.isVisibleTo(self._main):
+            self._enter_line(press)
+        elif self.fields.currentIndex() == 1:
+            self.controls.number(self.rating.text(), press)
+        elif self.fields.currentIndex() == 2:
+            self.controls.words(self.words.text(), press)
+        elif self.drawn.state is State.CLOSING:
+            self.controls.finish(press)
 
-    def _set_theme(self, name: theme.Theme) -> None:
-        self._theme: theme.Theme = name
-        self.setStyleSheet(theme.sheet(name))
+    def _leave(self, press: Press) -> None:
+        """Leave a page, a line or a correction. It never stops anything."""
+        if self.pages.currentIndex():
+            self.pages.setCurrentIndex(0)
+        elif self.entry_bar.isVisibleTo(self._main):
+            self._close_entry()
+        elif self.controls is not None and self.drawn.state is State.CORRECTING:
+            self.controls.do("leave", press)
 
-    def ask_line(self, question: str, enter: Callable[[str], None]) -> None:
+    def _begin_hold(self, press: Press) -> None:
+        if self.drawn.state is State.REARMING and not self._hold_timer.isActive():
+            self._hold = press
+            self._hold_timer.start(round(1000 * REARM_HELD_S))
+            self.say("Hold it …", "wait")
+
+    def _end_hold(self) -> None:
+        if self._hold_timer.isActive():
+            self._hold_timer.stop()
+            self.say("Let go too soon: hold T for a second.", "wait")
+
+    def _held(self) -> None:
+        if self._hold is not None and self.controls is not None:
+            self.controls.rearm(self._hold, max(REARM_HELD_S, self._clock.now() - self._hold.at_s))
+
+    # lines of text
+
+    def ask_line(self, question: str, enter: Callable[[str, Press], None]) -> None:
         """Ask for a line of text, and hand it over if one is entered."""
         self._enter = enter
         self.entry_label.setText(f"{question}  (Enter saves, Esc leaves it)")
@@ -302,58 +563,66 @@ class ConsoleWindow(QMainWindow):
         self.entry_bar.show()
         self.entry.setFocus()
 
-    def _entered(self) -> None:
+    def _enter_line(self, press: Press) -> None:
         text, enter = self.entry.text().strip(), self._enter
         if not text:
             self.say("Type a word or two, or leave it with Esc.", "bad")
             return
         self._close_entry()
         if enter is not None:
-            enter(text)
+            enter(text, press)
 
     def _close_entry(self) -> None:
         self._enter = None
         self.entry_bar.hide()
         self._focus()
 
+    # pages
+
+    def _help(self) -> None:
+        lines = [self._help_line(command.name) for command in COMMANDS]
+        self._page("Keys, and what each does now. Esc leaves this page.", "\n".join(lines))
+
+    def _help_line(self, name: Name) -> str:
+        command = BY_NAME[name]
+        not_now = (why_not(name, self.drawn) or "not now") if self._idle(name) else ""
+        key = shown_key(name, letters=self._typing().letters)
+        return f"{key:<8} {command.does}{f'   – not now: {not_now}' if not_now else ''}"
+
+    def _list(self) -> None:
+        self._page(
+            "Flags, notes, corrections and repeats of this set. Esc leaves this page.", "\n".join(view.marks(self.seen))
+        )
+
+    def _page(self, title: str, text: str) -> None:
+        if self.pages.currentIndex() and self.page_title.text() == title:
+            self.pages.setCurrentIndex(0)
+            return
+        self.page_title.setText(title)
+        self.page_text.setPlainText(text)
+        self.pages.setCurrentIndex(1)
+
+    def _other_theme(self) -> None:
+        self.theme = "light" if self.theme == "dark" else "dark"
+        self._restyle()
+
     def closeEvent(self, event: QCloseEvent | None) -> None:  # noqa: N802 - Qt's name
-        """Closing the window stops the run; what was answered is safe."""
-        if self.state.ended is None:
-            self.controls.stop_for("the window was closed")
-        super().closeEvent(event)
+        """Closing the window of a live run asks why it stops; once it has ended, the window goes."""
+        if event is None:
+            return
+        if self.ended is None and self.controls is not None:
+            event.ignore()
+            self.do("stop", self._press())
+            return
+        event.accept()
         self.closed.emit()
 
 
-def saved_text(state: State, message: Saved) -> str:
-    """What was saved, as the experimenter entered it; nothing for what needs no answer."""
-    if message.step is None:
-        return _remark_text(state, message.word)
-    word, step = message.word, message.step
-    match word:
-        case Answered() if isinstance(step, Ask):
-            return f"Saved: trial {step.trial.trial}, {word.response.upper()}"
-        case Rated() if isinstance(step, Rate):
-            return f"Saved: {ordinal(state, step.trial)}, {state.said(step.trial)}"
-        case Failed():
-            return f"The gun failed: {word.cause}. The trial is marked and presented again."
-        case Repeat():
-            return f"Saved: trial {word.trial.trial} is presented again ({word.reason})"
-        case Rested():
-            return "The break is over."
-        case _:
-            return ""
-
-
-def _remark_text(state: State, remark: Outcome | Remark) -> str:
-    match remark:
-        case AnswerCorrected() | RatingCorrected():
-            return f"Saved: trial {remark.trial.trial} corrected to {state.said(remark.trial)}"
-        case Flagged():
-            return f"Saved: trial {remark.trial.trial} flagged {remark.flag}"
-        case Noted():
-            return "Saved: note"
-        case _:
-            return ""
+def _size(label: QLabel, size_px: int, *, bold: bool) -> None:
+    """Give a label's type a size in pixels; the window's style sheet would win over a font."""
+    style = f"font-size: {max(8, size_px)}px; font-weight: {'bold' if bold else 'normal'};"
+    if label.styleSheet() != style:
+        label.setStyleSheet(style)
 
 
 def _fill(shown: QListWidget, lines: list[str]) -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import time
 import traceback
 from typing import BinaryIO
@@ -20,6 +21,7 @@ from experiments.screens.participant.words import (
     Close,
     Failed,
     FromParticipant,
+    KeyPressed,
     Noise,
     Ready,
     Show,
@@ -61,6 +63,8 @@ class App:
         self._stage, self._wire = stage, wire
         self._keys = Keys(stage.toolkit)
         self._noise = MaskingNoise()
+        self._told: tuple[str, ...] = ()
+        self._told_s = 0.0
 
     def begin(self) -> None:
         """Show an empty window and say that it is ready."""
@@ -77,13 +81,27 @@ class App:
             if word is not None:
                 self._obey(word)
             self._stage.step()
+            while self._stage.unasked:
+                self._wire.say(self._stage.unasked.popleft())
             self._keys.poll()
+            self._tell_keys()
             self._follow(self._stage.page.outcome() if self._stage.page else None)
             time.sleep(_STEP_S)
         self._noise.stop()
         self._stage.close()
 
+    def _tell_keys(self) -> None:
+        """Say which of the keys to be told went down since the last look."""
+        if not self._told:
+            return
+        for press in self._keys.since(self._told_s):
+            self._told_s = math.nextafter(press.pressed_s, math.inf)
+            if press.name in self._told:
+                self._wire.say(KeyPressed(name=press.name))
+
     def _obey(self, word: ToParticipant) -> None:
+        self._told = word.tell if isinstance(word, Show) else ()
+        self._told_s = self._stage.toolkit.now()
         match word:
             case Show():
                 self._stage.put(MessagePage(self._stage, word.text))

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import sys
 import threading
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import replace
 from typing import Self, TypeVar
@@ -33,6 +33,7 @@ from experiments.screens.participant.words import (
     RatingGiven,
     Ready,
     Show,
+    Unasked,
     from_participant_from,
     line,
 )
@@ -63,8 +64,10 @@ class ParticipantLink:
         self._mail = Mailbox()
         self._asking = threading.RLock()
         self._clocks: ClockMap | None = None
+        self._heard: Callable[[Unasked], None] = lambda _: None
+        self._gone: Callable[[str], None] = lambda _: None
         try:
-            self._process = ParticipantProcess(command, self._said, self._mail.fail)
+            self._process = ParticipantProcess(command, self._said, self._failed)
         except OSError as error:
             raise ParticipantError(f"the participant's screen cannot be started: {error}") from error
 
@@ -102,10 +105,16 @@ class ParticipantLink:
         self.map_clocks()
         return ready
 
-    def show(self, text: str) -> None:
-        """Show a plain message; a question that is being asked is called off."""
+    def listen(self, heard: Callable[[Unasked], None], gone: Callable[[str], None]) -> None:
+        """Have somebody told what is said without a question, and why the screen is gone if it goes."""
+        self._heard, self._gone = heard, gone
+        if self.failure is not None:
+            gone(self.failure)
+
+    def show(self, text: str, tell: tuple[str, ...] = ()) -> None:
+        """Show a plain message; a question that is being asked is called off. Keys in `tell` are told meanwhile."""
         self._mail.call_off()
-        self._process.write(line(Show(text=text)))
+        self._process.write(line(Show(text=text, tell=tell)))
 
     def map_clocks(self, pings: int = PINGS) -> ClockMap:
         """Map the clocks anew."""
@@ -143,6 +152,7 @@ class ParticipantLink:
 
     def close(self) -> None:
         """End the program: by asking, then by force. Who still waits for it is told."""
+        self._gone = lambda _: None
         self._process.write(line(Close()))
         self._mail.fail("the participant's screen was closed by the console")
         self._process.end()
@@ -185,9 +195,18 @@ class ParticipantLink:
         try:
             word = from_participant_from(wire)
         except ValidationError:
-            self._mail.fail(f"the participant's screen said what is no word: {wire[:200]!r}")
+            self._failed(f"the participant's screen said what is no word: {wire[:200]!r}")
             return
         if isinstance(word, Failed):
-            self._mail.fail(f"the participant's screen failed: {word.message}")
+            self._failed(f"the participant's screen failed: {word.message}")
+        elif isinstance(word, Unasked):
+            self._heard(word)
         else:
             self._mail.put(word)
+
+    def _failed(self, why: str) -> None:
+        """Nothing comes from there any more; the first reason stands, and is told once."""
+        first = self._mail.failure is None
+        self._mail.fail(why)
+        if first:
+            self._gone(why)

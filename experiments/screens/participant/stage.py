@@ -5,18 +5,20 @@ Places are in parts of the window's height from its middle, `half_width` to eith
 
 from __future__ import annotations
 
+from collections import deque
 from dataclasses import dataclass
 from typing import Any, Protocol
 
 from experiments.screens.participant.focus import Focus
 from experiments.screens.participant.look import PALETTES, Look
 from experiments.screens.participant.toolkit import Toolkit
-from experiments.screens.participant.words import FromParticipant
+from experiments.screens.participant.words import EmergencyPressed, Focused, FromParticipant, Unasked
 
 _SMALLEST = 0.018
 _SHRINK = 0.92
 _MARGIN = 0.94
 TITLE = "Recoil: participant"
+EMERGENCY_KEY = "F12"
 _STEADY_FLIPS, _MOST_FLIPS = 10, 60
 
 
@@ -84,6 +86,8 @@ class Stage:
         self._focus = Focus(self.window.winHandle)
         self._drawn_s = 0.0
         self._closed = False
+        self.unasked: deque[Unasked] = deque()
+        """What is to be said without a question."""
         self._font_files = [str(path) for path in sorted(toolkit.fonts.glob("NotoSans-*.ttf"))]
         self._handlers = _Handlers(self)  # pyglet holds them weakly
         self.window.winHandle.push_handlers(self._handlers)
@@ -193,6 +197,12 @@ class _Handlers:
         self._stage = stage
         self._names = stage.toolkit.key
 
+    def on_activate(self) -> None:
+        self._stage.unasked.append(Focused(on=True))
+
+    def on_deactivate(self) -> None:
+        self._stage.unasked.append(Focused(on=False))
+
     def on_close(self) -> bool:
         self._stage.note_closed()
         return True
@@ -210,9 +220,13 @@ class _Handlers:
             self._stage.page.released()
 
     def on_key_press(self, symbol: int, modifiers: int) -> bool:
+        name = self._names.symbol_string(symbol)
+        if name == EMERGENCY_KEY:
+            self._stage.unasked.append(EmergencyPressed())
+            return True
         if self._stage.page is None:
             return False
-        return self._stage.page.key(self._names.symbol_string(symbol), bool(modifiers & self._names.MOD_CTRL))
+        return self._stage.page.key(name, bool(modifiers & self._names.MOD_CTRL))
 
     def on_text_motion(self, motion: int) -> None:
         if self._stage.page is not None:

@@ -22,9 +22,10 @@ Share = Annotated[float, Field(ge=0, le=1, allow_inf_nan=False)]
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Show:
-    """Show a plain message; whatever was asked is asked no longer."""
+    """Show a plain message; whatever was asked is asked no longer. Keys in `tell` are told if they go down."""
 
     text: str
+    tell: tuple[str, ...] = ()
     kind: Literal["show"] = "show"
 
 
@@ -137,6 +138,29 @@ class NoiseIs:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
+class EmergencyPressed:
+    """The key of the emergency stop went down while this window had the keys."""
+
+    kind: Literal["emergency-pressed"] = "emergency-pressed"
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Focused:
+    """Whether this window has the keys."""
+
+    on: bool
+    kind: Literal["focused"] = "focused"
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class KeyPressed:
+    """A key went down that was to be told, while nothing was asked."""
+
+    name: str
+    kind: Literal["key-pressed"] = "key-pressed"
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
 class Failed:
     """The participant's screen ends, and why."""
 
@@ -145,7 +169,9 @@ class Failed:
 
 
 ToParticipant = Show | AskRating | AskDirection | Ping | Noise | Close
-FromParticipant = Ready | Pong | RatingGiven | DirectionGiven | NoiseIs | Failed
+Unasked = EmergencyPressed | Focused | KeyPressed
+"""What the participant's screen says without being asked."""
+FromParticipant = Ready | Pong | RatingGiven | DirectionGiven | NoiseIs | Unasked | Failed
 
 _TO: TypeAdapter[ToParticipant] = TypeAdapter(Annotated[ToParticipant, Field(discriminator="kind")])
 _FROM: TypeAdapter[FromParticipant] = TypeAdapter(Annotated[FromParticipant, Field(discriminator="kind")])
@@ -155,7 +181,7 @@ def line(word: ToParticipant | FromParticipant) -> bytes:
     r"""A word as a line of the wire: JSON in ASCII. `ValueError` for a number that is none.
 
     >>> line(Show(text="one\ntwo"))
-    b'{"text": "one\\ntwo", "kind": "show"}\n'
+    b'{"text": "one\\ntwo", "tell": [], "kind": "show"}\n'
     """
     return json.dumps(asdict(word), allow_nan=False).encode("ascii") + b"\n"
 

@@ -1,0 +1,474 @@
+"""A live run between who may act and who acts: events come in from any thread, the table judges, the run obeys.
+
+The emergency stop is a latch in here: the state is `halted`, under the lock, before the gun is told to disarm; the run
+looks at the state after every `arm` and before every `fire`.
+"""
+
+from __future__ import annotations
+
+import math
+import threading
+from collections import deque
+from collections.abc import Sequence
+from concurrent.futures import Future
+from dataclasses import dataclass, replace
+from typing import Protocol
+
+from device import DeviceError, Gun, GunStatus
+from experiments import events
+from experiments.clock import Clock
+from experiments.entries import Entry, entries, repeatable, trial_at, value
+from experiments.events import ACTS, Event, Press
+from experiments.journal import Journal, JournalGone
+from experiments.plan import Plan, Trial
+from experiments.remarks import (
+    AnswerCorrected,
+    Continued,
+    DescriptionCorrected,
+    Flagged,
+    Halted,
+    HaltReason,
+    Noted,
+    Paused,
+    RatingCorrected,
+    Refused,
+    Remark,
+    record,
+)
+from experiments.states import ARMED, No, Position, State, after, entered
+from experiments.steps import Outcome, Step
+from experiments.tables import Told
+
+EMERGENCY = "emergency stop"
+REARM_HELD_S = 1.0
+"""For so long a key is held to go on after an emergency stop."""
+
+DISARMED_S = 10.0
+"""The longest that a run waits for a disarming that began beside it: a gun on a line gives up before."""
+
+_DISARMS = (
+    events.Pause,
+    events.Stop,
+    events.EmergencyStop,
+    events.ParticipantLost,
+    events.DisplayLost,
+    events.ResultsGone,
+)
+
+
+class RunStopped(Exception):  # noqa: N818 - a stop is not an error
+    """The run stops here on purpose or for want of a gun; it can be resumed.
+
+    `saved`: the answers that were read back from the disk afterwards; `None` if they were not.
+    """
+
+    saved: int | None = None
+
+
+class RunHalted(RunStopped):
+    """The emergency stop: nothing in this run arms or fires any more."""
+
+
+class Held(Exception):  # noqa: N818 - what is so, not what went wrong
+    """No shot may be fired now: the run was paused."""
+
+
+class Screen(Protocol):
+    """Where a run is shown, and worked by a person, real or synthetic. All but `begin` and `act` come from any thread.
+
+    Whoever works it offers events to the live run; nothing is decided here.
+    """
+
+    def begin(self, live: LiveRun) -> None:
+        """Take the place before a run that stands where `live` says."""
+
+    def show(self, position: Position) -> None:
+        """Show a position; one of an earlier serial number than the last is out of date."""
+
+    def act(self, position: Position, until_s: float | None) -> None:
+        """The run waits now, at most until a time: who works in the run's own thread acts; others just go on."""
+
+    def acknowledge(self, step: Step | None, word: Outcome | Remark) -> None:
+        """Show that something is safe: its record is on the disk. A remark has no step."""
+
+    def trouble(self, text: str) -> None:
+        """Show what went wrong."""
+
+    def gun_seen(self, status: GunStatus | None, fault: str) -> None:
+        """Show what the gun itself says of its state, or why it says nothing."""
+
+
+@dataclass(frozen=True, slots=True)
+class Verdict:
+    """Whether an event was taken, and what there is to say about it."""
+
+    taken: bool
+    text: str = ""
+
+    def __bool__(self) -> bool:
+        return self.taken
+
+
+class LiveRun:
+    """The position of a run, and what was told so far. Every method but `enter`, `wait` and `sleep` from any thread."""
+
+    def __init__(
+        self, *, plan: Plan, gun: Gun, journal: Journal, clock: Clock, screen: Screen, guard_s: float, told: Told = ()
+    ) -> None:
+        self.plan, self.clock, self.guard_s = plan, clock, guard_s
+        self.gun, self._journal, self._screen = gun, journal, screen
+        self._told = list(told)
+        self._position = Position(since_s=clock.now())
+        self._painted_s: float | None = None
+        self._paused_s: float | None = None
+        self.shown_s: float | None = None
+        self._inbox: deque[Event] = deque()
+        self._news = threading.Condition(threading.RLock())
+        self._disarming: list[threading.Thread] = []
+
+    # for everybody
+
+    @property
+    def position(self) -> Position:
+        """Where the run is."""
+        return self._position
+
+    @property
+    def told(self) -> Sequence[tuple[Step | None, Outcome | Remark]]:
+        """What was told so far: steps with their outcomes, and remarks."""
+        with self._news:
+            return tuple(self._told)
+
+    @property
+    def trial(self) -> Trial:
+        """The trial at hand: that of an open correction, else that of the step, else the last one."""
+        position = self._position
+        return position.correcting.trial if position.correcting else trial_at(self.plan, self._told, position.step)
+
+    def ready_at_s(self, now_s: float) -> bool:
+        """Whether a press at a time would be late enough for what stands there."""
+        painted_s = self._painted_s
+        return painted_s is not None and now_s - painted_s >= self.guard_s
+
+    def paused_since(self, at_s: float) -> bool:
+        """Whether the run was paused since a time."""
+        return self._paused_s is not None and self._paused_s >= at_s
+
+    def painted(self, serial: int, at_s: float) -> None:
+        """Take when a position was painted: from then on, and the guard time later, it can be worked."""
+        with self._news:
+            if serial == self._position.serial and self._painted_s is None:
+                self._painted_s = at_s
+                self.shown_s = at_s if self.shown_s is None else self.shown_s
+
+    def offer(self, event: Event, press: Press | None = None) -> Verdict:
+        """Have an event judged, and taken if it may be. Never waits. `press`: by the experimenter's hand."""
+        with self._news:
+            meant, text = self._meant(event)
+            refusal = self._refusal(meant, press)
+            if refusal:
+                self._keep_refused(meant, refusal)
+                return Verdict(taken=False, text=refusal)
+            before = self._position
+            self._position = self._after(before, meant)
+            self._keep(meant, before)
+            self._paused_s = self._position.paused_s or self._paused_s
+            if self._position.serial != before.serial:
+                self._painted_s = None
+            if self._position.states[0] != before.states[0]:
+                self._inbox.append(meant)
+            self._news.notify_all()
+            position = self._position
+        if isinstance(meant, _DISARMS) and (before.base in ARMED or isinstance(meant, events.EmergencyStop)):
+            self._disarm_beside()
+        self._screen.show(position)
+        return Verdict(taken=True, text=text)
+
+    # for the run
+
+    def enter(self, state: State, step: Step | None = None, until_s: float | None = None) -> None:
+        """The session's next step is there. `RunStopped`: the run was stopped before. `Held`: no shot may be fired."""
+        with self._news:
+            self._check()
+            if state in ARMED and self._inbox:
+                self._inbox.clear()
+                raise Held(self._position.why)  # paused since the key to fire, and perhaps gone on with
+            new = step is not None and step is not self._position.step
+            self._position = entered(self._position, state, self.clock.now(), step, until_s)
+            self._inbox.clear()
+            self._painted_s = None
+            if new:
+                self.shown_s = None
+            position = self._position
+        self._screen.show(position)
+
+    def felt(self, onset_s: float | None, *, least_s: float = 0.0) -> None:
+        """A stimulus began, or is about to (`None`): what carries a train on is not taken before the least exposure."""
+        not_before_s = math.inf if onset_s is None else onset_s + least_s
+        with self._news:
+            self._position = replace(self._position, onset_s=onset_s, not_before_s=not_before_s)
+
+    def wait(self, until_s: float | None = None) -> Event | None:
+        """The event that carried the step on; `None` when its time is over, which it never is while it is held.
+
+        `RunStopped`: the run was stopped, `RunHalted`: for an emergency.
+        """
+        self._screen.act(self._position, until_s)
+        with self._news:
+            while not self._inbox:
+                self._check()
+                left_s = self._left_s(until_s)
+                if left_s is not None and left_s <= 0:
+                    return None
+                self.clock.wait(self._news, left_s)
+            self._check()
+            return self._inbox.popleft()
+
+    def taken(self) -> Event | None:
+        """What was taken meanwhile, without waiting. Raises as `wait`."""
+        with self._news:
+            self._check()
+            return self._inbox.popleft() if self._inbox else None
+
+    def stay_halted(self) -> str:
+        """Wait until a halted run is closed; why."""
+        while self._position.base is State.HALTED:
+            self._screen.act(self._position, None)
+            with self._news:
+                if self._position.base is State.HALTED:
+                    self.clock.wait(self._news, None)
+        return self._position.why
+
+    def end(self, why: str) -> None:
+        """The run is over: finished, or stopped for a reason. Nothing is taken any more."""
+        with self._news:
+            states = (State.STOPPED,)
+            self._position = replace(self._position, states=states, serial=self._position.serial + 1, why=why)
+            self._position = replace(self._position, correcting=None, paused_s=None)
+            position = self._position
+        self._screen.show(position)
+
+    def allow_shot(self) -> None:
+        """Nothing if a shot may be fired now. `RunStopped`, `RunHalted`, `Held`: it may not."""
+        with self._news:
+            self._check()
+            if self._position.state not in ARMED:
+                raise Held(self._position.why)
+
+    def settle(self) -> None:
+        """Wait until what began to disarm beside the run is done, so that it does not come too late."""
+        while self._disarming:
+            self._disarming.pop().join(DISARMED_S)
+
+    def sleep(self, until_s: float) -> None:
+        """Wait until a time, as long as a shot may be fired; raises as `allow_shot`."""
+        with self._news:
+            while True:
+                self.allow_shot()
+                left_s = until_s - self.clock.now()
+                if left_s <= 0:
+                    return
+                self.clock.wait(self._news, left_s)
+
+    def keep(self, step: Step, outcome: Outcome) -> None:
+        """Take an outcome that is on the disk, and show that it is."""
+        with self._news:
+            self._told.append((step, outcome))
+        self._screen.acknowledge(step, outcome)
+
+    def remark(self, remark: Remark) -> None:
+        """Have a remark written behind what was written before, and shown when it is on the disk."""
+        with self._news:
+            self._told.append((None, remark))
+        try:
+            written = self._journal.submit("remark", body=record(remark))
+        except RuntimeError:  # the journal is closed: the run has just ended
+            self._screen.trouble("The run has ended; nothing can be added.")
+            return
+        written.add_done_callback(lambda done: self._written(remark, done))
+
+    # judging
+
+    def _meant(self, event: Event) -> tuple[Event, str]:
+        """A correction to what stands there already is none."""
+        entry = self._position.correcting
+        if isinstance(event, events.Correct) and entry is not None and event.value == value(self._told, entry):
+            return events.Leave(), "That is what stands there: nothing was corrected."
+        return event, ""
+
+    def _refusal(self, event: Event, press: Press | None) -> str:
+        """Why an event is not taken now; empty if it is."""
+        judged = after(self._position, type(event), self.clock.now())
+        if isinstance(judged, No):
+            return judged.because
+        return self._mistimed(event, press) or self._impossible(event)
+
+    def _mistimed(self, event: Event, press: Press | None) -> str:
+        if not isinstance(event, ACTS):
+            return ""
+        position, not_before_s = self._position, self._position.not_before_s
+        if not_before_s is not None and self.clock.now() < not_before_s:
+            return "Too soon: it is to be felt for longer."
+        if press is None:
+            return ""
+        if press.serial != position.serial or self._painted_s is None:
+            return "That was pressed for what stood there before: press again."
+        if press.at_s - self._painted_s < self.guard_s:
+            return "Too soon after the change: press again."
+        return ""
+
+    def _impossible(self, event: Event) -> str:
+        """What the table cannot know: whether there is anything to undo or to repeat."""
+        match event:
+            case events.ParticipantKey() | events.ParticipantRated() if event.step != self._position.number:
+                return "It was the answer to an earlier question."
+            case events.Undo() if self._further_back() is None:
+                return "There is nothing to undo in this set."
+            case events.Repeat() if self._repeatable() is None:
+                return "There is no trial of this set to repeat now."
+            case events.Rearm(held_s=float() as held_s) if held_s < REARM_HELD_S:
+                return f"Hold it for {REARM_HELD_S:g} s."
+            case _:
+                return ""
+
+    def _further_back(self) -> Entry | None:
+        found = entries(self._told, self.trial)
+        here = self._position.correcting
+        if here in found:
+            return found[max(0, found.index(here) - 1)]
+        return found[-1] if found else None
+
+    def _repeatable(self) -> Trial | None:
+        return repeatable(self._told, self._position.step, trial_at(self.plan, self._told, self._position.step))
+
+    def repeated(self) -> Trial | None:
+        """The trial that would be presented again now, if there is one."""
+        with self._news:
+            return self._repeatable()
+
+    @property
+    def undoable(self) -> bool:
+        """Whether there is anything to undo in the set at hand."""
+        with self._news:
+            return self._further_back() is not None
+
+    def _after(self, before: Position, event: Event) -> Position:
+        position = after(before, type(event), self.clock.now())
+        if isinstance(position, No):  # it was judged under the same lock
+            raise TypeError(position.because)
+        match event:
+            case events.Undo():
+                entry = self._further_back()
+                moved = position.serial + (entry != before.correcting and position.serial == before.serial)
+                return replace(position, correcting=entry, serial=moved)
+            case events.EmergencyStop():
+                return replace(position, why=EMERGENCY)
+            case events.Stop():
+                return replace(position, why=_stopped(before, event.reason))
+            case events.DisplayLost():
+                return replace(position, why=_stopped(before, "the display was lost"))
+            case events.ParticipantLost() | events.ResultsGone():
+                return replace(position, why=event.cause)
+            case events.Pause() | events.GoOn() | events.ParticipantBack():
+                return replace(position, why="")
+            case _:
+                return position
+
+    # keeping
+
+    def _keep(self, event: Event, before: Position) -> None:
+        """Have what is no step's outcome written."""
+        remark = self._remark_of(event, before)
+        if remark is not None:
+            self.remark(remark)
+
+    def _remark_of(self, event: Event, before: Position) -> Remark | None:  # noqa: C901, PLR0911 - one case an event
+        match event:
+            case events.Flag():
+                return Flagged(trial=event.trial or self.trial, flag=event.flag)
+            case events.Note():
+                return Noted(trial=event.trial or self.trial, text=event.text)
+            case events.Correct() if before.correcting is not None:
+                return _corrected(before.correcting, event)
+            case events.Reason():
+                return HaltReason(text=event.text)
+            case events.EmergencyStop() if before.base is not State.HALTED:
+                return Halted(by=event.by)
+            case events.Pause():
+                return Paused()
+            case events.ParticipantBack():
+                return Noted(trial=None, text="The participant's screen was started again.")
+            case events.ParticipantLost() if before.paused_s is None and self._position.paused_s is not None:
+                return Paused(cause=event.cause)
+            case events.GoOn():
+                return Continued(paused_s=round(self.clock.now() - (before.paused_s or before.since_s), 3))
+            case _:
+                return None
+
+    def _keep_refused(self, event: Event, because: str) -> None:
+        """Keep what would have carried the run on."""
+        own = isinstance(event, events.ParticipantKey | events.ParticipantRated)
+        if not (own or isinstance(event, ACTS)) or self._position.base is State.STOPPED:
+            return
+        state = str(self._position.state)
+        self.remark(
+            Refused(
+                event=events.word(type(event)),
+                state=state,
+                because=because,
+                by="participant" if own else "experimenter",
+            )
+        )
+
+    def _written(self, remark: Remark, done: Future[None]) -> None:
+        error = done.exception()
+        if error is None:
+            self._screen.acknowledge(None, remark)
+            return
+        self._screen.trouble(str(error))
+        if isinstance(error, JournalGone):
+            self.offer(events.ResultsGone(cause=str(error)))
+
+    # the run's side
+
+    def _check(self) -> None:
+        if self._position.base is State.HALTED:
+            raise RunHalted(self._position.why)
+        if self._position.base is State.STOPPED:
+            raise RunStopped(self._position.why)
+
+    def _left_s(self, until_s: float | None) -> float | None:
+        """How long the step may still wait; `None` without an end, or while something lies over it."""
+        end_s = until_s if self._position.until_s is None else self._position.until_s
+        return None if end_s is None or self._position.held else end_s - self.clock.now()
+
+    def _disarm_beside(self) -> None:
+        thread = threading.Thread(target=self._disarm, daemon=True, name="disarm")
+        self._disarming.append(thread)
+        thread.start()
+
+    def _disarm(self) -> None:
+        """Disarm, and show what the gun itself then says."""
+        try:
+            self.gun.disarm()
+            self._screen.gun_seen(self.gun.status(), "")
+        except DeviceError as error:
+            self._screen.gun_seen(None, str(error))
+            self._screen.trouble(f"The gun does not say that it is disarmed ({error}): switch off its power!")
+
+
+def _stopped(before: Position, reason: str) -> str:
+    """Why a run stopped: after an emergency stop for that, whatever closed it."""
+    return EMERGENCY if before.base is State.HALTED else reason
+
+
+def _corrected(entry: Entry, event: events.Correct) -> Remark:
+    match entry.what, event.value:
+        case "answer", "forward" | "backward" as response:
+            return AnswerCorrected(trial=entry.trial, response=response)
+        case "rating", float() | None as rating:
+            return RatingCorrected(trial=entry.trial, rating=rating)
+        case "description", str() as comment:
+            return DescriptionCorrected(trial=entry.trial, comment=comment)
+        case _:
+            raise TypeError(f"{event.value!r} is no {entry.what}")

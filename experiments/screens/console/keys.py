@@ -1,0 +1,219 @@
+"""The keys of the console: which command each is, and which press counts. Pure: knows nothing of Qt.
+
+A key acts when it goes down and was up before. Auto-repeat never acts, nor does a contact that bounces.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import Literal
+
+from experiments import events
+from experiments.entries import What
+from experiments.events import Event
+from experiments.states import No, Position, State, change_of
+
+BOUNCE_S = 0.02
+"""A key that goes down again so soon was not let go by a hand: an auto-repeat told as two events, or a bounce."""
+
+STRANGE_S = 2.0
+"""An event whose time is further off than this is not dated by the clock that the others are."""
+
+Name = Literal[
+    "fire",
+    "next",
+    "damper",
+    "forward",
+    "backward",
+    "enter",
+    "no answer",
+    "end break",
+    "rearm",
+    "go on",
+    "pause",
+    "undo",
+    "leave",
+    "repeat",
+    "flag",
+    "note",
+    "reason",
+    "stop",
+    "emergency",
+    "restart",
+    "list",
+    "help",
+    "theme",
+]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Command:
+    """Something that a key does. `kind` is the event that it offers, if it offers one."""
+
+    name: Name
+    key: str
+    text: str
+    does: str
+    kind: type[Event] | None = None
+
+
+_C = Command
+COMMANDS: tuple[Command, ...] = (
+    _C(name="emergency", key="F12", text="EMERGENCY STOP", does="disarms; fires no more", kind=events.EmergencyStop),
+    _C(name="fire", key="Space", text="Fire", does="fires, when the gun is handed over", kind=events.Fire),
+    _C(name="next", key="Space", text="“Next” was said", does="ends the train", kind=events.Next),
+    _C(name="damper", key="M", text="Damper is set", does="says that the damper is set", kind=events.DamperSet),
+    _C(name="forward", key="F", text="FORWARD", does="enters forward", kind=events.Answer),
+    _C(name="backward", key="B", text="BACKWARD", does="enters backward", kind=events.Answer),
+    _C(
+        name="enter",
+        key="Enter",
+        text="Enter",
+        does="enters what is typed; at the end, ends the run",
+        kind=events.Finish,
+    ),
+    _C(name="no answer", key="Ctrl+X", text="No answer", does="enters that there is no rating", kind=events.Rating),
+    _C(name="end break", key="E", text="End the break…", does="ends a break early, for a reason", kind=events.EndBreak),
+    _C(name="rearm", key="T", text="Hold T: test shot", does="held for 1 s: a test shot", kind=events.Rearm),
+    _C(name="pause", key="P", text="Pause", does="holds everything; again, goes on", kind=events.Pause),
+    _C(name="go on", key="P", text="Go on", does="goes on after a pause", kind=events.GoOn),
+    _C(name="undo", key="U", text="Undo", does="opens the last entry, then the one before", kind=events.Undo),
+    _C(name="leave", key="Esc", text="Leave", does="leaves a field or a correction; never stops", kind=events.Leave),
+    _C(name="repeat", key="R", text="Repeat…", does="presents the trial again, for a reason", kind=events.Repeat),
+    _C(name="flag", key="G", text="Flag…", does="marks the trial with a word", kind=events.Flag),
+    _C(name="note", key="N", text="Note…", does="writes a note on the trial", kind=events.Note),
+    _C(name="reason", key="Y", text="Say why…", does="says why there was an emergency stop", kind=events.Reason),
+    _C(name="stop", key="Q", text="Stop…", does="stops the run, which can be resumed", kind=events.Stop),
+    _C(
+        name="restart",
+        key="S",
+        text="Start the participant's screen again",
+        does="starts the participant's screen again",
+    ),
+    _C(name="list", key="L", text="List", does="lists flags, notes and corrections of the set"),
+    _C(name="help", key="F1", text="Keys", does="shows this page"),
+    _C(name="theme", key="F2", text="Dark/light", does="changes the colours"),
+)
+BY_NAME: dict[Name, Command] = {command.name: command for command in COMMANDS}
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Typing:
+    """What is being typed: a line that was asked for, or the field of the position."""
+
+    line: bool = False
+    field: bool = False
+
+    @property
+    def letters(self) -> bool:
+        """Whether letters are text."""
+        return self.line or self.field
+
+
+def command_for(key: str, *, ctrl: bool, typing: Typing, position: Position) -> Name | None:
+    """The command that a key is now; `None` if it is none, and so may be text.
+
+    Where letters are text, a letter is a command with Ctrl held.
+    """
+    if key in ("F12", "F1", "F2", "Esc"):
+        return {"F12": "emergency", "F1": "help", "F2": "theme", "Esc": "leave"}[key]  # type: ignore[return-value]
+    if key == "Enter":
+        return "enter"
+    if ctrl and key == "X":
+        return "no answer" if field_of(position) == "number" and not typing.line else None
+    if ctrl != typing.letters:
+        return None
+    return _letter(key, position)
+
+
+def _letter(key: str, position: Position) -> Name | None:
+    match key:
+        case "Space":
+            return "next" if position.base is State.TRAIN else "fire"
+        case "P":
+            return "go on" if position.state is State.PAUSED else "pause"
+        case _:
+            return _LETTERS.get(key)
+
+
+_LETTERS: dict[str, Name] = {
+    command.key: command.name for command in COMMANDS if len(command.key) == 1 and command.key != "P"
+}
+
+
+def field_of(position: Position) -> Literal["number", "words"] | None:
+    """What is typed at a position, apart from a line that was asked for."""
+    what: What | None = None
+    if position.state is State.CORRECTING and position.correcting is not None:
+        what = position.correcting.what
+    elif position.state is State.RATING:
+        what = "rating"
+    elif position.state is State.DESCRIBING:
+        what = "description"
+    return {"rating": "number", "description": "words"}.get(what or "")  # type: ignore[return-value]
+
+
+def shown_key(name: Name, *, letters: bool) -> str:
+    """The key of a command as it stands on its button: letters that are text need Ctrl.
+
+    >>> shown_key("undo", letters=True), shown_key("help", letters=True)
+    ('Ctrl+U', 'F1')
+    """
+    key = BY_NAME[name].key
+    return f"Ctrl+{key}" if letters and len(key) == 1 else key
+
+
+def why_not(name: Name, position: Position) -> str:
+    """Why a command does nothing at a position; empty if it does something."""
+    kind = BY_NAME[name].kind
+    if name in ("forward", "backward") and position.state is State.CORRECTING:
+        kind = events.Correct if field_of(position) is None else kind
+    if name == "no answer" and position.state is State.CORRECTING:
+        kind = events.Correct
+    if kind is None:
+        return ""
+    change = change_of(position, kind)
+    return change.because if isinstance(change, No) else ""
+
+
+class Presses:
+    """Which keys are down, so that a press acts once."""
+
+    def __init__(self) -> None:
+        self._down: set[str] = set()
+        self._up_s: dict[str, float] = {}
+
+    def down(self, key: str, at_s: float, *, repeated: bool) -> bool:
+        """Whether this press acts: the key was up, and a hand let it go."""
+        fresh = key not in self._down and at_s - self._up_s.get(key, -math.inf) >= BOUNCE_S
+        if not repeated:
+            self._down.add(key)
+        return fresh and not repeated
+
+    def up(self, key: str, at_s: float, *, repeated: bool) -> None:
+        """A key was let go, unless the system only repeats it."""
+        if not repeated:
+            self._down.discard(key)
+            self._up_s[key] = at_s
+
+    def lost(self) -> None:
+        """The window has lost the keys: what was down may be let go unseen."""
+        self._down.clear()
+
+
+class EventClock:
+    """When events happened, on the run's clock, from the stamps of the window system, whose zero is its own.
+
+    The stamp can be no later than the event is seen: the smallest difference ever seen is that of the clocks.
+    """
+
+    def __init__(self) -> None:
+        self._offset_s = math.inf
+
+    def at(self, stamp_ms: int, now_s: float) -> float:
+        """When an event with a stamp happened that is seen now."""
+        stamp_s = stamp_ms / 1000
+        self._offset_s = min(self._offset_s, now_s - stamp_s)
+        at_s = stamp_s + self._offset_s
+        return at_s if now_s - at_s < STRANGE_S else now_s

@@ -1,0 +1,172 @@
+"""What every screen says in the same words: where a run is, what was saved, how a value reads. Pure.
+
+Neither correctness nor a score is in here, nor a method's name.
+"""
+
+from __future__ import annotations
+
+from experiments.entries import Entry, Value, together, value
+from experiments.plan import Plan, Trial
+from experiments.remarks import (
+    MAX_FLAG,
+    AnswerCorrected,
+    DescriptionCorrected,
+    Flagged,
+    HaltReason,
+    Noted,
+    RatingCorrected,
+    Remark,
+    TestShot,
+)
+from experiments.steps import (
+    Answered,
+    Described,
+    Failed,
+    Interrupted,
+    Outcome,
+    Prepare,
+    Presented,
+    Rated,
+    Repeat,
+    Rested,
+    Step,
+    trial_of,
+)
+from experiments.tables import Told, is_attempt
+
+FLAG_RULE = f"A flag is a word of at most {MAX_FLAG} letters, digits and hyphens."
+
+
+def ordinal(plan: Plan, trial: Trial) -> str:
+    """How a stimulus is named that is rated after all were felt: by its order, not by its method."""
+    return f"Feedback {trial.trial} of {len(plan.trials)}"
+
+
+def place_text(plan: Plan, trial: Trial) -> str:
+    """Where a trial stands: in its session, set and run."""
+    in_session = [other for other in plan.trials if other.session == trial.session]
+    where = f"Trial {trial.trial} of {len(in_session)}"
+    sessions, sets = plan.trials[-1].session, in_session[-1].set
+    return (
+        where
+        if sessions == sets == 1
+        else f"{where} · set {trial.set} of {sets} · session {trial.session} of {sessions}"
+    )
+
+
+def short_place(trial: Trial, here: Trial) -> str:
+    """Where a trial stands that is looked at from another: its set and session are named where they differ."""
+    place = f"trial {trial.trial}"
+    if together(trial, here):
+        return place
+    place += f" of set {trial.set}"
+    return place if trial.session == here.session else f"{place}, session {trial.session}"
+
+
+def again_text(told: Told, step: Prepare) -> str:
+    """How often a trial was felt already, as the table counts its attempts; empty if never."""
+    before = sum(is_attempt(one, word) for one, word in told if trial_of(one) == step.trial)
+    return f"Presented again, for the {_nth(before + 1)} time." if before else ""
+
+
+def _nth(number: int) -> str:
+    return {1: "first", 2: "second", 3: "third"}.get(number, f"{number}th")
+
+
+def read_out_text(plan: Plan, step: Prepare) -> str:
+    """What the participant is told: to be read out before a set, and as a reminder at its other trials."""
+    if not step.instruction:
+        return ""
+    how = "READ OUT" if plan.opens_set(step.trial) else "Instruction of this set"
+    return f"\n  {how}: “{step.instruction}”"
+
+
+def value_text(said: Value) -> str:
+    """What was entered, as text."""
+    if said is None:
+        return "no answer"
+    if isinstance(said, float):
+        return f"{said:g}"
+    return said.upper() if said in ("forward", "backward") else f"“{said}”"
+
+
+def entry_text(plan: Plan, told: Told, entry: Entry) -> str:
+    """An entry with what it says."""
+    name = f"Trial {entry.trial.trial}" if entry.what == "answer" else f"{ordinal(plan, entry.trial)}, {entry.what}"
+    return f"{name}: {value_text(value(told, entry))}"
+
+
+def saved_text(plan: Plan, step: Step | None, word: Outcome | Remark) -> str:  # noqa: C901, PLR0911 - one case a word
+    """That something is on the disk, as it was entered; empty for what needs no answer."""
+    trial = trial_of(step)
+    if trial is None:
+        return _rested_text(word) if step is not None else _remark_text(plan, word)
+    match word:
+        case Answered():
+            return f"Saved. Trial {trial.trial}: {value_text(word.response)}."
+        case Rated():
+            return f"Saved. {ordinal(plan, trial)}: {value_text(word.rating)}."
+        case Described():
+            return f"Saved. {ordinal(plan, trial)}: description."
+        case Presented():
+            return f"Presented and saved. {shots_text(word.shots)}, {word.exposure_s:.1f} s."
+        case Failed():
+            return f"The gun failed: {word.cause}. The trial is marked and presented again."
+        case Interrupted():
+            return "The pause ended the stimulus: its trial is presented again." if word.presented else ""
+        case Repeat():
+            return f"Saved. Trial {word.trial.trial} is presented again ({word.reason})."
+        case _:
+            return ""
+
+
+def _rested_text(word: Outcome | Remark) -> str:
+    match word:
+        case Rested():
+            return "The break is over."
+        case Repeat():
+            return f"Saved. Trial {word.trial.trial} is presented again ({word.reason})."
+        case _:
+            return ""
+
+
+def _remark_text(plan: Plan, remark: Outcome | Remark) -> str:
+    match remark:
+        case AnswerCorrected():
+            return f"Saved. Trial {remark.trial.trial} corrected to {value_text(remark.response)}."
+        case RatingCorrected():
+            return f"Saved. {ordinal(plan, remark.trial)} corrected to {value_text(remark.rating)}."
+        case DescriptionCorrected():
+            return f"Saved. {ordinal(plan, remark.trial)}: description corrected."
+        case Flagged():
+            return f"Saved. Trial {remark.trial.trial} flagged {remark.flag}."
+        case Noted():
+            return "Saved. Note."
+        case HaltReason():
+            return "Saved. Reason of the emergency stop."
+        case TestShot():
+            return f"Test shot failed: {remark.cause}." if remark.cause else "The test shot was fired; the run goes on."
+        case _:
+            return ""
+
+
+def shots_text(count: int) -> str:
+    """A number of shots.
+
+    >>> shots_text(1), shots_text(2)
+    ('1 shot', '2 shots')
+    """
+    return f"{count} shot{'' if count == 1 else 's'}"
+
+
+def typed_number(text: str, minimum: float, maximum: float) -> float | None:
+    """A number as people type it, comma or point, if it lies on the scale.
+
+    >>> typed_number("7,5", 0, 10), typed_number("11", 0, 10), typed_number("nan", 0, 10)
+    (7.5, None, None)
+    """
+    try:
+        number = float(text.strip().replace(",", "."))
+    except ValueError:
+        return None
+    return number if minimum <= number <= maximum else None
