@@ -1,4 +1,7 @@
-"""An experimenter's hands at the console's controls, without its window: a run in a thread, every message taken."""
+"""An experimenter's hands at the console's controls, on a window of paper: a run in a thread, its screen in ours.
+
+What the run tells is drawn when the test says so; keys go down and up when it says so, on a clock of its own.
+"""
 
 from __future__ import annotations
 
@@ -6,34 +9,45 @@ import csv
 import queue
 import re
 import threading
+import time
 from collections.abc import Callable
 from contextlib import contextmanager
 from dataclasses import dataclass, field, replace
+from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any
 
+from device import Gun, GunStatus, Shot, ShotReport
 from device.words import Direction
-from experiments.clock import VirtualClock
+from experiments import run as runs
+from experiments.events import Press
 from experiments.journal import Contents, read
+from experiments.live_run import LiveRun, Screen
 from experiments.load import load_setup
 from experiments.places import Place, place
 from experiments.plan import Plan, Trial
 from experiments.remarks import AnswerCorrected, Remark
 from experiments.replay import told
-from experiments.run import Request, run, table
-from experiments.runner import Screen
-from experiments.screens.console import theme
-from experiments.screens.console.controls import Controls
-from experiments.screens.console.messages import Began, Ended, Message, Saved, Trouble, Waiting
-from experiments.screens.console.screen import ConsoleScreen
-from experiments.screens.console.state import State, coming, instruction, place_text
+from experiments.run import Finished, Request, run, table
+from experiments.screens.console import theme, view
+from experiments.screens.console.controls import Controls, Field
+from experiments.screens.console.keys import Name, Presses
+from experiments.screens.console.messages import Ended, GunSeen
+from experiments.screens.console.view import About, Seen
 from experiments.setup import Setup
-from experiments.steps import Answered
+from experiments.states import ARMED, Position, State
+from experiments.steps import Answered, Outcome, Step
 
-BREAK_S = 0.02
-LONG_BREAK_S = 30.0
-PATIENCE_S = 20.0
+PATIENCE_S = 60.0
+LOOK_S = 0.002
 CORRECTNESS = re.compile(r"\b(correct|incorrect|correctly|wrong|right|score|hits?|points?)\b|%", re.IGNORECASE)
+"""Words of a running score; what a correction is called is none."""
+CORRECTION = re.compile(r"\bcorrect (the|an answer|to)|anything to correct", re.IGNORECASE)
+
+
+def tells_correctness(text: str) -> bool:
+    """Whether a text gives away how good the participant is."""
+    return CORRECTNESS.search(CORRECTION.sub("", text)) is not None
 
 
 def changed(name: str, **changes: dict[str, Any]) -> Setup[Any]:
@@ -45,118 +59,488 @@ def changed(name: str, **changes: dict[str, Any]) -> Setup[Any]:
     return replace(setup, config=type(setup.config).model_validate(config))
 
 
-def short_direction(sets: int = 2, trials: int = 3, set_break_s: float = LONG_BREAK_S) -> Setup[Any]:
-    """Experiment 1 with two methods. Breaks between sets are long, so they are cut short; the others end by themselves.
-
-    The virtual clock stands still meanwhile, so that a break lasts until its end is asked for or its queue gives up.
-    """
+def short_direction(sets: int = 2, trials: int = 3, set_break_s: float = 30.0) -> Setup[Any]:
+    """Experiment 1 with two methods, one of them with a damper."""
     half, rest = divmod(sets * trials, 2)
     design = {"methods": ("vibration", "asymmetric-2"), "sets_per_session": sets, "trials_per_set": trials}
     design |= {"forward_per_session": half + rest, "backward_per_session": half}
-    breaks = {"between_sets_s": set_break_s, "between_sessions_s": BREAK_S}
+    breaks = {"between_sets_s": set_break_s, "between_sessions_s": 60.0}
     return changed("direction", design=design, breaks=breaks, fatigue={"max_trials_without_break": 60})
 
 
 DIRECTION, PREFERENCE = short_direction(), load_setup("preference")
+GUARD_S: float = DIRECTION.config.console.guard_s
+
+
+class OwnClock:
+    """A clock that goes on when the test says so, and by itself while a gun gets ready: nothing there is timed.
+
+    `idle` is set while the run waits on it.
+    """
+
+    name = "test"
+
+    def __init__(self) -> None:
+        self._now_s = 1000.0
+        self._lock = threading.Lock()
+        self.idle = threading.Event()
+        self._timed = False
+        self.by_itself: Callable[[], bool] = lambda: False
+
+    def now(self) -> float:
+        return self._now_s
+
+    def utc(self) -> str:
+        return datetime.fromtimestamp(1_790_000_000 + self._now_s, UTC).isoformat(timespec="microseconds")
+
+    def skip(self, seconds: float) -> None:
+        """Let time go by."""
+        with self._lock:
+            self._now_s += seconds
+            if self._timed:
+                self.idle.clear()  # until the run has looked at the time again
+
+    def sleep(self, seconds: float) -> None:
+        self.skip(max(0.0, seconds))
+
+    def wait(self, news: threading.Condition, seconds: float | None) -> None:
+        if seconds is not None and self.by_itself():
+            self.skip(seconds)
+            return
+        with self._lock:
+            self._timed = seconds is not None
+            self.idle.set()
+        news.wait(None if seconds is None else LOOK_S)
+        with self._lock:
+            self._timed = False
+            self.idle.clear()
+
+
+@dataclass(frozen=True)
+class FiredShot:
+    """A call of `fire`: when, and at which position of the run."""
+
+    at_s: float
+    position: Position
+
+
+class WatchedGun:
+    """A gun that keeps what is asked of it, and does what the test wants of the next shot."""
+
+    def __init__(self, gun: Gun, clock: OwnClock) -> None:
+        self._gun, self._clock = gun, clock
+        self.live: LiveRun | None = None
+        self.fired: list[FiredShot] = []
+        self.calls: list[str] = []
+        self.fails: list[Exception] = []
+        self.hang = False
+        self.hangs, self.released = threading.Event(), threading.Event()
+
+    def arm(self) -> None:
+        self.calls.append("arm")
+        self._gun.arm()
+
+    def disarm(self) -> None:
+        self._gun.disarm()
+        self.calls.append("disarm")
+
+    def fire(self, shot: Shot, at_s: float | None = None) -> ShotReport:
+        assert self.live is not None
+        self.calls.append("fire")
+        self.fired.append(FiredShot(at_s=self._clock.now(), position=self.live.position))
+        if self.hang:
+            self.hang = False
+            self.released.clear()
+            self.hangs.set()
+            assert self.released.wait(PATIENCE_S)
+            self.hangs.clear()
+        if self.fails:
+            raise self.fails.pop(0)
+        return self._gun.fire(shot, at_s)
+
+    def __getattr__(self, name: str) -> Any:
+        return getattr(self._gun, name)
 
 
 @dataclass
-class Listener:
-    """A window that remembers what it was told and shown, and answers a question for a line at once."""
+class Offered:
+    """An event that was offered by a press, the position it was drawn for, and whether it was taken."""
 
-    line: str = "a dog barked"
-    lines: list[str] = field(default_factory=list)
-    heard: list[str] = field(default_factory=list)
+    event: Any
+    press: Press | None
+    position: Position
+    painted_s: float | None
+    taken: bool
+
+
+class PaperWindow:
+    """A window that draws nothing but remembers what it would show; the keys reach the controls as in the real one."""
+
+    def __init__(self, setup: Setup[Any], plan: Plan, clock: OwnClock) -> None:
+        self.about = About(setup=setup, plan=plan)
+        self._clock = clock
+        self._news: queue.SimpleQueue[tuple[str, Any]] = queue.SimpleQueue()
+        self._presses = Presses()
+        self.live: LiveRun | None = None
+        self.controls: Controls | None = None
+        self.heard: list[str] = []
+        self.fields: dict[Field, str] = {"line": "", "number": "", "words": ""}
+        self.painted_s: dict[int, float] = {}
+        self.offered: list[Offered] = []
+        self.saved: list[tuple[Step | None, Any]] = []
+        self.troubles: list[str] = []
+        self.gun: GunSeen | None = None
+
+    # the run's side: Screen
+
+    def begin(self, live: LiveRun) -> None:
+        self.live = live
+        offer = live.offer
+
+        def watched(event: Any, press: Press | None = None) -> Any:
+            position, painted_s = live.position, self.painted_s.get(live.position.serial)
+            verdict = offer(event, press)
+            self.offered.append(Offered(event, press, position, painted_s, verdict.taken))
+            return verdict
+
+        live.offer = watched  # type: ignore[method-assign]
+        self.controls = Controls(live, self._clock, self, scale=getattr(self.about.setup.config, "rating", None))
+        self._news.put(("show", live.position))
+
+    def show(self, position: Position) -> None:
+        self._news.put(("show", position))
+
+    def act(self, position: Position, until_s: float | None) -> None:
+        pass
+
+    def acknowledge(self, step: Step | None, word: Outcome | Remark) -> None:
+        self.saved.append((step, word))
+
+    def trouble(self, text: str) -> None:
+        self.troubles.append(text)
+
+    def gun_seen(self, status: GunStatus | None, fault: str) -> None:
+        self.gun = GunSeen(status=status, fault=fault)
+
+    # the window's side
+
+    def paint(self) -> None:
+        """Draw the newest position, as the window's thread does when it gets to it."""
+        while not self._news.empty():
+            self._news.get()
+        if self.live is None or self.controls is None:
+            return
+        drawn = self.live.position
+        if drawn.serial != self.controls.drawn.serial:
+            self.fields["number"] = self.fields["words"] = ""
+        self.controls.drawn = drawn
+        if drawn.state is State.HALTED:
+            self.controls.uncover()
+        self._look(drawn)
+        if drawn.serial not in self.painted_s:
+            self.painted_s[drawn.serial] = self._clock.now()
+        self.live.painted(drawn.serial, self._clock.now())
+
+    def _look(self, drawn: Position) -> None:
+        assert self.live is not None
+        assert self.controls is not None
+        seen = Seen(about=self.about, position=drawn, told=self.live.told, gun=self.gun)
+        shown = view.instruction(seen, self._clock.now())
+        self.heard += [shown.title, shown.damper, shown.detail, view.place_text(seen)]
+        self.heard += [*view.coming(seen), *view.answers(seen), *self.controls.help_lines()]
+
+    def down(self, key: str, *, ctrl: bool = False, repeated: bool = False) -> None:
+        """A key goes down, or is repeated by the system."""
+        assert self.controls is not None
+        at_s = self._clock.now()
+        acts = self._presses.down(key, at_s, repeated=repeated)
+        name = self.controls.command(key, ctrl=ctrl)
+        if name is None and acts and len(key) == 1:
+            self._type(key.lower())
+        elif name is not None and acts:
+            self.controls.down(name, at_s)
+
+    def up(self, key: str, *, repeated: bool = False) -> None:
+        """A key is let go."""
+        assert self.controls is not None
+        self._presses.up(key, self._clock.now(), repeated=repeated)
+        if not repeated:
+            self.controls.up(key)
+
+    def lose_keys(self) -> None:
+        """The window loses the keys and gets them back."""
+        self._presses.lost()
+
+    def press(self, key: str, *, ctrl: bool = False) -> None:
+        """A key goes down and up, with the pause of a hand before it."""
+        self._clock.skip(0.03)
+        self.down(key, ctrl=ctrl)
+        self._clock.skip(0.03)
+        self.up(key)
+
+    def click(self, name: Name, *, moved_on: bool = False) -> None:
+        """A click on a button; if it has moved on, its release falls into another position."""
+        assert self.controls is not None
+        press = self.controls.press()
+        if moved_on:
+            self.paint()
+        self.controls.do(name, press)
+
+    def type(self, text: str) -> None:
+        """Type into the field that is open, and Enter."""
+        self._type(text)
+        self.press("Enter")
+
+    def _type(self, text: str) -> None:
+        assert self.controls is not None
+        if self.controls.typing.line:
+            self.fields["line"] += text
+        elif self.controls.typing.field:
+            for field_ in ("number", "words"):
+                self.fields[field_] += text
+
+    # View
 
     def say(self, text: str, mood: str) -> None:
         assert mood in theme.MOODS
         self.heard.append(text)
 
-    def ask_line(self, question: str, enter: Callable[[str], None]) -> None:
+    def open_line(self, question: str) -> None:
+        self.fields["line"] = ""
         self.heard.append(question)
-        enter(self.lines.pop(0) if self.lines else self.line)
 
-    def refresh(self) -> None:
+    def close_line(self) -> None:
+        self.fields["line"] = ""
+
+    def typed(self, field: Field) -> str:
+        return self.fields[field]
+
+    def show_page(self, title: str, lines: list[str]) -> None:
+        self.heard += [title, *lines]
+
+    def close_page(self) -> None:
+        pass
+
+    def show_list(self) -> None:
+        pass
+
+    def other_theme(self) -> None:
+        pass
+
+    def shut(self) -> None:
         pass
 
 
+@dataclass
 class Sitting:
-    """One run at the console, from its start to its end or stop: the screen in the run's thread, the hands in ours."""
+    """One run at the console, from its start to its end or stop: the run in a thread, the hands in ours."""
 
-    def __init__(self, setup: Setup[Any], results: Path, *, resumed: bool = False) -> None:
-        again = "resume" if resumed else "ask"
-        self._request = Request(setup=setup, participant_id="P01", results=results, seed=1, again=again)
-        self._messages: queue.Queue[Message] = queue.Queue()
-        self.clock, self.view = VirtualClock(), Listener()
+    setup: Setup[Any]
+    results: Path
+    resumed: bool = False
+    clock: OwnClock = field(default_factory=OwnClock)
+
+    def __post_init__(self) -> None:
+        again = "resume" if self.resumed else "ask"
+        self._request = Request(setup=self.setup, participant_id="P01", results=self.results, seed=1, again=again)
         self.error: BaseException | None = None
+        self.result: Finished | None = None
+        self.ended = threading.Event()
         self._made = threading.Event()
-        self._thread = threading.Thread(target=self._run)
-        self._thread.start()
-        assert self._made.wait(PATIENCE_S), self.error
+        self._window: PaperWindow | None = None
+        self.guns: list[WatchedGun] = []
+        self.clock.by_itself = self._gets_ready
+        self._thread = threading.Thread(target=self._run, daemon=True)
+        with self._watched():
+            self._thread.start()
+            assert self._made.wait(PATIENCE_S)
+        if not self.ended.is_set():
+            self.settle()
+
+    def _gets_ready(self) -> bool:
+        """Whether nothing but the gun is waited for: its magnet to come home."""
+        live = self._window.live if self._window else None
+        return live is not None and (live.position.base is State.FIRING or self._no_onset(live.position))
+
+    @staticmethod
+    def _no_onset(position: Position) -> bool:
+        return position.base is State.TRAIN and position.onset_s is None
+
+    @contextmanager
+    def _watched(self) -> Any:
+        """From now on, until the run is there, guns that are opened are watched."""
+        opened = runs.open_gun
+
+        def open_gun(*where: Any, **how: Any) -> Any:
+            self.guns.append(WatchedGun(opened(*where, **how), self.clock))
+            return self.guns[-1]
+
+        runs.open_gun = open_gun
+        try:
+            yield
+        finally:
+            runs.open_gun = opened
 
     def _make_screen(self, setup: Setup[Any], plan: Plan, clock: Any) -> Screen:
-        self.screen = ConsoleScreen(clock, self._messages.put, setup=setup)
-        self.state = State(setup=setup, plan=plan)
-        self.controls = Controls(self.state, clock, self.view, self.screen.reply, self._messages.put)
-        self._made.set()
-        return self.screen
+        self._window = PaperWindow(setup, plan, clock)
+        window, guns, made = self._window, self.guns, self._made
+        begin = window.begin
+
+        def begun(live: LiveRun) -> None:
+            begin(live)
+            guns[-1].live = live
+            made.set()
+
+        window.begin = begun  # type: ignore[method-assign]
+        return window
 
     def _run(self) -> None:
         try:
-            run(self._request, self._make_screen, self.clock)
+            self.result = run(self._request, self._make_screen, self.clock)
         except BaseException as error:  # noqa: BLE001 - looked at by the test
             self.error = error
         finally:
-            self._messages.put(Ended(reason=None if self.error is None else str(self.error)))
+            self.ended.set()
             self._made.set()
 
-    def until(self, wanted: Callable[[Message], bool]) -> Message:
-        """Take messages as the window does, up to one that is wanted."""
-        while True:
-            message = self._messages.get(timeout=PATIENCE_S)
-            self.state.take(message, self.clock.now())
-            if isinstance(message, Began):
-                self.controls.desk = message.desk
-            self._show()
-            if wanted(message):
-                return message
-            assert not isinstance(message, Trouble), message.text
+    @property
+    def window(self) -> PaperWindow:
+        assert self._window is not None, self.error
+        return self._window
 
-    def _show(self) -> None:
-        shown = instruction(self.state, self.clock.now())
-        self.view.heard += [shown.title, shown.detail, place_text(self.state), *coming(self.state)]
+    @property
+    def live(self) -> LiveRun:
+        assert self.window.live is not None, self.error
+        return self.window.live
 
-    def step(self) -> Message:
-        """The next step that waits, or the end."""
-        return self.until(lambda message: isinstance(message, Waiting | Ended))
+    @property
+    def controls(self) -> Controls:
+        assert self.window.controls is not None, self.error
+        return self.window.controls
 
-    def remarked(self, count: int = 1) -> None:
-        """Wait until so many remarks are on the disk."""
-        for _ in range(count):
-            self.until(lambda message: isinstance(message, Saved) and message.step is None)
+    @property
+    def position(self) -> Position:
+        return self.live.position
+
+    @property
+    def state(self) -> State:
+        return self.position.state
+
+    @property
+    def gun(self) -> WatchedGun:
+        return self.guns[-1]
+
+    def settle(self) -> None:
+        """Wait until the run waits for somebody, hangs at the gun, or has ended."""
+        end_s = time.monotonic() + PATIENCE_S
+        while not self._settled():
+            assert time.monotonic() < end_s, f"the run does not settle: {self.position}"
+            time.sleep(LOOK_S / 4)
+
+    def _settled(self) -> bool:
+        if self.ended.is_set() or self.gun.hangs.is_set():
+            return True
+        live = self.live
+        moving = live.position.base in (State.SAVING, State.FIRING, State.STOPPED) or self._no_onset(live.position)
+        return self.clock.idle.is_set() and not moving and not live._inbox
+
+    def paint(self) -> None:
+        """Let the run get where it waits, and draw it."""
+        self.settle()
+        self.window.paint()
+
+    def ready(self) -> None:
+        """Draw, and let the guard's time go by."""
+        self.paint()
+        self.clock.skip(GUARD_S + 0.01)
+
+    def press(self, key: str, *, ctrl: bool = False) -> None:
+        """A press of somebody who looks first and takes their time."""
+        self.ready()
+        self.window.press(key, ctrl=ctrl)
+        self.settle()
+
+    def type(self, text: str) -> None:
+        """Type a line and Enter, as somebody who takes their time."""
+        self.ready()
+        self.window.type(text)
+        self.settle()
+
+    def to(self, state: State) -> None:
+        """Work on as far as a state, forward being the answer to everything."""
+        end_s = time.monotonic() + PATIENCE_S
+        while self.state is not state:
+            assert not self.ended.is_set(), self.error
+            assert time.monotonic() < end_s, f"{state} is not reached from {self.position}"
+            self.go_on()
+
+    def go_on(self) -> None:
+        """Do what is due at this state."""
+        match self.state:
+            case State.REARMING:
+                self.ready()
+                self.window.down("T")
+                self.clock.skip(1.0)
+                self.controls.tick()
+                self.window.up("T")
+            case State.TRAIN:
+                self.clock.skip(2.0)
+                self.press("Space")
+            case State.RESTING:
+                self.clock.skip(400.0)
+            case State.RATING:
+                self.type("5")
+            case State.DESCRIBING:
+                self.type("like a toy")
+            case State.CORRECTING:
+                self.press("Esc")
+            case state:
+                self.press(_DUE[state])
+        self.settle()
 
     def finish(self) -> None:
         self._thread.join(PATIENCE_S)
-        self.screen.end()
         assert not self._thread.is_alive()
+
+    def stop(self) -> None:
+        """Leave in the middle."""
+        from experiments import events
+
+        self.gun.released.set()
+        self.live.offer(events.Stop(reason="enough"))
+        self.finish()
+
+
+_DUE = {
+    State.SETTING: "M",
+    State.PREPARING: "Space",
+    State.ASKING: "F",
+    State.CLOSING: "Enter",
+    State.PAUSED: "P",
+    State.HALTED: "Q",
+}
 
 
 @contextmanager
-def stopped_at_the_end(sitting: Sitting) -> Any:
-    """Stops a sitting that a test leaves in the middle."""
+def sat(setup: Setup[Any], results: Path, *, resumed: bool = False) -> Any:
+    """A sitting that a test leaves in the middle."""
+    sitting = Sitting(setup, results, resumed=resumed)
     try:
         yield sitting
     finally:
-        sitting.controls.stop_for("enough")
-        sitting.until(lambda message: isinstance(message, Ended))
-        sitting.finish()
+        if not sitting.ended.is_set():
+            sitting.stop()
+
+
+def ended(sitting: Sitting) -> Ended:
+    """How the window is told that a run has ended."""
+    return Ended(reason=None if sitting.error is None else str(sitting.error))
 
 
 def kept(results: Path, experiment: str) -> tuple[Place, Contents, list[dict[str, str]]]:
     """Where a run lies, what its journal holds, and the rows of the table that was written."""
     where = place(results, "P01", experiment)
     contents = read(where.journal)
-    assert contents.finished
     assert where.table.read_bytes() == table(contents)
     with where.table.open(newline="", encoding="utf-8") as file:
         return where, contents, list(csv.DictReader(file))
@@ -175,3 +559,5 @@ def raw_answers(contents: Contents) -> list[tuple[str, Trial, Direction]]:
         elif isinstance(word, Answered):
             found.append((word.kind, step.trial, word.response))
     return found
+
+

@@ -35,7 +35,7 @@ class CommandButton(QPushButton):
 
     def label(self, text: str = "", *, letters: bool = False) -> None:
         """Show what it does and its key, on two lines where it is small."""
-        key, gap = shown_key(self.name, letters=letters), "  " if self.objectName() else "\n"
+        key, gap = shown_key(self.name, letters=letters), "  " if self.objectName() == "large" else "\n"
         shown = f"{text or BY_NAME[self.name].text}{gap}[{key}]"
         if shown != self.text():
             self.setText(shown)

@@ -1,37 +1,88 @@
-"""What the experimenter can do: each command of a key or button ends here, as an event. Knows nothing of Qt."""
+"""What the experimenter's hands do: keys and buttons become events. Knows nothing of Qt, and decides nothing.
+
+What a press means depends on what is on the screen: a page over it, a line that is being typed, the position drawn.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import Any, Protocol
+from typing import Any, Literal, Protocol
 
 from device.words import Direction
 from experiments import events
 from experiments.clock import Clock
 from experiments.entries import trial_at, value
 from experiments.events import Event, Hand, Press
-from experiments.live_run import LiveRun
+from experiments.live_run import EMERGENCY, REARM_HELD_S, LiveRun
 from experiments.plan import Trial
 from experiments.preference.config import RatingScale
 from experiments.remarks import flag_word
-from experiments.screens.console.keys import Name, why_not
+from experiments.screens.console.keys import (
+    BY_NAME,
+    COMMANDS,
+    Name,
+    Typing,
+    command_for,
+    field_of,
+    shown_key,
+    why_not,
+)
 from experiments.screens.texts import FLAG_RULE, short_place, typed_number
 from experiments.states import State
 from experiments.steps import Ask
+
+Field = Literal["line", "number", "words"]
+PAGE_COMMANDS: tuple[Name, ...] = ("help", "list", "leave", "emergency", "theme")
+"""What is done while a page covers the run; the rest would be done unseen."""
+
+_LINES: tuple[Name, ...] = ("end break", "repeat", "flag", "note", "reason", "stop")
+_EVENTS: dict[Name, Event] = {
+    "fire": events.Fire(),
+    "next": events.Next(),
+    "damper": events.DamperSet(),
+    "pause": events.Pause(),
+    "go on": events.GoOn(),
+    "undo": events.Undo(),
+    "emergency": events.EmergencyStop(),
+}
 
 
 class View(Protocol):
     """What the controls need of the window."""
 
     def say(self, text: str, mood: str) -> None:
-        """Show a line of answer."""
+        """Show a line of answer, for a few seconds."""
 
-    def ask_line(self, question: str, enter: Callable[[str, Press], None]) -> None:
-        """Ask for a line of text, and hand it over with the press that entered it, if one does."""
+    def open_line(self, question: str) -> None:
+        """Let a line be typed."""
+
+    def close_line(self) -> None:
+        """Take the line away."""
+
+    def typed(self, field: Field) -> str:
+        """What is typed in a field."""
+
+    def show_page(self, title: str, lines: list[str]) -> None:
+        """Cover the run with a page of text."""
+
+    def close_page(self) -> None:
+        """Show the run again."""
+
+    def show_list(self) -> None:
+        """Cover the run with the marks of the set."""
+
+    def other_theme(self) -> None:
+        """Change the colours."""
+
+    def shut(self) -> None:
+        """Close the window of a run that has ended."""
 
 
 class Controls:
-    """The experimenter's hands on a live run. `observer` is the synthetic participant, where it answers."""
+    """The experimenter's hands on a live run. `observer` is the synthetic participant, where it answers.
+
+    `drawn` is the position on the screen: a press counts for it.
+    """
 
     def __init__(
         self,
@@ -47,81 +98,174 @@ class Controls:
         self._live, self._clock, self._view = live, clock, view
         self._scale, self._hand, self._restart = scale, hand, restart
         self._observer = observer
+        self._enter: Callable[[str, Press], None] | None = None
+        self._held: Press | None = None
+        self.drawn = live.position
+        self.page = False
+        self.ended = False
+
+    # keys and buttons
+
+    @property
+    def typing(self) -> Typing:
+        """What is being typed."""
+        return Typing(line=self._enter is not None, field=field_of(self.drawn) is not None)
+
+    def command(self, key: str, *, ctrl: bool) -> Name | None:
+        """The command that a key is now; `None` if it is none, and so may be text."""
+        return None if key.startswith("#") else command_for(key, ctrl=ctrl, typing=self.typing, position=self.drawn)
 
     def press(self, at_s: float | None = None) -> Press:
         """A press at this moment, or at an earlier one, for what is on the screen now."""
-        return Press(at_s=self._clock.now() if at_s is None else at_s, serial=self._live.position.serial)
+        return Press(at_s=self._clock.now() if at_s is None else at_s, serial=self.drawn.serial)
 
-    def offer(self, event: Event, press: Press | None = None) -> bool:
-        """Have an event judged, and say what there is to say of it; whether it was taken."""
+    def down(self, name: Name, at_s: float) -> None:
+        """The key of a command went down."""
+        press = self.press(at_s)
+        if name == "rearm":
+            self.hold(press)
+        else:
+            self.do(name, press)
+
+    def up(self, key: str) -> None:
+        """A key was let go."""
+        if key == BY_NAME["rearm"].key:
+            self.let_go()
+
+    def hold(self, press: Press) -> None:
+        """The key or button of the test shot went down: it has to be held."""
+        if not self.page and self.drawn.state is State.REARMING and self._held is None:
+            self._held = press
+            self._view.say("Hold it …", "wait")
+
+    def let_go(self) -> None:
+        """It was let go."""
+        if self._held is not None:
+            self._held = None
+            self._view.say(f"Let go too soon: hold it for {REARM_HELD_S:g} s.", "wait")
+
+    def tick(self) -> None:
+        """Look whether it was held for long enough."""
+        press = self._held
+        if press is not None and (held_s := self._clock.now() - press.at_s) >= REARM_HELD_S:
+            self._held = None
+            self._offer(events.Rearm(held_s=held_s), press)
+
+    def do(self, name: Name, press: Press) -> None:
+        """Carry out a command."""
+        if name == "emergency":
+            self._offer(events.EmergencyStop())
+        elif self.page and name not in PAGE_COMMANDS:
+            self._view.say("Leave this page first: Esc.", "wait")
+        elif name in _WINDOWS:
+            _WINDOWS[name](self, press)
+        elif self.ended:
+            self._after_end(name)
+        else:
+            self._run(name, press)
+
+    def _after_end(self, name: Name) -> None:
+        if name == "stop":
+            self._view.shut()
+        else:
+            self._view.say("The run has ended: Q closes the window.", "wait")
+
+    def _run(self, name: Name, press: Press) -> None:
+        if name in _LINES:
+            self._ask_for(name)
+        elif name in ("forward", "backward"):
+            self._answer(name, press)
+        elif name == "no answer":
+            self._rate(None, press)
+        elif name == "restart":
+            self._restart()
+        else:
+            self._offer(_EVENTS[name], press)
+
+    def _offer(self, event: Event, press: Press | None = None) -> None:
+        """Have an event judged, and say what there is to say of it."""
         verdict = self._live.offer(event, press)
         if verdict.text:
             self._view.say(verdict.text, "wait" if verdict.taken else "bad")
-        return verdict.taken
 
-    def do(self, name: Name, press: Press) -> None:
-        """Carry out a command that is one event, or that asks for a line first."""
-        match name:
-            case "forward" | "backward":
-                self._answer(name, press)
-            case "no answer":
-                self._rate(None, press)
-            case "end break" | "repeat" | "flag" | "note" | "reason" | "stop":
-                self._ask_for(name)
-            case "restart":
-                self._restart()
-            case _ if (event := _EVENTS.get(name)) is not None:
-                self.offer(event, press)
-            case _:
-                raise KeyError(name)
+    def idle(self, name: Name) -> str:
+        """Why a command does nothing now; empty if it does something."""
+        if name in ("help", "list", "theme"):
+            return ""
+        if self.ended:
+            return "" if name == "stop" else "The run has ended."
+        if name == "enter":
+            return "" if self.typing.letters else why_not(name, self.drawn)
+        if name == "leave" and (self._enter is not None or self.page):
+            return ""
+        if name == "restart":
+            return (
+                "" if self.drawn.state is State.PAUSED and self.drawn.why else "The participant's screen is not lost."
+            )
+        return why_not(name, self.drawn) or self._nothing_to(name)
+
+    def _nothing_to(self, name: Name) -> str:
+        if name == "repeat" and self._live.repeated() is None:
+            return "There is no trial of this set to repeat now."
+        if name == "undo" and not self._live.undoable:
+            return "There is nothing to undo in this set."
+        return ""
+
+    # what is entered
 
     def _answer(self, response: Direction, press: Press) -> None:
-        if self._live.position.state is State.CORRECTING:
-            self.offer(events.Correct(value=response), press)
-        else:
-            drawn_s = self._drawn_s(response)
-            self.offer(events.Answer(response=response, at_s=press.at_s, by=self._hand, response_time_s=drawn_s), press)
+        if self.drawn.state is State.CORRECTING:
+            self._offer(events.Correct(value=response), press)
+            return
+        drawn_s = self._drawn_s(response)
+        answer = events.Answer(response=response, at_s=press.at_s, by=self._hand, response_time_s=drawn_s)
+        self._offer(answer, press)
 
     def _drawn_s(self, response: Direction) -> float | None:
         """The synthetic participant's response time, if it is its answer that was entered."""
-        step = self._live.position.step
+        step = self.drawn.step
         if self._observer is None or not isinstance(step, Ask):
             return None
         answer = self._observer.answer(step.trial)
         return float(answer.response_time_s) if answer.response == response else None
 
-    def number(self, typed: str, press: Press) -> bool:
-        """A rating as it was typed; whether it was taken."""
+    def _entered(self, press: Press) -> None:
+        """Enter: the line, the field, or the end of the run."""
+        if self._enter is not None:
+            self._enter_line(press)
+            return
+        match field_of(self.drawn):
+            case "number":
+                self._number(self._view.typed("number"), press)
+            case "words":
+                self._words(self._view.typed("words").strip(), press)
+            case None if self.drawn.state is State.CLOSING:
+                self._offer(events.Finish(), press)
+            case _:
+                pass
+
+    def _number(self, typed: str, press: Press) -> None:
+        """A rating as it was typed."""
         scale = self._scale
         rating = None if scale is None else typed_number(typed, scale.minimum, scale.maximum)
-        if rating is None:
-            ends = "a number" if scale is None else f"a number from {scale.minimum:g} to {scale.maximum:g}"
-            self._view.say(f"Not a rating: type {ends}.", "bad")
-            return False
-        return self._rate(rating, press)
+        if scale is None or rating is None:
+            ends = "" if scale is None else f" from {scale.minimum:g} to {scale.maximum:g}"
+            self._view.say(f"Not a rating: type a number{ends}.", "bad")
+        else:
+            self._rate(rating, press)
 
-    def _rate(self, rating: float | None, press: Press) -> bool:
-        if self._live.position.state is State.CORRECTING:
-            return self.offer(events.Correct(value=None if rating is None else float(rating)), press)
-        return self.offer(events.Rating(rating=rating, by=self._hand), press)
+    def _rate(self, rating: float | None, press: Press) -> None:
+        correcting = self.drawn.state is State.CORRECTING
+        self._offer(events.Correct(value=rating) if correcting else events.Rating(rating=rating, by=self._hand), press)
 
-    def words(self, text: str, press: Press) -> bool:
+    def _words(self, text: str, press: Press) -> None:
         """The participant's words; none is an answer as well."""
-        if self._live.position.state is State.CORRECTING:
-            return self.offer(events.Correct(value=text.strip()), press)
-        return self.offer(events.Description(text=text.strip()), press)
-
-    def finish(self, press: Press) -> None:
-        """There is nothing left to correct."""
-        self.offer(events.Finish(), press)
-
-    def rearm(self, pressed: Press, held_s: float) -> None:
-        """A key was held."""
-        self.offer(events.Rearm(held_s=held_s), pressed)
+        correcting = self.drawn.state is State.CORRECTING
+        self._offer(events.Correct(value=text) if correcting else events.Description(text=text), press)
 
     def entered_so_far(self) -> str:
         """What the open correction says now, to be typed over."""
-        entry = self._live.position.correcting
+        entry = self.drawn.correcting
         said = None if entry is None else value(self._live.told, entry)
         return "" if said is None else f"{said:g}" if isinstance(said, float) else said
 
@@ -129,14 +273,19 @@ class Controls:
 
     def _ask_for(self, name: Name) -> None:
         """Ask for the line that a command needs, if it can do anything with it now."""
-        refused = why_not(name, self._live.position)
-        if name == "repeat" and not refused and self._live.repeated() is None:
-            refused = "There is no trial of this set to repeat now."
+        refused = self.idle(name)
         if refused:
             self._view.say(refused, "bad")
-            return
-        trial = self._live.trial
-        self._view.ask_line(self._question(name, trial), lambda line, press: self._entered(name, trial, line, press))
+        elif name == "stop" and self.drawn.base is State.HALTED:
+            self._offer(events.Stop(reason=EMERGENCY))
+        else:
+            trial = self._live.trial
+            self._enter = lambda line, press: self._line(name, trial, line, press)
+            self._view.open_line(f"{self._question(name, trial)}  (Enter saves, Esc leaves it)")
+
+    def ask_why_it_stops(self) -> None:
+        """Somebody wants to close the window of a live run."""
+        self._ask_for("stop")
 
     def _question(self, name: Name, trial: Trial) -> str:
         live = self._live
@@ -145,7 +294,7 @@ class Controls:
             case "end break":
                 return "Why does the break end early?"
             case "repeat":
-                return f"Why is trial {(live.repeated() or live.trial).trial} to be presented again?"
+                return f"Why is trial {(live.repeated() or trial).trial} to be presented again?"
             case "flag":
                 return f"Flag {place} as (a word such as noise or late)"
             case "note":
@@ -155,39 +304,88 @@ class Controls:
             case _:
                 return "Why does the run stop here? It can be resumed."
 
-    def _entered(self, name: Name, trial: Trial, line: str, press: Press) -> None:
+    def _enter_line(self, press: Press) -> None:
+        text, enter = self._view.typed("line").strip(), self._enter
+        if not text:
+            self._view.say("Type a word or two, or leave it with Esc.", "bad")
+            return
+        self._close_line()
+        if enter is not None:
+            enter(text, press)
+
+    def _close_line(self) -> None:
+        self._enter = None
+        self._view.close_line()
+
+    def _line(self, name: Name, trial: Trial, line: str, press: Press) -> None:
         match name:
             case "end break" if self._live.position.base is not State.RESTING:
-                self.offer(events.Note(text=f"break: {line}", trial=trial))
+                self._offer(events.Note(text=f"break: {line}", trial=trial))
                 self._view.say("The break is over: what you typed is kept as a note.", "wait")
             case "end break":
-                self.offer(events.EndBreak(reason=line), press)
+                self._offer(events.EndBreak(reason=line), press)
             case "repeat":
-                self.offer(events.Repeat(reason=line), press)
+                self._offer(events.Repeat(reason=line), press)
             case "flag":
                 self._flag(line, trial)
             case "note":
-                self.offer(events.Note(text=line, trial=trial))
+                self._offer(events.Note(text=line, trial=trial))
             case "reason":
-                self.offer(events.Reason(text=line), press)
+                self._offer(events.Reason(text=line))
             case _:
-                self.offer(events.Stop(reason=line), press)
+                self._offer(events.Stop(reason=line))
 
     def _flag(self, typed: str, trial: Trial) -> None:
         flag = flag_word(typed)
         if flag is None:
             self._view.say(FLAG_RULE, "bad")
         else:
-            self.offer(events.Flag(flag=flag, trial=trial))
+            self._offer(events.Flag(flag=flag, trial=trial))
+
+    # what belongs to the window
+
+    def _leave(self, press: Press) -> None:
+        """Leave a page, a line or a correction. It never stops anything."""
+        if self.page:
+            self.uncover()
+        elif self._enter is not None:
+            self._close_line()
+        elif self.drawn.state is State.CORRECTING:
+            self._offer(events.Leave(), press)
+
+    def uncover(self) -> None:
+        """Show the run."""
+        self.page = False
+        self._view.close_page()
+
+    def _help(self, press: Press) -> None:
+        del press
+        self.page = True
+        self._view.show_page("Keys, and what each does now. Esc leaves this page.", self.help_lines())
+
+    def help_lines(self) -> list[str]:
+        """Every key, what it does, and why it does nothing now."""
+        return [self._help_line(command.name) for command in COMMANDS]
+
+    def _help_line(self, name: Name) -> str:
+        not_now = self.idle(name)
+        key = shown_key(name, letters=self.typing.letters)
+        return f"{key:<8} {BY_NAME[name].does}{f'   – not now: {not_now}' if not_now else ''}"
+
+    def _list(self, press: Press) -> None:
+        del press
+        self.page = True
+        self._view.show_list()
+
+    def _theme(self, press: Press) -> None:
+        del press
+        self._view.other_theme()
 
 
-_EVENTS: dict[Name, Event] = {
-    "fire": events.Fire(),
-    "next": events.Next(),
-    "damper": events.DamperSet(),
-    "pause": events.Pause(),
-    "go on": events.GoOn(),
-    "undo": events.Undo(),
-    "leave": events.Leave(),
-    "emergency": events.EmergencyStop(),
+_WINDOWS: dict[Name, Callable[[Controls, Press], None]] = {
+    "help": Controls._help,
+    "list": Controls._list,
+    "theme": Controls._theme,
+    "leave": Controls._leave,
+    "enter": Controls._entered,
 }

@@ -17,6 +17,7 @@ _COLOURS: dict[Theme, dict[str, str]] = {
         "filled": "#34414d",
         "text": "#f2f5f7",
         "quiet": "#b9c4ce",
+        "dim": "#8593a1",
         "act": "#8fd0ff",
         "ask": "#ffd479",
         "rest": "#9fe0b5",
@@ -37,6 +38,7 @@ _COLOURS: dict[Theme, dict[str, str]] = {
         "filled": "#c3ccd5",
         "text": "#10161c",
         "quiet": "#3c4852",
+        "dim": "#66727e",
         "act": "#00497a",
         "ask": "#6b4300",
         "rest": "#0b5028",
@@ -99,7 +101,7 @@ def sheet(theme: Theme, scale: float = 1.0) -> str:
         padding: {px(6)} {px(4)}; font-size: {px(16)}; }}
     QPushButton:focus {{ border: 3px solid {c["act"]}; }}
     QPushButton:hover {{ border-color: {c["act"]}; }}
-    QPushButton:disabled, QPushButton[dim="yes"] {{ color: {c["line"]}; border-style: dashed; }}
+    QPushButton:disabled, QPushButton[dim="yes"] {{ color: {c["dim"]}; border-style: dashed; }}
     QPushButton#large {{ font-size: {px(26)}; font-weight: bold; padding: {px(18)} {px(4)}; }}
     QPushButton#stop {{ background: {c["stop"]}; color: {c["stop_text"]}; font-weight: bold; font-size: {px(22)};
         padding: {px(14)} {px(6)}; }}

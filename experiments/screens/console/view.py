@@ -232,7 +232,6 @@ def _correcting(seen: Seen, now_s: float) -> Instruction:
     entry = seen.position.correcting
     if entry is None:
         return _moment(seen, 0.0)
-    place = texts.place_text(seen.about.plan, entry.trial)
     how = {
         "answer": "Enter what the participant said: F or B.",
         "rating": "Type what the participant said, Enter saves; Ctrl+X for no answer.",
@@ -240,7 +239,8 @@ def _correcting(seen: Seen, now_s: float) -> Instruction:
     }[entry.what]
     further = "Ctrl+U" if entry.what != "answer" else "U"
     return Instruction(
-        title=f"Correct the {entry.what} of\n{place}",
+        title=f"Correct the {entry.what}",
+        damper=texts.place_text(seen.about.plan, entry.trial),
         detail=f"It was entered as {texts.value_text(value(seen.told, entry))}. {how}\n"
         f"{further} goes further back, Esc leaves it.",
         mood="ask",

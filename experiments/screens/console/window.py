@@ -23,25 +23,15 @@ from PyQt6.QtWidgets import (
     QWidget,
 )
 
-from experiments import events
 from experiments.clock import Clock
 from experiments.events import Hand, Press
-from experiments.live_run import EMERGENCY, REARM_HELD_S, LiveRun
+from experiments.live_run import LiveRun
 from experiments.remarks import Halted
 from experiments.screens.console import parts, theme, tone, view
 from experiments.screens.console.actions import CommandButton, HeldButton, Slots
-from experiments.screens.console.controls import Controls
+from experiments.screens.console.controls import Controls, Field
 from experiments.screens.console.keyboard import Keyboard
-from experiments.screens.console.keys import (
-    BY_NAME,
-    COMMANDS,
-    Name,
-    Typing,
-    command_for,
-    field_of,
-    shown_key,
-    why_not,
-)
+from experiments.screens.console.keys import Name, Typing, field_of
 from experiments.screens.console.messages import (
     Began,
     Ended,
@@ -71,7 +61,6 @@ FITS = (1.0, 0.88, 0.76, 0.66, 0.56)
 """How far the instruction shrinks until all of it is there."""
 
 _KEY_ROW: tuple[Name, ...] = ("undo", "repeat", "flag", "note", "list", "pause", "stop", "help")
-_PAGE_KEYS: tuple[Name, ...] = ("help", "list", "leave", "emergency", "theme")
 
 
 class Bridge(QObject):
@@ -105,14 +94,9 @@ class ConsoleWindow(QMainWindow):
         self.participant: ParticipantSeen | None = None
         self.ended: Ended | None = None
         self._pace = Pace()
-        self._enter: Callable[[str, Press], None] | None = None
         self._brief_until_s: float | None = None
         self._lasting = ("", "good")
         self._field_of: tuple[object, ...] = ()
-        self._hold: Press | None = None
-        self._hold_timer = QTimer(self)
-        self._hold_timer.setSingleShot(True)
-        self._hold_timer.timeout.connect(self._held)
         self.theme: theme.Theme = "dark"
         self._scale = 0.0
         self._build()
@@ -185,7 +169,7 @@ class ConsoleWindow(QMainWindow):
         self.next, self.end_break, self.damper_set = make("next"), make("end break"), make("damper")
         self.no_answer, self.finish, self.go_on = make("no answer"), make("enter"), make("go on")
         self.reason, self.restart = make("reason"), make("restart")
-        self.rearm = HeldButton("rearm", self._press, self._begin_hold, self._end_hold)
+        self.rearm = HeldButton("rearm", self._press, self._hold, self._let_go)
         middle = [self.fire, self.next, self.go_on, self.finish, self.rearm, self.reason]
         left, right = [self.forward, self.damper_set, self.restart], [self.backward, self.end_break, self.no_answer]
         self.slots = Slots([*left], [*middle], [*right])
@@ -263,7 +247,9 @@ class ConsoleWindow(QMainWindow):
 
     def _end(self, message: Ended) -> None:
         self.ended = message
-        self._close_entry()
+        if self.controls is not None:
+            self.controls.ended = True
+        self.close_line()
         tone.play()
 
     def _arrive(self) -> None:
@@ -271,9 +257,11 @@ class ConsoleWindow(QMainWindow):
         if self.live is None:
             return
         self.drawn = self.live.position
+        if self.controls is not None:
+            self.controls.drawn = self.drawn
         self._pace.at(self.drawn, self._clock.now())
-        if self.drawn.state is State.HALTED:
-            self.pages.setCurrentIndex(0)
+        if self.drawn.state is State.HALTED and self.controls is not None:
+            self.controls.uncover()
         belongs = (field_of(self.drawn), self.drawn.number, self.drawn.correcting)
         if belongs != self._field_of:
             self._field_of = belongs
@@ -338,6 +326,8 @@ class ConsoleWindow(QMainWindow):
 
     def refresh(self) -> None:
         """Show what is so now."""
+        if self.controls is not None:
+            self.controls.tick()
         now_s, seen = self._clock.now(), self.seen
         shown = view.instruction(seen, now_s)
         for label, text in ((self.title, shown.title), (self.damper, shown.damper), (self.detail, shown.detail)):
@@ -345,7 +335,7 @@ class ConsoleWindow(QMainWindow):
                 label.setText(text)
                 label.setVisible(bool(text))
         parts.set_mood(self.title, shown.mood)
-        parts.set_mood(self.damper, "bad" if shown.mood == "bad" else "act")
+        parts.set_mood(self.damper, shown.mood)
         self.place.setText(view.place_text(seen))
         self._show_bands(seen)
         self._show_side(seen, now_s)
@@ -390,7 +380,7 @@ class ConsoleWindow(QMainWindow):
 
     def _show_buttons(self) -> None:
         """The buttons of what can be done now, and which of the keys below do something."""
-        over, letters, state = self.ended is not None, self._typing().letters, self.drawn.state
+        over, letters, state = self.ended is not None, self._typing.letters, self.drawn.state
         self.slots.show_only(set() if over else self._actions(state))
         for button in (self.forward, self.backward, self.no_answer, self.restart, self.end_break, self.reason):
             button.label(letters=letters)
@@ -425,15 +415,7 @@ class ConsoleWindow(QMainWindow):
 
     def _idle(self, name: Name) -> bool:
         """Whether a command does nothing now."""
-        if name in ("help", "list", "theme"):
-            return False
-        if self.ended is not None or self.live is None:
-            return name != "stop"
-        if name == "repeat" and self.live.repeated() is None:
-            return True
-        if name == "undo" and not self.live.undoable:
-            return True
-        return bool(why_not(name, self.drawn))
+        return self.controls is None or bool(self.controls.idle(name))
 
     # fitting
 
@@ -469,142 +451,86 @@ class ConsoleWindow(QMainWindow):
 
     # keys and buttons
 
+    @property
     def _typing(self) -> Typing:
-        return Typing(line=self.entry_bar.isVisibleTo(self._main), field=field_of(self.drawn) is not None)
+        return Typing() if self.controls is None else self.controls.typing
 
     def _press(self) -> Press:
         return Press(at_s=self._clock.now(), serial=self.drawn.serial)
 
     def command(self, key: str, *, ctrl: bool) -> Name | None:
         """The command that a key is now."""
-        if key.startswith("#"):
-            return None
-        return command_for(key, ctrl=ctrl, typing=self._typing(), position=self.drawn)
+        return None if self.controls is None else self.controls.command(key, ctrl=ctrl)
 
     def down(self, name: Name, at_s: float) -> None:
         """The key of a command went down."""
-        press = Press(at_s=at_s, serial=self.drawn.serial)
-        if name == "rearm":
-            self._begin_hold(press)
-        else:
-            self.do(name, press)
+        if self.controls is not None:
+            self.controls.down(name, at_s)
+        self.refresh()
 
     def up(self, key: str) -> None:
         """A key was let go."""
-        if key == BY_NAME["rearm"].key:
-            self._end_hold()
+        if self.controls is not None:
+            self.controls.up(key)
 
     def do(self, name: Name, press: Press) -> None:
-        """Carry out a command."""
-        if self.pages.currentIndex() and name not in _PAGE_KEYS:
-            self.say("Leave this page first: Esc.", "wait")
-        elif name in ("help", "list", "theme", "leave", "enter"):
-            {"help": self._help, "list": self._list, "theme": self._other_theme}.get(name, lambda: None)()
-            if name == "leave":
-                self._leave(press)
-            elif name == "enter":
-                self._entered(press)
+        """The button of a command was clicked."""
+        if self.controls is not None:
+            self.controls.do(name, press)
         elif name == "stop" and self.ended is not None:
             self.close()
-        elif self.controls is not None:
-            self._do(name, press, self.controls)
         self.refresh()
 
-    def _do(self, name: Name, press: Press, controls: Controls) -> None:
-        if name == "stop" and self.drawn.base is State.HALTED:
-            controls.offer(events.Stop(reason=EMERGENCY))
-        else:
-            controls.do(name, press)
+    def _hold(self, press: Press) -> None:
+        if self.controls is not None:
+            self.controls.hold(press)
 
-    def _entered(self, press: Press) -> None:
-        """Enter: the line, the field, or the end of the run."""
-        if self.controls is None:
-            return
-        if self.entry_bar.isVisibleTo(self._main):
-            self._enter_line(press)
-        elif self.fields.currentIndex() == 1:
-            self.controls.number(self.rating.text(), press)
-        elif self.fields.currentIndex() == 2:
-            self.controls.words(self.words.text(), press)
-        elif self.drawn.state is State.CLOSING:
-            self.controls.finish(press)
+    def _let_go(self) -> None:
+        if self.controls is not None:
+            self.controls.let_go()
 
-    def _leave(self, press: Press) -> None:
-        """Leave a page, a line or a correction. It never stops anything."""
-        if self.pages.currentIndex():
-            self.pages.setCurrentIndex(0)
-        elif self.entry_bar.isVisibleTo(self._main):
-            self._close_entry()
-        elif self.controls is not None and self.drawn.state is State.CORRECTING:
-            self.controls.do("leave", press)
+    # what the controls need
 
-    def _begin_hold(self, press: Press) -> None:
-        if self.drawn.state is State.REARMING and not self._hold_timer.isActive():
-            self._hold = press
-            self._hold_timer.start(round(1000 * REARM_HELD_S))
-            self.say("Hold it …", "wait")
-
-    def _end_hold(self) -> None:
-        if self._hold_timer.isActive():
-            self._hold_timer.stop()
-            self.say("Let go too soon: hold T for a second.", "wait")
-
-    def _held(self) -> None:
-        if self._hold is not None and self.controls is not None:
-            self.controls.rearm(self._hold, max(REARM_HELD_S, self._clock.now() - self._hold.at_s))
-
-    # lines of text
-
-    def ask_line(self, question: str, enter: Callable[[str, Press], None]) -> None:
-        """Ask for a line of text, and hand it over if one is entered."""
-        self._enter = enter
-        self.entry_label.setText(f"{question}  (Enter saves, Esc leaves it)")
+    def open_line(self, question: str) -> None:
+        """Let a line be typed."""
+        self.entry_label.setText(question)
         self.entry.clear()
         self.entry_bar.show()
         self.entry.setFocus()
 
-    def _enter_line(self, press: Press) -> None:
-        text, enter = self.entry.text().strip(), self._enter
-        if not text:
-            self.say("Type a word or two, or leave it with Esc.", "bad")
-            return
-        self._close_entry()
-        if enter is not None:
-            enter(text, press)
-
-    def _close_entry(self) -> None:
-        self._enter = None
+    def close_line(self) -> None:
+        """Take the line away."""
         self.entry_bar.hide()
         self._focus()
 
-    # pages
+    def typed(self, field: Field) -> str:
+        """What is typed in a field."""
+        return {"line": self.entry, "number": self.rating, "words": self.words}[field].text()
 
-    def _help(self) -> None:
-        lines = [self._help_line(command.name) for command in COMMANDS]
-        self._page("Keys, and what each does now. Esc leaves this page.", "\n".join(lines))
-
-    def _help_line(self, name: Name) -> str:
-        command = BY_NAME[name]
-        not_now = (why_not(name, self.drawn) or "not now") if self._idle(name) else ""
-        key = shown_key(name, letters=self._typing().letters)
-        return f"{key:<8} {command.does}{f'   – not now: {not_now}' if not_now else ''}"
-
-    def _list(self) -> None:
-        self._page(
-            "Flags, notes, corrections and repeats of this set. Esc leaves this page.", "\n".join(view.marks(self.seen))
-        )
-
-    def _page(self, title: str, text: str) -> None:
-        if self.pages.currentIndex() and self.page_title.text() == title:
-            self.pages.setCurrentIndex(0)
-            return
+    def show_page(self, title: str, lines: list[str]) -> None:
+        """Cover the run with a page of text."""
         self.page_title.setText(title)
-        self.page_text.setPlainText(text)
+        self.page_text.setPlainText("\n".join(lines))
         self.pages.setCurrentIndex(1)
 
-    def _other_theme(self) -> None:
+    def close_page(self) -> None:
+        """Show the run again."""
+        self.pages.setCurrentIndex(0)
+
+    def show_list(self) -> None:
+        """Cover the run with the marks of the set."""
+        self.show_page(
+            "Flags, notes, corrections and repeats of this set. Esc leaves this page.", view.marks(self.seen)
+        )
+
+    def other_theme(self) -> None:
+        """Change the colours."""
         self.theme = "light" if self.theme == "dark" else "dark"
         self._restyle()
+
+    def shut(self) -> None:
+        """Close the window of a run that has ended."""
+        self.close()
 
     def closeEvent(self, event: QCloseEvent | None) -> None:  # noqa: N802 - Qt's name
         """Closing the window of a live run asks why it stops; once it has ended, the window goes."""
@@ -612,7 +538,7 @@ class ConsoleWindow(QMainWindow):
             return
         if self.ended is None and self.controls is not None:
             event.ignore()
-            self.do("stop", self._press())
+            self.controls.ask_why_it_stops()
             return
         event.accept()
         self.closed.emit()
