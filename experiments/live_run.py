@@ -206,7 +206,8 @@ class LiveRun:
         """A stimulus began, or is about to (`None`): what carries a train on is not taken before the least exposure."""
         not_before_s = math.inf if onset_s is None else onset_s + least_s
         with self._news:
-            self._position = replace(self._position, onset_s=onset_s, not_before_s=not_before_s)
+            position = self._position = replace(self._position, onset_s=onset_s, not_before_s=not_before_s)
+        self._screen.show(position)
 
     def wait(self, until_s: float | None = None) -> Event | None:
         """The event that carried the step on; `None` when its time is over, which it never is while it is held.

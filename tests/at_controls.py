@@ -35,7 +35,7 @@ from experiments.screens.console.keys import Name, Presses
 from experiments.screens.console.messages import Ended, GunSeen
 from experiments.screens.console.view import About, Seen
 from experiments.setup import Setup
-from experiments.states import ARMED, Position, State
+from experiments.states import Position, State
 from experiments.steps import Answered, Outcome, Step
 
 PATIENCE_S = 60.0
@@ -559,5 +559,3 @@ def raw_answers(contents: Contents) -> list[tuple[str, Trial, Direction]]:
         elif isinstance(word, Answered):
             found.append((word.kind, step.trial, word.response))
     return found
-
-

@@ -12,6 +12,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Self
 
+FIRES, DAMPER, ENDS = "Enter fires:", "Then type d and Enter:", "Enter ends the run:"
 ANSWERS = "fbbffbfb"
 """What the person types, trial after trial, over and over."""
 
@@ -32,6 +33,7 @@ class AtTerminal:
         os.close(theirs)
         self._news = threading.Condition()
         self.seen = ""
+        self._dampers = 0
         self._closed = False
         self._reader = threading.Thread(target=self._read, daemon=True)
         self._reader.start()
@@ -53,17 +55,34 @@ class AtTerminal:
         """Type a line."""
         os.write(self._ours, f"{text}\n".encode())
 
-    def wait_for(self, text: str, count: int = 1, timeout_s: float = 30) -> None:
+    def wait_for(self, text: str, count: int = 1, timeout_s: float = 60) -> None:
         """Wait until the screen has shown `text` so many times; `AssertionError` with the screen if it does not."""
         with self._news:
             self._news.wait_for(lambda: self._closed or self.seen.count(text) >= count, timeout_s)
         assert self.seen.count(text) >= count, f"{text!r} was not shown {count} times:\n{self.seen}"
 
+    def fire(self, count: int = 1) -> None:
+        """Fire the n-th shot of what was seen, once its damper is set where it has to be."""
+        with self._news:
+            self._news.wait_for(lambda: self._closed or self._asked(count), 60)
+        if self.seen.count(FIRES) < count:
+            self._dampers += 1
+            self.type("d")
+        self.wait_for(FIRES, count)
+        self.type("")
+
+    def _asked(self, count: int) -> bool:
+        return self.seen.count(FIRES) >= count or self.seen.count(DAMPER) > self._dampers
+
+    def close(self, count: int = 1) -> None:
+        """End the run: there is nothing to correct."""
+        self.wait_for(ENDS, count)
+        self.type("")
+
     def answer_trials(self, count: int, already: int = 0) -> None:
         """Hand over, fire and answer so many trials of experiment 1, waiting for each to be saved."""
         for trial in range(already, already + count):
-            self.wait_for("Enter fires:", trial - already + 1)
-            self.type("")
+            self.fire(trial - already + 1)
             self.wait_for("b = backward:", trial - already + 1)
             self.type(ANSWERS[trial % len(ANSWERS)])
             self.wait_for("Saved.", trial - already + 1)
@@ -79,7 +98,7 @@ class AtTerminal:
         os.close(self._ours)
         self._ours = -1
 
-    def end(self, timeout_s: float = 30) -> int:
+    def end(self, timeout_s: float = 60) -> int:
         """The exit code."""
         code = self.process.wait(timeout_s)
         self._reader.join(5)

@@ -8,13 +8,13 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
+from experiments.screens.console.state import State
 from hypothesis import strategies as st
 
 from device.words import Direction
-from experiments.plan import Trial
 from experiments.live_run import RunStopped
+from experiments.plan import Trial
 from experiments.screens.console.messages import Ended, ParticipantAnswered, Waiting
-from experiments.screens.console.state import State
 from experiments.setup import Setup
 from experiments.steps import Ask, Describe, Prepare, Present, Rate, Rest
 from tests.at_controls import PREFERENCE, Sitting

@@ -17,11 +17,11 @@ from device.twin.twin import Twin
 from experiments import run as runs
 from experiments.clock import RealClock
 from experiments.journal import Contents, read
+from experiments.live_run import RunStopped
 from experiments.load import load_setup
 from experiments.places import Place, place
 from experiments.replay import told
 from experiments.run import Request
-from experiments.live_run import RunStopped
 from experiments.screens.synthetic import synthetic_screen
 from experiments.steps import Answered, Failed, Fired
 

@@ -24,12 +24,12 @@ from experiments import catalogue, storage
 from experiments import run as runs
 from experiments.clock import RealClock
 from experiments.journal import Contents, read
+from experiments.live_run import RunStopped
 from experiments.load import load_setup
 from experiments.places import place
 from experiments.plan import Plan
 from experiments.replay import told
 from experiments.run import Request
-from experiments.live_run import RunStopped
 from experiments.screens.console import theme
 from experiments.steps import Answered, Ask, Failed, Fire, Fired, Prepared, Rate, Rated, Step
 from tests.at_controls import short_direction
@@ -189,13 +189,13 @@ def faulty_guns(case: str) -> list[FaultyGun]:
 
 def window_alone() -> dict[str, Any]:
     """A console's window at a rating, without a run: what keys do there, and in which colour it says bad news."""
+    from experiments.screens.console.state import State
     from PyQt6.QtCore import Qt
     from PyQt6.QtTest import QTest
 
     from experiments.screens.console.app import application
     from experiments.screens.console.messages import Saved, Waiting
     from experiments.screens.console.screen import ConsoleScreen
-    from experiments.screens.console.state import State
     from experiments.screens.console.window import Bridge, ConsoleWindow
 
     app, clock, bridge, setup = application(), RealClock(), Bridge(), load_setup("preference")

@@ -12,10 +12,10 @@ from hypothesis import example, given, settings
 
 from device import Gun, LinkError, Shot, ShotReport
 from experiments import run as runs
+from experiments.live_run import RunStopped
 from experiments.plan import Plan
 from experiments.remarks import Continued, Paused, RatingCorrected
 from experiments.replay import told
-from experiments.live_run import RunStopped
 from experiments.screens.console.messages import Ended, Waiting
 from experiments.steps import Ask, Prepare, Rated, Rested
 from tests.at_controls import CORRECTNESS, DIRECTION, Sitting, kept, raw_answers, remarks, stopped_at_the_end

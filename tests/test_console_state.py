@@ -7,6 +7,7 @@ from collections.abc import Callable
 from typing import Any
 
 import pytest
+from experiments.screens.console.state import State, coming, gun_text, instruction, place_text
 from hypothesis import given
 from hypothesis import strategies as st
 
@@ -15,7 +16,6 @@ from experiments.plan import Trial
 from experiments.remarks import AnswerCorrected, Flagged, Noted
 from experiments.screens.console import theme
 from experiments.screens.console.messages import Saved, Waiting
-from experiments.screens.console.state import State, coming, gun_text, instruction, place_text
 from experiments.setup import Setup
 from experiments.steps import Answered, Ask, Prepare, Repeat
 from tests.at_controls import CORRECTNESS, DIRECTION

@@ -18,6 +18,8 @@ from experiments.setup import Setup
 from experiments.steps import (
     Answered,
     Ask,
+    Close,
+    Closed,
     Failed,
     Fire,
     Fired,
@@ -25,6 +27,7 @@ from experiments.steps import (
     Outcome,
     Prepare,
     Prepared,
+    Repeat,
     Rest,
     Rested,
     Step,
@@ -63,11 +66,20 @@ def fitting(step: Step) -> Outcome:
             return FIRED
         case Ask():
             return answered(step.trial)
+        case Close():
+            return Closed()
         case _:
             return Rested(rested_s=step.duration_s)
 
 
 def driven(plan: Plan, setup: Setup[Any], troubles: dict[int, Outcome] | None = None) -> list[Step]:
+    """All steps of a session but its close; the n-th is sent `troubles[n]` instead of what fits."""
+    steps = to_the_end(plan, setup, troubles)
+    assert steps[-1] == Close()
+    return [step for step in steps if step != Close()]
+
+
+def to_the_end(plan: Plan, setup: Setup[Any], troubles: dict[int, Outcome] | None = None) -> list[Step]:
     """All steps of a session; the n-th is sent `troubles[n]` instead of what fits."""
     going, steps = session(plan, setup), []
     step = next(going)
@@ -117,6 +129,21 @@ def test_a_rest_follows_every_fifth_trial_but_the_last() -> None:
     assert places == [15 * k + k - 1 for k in range(1, 12)]
     assert isinstance(STEPS[-1], Ask)
     assert len(STEPS) == 60 * 3 + 11
+
+
+def test_a_session_ends_with_a_close_before_which_the_last_trial_can_still_be_presented_again() -> None:
+    last = len(STEPS)
+    again = to_the_end(PLAN, SETUP, {last: Repeat(trial=PLAN.trials[-1], reason="noise")})
+    assert again[:last] == STEPS
+    assert [type(step) for step in again[last:]] == [Close, Prepare, Fire, Ask, Close]
+    assert {step.trial for step in again[last + 1 : -1]} == {PLAN.trials[-1]}
+
+
+def test_a_trial_can_be_presented_again_in_the_break_that_follows_it_which_then_begins_anew() -> None:
+    place = STEPS.index(Rest(between="sets", duration_s=20.0))
+    again = driven(PLAN, SETUP, {place: Repeat(trial=PLAN.trials[4], reason="noise")})
+    assert [type(step) for step in again[place : place + 5]] == [Rest, Prepare, Fire, Ask, Rest]
+    assert again[place + 5 :] == STEPS[place + 1 :]
 
 
 def test_a_hand_over_names_the_damper_that_the_gun_file_names_for_the_method() -> None:

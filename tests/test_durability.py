@@ -14,7 +14,7 @@ import pytest
 from experiments.journal import Contents, read
 from experiments.replay import history
 from experiments.steps import Answered
-from tests.at_terminal import ANSWERS, AtTerminal, answer_until_killed
+from tests.at_terminal import ANSWERS, DAMPER, FIRES, AtTerminal, answer_until_killed
 from tests.conftest import RECOIL
 
 STEM = "sub-P01/sub-P01_task-direction"
@@ -43,7 +43,7 @@ def killed_run(configs: Path, folder: Path, seconds: float, *, begun: bool) -> t
     """A run killed some seconds after its start, or after it has `begun`: what was acknowledged, and the journal."""
     with AtTerminal(words(configs), folder) as screen:
         if begun:
-            screen.wait_for("Enter fires:")
+            screen.wait_for(DAMPER)
         answer_until_killed(screen, seconds)
         saved = screen.seen.count("Saved.")
     return (ANSWERS * 8)[:saved], folder / "results" / f"{STEM}_journal.jsonl"
@@ -73,7 +73,7 @@ def test_a_killed_run_goes_on_where_it_broke_off_and_ends_with_a_whole_table(
     before = answers(read(journal))
     with AtTerminal(words(quick_configs, "--resume"), tmp_path) as screen:
         screen.answer_trials(2, already=len(before))
-        screen.wait_for("Enter fires:", 3)
+        screen.wait_for(FIRES, 3)
         screen.type("stop lunch")
         assert screen.end() == 130
     assert answers(read(journal)) == (ANSWERS * 8)[: len(before) + 2]
@@ -86,7 +86,7 @@ def traced_run(configs: Path, folder: Path) -> list[str]:
     calls = "trace=openat,write,fsync,close"
     with AtTerminal(["strace", "-f", "-s", "64", "-e", calls, "-o", trace, *words(configs)], folder) as screen:
         screen.answer_trials(3)
-        screen.wait_for("Enter fires:", 4)
+        screen.wait_for(FIRES, 4)
         screen.type("stop")
         assert screen.end(60) == 130
     return trace.read_text().splitlines()

@@ -26,11 +26,12 @@ from experiments.load import load_setup, shipped_folder
 from experiments.plan import Plan
 from experiments.replay import told
 from experiments.run import Request, run, table
-from experiments.screens.console.messages import Waiting
-from experiments.screens.console.state import State, coming, instruction
+from experiments.screens.console.view import About, Seen, coming, instruction
 from experiments.screens.synthetic import synthetic_screen
 from experiments.screens.terminal import TerminalScreen
+from experiments.screens.texts import read_out_text
 from experiments.setup import Setup
+from experiments.states import Position, State
 from experiments.steps import Prepare, outcome_from, record, step_from
 
 HURRY = load_setup(str(shipped_folder() / "examples" / "hurry.toml"))
@@ -128,37 +129,33 @@ def test_a_hand_over_without_an_instruction_is_recorded_as_before_there_were_any
     assert set(record(step)["trial"]) == {"session", "method", "set", "trial", "direction"}
 
 
-def test_the_console_has_it_read_out_before_a_set_and_shows_it_at_its_other_trials() -> None:
+def seen(setup: Setup[Any], plan: Plan, step: Prepare) -> Seen:
+    """A console at a hand-over."""
+    return Seen(about=About(setup=setup, plan=plan), position=Position(states=(State.PREPARING,), step=step))
+
+
+def test_every_screen_has_it_read_out_before_a_set_and_shows_it_at_its_other_trials() -> None:
     plan = make_plan(HURRY.config, "P01", 1, None)
     for step in prepares(HURRY):
-        state = State(setup=HURRY, plan=plan)
-        state.take(Waiting(step=step, since_s=0.0), 0.0)
-        how = "READ OUT" if step.trial.trial in (1, 6) else "Instruction"
-        assert instruction(state, 0.0).detail.startswith(f"{how}: “{step.instruction}”\n")
+        how = "READ OUT" if step.trial.trial in (1, 6) else "Instruction of this set"
+        shown = instruction(seen(HURRY, plan, step), 0.0).detail
+        assert shown.startswith(f"{how}: “{step.instruction}”\n")
+        assert read_out_text(plan, step) in typed(plan, step)
         if step.trial.trial == 4:
-            assert f"instruction: {plan.trials[5].instruction}" in coming(state, 5)
+            assert f"instruction: {plan.trials[5].instruction}" in coming(seen(HURRY, plan, step), 5)
 
 
 def test_the_console_and_the_terminal_say_nothing_where_there_is_none() -> None:
     step, plan = prepares(PLAIN)[0], make_plan(PLAIN.config, "P01", 1, None)
-    state = State(setup=PLAIN, plan=plan)
-    state.take(Waiting(step=step, since_s=0.0), 0.0)
-    shown = [instruction(state, 0.0).detail, *coming(state), typed(plan, step)]
+    here = seen(PLAIN, plan, step)
+    shown = [instruction(here, 0.0).detail, *coming(here), typed(plan, step)]
     assert not any("READ OUT" in text or "nstruction" in text for text in shown)
 
 
 def typed(plan: Plan, step: Prepare) -> str:
     """What the terminal says at a hand-over."""
-    out = io.StringIO()
-    TerminalScreen(plan, VirtualClock(), io.StringIO("\n"), out).prepare(step)
-    return out.getvalue()
-
-
-def test_the_terminal_has_it_read_out_before_a_set_and_shows_it_at_its_other_trials() -> None:
-    plan = make_plan(HURRY.config, "P01", 1, None)
-    for step in prepares(HURRY):
-        how = "READ OUT" if step.trial.trial in (1, 6) else "Instruction of this set"
-        assert f"\n  {how}: {step.instruction}\n" in typed(plan, step)
+    screen = TerminalScreen(plan, VirtualClock(), io.StringIO(), io.StringIO())
+    return screen.text(Position(states=(State.PREPARING,), step=step))
 
 
 # journal and table

@@ -8,6 +8,8 @@ from experiments.load import load_setup
 from experiments.preference.plan import make_plan
 from experiments.preference.session import session
 from experiments.steps import (
+    Close,
+    Closed,
     Describe,
     Described,
     Failed,
@@ -19,6 +21,7 @@ from experiments.steps import (
     Presented,
     Rate,
     Rated,
+    Repeat,
     Step,
     record,
 )
@@ -42,11 +45,20 @@ def fitting(step: Step) -> Outcome:
             )
         case Rate():
             return Rated(rating=0.0, rating_by="participant")
+        case Close():
+            return Closed()
         case _:
             return Described(comment="")
 
 
 def driven(troubles: dict[int, Outcome] | None = None) -> list[Step]:
+    """All steps but the close at the end."""
+    steps = to_the_end(troubles)
+    assert steps[-1] == Close()
+    return steps[:-1]
+
+
+def to_the_end(troubles: dict[int, Outcome] | None = None) -> list[Step]:
     going, steps = session(PLAN, SETUP), []
     step: Step | None = next(going)
     while step is not None:
@@ -120,3 +132,11 @@ def test_whatever_goes_wrong_each_method_is_felt_rated_and_described_once(troubl
     done = [step for number, step in enumerate(driven(troubles)) if number not in troubles]
     for kind in (Present, Rate, Describe):
         assert [step.trial for step in done if isinstance(step, kind)] == list(PLAN.trials)
+
+
+def test_a_stimulus_can_be_presented_again_as_long_as_its_rating_is_not_in() -> None:
+    steps = driven()
+    place = next(number for number, step in enumerate(steps) if isinstance(step, Rate))
+    again = driven({place: Repeat(trial=PLAN.trials[0], reason="a phone")})
+    assert [type(step) for step in again[place : place + 4]] == [Rate, Prepare, Present, Rate]
+    assert again[place + 3 :] == steps[place:]

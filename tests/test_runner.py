@@ -1,5 +1,6 @@
 import csv
 import json
+from collections import Counter
 from contextlib import closing, suppress
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -11,14 +12,18 @@ from device.words import GunStatus
 from experiments import catalogue, limits, replay, storage
 from experiments.clock import Clock, VirtualClock
 from experiments.journal import Journal, read
+from experiments.live_run import LiveRun, RunStopped
 from experiments.load import load_setup
 from experiments.places import Place, place
 from experiments.plan import Plan
+from experiments.remarks import Remark
+from experiments.replay import Standing
 from experiments.run import Request, run, table
-from experiments.runner import MAX_FAILURES, Desk, RunStopped, carry_out
+from experiments.runner import MAX_FAILURES, Desk, carry_out
 from experiments.screens.synthetic import SyntheticScreen, synthetic_screen
 from experiments.setup import Setup
-from experiments.steps import History, Outcome, Prepare, Prepared, Standing, Step, record
+from experiments.states import Position, State
+from experiments.steps import History, Outcome, Step, record
 
 SETUPS = {name: load_setup(name) for name in ("direction", "preference")}
 BOTH = pytest.mark.parametrize("name", SETUPS)
@@ -78,12 +83,14 @@ class WatchingScreen(SyntheticScreen):
         self.acknowledged = 0
         self.trouble: dict[int, BaseException] = {}
 
-    def prepare(self, step: Prepare) -> Prepared:
-        assert not self._gun.armed
-        return super().prepare(step)
+    def act(self, position: Position, until_s: float | None) -> None:
+        assert position.state is State.TRAIN or not self._gun.armed
+        super().act(position, until_s)
 
-    def acknowledge(self, step: Step, outcome: Outcome) -> None:
+    def acknowledge(self, step: Step | None, outcome: Outcome | Remark) -> None:
         assert not self._gun.armed
+        assert step is not None
+        assert not isinstance(outcome, Remark)
         lines = self._journal.read_bytes().splitlines(keepends=True)
         told, done = [one for line in lines if (one := json.loads(line))["kind"] != "shot"][-2:]
         assert lines[-1].endswith(b"\n")
@@ -107,16 +114,21 @@ class Sitting(NamedTuple):
 
     def carry_out(self) -> History:
         going = catalogue.CATALOGUE[self.plan.experiment].session(self.plan, self.setup)
+        live = LiveRun(
+            plan=self.plan, gun=self.gun, journal=self.journal, clock=self.clock, screen=self.screen, guard_s=0.25
+        )
         desk = Desk(
             gun=self.gun,
             gun_name="simulated",
             drives=limits.drives(self.setup),
-            screen=self.screen,
             journal=self.journal,
             clock=self.clock,
+            live=live,
         )
+        self.screen.begin(live)
         with self.journal:
-            return carry_out(going, desk, Standing(step=next(going), history=[]))
+            carry_out(going, desk, Standing(step=next(going)))
+        return replay.history(read(self.where.journal))
 
     def rows(self) -> list[dict[str, str]]:
         data = table(read(self.where.journal))
@@ -153,8 +165,12 @@ def resumed_rows(desk: Sitting) -> list[dict[str, str]]:
 def test_an_answer_is_acknowledged_once_its_record_is_on_the_disk(name: str, tmp_path: Path) -> None:
     desk = sitting(name, tmp_path)
     done = desk.carry_out()
-    assert desk.screen.acknowledged == len(done) == (191 if name == "direction" else 12)
-    assert replay.history(read(desk.where.journal)) == done
+    steps = Counter(step.kind for step, _ in done)
+    trials = len(desk.plan.trials)
+    rests = {"rest": 11} if name == "direction" else {}
+    each = ("prepare", "fire", "ask") if name == "direction" else ("prepare", "present", "rate", "describe")
+    assert steps == dict.fromkeys(each, trials) | rests | {"close": 1}
+    assert desk.screen.acknowledged == len(done)
 
 
 @BOTH
@@ -351,7 +367,7 @@ def test_what_was_acknowledged_before_an_interrupt_is_there_when_resumed(name: s
 
 def test_an_interrupted_run_leaves_a_reason_and_a_table_of_what_was_answered(tmp_path: Path) -> None:
     class Impatient(SyntheticScreen):
-        def acknowledge(self, step: Step, outcome: Outcome) -> None:
+        def acknowledge(self, step: Step | None, outcome: Outcome | Remark) -> None:
             super().acknowledge(step, outcome)
             if outcome.kind == "answered":
                 raise KeyboardInterrupt

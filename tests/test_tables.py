@@ -211,7 +211,7 @@ def test_a_rating_of_0_is_written_and_none_leaves_the_cell_empty(rating: float |
     shown = Presented(gun="simulated", onset_utc="t", shots=12, exposure_s=11.5, ended_by="next")
     rate = Rate(trial=trial, question="?", minimum=0, maximum=10, minimum_text="a", maximum_text="b", grain=0.1)
     history = [
-        (Present(trial=trial, attempt=1, repeat_every_s=1.0, max_shots=120), shown),
+        (Present(trial=trial, attempt=1, repeat_every_s=1.0, max_shots=120, least_exposure_s=1.0), shown),
         (rate, Rated(rating=rating, rating_by="participant")),
         (Describe(trial=trial, question="?"), Described(comment="-soft")),
     ]

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from tests.at_terminal import AtTerminal
+from tests.at_terminal import DAMPER, FIRES, AtTerminal
 from tests.conftest import RECOIL
 
 
@@ -43,8 +43,7 @@ def short_configs(quick_configs: Path) -> Path:
 def test_experiment_1_from_the_first_hand_over_to_the_table(short_configs: Path, tmp_path: Path) -> None:
     with AtTerminal(run(short_configs, "direction", "--seed", 3), tmp_path) as screen:
         for trial in range(12):
-            screen.wait_for("Enter fires:", trial + 1)
-            screen.type("")
+            screen.fire(trial + 1)
             screen.wait_for("b = backward:", trial + 1)
             if trial == 0:
                 screen.type("left")
@@ -59,6 +58,7 @@ def test_experiment_1_from_the_first_hand_over_to_the_table(short_configs: Path,
                 screen.type("skip fire drill")
             if trial == 0:  # one prompt more was shown for the answer that was none
                 screen.seen = screen.seen.replace("b = backward:", "", 1)
+        screen.close()
         assert screen.end() == 0
         shown = screen.seen
     assert "Break between sets: 1 s" in shown
@@ -77,8 +77,7 @@ def test_experiment_2_with_a_rating_of_zero_no_answer_and_a_comment_that_looks_l
 ) -> None:
     with AtTerminal(run(quick_configs, "preference"), tmp_path) as screen:
         for trial in range(3):
-            screen.wait_for("Enter fires:", trial + 1)
-            screen.type("")
+            screen.fire(trial + 1)
             screen.wait_for("says next:", trial + 1)
             screen.type("")
             screen.wait_for("Presented and saved.", trial + 1)
@@ -87,6 +86,7 @@ def test_experiment_2_with_a_rating_of_zero_no_answer_and_a_comment_that_looks_l
             screen.type(rating)
             screen.wait_for("in your own words.", trial + 1)
             screen.type(comment)
+        screen.close()
         assert screen.end() == 0
     table = rows(tmp_path, "preference_ratings")
     assert [row["rating"] for row in table] == ["0.0", "", "7.5"]
@@ -97,8 +97,7 @@ def test_experiment_2_with_a_rating_of_zero_no_answer_and_a_comment_that_looks_l
 def test_a_rating_off_the_scale_is_asked_again(quick_configs: Path, tmp_path: Path) -> None:
     with AtTerminal(run(quick_configs, "preference"), tmp_path) as screen:
         for trial in range(3):
-            screen.wait_for("Enter fires:", trial + 1)
-            screen.type("")
+            screen.fire(trial + 1)
             screen.wait_for("says next:", trial + 1)
             screen.type("")
         for count, typed in enumerate(("11", "-1", "much", "nan", ""), start=1):
@@ -112,7 +111,7 @@ def test_a_rating_off_the_scale_is_asked_again(quick_configs: Path, tmp_path: Pa
 def test_a_stopped_run_keeps_its_table_and_needs_a_decision(quick_configs: Path, tmp_path: Path) -> None:
     with AtTerminal(run(quick_configs, "direction"), tmp_path) as screen:
         screen.answer_trials(2)
-        screen.wait_for("Enter fires:", 3)
+        screen.wait_for(FIRES, 3)
         screen.type("stop lunch")
         assert screen.end() == 130
         assert "stopped: lunch. Go on with --resume." in screen.seen
@@ -121,7 +120,7 @@ def test_a_stopped_run_keeps_its_table_and_needs_a_decision(quick_configs: Path,
         assert screen.end() == 2
         assert "has an unfinished run of direction" in screen.seen
     with AtTerminal(run(quick_configs, "direction", "--fresh"), tmp_path) as screen:
-        screen.wait_for("Enter fires:")
+        screen.wait_for(DAMPER)
         screen.type("stop")
         assert screen.end() == 130
     aside = sorted(path.name for path in (tmp_path / "results/sub-P01").glob("*aside*"))
@@ -130,7 +129,7 @@ def test_a_stopped_run_keeps_its_table_and_needs_a_decision(quick_configs: Path,
 
 def test_two_consoles_cannot_run_one_participant(quick_configs: Path, tmp_path: Path) -> None:
     with AtTerminal(run(quick_configs, "direction"), tmp_path) as first:
-        first.wait_for("Enter fires:")
+        first.wait_for(DAMPER)
         with AtTerminal(run(quick_configs, "direction", "--resume"), tmp_path) as second:
             assert second.end() == 2
             assert "another run holds this journal" in second.seen

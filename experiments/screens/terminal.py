@@ -55,7 +55,7 @@ class TerminalScreen:
         self._source = lines or sys.stdin
         self._lock = threading.RLock()
         self._live: LiveRun | None = None
-        self._shown = Position()
+        self._shown, self._serial = Position(), -1
 
     def begin(self, live: LiveRun) -> None:
         """Say who it is, and begin to read."""
@@ -72,8 +72,10 @@ class TerminalScreen:
         with self._lock:
             if self._live is None or position.serial < self._shown.serial:
                 return
-            self._shown = position
-            self._show(self._text(position))
+            said, self._shown = self.text(self._shown), position
+            if position.serial != self._serial or self.text(position) != said:
+                self._show(self.text(position))
+            self._serial = position.serial
         self._live.painted(position.serial, self._clock.now())
 
     def acknowledge(self, step: Step | None, word: Outcome | Remark) -> None:
@@ -95,7 +97,8 @@ class TerminalScreen:
 
     # what is asked for
 
-    def _text(self, position: Position) -> str:  # noqa: C901, PLR0911, PLR0912 - one case a state
+    def text(self, position: Position) -> str:  # noqa: C901, PLR0911, PLR0912 - one case a state
+        """What is asked for at a position."""
         step = position.step
         match position.state:
             case State.REARMING:
@@ -109,7 +112,7 @@ class TerminalScreen:
                 damper = f"\n  The damper is {step.damper.upper()}." if step.damper else ""
                 turn = f"Turn the gun to {step.trial.direction.upper()} and hand it over."
                 return f"{self._head(step)}{damper}\n  {turn} Enter fires: "
-            case State.TRAIN:
+            case State.TRAIN if position.onset_s is not None:
                 return "\n  Enter when the participant says next: "
             case State.ASKING if isinstance(step, Ask):
                 return f"\n  {step.question} f = {step.forward}, b = {step.backward}: "
@@ -164,7 +167,7 @@ class TerminalScreen:
         event = self._meant(line, position, now_s)
         if isinstance(event, str):
             self._say(f"  {event}")
-            self._show(self._text(position))
+            self._show(self.text(position))
         elif event is not None:
             self._offer(event, Press(at_s=now_s, serial=position.serial))
 
@@ -174,7 +177,7 @@ class TerminalScreen:
         verdict = self._live.offer(event, press)
         if verdict.text:
             self._say(f"  {verdict.text}")
-            self._show(self._text(self._live.position))
+            self._show(self.text(self._live.position))
 
     def _meant(self, line: str, position: Position, now_s: float) -> Event | str | None:
         """The event that a line means there, or what to say about it."""

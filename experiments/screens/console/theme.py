@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import Literal
 
 Theme = Literal["dark", "light"]
@@ -91,6 +92,15 @@ def sheet(theme: Theme, scale: float = 1.0) -> str:
     return f"""
     QWidget {{ background: {c["ground"]}; color: {c["text"]}; font-size: {px(17)};
         font-family: "DejaVu Sans", "Noto Sans"; }}
+    {moods}
+    {bands}
+    {_labels_and_buttons(c, px)}
+    {_fields_and_lists(c, px)}
+    """
+
+
+def _labels_and_buttons(c: dict[str, str], px: Callable[[float], str]) -> str:
+    return f"""
     QFrame#panel {{ background: {c["panel"]}; border: 1px solid {c["line"]}; border-radius: 8px; }}
     QFrame#panel QLabel, QFrame#panel QCheckBox, QWidget#form {{ background: transparent; }}
     QLabel#place {{ font-size: {px(22)}; color: {c["quiet"]}; }}
@@ -105,6 +115,11 @@ def sheet(theme: Theme, scale: float = 1.0) -> str:
     QPushButton#large {{ font-size: {px(26)}; font-weight: bold; padding: {px(18)} {px(4)}; }}
     QPushButton#stop {{ background: {c["stop"]}; color: {c["stop_text"]}; font-weight: bold; font-size: {px(22)};
         padding: {px(14)} {px(6)}; }}
+    """
+
+
+def _fields_and_lists(c: dict[str, str], px: Callable[[float], str]) -> str:
+    return f"""
     QLineEdit, QDoubleSpinBox, QSpinBox, QComboBox {{ background: {c["panel"]}; border: 2px solid {c["line"]};
         border-radius: 6px; padding: {px(8)}; font-size: {px(24)}; }}
     QLineEdit:focus, QDoubleSpinBox:focus, QSpinBox:focus, QComboBox:focus {{ border: 3px solid {c["act"]}; }}
@@ -119,6 +134,4 @@ def sheet(theme: Theme, scale: float = 1.0) -> str:
     QPlainTextEdit {{ font-family: "DejaVu Sans Mono", monospace; }}
     QListWidget::item:selected, QTableWidget::item:selected {{ background: {c["act"]}; color: {c["ground"]}; }}
     QHeaderView::section {{ background: {c["ground"]}; color: {c["quiet"]}; border: none; padding: 6px; }}
-    {moods}
-    {bands}
     """
