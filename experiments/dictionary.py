@@ -46,13 +46,13 @@ that clock was real or virtual (synthetic participants: breaks take no time).
 | `body` | `step`, `outcome`, `remark` | what should happen, what did, what was said beside it; its `kind` says which |
 | `body.kind` | `remark` | `answer-corrected`, `rating-corrected`, `description-corrected`, `flagged`, `noted`, \
 `paused` (`cause`: of itself, for what), `continued`, `refused`, `halted`, `halt-reason`, `test-shot` |
-| `body.event`, `state`, `because`, `by` | `remark` | of a `refused` press: for what it was, in which state of the run, \
+| `body.event`, `state`, `because`, `by` | `remark` | of a `refused` press: for what it was, in which state, \
 why it was not taken, whose hand |
 | `body.by` | `remark` | of a `halted` run: at whose screen the emergency stop was pressed |
-| `body.held_s`, `cause` | `remark` | of a `test-shot` after an emergency stop: how long the key was held; empty `cause`: \
-it was fired |
-| `body.cause`, `shots`, `exposure_s` | `outcome` | of an `interrupted` stimulus: `pause` or `break-off`; how long it was \
-felt, where that is known |
+| `body.held_s`, `cause` | `remark` | of a `test-shot` after an emergency stop: how long the key was held; \
+empty `cause`: it was fired |
+| `body.cause`, `shots`, `exposure_s` | `outcome` | of an `interrupted` stimulus: `pause` or `break-off`; how long \
+it was felt, where that is known |
 | `body` | `shot` | one shot of a train, from 1, with its times; kept also if the train fails or is stopped |
 | `body.timing` | `outcome`, `shot` | of a gun on a line: request, write, acknowledgement, pulse, on both clocks |
 | `body.key_time_s` | `outcome` | when a synthetic participant's key went down (`--visual`), in s since the onset |

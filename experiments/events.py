@@ -318,6 +318,9 @@ ACTS: tuple[type[Event], ...] = (
 )
 """What carries the run on: by the experimenter's hand it counts only for the screen on which its press began."""
 
+DISARMS: tuple[type[Event], ...] = (Pause, Stop, EmergencyStop, ParticipantLost, DisplayLost, ResultsGone)
+"""What has the gun disarmed at once, beside the run, where it may be armed; the emergency stop everywhere."""
+
 
 def word(kind: type[Event]) -> str:
     """What an event is called."""

@@ -12,29 +12,21 @@ from collections import deque
 from collections.abc import Sequence
 from concurrent.futures import Future
 from dataclasses import dataclass, replace
-from typing import Protocol
 
-from device import DeviceError, Gun, GunStatus
+from device import DeviceError, Gun
 from experiments import events
 from experiments.clock import Clock
 from experiments.entries import Entry, entries, repeatable, trial_at, value
-from experiments.events import ACTS, Event, Press
+from experiments.events import ACTS, DISARMS, Event, Press
 from experiments.journal import Journal, JournalGone
+from experiments.live_remarks import remark_of
 from experiments.plan import Plan, Trial
 from experiments.remarks import (
-    AnswerCorrected,
-    Continued,
-    DescriptionCorrected,
-    Flagged,
-    Halted,
-    HaltReason,
-    Noted,
-    Paused,
-    RatingCorrected,
     Refused,
     Remark,
     record,
 )
+from experiments.screen import Screen
 from experiments.states import ARMED, No, Position, State, after, entered
 from experiments.steps import Outcome, Step
 from experiments.tables import Told
@@ -45,15 +37,6 @@ REARM_HELD_S = 1.0
 
 DISARMED_S = 10.0
 """The longest that a run waits for a disarming that began beside it: a gun on a line gives up before."""
-
-_DISARMS = (
-    events.Pause,
-    events.Stop,
-    events.EmergencyStop,
-    events.ParticipantLost,
-    events.DisplayLost,
-    events.ResultsGone,
-)
 
 
 class RunStopped(Exception):  # noqa: N818 - a stop is not an error
@@ -71,31 +54,6 @@ class RunHalted(RunStopped):
 
 class Held(Exception):  # noqa: N818 - what is so, not what went wrong
     """No shot may be fired now: the run was paused."""
-
-
-class Screen(Protocol):
-    """Where a run is shown, and worked by a person, real or synthetic. All but `begin` and `act` come from any thread.
-
-    Whoever works it offers events to the live run; nothing is decided here.
-    """
-
-    def begin(self, live: LiveRun) -> None:
-        """Take the place before a run that stands where `live` says."""
-
-    def show(self, position: Position) -> None:
-        """Show a position; one of an earlier serial number than the last is out of date."""
-
-    def act(self, position: Position, until_s: float | None) -> None:
-        """The run waits now, at most until a time: who works in the run's own thread acts; others just go on."""
-
-    def acknowledge(self, step: Step | None, word: Outcome | Remark) -> None:
-        """Show that something is safe: its record is on the disk. A remark has no step."""
-
-    def trouble(self, text: str) -> None:
-        """Show what went wrong."""
-
-    def gun_seen(self, status: GunStatus | None, fault: str) -> None:
-        """Show what the gun itself says of its state, or why it says nothing."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -179,7 +137,7 @@ class LiveRun:
                 self._inbox.append(meant)
             self._news.notify_all()
             position = self._position
-        if isinstance(meant, _DISARMS) and (before.base in ARMED or isinstance(meant, events.EmergencyStop)):
+        if isinstance(meant, DISARMS) and (before.base in ARMED or isinstance(meant, events.EmergencyStop)):
             self._disarm_beside()
         self._screen.show(position)
         return Verdict(taken=True, text=text)
@@ -379,32 +337,9 @@ class LiveRun:
 
     def _keep(self, event: Event, before: Position) -> None:
         """Have what is no step's outcome written."""
-        remark = self._remark_of(event, before)
+        remark = remark_of(event, before, self._position, self.trial)
         if remark is not None:
             self.remark(remark)
-
-    def _remark_of(self, event: Event, before: Position) -> Remark | None:  # noqa: C901, PLR0911 - one case an event
-        match event:
-            case events.Flag():
-                return Flagged(trial=event.trial or self.trial, flag=event.flag)
-            case events.Note():
-                return Noted(trial=event.trial or self.trial, text=event.text)
-            case events.Correct() if before.correcting is not None:
-                return _corrected(before.correcting, event)
-            case events.Reason():
-                return HaltReason(text=event.text)
-            case events.EmergencyStop() if before.base is not State.HALTED:
-                return Halted(by=event.by)
-            case events.Pause():
-                return Paused()
-            case events.ParticipantBack():
-                return Noted(trial=None, text="The participant's screen was started again.")
-            case events.ParticipantLost() if before.paused_s is None and self._position.paused_s is not None:
-                return Paused(cause=event.cause)
-            case events.GoOn():
-                return Continued(paused_s=round(self.clock.now() - (before.paused_s or before.since_s), 3))
-            case _:
-                return None
 
     def _keep_refused(self, event: Event, because: str) -> None:
         """Keep what would have carried the run on."""
@@ -461,15 +396,3 @@ class LiveRun:
 def _stopped(before: Position, reason: str) -> str:
     """Why a run stopped: after an emergency stop for that, whatever closed it."""
     return EMERGENCY if before.base is State.HALTED else reason
-
-
-def _corrected(entry: Entry, event: events.Correct) -> Remark:
-    match entry.what, event.value:
-        case "answer", "forward" | "backward" as response:
-            return AnswerCorrected(trial=entry.trial, response=response)
-        case "rating", float() | None as rating:
-            return RatingCorrected(trial=entry.trial, rating=rating)
-        case "description", str() as comment:
-            return DescriptionCorrected(trial=entry.trial, comment=comment)
-        case _:
-            raise TypeError(f"{event.value!r} is no {entry.what}")

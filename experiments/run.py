@@ -18,14 +18,16 @@ from experiments.clock import Clock
 from experiments.columns import FILE_SUFFIX, LATER
 from experiments.journal import Contents, Journal, JournalError, hold, is_empty
 from experiments.journal import read as read_journal
-from experiments.live_run import LiveRun, RunStopped, Screen
+from experiments.live_run import LiveRun, RunStopped
 from experiments.places import Place, PlaceError
 from experiments.plan import Plan
 from experiments.provenance import provenance
 from experiments.replay import Standing
-from experiments.runner import Desk, carry_out, gun_name
+from experiments.runner import carry_out, gun_name
+from experiments.screen import Screen
 from experiments.setup import Setup
 from experiments.steps import Answered, Rated, Session
+from experiments.stimulus import Desk
 from experiments.streams import draw_seed
 from experiments.tables import table_bytes
 

@@ -8,20 +8,13 @@ the line nor this machine delays them. Each is in the journal before the next is
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
-from dataclasses import dataclass, fields
-from typing import Any, Literal
 
-from device import DeviceError, Gun, LimitError, Shot, ShotReport
-from device.words import Drive, Identity
+from device.words import Identity
 from experiments import events
-from experiments.clock import Clock
 from experiments.entries import trial_at
-from experiments.journal import Journal
-from experiments.live_run import Held, LiveRun, RunHalted, RunStopped
+from experiments.live_run import RunHalted, RunStopped
 from experiments.plan import Trial
 from experiments.preference.scale import on_scale
-from experiments.remarks import TestShot
 from experiments.replay import Standing
 from experiments.states import State
 from experiments.steps import (
@@ -39,7 +32,6 @@ from experiments.steps import (
     Prepare,
     Prepared,
     Present,
-    Presented,
     Rate,
     Rated,
     Repeat,
@@ -47,48 +39,21 @@ from experiments.steps import (
     Rested,
     Session,
     Step,
-    TrainShot,
     record,
 )
+from experiments.stimulus import Desk, Stimulus, disarm
 
 MAX_FAILURES = 3
 """Failures of the gun in a row after which a run stops and can be resumed."""
-
-
-LEAD_S = 0.03
-"""How long before its tick a shot of a train is asked for; a `next` within that time comes too late for it.
-
-Assumed: twice what the doctor lets pass, 5 ms that a sleep overruns and 10 ms to the gun and back.
-"""
 
 
 class Unforeseen(TypeError):  # noqa: N818 - a fault of the program
     """The table took an event for a step that knows none of its kind."""
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Desk:
-    """All that carries steps out: gun and how each method drives it, journal, clock, and the live run."""
-
-    gun: Gun
-    gun_name: str
-    drives: Mapping[str, Drive]
-    journal: Journal
-    clock: Clock
-    live: LiveRun
-
-
 def gun_name(identity: Identity) -> str:
     """Who renders, as the tables say it: `simulated`, or model and serial number."""
     return identity.model if identity.model == identity.serial else f"{identity.model}:{identity.serial}"
-
-
-def disarm(gun: Gun) -> None:
-    """Disarm, or stop the run: nobody is to hold a gun that may fire. `RunStopped` says what to do."""
-    try:
-        gun.disarm()
-    except DeviceError as error:
-        raise RunStopped(f"the gun cannot be disarmed ({error}): switch off its power") from error
 
 
 def carry_out(session: Session, desk: Desk, standing: Standing) -> None:
@@ -112,6 +77,7 @@ class _Runner:
 
     def __init__(self, session: Session, desk: Desk) -> None:
         self._session, self._desk, self._live = session, desk, desk.live
+        self._stimulus = Stimulus(desk)
         self._failures = 0
         self._onset_s = math.nan
         self._damper = ""
@@ -153,13 +119,13 @@ class _Runner:
             case Prepare():
                 return self._prepare(step)
             case Fire():
-                return self._fire(step)
+                return self._fired(step)
             case Ask():
                 return self._ask(step)
             case Rest():
                 return self._rest(step)
             case Present():
-                return self._present(step)
+                return self._stimulus.present(step)
             case Rate():
                 return self._rate(step)
             case Describe():
@@ -270,64 +236,11 @@ class _Runner:
 
     # the gun
 
-    def _fire(self, step: Fire) -> Fired | Failed | Interrupted:
-        """One shot, armed for it alone."""
-        try:
-            self._live.enter(State.FIRING, step)
-            onset_utc, report = self._first(step.trial)
-        except Held:
-            return Interrupted(presented=False, cause="pause")
-        except DeviceError as error:
-            return self._failed(error, felt=not isinstance(error, LimitError))
-        finally:
-            disarm(self._desk.gun)
-        self._onset_s = report.pulse_start_s
-        self._live.felt(report.pulse_start_s)
-        return Fired(gun=self._desk.gun_name, onset_utc=onset_utc, **_times(report))
-
-    def _present(self, step: Present) -> Presented | Failed | Interrupted:
-        """Shots at whole multiples of the interval since the first, until next is said."""
-        train = _Train(step, self._desk)
-        try:
-            self._live.enter(State.TRAIN, step)
-            self._live.felt(None)
-            train.began(*self._first(step.trial))
-            while (event := self._live.wait((at_s := train.due_s()) - LEAD_S)) is None:
-                if train.shots == step.max_shots:
-                    return train.presented("limit")
-                self._live.allow_shot()
-                train.fired(self._shoot(step.trial, at_s))
-        except Held:
-            return train.interrupted()
-        except DeviceError as error:
-            return self._failed(error, felt=train.shots > 0 or not isinstance(error, LimitError))
-        finally:
-            disarm(self._desk.gun)
-        return train.presented("next") if isinstance(event, events.Next) else train.interrupted()
-
-    def _first(self, trial: Trial) -> tuple[str, ShotReport]:
-        """The first shot of a stimulus, as soon as the magnet is home, and its date and time. Raises as `allow_shot`.
-
-        Whether it may be fired is looked at after the gun was armed, and again just before it fires: what halts or
-        holds the run is set before the gun is told to disarm.
-        """
-        self._live.settle()
-        self._live.allow_shot()
-        self._desk.gun.arm()
-        self._live.sleep(self._desk.gun.status().ready_at_s)
-        return self._desk.clock.utc(), self._shoot(trial)
-
-    def _shoot(self, trial: Trial, at_s: float | None = None) -> ShotReport:
-        shot = Shot(method=trial.method, direction=trial.direction, drive=self._desk.drives[trial.method])
-        return self._desk.gun.fire(shot, at_s)
-
-    def _failed(self, error: DeviceError, *, felt: bool) -> Failed | Interrupted:
-        """What became of a stimulus at which the gun failed; a pause that disarmed it is no fault of the gun's."""
-        if self._live.taken() is not None:
-            return Interrupted(presented=felt, cause="pause")
-        lost = events.GunFault if isinstance(error, LimitError) else events.LinkLost
-        self._live.offer(lost(cause=str(error)))
-        return Failed(cause=str(error))
+    def _fired(self, step: Fire) -> Fired | Failed | Interrupted:
+        outcome = self._stimulus.fire(step)
+        if isinstance(outcome, Fired):
+            self._onset_s = outcome.pulse_start_s
+        return outcome
 
     def _rearm(self, trial: Trial) -> None:
         """After an emergency stop: a key held, and a test shot that the gun fires, before anything else."""
@@ -335,73 +248,10 @@ class _Runner:
             self._live.enter(State.REARMING)
             match self._live.wait():
                 case events.Rearm(held_s=held_s):
-                    if self._test_shot(trial, held_s):
+                    if self._stimulus.test_shot(trial, held_s):
                         return
                 case other:
                     raise Unforeseen(other)
-
-    def _test_shot(self, trial: Trial, held_s: float | None) -> bool:
-        """Fire a shot that nobody judges; whether it was fired."""
-        try:
-            _, report = self._first(trial)
-        except (Held, DeviceError) as error:
-            cause = str(error) or "paused"
-            self._live.remark(TestShot(method=trial.method, held_s=held_s, cause=cause))
-            return False
-        finally:
-            disarm(self._desk.gun)
-        fired = TestShot(method=trial.method, held_s=held_s, pulse_start_s=report.pulse_start_s, motion=report.motion)
-        self._live.remark(fired)
-        return True
-
-
-class _Train:
-    """A stimulus of several shots: each in the journal before the next is asked for."""
-
-    def __init__(self, step: Present, desk: Desk) -> None:
-        self._step, self._desk = step, desk
-        self._onset_utc, self._onset_s = "", math.nan
-        self.shots = 0
-
-    def began(self, onset_utc: str, first: ShotReport) -> None:
-        """Take the first shot; `next` counts after the least exposure."""
-        self._onset_utc, self._onset_s = onset_utc, first.pulse_start_s
-        self._desk.live.felt(first.pulse_start_s, least_s=self._step.least_exposure_s)
-        self.fired(first)
-
-    def fired(self, report: ShotReport) -> None:
-        """Have a shot on the disk."""
-        self.shots += 1
-        self._desk.journal.append("shot", body=record(TrainShot(shot=self.shots, **_times(report))))
-
-    def due_s(self) -> float:
-        """The next shot's tick, whole microseconds after the first; later if the magnet is not home by then."""
-        tick_s = self._onset_s + self.shots * round(self._step.repeat_every_s * 1e6) / 1e6
-        return max(tick_s, self._desk.gun.status().ready_at_s)
-
-    def presented(self, ended_by: Literal["next", "limit"]) -> Presented:
-        """The stimulus as it was felt to its end."""
-        return Presented(
-            gun=self._desk.gun_name,
-            onset_utc=self._onset_utc,
-            shots=self.shots,
-            exposure_s=self._exposure_s(),
-            ended_by=ended_by,
-        )
-
-    def interrupted(self) -> Interrupted:
-        """The stimulus as it was felt until a pause ended it."""
-        if not self.shots:
-            return Interrupted(presented=False, cause="pause")
-        return Interrupted(presented=True, cause="pause", shots=self.shots, exposure_s=self._exposure_s())
-
-    def _exposure_s(self) -> float:
-        return self._desk.clock.now() - self._onset_s
-
-
-def _times(report: ShotReport) -> dict[str, Any]:
-    """What the journal keeps of a shot's report, beside what was asked for."""
-    return {field.name: getattr(report, field.name) for field in fields(report) if field.name != "shot"}
 
 
 def _kept(rating: float, step: Rate) -> float:

@@ -22,13 +22,14 @@ from device.words import Direction
 from experiments import run as runs
 from experiments.events import Press
 from experiments.journal import Contents, read
-from experiments.live_run import LiveRun, Screen
+from experiments.live_run import LiveRun
 from experiments.load import load_setup
 from experiments.places import Place, place
 from experiments.plan import Plan, Trial
 from experiments.remarks import AnswerCorrected, Remark
 from experiments.replay import told
 from experiments.run import Finished, Request, run, table
+from experiments.screen import Screen
 from experiments.screens.console import theme, view
 from experiments.screens.console.controls import Controls, Field
 from experiments.screens.console.keys import Name, Presses

@@ -43,7 +43,7 @@ def killed_run(configs: Path, folder: Path, seconds: float, *, begun: bool) -> t
     """A run killed some seconds after its start, or after it has `begun`: what was acknowledged, and the journal."""
     with AtTerminal(words(configs), folder) as screen:
         if begun:
-            screen.wait_for(DAMPER)
+            screen.wait_for("Trial 1 of")
         answer_until_killed(screen, seconds)
         saved = screen.seen.count("Saved.")
     return (ANSWERS * 8)[:saved], folder / "results" / f"{STEM}_journal.jsonl"

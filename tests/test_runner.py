@@ -19,11 +19,12 @@ from experiments.plan import Plan
 from experiments.remarks import Remark
 from experiments.replay import Standing
 from experiments.run import Request, run, table
-from experiments.runner import MAX_FAILURES, Desk, carry_out
+from experiments.runner import MAX_FAILURES, carry_out
 from experiments.screens.synthetic import SyntheticScreen, synthetic_screen
 from experiments.setup import Setup
 from experiments.states import Position, State
 from experiments.steps import History, Outcome, Step, record
+from experiments.stimulus import Desk
 
 SETUPS = {name: load_setup(name) for name in ("direction", "preference")}
 BOTH = pytest.mark.parametrize("name", SETUPS)

@@ -120,7 +120,7 @@ def test_a_stopped_run_keeps_its_table_and_needs_a_decision(quick_configs: Path,
         assert screen.end() == 2
         assert "has an unfinished run of direction" in screen.seen
     with AtTerminal(run(quick_configs, "direction", "--fresh"), tmp_path) as screen:
-        screen.wait_for(DAMPER)
+        screen.wait_for("Trial 1 of")
         screen.type("stop")
         assert screen.end() == 130
     aside = sorted(path.name for path in (tmp_path / "results/sub-P01").glob("*aside*"))
@@ -129,7 +129,7 @@ def test_a_stopped_run_keeps_its_table_and_needs_a_decision(quick_configs: Path,
 
 def test_two_consoles_cannot_run_one_participant(quick_configs: Path, tmp_path: Path) -> None:
     with AtTerminal(run(quick_configs, "direction"), tmp_path) as first:
-        first.wait_for(DAMPER)
+        first.wait_for("Trial 1 of")
         with AtTerminal(run(quick_configs, "direction", "--resume"), tmp_path) as second:
             assert second.end() == 2
             assert "another run holds this journal" in second.seen

@@ -15,7 +15,7 @@ from device.words import GunStatus
 from experiments.clock import VirtualClock
 from experiments.journal import Journal, read
 from experiments.run import table
-from experiments.runner import LEAD_S
+from experiments.stimulus import LEAD_S
 from tests.serial_runs import of_trains
 from tests.test_runner import Sitting, TroubledGun, resumed_rows, sitting
 

@@ -11,11 +11,12 @@ from typing import Any
 from device.serial_gun.address import speed_of
 from experiments import storage
 from experiments.clock import Clock, RealClock, VirtualClock
-from experiments.live_run import RunStopped, Screen
+from experiments.live_run import RunStopped
 from experiments.load import load_setup
 from experiments.places import Place, PlaceError, set_aside_file
 from experiments.plan import Plan
 from experiments.run import Again, Finished, Request, rebuild, run
+from experiments.screen import Screen
 from experiments.screens.synthetic import synthetic_screen
 from experiments.screens.terminal import TerminalScreen
 from experiments.setup import Setup

@@ -18,11 +18,12 @@ from experiments import events
 from experiments.clock import Clock
 from experiments.events import Hand
 from experiments.journal import JournalError
-from experiments.live_run import LiveRun, RunStopped, Screen
+from experiments.live_run import LiveRun, RunStopped
 from experiments.load import ConfigError
 from experiments.places import PlaceError
 from experiments.plan import Plan
 from experiments.run import Finished, Request, run
+from experiments.screen import Screen
 from experiments.screens.console import display
 from experiments.screens.console.beside import ParticipantSide
 from experiments.screens.console.messages import Began, Ended, Message
