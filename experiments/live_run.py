@@ -123,24 +123,29 @@ class LiveRun:
         """Have an event judged, and taken if it may be. Never waits. `press`: by the experimenter's hand."""
         with self._news:
             meant, text = self._meant(event)
-            refusal = self._refusal(meant, press)
-            if refusal:
-                self._keep_refused(meant, refusal)
-                return Verdict(taken=False, text=refusal)
-            before = self._position
-            self._position = self._after(before, meant)
-            self._keep(meant, before)
-            self._paused_s = self._position.paused_s or self._paused_s
-            if self._position.serial != before.serial:
-                self._painted_s = None
-            if self._position.states[0] != before.states[0]:
-                self._inbox.append(meant)
-            self._news.notify_all()
+            refusal, before = self._refusal(meant, press), self._position
+            if not refusal:
+                self._take(meant, before)
             position = self._position
-        if isinstance(meant, DISARMS) and (before.base in ARMED or isinstance(meant, events.EmergencyStop)):
+            kept = self._refused(meant, refusal) if refusal else remark_of(meant, before, position, self.trial)
+            written = None if kept is None else self._submit(kept)
+        if kept is not None and written is not None:  # outside: who shows it may wait for this lock
+            written.add_done_callback(lambda done: self._written(kept, done))
+        if not refusal:
+            self._screen.show(position)
+        return Verdict(taken=not refusal, text=refusal or text)
+
+    def _take(self, event: Event, before: Position) -> None:
+        """Stand where an event leads; where it disarms, that begins when this is so, and before anything else."""
+        self._position = self._after(before, event)
+        if isinstance(event, DISARMS) and (before.base in ARMED or isinstance(event, events.EmergencyStop)):
             self._disarm_beside()
-        self._screen.show(position)
-        return Verdict(taken=True, text=text)
+        self._paused_s = self._position.paused_s or self._paused_s
+        if self._position.serial != before.serial:
+            self._painted_s = None
+        if self._position.base != before.base:
+            self._inbox.append(event)
+        self._news.notify_all()
 
     # for the run
 
@@ -238,13 +243,18 @@ class LiveRun:
     def remark(self, remark: Remark) -> None:
         """Have a remark written behind what was written before, and shown when it is on the disk."""
         with self._news:
-            self._told.append((None, remark))
+            written = self._submit(remark)
+        if written is not None:
+            written.add_done_callback(lambda done: self._written(remark, done))
+
+    def _submit(self, remark: Remark) -> Future[None] | None:
+        """Have a remark written; `None` if the journal is closed, as the run has just ended."""
         try:
             written = self._journal.submit("remark", body=record(remark))
-        except RuntimeError:  # the journal is closed: the run has just ended
-            self._screen.trouble("The run has ended; nothing can be added.")
-            return
-        written.add_done_callback(lambda done: self._written(remark, done))
+        except RuntimeError:
+            return None
+        self._told.append((None, remark))
+        return written
 
     # judging
 
@@ -335,25 +345,16 @@ class LiveRun:
 
     # keeping
 
-    def _keep(self, event: Event, before: Position) -> None:
-        """Have what is no step's outcome written."""
-        remark = remark_of(event, before, self._position, self.trial)
-        if remark is not None:
-            self.remark(remark)
-
-    def _keep_refused(self, event: Event, because: str) -> None:
-        """Keep what would have carried the run on."""
+    def _refused(self, event: Event, because: str) -> Refused | None:
+        """What is kept of an event that would have carried the run on, and was refused."""
         own = isinstance(event, events.ParticipantKey | events.ParticipantRated)
         if not (own or isinstance(event, ACTS)) or self._position.base is State.STOPPED:
-            return
-        state = str(self._position.state)
-        self.remark(
-            Refused(
-                event=events.word(type(event)),
-                state=state,
-                because=because,
-                by="participant" if own else "experimenter",
-            )
+            return None
+        return Refused(
+            event=events.word(type(event)),
+            state=str(self._position.state),
+            because=because,
+            by="participant" if own else "experimenter",
         )
 
     def _written(self, remark: Remark, done: Future[None]) -> None:

@@ -268,5 +268,6 @@ def entered(position: Position, state: State, now_s: float, step: Step | None, u
         step=step if new else position.step,
         since_s=now_s,
         until_s=until_s,
+        onset_s=None if state in ARMED else position.onset_s,
         not_before_s=None,
     )

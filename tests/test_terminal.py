@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import csv
+import json
 import re
 from pathlib import Path
+from typing import Any
 
 import pytest
 
@@ -143,3 +145,85 @@ def test_a_terminal_that_is_closed_stops_the_run(quick_configs: Path, tmp_path: 
         screen.end()
     journal = (tmp_path / "results/sub-P01/sub-P01_task-direction_journal.jsonl").read_text()
     assert '"kind":"stopped"' in journal.splitlines()[-1]
+
+
+# a hand that is hasty
+
+
+def journal_of(folder: Path) -> list[dict[str, Any]]:
+    lines = (folder / "results/sub-P01/sub-P01_task-direction_journal.jsonl").read_text().splitlines()
+    return [json.loads(line) for line in lines]
+
+
+def bodies(folder: Path, kind: str) -> list[dict[str, Any]]:
+    return [one["body"] for one in journal_of(folder) if one.get("body", {}).get("kind") == kind]
+
+
+def test_what_is_typed_ahead_fires_nothing_and_answers_nothing(quick_configs: Path, tmp_path: Path) -> None:
+    config = quick_configs / "direction.toml"
+    config.write_text(config.read_text().replace("guard_s = 0.0", "guard_s = 5.0"))
+    with AtTerminal(run(quick_configs, "direction", "--seed", 1), tmp_path) as screen:
+        screen.wait_for(DAMPER)
+        screen.type("d\n\nf\n\nf")  # all at once: nothing of it was asked for yet
+        screen.wait_for("press again")
+        screen.type("stop")
+        assert screen.end() == 130
+    assert bodies(tmp_path, "fired") == bodies(tmp_path, "answered") == []
+    assert {one["because"] for one in bodies(tmp_path, "refused")} >= {"Too soon after the change: press again."}
+
+
+def test_undo_flag_note_pause_and_repeat_by_typed_words(quick_configs: Path, tmp_path: Path) -> None:
+    with AtTerminal(run(quick_configs, "direction", "--seed", 1), tmp_path) as screen:
+        screen.answer_trials(2)
+        screen.wait_for(FIRES, 3)
+        for line, shown in (
+            ("undo", "(entered: BACKWARD)"),
+            ("undo", "(entered: FORWARD)"),
+            ("b", "Trial 1 corrected to BACKWARD."),
+            ("flag Door slam", "flagged door-slam"),
+            ("note a dog barked", "Saved. Note."),
+            ("pause", "Paused."),
+            ("f", "type `go on` and Enter"),
+        ):
+            screen.type(line)
+            screen.wait_for(shown)
+        hand_overs = screen.seen.count(FIRES)
+        screen.type("go on")
+        screen.wait_for(FIRES, hand_overs + 1)
+        screen.type("repeat noise")
+        screen.wait_for("is presented again (noise)")
+        screen.wait_for("for the second time")
+        screen.type("stop")
+        assert screen.end() == 130
+    first, second, third, *_ = rows(tmp_path, "direction_trials")
+    assert (first["response"], first["flags"], first["response_time_valid"]) == ("backward", "corrected", "0")
+    assert (second["flags"], second["attempts"]) == ("repeated", "1")
+    assert (third["flags"], third["note"]) == ("door-slam", "a dog barked")
+    assert [one["kind"] for one in journal_of(tmp_path) if one["kind"] == "stopped"] == ["stopped"]
+
+
+def test_after_an_emergency_stop_nothing_fires_and_a_resumed_run_begins_with_a_test_shot(
+    quick_configs: Path, tmp_path: Path
+) -> None:
+    with AtTerminal(run(quick_configs, "direction", "--seed", 1), tmp_path) as screen:
+        screen.answer_trials(1)
+        screen.wait_for(FIRES, 2)
+        screen.type("!")
+        screen.wait_for("The gun says that it is disarmed.")
+        screen.type("the cable burnt")
+        screen.wait_for("Reason of the emergency stop.")
+        screen.type("")
+        assert screen.end() == 130
+    assert [one["text"] for one in bodies(tmp_path, "halt-reason")] == ["the cable burnt"]
+    assert journal_of(tmp_path)[-1]["reason"] == "emergency stop"
+    assert len(bodies(tmp_path, "fired")) == 1
+    with AtTerminal(run(quick_configs, "direction", "--resume"), tmp_path) as screen:
+        screen.wait_for("Type `test shot` and Enter to fire it:")
+        screen.type("")
+        screen.wait_for("Type `test shot` and Enter.")
+        screen.type("test shot")
+        screen.wait_for("The test shot was fired")
+        screen.wait_for(DAMPER)
+        screen.type("stop")
+        assert screen.end() == 130
+    assert [one["cause"] for one in bodies(tmp_path, "test-shot")] == [""]

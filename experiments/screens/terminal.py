@@ -56,6 +56,7 @@ class TerminalScreen:
         self._lock = threading.RLock()
         self._live: LiveRun | None = None
         self._shown, self._serial = Position(), -1
+        self._gone = False
 
     def begin(self, live: LiveRun) -> None:
         """Say who it is, and begin to read."""
@@ -73,10 +74,10 @@ class TerminalScreen:
             if self._live is None or position.serial < self._shown.serial:
                 return
             said, self._shown = self.text(self._shown), position
+            self._live.painted(position.serial, self._clock.now())
             if position.serial != self._serial or self.text(position) != said:
                 self._show(self.text(position))
             self._serial = position.serial
-        self._live.painted(position.serial, self._clock.now())
 
     def acknowledge(self, step: Step | None, word: Outcome | Remark) -> None:
         """Say that something is safe; say what the gun failed at."""
@@ -124,7 +125,7 @@ class TerminalScreen:
             case State.RESTING:
                 return f"\nBreak {_between(position)}. (`skip` and a reason ends it early.)\n"
             case State.CLOSING:
-                return "\nEverything is answered. `undo` corrects, `note` and `flag` mark; Enter ends the run: "
+                return "\nEverything is answered. `undo` opens the last answer, `note` and `flag` mark; Enter ends the run: "
             case State.PAUSED:
                 why = f" {position.why}." if position.why else ""
                 return f"\n  Paused.{why} Type `go on` and Enter: "
@@ -158,7 +159,7 @@ class TerminalScreen:
         with suppress(OSError):  # a terminal that vanishes ends like one that is closed
             for line in self._source:
                 self._typed(line.strip())
-        self._offer(events.Stop(reason="the terminal was closed"))
+        self._closed()
 
     def _typed(self, line: str) -> None:
         with self._lock:
@@ -210,8 +211,15 @@ class TerminalScreen:
                 self._out.write(text)
                 self._out.flush()
         except (OSError, ValueError):
-            if self._live is not None:
-                self._live.offer(events.Stop(reason="the terminal was closed"))
+            self._closed()
+
+    def _closed(self) -> None:
+        """Nobody sees or types anything any more. Stopped beside: whoever shows may hold what the run waits for."""
+        live = self._live
+        if live is not None and not self._gone:
+            self._gone = True
+            stop = events.Stop(reason="the terminal was closed")
+            threading.Thread(target=live.offer, args=(stop,), daemon=True).start()
 
 
 def _corrects_words(position: Position) -> bool:
