@@ -99,8 +99,11 @@ class Shot:
 class ShotTiming:
     """How a shot over a line came about: host's times in seconds, the gun's in whole microseconds of its own clock.
 
-    `accepted_s` and the pulse's times are the gun's put on the host's clock, true to within `uncertainty_s`. `asked` is
-    how often the trigger was written until its outcome was known.
+    `written_s` is when the trigger was first written, `acknowledged_s` when the record of the shot was read.
+    `accepted_s` and the pulse's times are the gun's put on the host's clock, true to within `uncertainty_s`, and lie
+    between these two. `gun_count` is the gun's own count of shots since it was switched on, this one included: a gap
+    tells of a shot of unknown outcome that was fired, a smaller one that the gun was reset. `asked` is how often the
+    trigger was written until its outcome was known.
     """
 
     requested_s: float
@@ -113,6 +116,7 @@ class ShotTiming:
     gun_accepted_us: int
     gun_start_us: int
     gun_end_us: int
+    gun_count: int
     asked: int
 
 

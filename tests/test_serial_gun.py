@@ -181,7 +181,7 @@ def test_disarming_from_another_thread_cuts_a_shot_that_waits(pair):
     time.sleep(0.02)
     pair.gun.disarm()
     thread.join()
-    assert outcome == ["the gun refused TRIG: Cancelled"]
+    assert outcome == ["not fired: the gun was disarmed meanwhile"]
     assert pair.twin.body.ledger == []
     assert pair.gun.status().state == "disarmed"
 
