@@ -2,7 +2,6 @@
 
 import math
 import re
-import time
 from dataclasses import replace
 from random import Random
 
@@ -41,7 +40,7 @@ def test_a_forged_record_is_refused_with_its_cause_and_the_next_shot_is_fired(tm
         with pytest.raises(LinkError, match=FORGERIES[kind][1]) as refused:
             once(pair)
         assert "may have been fired" in str(refused.value)
-        assert str(refused.value).endswith("the gun had counted 1 shots before it")
+        assert str(refused.value).endswith("; the gun's COUNT was 1 before it")
         assert liar.told == [kind]
         assert pair.gun.status().state == "disarmed"
         assert abs(pair.gun._history.ready_s - pair.clock()) < 60  # 3 s of the world: nobody waits for a forged time
@@ -86,6 +85,32 @@ def test_a_lie_without_a_flaw_is_found_out_by_the_next_count(tmp_path):
         with pytest.raises(LinkError, match="COUNT is 1; it must be 2"):
             once(pair)
         assert once(pair).timing.gun_count == 2
+
+
+@pytest.mark.parametrize(
+    ("forge", "cause"),
+    [
+        (lambda shot: replace(shot, mark=shot.mark - 1), "was not fired, but COUNT is 1; it must be 0, as before"),
+        (lambda shot: replace(shot, ending="NONE"), "was not fired, but COUNT is 1; it must be 0, as before"),
+        (lambda shot: replace(shot, mark=shot.mark - 1, count=0), "the shot was fired, and its answer was lost"),
+    ],
+    ids=["another mark", "never begun", "another mark and its count"],
+)
+def test_a_shot_that_was_fired_is_not_fired_again_whatever_is_said_of_it(tmp_path, forge, cause):
+    with a_lying_pair(tmp_path, speed=1.0) as (pair, forger):
+        pair.ready()
+        lost = []
+
+        def lie(body):
+            if not body.startswith("SHOT "):
+                return body
+            lost.append(body)
+            return None if len(lost) == 1 else forge(ShotRecord.parse(body)).text()
+
+        forger.lie = lie
+        with pytest.raises(LinkError, match=cause):
+            pair.gun.fire(a_shot())
+        assert len(pair.twin.body.ledger) == 1
 
 
 def test_a_gun_that_says_for_ever_that_it_drives_is_given_up(tmp_path):
@@ -198,7 +223,6 @@ def test_after_a_reset_the_gun_is_counted_from_its_new_base(tmp_path):
         assert [once(pair).timing.gun_count for _ in range(2)] == [1, 2]
         pair.twin.order(pair.twin.reset)
         pair.wait(lambda: pair.gun.link.boot == 2)
-        time.sleep(1.2 / pair.speed)  # a gun fires nothing in its first second
         assert once(pair).timing.gun_count == 1
 
 

@@ -11,7 +11,7 @@ from device import LimitError, LinkError
 from device.serial_gun import triggering
 from device.serial_gun.outcomes import CalledOff
 from tests.forger import a_lying_pair
-from tests.twins import Troubles, a_pair, a_shot
+from tests.twins import Troubles, a_pair, a_shot, said
 
 ENDS_S = 30.0
 
@@ -37,21 +37,27 @@ class Doing(threading.Thread):
         return self.outcome
 
 
-class Turn:
-    """The lock of a gun's turn, which tells how many wait for it."""
+class Watched:
+    """A lock that tells how many have it or wait for it; `first` is done before it is given for the first time."""
 
-    def __init__(self, gun):
+    def __init__(self, lock, first=lambda: None):
         self.wait_for_it = 0
-        self._lock = gun._turn
-        gun._turn = self
+        self._lock, self._first = lock, [first]
 
     def __enter__(self):
         self.wait_for_it += 1
+        if self._first:
+            self._first.pop()()
         self._lock.acquire()
 
     def __exit__(self, *_):
         self._lock.release()
         self.wait_for_it -= 1
+
+
+def watched_turn(gun):
+    gun._turn = Watched(gun._turn)
+    return gun._turn
 
 
 def state(pair):
@@ -105,7 +111,7 @@ def test_an_arming_whose_answer_was_lost_is_not_asked_for_again_after_a_disarmin
 def test_an_arming_that_never_arrived_is_not_asked_for_again_after_the_line_was_lost(tmp_path):
     with a_lying_pair(tmp_path, speed=1.0) as (pair, forger):
         heard = heard_by(forger, lost=lambda body: body == "ARM")
-        turn = Turn(pair.gun)
+        turn = watched_turn(pair.gun)
         arming = Doing(pair.gun.arm)
         pair.wait(lambda: turn.wait_for_it == 1, ENDS_S)
         pair.gun.disarm()
@@ -121,7 +127,7 @@ def test_who_waits_for_a_gun_that_is_gone_does_not_arm_it_after_a_disarming(tmp_
     with a_pair(tmp_path, Troubles(replug_s=1.5), speed=1.0) as pair:
         pair.twin.order(pair.twin.unplug)
         pair.wait(lambda: not pair.gun.link.is_up, ENDS_S)
-        turn = Turn(pair.gun)
+        turn = watched_turn(pair.gun)
         arming = Doing(pair.gun.arm)
         pair.wait(lambda: turn.wait_for_it == 1, ENDS_S)
         pair.gun.disarm()
@@ -133,7 +139,7 @@ def test_who_waits_for_a_gun_that_is_gone_does_not_arm_it_after_a_disarming(tmp_
 def test_what_waited_for_its_turn_when_the_gun_was_disarmed_is_called_off(tmp_path):
     with a_lying_pair(tmp_path, speed=1.0) as (pair, forger):
         pair.ready()
-        heard, turn = heard_by(forger), Turn(pair.gun)
+        heard, turn = heard_by(forger), watched_turn(pair.gun)
         firing = Doing(lambda: pair.gun.fire(a_shot(), pair.clock() + 1.9))
         pair.wait(lambda: state(pair) == "WAITING", ENDS_S)
         others = [Doing(pair.gun.arm), Doing(lambda: pair.gun.fire(a_shot()))]
@@ -145,6 +151,32 @@ def test_what_waited_for_its_turn_when_the_gun_was_disarmed_is_called_off(tmp_pa
         assert heard[-1] == "ABOR"
         assert heard.count("TRIG") == 1
         assert pair.twin.body.ledger == []
+
+
+def test_a_disarming_between_the_answer_to_an_arming_and_its_note_counts(tmp_path):
+    with a_pair(tmp_path, speed=1.0) as pair:
+        arming = pair.gun._arming
+        arming._lock = Watched(arming._lock, pair.gun.disarm)
+        with pytest.raises(CalledOff, match="disarmed meanwhile"):
+            pair.gun.arm()
+        with pytest.raises(LimitError, match="the gun is disarmed"):
+            pair.gun.fire(a_shot())
+        assert said(pair.gun, "ARM", "ABOR", "TRIG") == ["ARM", "ABOR"]
+
+
+def test_a_shot_that_was_asked_for_before_a_disarming_is_not_fired_on_a_later_arming(tmp_path):
+    with a_pair(tmp_path) as pair:
+        pair.ready()
+
+        def as_another_thread_would():
+            pair.gun.disarm()
+            pair.gun._arming.arm(pair.gun._arming.disarms)
+
+        pair.gun._turn = Watched(pair.gun._turn, as_another_thread_would)
+        with pytest.raises(LimitError, match="the gun is disarmed"):
+            pair.gun.fire(a_shot())
+        assert said(pair.gun, "TRIG") == []
+        assert pair.gun.fire(a_shot()).timing.gun_count == 1  # asked for after it
 
 
 def test_a_trigger_that_was_lost_is_not_written_again_after_a_disarming(tmp_path):

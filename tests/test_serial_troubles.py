@@ -12,7 +12,7 @@ from device.serial_gun.link import Link
 from device.serial_gun.outcomes import Disconnected
 from device.serial_gun.port import SerialPort
 from tests.forger import a_lying_pair
-from tests.twins import Troubles, a_pair, a_shot, a_twin, disarmings_of
+from tests.twins import Troubles, a_pair, a_shot, a_twin, disarmings_of, said
 
 ALL = Troubles(lose=0.02, double=0.02, corrupt=0.02, partial=0.02, jitter_s=0.002)
 
@@ -62,6 +62,7 @@ def test_a_gun_whose_watchdog_disarmed_it_in_a_train_says_why_it_does_not_fire(t
         assert re.fullmatch(AWAY, pair.gun.status().fault)
         with pytest.raises(Disconnected, match=f"not fired: {AWAY}"):
             pair.gun.fire(a_shot())
+        assert len(said(pair.gun, "TRIG")) == 1
         pair.gun.disarm()
         assert pair.gun.status().fault is None
         pair.ready()

@@ -25,6 +25,11 @@ def a_shot(method: str = "asymmetric-2", direction: Any = "forward", drive: Any 
     return Shot(method=method, direction=direction, drive=drive)
 
 
+def said(gun: SerialGun, *headers: str) -> list[str]:
+    """The commands that begin so, as far as they are over, in the order of their ends."""
+    return [command.body for command in gun.link.commands if command.body.split()[0] in headers]
+
+
 def disarmings_of(twin: Twin) -> list[float]:
     """When the twin disarms, or is disarmed, from now on: on its own clock, in seconds of its world."""
     times: list[float] = []
@@ -87,4 +92,4 @@ def a_pair(folder: Path, troubles: Troubles | None = None, *, speed: float = 20.
             gun.close()
 
 
-__all__ = ["IDENTITY", "PULSE", "Pair", "Troubles", "a_pair", "a_shot", "a_twin", "disarmings_of", "host_clock"]
+__all__ = ["IDENTITY", "PULSE", "Pair", "Troubles", "a_pair", "a_shot", "a_twin", "disarmings_of", "host_clock", "said"]

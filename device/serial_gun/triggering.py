@@ -172,4 +172,4 @@ class Triggering:
     def _unsure(self, order: Order, what: str) -> Unsure:
         """The error of a shot that was, or may have been, fired. The gun is disarmed, lest it still be."""
         self._arming.disarm()
-        return Unsure(f"{what}; the gun had counted {order.count} shots before it")
+        return Unsure(f"{what}; the gun's COUNT was {order.count} before it")
