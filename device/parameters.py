@@ -9,6 +9,8 @@ import math
 from dataclasses import dataclass, fields
 from typing import Literal, get_args
 
+from device.words import MAX_EFFECT, is_number, is_whole_number, shown
+
 DriveOff = Literal["shorted", "open"]
 Emf = Literal["printed", "reciprocal"]
 
@@ -47,7 +49,7 @@ class GunParameters(_Remembers):
     return_friction_N: float | None = None  # None: friction_N on both ways
 
     def __post_init__(self) -> None:
-        _numbers_are_valid(self, above_zero=ABOVE_ZERO, not_numbers=("drive_off", "emf"))
+        _take_numbers(self, above_zero=ABOVE_ZERO, not_numbers=("drive_off", "emf"), may_be_none=MAY_BE_NONE)
         _is_one_of("drive_off", self.drive_off, get_args(DriveOff))
         _is_one_of("emf", self.emf, get_args(Emf))
 
@@ -59,6 +61,8 @@ class GunParameters(_Remembers):
 
 ABOVE_ZERO = ("magnet_mass_kg", "resistance_ohm", "inductance_H", "coil_reach_m", "contact_depth_m")
 """What the equations divide by; the other numbers may be 0."""
+MAY_BE_NONE = ("return_friction_N",)
+"""What takes another number's place if it is left out."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -76,23 +80,41 @@ class VibrationParameters:
     frequency_Hz: float = 175.0  # assumed: the usual resonance of such actuators, 150 to 250 Hz
 
     def __post_init__(self) -> None:
-        if not 1 <= self.effect <= 123:
-            raise ValueError(f"effect is {self.effect}; it must be a waveform of the DRV2605, 1 to 123")
-        _numbers_are_valid(self, above_zero=("peak_m_s2", "rms_m_s2", "duration_s", "frequency_Hz"))
+        if not (is_whole_number(self.effect) and 1 <= self.effect <= MAX_EFFECT):
+            raise ValueError(
+                f"effect is {shown(self.effect)}; it must be a waveform of the DRV2605, a whole number from 1 to "
+                f"{MAX_EFFECT}"
+            )
+        _take_numbers(self, above_zero=("peak_m_s2", "rms_m_s2", "duration_s", "frequency_Hz"), not_numbers=("effect",))
 
 
-def _numbers_are_valid(
-    parameters: GunParameters | VibrationParameters, *, above_zero: tuple[str, ...], not_numbers: tuple[str, ...] = ()
+def _take_numbers(
+    parameters: GunParameters | VibrationParameters,
+    *,
+    above_zero: tuple[str, ...],
+    not_numbers: tuple[str, ...] = (),
+    may_be_none: tuple[str, ...] = (),
 ) -> None:
+    """Check the numbers by kind and range; whole ones and numpy's become floats, as the physics counts in."""
     for name in (field.name for field in fields(parameters) if field.name not in not_numbers):
         value = getattr(parameters, name)
-        if value is None:
+        if value is None and name in may_be_none:
             continue
         strict = name in above_zero
-        if not (math.isfinite(value) and (value > 0 if strict else value >= 0)):
+        if not (_is_finite(value) and (value > 0 if strict else value >= 0)):
             raise ValueError(
-                f"{name} is {value}; it must be a finite number {'above 0' if strict else 'of at least 0'}"
+                f"{name} is {shown(value)}; it must be a finite number {'above 0' if strict else 'of at least 0'}"
             )
+        if type(value) is not float:
+            object.__setattr__(parameters, name, float(value))
+
+
+def _is_finite(value: object) -> bool:
+    """Whether a value is a number within a float's range."""
+    try:
+        return is_number(value) and math.isfinite(value)
+    except OverflowError:  # a whole number beyond all floats
+        return False
 
 
 def _is_one_of(name: str, value: str, options: tuple[str, ...]) -> None:

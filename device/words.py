@@ -7,7 +7,8 @@ and no config can lift the limit.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Literal, Protocol, get_args
+from numbers import Integral, Real
+from typing import Literal, Protocol, TypeGuard, get_args
 
 Direction = Literal["forward", "backward"]
 DIRECTIONS: tuple[Direction, ...] = get_args(Direction)
@@ -16,6 +17,8 @@ MAX_VOLTAGE_V = 24.0
 """The bench supply of the paper; nothing above it exists."""
 MAX_PULSE_S = 0.020
 """Longest pulse, assumed: twice the paper's 10 ms."""
+MAX_EFFECT = 123
+"""Waveforms in the library of the vibration driver (DRV2605)."""
 
 
 class DeviceError(Exception):
@@ -30,9 +33,28 @@ class LinkError(DeviceError):
     """The gun did not answer, or not in its language."""
 
 
+def is_number(value: object) -> TypeGuard[float]:
+    """Whether a value is a real number: of Python or numpy, whole or not, but neither true nor false, nor text.
+
+    >>> is_number(1), is_number(True), is_number("1")
+    (True, False, False)
+    """
+    return type(value) is float or (isinstance(value, Real) and not isinstance(value, bool))
+
+
+def is_whole_number(value: object) -> TypeGuard[int]:
+    """Whether a value is a whole number by its type: 1 is, 1.0 and true are not."""
+    return isinstance(value, Integral) and not isinstance(value, bool)
+
+
+def shown(value: object) -> str:
+    """A value as an error names it: a number as it is, anything else so that text is told from a number."""
+    return f"{value}" if is_number(value) else f"{value!r}"
+
+
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Pulse:
-    """One drive pulse of the voice coil; refused with `LimitError` beyond 24 V or 20 ms."""
+    """One drive pulse of the voice coil; refused with `LimitError` beyond 24 V or 20 ms, or if it is no number."""
 
     voltage_V: float
     pulse_s: float
@@ -49,7 +71,8 @@ class Effect:
     effect: int
 
     def __post_init__(self) -> None:
-        _within("effect", self.effect, 1, 123)
+        if not (is_whole_number(self.effect) and 1 <= self.effect <= MAX_EFFECT):
+            raise LimitError(f"effect is {shown(self.effect)}; it must be a whole number from 1 to {MAX_EFFECT}")
 
 
 Drive = Pulse | Effect
@@ -64,18 +87,23 @@ class Shot:
     drive: Drive
 
     def __post_init__(self) -> None:
-        if not self.method:
-            raise LimitError("shot: method is empty; it must name a rendering method")
+        if not (isinstance(self.method, str) and self.method):
+            raise LimitError(f"shot: method is {self.method!r}; it must name a rendering method")
         if self.direction not in DIRECTIONS:
             raise LimitError(f"shot: direction is {self.direction!r}; it must be one of {', '.join(DIRECTIONS)}")
+        if not isinstance(self.drive, Pulse | Effect):
+            raise LimitError(f"shot: drive is {self.drive!r}; it must be a Pulse or an Effect")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ShotTiming:
     """How a shot over a line came about: host's times in seconds, the gun's in whole microseconds of its own clock.
 
-    `accepted_s` and the pulse's times are the gun's put on the host's clock, true to within `uncertainty_s`. `asked` is
-    how often the trigger was written until its outcome was known.
+    `written_s` is when the trigger was first written, `acknowledged_s` when the record of the shot was read.
+    `accepted_s` and the pulse's times are the gun's put on the host's clock, true to within `uncertainty_s`, and lie
+    between these two. `gun_count` is the gun's own count of shots since it was switched on, this one included: a gap
+    tells of a shot of unknown outcome that was fired, a smaller one that the gun was reset. `asked` is how often the
+    trigger was written until its outcome was known.
     """
 
     requested_s: float
@@ -88,6 +116,7 @@ class ShotTiming:
     gun_accepted_us: int
     gun_start_us: int
     gun_end_us: int
+    gun_count: int
     asked: int
 
 
@@ -157,6 +186,6 @@ class Gun(Protocol):
         """Disarm and let go of the gun."""
 
 
-def _within(name: str, value: float, low: float, high: float) -> None:
-    if not low <= value <= high:  # NaN compares false, so it is refused as well
-        raise LimitError(f"{name} is {value}; it must be between {low:g} and {high:g}")
+def _within(name: str, value: object, low: float, high: float) -> None:
+    if not (is_number(value) and low <= value <= high):  # NaN compares false, so it is refused as well
+        raise LimitError(f"{name} is {shown(value)}; it must be a number between {low:g} and {high:g}")

@@ -55,6 +55,7 @@ empty `cause`: it was fired |
 it was felt, where that is known |
 | `body` | `shot` | one shot of a train, from 1, with its times; kept also if the train fails or is stopped |
 | `body.timing` | `outcome`, `shot` | of a gun on a line: request, write, acknowledgement, pulse, on both clocks |
+| `body.timing.gun_count` | `outcome`, `shot` | the gun's count since its reset; a gap: a shot of unknown outcome |
 | `body.key_time_s` | `outcome` | when a synthetic participant's key went down (`--visual`), in s since the onset |
 | `shown_s` | `outcome` | when the console had painted the step, where there was a console |
 | `reason` | `stopped` | why the run stopped before its end |

@@ -2,14 +2,17 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Any
 
 from device import LimitError
 from device.limits import MAX_SHOTS_PER_MINUTE, DriveHistory, Load, load_of
-from device.methods import drive_of, settle_s
+from device.methods import drive_of, rendering_of
 from device.parameters import GunParameters
 from device.words import Drive, Pulse
+from experiments.gun import GunConfig
 from experiments.load import ConfigError
 from experiments.preference.config import PreferenceConfig
 from experiments.setup import Setup
@@ -37,14 +40,38 @@ def drives(setup: Setup[Any]) -> dict[str, Drive]:
 
 def check_limits(setup: Setup[Any]) -> list[MethodLimits]:
     """Each method's drive within the limits, or `ConfigError` with method, value and limit."""
-    found = []
-    for name, method in setup.gun.renderings(setup.config.design.methods).items():
-        try:
-            found.append(MethodLimits(method=name, drive=drive_of(method), settle_s=settle_s(method)))
-        except LimitError as error:
-            raise ConfigError(f"{setup.source.parent / setup.config.gun}: methods.{name}: {error}") from error
+    found = check_methods(setup.gun, setup.config.design.methods, setup.source.parent / setup.config.gun)
     _check_repetition(setup, found)
     return found
+
+
+def check_methods(gun: GunConfig, methods: tuple[str, ...], source: Path) -> list[MethodLimits]:
+    """Methods of a gun that can be run: within the limits, and moving. `ConfigError` names file, method and rule."""
+    found = []
+    for name, method in gun.renderings(methods).items():
+        try:
+            drive, rendering = drive_of(method), rendering_of(method)
+        except LimitError as error:
+            raise ConfigError(f"{source}: methods.{name}: {error}") from error
+        if isinstance(method, GunParameters) and rendering.motion == "no-break-away":
+            raise ConfigError(f"{source}: methods.{name}: {_never_moves(method)}")
+        found.append(MethodLimits(method=name, drive=drive, settle_s=rendering.settle_s))
+    return found
+
+
+def _never_moves(gun: GunParameters) -> str:
+    """Why no shot of a gun ever moves: what holds the standing magnet, and what the coil pulls with at the most.
+
+    Held by k x_0 + F_f; pulled by k_m i, where i = V/R (1 - exp(-R t/L)) is largest at the end of the pulse.
+    """
+    held_N = gun.stiffness_N_m * gun.preload_length_m + gun.friction_N
+    share = -math.expm1(-gun.resistance_ohm * gun.pulse_s / gun.inductance_H)
+    pull_N = gun.motor_constant_N_A * gun.voltage_V / gun.resistance_ohm * share
+    return (
+        f"no shot ever moves the magnet, by the model: spring and friction hold it with {held_N:.4g} N "
+        f"(friction_N {gun.friction_N:g}), and the coil pulls with {pull_N:.4g} N at the most (voltage_V "
+        f"{gun.voltage_V:g} for pulse_s {gun.pulse_s:g}); lower the friction, or raise the voltage or the pulse"
+    )
 
 
 def _check_repetition(setup: Setup[Any], methods: list[MethodLimits]) -> None:

@@ -18,6 +18,7 @@ PURE = {
         *("wire.errors", "wire.frame", "wire.records"),
         *("twin.budget", "twin.machine", "twin.core", "twin.scripts", "twin.faults", "twin.body"),
         *("serial_gun.address", "serial_gun.asked", "serial_gun.clocks", "serial_gun.outcomes"),
+        *("serial_gun.checks", "serial_gun.reports"),
     },
     "experiments": {
         "canonical",

@@ -54,6 +54,14 @@ def test_the_first_shot_may_come_at_any_time():
     DriveHistory().check(COLD_10_MS, 0.0)
 
 
+def test_the_next_shot_waits_for_the_end_of_the_pulse_even_if_the_magnet_were_home_before_it():
+    history = DriveHistory().record(COLD_10_MS, 5.0, 5.004)
+    assert history.ready_s == 5.010
+    with pytest.raises(LimitError, match=r"not home yet.*5\.010000 s"):
+        history.check(COLD_10_MS, 5.006)
+    history.check(COLD_10_MS, 5.010)
+
+
 @pytest.mark.parametrize("at_s", [math.nan, math.inf, -math.inf])
 def test_a_time_that_is_no_number_is_refused(at_s):
     with pytest.raises(LimitError, match="at_s"):

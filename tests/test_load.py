@@ -8,6 +8,7 @@ import pytest
 
 from experiments.limits import check_limits
 from experiments.load import ConfigError, find, line_of, load_gun, load_setup, load_study, read_toml, shipped_folder
+from experiments.roof.check import check
 
 EXPERIMENTS = ("direction", "preference")
 DIRECTION, PREFERENCE, GUN = "direction.toml", "preference.toml", "gun.toml"
@@ -294,6 +295,19 @@ BROKEN_GUNS = {
         DIRECTION, GUN, "voice_coil.friction_N = 1.12", "voice_coil.friction_N = 1.7",
         ("methods.asymmetric-2: ", "friction_N 1.7", "does not come home (stuck)"),
     ),
+    "a friction that no shot overcomes": Broken(
+        DIRECTION, GUN, "voice_coil.friction_N = 1.12", "voice_coil.friction_N = 200.0",
+        ("methods.asymmetric-2: no shot ever moves the magnet, by the model", "hold it with 201.4 N (friction_N 200)",
+         "pulls with 41.93 N at the most (voltage_V 16 for pulse_s 0.01)", "lower the friction, or raise the voltage"),
+    ),
+    "a voltage that moves nothing": Broken(
+        PREFERENCE, GUN, "voltage_V = 16.0", "voltage_V = 0.1",
+        ("methods.asymmetric-1: no shot ever moves the magnet", "hold it with 1.61 N", "pulls with 0.2621 N at the"),
+    ),
+    "a pulse too short to move anything": Broken(
+        DIRECTION, GUN, "pulse_s = 0.010", "pulse_s = 0.000005",
+        ("methods.asymmetric-1: no shot ever moves the magnet", "pulls with 0.836 N at the most", "pulse_s 5e-06"),
+    ),
     "not TOML": Broken(DIRECTION, GUN, "[methods.vibration]", "[methods.vibration",
         ("not TOML", f"line {line(shipped_folder() / GUN, '[methods.vibration]')}")),
 }  # fmt: skip
@@ -313,6 +327,23 @@ def test_one_refusal_names_file_place_key_value_and_rule(folder: Path, broken: B
     named = broken.file if "the gun has no method" not in message else broken.config  # both files are at odds there
     place = f":{line(folder / broken.file, broken.at)}: " if broken.at else ": "
     assert f"{folder / named}{place}" in message
+
+
+def test_a_gun_file_by_itself_is_refused_for_a_method_that_never_moves(folder: Path) -> None:
+    edit(folder / GUN, "voice_coil.friction_N = 1.12", "voice_coil.friction_N = 200.0")
+    with pytest.raises(ConfigError, match=r"methods\.asymmetric-2: no shot ever moves the magnet, by the model"):
+        check(str(folder / GUN), None, 1)
+
+
+@pytest.mark.parametrize("words", [("check",), ("run", "--participant", "P01", "--screen", "synthetic")])
+def test_check_and_run_refuse_a_method_that_never_moves_with_the_same_words(folder: Path, recoil, words) -> None:
+    edit(folder / GUN, "voice_coil.friction_N = 1.12", "voice_coil.friction_N = 200.0")
+    command, *options = words
+    done = recoil(command, folder / DIRECTION, *options)
+    assert done.returncode == 2
+    assert f"{folder / GUN}: methods.asymmetric-2: no shot ever moves the magnet" in " ".join(done.stderr.split())
+    assert "Traceback" not in done.stderr
+    assert not (folder / "results").exists()
 
 
 def test_several_findings_are_told_at_once_a_line_each(folder: Path) -> None:

@@ -1,5 +1,7 @@
 import dataclasses
 import math
+import re
+from decimal import Decimal
 
 import numpy as np
 import pytest
@@ -339,15 +341,34 @@ def test_a_trace_of_one_point_is_refused():
         trace(GunParameters(), points=1)
 
 
+NUMBERS = [field.name for field in dataclasses.fields(GunParameters) if field.name not in ("drive_off", "emf")]
 POSITIVE = ["magnet_mass_kg", "resistance_ohm", "inductance_H", "coil_reach_m", "contact_depth_m"]
 OPTIONS = ["drive_off", "emf"]
 
 
-@pytest.mark.parametrize("field", [f.name for f in dataclasses.fields(GunParameters) if f.name not in OPTIONS])
+@pytest.mark.parametrize("field", NUMBERS)
 @pytest.mark.parametrize("value", [-1.0, math.nan, math.inf, -math.inf])
 def test_a_number_that_physics_has_not_is_refused_by_name(field, value):
     with pytest.raises(ValueError, match=f"{field} is {value}; it must be a finite number"):
         GunParameters(**{field: value})
+
+
+@pytest.mark.parametrize("field", NUMBERS)
+@pytest.mark.parametrize("value", [None, "1", True, 1j, [1.0], Decimal(1), 10**400])
+def test_a_parameter_of_the_wrong_kind_is_refused_by_name_value_and_rule(field, value):
+    if (field, value) == ("return_friction_N", None):
+        assert GunParameters(return_friction_N=None).homeward_friction_N == 0.21
+        return
+    with pytest.raises(ValueError, match=re.escape(f"{field} is {value!r}; it must be a finite number")):
+        GunParameters(**{field: value})
+
+
+@pytest.mark.parametrize("kind", [int, np.float64, np.float32, np.int64])
+def test_a_whole_number_and_numpys_numbers_are_the_float_that_they_mean(kind):
+    gun = GunParameters(voltage_V=kind(16), friction_N=kind(0))
+    assert gun == GunParameters(voltage_V=16.0, friction_N=0.0)
+    assert simulate(gun) == simulate(GunParameters(voltage_V=16.0, friction_N=0.0))
+    assert type(gun.voltage_V) is float
 
 
 @pytest.mark.parametrize("field", POSITIVE)

@@ -12,7 +12,7 @@ from device.parameters import GunParameters, VibrationParameters
 from device.serial_gun.asked import FLOORS_US, asked
 from device.simulated import SimulatedGun
 from device.twin import budget
-from tests.twins import PULSE, Troubles, a_pair, a_shot
+from tests.twins import PULSE, Troubles, a_pair, a_shot, said
 
 
 @pytest.fixture
@@ -26,11 +26,6 @@ def slow_pair(tmp_path):
     """A twin that lives no faster than the world: the magnet is still out when a slow machine asks again."""
     with a_pair(tmp_path, speed=1.0) as pair:
         yield pair
-
-
-def said(gun, *headers):
-    """What was written since, but for the exchanges that keep the line alive."""
-    return [command.body for command in gun.link.commands if command.body.split()[0] in headers]
 
 
 def test_it_is_born_disarmed_and_says_who_it_is(pair):
@@ -181,7 +176,7 @@ def test_disarming_from_another_thread_cuts_a_shot_that_waits(pair):
     time.sleep(0.02)
     pair.gun.disarm()
     thread.join()
-    assert outcome == ["the gun refused TRIG: Cancelled"]
+    assert outcome == ["not fired: the gun was disarmed meanwhile"]
     assert pair.twin.body.ledger == []
     assert pair.gun.status().state == "disarmed"
 

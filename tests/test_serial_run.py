@@ -11,6 +11,7 @@ from pathlib import Path
 
 import pytest
 
+from device.wire import errors
 from experiments.journal import read
 from experiments.places import PlaceError
 from experiments.roof.session import check_pace
@@ -128,16 +129,16 @@ def test_a_run_that_is_killed_leaves_the_gun_disarmed(tmp_path, quick_configs, n
         command = [str(RECOIL), *map(str, words), "--gun", f"serial:{socket.address}"]
         program = subprocess.Popen(command, cwd=tmp_path, stderr=subprocess.DEVNULL)
         try:
-            wait(lambda: len(twin.body.ledger) >= 2, 30)
+            wait(lambda: len(twin.body.ledger) >= 2, 60)
             assert twin._core.machine.state != "DISARMED"
             program.send_signal(number)
-            program.wait(10)
+            program.wait(60)
         finally:
             program.kill()
             program.wait()
-        start_s = time.monotonic()
-        wait(lambda: twin._core.machine.state == "DISARMED", 1.5)
-        assert number == signal.SIGKILL or time.monotonic() - start_s < 0.1  # it was disarmed, not left to the watchdog
+        wait(lambda: twin._core.machine.state == "DISARMED", 30)
+        left_to_the_watchdog = errors.WATCHDOG in twin._core._errors
+        assert left_to_the_watchdog == (number == signal.SIGKILL)
         fired = len(twin.body.ledger)
         time.sleep(1.0)
         assert len(twin.body.ledger) == fired

@@ -1,3 +1,5 @@
+import re
+
 import numpy as np
 import pytest
 from hypothesis import given, settings
@@ -101,3 +103,16 @@ def test_every_number_is_finite_and_above_zero(field, value):
 def test_an_effect_outside_the_library_is_refused():
     with pytest.raises(ValueError, match="effect is 124"):
         VibrationParameters(effect=124)
+
+
+@pytest.mark.parametrize("wrong", [None, "1", True, 1.5, 0, 124])
+def test_an_effect_that_the_driver_does_not_have_is_refused_by_value_and_rule(wrong):
+    with pytest.raises(ValueError, match=re.escape(f"effect is {wrong!r}; it must be a waveform of the DRV2605")):
+        VibrationParameters(effect=wrong)
+
+
+@pytest.mark.parametrize("field", ["peak_m_s2", "rms_m_s2", "duration_s", "frequency_Hz"])
+@pytest.mark.parametrize("wrong", [None, "1", True])
+def test_a_number_of_the_wrong_kind_is_refused_by_name_value_and_rule(field, wrong):
+    with pytest.raises(ValueError, match=re.escape(f"{field} is {wrong!r}; it must be a finite number above 0")):
+        VibrationParameters(**{field: wrong})

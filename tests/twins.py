@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
@@ -23,6 +23,24 @@ PULSE = Pulse(voltage_V=16.0, pulse_s=0.010)
 
 def a_shot(method: str = "asymmetric-2", direction: Any = "forward", drive: Any = PULSE) -> Shot:
     return Shot(method=method, direction=direction, drive=drive)
+
+
+def said(gun: SerialGun, *headers: str) -> list[str]:
+    """The commands that begin so, as far as they are over, in the order of their ends."""
+    return [command.body for command in gun.link.commands if command.body.split()[0] in headers]
+
+
+def disarmings_of(twin: Twin) -> list[float]:
+    """When the twin disarms, or is disarmed, from now on: on its own clock, in seconds of its world."""
+    times: list[float] = []
+    abort = twin._core.machine.abort
+
+    def noted(now_us: int) -> bool:
+        times.append(twin.world_of(now_us))
+        return abort(now_us)
+
+    twin._core.machine.abort = noted  # type: ignore[method-assign]
+    return times
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -49,6 +67,10 @@ class Pair:
             time.sleep(0.002)
 
 
+def host_clock(speed: float) -> Callable[[], float]:
+    return lambda: time.monotonic() * speed
+
+
 @contextmanager
 def a_twin(
     folder: Path, troubles: Troubles | None = None, *, speed: float = 20.0, tcp: bool = False, **make: Any
@@ -63,11 +85,11 @@ def a_twin(
 def a_pair(folder: Path, troubles: Troubles | None = None, *, speed: float = 20.0, **more: Any) -> Iterator[Pair]:
     with a_twin(folder, troubles, speed=speed, **more) as (twin, socket):
         address = f"serial:{socket.address}?speed={speed:g}"
-        gun = open_serial(address, paper_methods(), lambda: time.monotonic() * speed)
+        gun = open_serial(address, paper_methods(), host_clock(speed))
         try:
             yield Pair(twin=twin, gun=gun, socket=socket, speed=speed)
         finally:
             gun.close()
 
 
-__all__ = ["IDENTITY", "PULSE", "Pair", "Troubles", "a_pair", "a_shot", "a_twin"]
+__all__ = ["IDENTITY", "PULSE", "Pair", "Troubles", "a_pair", "a_shot", "a_twin", "disarmings_of", "host_clock", "said"]

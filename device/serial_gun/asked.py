@@ -9,8 +9,8 @@ from typing import Final
 from device.limits import Load, load_of
 from device.methods import Method, Rendering, rendering_of
 from device.parameters import GunParameters
-from device.wire.records import METHOD, Setting, ShotRecord, Way
-from device.words import Direction, Drive, Effect, LimitError, LinkError, Pulse, Shot
+from device.wire.records import METHOD, Setting, Way
+from device.words import Direction, Drive, Effect, LimitError, Pulse, Shot
 
 FLOORS_US: Final = {"PULS": 50_000, "EFF": 10_000}
 """The firmware's least time from onset to onset (`PROTOCOL.md`)."""
@@ -35,12 +35,23 @@ class Asked:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Order:
-    """A shot that was asked for, once: the mark that names it on the wire, when it was asked for, and for when."""
+    """A shot that was asked for, once: the mark that names it on the wire, and what the gun's word is held against.
+
+    `written_s`: when its trigger was first written; `at_us`: its tick on the gun's clock, 0 if it is to fire at once;
+    `count`: the shots that the gun had counted before it, since its `boot`; `session` and `disarms`: of the link and
+    the gun, for which alone it may be triggered.
+    """
 
     mark: int
     wanted: Asked
     requested_s: float
+    written_s: float
     at_s: float | None
+    at_us: int
+    count: int
+    boot: int
+    session: int
+    disarms: int
 
 
 def asked(shot: Shot, methods: Mapping[str, Method]) -> Asked:
@@ -80,14 +91,3 @@ def _setting(shot: Shot, drive: Drive, rendering: Rendering) -> Setting:
         length_us=length_us,
         rest_us=max(settle_us, length_us, FLOORS_US[kind]),
     )
-
-
-def check_record(record: ShotRecord, order: Order) -> None:
-    """`LinkError`, unless the record tells of just the shot that was asked for, driven to its end."""
-    setting = order.wanted.setting
-    if record.mark != order.mark or record.setting != setting:
-        asked_for, rendered = f"{order.mark} {setting.text()}", f"{record.mark} {record.setting.text()}"
-        raise LinkError(f"asked for {asked_for}, the gun rendered {rendered}")
-    driven_us = record.end_us - record.start_us
-    if record.ending != "DONE" or driven_us != setting.length_us:
-        raise LinkError(f"the shot was fired and cut short: driven for {driven_us} of {setting.length_us} microseconds")

@@ -1,4 +1,4 @@
-"""The line to one gun: a thread of its own that reads, keeps the gun's watchdog quiet, and connects again.
+"""The line to one gun: a thread that reads and connects again, and one that only keeps the gun's watchdog quiet.
 
 Anyone may `ask` from any thread: every command has a deadline and an outcome, and none is ever repeated here.
 """
@@ -9,48 +9,31 @@ import threading
 import time
 from collections import deque
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from contextlib import suppress
 
 from device.serial_gun.clocks import Clocks, Exchange, HostTime
-from device.serial_gun.outcomes import OUTCOMES, Command, Disconnected, Refused, TimedOut, WrongVersion
+from device.serial_gun.outcomes import CalledOff, Command, Disconnected, Forgotten, TimedOut, WrongVersion
+from device.serial_gun.pending import Pending, Reply, Waiting
 from device.serial_gun.port import OpenPort, Port, SerialPort
 from device.wire import errors
 from device.wire.frame import Frame, Garbled, Splitter, decode, encode, following
-from device.wire.records import WIRE_VERSION, Named, refusal, value
+from device.wire.records import WIRE_VERSION, Named, value
 from device.words import LinkError
 
 PATIENCE_S = 0.25
 """For an answer that the gun gives at once. All times here are of the real world, however fast a twin lives."""
-WATCHDOG_S = 1.0
-KEEP_ALIVE_S = 0.25
+WATCHDOG_S = 0.36
+"""After so long without a frame the gun disarms itself: 0.4 s after its host died, less what may still be on the way
+(an adapter as it leaves the factory keeps bytes back for 16 ms, and may have a few frames in its buffer)."""
+KEEP_ALIVE_S = 0.06
+"""Six in a watchdog's time: this machine may be away for 0.3 s, and a bad line may lose five in a row."""
 RECONNECT_EVERY_S = 0.1
 GREETING_TRIES = 5
 FIRST_EXCHANGES = 8
 SILENT_S = 2.0
 """After so long without a word from the gun the line is closed and opened again."""
 MAX_WATCHDOG_MS, MIN_WATCHDOG_MS = 60_000, 100
-KEPT_COMMANDS = 10_000
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Reply:
-    """An answer, and when its command was written and it was read, on the host's clock."""
-
-    body: str
-    written_s: float
-    received_s: float
-
-
-@dataclass(slots=True, kw_only=True)
-class _Waiting:
-    """A command whose answer is awaited."""
-
-    body: str
-    written_s: float
-    since_s: float
-    ended: threading.Event = field(default_factory=threading.Event)
-    reply: Reply | None = None
-    trouble: LinkError | None = None
+NO_SESSION = f"ERR {errors.message(errors.NO_SESSION)}"
 
 
 class Link:
@@ -61,36 +44,45 @@ class Link:
     ) -> None:
         self.named: Named | None = None
         self.session = 0  # counts the greetings; each disarms the gun
+        self.boot = 0  # counts the greetings of a gun that did not know the one before: its clock and count are new
         self.remembers = False  # whether the gun at this greeting still knew the one before
-        self.commands: deque[Command] = deque(maxlen=KEPT_COMMANDS)
+        self.why_lost = ""  # what ended the session before this one
         self._find, self._clock, self._open_port = find, clock, open_port
         self._watchdog_ms = round(min(max(1000 * WATCHDOG_S * speed, MIN_WATCHDOG_MS), MAX_WATCHDOG_MS))
         self.watchdog_s = self._watchdog_ms / 1000 / speed
-        self._keep_alive_s = min(KEEP_ALIVE_S, self.watchdog_s / 4)
+        self._keep_alive_s = min(KEEP_ALIVE_S, self.watchdog_s / 6)
         self._clocks = Clocks()
         self._lock = threading.RLock()
         self._port: Port | None = None
         self._splitter = Splitter()
-        self._waiting: dict[int, _Waiting] = {}
+        self._pending = Pending(clock)
         self._number = int(time.monotonic() * 1e3) % 0xFFFF
         self._token = 0
-        self._written_s = self._heard_s = self._sampled_s = 0.0
+        self._written_s = self._heard_s = 0.0
         self._trouble: LinkError | None = None
-        self._broken, self._unbroken = False, True
+        self._ended_by: LinkError | None = None  # the trouble that ended the last session
+        self._broken, self._unbroken, self._leaving = False, True, False
         self._plain = b""
         self._up, self._closing = threading.Event(), threading.Event()
         self._failed = threading.Event()
         self._thread = threading.Thread(target=self._run, name="gun", daemon=True)
+        self._keeper = threading.Thread(target=self._keep_alive, name="gun-keep-alive", daemon=True)
 
     def start(self, patience_s: float) -> None:
         """Connect for the first time. `LinkError`: there is no port, no gun, or one of another version."""
         self._thread.start()
+        self._keeper.start()
         end_s = time.monotonic() + patience_s
         while not self._up.wait(0.005):
             if self._failed.is_set() or time.monotonic() > end_s:
                 trouble = self._trouble or TimedOut(f"the gun did not answer within {patience_s:g} s")
                 self.close()
                 raise trouble
+
+    @property
+    def commands(self) -> deque[Command]:
+        """The last commands as they went, but for the questions that nobody waits for."""
+        return self._pending.log
 
     @property
     def is_up(self) -> bool:
@@ -129,23 +121,34 @@ class Link:
         with self._lock:
             return self._clocks.drift_ppm
 
-    def ask(self, body: str, patience_s: float = PATIENCE_S) -> Reply:
-        """Write a command and wait for its answer. `LinkError`: its other outcomes, by their type."""
-        if not self._up.is_set():
-            raise Disconnected(f"the gun is not there ({self._trouble or 'no answer'})")
-        number, waiting = self._write(body)
+    def ask(self, body: str, patience_s: float = PATIENCE_S, allowed: Callable[[], bool] = lambda: True) -> Reply:
+        """Write a command and wait for its answer. `LinkError`: its other outcomes, by their type.
+
+        `allowed` is asked while nobody else can write: a command that is not allowed then is `CalledOff`.
+        """
+        with self._lock:
+            if not self._up.is_set():
+                raise Disconnected(f"the gun is not there ({self._trouble or 'no answer'})")
+            if not allowed():
+                raise CalledOff(f"{body.split(maxsplit=1)[0]} was called off: the gun was disarmed meanwhile")
+            waiting = self._write(body)
         waiting.ended.wait(patience_s)
-        return self._ended(number, waiting)
+        return self._pending.outcome(waiting)
 
     def drop(self, why: str) -> None:
         """Let go of the line; the thread connects again, and that disarms the gun."""
         self._lose(Disconnected(why))
 
     def close(self) -> None:
-        """Let go for good."""
+        """Leave the gun disarmed in its plain mode, and let go for good."""
+        with self._lock:
+            self._leaving = True
+        with suppress(LinkError):
+            self.ask("SYST:PLAI")
         self._closing.set()
-        if self._thread.is_alive() and self._thread is not threading.current_thread():
-            self._thread.join()
+        for thread in (self._thread, self._keeper):
+            if thread.is_alive():
+                thread.join()
         self._lose(Disconnected("the line is closed"))
 
     def _run(self) -> None:
@@ -154,7 +157,7 @@ class Link:
                 self._connect()
                 while not self._closing.is_set():
                     self._pump()
-                    self._keep_alive()
+                    self._look_after()
             except LinkError as error:
                 self._lose(error)
                 fatal = isinstance(error, WrongVersion) or self._port is None
@@ -183,9 +186,21 @@ class Link:
                 self._clocks = Clocks()
         for _ in range(FIRST_EXCHANGES):
             self._greet("TIME?")
-        self.named, self.remembers, self._unbroken = named, self._unbroken, True
-        self.session += 1
-        self._up.set()
+        with self._lock:
+            self.named, self.remembers, self._unbroken = named, self._unbroken, True
+            self.why_lost = self._why_ended()
+            self.boot += not self.remembers
+            self.session += 1
+            self._up.set()
+
+    def _why_ended(self) -> str:
+        """What ended the session before, now that it is known whether the gun remembers it."""
+        ended = self._ended_by
+        if ended is None:
+            return ""
+        if not self.remembers:
+            return f"the gun does not know its last session any more, so it was reset ({ended})"
+        return ended.alone if isinstance(ended, Forgotten) else f"the line was lost ({ended})"
 
     def _introduce(self, port: Port) -> None:
         """See who is there, in the plain language that every version speaks; a wrong version must say so twice."""
@@ -219,56 +234,39 @@ class Link:
         """Ask from the thread that reads. What is asked here may be asked again."""
         trouble: LinkError | None = None
         for _ in range(GREETING_TRIES):
-            number, waiting = self._write(body)
+            waiting = self._write(body)
             end_s = time.monotonic() + PATIENCE_S
             while not waiting.ended.is_set() and time.monotonic() < end_s and not self._closing.is_set():
                 self._pump()
             try:
-                return self._ended(number, waiting)
+                return self._pending.outcome(waiting)
             except (TimedOut, Garbled) as error:
                 trouble = error
         raise trouble or TimedOut("no answer")
 
-    def _write(self, body: str) -> tuple[int, _Waiting]:
+    def _write(self, body: str) -> Waiting:
         with self._lock:
             if self._port is None or self._broken:
                 raise Disconnected(f"the gun is not there ({self._trouble or 'no answer'})")
-            self._number = number = following(self._number)
+            self._number = following(self._number)
             now_s = time.monotonic()
-            waiting = self._waiting[number] = _Waiting(body=body, written_s=self._clock(), since_s=now_s)
+            waiting = Waiting(
+                number=self._number,
+                body=body,
+                written_s=self._clock(),
+                since_s=now_s,
+                gap_s=now_s - self._written_s,
+            )
+            self._pending.add(waiting)
             try:
-                self._port.write(encode(Frame(number=number, body=body), "host"))
+                self._port.write(encode(Frame(number=waiting.number, body=body), "host"))
             except LinkError as error:
-                self._waiting.pop(number)
+                self._pending.take(waiting.number)
                 self._lose(error)
                 raise
+            waiting.gap_s += time.monotonic() - now_s
             self._written_s = time.monotonic()
-        return number, waiting
-
-    def _ended(self, number: int, waiting: _Waiting) -> Reply:
-        """The answer, or the trouble; either way the command is over and in the log."""
-        with self._lock:
-            self._waiting.pop(number, None)
-        reply, trouble = waiting.reply, waiting.trouble
-        if reply is None and trouble is None:
-            trouble = TimedOut(f"no answer to {waiting.body.split()[0]} within its time")
-        no = refusal(reply.body) if reply else None
-        if no is not None:
-            trouble = Refused(no.code, f"the gun refused {waiting.body.split()[0]}: {no.reason}")
-        self.commands.append(
-            Command(
-                number=number,
-                body=waiting.body,
-                written_s=waiting.written_s,
-                ended_s=reply.received_s if reply else self._clock(),
-                outcome=OUTCOMES.get(type(trouble), "disconnected") if trouble else "done",
-            )
-        )
-        if trouble is not None:
-            raise trouble
-        if reply is None:  # for the type checker: one of the two is there
-            raise TimedOut("no answer")
-        return reply
+        return waiting
 
     def _pump(self) -> None:
         """Read what is there, and hand the answers out."""
@@ -287,53 +285,66 @@ class Link:
         try:
             frame = decode(line or b"", "gun")
         except Garbled as error:
-            self._end_all(Garbled(f"the answer was garbled: {error}"))
+            self._pending.end_all(Garbled(f"the answer was garbled: {error}"))
             return
         if frame.body == "NAK":
-            self._end_all(Garbled("the gun understood no line"))
+            self._pending.end_all(Garbled("the gun understood no line"))
             return
-        with self._lock:
-            waiting = self._waiting.pop(frame.number, None)
-        if frame.body == f"ERR {errors.message(errors.NO_SESSION)}":
-            raise Disconnected("the gun has forgotten this session: it was reset, or left alone for too long")
+        waiting = self._pending.take(frame.number)
+        if frame.body == NO_SESSION:
+            raise Forgotten(self._alone(waiting))
         if waiting is None:  # its deadline has passed
             return
-        waiting.reply = Reply(body=frame.body, written_s=waiting.written_s, received_s=received_s)
+        waiting.reply = Reply(body=frame.body, written_s=waiting.written_s, received_s=received_s, session=self.session)
         self._learn(waiting, waiting.reply)
         waiting.ended.set()
 
-    def _learn(self, waiting: _Waiting, reply: Reply) -> None:
+    def _learn(self, waiting: Waiting, reply: Reply) -> None:
         if waiting.body != "TIME?" or not reply.body.startswith("TIME "):
             return
         exchange = Exchange(sent_s=reply.written_s, gun_us=value(reply.body, "TIME"), received_s=reply.received_s)
         with self._lock:
             self._clocks.add(exchange)
 
-    def _end_all(self, trouble: LinkError) -> None:
-        with self._lock:
-            ended = [self._waiting.pop(number) for number in list(self._waiting)]
-        for waiting in ended:
-            waiting.trouble = trouble
-            waiting.ended.set()
+    def _alone(self, waiting: Waiting | None) -> str:
+        """How the gun came to hear nothing for its watchdog's time, as the first frame after it shows."""
+        watchdog_ms, gap_ms = 1000 * self.watchdog_s, 1000 * waiting.gap_s if waiting else 0.0
+        if gap_ms > watchdog_ms / 2:
+            return (
+                f"the gun's watchdog disarmed it: this machine was away for {gap_ms:.0f} ms, and the gun waits for "
+                f"{watchdog_ms:.0f} ms"
+            )
+        return (
+            f"the gun's watchdog disarmed it: nothing reached it for {watchdog_ms:.0f} ms, though this machine wrote; "
+            "check the line"
+        )
 
-    def _keep_alive(self) -> None:
-        """Ask for the time now and then; nobody waits for it, but the clocks learn from it."""
+    def _look_after(self) -> None:
+        """Notice a gun that says nothing any more, and forget questions for the time that nobody answered."""
         now_s = time.monotonic()
         if now_s - self._heard_s > max(SILENT_S, 2 * self.watchdog_s):
             raise Disconnected("the gun says nothing any more")
-        with self._lock:
-            for number, waiting in list(self._waiting.items()):
-                if waiting.body == "TIME?" and now_s - waiting.since_s > SILENT_S:
-                    self._waiting.pop(number)
-        if now_s - self._sampled_s >= self._keep_alive_s:
-            self._sampled_s = now_s
-            self._write("TIME?")
+        self._pending.forget("TIME?", now_s - SILENT_S)
+
+    def _keep_alive(self) -> None:
+        """Ask for the time now and then; nobody waits for it, but the clocks learn from it.
+
+        In a thread that does nothing else: it needs the interpreter twice a turn, the one that reads a dozen times, and
+        each time may have to wait for it on a busy machine.
+        """
+        while not self._closing.wait(self._keep_alive_s):
+            with self._lock, suppress(LinkError):  # whoever reads is told of it, and connects again
+                if self._up.is_set() and not self._leaving:
+                    self._write("TIME?")
 
     def _lose(self, trouble: LinkError) -> None:
         """The line is of no use any more: whoever waits is told. The thread that reads lets go of the port."""
-        self._up.clear()
-        self._trouble, self._broken = trouble, True
-        self._end_all(Disconnected(str(trouble)))
+        with self._lock:
+            if self._up.is_set():
+                self._ended_by = trouble
+            self._up.clear()
+            self._trouble, self._broken = trouble, True
+        self._pending.end_all(Disconnected(str(trouble)))
 
     def _let_go(self) -> None:
         with self._lock:

@@ -19,6 +19,30 @@ class Disconnected(LinkError):  # noqa: N818
     """The line is gone, or the gun has forgotten this session."""
 
 
+class Forgotten(Disconnected):
+    """The gun is in no session any more: it was reset, or its watchdog disarmed it. `alone`: how, if it was that."""
+
+    def __init__(self, alone: str) -> None:
+        super().__init__(f"the gun has forgotten this session: it was reset, or {alone}")
+        self.alone = alone
+
+
+class CalledOff(LinkError):  # noqa: N818
+    """Nothing was written: what would have armed or fired was overtaken by a disarming."""
+
+
+class Contradiction(LinkError):  # noqa: N818
+    """What the gun says contradicts its order, itself, or this machine's clock. Nothing of it is believed."""
+
+
+class Unsure(LinkError):  # noqa: N818
+    """A shot was fired, or may have been, and not as it was ordered. The gun is disarmed: nothing more comes of it."""
+
+
+class CutShort(LinkError):  # noqa: N818
+    """A shot was fired, and switched off before its end."""
+
+
 class WrongVersion(LinkError):  # noqa: N818
     """A gun that speaks another version of the wire."""
 

@@ -48,10 +48,10 @@ class Named:
         >>> Named.parse("Recoil,haptic-gun,TWIN,wire 1 firmware 1.0").serial
         'TWIN'
         """
-        fields = _fields(text, 4)
+        fields = _fields(text, 4, "who a gun is, Recoil,MODEL,SERIAL,wire W firmware F")
         version = _VERSION.fullmatch(fields[3])
         if fields[0] != "Recoil" or version is None or not all(map(_NAME.fullmatch, fields[1:3])):
-            raise Garbled(f"not a Recoil gun: {text[:80]!r}")
+            raise Garbled(f"{text[:80]!r} names no Recoil gun")
         return cls(model=fields[1], serial=fields[2], wire=int(version[1]), firmware=version[2])
 
 
@@ -73,7 +73,7 @@ class Setting:
     @classmethod
     def parse(cls, text: str) -> Self:
         """From the parameters of `CONF`; their ranges are the gun's to judge."""
-        fields = _fields(text, 6)
+        fields = _fields(text, 6, "setting, METHOD,WAY,KIND,AMOUNT,LENGTH,REST")
         if METHOD.fullmatch(fields[0]) is None:
             raise Garbled(f"not the name of a method: {fields[0][:40]!r}")
         amount, length_us, rest_us = _numbers(fields[3:])
@@ -108,7 +108,7 @@ class ShotRecord:
     @classmethod
     def parse(cls, text: str) -> Self:
         """From the answer to `SHOT?` or to a trigger."""
-        fields = _fields(text.removeprefix("SHOT ") if text.startswith("SHOT ") else "", 13)
+        fields = _fields(_behind(text, "SHOT"), 13, "record of a shot")
         count, mark = _numbers(fields[:2])
         accepted_us, start_us, end_us, home_us = _numbers(fields[3:7])
         return cls(
@@ -141,7 +141,7 @@ class Standing:
     @classmethod
     def parse(cls, text: str) -> Self:
         """From the answer to `STAT?`."""
-        fields = _fields(text.removeprefix("STAT ") if text.startswith("STAT ") else "", 6)
+        fields = _fields(_behind(text, "STAT"), 6, "standing of a gun")
         count, clock_us, ready_us, coil_mC, fault = _numbers(fields[1:])
         return cls(
             state=cast("State", _one_of(fields[0], get_args(State))),
@@ -180,15 +180,20 @@ def number(text: str) -> int:
 
 def value(text: str, name: str) -> int:
     """The number behind a name: `TIME 123`. `Garbled`: anything else."""
+    return number(_behind(text, name))
+
+
+def _behind(text: str, name: str) -> str:
+    """What stands behind the word that names an answer."""
     if not text.startswith(f"{name} "):
-        raise Garbled(f"not {name}: {text[:40]!r}")
-    return number(text[len(name) + 1 :])
+        raise Garbled(f"{text[:80]!r} is no answer that begins with {name}")
+    return text[len(name) + 1 :]
 
 
-def _fields(text: str, count: int) -> list[str]:
+def _fields(text: str, count: int, what: str) -> list[str]:
     fields = text.split(",", count)
     if len(fields) != count:
-        raise Garbled(f"not {count} fields: {text[:80]!r}")
+        raise Garbled(f"{text[:80]!r} is no {what}: it must have {count} fields")
     return fields
 
 

@@ -14,7 +14,7 @@ from experiments.config import participant_codes
 from experiments.direction.config import DirectionConfig
 from experiments.direction.felt import NEUTRAL, forward_rates, mind_of
 from experiments.direction.percept import percepts_of
-from experiments.limits import MethodLimits, check_limits
+from experiments.limits import MethodLimits, check_limits, check_methods
 from experiments.load import ConfigError, find, load_gun, load_setup, load_study, read_toml
 from experiments.orders import next_row
 from experiments.screens.synthetic import observer_of
@@ -36,6 +36,7 @@ def check(name: str, seed: int | None, participants: int) -> Facts:
         return _study_facts(name, seed)
     if "methods" in table and "voice_coil" in table:
         gun = load_gun(path)
+        check_methods(gun, tuple(gun.methods), path)
         return {"gun": gun.title, "methods": list(gun.methods), "assumed": list(gun.assumed)}
     try:
         paper = load_paper(path)

@@ -1,0 +1,175 @@
+"""One shot from its order to its outcome: fired once, its record checked; what was lost on the way is looked for."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable
+
+from device.serial_gun.arming import Arming
+from device.serial_gun.asked import Order
+from device.serial_gun.asking import TRIES, ask, last_shot, standing
+from device.serial_gun.checks import check_not_fired, check_record, check_times
+from device.serial_gun.link import PATIENCE_S, Link
+from device.serial_gun.outcomes import CalledOff, Contradiction, CutShort, Disconnected, Refused, TimedOut, Unsure
+from device.serial_gun.pending import Reply
+from device.serial_gun.reports import Told
+from device.wire import errors
+from device.wire.frame import Garbled
+from device.wire.records import ShotRecord
+from device.words import LimitError, LinkError
+
+LATEST_S = 0.15
+"""A trigger that is so late does not fire any more."""
+CLOCK_TRIES = 3
+"""So often are a shot's times judged, the clock learnt again in between."""
+
+_LIMITS = {errors.DUTY, errors.RATE, errors.HOT, errors.OUT_OF_RANGE}
+_STOPPED = {errors.CANCELLED, errors.DISARMED, errors.FAULT}
+_DOUBLED = {errors.ALREADY_FIRED, errors.BUSY}
+"""The line doubled the trigger: it was fired, or is being fired, and what came of it is lost."""
+
+
+class Triggering:
+    """Triggers shots on a link; `clock` is the host's, at `speed` times the world's pace."""
+
+    def __init__(self, link: Link, arming: Arming, clock: Callable[[], float], speed: float) -> None:
+        self._link, self._arming, self._clock, self._speed = link, arming, clock, speed
+
+    def fire(self, order: Order) -> Told:
+        """The shot as it was told of and is believed. Only one that was surely not fired is triggered again.
+
+        `LimitError`, `LinkError`: it was not fired. `Unsure`: it was, or may have been.
+        """
+        trouble = LinkError()
+        for tries in range(1, TRIES + 1):
+            try:
+                reply = self._trigger(order)
+                record = ShotRecord.parse(reply.body)
+            except CalledOff as error:
+                raise Disconnected(f"not fired: {self._why_not(order)}") from error
+            except Refused as error:
+                trouble = self._refused(error, order)
+            except (TimedOut, Garbled, Disconnected) as error:
+                trouble = error
+                found = self._look(order, error)
+                if found is not None:
+                    return self._believed(*found, order, tries)
+            else:
+                return self._believed(reply, record, order, tries)
+        self._arming.disarm()
+        raise TimedOut(f"not fired: {trouble}, {TRIES} times")
+
+    def _trigger(self, order: Order) -> Reply:
+        before_us = max(order.at_us, self._link.gun_us(self._clock())) + round(LATEST_S * self._speed * 1e6)
+        trigger = f"TRIG {order.mark},{order.at_us},{before_us}"
+        return self._link.ask(
+            trigger, self._patience_s(order), lambda: self._arming.stands(order.disarms, order.session)
+        )
+
+    def _patience_s(self, order: Order) -> float:
+        """How long from now on a shot may take to end, in seconds of the real world."""
+        ahead_s = 0.0 if order.at_s is None else max(order.at_s - self._clock(), 0.0)
+        return PATIENCE_S + (ahead_s + order.wanted.setting.length_us / 1e6) / self._speed
+
+    def _look(self, order: Order, trouble: LinkError) -> tuple[Reply, ShotRecord] | None:
+        """The record of a shot whose answer was lost, when it has ended; None if it was surely not fired."""
+        end_s, stopped = time.monotonic() + self._patience_s(order), False
+        while True:
+            reply, record = self._last_shot(order, trouble)
+            if record.mark != order.mark or record.ending == "NONE":
+                return None
+            if record.ending in {"DONE", "CUT"} or stopped:
+                return reply, record
+            if time.monotonic() > end_s:
+                self._arming.disarm()
+                stopped = True
+
+    def _last_shot(self, order: Order, trouble: LinkError) -> tuple[Reply, ShotRecord]:
+        """What the gun says of its last shot, if it still knows. `Unsure`: it does not, or it contradicts itself."""
+        try:
+            reply, record = last_shot(self._link)
+            if self._link.boot == order.boot:
+                check_not_fired(record, order)
+                return reply, record
+        except Contradiction as error:
+            raise self._disbelieved(order, error) from error
+        except LinkError as error:
+            trouble = error
+        raise self._lost(order, trouble)
+
+    def _refused(self, error: Refused, order: Order) -> LinkError:
+        """A trigger that came too late, and may be written again. Raises what any other refusal means."""
+        if error.code == errors.TOO_LATE:
+            return error
+        if error.code in _DOUBLED:
+            raise self._unsure(order, f"the shot was fired, and its answer was lost ({error})") from error
+        if error.code in _STOPPED:
+            raise Disconnected(f"not fired: {self._why_not(order)}") from error
+        if error.code in _LIMITS:
+            raise LimitError(f"{error}; not fired") from error
+        raise self._too_soon(error) from error
+
+    def _too_soon(self, error: Refused) -> LinkError | LimitError:
+        """A gun that was switched on just now fires nothing in its first second, and none before its magnet is home."""
+        found = standing(self._link)[1]
+        left_s = (found.ready_us - found.clock_us) / 1e6
+        if found.count == 0 and left_s > 0:
+            return LimitError(
+                f"not fired: the gun was switched on or reset {found.clock_us / 1e6:.1f} s ago, and fires nothing in "
+                "its first second, because what was driven before is not known"
+            )
+        if error.code == errors.NOT_HOME:
+            return LimitError(
+                f"not fired: its magnet was not home, by the gun's own clock ({max(left_s, 0):.3f} s to go)"
+            )
+        return Disconnected(f"not fired: {error}")
+
+    def _why_not(self, order: Order) -> str:
+        """Why a shot was called off, or cut short: a disarming, a fault of the driver, the line, or the watchdog."""
+        if self._arming.disarms != order.disarms:
+            return "the gun was disarmed meanwhile"
+        try:
+            _, found = standing(self._link)
+        except LinkError as error:
+            return str(error)
+        if self._link.session != order.session:
+            return self._link.why_lost
+        return f"the driver reports fault {found.fault}" if found.fault else "the gun does not say why"
+
+    def _believed(self, reply: Reply, record: ShotRecord, order: Order, tries: int) -> Told:
+        """What is told of a shot, if it is believed."""
+        try:
+            check_record(record, order)
+            return self._told(reply, record, order, tries)
+        except Contradiction as error:
+            raise self._disbelieved(order, error) from error
+        except CutShort as error:
+            raise self._unsure(order, f"{error} ({self._why_not(order)})") from error
+        except LinkError as error:
+            raise self._lost(order, error) from error
+
+    def _told(self, reply: Reply, record: ShotRecord, order: Order, tries: int) -> Told:
+        """A record's times on the host's clock. A clock that was misread is learnt anew before they are disbelieved."""
+        trouble = Contradiction()
+        for _ in range(CLOCK_TRIES):
+            accepted, start, end = self._link.host(record.accepted_us, record.start_us, record.end_us)
+            told = Told(reply=reply, record=record, tries=tries, accepted=accepted, start=start, end=end)
+            try:
+                check_times(told, order, self._speed)
+            except Contradiction as error:
+                trouble = error
+                ask(self._link, "TIME?")
+            else:
+                return told
+        raise trouble
+
+    def _disbelieved(self, order: Order, why: Contradiction) -> Unsure:
+        return self._unsure(order, f"the shot may have been fired, and the gun's record is not believed: {why}")
+
+    def _lost(self, order: Order, why: LinkError) -> Unsure:
+        return self._unsure(order, f"the shot may have been fired: {why}, and the gun cannot tell any more")
+
+    def _unsure(self, order: Order, what: str) -> Unsure:
+        """The error of a shot that was, or may have been, fired. The gun is disarmed, lest it still be."""
+        self._arming.disarm()
+        return Unsure(f"{what}; the gun's COUNT was {order.count} before it")
