@@ -125,6 +125,16 @@ def test_whatever_bytes_come_the_core_in_c_says_what_the_twin_says(calls):
     assert differences("host", script) == []
 
 
+@pytest.mark.parametrize("core", CORES)
+def test_a_frame_with_the_number_0000_is_answered_as_no_frame(core):
+    script = [f"in {time_us} {encode(Frame(number=0, body='SYST:STRI 8'), 'host').hex().upper()}" for time_us in (1, 2)]
+    script.insert(1, f"in 1 {encode(Frame(number=1, body='SYST:STRI 7'), 'host').hex().upper()}")
+    nak, entered = (
+        encode(Frame(number=number, body=body), "gun").decode() for number, body in ((0, "NAK"), (1, "STRI 0"))
+    )
+    assert said(told(core, script)) == nak + entered + nak
+
+
 def errors_after(core: str, lines: list[tuple[int, str]]) -> list[str]:
     end_us = lines[-1][0] + 1_000_000
     script = by_hand(*lines, *[(end_us, "SYST:ERR?")] * 2, (end_us, "SHOT?"))

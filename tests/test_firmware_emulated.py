@@ -23,7 +23,7 @@ import serial
 
 from device.twin.core import IDENTITY
 from device.twin.scripts import random_script, transcript
-from device.wire.frame import Frame, encode
+from device.wire.frame import LAST_NUMBER, Frame, encode
 from device.wire.records import ShotRecord, Standing
 from tests.test_firmware_core import EMULATOR, built, message
 
@@ -186,8 +186,8 @@ def play(hand: Hand, script: Iterator[str]) -> None:
 
 def finish(hand: Hand, mark: str) -> None:
     """Everything that was said is answered: the answer to a question in both modes is the last."""
-    hand.line.write(b"\n*IDN?\n" + encode(Frame(number=0, body=f"SYST:STRI {mark}"), "host"))
-    while b"<0000 STRI" not in hand.read():
+    hand.line.write(b"\n*IDN?\n" + encode(Frame(number=LAST_NUMBER, body=f"SYST:STRI {mark}"), "host"))
+    while b"<FFFF STRI" not in hand.read():
         pass
 
 

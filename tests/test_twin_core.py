@@ -145,6 +145,16 @@ def test_a_doubled_or_older_frame_does_nothing(strict):
     assert strict.core.machine.shot.count == 1
 
 
+@pytest.mark.parametrize("body", ["ARM", "SYST:STRI 8", "SYST:PLAI"])
+@pytest.mark.parametrize("in_session", [False, True])
+def test_a_frame_with_the_number_0000_is_no_frame(body, in_session):
+    gun = Strict() if in_session else Hand()
+    out, _ = gun.core.step(encode(Frame(number=0, body=body), "host"), gun.now_us)
+    assert decode(out.strip(), "gun") == Frame(number=0, body="NAK")
+    assert gun.core.machine.state == "DISARMED"
+    assert gun.core.strict == in_session
+
+
 def test_frames_without_a_session_are_told_so_and_a_new_session_tells_the_token_before(strict):
     assert strict.say("SYST:STRI 8") == ["STRI 7"]
     assert strict.standing().state == "DISARMED"
