@@ -163,6 +163,15 @@ def test_what_no_shot_may_be_made_of_is_refused_by_the_firmware_itself(core, set
 
 
 @pytest.mark.parametrize("core", CORES)
+def test_in_the_first_second_it_says_that_it_has_just_booted_and_later_that_the_magnet_is_not_home(core):
+    setting = "CONF a,FORW,PULS,16000,10000,2000000"
+    lines = [(0, setting), (0, "ARM"), (999_999, "TRIG"), (1_000_000, "TRIG"), (2_999_999, "TRIG"), (3_000_000, "TRIG")]
+    first, second, shot = errors_after(core, lines)
+    assert (first, second) == ('114,"Just booted"', '102,"Magnet not home"')
+    assert shot.startswith("SHOT 2,")
+
+
+@pytest.mark.parametrize("core", CORES)
 @pytest.mark.parametrize(
     ("rest_us", "length_us", "error", "fired"),
     [(50_000, 20_000, 103, 5), (199_000, 1_000, 104, 300)],

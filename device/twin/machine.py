@@ -121,7 +121,7 @@ class Machine:
         if before_us != 0 and start_us > before_us:
             return errors.TOO_LATE
         if start_us < self._ready_us:
-            return errors.NOT_HOME
+            return errors.NOT_HOME if self.shot.count else errors.JUST_BOOTED
         return self._budget.refusal(self.setting, start_us)
 
     def abort(self, now_us: int) -> bool:

@@ -96,7 +96,7 @@ static enum error forbidden(const struct machine *machine, struct trigger trigge
     if (trigger.before_us != 0 && start_us > trigger.before_us)
         return ERROR_TOO_LATE;
     if (start_us < machine->ready_us)
-        return ERROR_NOT_HOME;
+        return machine->shot.count == 0 ? ERROR_JUST_BOOTED : ERROR_NOT_HOME;
     return budget_refusal(&machine->budget, &machine->setting, start_us);
 }
 
