@@ -22,8 +22,8 @@ enum { FAULT_NONE = 0, FAULT_COIL_DRIVER = 1, FAULT_VIBRATION_DRIVER = 2 };
 void board_start(void);
 /* At most 24 characters of [A-Za-z0-9._-], after board_start. */
 const char *board_serial(void);
-/* Drive, or stop. What is begun late still ends in time. */
-void board_drive(const struct drive *drive, uint64_t now_us);
+/* Drive, or stop. What is begun late still ends in time, what is over is not begun. */
+struct carried board_drive(const struct drive *drive);
 /* The driver's fault, or FAULT_NONE. */
 uint64_t board_fault(void);
 /* The main loop is in good health; left out too long, the chip resets itself. */

@@ -4,6 +4,7 @@
  * RM0390, chapters of the same names; alternate functions after the STM32F446xC/E data sheet (DS10693).
  */
 #include "board.h"
+#include "clock.h"
 #include "coil.h"
 #include "startup.h"
 #include "vibration.h"
@@ -95,24 +96,38 @@ const char *board_serial(void)
     return text.bytes;
 }
 
-static void all_off(bool vibrating)
+static struct carried pulse(const struct drive *drive)
 {
-    coil_off();
-    if (vibrating)
-        vibration_off();
+    uint64_t now_us = clock_us();
+    if (drive_is_over(drive, now_us))
+        return (struct carried){ERROR_TOO_LATE, now_us};
+    coil_on((uint32_t)drive->amount, drive->end_us > now_us ? (uint32_t)(drive->end_us - now_us) : 0);
+    return (struct carried){ERROR_NONE, now_us};
 }
 
-void board_drive(const struct drive *drive, uint64_t now_us)
+static struct carried effect(const struct drive *drive)
+{
+    if (drive_is_over(drive, clock_us()))
+        return (struct carried){ERROR_TOO_LATE, clock_us()};
+    bool begun = vibration_on((uint8_t)drive->amount);
+    return (struct carried){begun ? ERROR_NONE : ERROR_FAULT, clock_us()};
+}
+
+static struct carried all_off(bool vibrating)
+{
+    coil_off();
+    bool off = !vibrating || vibration_off();
+    return (struct carried){off ? ERROR_NONE : ERROR_FAULT, clock_us()};
+}
+
+struct carried board_drive(const struct drive *drive)
 {
     static bool vibrating;
-    uint64_t left_us = drive->end_us > now_us ? drive->end_us - now_us : 0;
-    if (drive->kind == DRIVE_PULS)
-        coil_on((uint32_t)drive->amount, (uint32_t)left_us);
-    else if (drive->kind == DRIVE_EFF)
-        vibration_on((uint8_t)drive->amount);
-    else
-        all_off(vibrating);
+    bool vibrated = vibrating;
     vibrating = drive->kind == DRIVE_EFF;
+    if (drive->kind == DRIVE_OFF)
+        return all_off(vibrated);
+    return drive->kind == DRIVE_PULS ? pulse(drive) : effect(drive);
 }
 
 uint64_t board_fault(void)

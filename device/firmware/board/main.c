@@ -15,10 +15,10 @@ static void send(void *owner, struct slice line)
     port_write(line);
 }
 
-static void drive(void *owner, const struct drive *drive)
+static struct carried drive(void *owner, const struct drive *drive)
 {
     (void)owner;
-    board_drive(drive, clock_us());
+    return board_drive(drive);
 }
 
 /* The core's times never run back, though a byte's stamp may be older than the last step. */

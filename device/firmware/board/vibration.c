@@ -25,12 +25,14 @@ static bool drv_try(uint8_t place, uint8_t value)
     return i2c_send(place, TXE) && i2c_send(value, BTF);
 }
 
-static void drv_write(uint8_t place, uint8_t value)
+static bool drv_write(uint8_t place, uint8_t value)
 {
     enum { STOP = BIT(9) };
-    failed = !drv_try(place, value) || failed;
+    bool done = drv_try(place, value);
+    failed = !done || failed;
     I2C1->CR1 |= STOP;
     wait_for(&I2C1->CR1, STOP, 0);
+    return done;
 }
 
 void vibration_start(void)
@@ -46,15 +48,14 @@ void vibration_start(void)
     drv_write(DRV_NEXT, 0);
 }
 
-void vibration_on(uint8_t effect)
+bool vibration_on(uint8_t effect)
 {
-    drv_write(DRV_EFFECT, effect);
-    drv_write(DRV_GO, 1);
+    return drv_write(DRV_EFFECT, effect) && drv_write(DRV_GO, 1);
 }
 
-void vibration_off(void)
+bool vibration_off(void)
 {
-    drv_write(DRV_GO, 0);
+    return drv_write(DRV_GO, 0);
 }
 
 bool vibration_failed(void)
