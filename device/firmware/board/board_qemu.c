@@ -26,8 +26,12 @@ const struct board BOARD = {
 
 void board_start(void)
 {
-    USART2->CR1 = USART_CR1_UE | USART_CR1_TE;
-    USART3->CR1 = USART_CR1_UE | USART_CR1_RE;
+    reg_write(&USART2->CR1, USART_CR1_UE | USART_CR1_TE);
+    reg_write(&USART3->CR1, USART_CR1_UE | USART_CR1_RE);
+}
+
+void board_connect(void)
+{
 }
 
 const char *board_serial(void)
@@ -38,9 +42,9 @@ const char *board_serial(void)
 static void put(const struct text *text)
 {
     for (size_t i = 0; i < text->length; i++) {
-        while ((USART2->SR & USART_SR_TXE) == 0) {
+        while ((reg_read(&USART2->SR) & USART_SR_TXE) == 0) {
         }
-        USART2->DR = (uint8_t)text->bytes[i];
+        reg_write(&USART2->DR, (uint8_t)text->bytes[i]);
     }
 }
 
@@ -86,17 +90,18 @@ static void be_late(uint64_t time_us)
 
 uint64_t board_fault(void)
 {
-    if ((USART3->SR & USART_SR_RXNE) == 0)
+    if ((reg_read(&USART3->SR) & USART_SR_RXNE) == 0)
         return FAULT_NONE;
-    uint32_t byte = USART3->DR & 0xFF;
+    uint32_t byte = reg_read(&USART3->DR) & 0xFF;
     if (byte < LATE_BYTES)
         return byte;
     be_late(1000 * (byte - LATE_BYTES));
     return FAULT_NONE;
 }
 
-void board_alive(void)
+void board_alive(uint64_t now_us)
 {
+    (void)now_us;
 }
 
 void board_booted(uint64_t now_us)

@@ -6,7 +6,7 @@
 #include <stdint.h>
 
 void vibration_start(void);
-/* Whether the driver took the command. */
+/* Whether the driver took the command. It is given up after 1.2 ms, and tried anew by the next. */
 bool vibration_on(uint8_t effect);
 bool vibration_off(void);
 /* Whether it did not answer since this was asked last. */

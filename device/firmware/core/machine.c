@@ -1,7 +1,7 @@
 #include "machine.h"
 
 enum { BOOT_REST_US = 1000000, MAX_AHEAD_US = 2000000 };
-/* A pulse is on time if it loses at most 2 %, and at most one turn of the main loop; an effect's driver must be told. */
+/* A pulse is on time if it loses at most 2 %, at most one turn of the main loop; an effect waits for its driver. */
 enum { LATE_PULSE_US = 100, LATE_PULSE_PARTS = 50, LATE_EFFECT_US = 1000 };
 static const uint64_t MAX_MARK = 0xFFFFFFFF;
 
