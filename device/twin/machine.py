@@ -39,11 +39,12 @@ NO_SHOT: Final = ShotRecord(
 )
 
 
-LATE_PULSE_US: Final = 100
+LATE_PULSE_US: Final = 200
 LATE_PULSE_PARTS: Final = 50
-"""A pulse is on time if it loses at most 2 % of its length, and at most 0.1 ms: one turn of the main loop. Assumed."""
+"""A pulse is on time if it loses at most 2 % of its length, and at most 0.2 ms, a long turn of the main loop: the chip
+takes fewer than 20,000 instructions to answer a line (counted on the emulator), 0.12 ms at one a cycle. Assumed."""
 LATE_EFFECT_US: Final = 1_000
-"""A vibration waits for its driver to be told: 0.2 ms, 0.6 ms if that has to be set up anew. Assumed."""
+"""A vibration waits for its driver to be told: 0.16 ms, 0.55 ms if that has to be set up anew. Assumed."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -2,7 +2,7 @@
 
 enum { BOOT_REST_US = 1000000, MAX_AHEAD_US = 2000000 };
 /* A pulse is on time if it loses at most 2 %, at most one turn of the main loop; an effect waits for its driver. */
-enum { LATE_PULSE_US = 100, LATE_PULSE_PARTS = 50, LATE_EFFECT_US = 1000 };
+enum { LATE_PULSE_US = 200, LATE_PULSE_PARTS = 50, LATE_EFFECT_US = 1000 };
 static const uint64_t MAX_MARK = 0xFFFFFFFF;
 
 enum guarded { GUARD_CONF, GUARD_ARM, GUARD_TRIG };
