@@ -8,9 +8,11 @@ from __future__ import annotations
 
 import re
 import subprocess
+from random import Random
 
 import pytest
 
+from device.twin.machine import LATE_PULSE_US
 from device.wire.errors import message
 from device.wire.records import ShotRecord, Standing
 from tests.test_firmware_core import built
@@ -18,8 +20,9 @@ from tests.test_firmware_core import built
 PULSE, EFFECT = "CONF a,FORW,PULS,16000,10000,211000", "CONF v,FORW,EFF,47,24000,50000"
 LEAST_WATCHDOG_US, MOST_WATCHDOG_US = 36_000, 101_000
 """425 ticks of LSI / 4, whose frequency the data sheet (DS10693) gives as 17 to 47 kHz."""
-STAGES = ("sb", "addr", "txe", "btf", "stop")
-"""Where the master's transfer can hang (RM0390, "Transfer sequence diagram for master transmitter")."""
+BUSES = ("absent", "error", "low", "sb", "addr", "txe", "btf", "stop")
+"""No driver, a bus error, the clock held low; where a transfer hangs (RM0390, "Transfer sequence diagram for master
+transmitter")."""
 
 
 class Run:
@@ -127,18 +130,22 @@ def test_while_the_clock_runs_the_watchdog_is_fed_at_rest_and_at_work():
     assert run.longest_unfed_us < LEAST_WATCHDOG_US / 10
 
 
-@pytest.mark.parametrize("access_ns", [100, 1_000])
-@pytest.mark.parametrize("bus", ["absent", "error", "low", *STAGES])
-def test_a_dead_bus_holds_the_main_loop_less_than_the_watchdogs_time_and_the_next_effect_works_again(bus, access_ns):
-    run = Run(
-        f"0 access {access_ns}",
+def dead_bus(bus: str) -> list[str]:
+    """An effect on a bus that is dead, and another when it is well again."""
+    return [
         f"1000000 bus {bus}",
         *say(1_100_000, EFFECT, "ARM", "TRIG 5"),
         *say(1_200_000, "SHOT?", "STAT?", "SYST:ERR?", "SYST:ERR?"),
         "1300000 bus good",
         *say(1_400_000, "*RST", EFFECT.replace("47", "48"), "ARM", "TRIG 5"),
         *say(1_500_000, "SHOT?"),
-    )
+    ]
+
+
+@pytest.mark.parametrize("access_ns", [100, 1_000])
+@pytest.mark.parametrize("bus", BUSES)
+def test_a_dead_bus_holds_the_main_loop_less_than_the_watchdogs_time_and_the_next_effect_works_again(bus, access_ns):
+    run = Run(f"0 access {access_ns}", *dead_bus(bus))
     assert well(run)
     assert run.longest_unfed_us < LEAST_WATCHDOG_US / 10
     failed, again = run.shots
@@ -156,7 +163,7 @@ def test_a_driver_that_is_not_there_is_noticed_by_its_missing_acknowledge_and_no
     assert answered["addr"][0] - answered["absent"][0] > 500
 
 
-@pytest.mark.parametrize("bus", ["absent", "error", "low", *STAGES])
+@pytest.mark.parametrize("bus", BUSES)
 def test_a_bus_that_dies_in_mid_effect_is_a_fault_and_no_reset(bus):
     run = Run(
         *say(1_100_000, EFFECT, "ARM", "TRIG 5"),
@@ -235,6 +242,59 @@ def test_a_pulse_that_would_begin_after_its_end_drives_nothing_and_is_told_as_ne
     assert well(run)
     assert run.times("coil") == []
     assert (run.shots[0].ending, run.shots[0].count, run.said()[-1]) == ("NONE", 0, message(107))
+
+
+EVERY_US = 400_000
+
+
+def mishaps(draw: Random, time_us: int) -> list[str]:
+    """What befalls the chip around a shot, and is over before the next."""
+    around_us = time_us + draw.randrange(-5_000, 30_000)
+    return draw.choice(
+        (
+            [],
+            [f"{around_us} stall {draw.randrange(30_000)}"],
+            [f"{around_us} bus {draw.choice(BUSES)}", f"{time_us + 150_000} bus good"],
+            [f"{around_us} held {draw.randrange(1, 9)}"],
+            [f"{around_us} coil-fault 1", f"{around_us + 20_000} coil-fault 0"],
+            [f"{around_us} say ABOR"],
+        )
+    )
+
+
+def chances(seed: int, shots: int) -> list[str]:
+    """Shots of both kinds, each asked for ahead of its time, with what befalls them, and then asked about."""
+    draw, script = Random(seed), []
+    for mark in range(1, shots + 1):
+        time_us = 1_000_000 + EVERY_US * mark
+        script += say(time_us - 60_000, "*RST", draw.choice((PULSE, EFFECT)), "ARM", f"TRIG {mark},{time_us}")
+        script += [*mishaps(draw, time_us), *say(time_us + 200_000, "SHOT?")]
+    return script
+
+
+def lasted_us(run: Run, begin: str, end: str, asked_us: int) -> int:
+    """How long something lasted in the time before a shot was asked about; 0 if it was not."""
+    ons, offs = ([time for time in run.times(words) if asked_us - EVERY_US < time < asked_us] for words in (begin, end))
+    return min(time for time in offs if time > ons[0]) - ons[0] if ons else 0
+
+
+def check_records(run: Run) -> int:
+    """Every record is what the coil saw. How many shots were less than whole."""
+    assert well(run)
+    assert run.longest_unfed_us < LEAST_WATCHDOG_US
+    for asked_us, shot in zip(run.times("says SHOT"), run.shots, strict=True):
+        if shot.setting.kind == "EFF":
+            continue
+        coil_us = lasted_us(run, "coil on", "coil off", asked_us)
+        told_us = 0 if shot.ending == "NONE" else shot.end_us - shot.start_us
+        assert coil_us == pytest.approx(told_us, abs=LATE_PULSE_US + 10), shot
+        assert (shot.ending == "DONE") == (told_us == shot.setting.length_us)
+    return sum(shot.ending != "DONE" for shot in run.shots)
+
+
+@pytest.mark.parametrize("seed", range(20))
+def test_whatever_befalls_a_shot_its_record_is_what_the_coil_saw_and_the_watchdog_sleeps(seed):
+    assert check_records(Run(*chances(seed, shots=15))) > 0
 
 
 def test_a_fault_of_the_coil_driver_in_mid_pulse_switches_off_at_once():
