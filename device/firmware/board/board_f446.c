@@ -1,8 +1,8 @@
 /* A NUCLEO-F446RE as the gun's board: host's port on the ST-LINK's USB, coil driver, vibration driver.
  *
- * NEVER RUN on a board: none was at hand; tests run it on fake/. Pins are assumed (README.md); the paper names the parts
- * only. Registers after RM0390, chapters of the same names; alternate functions after the STM32F446xC/E data sheet
- * (DS10693).
+ * NEVER RUN on a board: none was at hand; tests run it on fake/. Pins are assumed (README.md), the paper names the
+ * parts only. Registers after RM0390, chapters of the same names; alternate functions after the STM32F446xC/E data
+ * sheet (DS10693).
  */
 #include "board.h"
 #include "clock.h"
