@@ -235,7 +235,7 @@ class Machine:
         if off_us - time_us <= _allowed_us(shot.setting):
             off_us = time_us
         off_us = max(off_us, shot.start_us)
-        whole = off_us - shot.start_us >= shot.setting.length_us
+        whole = off_us >= max(shot.end_us, shot.start_us + shot.setting.length_us)
         self.shot = replace(shot, ending="DONE" if whole else "CUT", end_us=off_us)
 
     def _call_off(self, error: int) -> None:
