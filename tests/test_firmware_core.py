@@ -51,6 +51,8 @@ def command(core: str) -> list[str]:
 
 def told(core: str, script: Iterable[str]) -> list[str]:
     """A core's transcript of a script."""
+    if core == "twin":
+        return list(transcript(script))
     text = "".join(f"{line}\n" for line in script)
     return subprocess.run(
         command(core), input=text, capture_output=True, text=True, check=True, timeout=600
@@ -81,6 +83,7 @@ def by_hand(*lines: tuple[int, str]) -> list[str]:
 
 
 CORES = ("host", "chip")
+ALL = ("twin", *CORES)
 
 
 @pytest.mark.parametrize("core", CORES)
@@ -125,6 +128,16 @@ def test_whatever_bytes_come_the_core_in_c_says_what_the_twin_says(calls):
     assert differences("host", script) == []
 
 
+@pytest.mark.parametrize("core", CORES)
+def test_a_frame_with_the_number_0000_is_answered_as_no_frame(core):
+    script = [f"in {time_us} {encode(Frame(number=0, body='SYST:STRI 8'), 'host').hex().upper()}" for time_us in (1, 2)]
+    script.insert(1, f"in 1 {encode(Frame(number=1, body='SYST:STRI 7'), 'host').hex().upper()}")
+    nak, entered = (
+        encode(Frame(number=number, body=body), "gun").decode() for number, body in ((0, "NAK"), (1, "STRI 0"))
+    )
+    assert said(told(core, script)) == nak + entered + nak
+
+
 def errors_after(core: str, lines: list[tuple[int, str]]) -> list[str]:
     end_us = lines[-1][0] + 1_000_000
     script = by_hand(*lines, *[(end_us, "SYST:ERR?")] * 2, (end_us, "SHOT?"))
@@ -150,6 +163,15 @@ def test_what_no_shot_may_be_made_of_is_refused_by_the_firmware_itself(core, set
     first, second, shot = errors_after(core, lines)
     assert (first, second) == ('-222,"Data out of range"', '106,"Not configured"')
     assert shot.startswith("SHOT 0,0,NONE")
+
+
+@pytest.mark.parametrize("core", CORES)
+def test_in_the_first_second_it_says_that_it_has_just_booted_and_later_that_the_magnet_is_not_home(core):
+    setting = "CONF a,FORW,PULS,16000,10000,2000000"
+    lines = [(0, setting), (0, "ARM"), (999_999, "TRIG"), (1_000_000, "TRIG"), (2_999_999, "TRIG"), (3_000_000, "TRIG")]
+    first, second, shot = errors_after(core, lines)
+    assert (first, second) == ('114,"Just booted"', '102,"Magnet not home"')
+    assert shot.startswith("SHOT 2,")
 
 
 @pytest.mark.parametrize("core", CORES)
@@ -196,6 +218,120 @@ def test_left_alone_in_mid_shot_it_switches_off_at_the_watchdogs_microsecond(cor
     found = told(core, [*script, "tick 9000000", *by_hand((9_000_000, "STAT?"), (9_000_000, "SYST:ERR?"))])
     assert [line for line in found if line.startswith("drive")] == ["drive 2000000 EFF 1", "drive 2100000 OFF"]
     assert re.match(r'STAT DISARMED,.*\n109,"Watchdog"\n', said(found))
+
+
+PULSE, EFFECT = "CONF a,FORW,PULS,16000,10000,211000", "CONF v,FORW,EFF,1,24000,24000"
+START_US, END_US = 2_000_000, 2_010_000
+
+
+def shot_of(core: str, setting: str, *calls: str) -> tuple[str, list[str], list[str]]:
+    """The shot with the mark 5 that is fired at 2 s, after some calls and 1 s: its record, the errors, the drives."""
+    before = [call for call in calls if int(call.split()[1]) <= START_US]
+    after = [call for call in calls if call not in before]
+    lines = by_hand(*[(START_US, line) for line in (setting, "ARM", "TRIG 5")])
+    asked = by_hand(*[(3_000_000, line) for line in ("SHOT?", *["SYST:ERR?"] * 2)])
+    found = told(core, [*before, *lines, *after, *asked])
+    record, *errors_told = said(found).splitlines()
+    return record, errors_told, [line for line in found if line.startswith("drive")]
+
+
+@pytest.mark.parametrize("core", ALL)
+def test_a_pulse_that_is_begun_late_is_cut_and_its_record_tells_when_it_was_on(core):
+    record, found, drives = shot_of(core, PULSE, f"late {START_US} 4000", f"tick {END_US - 1}", f"late {END_US - 1} 0")
+    on_us, home_us = START_US + 4_000, START_US + 4_000 + 211_000
+    assert record == f"SHOT 1,5,CUT,{START_US},{on_us},{END_US},{home_us},{PULSE[5:]}"
+    assert found == [message(0)] * 2
+    assert drives == [f"drive {on_us} PULS 16000", f"drive {END_US} OFF"]
+
+
+@pytest.mark.parametrize("core", ALL)
+@pytest.mark.parametrize("late_us", [10_000, 500_000])
+def test_a_pulse_that_would_begin_when_it_ought_to_be_over_is_not_begun_and_not_counted(core, late_us):
+    record, found, drives = shot_of(core, PULSE, f"late {START_US} {late_us}")
+    assert record.startswith("SHOT 0,5,NONE,")
+    assert found == [message(107), message(0)]
+    assert drives == []
+
+
+@pytest.mark.parametrize("core", ALL)
+@pytest.mark.parametrize(
+    ("setting", "late_us", "ending", "told_us"),
+    [
+        (PULSE, 200, "DONE", 0),
+        (PULSE, 201, "CUT", 201),
+        ("CONF a,FORW,PULS,16000,20000,211000", 200, "DONE", 0),
+        ("CONF a,FORW,PULS,16000,20000,211000", 201, "CUT", 201),
+        ("CONF a,FORW,PULS,16000,1000,211000", 20, "DONE", 0),
+        ("CONF a,FORW,PULS,16000,1000,211000", 21, "CUT", 21),
+        ("CONF a,FORW,PULS,16000,1,211000", 1, "NONE", 0),
+        ("CONF a,FORW,PULS,16000,0,211000", 0, "DONE", 0),
+        (EFFECT, 1000, "DONE", 0),
+        (EFFECT, 1001, "DONE", 1001),  # its driver is told to stop as much later: it was whole
+        (EFFECT, 24000, "NONE", 0),
+    ],
+)
+def test_a_pulse_is_on_time_within_2_percent_and_200_us_a_vibration_within_1_ms(
+    core, setting, late_us, ending, told_us
+):
+    record, _, _ = shot_of(core, setting, f"late {START_US} {late_us}")
+    fields = record.split(",")
+    assert (fields[2], int(fields[4])) == (ending, START_US + told_us)
+
+
+@pytest.mark.parametrize("core", ALL)
+def test_the_rest_counts_from_when_a_late_pulse_truly_began(core):
+    late = [f"late {START_US} 4000", *by_hand((START_US, PULSE), (START_US, "ARM"), (START_US, "TRIG"))]
+    again = by_hand(*[(START_US + 211_000 + after_us, "TRIG") for after_us in (3_999, 4_000)])
+    asked = by_hand((3_000_000, "SHOT?"), (3_000_000, "SYST:ERR?"))
+    record, error = said(told(core, [*late, f"late {START_US + 1} 0", *again, *asked])).splitlines()
+    assert (record.split(",")[0], error) == ("SHOT 2", message(102))
+
+
+@pytest.mark.parametrize("core", ALL)
+def test_a_driver_that_does_not_answer_begins_no_shot_and_the_answer_says_so(core):
+    record, found, drives = shot_of(core, EFFECT, f"dead {START_US} 1")
+    assert record.startswith("SHOT 0,5,NONE,")
+    assert found == [message(110), message(0)]
+    assert drives == []
+
+
+@pytest.mark.parametrize("core", ALL)
+def test_a_shot_that_was_never_begun_may_be_asked_for_again_by_its_mark_and_is_fired_once(core):
+    retry = by_hand(*[(time_us, "TRIG 5") for time_us in (START_US + 600_000, START_US + 900_000)])
+    off = f"late {START_US + 500_000} 0"
+    record, found, drives = shot_of(core, PULSE, f"late {START_US} 20000", off, *retry)
+    assert record.startswith("SHOT 1,5,DONE,")
+    assert found == [message(107), message(113)]
+    assert drives == [f"drive {START_US + 600_000} PULS 16000", f"drive {START_US + 610_000} OFF"]
+
+
+@pytest.mark.parametrize("core", ALL)
+def test_a_trigger_in_a_frame_is_told_why_its_shot_was_never_begun(core):
+    bodies = ("SYST:STRI 1", PULSE, "ARM", "TRIG 5", "STAT?")
+    frames = [encode(Frame(number=number, body=body), "host") for number, body in enumerate(bodies, 1)]
+    script = [f"late {START_US} 10000", *[f"in {START_US} {frame.hex().upper()}" for frame in frames]]
+    answers = [line[6:].split("~")[0] for line in said(told(core, script)).splitlines()]
+    assert answers[3] == 'ERR 107,"Too late"'
+    assert answers[4].startswith("STAT ARMED,0,")
+
+
+@pytest.mark.parametrize("core", ALL)
+@pytest.mark.parametrize(
+    ("setting", "late_us", "ending", "lasted_us"),
+    [
+        (PULSE, 0, "CUT", 4_000),
+        (PULSE, 200, "CUT", 4_000),
+        (PULSE, 3_000, "CUT", 7_000),
+        (PULSE, 9_000, "DONE", 10_000),  # its own timer had ended it
+        (EFFECT, 9_000, "CUT", 13_000),
+        (EFFECT, 30_000, "DONE", 34_000),
+    ],
+)
+def test_a_shot_that_is_called_off_after_4_ms_ends_when_the_board_says(core, setting, late_us, ending, lasted_us):
+    cut_us = START_US + 4_000
+    record, _, _ = shot_of(core, setting, f"late {cut_us} {late_us}", *by_hand((cut_us, "ABOR")))
+    fields = record.split(",")
+    assert (fields[2], int(fields[5]) - int(fields[4])) == (ending, lasted_us)
 
 
 def test_the_image_holds_no_floating_point_and_no_heap():

@@ -23,7 +23,7 @@ import serial
 
 from device.twin.core import IDENTITY
 from device.twin.scripts import random_script, transcript
-from device.wire.frame import Frame, encode
+from device.wire.frame import LAST_NUMBER, Frame, encode
 from device.wire.records import ShotRecord, Standing
 from tests.test_firmware_core import EMULATOR, built, message
 
@@ -35,7 +35,7 @@ LONGEST_WAIT_S = 0.003
 
 @dataclass(frozen=True)
 class Call:
-    """A drive as the chip carried it out: when it was due, and when it was done."""
+    """A drive as the chip carried it out: when it says, and when it wrote it down."""
 
     text: str
     due_us: int
@@ -74,6 +74,18 @@ class Emulated:
 
     def fail(self, number: int) -> None:
         os.write(self._held[1], bytes([number]))
+
+    def be_late(self, late_ms: int) -> None:
+        """From now on the board carries out so much later what it is told."""
+        before = len(self._lates())
+        os.write(self._held[1], bytes([128 + late_ms]))
+        end_s = time.monotonic() + 30
+        while len(self._lates()) == before:
+            assert time.monotonic() < end_s, "the board takes no order"
+            time.sleep(0.001)
+
+    def _lates(self) -> list[str]:
+        return [line for line in self._lines() if line.startswith("late")]
 
     def calls(self) -> list[str]:
         """What the core was called with, as a script."""
@@ -133,7 +145,17 @@ class Hand:
         self.line.close()
 
     def say(self, *lines: str) -> None:
-        self.line.write("".join(f"{line}\n" for line in lines).encode())
+        self.write("".join(f"{line}\n" for line in lines).encode())
+
+    def write(self, data: bytes) -> None:
+        """Not by pyserial, which then waits for room for more: a busy pseudo-terminal may never tell of it."""
+        end_s = time.monotonic() + 30
+        while data:
+            assert time.monotonic() < end_s, "the chip reads nothing"
+            try:
+                data = data[os.write(self.line.fileno(), data) :]
+            except BlockingIOError:
+                time.sleep(0.001)
 
     def ask(self, line: str) -> str:
         self.say(line)
@@ -151,8 +173,11 @@ class Hand:
         return ShotRecord.parse(self.ask("SHOT?"))
 
     def wait_until_driven(self) -> None:
+        self.wait_for_ending("DONE")
+
+    def wait_for_ending(self, ending: str) -> None:
         end_s = time.monotonic() + 10
-        while self.shot().ending != "DONE":
+        while self.shot().ending != ending:
             assert time.monotonic() < end_s
             time.sleep(0.001)
 
@@ -178,7 +203,7 @@ def play(hand: Hand, script: Iterator[str]) -> None:
         time.sleep(min((int(time_us) - before_us) / 1e6, LONGEST_WAIT_S))
         before_us = int(time_us)
         if word == "in":
-            hand.line.write(bytes.fromhex("".join(rest)))
+            hand.write(bytes.fromhex("".join(rest)))
         elif word == "fault":
             hand.chip.fail(int(rest[0]))
         hand.heard += hand.line.read(hand.line.in_waiting)
@@ -186,9 +211,10 @@ def play(hand: Hand, script: Iterator[str]) -> None:
 
 def finish(hand: Hand, mark: str) -> None:
     """Everything that was said is answered: the answer to a question in both modes is the last."""
-    hand.line.write(b"\n*IDN?\n" + encode(Frame(number=0, body=f"SYST:STRI {mark}"), "host"))
-    while b"<0000 STRI" not in hand.read():
-        pass
+    hand.write(b"\n*IDN?\n" + encode(Frame(number=LAST_NUMBER, body=f"SYST:STRI {mark}"), "host"))
+    end_s = time.monotonic() + 60
+    while b"<FFFF STRI" not in hand.read():
+        assert time.monotonic() < end_s, "the last question is not answered"
 
 
 def as_the_twin_would(chip: Emulated) -> tuple[bytes, list[str]]:
@@ -253,12 +279,14 @@ def test_its_clock_goes_as_the_worlds(hand):
 def test_a_train_at_its_rest_is_driven_to_the_microsecond(hand):
     hand.wait_for_boot_rest()
     hand.say("CONF asymmetric-2,FORW,PULS,16000,10000,200000", "ARM")
-    start_us = hand.standing().clock_us + 200_000
-    for shot in range(6):
-        hand.say(f"TRIG {shot + 1},{start_us + 200_000 * shot}")
+    at_us, starts = hand.standing().clock_us + 200_000, []
+    for mark in range(1, 7):
+        hand.say(f"TRIG {mark},{at_us}")
         hand.wait_until_driven()
-    starts = [call.due_us for call in hand.chip.drives() if "PULS" in call.text]
-    assert starts == [start_us + 200_000 * shot for shot in range(6)]
+        shot = hand.shot()
+        starts.append(max(at_us, shot.accepted_us))  # the second where this machine was away
+        at_us = hand.standing().ready_us
+    assert [call.due_us for call in hand.chip.drives() if "PULS" in call.text] == starts
     assert statistics.median(call.done_us - call.due_us for call in hand.chip.drives()) < 20_000
     assert agree(hand)
 
@@ -287,6 +315,34 @@ def test_a_driver_that_fails_in_mid_shot_is_switched_off_until_reset(hand):
     hand.say("ARM", "*RST")
     assert [hand.ask("SYST:ERR?") for _ in range(2)] == [message(110)] * 2
     assert hand.standing().state == "DISARMED"
+    assert agree(hand)
+
+
+def test_a_pulse_that_the_board_begins_4_ms_late_is_told_as_cut_with_its_true_start(hand):
+    hand.wait_for_boot_rest()
+    hand.say("CONF a,FORW,PULS,16000,10000,211000", "ARM")
+    hand.standing()
+    hand.chip.be_late(4)
+    hand.say("TRIG 5")
+    hand.wait_for_ending("CUT")
+    shot = hand.shot()
+    assert (shot.start_us - shot.accepted_us, shot.end_us - shot.accepted_us) == (4_000, 10_000)
+    assert [call.due_us for call in hand.chip.drives()] == [shot.start_us, shot.end_us + 4_000]
+    assert agree(hand)
+
+
+def test_a_pulse_that_the_board_would_begin_after_its_end_is_told_as_never_begun_and_fired_when_asked_again(hand):
+    hand.wait_for_boot_rest()
+    hand.say("CONF a,FORW,PULS,16000,10000,211000", "ARM")
+    hand.standing()
+    hand.chip.be_late(12)
+    hand.say("TRIG 5")
+    hand.wait_for_ending("NONE")
+    assert (hand.ask("SYST:ERR?"), hand.shot().count, hand.chip.drives()) == (message(107), 0, [])
+    hand.chip.be_late(0)
+    hand.say("TRIG 5")
+    hand.wait_until_driven()
+    assert hand.shot().count == 1
     assert agree(hand)
 
 

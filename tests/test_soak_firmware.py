@@ -10,6 +10,7 @@ import pytest
 
 from device.twin.scripts import transcript
 from tests.serial_runs import hasty
+from tests.test_firmware_board import BUSES, Run, chances, check_records, dead_bus
 from tests.test_firmware_core import CORES, one_after_the_other, told
 from tests.test_firmware_emulated import Hand, emulated, play_all
 from tests.test_firmware_session import FAST, as_on_the_simulated_gun
@@ -18,6 +19,7 @@ pytestmark = pytest.mark.soak
 
 SCRIPTS = 1000
 LIVE_SCRIPTS = 200
+BOARD_SCRIPTS, BOARD_SHOTS = 300, 15
 
 
 def test_a_thousand_random_scripts_agree_to_the_byte_with_their_times(soak):
@@ -30,6 +32,25 @@ def test_a_thousand_random_scripts_agree_to_the_byte_with_their_times(soak):
         detail = f"{len(script)} calls, {len(expected)} lines of transcript, {time.monotonic() - start_s:.1f} s"
         soak(f"lines in which the {core}'s core differs from the twin, {SCRIPTS} random scripts", wrong, 0, detail)
         assert found == expected
+
+
+def test_whatever_befalls_shots_on_the_fake_board_their_records_are_what_the_coil_saw(soak):
+    start_s, unfed_us, less = time.monotonic(), [], 0
+    for seed in range(BOARD_SCRIPTS):
+        run = Run(*chances(seed, shots=BOARD_SHOTS))
+        less += check_records(run)
+        unfed_us.append(run.longest_unfed_us)
+    detail = f"stalls to 30 ms, dead buses, faults, ABOR; {less} not whole; {time.monotonic() - start_s:.0f} s"
+    soak(f"records that differ from the fake board's coil, {BOARD_SCRIPTS * BOARD_SHOTS} shots", 0, 0, detail)
+    how = "the watchdog's least time is 36 ms"
+    soak("longest between two feeds of the watchdog in these", f"{max(unfed_us) / 1000:.1f} ms", "36 ms", how)
+
+
+def test_a_dead_bus_holds_the_main_loop(soak):
+    unfed_us = {bus: Run(*dead_bus(bus)).longest_unfed_us for bus in BUSES}
+    worst = max(unfed_us, key=lambda bus: unfed_us[bus])
+    how = f"of {len(unfed_us)} ways to be dead, {worst}; the watchdog's least time is 36 ms"
+    soak("longest wait of the main loop on a dead I2C bus", f"{unfed_us[worst] / 1000:.2f} ms", "36 ms", how)
 
 
 def test_random_scripts_in_real_time_on_the_emulated_chip_are_replayed_exactly_by_the_twin(tmp_path, soak):

@@ -96,6 +96,6 @@ def test_after_a_boot_nothing_is_fired_for_a_second():
     hand.say(PULSE)
     hand.say("ARM")
     hand.say("TRIG", READY - 1)
-    assert hand.error() == '102,"Magnet not home"'
+    assert hand.error() == '114,"Just booted"'
     hand.say("TRIG", 1)
     assert hand.error() == '0,"No error"'

@@ -36,8 +36,8 @@ def test_a_shot_by_hand_is_driven_to_the_microsecond_and_kept(hand):
     assert hand.say("", 50_000) == []
     start = READY + 17
     assert hand.drives == [
-        Drive(time_us=start, kind="PULS", amount=16_000),
-        Drive(time_us=start + 10_000, kind="OFF"),
+        Drive(time_us=start, kind="PULS", amount=16_000, end_us=start + 10_000),
+        Drive(time_us=start + 10_000, kind="OFF", end_us=start + 10_000),
     ]
     assert hand.say("SHOT?") == [
         f"SHOT 1,5,DONE,{start},{start},{start + 10_000},{start + 211_000},asymmetric-1,FORW,PULS,16000,10000,211000"
@@ -87,7 +87,7 @@ def test_abort_cuts_a_pulse_and_disarms(strict):
     shot, done = strict.say("ABOR", 4_000)
     found = ShotRecord.parse(shot)
     assert (done, found.ending, found.end_us - found.start_us) == ("OK", "CUT", 4_000)
-    assert strict.drives[-1] == Drive(time_us=READY + 4_000, kind="OFF")
+    assert strict.drives[-1] == Drive(time_us=READY + 4_000, kind="OFF", end_us=READY + 4_000)
     assert strict.standing().state == "DISARMED"
 
 
@@ -145,6 +145,16 @@ def test_a_doubled_or_older_frame_does_nothing(strict):
     assert strict.core.machine.shot.count == 1
 
 
+@pytest.mark.parametrize("body", ["ARM", "SYST:STRI 8", "SYST:PLAI"])
+@pytest.mark.parametrize("in_session", [False, True])
+def test_a_frame_with_the_number_0000_is_no_frame(body, in_session):
+    gun = Strict() if in_session else Hand()
+    out, _ = gun.core.step(encode(Frame(number=0, body=body), "host"), gun.now_us)
+    assert decode(out.strip(), "gun") == Frame(number=0, body="NAK")
+    assert gun.core.machine.state == "DISARMED"
+    assert gun.core.strict == in_session
+
+
 def test_frames_without_a_session_are_told_so_and_a_new_session_tells_the_token_before(strict):
     assert strict.say("SYST:STRI 8") == ["STRI 7"]
     assert strict.standing().state == "DISARMED"
@@ -164,7 +174,7 @@ def test_a_driver_fault_cuts_and_stays_until_reset(strict):
     strict.say("TRIG 1")
     out, drives = strict.core.fail(3, strict.now_us + 2_000)
     strict.now_us += 2_000
-    assert drives == [Drive(time_us=READY + 2_000, kind="OFF")]
+    assert drives == [Drive(time_us=READY + 2_000, kind="OFF", end_us=READY + 2_000)]
     assert ShotRecord.parse(decode(out.strip(), "gun").body).ending == "CUT"
     assert (strict.standing().state, strict.standing().fault) == ("FAULT", 3)
     for text in ("ARM", "TRIG"):

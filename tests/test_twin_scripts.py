@@ -6,7 +6,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from device.twin.scripts import random_script, transcript
+from device.twin.machine import LATE_EFFECT_US
+from device.twin.scripts import MAX_LATE_US, random_script, transcript
 from device.wire import errors
 from device.wire.frame import MAX_LINE
 from tests.twin_hosts import Hand, Strict
@@ -33,13 +34,13 @@ def test_whatever_is_said_each_pulse_ends_in_time_and_none_comes_too_soon(seed):
             continue
         if rest[0] == "OFF":
             assert on is not None
-            assert int(time) - on[0] <= (20_000 if on[1] == "PULS" else 1_000_000)
+            assert int(time) - on[0] <= (20_000 if on[1] == "PULS" else 1_000_000) + MAX_LATE_US
             on = None
         else:
             assert on is None
             on = (int(time), rest[0])
             starts.append(on[0])
-    assert all(later - sooner >= 10_000 for sooner, later in pairwise(starts))
+    assert all(later - sooner >= 10_000 - LATE_EFFECT_US for sooner, later in pairwise(starts))
 
 
 def test_a_script_gives_the_same_transcript_again_and_reaches_every_error():

@@ -26,7 +26,7 @@ from device.wire.frame import (
 from device.wire.records import Named, Refusal, Setting, ShotRecord, Standing, refusal
 
 BODIES = st.text(st.characters(min_codepoint=0x20, max_codepoint=0x7E), min_size=1, max_size=MAX_BODY)
-FRAMES = st.builds(Frame, number=st.integers(0, LAST_NUMBER), body=BODIES)
+FRAMES = st.builds(Frame, number=st.integers(1, LAST_NUMBER), body=BODIES)
 SENDERS = st.sampled_from(["host", "gun"])
 NUMBERS = st.integers(0, 10**16 - 1)
 SHORT_NUMBERS = st.integers(0, 2**32 - 1)
@@ -88,6 +88,13 @@ def test_a_frame_with_one_byte_changed_lost_or_doubled_is_garbled(frame, data):
 def test_the_hosts_own_echo_is_no_answer():
     with pytest.raises(Garbled):
         decode(encode(Frame(number=1, body="ARM"), "host").strip(), "gun")
+
+
+def test_the_number_0000_is_the_guns_alone():
+    frame = Frame(number=0, body="NAK")
+    assert decode(encode(frame, "gun").strip(), "gun") == frame
+    with pytest.raises(Garbled, match="0001 to FFFF"):
+        decode(encode(frame, "host").strip(), "host")
 
 
 def test_the_checksum_is_that_of_zip_files():
@@ -171,4 +178,3 @@ def test_numbers_go_round_and_the_older_half_is_not_newer(number):
         assert is_newer(ahead, number)
         assert not is_newer(number, ahead)
     assert not is_newer(number, number)
-    assert not is_newer(0, number)

@@ -5,9 +5,10 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import Final
 
-from device.twin.machine import Drive, Machine
+from device.twin.machine import Carried, Drive, Machine
 from device.wire import errors
 from device.wire.errors import message
 from device.wire.frame import Frame, Garbled, Splitter, decode, encode, is_newer
@@ -25,10 +26,12 @@ Said = str | int | None
 
 
 class Core:
-    """One gun from its boot at `now_us` on. Calls come with times that never run back."""
+    """One gun from its boot at `now_us` on. Calls come with times that never run back; `board` carries drives out."""
 
-    def __init__(self, identity: Named = IDENTITY, now_us: int = 0) -> None:
-        self.machine = Machine(now_us)
+    def __init__(
+        self, identity: Named = IDENTITY, now_us: int = 0, board: Callable[[Drive], Carried] | None = None
+    ) -> None:
+        self.machine = Machine(now_us, board)
         self.strict = False
         self._identity = identity
         self._splitter = Splitter()
@@ -76,7 +79,7 @@ class Core:
         while (time_us := self.wake_us()) is not None and time_us <= now_us:
             if time_us == self.machine.due_us():
                 if self.machine.run_due():
-                    self._answer_trigger()
+                    self._answer_ended()
             else:
                 self._abort(time_us)
                 self._queue(errors.WATCHDOG)
@@ -138,11 +141,17 @@ class Core:
         else:
             self._send(frame.number, said or "OK")
 
+    def _answer_ended(self) -> None:
+        """Tell what became of a shot whose time has come; in the plain mode an error is queued."""
+        if not self._pending and self.machine.shot.ending == "NONE":
+            self._queue(self.machine.never)
+        self._answer_trigger()
+
     def _answer_trigger(self) -> None:
         """Tell what became of the shot that waits for its answer."""
         if self._pending:
             ended = self.machine.shot.ending != "NONE"
-            self._send(self._pending, self.machine.shot.text() if ended else f"ERR {message(errors.CANCELLED)}")
+            self._send(self._pending, self.machine.shot.text() if ended else f"ERR {message(self.machine.never)}")
         self._pending = 0
 
     def _do(self, text: str, now_us: int) -> Said:

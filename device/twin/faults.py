@@ -21,6 +21,7 @@ class Troubles:
     partial: float = 0.0  # the rest of a piece
     reset: float = 0.0  # of the gun, in mid-shot
     busy: float = 0.0  # the pulse does not end for 2 s
+    late: float = 0.0  # the board begins the shot late, at most half its length after its end
     hang: float = 0.0  # the gun reads nothing for `hang_s` from a shot's start on
     unplug: float = 0.0  # in mid-shot
     unplug_reply: float = 0.0  # in mid-answer

@@ -5,12 +5,13 @@ States and what each command may do in them stand in `REFUSED`; everything timed
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 from typing import Final, Literal
 
 from device.twin.budget import Budget, out_of_range
 from device.wire import errors
-from device.wire.records import Ending, Setting, ShotRecord, Standing, State
+from device.wire.records import Setting, ShotRecord, Standing, State
 
 BOOT_REST_US: Final = 1_000_000
 """No shot in the first second: what was driven before a reset is not known."""
@@ -38,23 +39,68 @@ NO_SHOT: Final = ShotRecord(
 )
 
 
+LATE_PULSE_US: Final = 200
+LATE_PULSE_PARTS: Final = 50
+"""A pulse is on time if it loses at most 2 % of its length, and at most 0.2 ms, a long turn of the main loop: the chip
+takes fewer than 20,000 instructions to answer a line (counted on the emulator), 0.12 ms at one a cycle. Assumed."""
+LATE_EFFECT_US: Final = 1_000
+"""A vibration waits for its driver to be told: 0.16 ms, 0.55 ms if that has to be set up anew. Assumed."""
+
+
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Drive:
-    """What the board is told at a time: a pulse of so many mV, an effect by its number, or off."""
+    """What the board is told, and when: a pulse of so many mV, an effect by its number, or off.
+
+    `end_us`: when a pulse or an effect is to be over; of an OFF its own time.
+    """
 
     time_us: int
     kind: Literal["PULS", "EFF", "OFF"]
     amount: int = 0
+    end_us: int
+
+    def is_over(self, now_us: int) -> bool:
+        """Whether it is too late to begin it: nothing would be driven."""
+        return self.end_us > self.time_us and now_us >= self.end_us
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Carried:
+    """How the board carried a drive out: when, or the error for which it did not."""
+
+    at_us: int
+    error: int = errors.NONE
+
+
+@dataclass(slots=True, kw_only=True)
+class Board:
+    """The board under a gun, as a script has it: so late with everything, and its driver may be dead."""
+
+    late_us: int = 0
+    dead: bool = False
+
+    def __call__(self, drive: Drive) -> Carried:
+        """What becomes of a drive."""
+        at_us = drive.time_us + self.late_us
+        if self.dead:
+            return Carried(at_us=at_us, error=errors.FAULT)
+        return Carried(at_us=at_us, error=errors.TOO_LATE if drive.is_over(at_us) else errors.NONE)
 
 
 class Machine:
-    """One gun from its boot on. Times never run back; `drives` is what the board was told and has not taken yet."""
+    """One gun from its boot on. Times never run back.
 
-    def __init__(self, boot_us: int = 0) -> None:
+    `drives` is what the board has carried out, and when, as far as nobody has taken it yet; `never` is the error for
+    which the last shot was never begun, if it was not.
+    """
+
+    def __init__(self, boot_us: int = 0, board: Callable[[Drive], Carried] | None = None) -> None:
         self.state: State = "DISARMED"
         self.setting: Setting | None = None
         self.shot: ShotRecord = NO_SHOT
         self.drives: list[Drive] = []
+        self.never = errors.NONE
+        self._board = board or Board()
         self._fault = 0
         self._ready_us = boot_us + BOOT_REST_US
         self._budget = Budget()
@@ -66,9 +112,8 @@ class Machine:
     def run_due(self) -> bool:
         """Let the next thing happen; true if a shot ended by it."""
         if self.state == "WAITING":
-            self._begin()
-            return False
-        self._end("DONE", self.shot.end_us)
+            return not self._begin()
+        self._end(self.shot.end_us)
         self.state = "ARMED"
         return True
 
@@ -116,21 +161,21 @@ class Machine:
             return errors.NOT_CONFIGURED
         if mark > MAX_MARK or start_us - now_us > MAX_AHEAD_US:
             return errors.OUT_OF_RANGE
-        if mark != 0 and mark == self.shot.mark:
+        if mark != 0 and mark == self.shot.mark and self.shot.ending != "NONE":
             return errors.ALREADY_FIRED
         if before_us != 0 and start_us > before_us:
             return errors.TOO_LATE
         if start_us < self._ready_us:
-            return errors.NOT_HOME
+            return errors.NOT_HOME if self.shot.count else errors.JUST_BOOTED
         return self._budget.refusal(self.setting, start_us)
 
     def abort(self, now_us: int) -> bool:
         """Switch off and disarm, from every state; true if a shot ended by it."""
         ended = self.state in {"WAITING", "FIRING"}
         if self.state == "FIRING":
-            self._end("CUT", now_us)
+            self._end(now_us)
         elif self.state == "WAITING":
-            self.shot = replace(self.shot, ending="NONE")
+            self._call_off(errors.CANCELLED)
         if self.state != "FAULT":
             self.state = "DISARMED"
         return ended
@@ -157,14 +202,56 @@ class Machine:
             fault=self._fault,
         )
 
-    def _begin(self) -> None:
+    def _begin(self) -> bool:
+        """Whether the board could begin the shot; how late it was is told by START, if that is too late."""
+        setting, start_us = self.shot.setting, self.shot.start_us
+        drive = Drive(time_us=start_us, kind=setting.kind, amount=setting.amount, end_us=self.shot.end_us)
+        carried = self._tell(drive)
+        if carried.error:
+            self._call_off(carried.error)
+            self.state = "ARMED"
+            return False
+        if carried.at_us - start_us > _allowed_us(setting):
+            start_us = carried.at_us
         self.state = "FIRING"
-        self.shot = replace(self.shot, count=self.shot.count + 1, ending="DRIV")
-        self._ready_us = self.shot.home_predicted_us
-        self._budget.spend(self.shot.setting, self.shot.start_us)
-        setting = self.shot.setting
-        self.drives.append(Drive(time_us=self.shot.start_us, kind=setting.kind, amount=setting.amount))
+        self._ready_us = start_us + setting.rest_us
+        self.shot = replace(
+            self.shot,
+            count=self.shot.count + 1,
+            ending="DRIV",
+            start_us=start_us,
+            home_predicted_us=self._ready_us,
+        )
+        self._budget.spend(setting, start_us)
+        return True
 
-    def _end(self, ending: Ending, time_us: int) -> None:
-        self.shot = replace(self.shot, ending=ending, end_us=time_us)
-        self.drives.append(Drive(time_us=time_us, kind="OFF"))
+    def _end(self, time_us: int) -> None:
+        """It is over, whole or cut short. Off is told by END, if that is too late; a pulse never outlasts its END."""
+        shot = self.shot
+        carried = self._tell(Drive(time_us=time_us, kind="OFF", end_us=time_us))
+        off_us = time_us if carried.error else carried.at_us
+        if shot.setting.kind == "PULS":
+            off_us = min(off_us, shot.end_us)
+        if off_us - time_us <= _allowed_us(shot.setting):
+            off_us = time_us
+        off_us = max(off_us, shot.start_us)
+        whole = off_us >= max(shot.end_us, shot.start_us + shot.setting.length_us)
+        self.shot = replace(shot, ending="DONE" if whole else "CUT", end_us=off_us)
+
+    def _call_off(self, error: int) -> None:
+        """The shot that waits is never begun."""
+        self.never = error
+        self.shot = replace(self.shot, ending="NONE")
+
+    def _tell(self, drive: Drive) -> Carried:
+        carried = self._board(drive)
+        if not carried.error:
+            self.drives.append(replace(drive, time_us=carried.at_us))
+        return carried
+
+
+def _allowed_us(setting: Setting) -> int:
+    """How late a drive may be, and still be told as on time."""
+    if setting.kind == "EFF":
+        return LATE_EFFECT_US
+    return min(LATE_PULSE_US, setting.length_us // LATE_PULSE_PARTS)

@@ -5,9 +5,11 @@ A script is text, one call a line, times in microseconds that never run back; th
     in TIME HEX         step with these bytes
     tick TIME           step without bytes
     fault TIME NUMBER   the driver reports a fault
+    late TIME US        from then on the board carries out so much later what it is told
+    dead TIME FLAG      from then on the driver does not answer (1), or does again (0)
     reset TIME          power off and on: a new core, booted at this time; bytes not yet answered are gone
 
-Its transcript has, for each line, what came of it: first the drive events, each with its own time, then the bytes:
+Its transcript has, for each line, what came of it: first what the board carried out, and when, then the bytes:
 
     boot TIME           for a reset; whatever was driven is off
     drive TIME PULS AMOUNT | drive TIME EFF AMOUNT | drive TIME OFF
@@ -21,27 +23,39 @@ from random import Random
 from typing import Final
 
 from device.twin.core import Core
-from device.twin.machine import Drive
+from device.twin.machine import Board, Drive
 from device.wire.frame import Frame, encode, following
 
 
 def transcript(script: Iterable[str]) -> Iterator[str]:
     """What the core says and does for a script."""
-    core = Core()
+    board = Board()
+    core = Core(board=board)
     for line in script:
         word, time, *rest = line.split()
-        time_us = int(time)
         if word == "reset":
-            core = Core(now_us=time_us)
-            yield f"boot {time_us}"
+            core = Core(now_us=int(time), board=board)
+            yield f"boot {time}"
             continue
-        if word == "fault":
-            out, drives = core.fail(int(rest[0]), time_us)
-        else:
-            out, drives = core.step(bytes.fromhex("".join(rest)), time_us)
+        out, drives = _called(core, word, rest, int(time))
+        if word in {"late", "dead"}:
+            _change(board, word, int(rest[0]))
         yield from map(_drive, drives)
         if out:
-            yield f"out {time_us} {out.hex().upper()}"
+            yield f"out {time} {out.hex().upper()}"
+
+
+def _called(core: Core, word: str, rest: list[str], time_us: int) -> tuple[bytes, list[Drive]]:
+    if word == "fault":
+        return core.fail(int(rest[0]), time_us)
+    return core.step(bytes.fromhex("".join(rest)) if word == "in" else b"", time_us)
+
+
+def _change(board: Board, word: str, number: int) -> None:
+    if word == "late":
+        board.late_us = number
+    else:
+        board.dead = number == 1
 
 
 def _drive(drive: Drive) -> str:
@@ -57,6 +71,8 @@ _PLAIN: Final = (
 _STEPS_US: Final = (0, 0, 1, 100, 999, 10_000, 50_000, 99_000, 100_000, 211_000, 211_003, 1_000_000, 2_500_000)
 _LONG: Final = 310
 """Shots of a train that meets the limits of a minute and of the coil."""
+_LATE_US: Final = (1, 20, 21, 100, 101, 200, 201, 999, 1_000, 1_001, 9_999, 10_000, 19_999, 20_000, 30_000)
+MAX_LATE_US: Final = max(_LATE_US)
 _PAUSES_US: Final = (500_000, 29_999_999, 30_000_000, 61_000_000, 400_000_000)
 
 
@@ -93,9 +109,9 @@ class _Writer:
                 yield self._say(f"SYST:STRI {self._draw.randrange(2**32)}")
         elif chance < 0.15:
             yield from self._train(self._draw.choice((2, 3, 12, 12, _LONG)))
-        elif chance < 0.2:
-            yield from self._special()
-        elif chance < 0.25 and self._strict:
+        elif chance < 0.23:
+            yield from self._special() if chance < 0.2 else self._late()
+        elif chance < 0.28 and self._strict:
             yield self._say(f"SYST:STRI {self._draw.randrange(2**32)}")
         else:
             yield self._say(_body(self._draw, self._time_us))
@@ -111,6 +127,19 @@ class _Writer:
             yield self._say(f"TRIG {self._draw.randrange(2**32)}")
             self._time_us += every_us
         yield self._say("STAT?")
+
+    def _late(self) -> Iterator[str]:
+        """Shots that the board begins late or not at all, to their end, and called off."""
+        dead = self._draw.random() < 0.2
+        word, number = ("dead", 1) if dead else ("late", self._draw.choice(_LATE_US))
+        self._time_us += self._draw.choice((0, 1_300_000))
+        yield f"{word} {self._time_us} {number}"
+        yield self._say(f"CONF {_setting(self._draw)}")
+        trigger = f"TRIG {self._draw.randrange(2**32)}"
+        for body in ("ARM", trigger, self._draw.choice(("ABOR", "STAT?", "SHOT?")), "ARM", trigger, "SHOT?"):
+            yield self._say(body)
+            self._time_us += self._draw.choice((0, 0, 5_000, 100_000, 1_200_000))
+        yield f"{word} {self._time_us} 0"
 
     def _special(self) -> Iterator[str]:
         """A shot that waits and meets something else; one that is asked for twice; a line beyond all bounds."""

@@ -14,7 +14,7 @@ from device.methods import Method
 from device.twin.body import Body
 from device.twin.core import IDENTITY, Core
 from device.twin.faults import Troubles
-from device.twin.machine import Drive
+from device.twin.machine import Board, Carried, Drive
 from device.twin.ports import Socket
 from device.wire.records import Named
 
@@ -46,7 +46,7 @@ class Twin:
         self._make = make or Make()
         self._draw = Random(self._make.seed)  # noqa: S311 - troubles, no secrets
         self._boot_s = self.world_s()
-        self._core = Core(self._make.identity)
+        self._core = self._booted()
         self._coming: deque[tuple[float, bytes]] = deque()
         self._going: deque[tuple[float, bytes]] = deque()
         self._planned: list[tuple[float, Callable[[], None]]] = []
@@ -114,8 +114,18 @@ class Twin:
         self.accidents.append("reset")
         self.body.stop(self.world_s())
         self._boot_s = self.world_s()
-        self._core = Core(self._make.identity)
+        self._core = self._booted()
         self._coming.clear()
+
+    def _booted(self) -> Core:
+        return Core(self._make.identity, board=self._carry)
+
+    def _carry(self, drive: Drive) -> Carried:
+        """What the board makes of a drive."""
+        late = drive.kind != "OFF" and self._happens(self._make.troubles.late)
+        if late:
+            self.accidents.append("late")
+        return Board(late_us=int(1.5 * self._draw.random() * (drive.end_us - drive.time_us)) if late else 0)(drive)
 
     def _wait_s(self) -> float:
         now_s, wake_us = time.monotonic(), self._core.wake_us()

@@ -25,6 +25,7 @@ FAULT: Final = 110
 NO_SESSION: Final = 111
 CANCELLED: Final = 112
 ALREADY_FIRED: Final = 113
+JUST_BOOTED: Final = 114
 
 TEXTS: Final = {
     NONE: "No error",
@@ -48,6 +49,7 @@ TEXTS: Final = {
     NO_SESSION: "No session",
     CANCELLED: "Cancelled",
     ALREADY_FIRED: "Already fired",
+    JUST_BOOTED: "Just booted",
 }
 
 

@@ -17,7 +17,7 @@ MAX_LINE: Final = 200
 MAX_BODY: Final = MAX_LINE - 15
 """Bytes of a frame's body: what is around it takes 15."""
 LAST_NUMBER: Final = 0xFFFF
-"""Sequence numbers go from 1 to here and start again at 1; 0 belongs to no command."""
+"""Sequence numbers go from 1 to here and start again at 1; 0 is only the gun's, for what answers no command."""
 
 Sender = Literal["host", "gun"]
 _MARKS: Final[dict[Sender, bytes]] = {"host": b">", "gun": b"<"}
@@ -53,18 +53,21 @@ def encode(frame: Frame, sender: Sender) -> bytes:
 
 
 def decode(line: bytes, sender: Sender) -> Frame:
-    """The frame that a line without its end is, if `sender` sent it. `Garbled`: it is none."""
+    """The frame that a line without its end is, if `sender` sent it. `Garbled`: it is none, or a command's number 0."""
     found = _FRAME.fullmatch(line)
     if found is None or not line.startswith(_MARKS[sender]):
         raise Garbled(f"not a frame of the {sender}: {line[:40]!r}")
     if int(found[3], 16) != zlib.crc32(found[1]):
         raise Garbled(f"the checksum does not fit: {line[:40]!r}")
-    return Frame(number=int(line[1:5], 16), body=found[2].decode("ascii"))
+    frame = Frame(number=int(line[1:5], 16), body=found[2].decode("ascii"))
+    if sender == "host" and frame.number == 0:
+        raise Garbled(f"a command's number is 0001 to FFFF: {line[:40]!r}")
+    return frame
 
 
 def is_newer(number: int, last: int) -> bool:
     """Whether a sequence number comes after the last one: at most half of all numbers ahead."""
-    return number != 0 and 0 < (number - last) % LAST_NUMBER <= LAST_NUMBER // 2
+    return 0 < (number - last) % LAST_NUMBER <= LAST_NUMBER // 2
 
 
 def following(number: int) -> int:

@@ -5,19 +5,19 @@
 /* TIM2 runs free at 1 MHz; SysTick wakes the main loop each millisecond. */
 void clock_start(void)
 {
-    TIM2->PSC = BOARD.timer_MHz - 1;
-    TIM2->ARR = UINT32_MAX;
-    TIM2->EGR = TIM_EGR_UG;
-    TIM2->CNT = 0;
-    TIM2->CR1 = TIM_CR1_CEN;
-    SYSTICK->LOAD = BOARD.processor_MHz * 1000 - 1;
-    SYSTICK->VAL = 0;
-    SYSTICK->CTRL = SYSTICK_ENABLE | SYSTICK_TICKINT | SYSTICK_CLKSOURCE;
+    reg_write(&TIM2->PSC, BOARD.timer_MHz - 1);
+    reg_write(&TIM2->ARR, UINT32_MAX);
+    reg_write(&TIM2->EGR, TIM_EGR_UG);
+    reg_write(&TIM2->CNT, 0);
+    reg_write(&TIM2->CR1, TIM_CR1_CEN);
+    reg_write(&SYSTICK->LOAD, BOARD.processor_MHz * 1000 - 1);
+    reg_write(&SYSTICK->VAL, 0);
+    reg_write(&SYSTICK->CTRL, SYSTICK_ENABLE | SYSTICK_TICKINT | SYSTICK_CLKSOURCE);
 }
 
 uint32_t clock_stamp(void)
 {
-    return TIM2->CNT;
+    return reg_read(&TIM2->CNT);
 }
 
 uint64_t clock_us(void)

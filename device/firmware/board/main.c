@@ -2,7 +2,9 @@
 #include "board.h"
 #include "clock.h"
 #include "core.h"
+#include "cpu.h"
 #include "port.h"
+#include "startup.h"
 
 enum { SPIN_US = 2000 }; /* nearer events are waited for awake; SysTick wakes each 1000 */
 
@@ -15,10 +17,10 @@ static void send(void *owner, struct slice line)
     port_write(line);
 }
 
-static void drive(void *owner, const struct drive *drive)
+static struct carried drive(void *owner, const struct drive *drive)
 {
     (void)owner;
-    board_drive(drive, clock_us());
+    return board_drive(drive);
 }
 
 /* The core's times never run back, though a byte's stamp may be older than the last step. */
@@ -56,16 +58,17 @@ static void rest(void)
     bool soon = core_wake(&core, &wake_us) && wake_us < stepped_us + SPIN_US;
     if (port_pump() || soon)
         return;
-    __asm__ volatile("cpsid i" ::: "memory");
+    cpu_hold();
     if (!port_waits())
-        __asm__ volatile("dsb\n wfi" ::: "memory");
-    __asm__ volatile("cpsie i" ::: "memory");
+        cpu_sleep();
+    cpu_release();
 }
 
 int main(void)
 {
     board_start();
     clock_start();
+    board_connect();
     port_start();
     core_boot(&core, board_serial(), (struct outlet){NULL, send, drive}, forward(clock_us()));
     board_booted(stepped_us);
@@ -73,7 +76,7 @@ int main(void)
         take_bytes();
         take_fault();
         core_step(&core, NULL, 0, forward(clock_us()));
-        board_alive();
+        board_alive(stepped_us);
         rest();
     }
 }

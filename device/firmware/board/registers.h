@@ -15,6 +15,9 @@ struct rcc {
     reg CR, PLLCFGR, CFGR, CIR, AHB1RSTR, AHB2RSTR, AHB3RSTR, unused_1c, APB1RSTR, APB2RSTR, unused_28, unused_2c;
     reg AHB1ENR, AHB2ENR, AHB3ENR, unused_3c, APB1ENR, APB2ENR;
 };
+struct pwr {
+    reg CR, CSR;
+};
 struct gpio {
     reg MODER, OTYPER, OSPEEDR, PUPDR, IDR, ODR, BSRR, LCKR, AFRL, AFRH;
 };
@@ -35,7 +38,8 @@ struct systick {
 };
 
 #define RCC ((struct rcc *)0x40023800)
-#define FLASH_ACR (*(reg *)0x40023C00)
+#define PWR ((struct pwr *)0x40007000)
+#define FLASH_ACR ((reg *)0x40023C00)
 #define GPIOA ((struct gpio *)0x40020000)
 #define GPIOB ((struct gpio *)0x40020400)
 #define GPIOC ((struct gpio *)0x40020800)
@@ -50,7 +54,7 @@ struct systick {
 #define UNIQUE_ID ((reg *)0x1FFF7A10)
 #define SYSTICK ((struct systick *)0xE000E010)
 #define NVIC_ISER ((reg *)0xE000E100)
-#define AIRCR (*(reg *)0xE000ED0C)
+#define AIRCR ((reg *)0xE000ED0C)
 
 #define BIT(n) (1u << (n))
 
@@ -71,11 +75,42 @@ enum {
     SYSTICK_CLKSOURCE = BIT(2),
 };
 
-/* Looks at flags for 1 to 10 ms; nothing on a board may take so long. */
+/* The only two ways to a register: a load and a store on the chip, functions that see each access in fake/. */
+#ifdef RECOIL_FAKE
+uint32_t reg_read(const reg *place);
+void reg_write(reg *place, uint32_t value);
+#else
+static inline uint32_t reg_read(const reg *place)
+{
+    return *place;
+}
+
+static inline void reg_write(reg *place, uint32_t value)
+{
+    *place = value;
+}
+#endif
+
+static inline void reg_set(reg *place, uint32_t bits)
+{
+    reg_write(place, reg_read(place) | bits);
+}
+
+static inline void reg_clear(reg *place, uint32_t bits)
+{
+    reg_write(place, reg_read(place) & ~bits);
+}
+
+static inline void reg_field(reg *place, uint32_t mask, uint32_t value)
+{
+    reg_write(place, (reg_read(place) & ~mask) | value);
+}
+
+/* Looks at flags some milliseconds long. For the start alone, before the watchdog is fed by the main loop. */
 static inline bool wait_for(const reg *flags, uint32_t mask, uint32_t wanted)
 {
     for (unsigned looks = 0; looks < 20000; looks++)
-        if ((*flags & mask) == wanted)
+        if ((reg_read(flags) & mask) == wanted)
             return true;
     return false;
 }

@@ -5,7 +5,6 @@
 #include "startup.h"
 
 extern uint32_t data_source[], data_begin[], data_end[], bss_begin[], bss_end[], stack_top[];
-int main(void);
 
 /* GCC calls these two of its own accord; keep it from making them call themselves. */
 #define NO_LOOP_CALLS __attribute__((optimize("no-tree-loop-distribute-patterns"), used))

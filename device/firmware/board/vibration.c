@@ -1,60 +1,50 @@
-/* RM0390, "Inter-integrated circuit (I2C) interface"; the driver's registers: TI's data sheet SLOS825. */
+/* The driver's registers: TI's data sheet SLOS825. */
 #include "vibration.h"
 
-#include "board.h"
+#include <stddef.h>
+
+#include "i2c.h"
 
 enum { DRV_ADDRESS = 0x5A, DRV_MODE = 0x01, DRV_LIBRARY = 0x03, DRV_EFFECT = 0x04, DRV_NEXT = 0x05, DRV_GO = 0x0C };
 enum { DRV_FEEDBACK = 0x1A, DRV_INTERNAL_TRIGGER = 0, DRV_LRA_LIBRARY = 6, DRV_LRA = 0xB6 }; /* default and N_ERM_LRA */
 
+static bool ready; /* it answered last, and was set up before */
 static bool failed;
 
-static bool i2c_send(uint8_t byte, uint32_t flag)
+static bool set_up(void)
 {
-    I2C1->DR = byte;
-    return wait_for(&I2C1->SR1, flag, flag);
+    static const uint8_t SETTINGS[][2] = {
+        {DRV_MODE, DRV_INTERNAL_TRIGGER}, {DRV_GO, 0},   {DRV_FEEDBACK, DRV_LRA},
+        {DRV_LIBRARY, DRV_LRA_LIBRARY},   {DRV_NEXT, 0},
+    };
+    bool done = true;
+    for (size_t i = 0; i < sizeof SETTINGS / sizeof SETTINGS[0] && done; i++)
+        done = i2c_write(DRV_ADDRESS, SETTINGS[i][0], SETTINGS[i][1]);
+    return done;
 }
 
-/* One register of the vibration driver: start, address, register, value, stop. */
-static bool drv_try(uint8_t place, uint8_t value)
+/* One that did not answer may have lost its supply, and what was set up with it. */
+static bool told(bool done)
 {
-    enum { START = BIT(8), SB = BIT(0), ADDR = BIT(1), BTF = BIT(2), TXE = BIT(7) };
-    I2C1->CR1 |= START;
-    if (!wait_for(&I2C1->SR1, SB, SB) || !i2c_send(DRV_ADDRESS << 1, ADDR))
-        return false;
-    (void)I2C1->SR2; /* clears ADDR */
-    return i2c_send(place, TXE) && i2c_send(value, BTF);
-}
-
-static void drv_write(uint8_t place, uint8_t value)
-{
-    enum { STOP = BIT(9) };
-    failed = !drv_try(place, value) || failed;
-    I2C1->CR1 |= STOP;
-    wait_for(&I2C1->CR1, STOP, 0);
+    ready = done;
+    failed = failed || !done;
+    return done;
 }
 
 void vibration_start(void)
 {
-    I2C1->CR2 = 42;            /* MHz of APB1 */
-    I2C1->CCR = BIT(15) | 35u; /* fast mode: 42 MHz / (3 * 35) = 400 kHz */
-    I2C1->TRISE = 13;          /* 300 ns */
-    I2C1->CR1 = BIT(0);
-    drv_write(DRV_MODE, DRV_INTERNAL_TRIGGER);
-    drv_write(DRV_GO, 0);
-    drv_write(DRV_FEEDBACK, DRV_LRA);
-    drv_write(DRV_LIBRARY, DRV_LRA_LIBRARY);
-    drv_write(DRV_NEXT, 0);
+    i2c_start();
+    told(set_up());
 }
 
-void vibration_on(uint8_t effect)
+bool vibration_on(uint8_t effect)
 {
-    drv_write(DRV_EFFECT, effect);
-    drv_write(DRV_GO, 1);
+    return told((ready || set_up()) && i2c_write(DRV_ADDRESS, DRV_EFFECT, effect) && i2c_write(DRV_ADDRESS, DRV_GO, 1));
 }
 
-void vibration_off(void)
+bool vibration_off(void)
 {
-    drv_write(DRV_GO, 0);
+    return told(i2c_write(DRV_ADDRESS, DRV_GO, 0) && ready);
 }
 
 bool vibration_failed(void)

@@ -6,8 +6,9 @@
 #include <stdint.h>
 
 void vibration_start(void);
-void vibration_on(uint8_t effect);
-void vibration_off(void);
+/* Whether the driver took the command. It is given up after 1.2 ms, and tried anew by the next. */
+bool vibration_on(uint8_t effect);
+bool vibration_off(void);
 /* Whether it did not answer since this was asked last. */
 bool vibration_failed(void);
 

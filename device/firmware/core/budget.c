@@ -102,8 +102,11 @@ void budget_spend(struct budget *budget, const struct setting *setting, uint64_t
 
 void budget_cool(struct budget *budget, uint64_t now_us)
 {
+    uint64_t now_step = now_us / COOLING_US;
+    if (now_step <= budget->cooled_step) /* a shot that was begun late is ahead of the core's time */
+        return;
     budget->warmth_nJ = warmth_at(budget, now_us);
-    budget->cooled_step = now_us / COOLING_US;
+    budget->cooled_step = now_step;
 }
 
 uint64_t budget_coil_mC(const struct budget *budget, uint64_t now_us)

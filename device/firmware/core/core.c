@@ -53,12 +53,20 @@ static void answer_trigger(struct core *core)
     if (number == 0)
         return;
     if (core->machine.shot.ending == ENDING_NONE) {
-        send_error(core, number, ERROR_CANCELLED);
+        send_error(core, number, core->machine.never);
         return;
     }
     text_clear(&core->answer);
     shot_text(&core->machine.shot, &core->answer);
     send_frame(core, number, written(&core->answer));
+}
+
+/* A shot's time has come and is over; what kept it from being begun is queued in the plain mode. */
+static void answer_ended(struct core *core)
+{
+    if (core->pending == 0 && core->machine.shot.ending == ENDING_NONE)
+        queue(core, core->machine.never);
+    answer_trigger(core);
 }
 
 void core_abort(struct core *core, uint64_t now_us)
@@ -90,7 +98,7 @@ static void run_next(struct core *core, uint64_t time_us)
     uint64_t machine_us;
     if (machine_due(&core->machine, &machine_us) && machine_us == time_us) {
         if (machine_run_due(&core->machine))
-            answer_trigger(core);
+            answer_ended(core);
         return;
     }
     core_abort(core, time_us);

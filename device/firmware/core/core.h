@@ -14,7 +14,7 @@ enum { QUEUE_SIZE = 16 };
 struct outlet {
     void *owner;
     void (*send)(void *owner, struct slice line);
-    void (*drive)(void *owner, const struct drive *drive);
+    struct carried (*drive)(void *owner, const struct drive *drive);
 };
 
 struct core {

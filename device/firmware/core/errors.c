@@ -24,6 +24,7 @@ const char *error_message(enum error error)
     case ERROR_NO_SESSION: return "111,\"No session\"";
     case ERROR_CANCELLED: return "112,\"Cancelled\"";
     case ERROR_ALREADY_FIRED: return "113,\"Already fired\"";
+    case ERROR_JUST_BOOTED: return "114,\"Just booted\"";
     }
     return "0,\"No error\"";
 }

@@ -24,6 +24,7 @@ enum error {
     ERROR_NO_SESSION = 111,
     ERROR_CANCELLED = 112,
     ERROR_ALREADY_FIRED = 113,
+    ERROR_JUST_BOOTED = 114,
 };
 
 /* An error as it stands on the wire: 101,"Disarmed" */

@@ -69,7 +69,7 @@ bool frame_decode(struct slice line, struct frame *frame)
         return false;
     frame->number = (uint16_t)number;
     frame->body = (struct slice){bytes + HEAD, end - HEAD};
-    return slice_printable(frame->body) && crc32((struct slice){bytes, end}) == checksum;
+    return number != 0 && slice_printable(frame->body) && crc32((struct slice){bytes, end}) == checksum;
 }
 
 void frame_encode(uint16_t number, struct slice body, struct text *line)
@@ -88,5 +88,5 @@ void frame_encode(uint16_t number, struct slice body, struct text *line)
 bool frame_is_newer(uint16_t number, uint16_t last)
 {
     uint32_t ahead = ((uint32_t)number + LAST_NUMBER - last) % LAST_NUMBER;
-    return number != 0 && ahead > 0 && ahead <= LAST_NUMBER / 2;
+    return ahead > 0 && ahead <= LAST_NUMBER / 2;
 }

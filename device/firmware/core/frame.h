@@ -21,7 +21,7 @@ struct splitter {
 /* What this byte completes. The line stays until the next byte. */
 enum heard splitter_feed(struct splitter *splitter, uint8_t byte, struct slice *line);
 
-/* Whether a line is a frame of the host, and which. */
+/* Whether a line is a frame of the host, and which; its number is never 0. */
 bool frame_decode(struct slice line, struct frame *frame);
 /* A frame of the gun as a line with its end. */
 void frame_encode(uint16_t number, struct slice body, struct text *line);

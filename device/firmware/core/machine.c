@@ -1,6 +1,8 @@
 #include "machine.h"
 
 enum { BOOT_REST_US = 1000000, MAX_AHEAD_US = 2000000 };
+/* A pulse is on time if it loses at most 2 %, at most one turn of the main loop; an effect waits for its driver. */
+enum { LATE_PULSE_US = 200, LATE_PULSE_PARTS = 50, LATE_EFFECT_US = 1000 };
 static const uint64_t MAX_MARK = 0xFFFFFFFF;
 
 enum guarded { GUARD_CONF, GUARD_ARM, GUARD_TRIG };
@@ -29,34 +31,76 @@ bool machine_due(const struct machine *machine, uint64_t *due_us)
     return machine->state == STATE_WAITING || machine->state == STATE_FIRING;
 }
 
-static void begin(struct machine *machine)
+/* How late a drive may be, and still be told as on time. */
+static uint64_t allowed_us(const struct setting *setting)
+{
+    uint64_t part_us = setting->length_us / LATE_PULSE_PARTS;
+    if (setting->kind == KIND_EFF)
+        return LATE_EFFECT_US;
+    return part_us < LATE_PULSE_US ? part_us : LATE_PULSE_US;
+}
+
+static struct carried tell(struct machine *machine, const struct drive *drive)
+{
+    return machine->driver.drive(machine->driver.owner, drive);
+}
+
+/* The shot that waits is never begun. */
+static void call_off(struct machine *machine, enum error error)
+{
+    machine->never = error;
+    machine->shot.ending = ENDING_NONE;
+}
+
+/* Whether the board could begin the shot; how late it was is told by START, if that is too late. */
+static bool begin(struct machine *machine)
 {
     struct shot *shot = &machine->shot;
     bool pulse = shot->setting.kind == KIND_PULS;
     struct drive drive = {shot->start_us, pulse ? DRIVE_PULS : DRIVE_EFF, shot->setting.amount, shot->end_us};
-    machine->state = STATE_FIRING;
+    struct carried carried = tell(machine, &drive);
+    if (carried.error != ERROR_NONE) {
+        call_off(machine, carried.error);
+        machine->state = STATE_ARMED;
+        return false;
+    }
+    if (carried.at_us > shot->start_us + allowed_us(&shot->setting))
+        shot->start_us = carried.at_us;
     shot->count++;
     shot->ending = ENDING_DRIV;
+    shot->home_predicted_us = shot->start_us + shot->setting.rest_us;
+    machine->state = STATE_FIRING;
     machine->ready_us = shot->home_predicted_us;
     budget_spend(&machine->budget, &shot->setting, shot->start_us);
-    machine->driver.drive(machine->driver.owner, &drive);
+    return true;
 }
 
-static void end(struct machine *machine, enum ending ending, uint64_t time_us)
+/* When it was truly off, if that was noticeably later than the core's time for it; a pulse never outlasts its END. */
+static uint64_t off_at(const struct shot *shot, const struct carried *carried, uint64_t time_us)
 {
+    uint64_t off_us = carried->error == ERROR_NONE ? carried->at_us : time_us;
+    if (shot->setting.kind == KIND_PULS && off_us > shot->end_us)
+        off_us = shot->end_us;
+    if (off_us <= time_us + allowed_us(&shot->setting))
+        off_us = time_us;
+    return off_us > shot->start_us ? off_us : shot->start_us;
+}
+
+/* It is over, whole or cut short. */
+static void end(struct machine *machine, uint64_t time_us)
+{
+    struct shot *shot = &machine->shot;
     struct drive off = {time_us, DRIVE_OFF, 0, time_us};
-    machine->shot.ending = ending;
-    machine->shot.end_us = time_us;
-    machine->driver.drive(machine->driver.owner, &off);
+    struct carried carried = tell(machine, &off);
+    shot->end_us = off_at(shot, &carried, time_us);
+    shot->ending = shot->end_us - shot->start_us < shot->setting.length_us ? ENDING_CUT : ENDING_DONE;
 }
 
 bool machine_run_due(struct machine *machine)
 {
-    if (machine->state == STATE_WAITING) {
-        begin(machine);
-        return false;
-    }
-    end(machine, ENDING_DONE, machine->shot.end_us);
+    if (machine->state == STATE_WAITING)
+        return !begin(machine);
+    end(machine, machine->shot.end_us);
     machine->state = STATE_ARMED;
     return true;
 }
@@ -91,12 +135,12 @@ static enum error forbidden(const struct machine *machine, struct trigger trigge
         return ERROR_NOT_CONFIGURED;
     if (trigger.mark > MAX_MARK || start_us - now_us > MAX_AHEAD_US)
         return ERROR_OUT_OF_RANGE;
-    if (trigger.mark != 0 && trigger.mark == machine->shot.mark)
+    if (trigger.mark != 0 && trigger.mark == machine->shot.mark && machine->shot.ending != ENDING_NONE)
         return ERROR_ALREADY_FIRED;
     if (trigger.before_us != 0 && start_us > trigger.before_us)
         return ERROR_TOO_LATE;
     if (start_us < machine->ready_us)
-        return ERROR_NOT_HOME;
+        return machine->shot.count == 0 ? ERROR_JUST_BOOTED : ERROR_NOT_HOME;
     return budget_refusal(&machine->budget, &machine->setting, start_us);
 }
 
@@ -124,9 +168,9 @@ bool machine_abort(struct machine *machine, uint64_t now_us)
 {
     enum state state = machine->state;
     if (state == STATE_FIRING)
-        end(machine, ENDING_CUT, now_us);
+        end(machine, now_us);
     else if (state == STATE_WAITING)
-        machine->shot.ending = ENDING_NONE;
+        call_off(machine, ERROR_CANCELLED);
     if (state != STATE_FAULT)
         machine->state = STATE_DISARMED;
     return state == STATE_FIRING || state == STATE_WAITING;

@@ -14,10 +14,22 @@ struct drive {
     uint64_t end_us; /* when a pulse or an effect is to be over; of an OFF its own time */
 };
 
+/* Whether it is too late to begin: nothing would be driven. */
+static inline bool drive_is_over(const struct drive *drive, uint64_t now_us)
+{
+    return drive->end_us > drive->time_us && now_us >= drive->end_us;
+}
+
+/* How the board carried a drive out: when, or the error for which it did not. */
+struct carried {
+    enum error error;
+    uint64_t at_us;
+};
+
 /* Who is told to drive. */
 struct driver {
     void *owner;
-    void (*drive)(void *owner, const struct drive *drive);
+    struct carried (*drive)(void *owner, const struct drive *drive);
 };
 
 struct trigger {
@@ -29,6 +41,7 @@ struct machine {
     bool configured;
     struct setting setting;
     struct shot shot;
+    enum error never; /* why the last shot was never begun, if it was not */
     uint64_t fault, ready_us;
     struct budget budget;
     struct driver driver;
@@ -37,7 +50,7 @@ struct machine {
 void machine_boot(struct machine *machine, struct driver driver, uint64_t now_us);
 /* Whether something happens by itself, and when: a pulse begins or ends. */
 bool machine_due(const struct machine *machine, uint64_t *due_us);
-/* Lets it happen; true if a shot ended by it. */
+/* Lets it happen; true if a shot ended by it, or could not be begun. */
 bool machine_run_due(struct machine *machine);
 enum error machine_configure(struct machine *machine, const struct setting *setting);
 enum error machine_arm(struct machine *machine);

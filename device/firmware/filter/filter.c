@@ -10,6 +10,8 @@ enum { MAX_OUT = 32768, MAX_WORD = 8 };
 struct filter {
     struct core core;
     uint64_t now_us;
+    uint64_t late_us; /* the board's */
+    bool dead;
     size_t out_count;
     char out[MAX_OUT];
     int next; /* the byte after the one that was read last */
@@ -40,16 +42,27 @@ static void keep(void *owner, struct slice line)
     }
 }
 
-static void tell_drive(void *owner, const struct drive *drive)
+static struct carried carry_late(const struct filter *filter, const struct drive *drive)
+{
+    uint64_t at_us = drive->time_us + filter->late_us;
+    if (filter->dead)
+        return (struct carried){ERROR_FAULT, at_us};
+    return (struct carried){drive_is_over(drive, at_us) ? ERROR_TOO_LATE : ERROR_NONE, at_us};
+}
+
+static struct carried tell_drive(void *owner, const struct drive *drive)
 {
     static const char *const KINDS[] = {[DRIVE_PULS] = " PULS", [DRIVE_EFF] = " EFF", [DRIVE_OFF] = " OFF"};
-    (void)owner;
+    struct carried carried = carry_late(owner, drive);
+    if (carried.error != ERROR_NONE)
+        return carried;
     put_words("drive");
-    put_number(drive->time_us);
+    put_number(carried.at_us);
     put_words(KINDS[drive->kind]);
     if (drive->kind != DRIVE_OFF)
         put_number(drive->amount);
     bytes_put('\n');
+    return carried;
 }
 
 static void tell_out(struct filter *filter)
@@ -126,10 +139,21 @@ static void reset(struct filter *filter)
     bytes_put('\n');
 }
 
+/* What is due happens before the board changes. */
+static uint64_t read_change(struct filter *filter)
+{
+    core_step(&filter->core, NULL, 0, filter->now_us);
+    return read_number(filter);
+}
+
 static void carry_out(struct filter *filter, struct slice word)
 {
     if (slice_is(word, "in") || slice_is(word, "tick"))
         take_bytes(filter);
+    else if (slice_is(word, "late"))
+        filter->late_us = read_change(filter);
+    else if (slice_is(word, "dead"))
+        filter->dead = read_change(filter) == 1;
     else if (slice_is(word, "fault"))
         core_fail(&filter->core, read_number(filter), filter->now_us);
     else if (slice_is(word, "reset"))
