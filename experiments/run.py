@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import os
+import shlex
 from collections.abc import Callable
 from contextlib import closing
 from dataclasses import asdict, dataclass, replace
@@ -195,9 +196,10 @@ def _practice(job: _Job) -> Plan:
 def _refuse_changes(request: Request, before: Contents) -> None:
     began, now = before.header["setup_sha256"], request.setup.sha256()
     if began != now:
+        given_back = f"`recoil configs --from {shlex.quote(str(before.path))} --copy DIR`"
         raise PlaceError(
             f"{before.path}: the run began with another config or gun file (setup {began[:12]}, now {now[:12]}); "
-            "resume with the files it began with, or start --fresh"
+            f"resume with the files it began with, which {given_back} gives back, or set it aside and start anew"
         )
     seed = before.header["plan"]["seed"]
     if request.seed is not None and request.seed != seed:

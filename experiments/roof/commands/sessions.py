@@ -126,12 +126,18 @@ def rebuild(journals: Annotated[list[Path], typer.Argument(metavar="JOURNAL...")
 
 
 def configs(
-    copy: Annotated[Path | None, typer.Option(help="Copy the shipped configs into this folder.")] = None,
+    copy: Annotated[Path | None, typer.Option(help="Copy the configs into this folder.")] = None,
+    journal: Annotated[
+        Path | None, typer.Option("--from", metavar="JOURNAL", help="With --copy: the files that its run began with.")
+    ] = None,
 ) -> None:
-    """List the shipped configs, or copy them to edit."""
+    """List the shipped configs, copy them to edit, or give back those that a run began with."""
+    from experiments.roof.began_with import copy_began_with
     from experiments.roof.folders import copy_configs, shipped
 
-    paths = copy_configs(copy) if copy else shipped()
+    if journal is not None and copy is None:
+        raise typer.BadParameter("--from goes with --copy DIR, the folder that the files are written to")
+    paths = shipped() if copy is None else copy_began_with(journal, copy) if journal else copy_configs(copy)
     sys.stdout.write("".join(f"{path}\n" for path in paths))
 
 
