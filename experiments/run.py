@@ -199,7 +199,7 @@ def _refuse_changes(request: Request, before: Contents) -> None:
         given_back = f"`recoil configs --from {shlex.quote(str(before.path))} --copy DIR`"
         raise PlaceError(
             f"{before.path}: the run began with another config or gun file (setup {began[:12]}, now {now[:12]}); "
-            f"resume with the files it began with, which {given_back} gives back, or set it aside and start anew"
+            f"resume with the files it began with, which {given_back} gives back, or start anew with --fresh"
         )
     seed = before.header["plan"]["seed"]
     if request.seed is not None and request.seed != seed:
