@@ -33,6 +33,7 @@ class Asked:
     seed: int | None
     resume: bool
     fresh: bool
+    reason: str = ""
     visual: bool = False
     participant_screen: bool = False
     participant_keys: bool = False
@@ -50,6 +51,7 @@ def run_session(asked: Asked) -> Place:
         gun=asked.gun,
         seed=asked.seed,
         again=_again(asked),
+        anew_reason=asked.reason,
     )
     try:
         return _SCREENS[asked.screen](request, asked).place
@@ -131,6 +133,8 @@ _SCREENS = {"terminal": _at_terminal, "synthetic": _synthetic, "console": _at_co
 def _again(asked: Asked) -> Again:
     if asked.resume and asked.fresh:
         raise PlaceError("--resume and --fresh: give one of them; the first goes on with a run, the second starts anew")
+    if asked.reason and not asked.fresh:
+        raise PlaceError("--reason: goes with --fresh, and says why the unfinished run is set aside")
     return "resume" if asked.resume else "fresh" if asked.fresh else "ask"
 
 

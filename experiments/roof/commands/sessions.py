@@ -50,6 +50,7 @@ def run(
     seed: Seed = None,
     resume: Annotated[bool, typer.Option("--resume", help="Go on with an unfinished run.")] = False,
     fresh: Annotated[bool, typer.Option("--fresh", help="Set an unfinished run aside and start anew.")] = False,
+    reason: Annotated[str, typer.Option(help="With --fresh: why, for the register; never a name.")] = "",
     visual: Annotated[bool, typer.Option("--visual", help="A synthetic participant works the console.")] = False,
     participant_screen: Annotated[
         bool, typer.Option("--participant-screen", help="The participant rates on a screen of their own (PsychoPy).")
@@ -80,6 +81,7 @@ def run(
             seed=seed,
             resume=resume,
             fresh=fresh,
+            reason=reason,
             visual=visual,
             participant_screen=participant_screen,
             participant_keys=participant_keys,
