@@ -79,6 +79,7 @@ class SetAside(Model):
 
 
 Entry = Joined | Excluded | Readmitted | SetAside
+_REASON: TypeAdapter[str] = TypeAdapter(Reason)
 _ENTRY: TypeAdapter[Entry] = TypeAdapter(Annotated[Entry, Field(discriminator="kind")])
 
 
@@ -89,6 +90,14 @@ def entry(kind: str, participant_id: str, **body: object) -> Entry:
     'excluded'
     """
     return _checked({"kind": kind, "participant_id": participant_id, **body})
+
+
+def check_reason(text: str) -> None:
+    """`RegisterError` unless a text is fit as a reason."""
+    try:
+        _REASON.validate_python(text)
+    except ValidationError as error:
+        raise RegisterError(f"reason {text!r}: {error.errors()[0]['msg'].removeprefix('Value error, ')}") from error
 
 
 def _checked(values: dict[str, Any]) -> Entry:

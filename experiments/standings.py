@@ -115,30 +115,28 @@ def _participant(study: StudyFolder, member: Member, problems: list[str]) -> Par
     )
 
 
-def look_at(study: StudyFolder, participant_id: str) -> Participant:
-    """How one participant stands at this moment; of somebody new, that nothing has begun.
+def look_at(study: StudyFolder, participant_id: str) -> tuple[Participant, tuple[str, ...]]:
+    """How one participant stands at this moment, and what could not be read; of somebody new, that nothing has begun.
 
-    `PlaceError` if the code breaks a rule; `JournalError` if their journals or the register cannot be trusted.
+    `PlaceError` if the code breaks a rule; `JournalError` if the register cannot be trusted.
     """
     found, problems = register.read(study.results), list[str]()
     if found.problem:
         raise JournalError(found.problem)
     member = found.members.get(participant_id, Member(participant_id=participant_id))
-    one = _participant(study, member, problems)
-    if problems:
-        raise JournalError("\n".join(problems))
-    return one
+    return _participant(study, member, problems), tuple(problems)
 
 
 def _run(where: places.Place, problems: list[str]) -> RunStanding:
     try:
-        return replace(_state(where), practised=_practised(where))
+        return replace(run_standing(where), practised=_practised(where))
     except JournalError as error:
         problems.append(str(error))
         return RunStanding(experiment=where.experiment, state="unreadable")
 
 
-def _state(where: places.Place) -> RunStanding:
+def run_standing(where: places.Place) -> RunStanding:
+    """How far a run has come. `JournalError` if its journal cannot be trusted."""
     if not where.journal.exists():
         return RunStanding(experiment=where.experiment, state="not begun")
     elsewhere = _is_held(where)

@@ -61,33 +61,34 @@ def run(
     noise: Annotated[
         bool, typer.Option("--noise", help="Masking white noise through the participant's headphones (PsychoPy).")
     ] = False,
+    participant_monitor: Annotated[
+        int | None, typer.Option(min=0, help="The participant's screen: 0 is the first; without: the last of several.")
+    ] = None,
     as_json: AsJson = False,
 ) -> None:
     """One run: a participant doing one experiment."""
     from experiments.roof import session
 
-    if participant is None:
-        if screen is not ScreenName.console:
-            raise typer.BadParameter("give --participant CODE, or --screen console for its start window")
-        session.run_lab_day(config, results, gun, seed)
-        return
-    finished = session.run_session(
-        session.Asked(
-            config=config,
-            participant_id=participant,
-            gun=gun,
-            screen=screen.value,
-            results=results,
-            seed=seed,
-            resume=resume,
-            fresh=fresh,
-            reason=reason,
-            visual=visual,
-            participant_screen=participant_screen,
-            participant_keys=participant_keys,
-            noise=noise,
-        )
+    asked = session.Asked(
+        config=config,
+        participant_id=participant or "",
+        gun=gun,
+        screen=screen.value,
+        results=results,
+        seed=seed,
+        resume=resume,
+        fresh=fresh,
+        reason=reason,
+        visual=visual,
+        participant_screen=participant_screen,
+        participant_keys=participant_keys,
+        noise=noise,
+        monitor=participant_monitor,
     )
+    if participant is None:
+        session.run_lab_day(asked)
+        return
+    finished = session.run_session(asked)
     show({"journal": str(finished.journal), "table": str(finished.table)}, f"Done: {finished.table}", as_json)
 
 

@@ -3,11 +3,9 @@
 from __future__ import annotations
 
 import os
-import signal
 import sys
 import threading
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from collections.abc import Callable
 from functools import lru_cache
 from typing import Any
 
@@ -24,6 +22,7 @@ from experiments.runner import RunStopped, Screen
 from experiments.screens.console.beside import ParticipantSide
 from experiments.screens.console.messages import Ended
 from experiments.screens.console.screen import ConsoleScreen, Hand
+from experiments.screens.console.signals import signals_to
 from experiments.screens.console.state import State
 from experiments.screens.console.window import Bridge, ConsoleWindow
 from experiments.screens.synthetic import observer_of
@@ -144,7 +143,7 @@ def run_console(
     wake = QTimer()  # lets Python look at signals such as Ctrl-C while Qt waits
     wake.timeout.connect(lambda: _leave_without_window(loop, console))
     wake.start(WAKE_MS)
-    with _signals_to(console.leave):
+    with signals_to(console.leave):
         console.start()
         watch(console)
         loop.exec()
@@ -159,17 +158,3 @@ def run_console(
 def _leave_without_window(loop: QEventLoop, console: Console) -> None:
     if console.error is not None and console.window is None:
         loop.quit()
-
-
-@contextmanager
-def _signals_to(leave: Callable[[str], None]) -> Iterator[None]:
-    """Have an interrupt stop the run in order: an exception out of a Qt slot would end the process at once."""
-    known = [getattr(signal, name) for name in ("SIGINT", "SIGTERM", "SIGHUP") if hasattr(signal, name)]
-    before = {number: signal.getsignal(number) for number in known}
-    try:
-        for number in known:
-            signal.signal(number, lambda got, _: leave(signal.Signals(got).name))
-        yield
-    finally:
-        for number, handler in before.items():
-            signal.signal(number, handler)

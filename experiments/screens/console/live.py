@@ -19,9 +19,11 @@ from experiments.run import Finished, Request, UnfinishedRun
 from experiments.runner import RunStopped
 from experiments.screens.console.app import Console, application, run_console
 from experiments.screens.console.beside import ParticipantSide
+from experiments.screens.console.form import Beside, monitors
 from experiments.screens.console.rater import Rater
 from experiments.screens.console.screen import Hand
-from experiments.screens.console.start import Choice, choose
+from experiments.screens.console.signals import signals_to
+from experiments.screens.console.start import Choice, Opening, choose
 from experiments.screens.console.unfinished import ask
 from experiments.screens.console.visual import VisualParticipant
 from experiments.screens.participant.link import ParticipantLink
@@ -36,12 +38,13 @@ _NO_HANDS = "--visual --participant-screen rates by synthetic events, which only
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Sides:
-    """Who works the console, and what the participant has beside it."""
+    """Who works the console, and what the participant has beside it; `monitor` is theirs, the last one if `None`."""
 
     visual: bool = False
     screen: bool = False
     own_keys: bool = False
     noise: bool = False
+    monitor: int | None = None
 
     @property
     def beside(self) -> bool:
@@ -57,11 +60,11 @@ def run_live(request: Request, sides: Sides) -> Finished:
     application()
     try:
         return _carry_out(request, sides)
-    except UnfinishedRun as found:
-        again = None if sides.visual else ask(found)
-        if again is None:
+    except UnfinishedRun:
+        decided = None if sides.visual else ask(request)
+        if decided is None:
             raise
-        return _carry_out(replace(request, again=again), sides)
+        return _carry_out(decided, sides)
 
 
 def _carry_out(request: Request, sides: Sides) -> Finished:
@@ -80,35 +83,71 @@ def _carry_out(request: Request, sides: Sides) -> Finished:
         return run_console(request, clock, hand=hand, beside=beside, watch=watch)
 
 
-def lab_day(request: Request) -> None:
-    """One run after the other from the start window, until it is closed. `request` says what all have in common."""
+def lab_day(request: Request, sides: Sides) -> None:
+    """One run after the other from the start window, until it is closed.
+
+    `request` says what all have in common, `sides` what is ticked at first. `KeyboardInterrupt` if a signal ended it.
+    """
     application()
-    study, said = _study(request), ""
-    while (choice := choose(study, request.setup.config.experiment, request.gun, RealClock(), said)) is not None:
-        with ExitStack() as stack:
-            results = Path(stack.enter_context(tempfile.TemporaryDirectory())) if choice.training else request.results
-            said = _what_became(_chosen(request, choice, results), _sides(choice))
+    check_monitor(sides.monitor)
+    study, signalled = _study(request), list[str]()
+    opening = Opening(gun=request.gun, beside=_ticked(sides))
+    with signals_to(signalled.append):
+        while (choice := choose(study, opening, RealClock())) is not None and not signalled:
+            said = _of_the_day(request, choice)
+            opening = replace(opening, beside=_ticked(_sides(choice)), participant_id=_seated(choice), said=said)
+    if signalled:
+        raise KeyboardInterrupt(signalled[0])
 
 
-def _what_became(request: Request, sides: Sides) -> str:
-    """Carry out a run of a lab day; what went wrong, for the start window, which it must not end."""
-    try:
-        run_live(request, sides)
-    except RunStopped as stop:
-        return f"{request.participant_id} stopped: {stop}. Choose them again to go on."
-    except (PlaceError, JournalError, ConfigError, DeviceError) as error:
-        return str(error)
+def check_monitor(monitor: int | None) -> None:
+    """`PlaceError` if there is no such screen."""
+    known = monitors()
+    if monitor is not None and monitor >= len(known):
+        raise PlaceError(f"--participant-monitor {monitor}: there is no such screen; known are {'; '.join(known)}")
+
+
+def _ticked(sides: Sides) -> Beside:
+    return Beside(
+        participant_screen=sides.screen, participant_keys=sides.own_keys, noise=sides.noise, monitor=sides.monitor
+    )
+
+
+def _seated(choice: Choice) -> str:
+    """Who was there; nobody in a training."""
+    return "" if choice.training else choice.participant_id
+
+
+def _of_the_day(request: Request, choice: Choice) -> str:
+    """Carry out what was chosen; what went wrong, for the start window, which it must not end."""
+    with ExitStack() as stack:
+        results = Path(stack.enter_context(tempfile.TemporaryDirectory())) if choice.training else request.results
+        try:
+            run_live(_chosen(request, choice, results), _sides(choice))
+        except RunStopped as stop:
+            return _stopped(choice, str(stop))
+        except (PlaceError, JournalError, ConfigError, DeviceError) as error:
+            return str(error)
     return ""
 
 
+def _stopped(choice: Choice, reason: str) -> str:
+    if choice.training:
+        return f"The training stopped: {reason}."
+    if choice.practice:
+        return f"The practice of {choice.participant_id} stopped: {reason}. It can be done again."
+    return f"{choice.participant_id} stopped: {reason}. Start asks whether to go on there or to start anew."
+
+
 def _study(request: Request) -> StudyFolder:
-    """The study that the config lies in with all its experiments, else the shipped one with this experiment alone."""
+    """The study that the config lies in, if the study names it; else this experiment alone, by the rules of that study.
+
+    Where there is no study beside the config, they are those of the shipped one.
+    """
     own = request.setup.source.parent / "study.toml"
-    if not own.is_file():
-        config, folder = load_study("study")
-        setups: tuple[Setup[Any], ...] = (request.setup,)
-    else:
-        config, folder = load_study(str(own))
+    config, folder = load_study(str(own) if own.is_file() else "study")
+    setups: tuple[Setup[Any], ...] = (request.setup,)
+    if request.setup.source.resolve() in [(folder / name).resolve() for name in config.experiments]:
         setups = tuple(load_setup(str(folder / name)) for name in config.experiments)
     return StudyFolder(config=config, source=folder / "study.toml", setups=setups, results=request.results)
 
@@ -122,12 +161,18 @@ def _chosen(request: Request, choice: Choice, results: Path) -> Request:
         results=results,
         gun=gun,
         again=choice.again,
+        anew_reason=choice.anew_reason,
         practice=choice.practice,
     )
 
 
 def _sides(choice: Choice) -> Sides:
-    return Sides(screen=choice.participant_screen, own_keys=choice.participant_keys, noise=choice.noise)
+    return Sides(
+        screen=choice.participant_screen,
+        own_keys=choice.participant_keys,
+        noise=choice.noise,
+        monitor=choice.monitor,
+    )
 
 
 def _participant(stack: ExitStack, sides: Sides) -> ParticipantSide:
