@@ -25,6 +25,7 @@ from experiments.screens.console.screen import ConsoleScreen, Hand
 from experiments.screens.console.signals import signals_to
 from experiments.screens.console.state import State
 from experiments.screens.console.window import Bridge, ConsoleWindow
+from experiments.screens.console.windows import let_go
 from experiments.screens.synthetic import observer_of
 from experiments.setup import Setup
 
@@ -148,6 +149,7 @@ def run_console(
         watch(console)
         loop.exec()
         console.finish()
+    let_go(wake)
     if console.error is not None:
         raise console.error
     if console.result is None:

@@ -60,7 +60,8 @@ class Lines(QTextEdit):
         if text is None:
             return
         text.setDocumentMargin(0)
-        needed, most = ceil(text.size().height()), self.fontMetrics().lineSpacing() * self._most_lines
+        # half a line more: a letter that another font has to lend may be higher than the rest
+        needed, most = ceil(text.size().height()), int(self.fontMetrics().lineSpacing() * (self._most_lines + 0.5))
         never, always = Qt.ScrollBarPolicy.ScrollBarAlwaysOff, Qt.ScrollBarPolicy.ScrollBarAlwaysOn
         self.setVerticalScrollBarPolicy(always if needed > most else never)
         self.setFixedHeight(min(needed, most) if self.toPlainText() else 0)
@@ -106,7 +107,7 @@ class ListBox(QComboBox):
 
 
 class LineEdit(QLineEdit):
-    """A line of text. Enter goes on to the next field; a held key types its letter once."""
+    """A line of text. Enter goes on to the next field, and a held Enter no further."""
 
     def keyPressEvent(self, event: QKeyEvent | None) -> None:  # noqa: N802 - Qt's name
         """Take a key."""
@@ -115,8 +116,6 @@ class LineEdit(QLineEdit):
         if event.key() in (Qt.Key.Key_Return, Qt.Key.Key_Enter):
             if not event.isAutoRepeat():
                 self.focusNextChild()
-            return
-        if event.isAutoRepeat() and event.text().isalnum():
             return
         super().keyPressEvent(event)
 

@@ -90,10 +90,9 @@ def lab_day(request: Request, sides: Sides) -> None:
     """
     application()
     check_monitor(sides.monitor)
-    study, signalled = _study(request), list[str]()
-    opening = Opening(gun=request.gun, beside=_ticked(sides))
-    with signals_to(signalled.append):
-        while (choice := choose(study, opening, RealClock())) is not None and not signalled:
+    study, opening = _study(request), Opening(gun=request.gun, beside=_ticked(sides))
+    with signals_to() as signalled:
+        while not signalled and (choice := choose(study, opening, RealClock())) is not None:
             said = _of_the_day(request, choice)
             opening = replace(opening, beside=_ticked(_sides(choice)), participant_id=_seated(choice), said=said)
     if signalled:

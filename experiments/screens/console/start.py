@@ -25,11 +25,11 @@ from experiments.run import Again
 from experiments.screens.console import parts, people, theme
 from experiments.screens.console.fields import Lines, sheet
 from experiments.screens.console.form import Beside, Form
-from experiments.screens.console.geometry import open_as_left, remember, scaled, type_scale
 from experiments.screens.console.people_table import PeopleTable
 from experiments.screens.console.question import WHY, Answer, Question, once_a_press, unfit
 from experiments.screens.console.shot_page import ShotPage
 from experiments.screens.console.signals import signals_to
+from experiments.screens.console.windows import let_go, open_as_left, remember, scaled, type_scale
 from experiments.setup import Setup
 from experiments.standings import Overview, StudyFolder, overview
 from experiments.study import Participant, RunStanding
@@ -98,7 +98,7 @@ class StartWindow(QWidget):
         for page in (self._page(), self.shots):
             self.pages.addWidget(page)
         down, top = QVBoxLayout(self), QHBoxLayout()
-        top.addWidget(Lines("place", f"{self._study.config.title} · {self._study.results.resolve()}", most_lines=2), 1)
+        top.addWidget(Lines("place", f"{self._study.config.title} · {self._study.results.resolve()}", most_lines=3), 1)
         top.addWidget(self._gun())
         down.addLayout(top)
         down.addWidget(self.pages, 1)
@@ -389,4 +389,6 @@ def choose(study: StudyFolder, opening: Opening, clock: Clock) -> Choice | None:
         open_as_left(window, NAME)
         window.activateWindow()
         loop.exec()
-    return window.choice
+    choice = window.choice
+    let_go(window)
+    return choice

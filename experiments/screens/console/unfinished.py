@@ -13,6 +13,7 @@ from experiments.screens.console import people, theme
 from experiments.screens.console.fields import Lines, sheet
 from experiments.screens.console.question import WHY, Answer, Question, unfit
 from experiments.screens.console.signals import signals_to
+from experiments.screens.console.windows import let_go
 from experiments.standings import run_standing
 
 
@@ -68,14 +69,11 @@ def ask(request: Request) -> Request | None:
 
     `KeyboardInterrupt` if a signal ended the question.
     """
-    dialog, signalled = Unfinished(request), list[str]()
-
-    def leave(signal: str) -> None:
-        signalled.append(signal)
-        dialog.reject()
-
-    with signals_to(leave):
+    dialog = Unfinished(request)
+    with signals_to(lambda _: dialog.reject()) as signalled:
         dialog.exec()
+    decided = dialog.decided
+    let_go(dialog)
     if signalled:
         raise KeyboardInterrupt(signalled[0])
-    return dialog.decided
+    return decided

@@ -1,10 +1,10 @@
-"""How large windows are: they open as they were left, else maximised, and their type grows with them."""
+"""Windows: they open as they were left, else maximised, their type grows with them, and they end in Qt's own thread."""
 
 from __future__ import annotations
 
 import re
 
-from PyQt6.QtCore import QByteArray, QSettings
+from PyQt6.QtCore import QByteArray, QCoreApplication, QEvent, QObject, QSettings
 from PyQt6.QtWidgets import QWidget
 
 DESIGNED_FOR_PX = (1280, 800)
@@ -29,6 +29,12 @@ def remember(window: QWidget, name: str) -> None:
     settings = _settings()
     settings.setValue(name, window.saveGeometry())
     settings.sync()
+
+
+def let_go(thing: QObject) -> None:
+    """Have Qt delete a window, or a timer, now and in this thread: Python's garbage collector works in any thread."""
+    thing.deleteLater()
+    QCoreApplication.sendPostedEvents(thing, QEvent.Type.DeferredDelete.value)
 
 
 def _settings() -> QSettings:
