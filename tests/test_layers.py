@@ -20,6 +20,7 @@ PURE = {
         *("serial_gun.address", "serial_gun.asked", "serial_gun.clocks", "serial_gun.outcomes"),
     },
     "experiments": {
+        "beginnings",
         "canonical",
         "columns",
         "config",
@@ -31,6 +32,9 @@ PURE = {
         "streams",
         "study",
         "tables",
+        "toml_text",
+        "screens.console.dates",
+        "screens.console.people",
     },
 }
 HEAVY = {

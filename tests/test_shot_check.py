@@ -68,7 +68,7 @@ class Spied:
 class Bench:
     """A test shot with a spied gun, carried out in this thread."""
 
-    def __init__(self, monkeypatch: pytest.MonkeyPatch, method: str = "asymmetric-1", setup: Any = SETUP) -> None:
+    def __init__(self, monkeypatch: pytest.MonkeyPatch, method: str = "asymmetric-1", countdown_s: int = 0) -> None:
         self.told: list[Told] = []
         self.at: dict[str, Callable[[], None]] = {}
         self.guns: list[Spied] = []
@@ -81,7 +81,8 @@ class Bench:
             return self.guns[-1]
 
         monkeypatch.setattr(shot_check, "open_gun", opened)
-        self.check = ShotCheck(setup, method, "simulated", self.clock, self._tell, countdown_s=0)
+        monkeypatch.setattr(shot_check, "COUNTDOWN_S", countdown_s)
+        self.check = ShotCheck(SETUP, method, "simulated", self.clock, self._tell)
 
     def _tell(self, told: Told) -> None:
         self.told.append(told)
@@ -134,8 +135,8 @@ def test_the_gun_is_armed_for_the_shot_alone_and_its_state_is_read_back_before_i
     assert over.text.endswith("The gun reports: disarmed.")
 
 
-def test_a_countdown_says_each_second_and_then_fires(bench: Bench) -> None:
-    bench.check = ShotCheck(SETUP, "vibration", "simulated", bench.clock, bench._tell, countdown_s=1)
+def test_a_countdown_says_each_second_and_then_fires(monkeypatch: pytest.MonkeyPatch) -> None:
+    bench = Bench(monkeypatch, countdown_s=1)
     assert bench.carry_out().fired
     assert [(one.phase, one.seconds) for one in bench.told[:3]] == [("opening", 0), ("counting", 1), ("firing", 0)]
 
@@ -144,8 +145,10 @@ def test_a_countdown_says_each_second_and_then_fires(bench: Bench) -> None:
 
 
 @pytest.mark.parametrize("phase", ["opening", "counting", "firing", "after arm", "after status"])
-def test_a_test_shot_that_is_called_off_before_it_fires_does_not_fire(phase: str, bench: Bench) -> None:
-    bench.check = ShotCheck(SETUP, "vibration", "simulated", bench.clock, bench._tell, countdown_s=1)
+def test_a_test_shot_that_is_called_off_before_it_fires_does_not_fire(
+    phase: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    bench = Bench(monkeypatch, countdown_s=1)
     bench.at[phase] = bench.check.call_off
     over = bench.carry_out()
     assert not over.fired
@@ -170,8 +173,8 @@ def stopping(bench: Bench, at: str) -> None:
 
 
 @pytest.mark.parametrize("at", ["opening", "counting", "firing", "before arm", "after arm", "after status"])
-def test_nothing_fires_after_an_emergency_stop(at: str, bench: Bench) -> None:
-    bench.check = ShotCheck(SETUP, "vibration", "simulated", bench.clock, bench._tell, countdown_s=1)
+def test_nothing_fires_after_an_emergency_stop(at: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    bench = Bench(monkeypatch, countdown_s=1)
     stopping(bench, at)
     over = bench.carry_out()
     assert not over.fired
@@ -230,7 +233,8 @@ def test_a_gun_that_cannot_be_read_is_to_be_switched_off(bench: Bench) -> None:
 
 def test_a_gun_that_is_not_there_is_one_sentence(monkeypatch: pytest.MonkeyPatch) -> None:
     told: list[Told] = []
-    ShotCheck(SETUP, "vibration", "serial:/dev/nowhere", RealClock(), told.append, countdown_s=0).carry_out()
+    monkeypatch.setattr(shot_check, "COUNTDOWN_S", 0)
+    ShotCheck(SETUP, "vibration", "serial:/dev/nowhere", RealClock(), told.append).carry_out()
     assert told[-1].phase == "over"
     assert told[-1].text.startswith("Test shot of Vibration: ")
     assert not told[-1].fired

@@ -197,6 +197,16 @@ def test_a_signal_ends_the_start_window(number: signal.Signals, pilot: Path, dis
     assert said == f"recoil: ended by {number.name}\n"
 
 
+def test_a_signal_ends_the_question_of_an_unfinished_run(pilot: Path, display: str) -> None:
+    command = [RECOIL, "run", pilot / "pilot" / "direction.toml", "--screen", "console", "--participant", "P01"]
+    before = (pilot / LONG / "sub-P01" / "sub-P01_task-direction_journal.jsonl").read_bytes()
+    with AtDisplay([*command, "--results", LONG], pilot, display) as screen:
+        screen.focus_on("unfinished")
+        screen.process.terminate()
+        assert screen.end()[0] == 130
+    assert (pilot / LONG / "sub-P01" / "sub-P01_task-direction_journal.jsonl").read_bytes() == before
+
+
 def test_a_signal_in_a_test_shot_disarms_and_ends_it(pilot: Path, display: str) -> None:
     with started(pilot, display) as (screen, eye):
         wait_for(eye, having("Next: P01"))

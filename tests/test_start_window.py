@@ -33,7 +33,8 @@ from experiments.screens.console import theme
 from experiments.screens.console.app import application
 from experiments.screens.console.form import Beside
 from experiments.screens.console.live import _study
-from experiments.screens.console.start import Opening, StartWindow
+from experiments.screens.console.opening import Opening
+from experiments.screens.console.start import StartWindow
 from experiments.screens.synthetic import synthetic_screen
 from experiments.standings import StudyFolder, open_study
 from experiments.study import Facts
@@ -202,6 +203,27 @@ def test_who_was_there_stays_if_they_have_something_left_to_do(study: StudyFolde
     assert opened(participant_id="P02").form.code.text() == "P01"
 
 
+@pytest.mark.parametrize(
+    ("named", "words"),
+    [
+        ("direction", "direction was named, but P01 has done it: preference is chosen."),
+        ("preference", ""),
+    ],
+)
+def test_where_the_experiment_is_not_the_one_that_was_named_it_is_said_why(
+    named: str, words: str, study: StudyFolder, opened: Open
+) -> None:
+    do(study, "P01")
+    window = opened(named=named)
+    assert (said(window), experiment(window)) == (words, "preference")
+
+
+def test_an_experiment_that_was_named_too_early_is_not_chosen(opened: Open) -> None:
+    window = opened(named="preference")
+    assert experiment(window) == "direction"
+    assert said(window) == "preference was named, but P01 comes to direction first: direction is chosen."
+
+
 def test_a_config_that_the_study_does_not_name_is_run_alone_by_the_rules_of_the_study(study: StudyFolder) -> None:
     folder = study.source.parent
     shutil.copy(folder / "direction.toml", folder / "mine.toml")
@@ -211,6 +233,16 @@ def test_a_config_that_the_study_does_not_name_is_run_alone_by_the_rules_of_the_
     assert found.config == study.config
     named = Request(setup=load_setup(str(folder / "preference.toml")), participant_id="", results=study.results)
     assert [one.source.name for one in _study(named).setups] == ["direction.toml", "preference.toml"]
+
+
+def test_what_cannot_be_read_is_said_when_the_window_opens_below_what_there_is_to_say(
+    study: StudyFolder, opened: Open
+) -> None:
+    journal = do(study, "P01")
+    journal.write_bytes(b"damage\n")
+    first, second = said(opened(said="P02 stopped: emergency stop.")).splitlines()
+    assert first == "P02 stopped: emergency stop."
+    assert "line 1: not a JSON record" in second
 
 
 # starting
@@ -616,6 +648,22 @@ def colours_of_box(box: QWidget) -> set[str]:
     return {image.pixelColor(x, y).name() for x in range(image.width()) for y in range(image.height())}
 
 
+def test_where_there_are_several_monitors_the_participants_is_chosen_by_its_number(
+    opened: Open, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    assert opened().form.beside().monitor is None
+    screens = ["0: eDP-1, 1920 × 1080", "1: HDMI-1, 1280 × 800", "2: DP-1, 1280 × 800"]
+    monkeypatch.setattr("experiments.screens.console.form.monitors", lambda: screens)
+    assert opened().form.beside().monitor == 2
+    window = opened(beside=Beside(monitor=1))
+    assert window.form.monitor.currentText() == "1: HDMI-1, 1280 × 800"
+    fill(window, "P01")
+    window.form.monitor.setCurrentIndex(0)
+    key(window, "Return", CTRL)
+    assert window.choice is not None
+    assert window.choice.monitor == 0
+
+
 def test_a_ticked_box_shows_a_tick(opened: Open) -> None:
     box = opened().form.noise
     tick = theme.colour("dark", "ground")  # of a box that is ticked, on a ground of another colour
@@ -661,6 +709,20 @@ def test_while_a_test_shot_is_under_way_nothing_else_can_be_begun(opened: Open) 
     assert window.shots.title.text() == "Not fired"
     assert window.shots.detail.toPlainText() == "Nothing was fired. The gun reports: disarmed."
     assert window.shots.next_text() == "Test shot: Vibration"
+
+
+def test_a_double_click_on_the_button_of_the_test_shot_neither_stops_it_nor_calls_it_off(
+    opened: Open, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("experiments.screens.console.shot_check.COUNTDOWN_S", 1)
+    window = opened(gun="simulated")
+    place = window.test_button.mapTo(window, window.test_button.rect().center())
+    QTest.mouseClick(window.test_button, Qt.MouseButton.LeftButton)
+    until(window.shots.isVisible)
+    under = window.childAt(place)
+    QTest.mouseDClick(under, Qt.MouseButton.LeftButton)
+    until(lambda: not window.shots.is_running)
+    assert window.shots.title.text() == "Fired"
 
 
 def test_an_escape_that_is_held_calls_off_and_does_not_leave_what_came_of_it(opened: Open) -> None:

@@ -8,7 +8,7 @@ from typing import Any, get_args
 
 from PyQt6.QtCore import Qt, pyqtSignal
 from PyQt6.QtGui import QGuiApplication, QScreen
-from PyQt6.QtWidgets import QFormLayout, QFrame, QScrollArea, QVBoxLayout, QWidget
+from PyQt6.QtWidgets import QFormLayout, QFrame, QLabel, QScrollArea, QSizePolicy, QVBoxLayout, QWidget
 
 from experiments.beginnings import Entered, typed_facts
 from experiments.config import Fact, Handedness, Sex
@@ -56,11 +56,10 @@ class Form(QFrame):
         form = QFormLayout(fields := QWidget())
         fields.setObjectName("form")
         form.setRowWrapPolicy(QFormLayout.RowWrapPolicy.WrapLongRows)
-        form.setLabelAlignment(Qt.AlignmentFlag.AlignVCenter)
         form.setFieldGrowthPolicy(QFormLayout.FieldGrowthPolicy.ExpandingFieldsGrow)
         for name, field in self._rows():
-            field.setAccessibleName(name.strip())
-            form.addRow(name, field)
+            field.setAccessibleName(name)
+            form.addRow(_beside_its_field(name), field)
         scroll = QScrollArea()
         scroll.setWidget(fields)
         scroll.setWidgetResizable(True)
@@ -137,6 +136,14 @@ class Form(QFrame):
                 field.setText(values[fact])
             else:
                 field.setCurrentText(values[fact])
+
+
+def _beside_its_field(name: str) -> QLabel:
+    """The name of a field, at half its height."""
+    made = parts.label("", name, wrap=False)
+    made.setAlignment(Qt.AlignmentFlag.AlignVCenter)
+    made.setSizePolicy(QSizePolicy.Policy.Preferred, QSizePolicy.Policy.Expanding)
+    return made
 
 
 def _fact(fact: str) -> LineEdit | ListBox:

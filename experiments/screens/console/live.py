@@ -20,10 +20,11 @@ from experiments.runner import RunStopped
 from experiments.screens.console.app import Console, application, run_console
 from experiments.screens.console.beside import ParticipantSide
 from experiments.screens.console.form import Beside, monitors
+from experiments.screens.console.opening import Choice, Opening
 from experiments.screens.console.rater import Rater
 from experiments.screens.console.screen import Hand
 from experiments.screens.console.signals import signals_to
-from experiments.screens.console.start import Choice, Opening, choose
+from experiments.screens.console.start import choose
 from experiments.screens.console.unfinished import ask
 from experiments.screens.console.visual import VisualParticipant
 from experiments.screens.participant.link import ParticipantLink
@@ -90,11 +91,14 @@ def lab_day(request: Request, sides: Sides) -> None:
     """
     application()
     check_monitor(sides.monitor)
-    study, opening = _study(request), Opening(gun=request.gun, beside=_ticked(sides))
+    study, named = _study(request), request.setup.config.experiment
+    opening = Opening(gun=request.gun, named=named, beside=_ticked(sides))
     with signals_to() as signalled:
         while not signalled and (choice := choose(study, opening, RealClock())) is not None:
             said = _of_the_day(request, choice)
-            opening = replace(opening, beside=_ticked(_sides(choice)), participant_id=_seated(choice), said=said)
+            opening = Opening(
+                gun=request.gun, beside=_ticked(_sides(choice)), participant_id=_seated(choice), said=said
+            )
     if signalled:
         raise KeyboardInterrupt(signalled[0])
 

@@ -45,6 +45,15 @@ def coming_text(seen: Overview) -> str:
     return "Everyone has done everything." if done else "Nobody can be named next: see what cannot be read."
 
 
+def named_text(named: str, code: str, person: Participant | None, experiment: str) -> str:
+    """Why another experiment is chosen than the one that was named when the program was started."""
+    if not code or named in ("", experiment):
+        return ""
+    if person is not None and run_of(person, named).state == "done":
+        return f"{named} was named, but {code} has done it: {experiment} is chosen."
+    return f"{named} was named, but {code} comes to {experiment} first: {experiment} is chosen."
+
+
 def remark(code: str, person: Participant | None, experiment: str, experiments: Sequence[str]) -> tuple[str, str]:
     """What there is to know before somebody does an experiment, and a word that chooses the colour."""
     return next(_remarks(code, person, experiment, experiments))

@@ -43,11 +43,9 @@ class ShotCheck:
         address: str,
         clock: Clock,
         tell: Callable[[Told], None],
-        *,
-        countdown_s: int = COUNTDOWN_S,
     ) -> None:
         self._setup, self._method, self._address = setup, method, address
-        self._clock, self._tell, self._countdown_s = clock, tell, countdown_s
+        self._clock, self._tell = clock, tell
         self._latched, self._off = threading.Event(), threading.Event()
         self._gun: Gun | None = None
         self._report: ShotReport | None = None
@@ -104,7 +102,7 @@ class ShotCheck:
         return f"{outcome} {state}", "bad" if self._latched.is_set() or not is_safe else mood
 
     def _fire(self, gun: Gun, drive: Drive) -> str:
-        for seconds in range(self._countdown_s, 0, -1):
+        for seconds in range(COUNTDOWN_S, 0, -1):
             self._tell(Told(phase="counting", seconds=seconds))
             if self._off.wait(1.0):
                 break

@@ -44,9 +44,13 @@ class ShotPage(QWidget):
         for part in (self.title, self.detail, self.count):
             down.addWidget(part)
         down.addStretch(1)
-        for button in (self.next_button, self.call_off_button, self.stop_button):
+        for button in (self.stop_button, self.call_off_button, self.next_button):
             down.addWidget(button)
         once_a_press(self)
+        # its place stays empty: there the second click of a double click on the window's own button falls
+        kept = self.next_button.sizePolicy()
+        kept.setRetainSizeWhenHidden(True)
+        self.next_button.setSizePolicy(kept)
 
     @property
     def is_running(self) -> bool:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, field
 from typing import Any
 
 from PyQt6.QtCore import QEventLoop, pyqtSignal
@@ -24,7 +23,8 @@ from experiments.places import PlaceError
 from experiments.run import Again
 from experiments.screens.console import parts, people, theme
 from experiments.screens.console.fields import Lines, sheet
-from experiments.screens.console.form import Beside, Form
+from experiments.screens.console.form import Form
+from experiments.screens.console.opening import Choice, Opening
 from experiments.screens.console.people_table import PeopleTable
 from experiments.screens.console.question import WHY, Answer, Question, once_a_press, unfit
 from experiments.screens.console.shot_page import ShotPage
@@ -36,32 +36,6 @@ from experiments.study import Participant, RunStanding
 
 NAME = "start"
 SIMULATED = "simulated"
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Choice:
-    """What was chosen: who does which experiment, and how. `anew_reason`: why an unfinished run is set aside."""
-
-    setup: Setup[Any]
-    participant_id: str
-    again: Again = "ask"
-    anew_reason: str = ""
-    practice: bool = False
-    training: bool = False
-    participant_screen: bool = False
-    participant_keys: bool = False
-    noise: bool = False
-    monitor: int | None = None
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Opening:
-    """How a start window opens: on which gun, with what ticked, with whom (empty: who comes next), and what it says."""
-
-    gun: str
-    beside: Beside = field(default_factory=Beside)
-    participant_id: str = ""
-    said: str = ""
 
 
 class StartWindow(QWidget):
@@ -80,8 +54,7 @@ class StartWindow(QWidget):
         self._build()
         self._fill()
         self._propose(opening.participant_id)
-        if opening.said:
-            self.say(opening.said, "bad")
+        self._say_first(opening)
 
     # building
 
@@ -156,8 +129,12 @@ class StartWindow(QWidget):
         self._seen: Overview = overview(self._study)
         self.table.show_people(self._seen.participants)
         self.next.say(people.coming_text(self._seen))
-        if self._seen.problems:
-            self.say("\n".join(self._seen.problems), "bad")
+
+    def _say_first(self, opening: Opening) -> None:
+        entered, bad = self.form.entered(), [*filter(None, [opening.said]), *self._seen.problems]
+        code, experiment = entered.participant_id, entered.experiment
+        named = people.named_text(opening.named, code, self._person(code), experiment)
+        self.say("\n".join([*bad, *filter(None, [named])]), "bad" if bad else "ask")
 
     def _propose(self, participant_id: str) -> None:
         """Who was there before if they have something left to do, else who comes next."""
@@ -361,6 +338,7 @@ class StartWindow(QWidget):
             return
         self._fill()
         self._show_choice()
+        self.say("\n".join(self._seen.problems), "bad")
         self.form.code_again.setFocus()
 
     # test shots
