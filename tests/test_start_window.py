@@ -718,9 +718,9 @@ def test_a_double_click_on_the_button_of_the_test_shot_neither_stops_it_nor_call
     window = opened(gun="simulated")
     place = window.test_button.mapTo(window, window.test_button.rect().center())
     QTest.mouseClick(window.test_button, Qt.MouseButton.LeftButton)
-    until(window.shots.isVisible)
+    until(lambda: window.shots.title.text() == "STAND CLEAR")  # and the page has taken its places
     under = window.childAt(place)
-    QTest.mouseDClick(under, Qt.MouseButton.LeftButton)
+    QTest.mouseClick(under, Qt.MouseButton.LeftButton, pos=under.mapFrom(window, place))
     until(lambda: not window.shots.is_running)
     assert window.shots.title.text() == "Fired"
 
