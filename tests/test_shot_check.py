@@ -327,3 +327,39 @@ def test_only_a_gun_that_reports_itself_disarmed_and_without_a_fault_is_safe(
     assert is_safe is safe
     assert ("SWITCH OFF ITS POWER" in text) is not safe
     assert state_text(None)[1] is False
+
+
+# on a line
+
+
+def test_on_a_line_the_shot_that_was_asked_for_is_rendered_and_its_timing_is_told(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    from tests.twins import a_twin
+
+    monkeypatch.setattr(shot_check, "COUNTDOWN_S", 0)
+    told: list[Told] = []
+    with a_twin(tmp_path, speed=1.0) as (twin, socket):
+        ShotCheck(SETUP, "asymmetric-2", f"serial:{socket.address}", RealClock(), told.append).carry_out()
+        (rendered,) = twin.body.ledger
+    assert told[-1].fired
+    assert (rendered.method, rendered.too_soon) == ("asymmetric-2", False)
+    assert "after the request, by the gun's clock (to within " in told[-1].text
+    assert told[-1].text.endswith("The gun reports: disarmed.")
+
+
+def test_on_a_line_nothing_is_rendered_after_an_emergency_stop(tmp_path: Path) -> None:
+    from tests.twins import a_twin
+
+    told: list[Told] = []
+
+    def tell(one: Told) -> None:
+        told.append(one)
+        if one.phase == "counting":
+            check.emergency_stop()
+
+    with a_twin(tmp_path, speed=1.0) as (twin, socket):
+        check = ShotCheck(SETUP, "asymmetric-2", f"serial:{socket.address}", RealClock(), tell)
+        check.carry_out()
+        assert not list(twin.body.ledger)
+    assert told[-1].text == "Nothing was fired. The gun reports: disarmed."
