@@ -181,6 +181,18 @@ def test_a_row_that_is_chosen_sets_code_and_experiment(study: StudyFolder, opene
     assert (window.form.code.text(), experiment(window)) == ("P01", "preference")
 
 
+def test_a_row_that_was_chosen_before_is_chosen_again_by_a_click(study: StudyFolder, opened: Open) -> None:
+    do(study, "P01")
+    window = opened()
+    window.table.selectRow(0)
+    window.form.code.setText("P09")
+    item = window.table.item(0, 0)
+    assert item is not None
+    place = window.table.visualItemRect(item).center()
+    QTest.mouseClick(window.table.viewport(), Qt.MouseButton.LeftButton, pos=place)
+    assert window.form.code.text() == "P01"
+
+
 def test_to_break_the_order_of_the_study_is_said_in_words_and_a_new_code_mends_it(
     study: StudyFolder, opened: Open
 ) -> None:

@@ -33,6 +33,7 @@ class PeopleTable(QTableWidget):
             down.setVisible(False)  # numbers beside codes are no codes
             down.setSectionResizeMode(QHeaderView.ResizeMode.ResizeToContents)
         self.itemSelectionChanged.connect(self._chosen)
+        self.cellClicked.connect(self._chosen)  # also the row that was chosen before
 
     def show_people(self, seen: Sequence[Participant]) -> None:
         """Show how the participants stand."""

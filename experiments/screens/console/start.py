@@ -62,11 +62,8 @@ class StartWindow(QWidget):
         self.setWindowTitle("Recoil – start")
         self.form = Form(self._study.experiments, self._study.config.eligibility.ask, self._opening.beside)
         self.shots = ShotPage(self._opening.gun, self._clock)
-        self.table, self.next, self.saved = (
-            PeopleTable(self._study.experiments),
-            Lines("detail"),
-            Lines("saved", most_lines=5),
-        )
+        self.table = PeopleTable(self._study.experiments)
+        self.next, self.saved = Lines("detail"), Lines("saved", most_lines=5)
         self.pages = QStackedWidget()
         for page in (self._page(), self.shots):
             self.pages.addWidget(page)
@@ -139,7 +136,7 @@ class StartWindow(QWidget):
     def _propose(self, participant_id: str) -> None:
         """Who was there before if they have something left to do, else who comes next."""
         before, coming = self._person(participant_id), self._seen.next
-        if before is None or not before.open_runs:
+        if before is None or before.excluded is not None or not before.open_runs:
             participant_id = "" if coming is None else coming.participant_id
         self.form.code.setText(participant_id)
         self._follow_code()
