@@ -42,6 +42,7 @@ that clock was real or virtual (synthetic participants: breaks take no time).
 | `plan`, `plan_sha256` | `run` | the whole frozen plan with its seed, and the hash of its canonical JSON |
 | `setup`, `setup_sha256` | `run` | the resolved configs (and the synthetic table, if used) and their hash |
 | `provenance`, `gun`, `clock` | `run`, `resumed` | versions, commit, system; who renders; which clock |
+| `set_aside_reason` | `run` | why an unfinished run was set aside for this one, where a reason was given |
 | `experimenter_knows` | `run`, `resumed` | what the experimenter could not be kept from knowing: direction, dampers |
 | `body` | `step`, `outcome`, `remark` | what should happen, what did, what was said beside it; its `kind` says which |
 | `body.kind` | `remark` | `answer-corrected`, `rating-corrected`, `description-corrected`, `flagged`, `noted`, \
@@ -67,22 +68,23 @@ Canonical JSON: UTF-8, keys sorted, no blanks, no NaN, floats in shortest round-
 ## `participants.jsonl`
 
 The register of a results folder, beside the `sub-<ID>` folders and readable by its owner only: who joined, with the
-facts that the study asks for, and who is excluded. Codes only, never names. Appended, synced and chained like a
-journal; `recoil study` shows and changes it. A later `joined` of the same code corrects the facts of the earlier one;
-the last of `excluded` and `readmitted` counts. Who is excluded keeps their files, but gives their row of the balancing
-square back.
+facts that the study asks for, who is excluded, and whose unfinished run was set aside. Codes only, never names.
+Appended, synced and chained like a journal; `recoil study` shows and changes it. A later `joined` of the same code
+corrects the facts of the earlier one; the last of `excluded` and `readmitted` counts. Who is excluded keeps their
+files, but gives their row of the balancing square back.
 
 | key | in | meaning |
 | --- | --- | --- |
 | `n` | every record | number of the record, from 0 |
-| `kind` | every record | `joined`, `excluded` or `readmitted` |
+| `kind` | every record | `joined`, `excluded`, `readmitted` or `set-aside` |
 | `utc` | every record | date and time (UTC, ISO 8601) when it was written |
 | `link` | every record | first 16 digits of the SHA-256 of the line before; empty in the first |
 | `participant_id` | every record | participant's code, 1 to 32 letters and digits |
 | `facts.age_years` | `joined` | age in whole years, 1 to 120; `null` if it was not asked |
 | `facts.sex` | `joined` | `female`, `male`, `other`, `undisclosed`; `null` if it was not asked |
 | `facts.handedness` | `joined` | `right`, `left`, `both`; `null` if it was not asked |
-| `reason` | `excluded`, `readmitted` | why, at most 200 characters in one line; the only free text, never a name |
+| `experiment` | `set-aside` | of which experiment an unfinished run was set aside for a fresh one |
+| `reason` | `excluded`, `readmitted`, `set-aside` | why, in one line of at most 200 characters; no name |
 
 ## What `recoil analyze` writes
 

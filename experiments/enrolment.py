@@ -4,12 +4,40 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from experiments import places, register
+from experiments import beginnings, places, register
+from experiments.beginnings import Entered
 from experiments.clock import Clock
+from experiments.journal import JournalError
 from experiments.places import PlaceError
 from experiments.register import RegisterError
-from experiments.standings import StudyFolder
-from experiments.study import Facts, eligible, unanswered, unasked
+from experiments.standings import StudyFolder, look_at
+from experiments.study import Facts, RunStanding, eligible, unanswered, unasked
+
+
+def admit(study: StudyFolder, entered: Entered, clock: Clock, *, practice: bool = False) -> RunStanding:
+    """Check all that must hold before somebody runs, have what they said on record, and give back how their run stands.
+
+    `PlaceError` and `JournalError` say why they may not; then nothing is recorded.
+    """
+    _refuse(beginnings.read_back_refusal(entered))
+    person, problems = look_at(study, entered.participant_id)
+    run = beginnings.run_of(person, entered.experiment)
+    if run.state == "unreadable":
+        raise JournalError("\n".join(problems))
+    try:
+        facts = beginnings.facts_of(entered.facts)
+    except ValueError as error:
+        raise PlaceError(str(error)) from error
+    rules = study.config.eligibility
+    _refuse(beginnings.refusal(person, entered, facts, rules, practice=practice))
+    if beginnings.is_news(person, facts, rules.ask):
+        join(study, entered.participant_id, facts, clock)
+    return run
+
+
+def _refuse(reason: str) -> None:
+    if reason:
+        raise PlaceError(reason)
 
 
 def join(study: StudyFolder, participant_id: str, facts: Facts, clock: Clock) -> tuple[str, ...]:

@@ -22,6 +22,8 @@ from experiments.clock import Clock
 
 Kind = Literal["run", "step", "outcome", "shot", "remark", "resumed", "stopped", "finished"]
 _KINDS = get_args(Kind)
+_PATIENCE_S = 0.5
+"""How long a journal is tried that somebody may only be looking at."""
 
 
 class JournalError(Exception):
@@ -189,7 +191,7 @@ def hold(path: Path) -> int:
 
 
 def _held(path: Path, descriptor: int) -> int:
-    if not storage.hold(descriptor):
+    if not storage.hold(descriptor, _PATIENCE_S):
         os.close(descriptor)
         raise JournalError(f"{path}: another run holds this journal; close that one first")
     return descriptor

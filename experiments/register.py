@@ -1,8 +1,8 @@
-"""The register of a results folder: who joined with which facts, who is excluded and why. Codes only, never names.
+"""The register of a results folder: who joined with which facts, who is excluded, whose run was set aside, and why.
 
-`participants.jsonl` is written and read like a journal: one JSON object a line, appended and synced record by record,
-each with its number, the date and time, and the hash of the line before it. A later `joined` record of a code corrects
-the facts of an earlier one; nothing is ever taken away.
+Codes only, never names. `participants.jsonl` is written and read like a journal: one JSON object a line, appended and
+synced record by record, each with its number, the date and time, and the hash of the line before it. A later `joined`
+record of a code corrects the facts of an earlier one; nothing is ever taken away.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ from pydantic import AfterValidator, Field, StringConstraints, TypeAdapter, Vali
 from experiments import storage
 from experiments.canonical import canonical_json
 from experiments.clock import Clock
-from experiments.config import CODE, Model
+from experiments.config import CODE, Model, Text
 from experiments.journal import JournalError, check_chain, link, parsed
 from experiments.study import Facts
 
@@ -69,7 +69,17 @@ class Readmitted(Model):
     reason: Reason
 
 
-Entry = Joined | Excluded | Readmitted
+class SetAside(Model):
+    """An unfinished run was set aside, to be started anew: of which experiment, and why."""
+
+    kind: Literal["set-aside"] = "set-aside"
+    participant_id: Code
+    experiment: Text
+    reason: Reason
+
+
+Entry = Joined | Excluded | Readmitted | SetAside
+_REASON: TypeAdapter[str] = TypeAdapter(Reason)
 _ENTRY: TypeAdapter[Entry] = TypeAdapter(Annotated[Entry, Field(discriminator="kind")])
 
 
@@ -80,6 +90,14 @@ def entry(kind: str, participant_id: str, **body: object) -> Entry:
     'excluded'
     """
     return _checked({"kind": kind, "participant_id": participant_id, **body})
+
+
+def check_reason(text: str) -> None:
+    """`RegisterError` unless a text is fit as a reason."""
+    try:
+        _REASON.validate_python(text)
+    except ValidationError as error:
+        raise RegisterError(f"reason {text!r}: {error.errors()[0]['msg'].removeprefix('Value error, ')}") from error
 
 
 def _checked(values: dict[str, Any]) -> Entry:
@@ -134,6 +152,8 @@ def members(entries: Iterable[tuple[str, Entry]]) -> dict[str, Member]:
 def _after(before: Member, utc: str, one: Entry) -> Member:
     if isinstance(one, Joined):
         return replace(before, facts=one.facts, joined_utc=before.joined_utc or utc)
+    if isinstance(one, SetAside):
+        return before
     return replace(before, excluded=one.reason if isinstance(one, Excluded) else None)
 
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import os
+import shlex
 from collections.abc import Callable
 from contextlib import closing
 from dataclasses import asdict, dataclass, replace
@@ -43,7 +44,8 @@ class UnfinishedRun(PlaceError):  # noqa: N818 - what is there, not what went wr
 class Request:
     """Who does what, where, with which gun and seed; `seed` is `None` where the config or the system gives it.
 
-    A `practice` is not analysed: it has files of its own and can be done again.
+    A `practice` is not analysed: it has files of its own and can be done again. `anew_reason` is why an unfinished run
+    is set aside for a fresh one: for the register and the head of the new journal.
     """
 
     setup: Setup[Any]
@@ -52,6 +54,7 @@ class Request:
     gun: str = "simulated"
     seed: int | None = None
     again: Again = "ask"
+    anew_reason: str = ""
     practice: bool = False
 
 
@@ -83,6 +86,7 @@ class _Job:
     place: Place
     clock: Clock
     before: Contents | None
+    anew_reason: str = ""
 
     @property
     def experiment(self) -> catalogue.Experiment:
@@ -94,10 +98,11 @@ def run(request: Request, make_screen: MakeScreen, clock: Clock) -> Finished:
     limits.check_limits(request.setup)
     place = places.place(request.results, request.participant_id, request.setup.config.experiment)
     place = replace(place, practice=request.practice)
-    before = _before(place, request)
+    anew_reason = request.anew_reason if place.journal.exists() else ""
+    before = _before(place, request, clock)
     if before is None:
         _refuse_excluded(place)
-    job = _Job(request=request, place=place, clock=clock, before=before)
+    job = _Job(request=request, place=place, clock=clock, before=before, anew_reason=anew_reason)
     with closing(_open_gun(request, clock)) as gun:
         return _carry_out(job, gun, make_screen)
 
@@ -119,13 +124,14 @@ def _open_gun(request: Request, clock: Clock) -> Gun:
         raise PlaceError(f"--gun {request.gun}: {error}") from error
 
 
-def _before(where: Place, request: Request) -> Contents | None:
+def _before(where: Place, request: Request, clock: Clock) -> Contents | None:
     """The unfinished run to go on with, if there is one and it is wanted."""
     if not where.journal.exists():
         return None
     if request.again == "fresh" or request.practice or is_empty(where.journal):
         _refuse_finished(where, _readable(where))
         os.close(hold(where.journal))  # refused while another run is at it
+        _record_reason(where, request.anew_reason, clock)
         places.set_aside(where)
         return None
     contents = read_journal(where.journal)
@@ -133,6 +139,13 @@ def _before(where: Place, request: Request) -> Contents | None:
     if request.again == "ask":
         raise UnfinishedRun(_unfinished(where, contents))
     return contents
+
+
+def _record_reason(where: Place, reason: str, clock: Clock) -> None:
+    """Have the reason on record before anything is moved."""
+    if reason:
+        one = register.entry("set-aside", where.participant_id, experiment=where.experiment, reason=reason)
+        register.append(where.results, one, clock)
 
 
 def _refuse_finished(where: Place, contents: Contents | None) -> None:
@@ -210,9 +223,10 @@ def _practice(job: _Job) -> Plan:
 def _refuse_changes(request: Request, before: Contents) -> None:
     began, now = before.header["setup_sha256"], request.setup.sha256()
     if began != now:
+        given_back = f"`recoil configs --from {shlex.quote(str(before.path))} --copy DIR`"
         raise PlaceError(
             f"{before.path}: the run began with another config or gun file (setup {began[:12]}, now {now[:12]}); "
-            "resume with the files it began with, or start --fresh"
+            f"resume with the files it began with, which {given_back} gives back, or start anew with --fresh"
         )
     seed = before.header["plan"]["seed"]
     if request.seed is not None and request.seed != seed:
@@ -244,6 +258,8 @@ def _begin(job: _Job, plan: Plan, session: Session, journal: Journal, gun: Gun) 
         return replay.go_on(session, job.before, standing, journal.append)
     setup = job.request.setup
     plan_head = {"plan": plan.record(), "plan_sha256": plan.sha256()}
+    if job.anew_reason:
+        plan_head["set_aside_reason"] = job.anew_reason
     journal.append("run", **plan_head, setup=setup.record(), setup_sha256=setup.sha256(), **now)
     return Standing(step=next(session))
 

@@ -1,6 +1,7 @@
 """A study's folder as it stands: what the register and the journals say of every participant. Reads, never writes.
 
-A journal is read without being held, so that looking never stands in the way of a run.
+A journal is read without being held. Whether another process holds it is looked up in a moment, for which a run that
+begins just then has patience; so looking never stands in the way of a run.
 """
 
 from __future__ import annotations
@@ -9,11 +10,12 @@ import csv
 import io
 import os
 from collections.abc import Iterator
-from dataclasses import dataclass
+from contextlib import suppress
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
-from experiments import catalogue, journal, orders, places, register
+from experiments import catalogue, journal, orders, places, register, storage
 from experiments.config import StudyConfig
 from experiments.journal import JournalError
 from experiments.load import load_setup, load_study
@@ -97,28 +99,68 @@ def overview(study: StudyFolder) -> Overview:
 def _participants(study: StudyFolder, members: dict[str, Member], problems: list[str]) -> Iterator[Participant]:
     for code in sorted(places.known_codes(study.results), key=by_code):
         try:
-            where = [places.place(study.results, code, experiment) for experiment in study.experiments]
+            yield _participant(study, members.get(code, Member(participant_id=code)), problems)
         except PlaceError as error:
             problems.append(f"{study.results / f'sub-{code}'}: {error}")
-            continue
-        member = members.get(code, Member(participant_id=code))
-        yield Participant(
-            participant_id=code,
-            runs=tuple(_run(one, problems) for one in where),
-            facts=member.facts,
-            joined_utc=member.joined_utc,
-            excluded=member.excluded,
-        )
+
+
+def _participant(study: StudyFolder, member: Member, problems: list[str]) -> Participant:
+    where = [places.place(study.results, member.participant_id, experiment) for experiment in study.experiments]
+    return Participant(
+        participant_id=member.participant_id,
+        runs=tuple(_run(one, problems) for one in where),
+        facts=member.facts,
+        joined_utc=member.joined_utc,
+        excluded=member.excluded,
+    )
+
+
+def look_at(study: StudyFolder, participant_id: str) -> tuple[Participant, tuple[str, ...]]:
+    """How one participant stands at this moment, and what could not be read; of somebody new, that nothing has begun.
+
+    `PlaceError` if the code breaks a rule; `JournalError` if the register cannot be trusted.
+    """
+    found, problems = register.read(study.results), list[str]()
+    if found.problem:
+        raise JournalError(found.problem)
+    member = found.members.get(participant_id, Member(participant_id=participant_id))
+    return _participant(study, member, problems), tuple(problems)
 
 
 def _run(where: places.Place, problems: list[str]) -> RunStanding:
     try:
-        if not where.journal.exists() or journal.is_empty(where.journal):
-            return RunStanding(experiment=where.experiment, state="not begun")
-        return _begun(where)
+        return replace(run_standing(where), practised=_practised(where))
     except JournalError as error:
         problems.append(str(error))
         return RunStanding(experiment=where.experiment, state="unreadable")
+
+
+def run_standing(where: places.Place) -> RunStanding:
+    """How far a run has come. `JournalError` if its journal cannot be trusted."""
+    if not where.journal.exists():
+        return RunStanding(experiment=where.experiment, state="not begun")
+    elsewhere = _is_held(where)
+    if journal.is_empty(where.journal):
+        return RunStanding(experiment=where.experiment, state="open elsewhere" if elsewhere else "not begun")
+    begun = _begun(where)
+    return replace(begun, state="open elsewhere") if elsewhere and begun.state != "done" else begun
+
+
+def _is_held(where: places.Place) -> bool:
+    try:
+        return storage.is_held(where.journal)
+    except OSError as error:
+        raise JournalError(f"{where.journal}: cannot be opened ({error.strerror})") from error
+
+
+def _practised(where: places.Place) -> bool:
+    """Whether a practice was done to its end, also one that a later practice has set aside."""
+    practice = replace(where, practice=True)
+    for path in practice.folder.glob(f"{practice.journal.stem}*{practice.journal.suffix}"):
+        with suppress(JournalError):  # a practice is not analysed, so a broken one is nobody's concern
+            if journal.read(path).finished:
+                return True
+    return False
 
 
 def _begun(where: places.Place) -> RunStanding:

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import os
 import sys
+import time
 from pathlib import Path
 
 OWNER_FILE = 0o600
@@ -91,8 +92,32 @@ def sync_folder(folder: Path) -> None:
         os.close(descriptor)
 
 
-def hold(descriptor: int) -> bool:
-    """Take the file for this process alone; false if another holds it. Let go when the file is closed."""
+def hold(descriptor: int, patience_s: float = 0.0) -> bool:
+    """Take the file for this process alone; false if another holds it. Let go when the file is closed.
+
+    With patience, somebody who only looks (`is_held`) and lets go at once is no hindrance.
+    """
+    end_s = time.monotonic() + patience_s
+    while not _locked(descriptor, shared=False):
+        if time.monotonic() >= end_s:
+            return False
+        time.sleep(_AGAIN_S)
+    return True
+
+
+_AGAIN_S = 0.01
+
+
+def is_held(path: Path) -> bool:
+    """Whether somebody holds a file. To find out it is held for a moment, which others who only look do not notice."""
+    descriptor = os.open(path, os.O_RDONLY | getattr(os, "O_CLOEXEC", 0))
+    try:
+        return not _locked(descriptor, shared=True)
+    finally:
+        os.close(descriptor)
+
+
+def _locked(descriptor: int, *, shared: bool) -> bool:
     try:
         if sys.platform == "win32":
             import msvcrt  # noqa: PLC0415 - this system only
@@ -102,7 +127,7 @@ def hold(descriptor: int) -> bool:
         else:
             import fcntl  # noqa: PLC0415 - not on Windows
 
-            fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
+            fcntl.flock(descriptor, (fcntl.LOCK_SH if shared else fcntl.LOCK_EX) | fcntl.LOCK_NB)
     except OSError:
         return False
     return True

@@ -10,7 +10,8 @@ from typing import Literal, get_args
 
 from experiments.config import AgeYears, EligibilityConfig, Fact, Handedness, Model, Sex, StudyConfig
 
-State = Literal["done", "in progress", "not begun", "unreadable"]
+State = Literal["done", "in progress", "open elsewhere", "not begun", "unreadable"]
+"""How a run stands; `open elsewhere`: another process is carrying it out at this moment."""
 
 
 class Facts(Model):
@@ -30,7 +31,7 @@ class RunStanding:
     """How far a participant has come in one experiment.
 
     `answered` of `planned` trials, `last_utc` the time of the last record, `methods` in the order of the run. All four
-    are empty where no run has begun, or where its journal cannot be read.
+    are empty where no run has begun, or where its journal cannot be read. `practised`: a practice was done to its end.
     """
 
     experiment: str
@@ -39,6 +40,7 @@ class RunStanding:
     planned: int = 0
     last_utc: str = ""
     methods: tuple[str, ...] = ()
+    practised: bool = False
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -60,6 +62,11 @@ class Participant:
     def in_progress(self) -> bool:
         """Whether a run has begun and not ended."""
         return any(run.state == "in progress" for run in self.runs)
+
+    @property
+    def is_elsewhere(self) -> bool:
+        """Whether they sit at another console."""
+        return any(run.state == "open elsewhere" for run in self.runs)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -111,11 +118,11 @@ def unasked(facts: Facts, eligibility: EligibilityConfig) -> tuple[Fact, ...]:
 def who_is_next(people: Sequence[Participant], study: StudyConfig, experiments: Sequence[str]) -> Next | None:
     """Who is in progress, else who joined and is not finished, else the next free code; in order of their codes.
 
-    `None` when the study has its participants and all of them are done. Who is excluded does not count: a new
-    participant takes their place.
+    `None` when the study has its participants and none of them waits. Who is excluded does not count: a new
+    participant takes their place. Who sits at another console does not wait.
     """
     taking_part = sorted((one for one in people if one.excluded is None), key=lambda one: by_code(one.participant_id))
-    waiting = [one for one in taking_part if one.open_runs]
+    waiting = [one for one in taking_part if one.open_runs and not one.is_elsewhere]
     for one in sorted(waiting, key=lambda one: not one.in_progress):  # stable: codes stay in order
         return Next(participant_id=one.participant_id, new=False, runs=one.open_runs)
     if len(taking_part) >= study.participants:

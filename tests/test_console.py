@@ -58,10 +58,16 @@ def answer_by(screen: AtDisplay, body: dict[str, Any]) -> None:
         screen.keys.type("like a toy\n")
 
 
-def start(screen: AtDisplay, code: str = "P01") -> None:
-    """From the start window: read the code back, say what is asked, start."""
+def start(screen: AtDisplay, code: str = "P01", later: int = 0) -> None:
+    """From the start window: read the code back, say what is asked, start, on the simulated gun as well.
+
+    `later` is how many experiments of the study are passed over.
+    """
     keys = screen.keys
     screen.focus_on("start")
+    if later:
+        for key, held in [("Tab", ["Shift_L"]), ("Tab", ["Shift_L"]), *([("Down", [])] * later), *([("Tab", [])] * 2)]:
+            keys.press(key, *held)
     keys.type(code)
     keys.press("Tab")
     keys.type("25")
@@ -70,6 +76,7 @@ def start(screen: AtDisplay, code: str = "P01") -> None:
     keys.press("Tab")
     keys.press("Down")
     keys.press("Return", "Control_L")
+    keys.press("s", "Control_L")
 
 
 def focus_on_console(screen: AtDisplay, journal: Path) -> None:
@@ -118,7 +125,7 @@ def test_experiment_2_from_the_start_window_to_the_end_screen_with_a_rating_of_z
 ) -> None:
     journal = tmp_path / f"{PREFERENCE}_journal.jsonl"
     with AtDisplay(words(quick_configs, "preference"), tmp_path, display) as screen:
-        start(screen)
+        start(screen, later=1)
         focus_on_console(screen, journal)
         last = work_console(screen, journal, lambda body: answer_by(screen, body))
         assert last["kind"] == "finished"
@@ -144,7 +151,7 @@ def test_a_training_leaves_nothing_behind(quick_configs: Path, tmp_path: Path, d
     assert not list(tmp_path.glob("results/sub-*"))
 
 
-@pytest.mark.parametrize(("key", "kept"), [("g", 2), ("a", 0)])
+@pytest.mark.parametrize(("key", "kept"), [("g", 2), ("n", 0)])
 def test_an_unfinished_run_is_shown_and_asked_about(
     quick_configs: Path, tmp_path: Path, display: str, key: str, kept: int
 ) -> None:
@@ -166,7 +173,10 @@ def test_an_unfinished_run_is_shown_and_asked_about(
         assert screen.end()[0] == 130
     with AtDisplay(run, tmp_path, display) as screen:
         screen.focus_on("unfinished")
-        screen.keys.press(key, "Alt_L")
+        screen.keys.type("loose" if key == "n" else "")
+        for _ in range(3):
+            screen.keys.press("Return")  # as a hand that still holds Enter does: nothing is decided by it
+        screen.keys.press(key, "Control_L")
         time.sleep(2.0)
         screen.focus_on("P01")
         answered = len(answers(journal))

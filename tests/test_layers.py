@@ -21,6 +21,7 @@ PURE = {
         *("serial_gun.checks", "serial_gun.reports"),
     },
     "experiments": {
+        "beginnings",
         "canonical",
         "columns",
         "config",
@@ -32,6 +33,9 @@ PURE = {
         "streams",
         "study",
         "tables",
+        "toml_text",
+        "screens.console.dates",
+        "screens.console.people",
     },
 }
 HEAVY = {

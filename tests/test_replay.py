@@ -11,13 +11,14 @@ from typing import Any, NamedTuple
 
 import pytest
 
-from experiments import catalogue
+from experiments import catalogue, register
 from experiments.canonical import canonical_json
 from experiments.clock import VirtualClock
 from experiments.journal import Journal, JournalError, link, read
 from experiments.load import load_setup
 from experiments.places import PlaceError, place
 from experiments.plan import Plan
+from experiments.register import RegisterError
 from experiments.replay import go_on, history, replay
 from experiments.run import Again, Request, rebuild, run
 from experiments.screens.synthetic import synthetic_screen
@@ -328,6 +329,45 @@ def test_a_fresh_run_sets_the_unfinished_one_aside_with_every_byte(
     run(request(name, tmp_path, "fresh", seed=5), synthetic_screen, VirtualClock())
     assert journal.with_name(f"{journal.stem}.aside-1.jsonl").read_bytes() == before
     assert read(journal).header["plan"]["seed"] == 5
+
+
+def test_why_a_run_was_set_aside_stands_in_the_register_and_in_the_new_journals_head(
+    unbroken: dict[str, Unbroken], tmp_path: Path
+) -> None:
+    journal = broken_off(unbroken["preference"], tmp_path, 6)
+    asked = replace(request("preference", tmp_path, "fresh"), anew_reason="the gun came loose")
+    run(asked, synthetic_screen, VirtualClock())
+    (_, one), *others = register.read(tmp_path).entries
+    assert not others
+    assert one.model_dump() == {
+        "kind": "set-aside",
+        "participant_id": "P01",
+        "experiment": "preference",
+        "reason": "the gun came loose",
+    }
+    assert read(journal).header["set_aside_reason"] == "the gun came loose"
+
+
+def test_where_there_was_nothing_to_set_aside_no_reason_is_recorded(tmp_path: Path) -> None:
+    asked = replace(request("preference", tmp_path, "fresh"), anew_reason="the gun came loose")
+    done = run(asked, synthetic_screen, VirtualClock())
+    assert not register.read(tmp_path).entries
+    assert "set_aside_reason" not in read(done.place.journal).header
+
+
+def test_a_reason_that_cannot_be_recorded_leaves_the_run_where_it_is(
+    unbroken: dict[str, Unbroken], tmp_path: Path
+) -> None:
+    journal = broken_off(unbroken["preference"], tmp_path, 6)
+    before = journal.read_bytes()
+    with pytest.raises(RegisterError, match="must say why"):
+        run(
+            replace(request("preference", tmp_path, "fresh"), anew_reason="two\nlines"),
+            synthetic_screen,
+            VirtualClock(),
+        )
+    assert journal.read_bytes() == before
+    assert not list(journal.parent.glob("*aside*"))
 
 
 @pytest.mark.parametrize("again", ["ask", "resume", "fresh"])

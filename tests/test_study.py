@@ -183,6 +183,13 @@ def test_a_run_that_cannot_be_read_is_not_done_again() -> None:
     assert next_code(someone("P01", "done", "unreadable")) == "P02"
 
 
+def test_who_sits_at_another_console_is_not_called_to_this_one() -> None:
+    busy = someone("P01", "open elsewhere", "not begun")
+    assert next_code(busy) == "P02"
+    assert next_code(busy, someone("P02", "not begun", "not begun")) == "P02"
+    assert next_code(busy, *(someone(f"P0{number}", "done", "done") for number in (2, 3))) is None
+
+
 def test_who_is_excluded_never_comes_and_is_replaced_by_a_new_code() -> None:
     people = [someone(f"P0{number}", "done", "done") for number in (1, 2)]
     gone = someone("P03", "in progress", "not begun", excluded="left")
@@ -208,14 +215,16 @@ def test_nobody_comes_before_someone_in_progress_and_no_more_come_than_planned(d
     coming = who_is_next(people, STUDY, EXPERIMENTS)
     if coming is None:
         assert len(taking_part) >= STUDY.participants
-        assert not any(one.open_runs for one in taking_part.values())
+        assert not any(one.open_runs and not one.is_elsewhere for one in taking_part.values())
     elif coming.new:
         assert coming.participant_id not in {one.participant_id for one in people}
         assert len(taking_part) < STUDY.participants
     else:
         chosen = taking_part[coming.participant_id]
         assert coming.runs == chosen.open_runs != ()
-        assert chosen.in_progress or not any(one.in_progress for one in taking_part.values())
+        assert not chosen.is_elsewhere
+        waiting = [one for one in taking_part.values() if not one.is_elsewhere]
+        assert chosen.in_progress or not any(one.in_progress for one in waiting)
 
 
 # balance

@@ -11,6 +11,7 @@ from typing import Any
 import pytest
 
 from experiments.clock import VirtualClock
+from experiments.journal import hold
 from experiments.load import load_setup
 from experiments.register import append, entry
 from experiments.roof.folders import new_study
@@ -145,6 +146,59 @@ def test_looking_while_a_run_writes_disturbs_neither(recoil: Recoil, pilot: Path
             assert all(one[1] == "not begun" for one in states(told(recoil)).values())
         assert running.returncode == 0
     assert states(told(recoil)) == {f"P{number:02d}": ["done", "not begun"] for number in range(1, 4)}
+
+
+@pytest.mark.parametrize("lines", [0, 40])
+def test_a_run_that_another_process_is_at_is_open_elsewhere_until_it_lets_go(
+    recoil: Recoil, pilot: Path, lines: int
+) -> None:
+    do(pilot, "P01")
+    answered = cut(journal_of(pilot, "P01"), lines)
+    descriptor = hold(journal_of(pilot, "P01"))
+    found = told(recoil)
+    run = found["participants"][0]["experiments"]["direction"]
+    assert (run["state"], run["answered"]) == ("open elsewhere", answered)
+    assert found["next"]["participant_id"] == "P02"
+    assert "open elsewhere" in recoil("study", "pilot").stdout
+    os.close(descriptor)
+    assert states(told(recoil))["P01"][0] == ("in progress" if lines else "not begun")
+
+
+def test_when_all_who_are_left_sit_at_a_console_the_study_is_not_called_done(recoil: Recoil, pilot: Path) -> None:
+    config = pilot / "study.toml"
+    config.write_text(config.read_text().replace("participants = 14", "participants = 1"))
+    do(pilot, "P01")
+    cut(journal_of(pilot, "P01"), 40)
+    descriptor = hold(journal_of(pilot, "P01"))
+    assert "Next: nobody waits; at a console now: P01" in recoil("study", "pilot").stdout
+    os.close(descriptor)
+
+
+def test_a_finished_run_is_done_whoever_still_looks_at_it(recoil: Recoil, pilot: Path) -> None:
+    do(pilot, "P01")
+    descriptor = hold(journal_of(pilot, "P01"))
+    assert states(told(recoil)) == {"P01": ["done", "not begun"]}
+    os.close(descriptor)
+
+
+def test_results_that_may_only_be_read_are_shown(recoil: Recoil, pilot: Path) -> None:
+    do(pilot, "P01")
+    cut(journal_of(pilot, "P01"), 40)
+    journal_of(pilot, "P01").chmod(0o400)
+    assert states(told(recoil)) == {"P01": ["in progress", "not begun"]}
+
+
+def test_a_practice_is_told_once_it_was_done_to_its_end(recoil: Recoil, pilot: Path) -> None:
+    setup = load_setup(str(pilot / "direction.toml"))
+    request = Request(setup=setup, participant_id="P01", results=pilot / "results", practice=True)
+    practice = run(request, synthetic_screen, VirtualClock()).place.journal
+    whole = practice.read_bytes()
+    assert told(recoil)["participants"][0]["experiments"]["direction"]["practised"]
+    assert "practice done" in recoil("study", "pilot").stdout
+    practice.write_bytes(whole[: whole.rfind(b"{")])
+    assert not told(recoil)["participants"][0]["experiments"]["direction"]["practised"]
+    practice.with_name(f"{practice.stem}.aside-1.jsonl").write_bytes(whole)
+    assert told(recoil)["participants"][0]["experiments"]["direction"]["practised"]
 
 
 def test_what_cannot_be_read_is_listed_once_and_the_rest_is_shown(recoil: Recoil, pilot: Path) -> None:

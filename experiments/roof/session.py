@@ -34,10 +34,12 @@ class Asked:
     seed: int | None
     resume: bool
     fresh: bool
+    reason: str = ""
     visual: bool = False
     participant_screen: bool = False
     participant_keys: bool = False
     noise: bool = False
+    monitor: int | None = None
 
 
 def run_session(asked: Asked) -> Place:
@@ -51,6 +53,7 @@ def run_session(asked: Asked) -> Place:
         gun=asked.gun,
         seed=asked.seed,
         again=_again(asked),
+        anew_reason=asked.reason,
     )
     try:
         return _SCREENS[asked.screen](request, asked).place
@@ -63,9 +66,12 @@ def run_session(asked: Asked) -> Place:
 def _check_screen(asked: Asked) -> None:
     if asked.screen == "terminal" and not (sys.stdin.isatty() and sys.stdout.isatty()):
         raise PlaceError("--screen terminal: standard input and output are no terminal; use --screen synthetic")
-    sides = (asked.visual, asked.participant_screen, asked.participant_keys, asked.noise)
+    sides = (asked.visual, asked.participant_screen, asked.participant_keys, asked.noise, asked.monitor is not None)
     if asked.screen != "console" and any(sides):
-        raise PlaceError("--visual, --participant-screen, --participant-keys and --noise go with --screen console")
+        raise PlaceError(
+            "--visual, --participant-screen, --participant-keys, --participant-monitor and --noise go with "
+            "--screen console"
+        )
 
 
 def check_pace(screen: str, gun: str) -> None:
@@ -98,21 +104,36 @@ def _speed(gun: str) -> float | None:
 
 def _at_console(request: Request, asked: Asked) -> Finished:
     live = _console()
-    sides = live.Sides(
+    finished: Finished = live.run_live(request, _sides(live, asked))
+    return finished
+
+
+def _sides(live: Any, asked: Asked) -> Any:
+    return live.Sides(
         visual=asked.visual,
         screen=asked.participant_screen,
         own_keys=asked.participant_keys,
         noise=asked.noise,
+        monitor=asked.monitor,
     )
-    finished: Finished = live.run_live(request, sides)
-    return finished
 
 
-def run_lab_day(config: str, results: Path, gun: str, seed: int | None) -> None:
+def run_lab_day(asked: Asked) -> None:
     """The start window at the console, and one run after the other from it."""
-    check_pace("console", gun)
-    request = Request(setup=load_setup(config), participant_id="", results=results, gun=gun, seed=seed)
-    _console().lab_day(request)
+    if asked.screen != "console":
+        raise PlaceError("give --participant CODE, or --screen console for its start window")
+    if asked.resume or asked.fresh or asked.visual:
+        raise PlaceError("--resume, --fresh and --visual go with --participant CODE; the start window asks by itself")
+    check_pace("console", asked.gun)
+    setup = load_setup(asked.config)
+    request = Request(setup=setup, participant_id="", results=asked.results, gun=asked.gun, seed=asked.seed)
+    live = _console()
+    try:
+        live.lab_day(request, _sides(live, asked))
+    except KeyboardInterrupt as signalled:
+        with suppress(OSError):  # where the terminal is gone, nobody reads it
+            sys.stderr.write(f"recoil: ended by {signalled}\n")
+        raise
 
 
 def _console() -> Any:
@@ -132,6 +153,8 @@ _SCREENS = {"terminal": _at_terminal, "synthetic": _synthetic, "console": _at_co
 def _again(asked: Asked) -> Again:
     if asked.resume and asked.fresh:
         raise PlaceError("--resume and --fresh: give one of them; the first goes on with a run, the second starts anew")
+    if asked.reason and not asked.fresh:
+        raise PlaceError("--reason: goes with --fresh, and says why the unfinished run is set aside")
     return "resume" if asked.resume else "fresh" if asked.fresh else "ask"
 
 

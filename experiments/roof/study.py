@@ -21,6 +21,7 @@ from experiments.standings import Overview, StudyFolder, open_study, overview
 from experiments.study import Facts, Participant, RunStanding, eligible
 
 _OPTIONS = {"age_years": "--age", "sex": "--sex", "handedness": "--handedness"}
+_UNDER_WAY = ("in progress", "open elsewhere")
 _WIDTH = 160
 """Columns of the table where it does not go to a terminal."""
 
@@ -154,10 +155,9 @@ def _cells(found: Found, one: Participant) -> Iterator[str]:
 
 
 def _state(run: RunStanding) -> str:
-    if run.state in ("not begun", "unreadable"):
-        return run.state
     counts = f", {run.answered} of {run.planned} trials, last record {_minute(run.last_utc)}"
-    return f"{run.state}{counts if run.state == 'in progress' else ''}\n{' > '.join(run.methods)}"
+    lines = [f"{run.state}{counts if run.state in _UNDER_WAY and run.planned else ''}", " > ".join(run.methods)]
+    return "\n".join(filter(None, [*lines, "practice done" if run.practised else ""]))
 
 
 def _minute(utc: str) -> str:
@@ -175,14 +175,20 @@ def _count_lines(found: Found) -> Iterator[str]:
 def _next_lines(found: Found) -> Iterator[str]:
     coming = found.overview.next
     if coming is None:
-        left = any(one.excluded is None and _unreadable(one) for one in found.overview.participants)
-        yield "Next: nobody who can be named, see what could not be read" if left else "Next: nobody, the study is done"
+        yield f"Next: {_nobody([one for one in found.overview.participants if one.excluded is None])}"
         return
     yield f"Next: {coming.participant_id}{' (new)' if coming.new else ''}"
     for run in coming.runs:
         methods = found.overview.orders[run.experiment]
         go_on = " (go on with --resume)" if run.state == "in progress" else ""
         yield f"  {run.experiment}: {' > '.join(methods) if methods else 'order drawn when the run begins'}{go_on}"
+
+
+def _nobody(taking_part: list[Participant]) -> str:
+    if any(map(_unreadable, taking_part)):
+        return "nobody who can be named, see what could not be read"
+    elsewhere = [one.participant_id for one in taking_part if one.is_elsewhere]
+    return f"nobody waits; at a console now: {', '.join(elsewhere)}" if elsewhere else "nobody, the study is done"
 
 
 def _unreadable(one: Participant) -> bool:

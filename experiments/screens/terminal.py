@@ -125,7 +125,10 @@ class TerminalScreen:
             case State.RESTING:
                 return f"\nBreak {_between(position)}. (`skip` and a reason ends it early.)\n"
             case State.CLOSING:
-                return "\nEverything is answered. `undo` opens the last answer, `note` and `flag` mark; Enter ends the run: "
+                return (
+                    "\nEverything is answered. `undo` opens the last answer, `note` and `flag` mark.\n"
+                    "  Enter ends the run: "
+                )
             case State.PAUSED:
                 why = f" {position.why}." if position.why else ""
                 return f"\n  Paused.{why} Type `go on` and Enter: "

@@ -50,6 +50,7 @@ def run(
     seed: Seed = None,
     resume: Annotated[bool, typer.Option("--resume", help="Go on with an unfinished run.")] = False,
     fresh: Annotated[bool, typer.Option("--fresh", help="Set an unfinished run aside and start anew.")] = False,
+    reason: Annotated[str, typer.Option(help="With --fresh: why, for the register; never a name.")] = "",
     visual: Annotated[bool, typer.Option("--visual", help="A synthetic participant works the console.")] = False,
     participant_screen: Annotated[
         bool, typer.Option("--participant-screen", help="The participant rates on a screen of their own (PsychoPy).")
@@ -60,32 +61,34 @@ def run(
     noise: Annotated[
         bool, typer.Option("--noise", help="Masking white noise through the participant's headphones (PsychoPy).")
     ] = False,
+    participant_monitor: Annotated[
+        int | None, typer.Option(min=0, help="The participant's screen: 0 is the first; without: the last of several.")
+    ] = None,
     as_json: AsJson = False,
 ) -> None:
     """One run: a participant doing one experiment."""
     from experiments.roof import session
 
-    if participant is None:
-        if screen is not ScreenName.console:
-            raise typer.BadParameter("give --participant CODE, or --screen console for its start window")
-        session.run_lab_day(config, results, gun, seed)
-        return
-    finished = session.run_session(
-        session.Asked(
-            config=config,
-            participant_id=participant,
-            gun=gun,
-            screen=screen.value,
-            results=results,
-            seed=seed,
-            resume=resume,
-            fresh=fresh,
-            visual=visual,
-            participant_screen=participant_screen,
-            participant_keys=participant_keys,
-            noise=noise,
-        )
+    asked = session.Asked(
+        config=config,
+        participant_id=participant or "",
+        gun=gun,
+        screen=screen.value,
+        results=results,
+        seed=seed,
+        resume=resume,
+        fresh=fresh,
+        reason=reason,
+        visual=visual,
+        participant_screen=participant_screen,
+        participant_keys=participant_keys,
+        noise=noise,
+        monitor=participant_monitor,
     )
+    if participant is None:
+        session.run_lab_day(asked)
+        return
+    finished = session.run_session(asked)
     show({"journal": str(finished.journal), "table": str(finished.table)}, f"Done: {finished.table}", as_json)
 
 
@@ -126,12 +129,18 @@ def rebuild(journals: Annotated[list[Path], typer.Argument(metavar="JOURNAL...")
 
 
 def configs(
-    copy: Annotated[Path | None, typer.Option(help="Copy the shipped configs into this folder.")] = None,
+    copy: Annotated[Path | None, typer.Option(help="Copy the configs into this folder.")] = None,
+    journal: Annotated[
+        Path | None, typer.Option("--from", metavar="JOURNAL", help="With --copy: the files that its run began with.")
+    ] = None,
 ) -> None:
-    """List the shipped configs, or copy them to edit."""
+    """List the shipped configs, copy them to edit, or give back those that a run began with."""
+    from experiments.roof.began_with import copy_began_with
     from experiments.roof.folders import copy_configs, shipped
 
-    paths = copy_configs(copy) if copy else shipped()
+    if journal is not None and copy is None:
+        raise typer.BadParameter("--from goes with --copy DIR, the folder that the files are written to")
+    paths = shipped() if copy is None else copy_began_with(journal, copy) if journal else copy_configs(copy)
     sys.stdout.write("".join(f"{path}\n" for path in paths))
 
 

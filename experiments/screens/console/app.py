@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import os
-import signal
 import sys
 import threading
 from collections.abc import Callable, Iterator
@@ -28,8 +27,10 @@ from experiments.screens.console import display
 from experiments.screens.console.beside import ParticipantSide
 from experiments.screens.console.messages import Began, Ended, Message
 from experiments.screens.console.screen import ConsoleScreen
+from experiments.screens.console.signals import signals_to
 from experiments.screens.console.view import About
 from experiments.screens.console.window import Bridge, ConsoleWindow
+from experiments.screens.console.windows import let_go, open_as_left
 from experiments.screens.synthetic import observer_of
 from experiments.setup import Setup
 
@@ -126,7 +127,7 @@ class Console:
         )
         self.window.closed.connect(self.closed)
         self._bridge.message.connect(self._ends)
-        self.window.showMaximized()
+        open_as_left(self.window, "run")
         self.window.activateWindow()
         self._opened.set()
 
@@ -197,12 +198,13 @@ def run_console(
     wake.timeout.connect(lambda: _leave_without_window(loop, console))
     wake.start(WAKE_MS)
     keep = display.on_loss(console.lose_display)
-    with _signals_to(console.leave), _quick_threads():
+    with signals_to(console.leave), _quick_threads():
         console.start()
         watch(console)
         loop.exec()
         console.finish()
     keep()
+    let_go(wake)
     if console.error is not None:
         raise console.error
     if console.result is None:
@@ -223,17 +225,3 @@ def _quick_threads() -> Iterator[None]:
         yield
     finally:
         sys.setswitchinterval(before)
-
-
-@contextmanager
-def _signals_to(leave: Callable[[str], None]) -> Iterator[None]:
-    """Have an interrupt stop the run in order: an exception out of a Qt slot would end the process at once."""
-    known = [getattr(signal, name) for name in ("SIGINT", "SIGTERM", "SIGHUP") if hasattr(signal, name)]
-    before = {number: signal.getsignal(number) for number in known}
-    try:
-        for number in known:
-            signal.signal(number, lambda got, _: leave(signal.Signals(got).name))
-        yield
-    finally:
-        for number, handler in before.items():
-            signal.signal(number, handler)

@@ -20,8 +20,11 @@ from experiments.places import PlaceError
 from experiments.run import Finished, Request, UnfinishedRun
 from experiments.screens.console.app import Console, application, run_console
 from experiments.screens.console.beside import WAIT, ParticipantSide
+from experiments.screens.console.form import Beside, monitors
+from experiments.screens.console.opening import Choice, Opening
 from experiments.screens.console.rater import Rater
-from experiments.screens.console.start import Choice, choose
+from experiments.screens.console.signals import signals_to
+from experiments.screens.console.start import choose
 from experiments.screens.console.unfinished import ask
 from experiments.screens.console.visual import VisualParticipant
 from experiments.screens.console.waiting import while_shown
@@ -32,17 +35,27 @@ from experiments.screens.participant.words import NoiseIs
 from experiments.setup import Setup
 from experiments.standings import StudyFolder
 
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Words:
+    """What the window says of a run: the band of a practice or a training, and the last sentence."""
+
+    band: str = ""
+    last: str = "Thank the participant."
+
+
 _NO_HANDS = "--visual --participant-screen rates by synthetic events, which only an X display takes"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Sides:
-    """Who works the console, and what the participant has beside it."""
+    """Who works the console, and what the participant has beside it; `monitor` is theirs, the last one if `None`."""
 
     visual: bool = False
     screen: bool = False
     own_keys: bool = False
     noise: bool = False
+    monitor: int | None = None
 
     @property
     def beside(self) -> bool:
@@ -50,22 +63,22 @@ class Sides:
         return self.screen or self.own_keys or self.noise
 
 
-def run_live(request: Request, sides: Sides) -> Finished:
+def run_live(request: Request, sides: Sides, words: Words | None = None) -> Finished:
     """Carry out a run at the console. An unfinished one is shown and asked about, but for a synthetic participant.
 
     `PlaceError` without a display, or if the participant's screen does not open.
     """
     application()
     try:
-        return _carry_out(request, sides)
-    except UnfinishedRun as found:
-        again = None if sides.visual else ask(found)
-        if again is None:
+        return _carry_out(request, sides, words or Words())
+    except UnfinishedRun:
+        decided = None if sides.visual else ask(request)
+        if decided is None:
             raise
-        return _carry_out(replace(request, again=again), sides)
+        return _carry_out(decided, sides, words or Words())
 
 
-def _carry_out(request: Request, sides: Sides) -> Finished:
+def _carry_out(request: Request, sides: Sides, words: Words) -> Finished:
     driver: list[VisualParticipant] = []
     clock = RealClock()
 
@@ -78,38 +91,87 @@ def _carry_out(request: Request, sides: Sides) -> Finished:
                 driver.append(VisualParticipant(console, clock, rater, beside))
 
         hand: Hand = "synthetic" if sides.visual else "experimenter"
-        return run_console(request, clock, hand=hand, beside=beside, watch=watch)
+        return run_console(request, clock, hand=hand, beside=beside, band=words.band, last=words.last, watch=watch)
 
 
-def lab_day(request: Request) -> None:
-    """One run after the other from the start window, until it is closed. `request` says what all have in common."""
+def lab_day(request: Request, sides: Sides) -> None:
+    """One run after the other from the start window, until it is closed.
+
+    `request` says what all have in common, `sides` what is ticked at first. `KeyboardInterrupt` if a signal ended it.
+    """
     application()
-    study, said = _study(request), ""
-    while (choice := choose(study, request.setup.config.experiment, request.gun, RealClock(), said)) is not None:
-        with ExitStack() as stack:
-            results = Path(stack.enter_context(tempfile.TemporaryDirectory())) if choice.training else request.results
-            said = _what_became(_chosen(request, choice, results), _sides(choice))
+    check_monitor(sides.monitor)
+    study, named = _study(request), request.setup.config.experiment
+    opening = Opening(gun=request.gun, named=named, beside=_ticked(sides))
+    with signals_to() as signalled:
+        while not signalled and (choice := choose(study, opening, RealClock())) is not None:
+            said = _of_the_day(request, study, choice)
+            opening = Opening(
+                gun=request.gun, beside=_ticked(_sides(choice)), participant_id=_seated(choice), said=said
+            )
+    if signalled:
+        raise KeyboardInterrupt(signalled[0])
 
 
-def _what_became(request: Request, sides: Sides) -> str:
-    """Carry out a run of a lab day; what went wrong, for the start window, which it must not end."""
-    try:
-        run_live(request, sides)
-    except RunStopped as stop:
-        return f"{request.participant_id} stopped: {stop}. Choose them again to go on."
-    except (PlaceError, JournalError, ConfigError, DeviceError) as error:
-        return str(error)
+def check_monitor(monitor: int | None) -> None:
+    """`PlaceError` if there is no such screen."""
+    known = monitors()
+    if monitor is not None and monitor >= len(known):
+        raise PlaceError(f"--participant-monitor {monitor}: there is no such screen; known are {'; '.join(known)}")
+
+
+def _ticked(sides: Sides) -> Beside:
+    return Beside(
+        participant_screen=sides.screen, participant_keys=sides.own_keys, noise=sides.noise, monitor=sides.monitor
+    )
+
+
+def _seated(choice: Choice) -> str:
+    """Who was there; nobody in a training."""
+    return "" if choice.training else choice.participant_id
+
+
+def _words(study: StudyFolder, choice: Choice) -> Words:
+    """What the window of a chosen run is to say of it."""
+    if choice.training:
+        return Words(band="TRAINING – nothing of it is kept", last="The training is over.")
+    if choice.practice:
+        return Words(band="PRACTICE – never analysed", last="The practice is over: the run itself comes next.")
+    names = [setup.config.experiment for setup in study.setups]
+    later = names[names.index(choice.setup.config.experiment) + 1 :]
+    return Words(last=f"Next: {later[0]}.") if later else Words()
+
+
+def _of_the_day(request: Request, study: StudyFolder, choice: Choice) -> str:
+    """Carry out what was chosen; what went wrong, for the start window, which it must not end."""
+    with ExitStack() as stack:
+        results = Path(stack.enter_context(tempfile.TemporaryDirectory())) if choice.training else request.results
+        try:
+            run_live(_chosen(request, choice, results), _sides(choice), _words(study, choice))
+        except RunStopped as stop:
+            return _stopped(choice, str(stop))
+        except (PlaceError, JournalError, ConfigError, DeviceError) as error:
+            return str(error)
     return ""
 
 
+def _stopped(choice: Choice, reason: str) -> str:
+    if choice.training:
+        return f"The training stopped: {reason}."
+    if choice.practice:
+        return f"The practice of {choice.participant_id} stopped: {reason}. It can be done again."
+    return f"{choice.participant_id} stopped: {reason}. Start asks whether to go on there or to start anew."
+
+
 def _study(request: Request) -> StudyFolder:
-    """The study that the config lies in with all its experiments, else the shipped one with this experiment alone."""
+    """The study that the config lies in, if the study names it; else this experiment alone, by the rules of that study.
+
+    Where there is no study beside the config, they are those of the shipped one.
+    """
     own = request.setup.source.parent / "study.toml"
-    if not own.is_file():
-        config, folder = load_study("study")
-        setups: tuple[Setup[Any], ...] = (request.setup,)
-    else:
-        config, folder = load_study(str(own))
+    config, folder = load_study(str(own) if own.is_file() else "study")
+    setups: tuple[Setup[Any], ...] = (request.setup,)
+    if request.setup.source.resolve() in [(folder / name).resolve() for name in config.experiments]:
         setups = tuple(load_setup(str(folder / name)) for name in config.experiments)
     return StudyFolder(config=config, source=folder / "study.toml", setups=setups, results=request.results)
 
@@ -123,17 +185,24 @@ def _chosen(request: Request, choice: Choice, results: Path) -> Request:
         results=results,
         gun=gun,
         again=choice.again,
+        anew_reason=choice.anew_reason,
         practice=choice.practice,
     )
 
 
 def _sides(choice: Choice) -> Sides:
-    return Sides(screen=choice.participant_screen, own_keys=choice.participant_keys, noise=choice.noise)
+    return Sides(
+        screen=choice.participant_screen,
+        own_keys=choice.participant_keys,
+        noise=choice.noise,
+        monitor=choice.monitor,
+    )
 
 
 def _participant(stack: ExitStack, request: Request, sides: Sides) -> ParticipantSide:
     """The participant's screen, once it is open: PsychoPy takes its time, and a window says so meanwhile."""
-    look = _look()
+    check_monitor(sides.monitor)
+    look = _look(sides.monitor)
 
     def open_link() -> ParticipantLink:
         link = stack.enter_context(ParticipantLink.start(look))
@@ -156,10 +225,10 @@ def _participant(stack: ExitStack, request: Request, sides: Sides) -> Participan
     )
 
 
-def _look() -> Look:
-    """The last of several screens, all of it; where there is one, a window that leaves the console in reach."""
+def _look(monitor: int | None) -> Look:
+    """The screen that was chosen, else the last of several, all of it; of one screen a part, to leave the console."""
     screens = len(QGuiApplication.screens())
-    return Look(screen=screens - 1, full_screen=screens > 1)
+    return Look(screen=screens - 1 if monitor is None else monitor, full_screen=screens > 1)
 
 
 def _noise(link: ParticipantLink) -> NoiseIs:

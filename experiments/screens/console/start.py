@@ -1,303 +1,369 @@
-"""The start window: who comes next, what is asked of them, and a test shot, before a run begins."""
+"""The start window: who comes next, what is asked of them, and test shots, before a run begins."""
 
 from __future__ import annotations
 
-import threading
-from contextlib import closing
-from dataclasses import dataclass
-from typing import Any, get_args
+from collections.abc import Callable
+from typing import Any
 
-from PyQt6.QtCore import QEventLoop, QObject, pyqtSignal
-from PyQt6.QtGui import QCloseEvent
+from PyQt6.QtCore import QEventLoop, pyqtSignal
+from PyQt6.QtGui import QCloseEvent, QResizeEvent
 from PyQt6.QtWidgets import (
-    QCheckBox,
-    QComboBox,
-    QFormLayout,
+    QGridLayout,
     QHBoxLayout,
-    QHeaderView,
-    QLineEdit,
-    QTableWidget,
-    QTableWidgetItem,
+    QPushButton,
+    QStackedWidget,
     QVBoxLayout,
     QWidget,
 )
 
-from device import DeviceError, Shot, open_gun
-from experiments import enrolment
+from experiments import beginnings, enrolment
 from experiments.clock import Clock
-from experiments.config import Handedness, Sex
-from experiments.limits import drives
-from experiments.load import ConfigError
+from experiments.journal import JournalError
 from experiments.places import PlaceError
-from experiments.register import RegisterError
 from experiments.run import Again
-from experiments.screens.console import parts, theme
+from experiments.screens.console import parts, people, theme
+from experiments.screens.console.fields import Lines, sheet
+from experiments.screens.console.form import Form
+from experiments.screens.console.opening import Choice, Opening
+from experiments.screens.console.people_table import PeopleTable
+from experiments.screens.console.question import WHY, Answer, Question, once_a_press, unfit
+from experiments.screens.console.shot_page import ShotPage
+from experiments.screens.console.signals import signals_to
+from experiments.screens.console.windows import let_go, open_as_left, remember, scaled, type_scale
 from experiments.setup import Setup
 from experiments.standings import Overview, StudyFolder, overview
-from experiments.study import Facts, Participant, RunStanding
+from experiments.study import Participant, RunStanding
 
-_LEVELS: dict[str, tuple[str, ...]] = {"sex": get_args(Sex), "handedness": get_args(Handedness)}
-_FACT_TEXT = {"age_years": "Age in years", "sex": "Sex", "handedness": "Handedness"}
-_HOW_TO_START = "Read the code back with the participant, fill in what is asked, then Start."
-_STATE_TEXT = {"done": "done", "not begun": "–"}
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Choice:
-    """What was chosen: who does which experiment, and how."""
-
-    setup: Setup[Any]
-    participant_id: str
-    again: Again = "ask"
-    practice: bool = False
-    training: bool = False
-    participant_screen: bool = False
-    participant_keys: bool = False
-    noise: bool = False
-
-
-class _Told(QObject):
-    """Takes what another thread has to say to the window's."""
-
-    text = pyqtSignal(str, str)
+NAME = "start"
+SIMULATED = "simulated"
 
 
 class StartWindow(QWidget):
-    """A table of the participants, a form for the next one, and four ways to go on. `choice` is what was chosen."""
+    """A table of the participants, a form for the next one, and the ways to go on. `choice` is what was chosen."""
 
     closed = pyqtSignal()
 
-    def __init__(self, study: StudyFolder, experiment: str, gun: str, clock: Clock) -> None:
+    def __init__(self, study: StudyFolder, opening: Opening, clock: Clock) -> None:
         super().__init__()
-        self._study, self._gun, self._clock = study, gun, clock
+        self._study, self._opening, self._clock = study, opening, clock
         self.choice: Choice | None = None
-        self._told = _Told()
-        self._told.text.connect(self.say)
-        self._wanted = experiment
-        self._build(experiment)
-        self.setStyleSheet(theme.sheet("dark"))
+        self.question: Question | None = None
+        self._simulation_is_known = False
+        self._closing = False
+        self._scale = 0.0
+        self._build()
         self._fill()
-        self.resize(1280, 800)
+        self._propose(opening.participant_id)
+        self._say_first(opening)
 
     # building
 
-    def _build(self, experiment: str) -> None:
+    def _build(self) -> None:
         self.setWindowTitle("Recoil – start")
-        self.table = QTableWidget()
-        self.table.setEditTriggers(QTableWidget.EditTrigger.NoEditTriggers)
-        self.table.setSelectionBehavior(QTableWidget.SelectionBehavior.SelectRows)
-        header = self.table.horizontalHeader()
-        if header is not None:
-            header.setSectionResizeMode(QHeaderView.ResizeMode.ResizeToContents)
-            header.setStretchLastSection(True)
-        self.table.itemSelectionChanged.connect(self._selected)
-        self.next, self.saved = parts.label("detail"), parts.label("saved")
-        across, whole = QHBoxLayout(), QVBoxLayout(self)
-        across.addWidget(parts.column(parts.label("quiet", "Participants of the study"), self.table), 3)
-        across.addWidget(self._form(experiment), 2)
-        title = parts.label("place", f"{self._study.config.title} · {self._study.results}")
-        for widget in (title, self.next):
-            whole.addWidget(widget)
-        whole.addLayout(across, 1)
-        whole.addWidget(self.saved)
-        whole.addWidget(self._keys())
+        self.form = Form(self._study.experiments, self._study.config.eligibility.ask, self._opening.beside)
+        self.shots = ShotPage(self._opening.gun, self._clock)
+        self.table = PeopleTable(self._study.experiments)
+        self.next, self.saved = Lines("detail"), Lines("saved", most_lines=5)
+        self.pages = QStackedWidget()
+        for page in (self._page(), self.shots):
+            self.pages.addWidget(page)
+        down, top = QVBoxLayout(self), QHBoxLayout()
+        top.addWidget(Lines("place", f"{self._study.config.title} · {self._study.results.resolve()}", most_lines=3), 1)
+        top.addWidget(self._gun())
+        down.addLayout(top)
+        down.addWidget(self.pages, 1)
+        self._connect()
 
-    def _form(self, experiment: str) -> QWidget:
-        self.experiment, self.code, self.code_again = QComboBox(), QLineEdit(), QLineEdit()
-        self.experiment.addItems(self._study.experiments)
-        self.experiment.setCurrentText(experiment)
-        self.own_screen, self.own_keys = QCheckBox("rates on a screen of their own"), QCheckBox("answers with own keys")
-        self.noise = QCheckBox("hears masking noise")
-        self.facts: dict[str, QLineEdit | QComboBox] = {fact: self._fact(fact) for fact in self._asked()}
-        form = QFormLayout(holder := QWidget())
-        holder.setObjectName("form")
-        rows: dict[str, QWidget] = {"Experiment": self.experiment, "Code": self.code}
-        rows["Code, read back"] = self.code_again
-        rows |= {_FACT_TEXT[fact]: field for fact, field in self.facts.items()}
-        for name, field in (rows | {"Participant": self.own_screen, "": self.own_keys, " ": self.noise}).items():
-            field.setAccessibleName(name)
-            form.addRow(name, field)
-        return parts.panel(parts.label("quiet", _HOW_TO_START), holder)
+    def _page(self) -> QWidget:
+        down = QVBoxLayout(page := QWidget())
+        down.setContentsMargins(0, 0, 0, 0)
+        middle, self._foot = QHBoxLayout(), QVBoxLayout()
+        middle.addWidget(self.table, 3)
+        middle.addWidget(self.form, 2)
+        down.addWidget(self.next)
+        down.addLayout(middle, 1)
+        down.addWidget(self.saved)
+        down.addLayout(self._foot)
+        down.addLayout(self._buttons(page))
+        once_a_press(page)
+        return page
 
-    def _asked(self) -> tuple[str, ...]:
-        return tuple(self._study.config.eligibility.ask)
+    def _gun(self) -> QWidget:
+        simulated = self._opening.gun == SIMULATED
+        made = parts.label("gun", "SIMULATED GUN" if simulated else f"Gun: {self._opening.gun}", wrap=False)
+        parts.set_mood(made, "ask" if simulated else "wait")
+        return made
 
-    def _fact(self, fact: str) -> QLineEdit | QComboBox:
-        if fact not in _LEVELS:
-            return QLineEdit()
-        box = QComboBox()
-        box.addItems(["", *_LEVELS[fact]])
-        return box
+    def _buttons(self, page: QWidget) -> QGridLayout:
+        def button(text: str, key: str, slot: Callable[[], object], name: str = "") -> QPushButton:
+            return parts.button(page, text, key, slot, name=name)
 
-    def _keys(self) -> QWidget:
-        return parts.row(
-            parts.button(self, "Start", "Ctrl+Return", self._start, name="large"),
-            parts.button(self, "Practice", "Ctrl+P", self._practice),
-            parts.button(self, "Test shot", "Ctrl+T", self._test_shot),
-            parts.button(self, "Training (simulated gun)", "Ctrl+R", self._training),
-            parts.button(self, "Quit", "Ctrl+Q", self.close),
-        )
+        self.test_button = button("Test shot", "Ctrl+T", self._test_shot)
+        self.exclude_button = button("Exclude…", "Alt+E", self._ask_exclusion)
+        grid = QGridLayout()
+        grid.addWidget(button("Start", "Ctrl+Return", self._start, "large"), 0, 0, 2, 1)
+        grid.addWidget(button("Practice", "Ctrl+P", self._practice), 0, 1)
+        grid.addWidget(button("Training (simulated gun)", "Ctrl+R", self._training), 0, 2, 1, 2)
+        grid.addWidget(self.test_button, 1, 1, 1, 2)
+        grid.addWidget(self.exclude_button, 1, 3)
+        grid.addWidget(button("Quit", "Ctrl+Q", self.close), 0, 4, 2, 1)
+        for column, stretch in enumerate((3, 2, 2, 2, 1)):
+            grid.setColumnStretch(column, stretch)
+        return grid
+
+    def _connect(self) -> None:
+        self.table.person_chosen.connect(self.form.code.setText)
+        self.form.edited.connect(self._take_back)
+        self.form.code_edited.connect(self._follow_code)
+        self.form.experiment_edited.connect(self._show_choice)
+        self.shots.left.connect(self._leave_shots)
+        self.shots.over = self._shot_over
 
     # showing
 
     def _fill(self) -> None:
+        """Look at the study, and show how it stands."""
         self._seen: Overview = overview(self._study)
-        people = self._seen.participants
-        self.table.setColumnCount(2 + len(self._study.experiments))
-        self.table.setHorizontalHeaderLabels(["code", *self._study.experiments, "note"])
-        self.table.setRowCount(len(people))
-        for line, person in enumerate(people):
-            cells = [person.participant_id, *map(_run_text, person.runs), _note_text(person)]
-            for column, text in enumerate(cells):
-                self.table.setItem(line, column, QTableWidgetItem(text))
-        coming = self._seen.next
-        if coming is None:
-            self.next.setText("Everyone has done everything.")
-        else:
-            self.next.setText(f"Next: {coming.participant_id}, {' and '.join(run.experiment for run in coming.runs)}")
-            self.code.setText(coming.participant_id)
-            ahead = [run.experiment for run in coming.runs]
-            self.experiment.setCurrentText(self._wanted if self._wanted in ahead else ahead[0])
-        for problem in self._seen.problems:
-            self.say(problem, "bad")
-        self.code_again.setFocus()
+        self.table.show_people(self._seen.participants)
+        self.next.say(people.coming_text(self._seen))
 
-    def _selected(self) -> None:
-        line = self.table.currentRow()
-        if 0 <= line < len(self._seen.participants):
-            self.code.setText(self._seen.participants[line].participant_id)
+    def _say_first(self, opening: Opening) -> None:
+        entered, bad = self.form.entered(), [*filter(None, [opening.said]), *self._seen.problems]
+        code, experiment = entered.participant_id, entered.experiment
+        named = people.named_text(opening.named, code, self._person(code), experiment)
+        self.say("\n".join([*bad, *filter(None, [named])]), "bad" if bad else "ask")
+
+    def _propose(self, participant_id: str) -> None:
+        """Who was there before if they have something left to do, else who comes next."""
+        before, coming = self._person(participant_id), self._seen.next
+        if before is None or before.excluded is not None or not before.open_runs:
+            participant_id = "" if coming is None else coming.participant_id
+        self.form.code.setText(participant_id)
+        self._follow_code()
+        self.form.code_again.setFocus()
+
+    def _person(self, participant_id: str) -> Participant | None:
+        return next((one for one in self._seen.participants if one.participant_id == participant_id), None)
+
+    def _follow_code(self) -> None:
+        """Show what is on record of the code, and the experiment that comes next for them in the order of the study."""
+        person = self._person(self.form.participant_id)
+        self.form.show_facts(person)
+        self.form.experiment.setCurrentText(beginnings.next_experiment(person, self._study.experiments))
+        self._show_choice()
+
+    def _show_choice(self) -> None:
+        code, experiment = self.form.participant_id, self.form.experiment.currentText()
+        person = self._person(code)
+        self.form.remark.say(*people.remark(code, person, experiment, self._study.experiments))
+        out = person is not None and person.excluded is not None
+        self.exclude_button.setText(f"{'Readmit…' if out else 'Exclude…'}  [Alt+E]")
+        self.shots.choose(self._setup())
+        self.test_button.setText(f"{self.shots.next_text()}  [Ctrl+T]")
+
+    def resizeEvent(self, event: QResizeEvent | None) -> None:  # noqa: N802 - Qt's name
+        """Have the type grow with the window."""
+        super().resizeEvent(event)
+        scale = type_scale(self.width(), self.height())
+        if scale != self._scale:
+            self._scale = scale
+            self.setStyleSheet(scaled(theme.sheet("dark") + sheet(), scale))
 
     def closeEvent(self, event: QCloseEvent | None) -> None:  # noqa: N802 - Qt's name
-        """Let whoever waits for a choice go on."""
+        """Let whoever waits for a choice go on, once no test shot is under way."""
+        if self.shots.is_running and not self._closing and event is not None:
+            self._closing = True
+            self.shots.emergency_stop()
+            event.ignore()
+            return
         super().closeEvent(event)
+        remember(self, NAME)
         self.closed.emit()
+
+    def leave_for(self, signal: str) -> None:
+        """Close without a choice: a signal came, which whoever made this window hears of as well."""
+        del signal
+        self.close()
 
     def say(self, text: str, mood: str) -> None:
         """Show a line of answer."""
-        self.saved.setText(text)
-        parts.set_mood(self.saved, mood)
+        self.saved.say(text, mood)
+
+    # questions
+
+    def _ask(self, question: Question) -> None:
+        self._take_back()
+        self.question = question
+        self._foot.addWidget(question)
+        question.show()  # now, so that its keys answer at once
+
+    def _take_back(self) -> None:
+        """What was asked belonged to what stood in the form."""
+        self.say("", "")
+        if self.question is not None:
+            self.question.hide()
+            self.question.deleteLater()
+            self.question = None
+
+    def _leave_it(self) -> Answer:
+        return Answer(text="Leave it", key="Esc", do=lambda _: self._take_back())
 
     # choosing
 
     def _start(self) -> None:
-        self._choose(practice=False)
+        run = self._admit(practice=False)
+        if run is None:
+            return
+        if self._opening.gun == SIMULATED and not self._simulation_is_known:
+            self._ask_simulation()
+        elif run.state == "in progress":
+            self._ask_resume(run)
+        else:
+            self._leave(self.form.participant_id)
 
     def _practice(self) -> None:
-        self._choose(practice=True)
-
-    def _choose(self, *, practice: bool) -> None:
-        code = self.code.text().strip()
-        if code != self.code_again.text().strip():
-            self.say("Read the code back: type it a second time, just as it stands above.", "bad")
-            return
-        try:
-            self._enrol(code)
-        except (PlaceError, RegisterError, ConfigError, ValueError) as error:
-            self.say(str(error), "bad")
-            return
-        standing = self._standing(code)
-        if standing is not None and standing.state == "in progress" and not practice:
-            self._ask_resume(code, standing)
-        else:
-            self._leave(code, practice=practice)
-
-    def _enrol(self, code: str) -> None:
-        """Have what was said of a participant on record; nothing is asked of those who joined and said nothing new."""
-        known = next((one for one in self._seen.participants if one.participant_id == code), None)
-        given = self._given()
-        if known is not None and known.facts is not None and not given:
-            return
-        enrolment.join(self._study, code, Facts(**given), self._clock)
-
-    def _given(self) -> dict[str, Any]:
-        values = {
-            fact: field.text().strip() if isinstance(field, QLineEdit) else field.currentText()
-            for fact, field in self.facts.items()
-        }
-        given: dict[str, Any] = {fact: value for fact, value in values.items() if value}
-        if "age_years" in given:
-            if not given["age_years"].isdecimal():
-                raise ValueError(f"age {given['age_years']!r}: type whole years")
-            given["age_years"] = int(given["age_years"])
-        return given
-
-    def _standing(self, code: str) -> RunStanding | None:
-        runs = [run for one in self._seen.participants if one.participant_id == code for run in one.runs]
-        return next((run for run in runs if run.experiment == self.experiment.currentText()), None)
-
-    def _ask_resume(self, code: str, standing: RunStanding) -> None:
-        """Show when the run stopped, and ask."""
-        self.say(
-            f"{code} stopped at {standing.last_utc} with {standing.answered} of {standing.planned} trials answered. "
-            "Go on there: Ctrl+G. Set it aside and start anew: Ctrl+N.",
-            "ask",
-        )
-        if not hasattr(self, "resume_keys"):
-            self.resume_keys = parts.row(
-                parts.button(self, "Go on with it", "Ctrl+G", lambda: self._leave(self.code.text(), again="resume")),
-                parts.button(self, "Start anew", "Ctrl+N", lambda: self._leave(self.code.text(), again="fresh")),
-            )
-            layout = self.layout()
-            if layout is not None:
-                layout.addWidget(self.resume_keys)
+        if self._admit(practice=True) is not None:
+            self._leave(self.form.participant_id, practice=True)
 
     def _training(self) -> None:
         self._leave("training", practice=True, training=True)
 
-    def _leave(self, code: str, *, again: Again = "ask", practice: bool = False, training: bool = False) -> None:
+    def _admit(self, *, practice: bool) -> RunStanding | None:
+        """How the run stands that may begin now; `None`, with the reason shown, if it may not."""
+        self._take_back()
+        try:
+            return enrolment.admit(self._study, self.form.entered(), self._clock, practice=practice)
+        except (PlaceError, JournalError) as error:
+            self._refused(str(error))
+            return None
+
+    def _refused(self, reason: str) -> None:
+        """What stands in the window may be old: look again, then say the reason."""
+        self._fill()
+        self._show_choice()
+        self.say(reason, "bad")
+
+    def _ask_simulation(self) -> None:
+        def known(_: str) -> None:
+            self._simulation_is_known = True
+            self._start()
+
+        text = f"The gun is SIMULATED: {self.form.participant_id} will feel nothing. Start all the same?"
+        self._ask(Question(text, (Answer(text="Start, simulated", key="Ctrl+S", do=known), self._leave_it())))
+
+    def _ask_resume(self, run: RunStanding) -> None:
+        answers = (
+            Answer(text="Go on with it", key="Ctrl+G", do=lambda _: self._begin_again("resume", "")),
+            Answer(text="Set it aside, start anew", key="Ctrl+N", do=lambda why: self._begin_again("fresh", why)),
+            self._leave_it(),
+        )
+        text = f"{people.stopped_text(self.form.participant_id, run)} Go on there, or set it aside and start anew?"
+        self._ask(Question(text, answers, reason=f"to start anew: {WHY}"))
+
+    def _begin_again(self, again: Again, reason: str) -> None:
+        """Check everything once more, as Start does: the study may have gone on at another console meanwhile."""
+        if again == "fresh" and not self._is_reason(reason):
+            return
+        run = self._admit(practice=False)
+        if run is not None and run.state == "in progress":
+            self._leave(self.form.participant_id, again=again, reason=reason)
+        elif run is not None:
+            self._start()
+
+    def _is_reason(self, reason: str) -> bool:
+        """Whether a reason can be kept; if not, it is said why, and its line gets the keys."""
+        wrong = unfit(reason)
+        if wrong:
+            self.say(wrong, "bad")
+            if self.question is not None:
+                self.question.reason.setFocus()
+        return not wrong
+
+    def _leave(
+        self, code: str, *, again: Again = "ask", reason: str = "", practice: bool = False, training: bool = False
+    ) -> None:
+        if self.choice is not None:
+            return
+        beside = self.form.beside()
         self.choice = Choice(
             setup=self._setup(),
-            participant_id=code.strip(),
+            participant_id=code,
             again=again,
+            anew_reason=reason,
             practice=practice,
             training=training,
-            participant_screen=self.own_screen.isChecked(),
-            participant_keys=self.own_keys.isChecked(),
-            noise=self.noise.isChecked(),
+            participant_screen=beside.participant_screen,
+            participant_keys=beside.participant_keys,
+            noise=beside.noise,
+            monitor=beside.monitor,
         )
         self.close()
 
     def _setup(self) -> Setup[Any]:
-        return next(s for s in self._study.setups if s.config.experiment == self.experiment.currentText())
+        return next(s for s in self._study.setups if s.config.experiment == self.form.experiment.currentText())
 
-    # the test shot
+    # excluding
+
+    def _ask_exclusion(self) -> None:
+        person = self._person(self.form.participant_id)
+        if person is None:
+            self._take_back()
+            self.say("Choose in the table who is to be excluded; a code that is not there needs none.", "bad")
+            return
+        out = person.excluded is not None
+        verb, act = ("Readmit", enrolment.readmit) if out else ("Exclude", enrolment.exclude)
+        text = f"{verb} {person.participant_id}? "
+        text += (
+            f"They are excluded: {person.excluded}." if out else "Their logs stay, but are left out of the analysis."
+        )
+
+        def carry_out(reason: str) -> None:
+            if self._is_reason(reason):
+                self._change(lambda: act(self._study.results, person.participant_id, reason, self._clock))
+
+        answers = (Answer(text=f"{verb} {person.participant_id}", key="Ctrl+D", do=carry_out), self._leave_it())
+        self._ask(question := Question(text, answers, reason=WHY))
+        question.reason.setFocus()
+
+    def _change(self, act: Callable[[], None]) -> None:
+        """Change the register, and show how things stand then."""
+        self._take_back()
+        try:
+            act()
+        except (PlaceError, JournalError) as error:
+            self._refused(str(error))
+            return
+        self._fill()
+        self._show_choice()
+        self.say("\n".join(self._seen.problems), "bad")
+        self.form.code_again.setFocus()
+
+    # test shots
 
     def _test_shot(self) -> None:
-        """Fire once, beside the window: a gun that hangs is not to freeze it."""
-        self.say("Firing a test shot.", "wait")
-        threading.Thread(target=self._shoot, args=(self._setup(),), daemon=True).start()
+        self._take_back()
+        self.pages.setCurrentWidget(self.shots)
+        self.shots.begin()
 
-    def _shoot(self, setup: Setup[Any]) -> None:
-        methods = setup.gun.renderings(setup.config.design.methods)
-        method, drive = next(iter(drives(setup).items()))
-        try:
-            with closing(open_gun(self._gun, methods, clock=self._clock.now)) as gun:
-                gun.arm()
-                report = gun.fire(Shot(method=method, direction="forward", drive=drive))
-                gun.disarm()
-        except (DeviceError, ValueError) as error:
-            self._told.text.emit(f"Test shot: {error}", "bad")
-        else:
-            name = setup.gun.methods[method].label
-            self._told.text.emit(f"Test shot: {name} was rendered ({report.motion}); the gun is disarmed.", "good")
+    def _shot_over(self) -> None:
+        if self._closing:
+            self.close()
+
+    def _leave_shots(self) -> None:
+        self.pages.setCurrentIndex(0)
+        self._show_choice()
+        self.form.code_again.setFocus()
 
 
-def _run_text(run: RunStanding) -> str:
-    return _STATE_TEXT.get(run.state, f"{run.state}, {run.answered} of {run.planned}")
-
-
-def _note_text(person: Participant) -> str:
-    return f"excluded: {person.excluded}" if person.excluded is not None else ""
-
-
-def choose(study: StudyFolder, experiment: str, gun: str, clock: Clock, said: str = "") -> Choice | None:
-    """Show the start window until something is chosen; `None` if it was closed. `said` is what it has to tell first."""
-    window = StartWindow(study, experiment, gun, clock)
-    if said:
-        window.say(said, "bad")
+def choose(study: StudyFolder, opening: Opening, clock: Clock) -> Choice | None:
+    """Show the start window until something is chosen; `None` if it was closed, or a signal ended it."""
+    window = StartWindow(study, opening, clock)
     loop = QEventLoop()
     window.closed.connect(loop.quit)
-    window.show()
-    window.activateWindow()
-    loop.exec()
-    return window.choice
+    with signals_to(window.leave_for):
+        open_as_left(window, NAME)
+        window.activateWindow()
+        loop.exec()
+    choice = window.choice
+    let_go(window)
+    return choice

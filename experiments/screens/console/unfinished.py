@@ -2,23 +2,78 @@
 
 from __future__ import annotations
 
-from PyQt6.QtWidgets import QMessageBox
+from dataclasses import replace
 
-from experiments.run import Again, UnfinishedRun
-from experiments.screens.console import theme
+from PyQt6.QtWidgets import QDialog, QPushButton, QVBoxLayout
+
+from experiments.journal import JournalError
+from experiments.places import place
+from experiments.run import Again, Request
+from experiments.screens.console import people, theme
+from experiments.screens.console.fields import Lines, sheet
+from experiments.screens.console.question import WHY, Answer, Question, unfit
+from experiments.screens.console.signals import signals_to
+from experiments.screens.console.windows import let_go
+from experiments.standings import run_standing
 
 
-def ask(found: UnfinishedRun) -> Again | None:
-    """Go on with the run, set it aside, or leave it (`None`). Nothing is chosen by closing the window."""
-    box = QMessageBox()
-    box.setWindowTitle("Recoil – unfinished run")
-    box.setStyleSheet(theme.sheet("dark"))
-    box.setText(str(found).split(";", maxsplit=1)[0])
-    go_on = box.addButton("&Go on with it", QMessageBox.ButtonRole.AcceptRole)
-    fresh = box.addButton("Set it aside and start &anew", QMessageBox.ButtonRole.DestructiveRole)
-    box.setDefaultButton(go_on)
-    leave = box.addButton("&Leave it", QMessageBox.ButtonRole.RejectRole)
-    box.setEscapeButton(leave)
-    box.exec()
-    chosen = box.clickedButton()
-    return "resume" if chosen is go_on else "fresh" if chosen is fresh else None
+class Unfinished(QDialog):
+    """Go on with a run, set it aside for a reason, or leave it. `decided` is the request with the decision, if any.
+
+    Nothing is chosen by Enter or by closing the window.
+    """
+
+    def __init__(self, request: Request) -> None:
+        super().__init__()
+        self._request = request
+        self.decided: Request | None = None
+        self.setWindowTitle("Recoil – unfinished run")
+        self.setStyleSheet(theme.sheet("dark") + sheet())
+        answers = (
+            Answer(text="Go on with it", key="Ctrl+G", do=lambda _: self._decide("resume", "")),
+            Answer(text="Set it aside, start anew", key="Ctrl+N", do=self._fresh),
+            Answer(text="Leave it", key="Esc", do=lambda _: self.reject()),
+        )
+        self.question = Question(_text(request), answers, reason=f"to start anew: {WHY}")
+        self.said = Lines("saved")
+        down = QVBoxLayout(self)
+        down.addWidget(self.question)
+        down.addWidget(self.said)
+        self.setMinimumWidth(720)
+        for button in self.findChildren(QPushButton):
+            button.setAutoDefault(False)
+
+    def _fresh(self, reason: str) -> None:
+        wrong = unfit(reason)
+        if not wrong:
+            self._decide("fresh", reason)
+            return
+        self.said.say(wrong, "bad")
+        self.question.reason.setFocus()
+
+    def _decide(self, again: Again, reason: str) -> None:
+        self.decided = replace(self._request, again=again, anew_reason=reason)
+        self.accept()
+
+
+def _text(request: Request) -> str:
+    where = place(request.results, request.participant_id, request.setup.config.experiment)
+    try:
+        return people.stopped_text(request.participant_id, run_standing(where))
+    except JournalError as error:
+        return str(error)
+
+
+def ask(request: Request) -> Request | None:
+    """The request with the decision of the person at the console; `None` if they leave the run as it is.
+
+    `KeyboardInterrupt` if a signal ended the question.
+    """
+    dialog = Unfinished(request)
+    with signals_to(lambda _: dialog.reject()) as signalled:
+        dialog.exec()
+    decided = dialog.decided
+    let_go(dialog)
+    if signalled:
+        raise KeyboardInterrupt(signalled[0])
+    return decided

@@ -45,6 +45,7 @@ from experiments.screens.console.messages import (
 from experiments.screens.console.pace import Pace, clock_text, end_text, progress, remaining_s
 from experiments.screens.console.strip import Strip
 from experiments.screens.console.view import About, Seen
+from experiments.screens.console.windows import remember
 from experiments.screens.texts import saved_text
 from experiments.states import Position, State
 from experiments.steps import Failed, Rate, Rated, Rested
@@ -540,6 +541,7 @@ class ConsoleWindow(QMainWindow):
             event.ignore()
             self.controls.ask_why_it_stops()
             return
+        remember(self, "run")
         event.accept()
         self.closed.emit()
 

@@ -1,0 +1,168 @@
+"""The form of the start window: who, which experiment, what is asked of them, and what they have beside the console."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any, get_args
+
+from PyQt6.QtCore import Qt, pyqtSignal
+from PyQt6.QtGui import QGuiApplication, QScreen
+from PyQt6.QtWidgets import QFormLayout, QFrame, QLabel, QScrollArea, QSizePolicy, QVBoxLayout, QWidget
+
+from experiments.beginnings import Entered, typed_facts
+from experiments.config import Fact, Handedness, Sex
+from experiments.screens.console import parts
+from experiments.screens.console.fields import LineEdit, Lines, ListBox, TickBox
+from experiments.study import Participant
+
+_LEVELS: dict[str, tuple[str, ...]] = {"sex": get_args(Sex), "handedness": get_args(Handedness)}
+_FACT_TEXT = {"age_years": "Age in years", "sex": "Sex", "handedness": "Handedness"}
+_HOW_TO_START = "Read the code back with the participant, fill in what is asked, then Start."
+_AGE_DIGITS = 3
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Beside:
+    """What the participant has beside the console; `monitor` is the index of their screen, `None` for the last one."""
+
+    participant_screen: bool = False
+    participant_keys: bool = False
+    noise: bool = False
+    monitor: int | None = None
+
+
+class Form(QFrame):
+    """The fields. `edited` after any change; `code_edited` after one of the code, `experiment_edited` of the other."""
+
+    edited = pyqtSignal()
+    code_edited = pyqtSignal()
+    experiment_edited = pyqtSignal()
+
+    def __init__(self, experiments: Sequence[str], asked: Sequence[Fact], beside: Beside) -> None:
+        super().__init__()
+        self.setObjectName("panel")
+        self.experiment, self.code, self.code_again = ListBox(experiments), LineEdit(), LineEdit()
+        self.facts: dict[str, LineEdit | ListBox] = {fact: _fact(fact) for fact in asked}
+        self.own_screen, self.own_keys = TickBox("rates on a screen of their own"), TickBox("answers with own keys")
+        self.noise, self.monitor = TickBox("hears masking noise"), ListBox(monitors())
+        self.remark = Lines("remark")
+        self._typed: dict[str, str] | None = None
+        self._tick(beside)
+        self._lay_out()
+        self._connect()
+
+    def _lay_out(self) -> None:
+        form = QFormLayout(fields := QWidget())
+        fields.setObjectName("form")
+        form.setRowWrapPolicy(QFormLayout.RowWrapPolicy.WrapLongRows)
+        form.setFieldGrowthPolicy(QFormLayout.FieldGrowthPolicy.ExpandingFieldsGrow)
+        for name, field in self._rows():
+            field.setAccessibleName(name)
+            form.addRow(_beside_its_field(name), field)
+        scroll = QScrollArea()
+        scroll.setWidget(fields)
+        scroll.setWidgetResizable(True)
+        scroll.setFrameShape(QFrame.Shape.NoFrame)
+        scroll.setFocusPolicy(Qt.FocusPolicy.NoFocus)
+        scroll.setHorizontalScrollBarPolicy(Qt.ScrollBarPolicy.ScrollBarAlwaysOff)
+        down = QVBoxLayout(self)
+        for part in (parts.label("quiet", _HOW_TO_START), self.remark):
+            down.addWidget(part)
+        down.addWidget(scroll, 1)
+
+    def _rows(self) -> list[tuple[str, QWidget]]:
+        rows: list[tuple[str, QWidget]] = [("Experiment", self.experiment), ("Code", self.code)]
+        rows += [("Code, read back", self.code_again)]
+        rows += [(_FACT_TEXT[fact], field) for fact, field in self.facts.items()]
+        rows += [("Participant", self.own_screen), ("", self.own_keys), ("", self.noise)]
+        return rows + ([("Their monitor", self.monitor)] if self.monitor.count() > 1 else [])
+
+    def _connect(self) -> None:
+        for line in (self.code, self.code_again, *self.facts.values()):
+            if isinstance(line, LineEdit):
+                line.textChanged.connect(self.edited)
+        for box in (self.experiment, self.monitor, *self.facts.values()):
+            if isinstance(box, ListBox):
+                box.currentIndexChanged.connect(self.edited)
+        for tick in (self.own_screen, self.own_keys, self.noise):
+            tick.toggled.connect(self.edited)
+        self.code.textChanged.connect(self.code_edited)
+        self.experiment.currentIndexChanged.connect(self.experiment_edited)
+
+    def _tick(self, beside: Beside) -> None:
+        self.own_screen.setChecked(beside.participant_screen)
+        self.own_keys.setChecked(beside.participant_keys)
+        self.noise.setChecked(beside.noise)
+        last = self.monitor.count() - 1
+        self.monitor.setCurrentIndex(last if beside.monitor is None else beside.monitor)
+
+    @property
+    def participant_id(self) -> str:
+        """The code that stands there."""
+        return self.code.text().strip()
+
+    def entered(self) -> Entered:
+        """What stands in the fields about the participant."""
+        return Entered(
+            participant_id=self.participant_id,
+            read_back=self.code_again.text().strip(),
+            experiment=self.experiment.currentText(),
+            facts={fact: _text(field) for fact, field in self.facts.items()},
+        )
+
+    def beside(self) -> Beside:
+        """What is ticked."""
+        return Beside(
+            participant_screen=self.own_screen.isChecked(),
+            participant_keys=self.own_keys.isChecked(),
+            noise=self.noise.isChecked(),
+            monitor=self.monitor.currentIndex() if self.monitor.count() > 1 else None,
+        )
+
+    def show_facts(self, person: Participant | None) -> None:
+        """Show what is on record of somebody; where nothing is, what was typed before another's record stood there."""
+        if person is not None and person.facts is not None:
+            if self._typed is None:
+                self._typed = dict(self.entered().facts)
+            self._fill(typed_facts(person.facts))
+        elif self._typed is not None:
+            self._fill(self._typed)
+            self._typed = None
+
+    def _fill(self, values: dict[str, str]) -> None:
+        for fact, field in self.facts.items():
+            if isinstance(field, LineEdit):
+                field.setText(values[fact])
+            else:
+                field.setCurrentText(values[fact])
+
+
+def _beside_its_field(name: str) -> QLabel:
+    """The name of a field, at half its height."""
+    made = parts.label("", name, wrap=False)
+    made.setAlignment(Qt.AlignmentFlag.AlignVCenter)
+    made.setSizePolicy(QSizePolicy.Policy.Preferred, QSizePolicy.Policy.Expanding)
+    return made
+
+
+def _fact(fact: str) -> LineEdit | ListBox:
+    if fact in _LEVELS:
+        return ListBox(["", *_LEVELS[fact]])
+    line = LineEdit()
+    line.setMaxLength(_AGE_DIGITS)
+    return line
+
+
+def _text(field: Any) -> str:
+    return str(field.text() if isinstance(field, LineEdit) else field.currentText())
+
+
+def monitors() -> list[str]:
+    """The screens in the order of their numbers, as somebody in the lab would tell them apart."""
+    return [_monitor(number, screen) for number, screen in enumerate(QGuiApplication.screens())]
+
+
+def _monitor(number: int, screen: QScreen) -> str:
+    size = screen.size() * screen.devicePixelRatio()
+    return f"{number}: {screen.name()}, {size.width()} × {size.height()}"

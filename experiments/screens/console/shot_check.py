@@ -1,0 +1,170 @@
+"""A test shot: one shot of one method as a run fires it, beside the window, after a countdown. No Qt.
+
+The emergency stop is a latch: it is set before the gun is told to disarm, and looked at after the gun was armed and
+before it fires, so that nothing of this test fires after it, whatever the gun does meanwhile.
+"""
+
+from __future__ import annotations
+
+import threading
+from collections.abc import Callable, Iterator
+from contextlib import closing, suppress
+from dataclasses import dataclass
+from typing import Any, Literal
+
+from device import DeviceError, Gun, GunStatus, Shot, ShotReport, open_gun
+from device.words import Drive, Effect
+from experiments.clock import Clock
+from experiments.limits import drives
+from experiments.setup import Setup
+
+COUNTDOWN_S = 3
+SWITCH_OFF = "SWITCH OFF ITS POWER."
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Told:
+    """What a test shot has to tell: how far it is, the seconds until the shot, and at the end what came of it."""
+
+    phase: Literal["opening", "counting", "firing", "over"]
+    seconds: int = 0
+    fired: bool = False
+    text: str = ""
+    mood: str = "wait"
+
+
+class ShotCheck:
+    """One test shot of a method. `tell` is called from its own thread; the last it is told is `over`."""
+
+    def __init__(
+        self,
+        setup: Setup[Any],
+        method: str,
+        address: str,
+        clock: Clock,
+        tell: Callable[[Told], None],
+    ) -> None:
+        self._setup, self._method, self._address = setup, method, address
+        self._clock, self._tell = clock, tell
+        self._latched, self._off = threading.Event(), threading.Event()
+        self._gun: Gun | None = None
+        self._report: ShotReport | None = None
+        self._disarming: list[threading.Thread] = []
+
+    def start(self) -> None:
+        """Begin; returns at once."""
+        threading.Thread(target=self.carry_out, name="test shot", daemon=True).start()
+
+    def call_off(self) -> None:
+        """Fire no more, if it has not fired yet."""
+        self._off.set()
+
+    def emergency_stop(self) -> None:
+        """Latch, then disarm; returns at once, since a gun may take its time."""
+        self._latched.set()
+        self._off.set()
+        disarming = threading.Thread(target=self._disarm, name="emergency stop", daemon=True)
+        disarming.start()
+        self._disarming.append(disarming)
+
+    def _disarm(self) -> None:
+        gun = self._gun
+        if gun is not None:
+            with suppress(DeviceError):  # the thread that fires disarms as well, and reads back what came of it
+                gun.disarm()
+
+    def carry_out(self) -> None:
+        """All of it, in this thread."""
+        text, mood = "The test shot ended without a word; start Recoil from a terminal to see why.", "bad"
+        try:
+            text, mood = self._with_gun()
+        except (DeviceError, ValueError) as error:
+            text = f"Test shot of {self._label}: {error}"
+        finally:
+            self._tell(Told(phase="over", fired=self._report is not None, text=text, mood=mood))
+
+    @property
+    def _label(self) -> str:
+        return self._setup.gun.methods[self._method].label
+
+    def _with_gun(self) -> tuple[str, str]:
+        """Open, fire, disarm, read back, close; what came of it, and a word for the colour."""
+        self._tell(Told(phase="opening"))
+        methods = self._setup.gun.renderings(self._setup.config.design.methods)
+        drive = drives(self._setup)[self._method]
+        with closing(open_gun(self._address, methods, clock=self._clock.now)) as gun:
+            self._gun = gun
+            try:
+                outcome, mood = self._fire(gun, drive), "good"
+            except (DeviceError, ValueError) as error:
+                outcome, mood = f"Test shot of {self._label}: {error}.", "bad"
+            state, is_safe = state_text(self._disarmed(gun))
+        return f"{outcome} {state}", "bad" if self._latched.is_set() or not is_safe else mood
+
+    def _fire(self, gun: Gun, drive: Drive) -> str:
+        for seconds in range(COUNTDOWN_S, 0, -1):
+            self._tell(Told(phase="counting", seconds=seconds))
+            if self._off.wait(1.0):
+                break
+        if not self._off.is_set():
+            self._report = self._armed_shot(gun, drive)
+        return "Nothing was fired." if self._report is None else report_text(self._label, self._report, drive)
+
+    def _armed_shot(self, gun: Gun, drive: Drive) -> ShotReport | None:
+        """As the runner fires the first shot of a stimulus: armed for it alone, as soon as the magnet is home."""
+        self._tell(Told(phase="firing"))
+        gun.arm()
+        if self._off.wait(max(0.0, gun.status().ready_at_s - self._clock.now())):
+            return None
+        return gun.fire(Shot(method=self._method, direction="forward", drive=drive))
+
+    def _disarmed(self, gun: Gun) -> GunStatus | None:
+        """The state read back from the gun once it was told to disarm; `None` if it does not say."""
+        try:
+            gun.disarm()
+            for disarming in self._disarming:
+                disarming.join()
+            return gun.status()
+        except DeviceError:
+            return None
+
+
+def report_text(label: str, report: ShotReport, drive: Drive) -> str:
+    """What the gun reported of a shot, in words."""
+    return f"{label}: {' '.join(_report_sentences(report, drive))}"
+
+
+def _report_sentences(report: ShotReport, drive: Drive) -> Iterator[str]:
+    duration_ms = 1000 * (report.pulse_end_s - report.pulse_start_s)
+    if isinstance(drive, Effect):
+        yield f"the gun vibrated for {duration_ms:.0f} ms."
+    else:
+        yield f"the coil was driven at {drive.voltage_V:g} V for {duration_ms:.1f} ms."
+        yield _motion(report)
+    if report.timing is not None:
+        began_ms = 1000 * (report.pulse_start_s - report.timing.requested_s)
+        yield (
+            f"The pulse began {began_ms:.1f} ms after the request, by the gun's clock (to within "
+            f"{1000 * report.timing.uncertainty_s:.1f} ms)."
+        )
+
+
+def _motion(report: ShotReport) -> str:
+    """What the magnet did by the model: there is no sensor that sees it."""
+    if report.motion == "no-break-away":
+        return "By the model the magnet did not move."
+    if report.motion == "home":
+        home_ms = 1000 * (report.home_predicted_s - report.pulse_start_s)
+        return f"By the model the magnet moved, and was home after {home_ms:.0f} ms."
+    return f"By the model the magnet is not home ({report.motion})."
+
+
+def state_text(status: GunStatus | None) -> tuple[str, bool]:
+    """What the gun reports of itself, and whether it is safe to take."""
+    if status is None:
+        return f"The gun's state cannot be read: {SWITCH_OFF}", False
+    if status.fault is not None:
+        return f"The gun reports a fault ({status.fault}): {SWITCH_OFF}", False
+    if status.state != "disarmed":
+        return f"The gun reports: {status.state}. {SWITCH_OFF}", False
+    return "The gun reports: disarmed.", True

@@ -1,0 +1,204 @@
+"""`recoil configs --from JOURNAL --copy DIR`: the files that a run began with come back, to the very same hash."""
+
+from __future__ import annotations
+
+import json
+import re
+import shlex
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from experiments.canonical import canonical_json, sha256
+from experiments.clock import VirtualClock
+from experiments.journal import JournalError, read
+from experiments.load import ConfigError, load_setup, shipped_folder
+from experiments.places import PlaceError
+from experiments.roof.began_with import copy_began_with
+from experiments.run import Request, run
+from experiments.screens.synthetic import synthetic_screen
+from tests.conftest import Recoil
+
+ODD = 'A "quoted" \\ title,\n\tin two lines: 反冲 é \x7f'
+
+
+def configs(folder: Path) -> Path:
+    """The shipped configs, as a laboratory would have them in a folder of its own."""
+    folder.mkdir()
+    for source in shipped_folder().glob("*.toml"):
+        (folder / source.name).write_bytes(source.read_bytes())
+    return folder
+
+
+def edited(path: Path, *edits: tuple[str, str]) -> Path:
+    text = path.read_text(encoding="utf-8")
+    for old, new in edits:
+        assert old in text, f"no {old!r} any more"
+        text = text.replace(old, new, 1)
+    path.write_text(text, encoding="utf-8")
+    return path
+
+
+def journal_of(config: Path, results: Path) -> Path:
+    setup = load_setup(str(config))
+    done = run(Request(setup=setup, participant_id="P01", results=results, seed=1), synthetic_screen, VirtualClock())
+    return done.place.journal
+
+
+def with_a_table(folder: Path) -> Path:
+    from experiments.catalogue import CATALOGUE
+
+    columns = CATALOGUE["preference"].answer_columns
+    rows = ["P01,vibration,2.5", '"P01","asymmetric-1","6.25"', "P01,asymmetric-2,10"]
+    assert len(columns) == 3, columns
+    (folder / "answers").mkdir()
+    (folder / "answers" / "mine.csv").write_text("\n".join([",".join(columns), *rows]) + "\n", encoding="utf-8-sig")
+    return edited(
+        folder / "preference.toml", ('observer = "ratings"', 'observer = "table"\ntable = "answers/mine.csv"')
+    )
+
+
+def one_up(folder: Path) -> Path:
+    inner = folder / "examples"
+    inner.mkdir()
+    (inner / "hurry.toml").write_bytes((shipped_folder() / "examples" / "hurry.toml").read_bytes())
+    return inner / "hurry.toml"
+
+
+CASES: dict[str, Any] = {
+    "direction as shipped": lambda folder: folder / "direction.toml",
+    "preference as shipped": lambda folder: folder / "preference.toml",
+    "a title that has all that is hard to write": lambda folder: edited(
+        folder / "direction.toml", ('"Direction recognition of a shot"', json.dumps(ODD))
+    ),
+    "numbers that must come back exactly": lambda folder: edited(
+        folder / "direction.toml",
+        ("shift_s = 0.35", "shift_s = 0.30000000000000004"),
+        ("trial_s = 17.0", "trial_s = 17"),
+    ),
+    "a gun with strips and whole numbers": lambda folder: (
+        edited(
+            folder / "gun.toml",
+            ("voltage_V = 16.0", "voltage_V = 16"),
+            (
+                "voice_coil.friction_N = 1.12",
+                "[methods.asymmetric-2.strips]\ncoefficient = 0.7\nstiffness_N_m = 1300.0\ndeformation_m = 5e-4",
+            ),
+        ),
+        folder / "direction.toml",
+    )[1],
+    "a seed of its own": lambda folder: edited(folder / "direction.toml", ("[design]", "seed = 7\n[design]")),
+    "a table of answers in a folder below": with_a_table,
+    "a gun in the folder above, instructions, who feels": one_up,
+}
+
+
+@pytest.mark.parametrize("case", CASES)
+def test_the_files_that_a_run_began_with_load_to_the_same_setup(case: str, tmp_path: Path) -> None:
+    config = CASES[case](configs(tmp_path / "lab"))
+    journal = journal_of(config, tmp_path / "results")
+    copied = copy_began_with(journal, tmp_path / "back")
+    assert load_setup(str(copied[0])).record() == load_setup(str(config)).record()
+    assert load_setup(str(copied[0])).sha256() == read(journal).header["setup_sha256"]
+    assert all(path.is_relative_to(tmp_path / "back") for path in copied)
+
+
+def test_a_resume_that_was_refused_names_the_command_that_makes_it_possible(recoil: Recoil, tmp_path: Path) -> None:
+    lab = configs(tmp_path / "my lab")
+    journal = journal_of(lab / "direction.toml", tmp_path / "results")
+    whole = journal.read_bytes().splitlines(keepends=True)
+    journal.write_bytes(b"".join(whole[:9]))
+    edited(lab / "direction.toml", ("between_sets_s = 20.0", "between_sets_s = 25.0"))
+
+    def resume(config: str) -> Any:
+        options = ("--participant", "P01", "--screen", "synthetic", "--results", tmp_path / "results", "--resume")
+        return recoil("run", config, *options)
+
+    refused = resume("my lab/direction.toml")
+    assert refused.returncode == 2
+    command = re.search(r"`recoil (configs --from .* --copy) DIR`", refused.stderr)
+    assert command is not None, refused.stderr
+    given = recoil(*shlex.split(command[1]), "back")
+    assert given.returncode == 0, given.stderr
+    assert given.stdout.splitlines() == ["back/direction.toml", "back/gun.toml"]
+    assert resume("back/direction.toml").returncode == 0
+    assert read(journal).finished
+
+
+def test_nothing_is_overwritten_and_then_nothing_is_written(tmp_path: Path) -> None:
+    journal = journal_of(configs(tmp_path / "lab") / "direction.toml", tmp_path / "results")
+    (tmp_path / "back").mkdir()
+    (tmp_path / "back" / "gun.toml").write_text("mine")
+    with pytest.raises(PlaceError, match=r"gun\.toml: already there; nothing is overwritten"):
+        copy_began_with(journal, tmp_path / "back")
+    assert [path.name for path in (tmp_path / "back").iterdir()] == ["gun.toml"]
+    assert (tmp_path / "back" / "gun.toml").read_text() == "mine"
+
+
+def forged(journal: Path, **changes: Any) -> Path:
+    """The journal with another setup at its head, hashed as it should be."""
+    head = json.loads(journal.read_bytes().splitlines()[0])
+    for part, values in changes.items():
+        head["setup"][part] |= values
+    head["setup_sha256"] = sha256(head["setup"])
+    journal.write_bytes(canonical_json(head) + b"\n")
+    return journal
+
+
+@pytest.mark.parametrize(
+    ("name", "error", "said"),
+    [
+        ("/etc/gun.toml", PlaceError, "no place inside a folder of copies"),
+        ("gun\0.toml", PlaceError, "no place inside a folder of copies"),
+        ("direction.toml", ConfigError, "does not load here"),
+    ],
+)
+def test_a_gun_that_cannot_lie_beside_its_config_is_refused(
+    name: str, error: type[Exception], said: str, tmp_path: Path
+) -> None:
+    journal = journal_of(configs(tmp_path / "lab") / "direction.toml", tmp_path / "results")
+    with pytest.raises(error, match=said):
+        copy_began_with(forged(journal, experiment={"gun": name}), tmp_path / "back")
+    assert not list(tmp_path.rglob("back/**/*.toml"))
+
+
+@pytest.mark.parametrize("name", ["../gun.toml", "../../guns/gun.toml", "guns/../../gun.toml"])
+def test_no_name_of_a_gun_leads_out_of_the_folder_of_copies(name: str, tmp_path: Path) -> None:
+    journal = journal_of(configs(tmp_path / "lab") / "direction.toml", tmp_path / "results")
+    (tmp_path / "back").mkdir()
+    before = {path for path in tmp_path.rglob("*") if not path.is_relative_to(tmp_path / "back")}
+    try:
+        copied = copy_began_with(forged(journal, experiment={"gun": name}), tmp_path / "back")
+    except ConfigError:
+        copied = []
+    assert {path for path in tmp_path.rglob("*") if not path.is_relative_to(tmp_path / "back")} == before
+    assert bool(copied) is not name.startswith("guns/")
+
+
+def test_what_does_not_load_to_the_same_hash_is_taken_away_again(tmp_path: Path) -> None:
+    journal = journal_of(configs(tmp_path / "lab") / "direction.toml", tmp_path / "results")
+    with pytest.raises(ConfigError, match=r"line 1: the run began with setup [0-9a-f]{12}, but this version"):
+        copy_began_with(forged(journal, gun={"serial": {"round_trip_limit_s": 0.02}}), tmp_path / "back")
+    assert not list((tmp_path / "back").iterdir())
+
+
+@pytest.mark.parametrize(
+    ("data", "said"),
+    [
+        (b"", "line 1: no whole record"),
+        (b'{"kind": "run"', "line 1: no whole record"),
+        (b'{"kind": "step", "n": 0, "link": ""}\n', "line 1: not the head of a journal"),
+        (b"PK\x03\x04\n", "line 1: not a JSON record"),
+    ],
+)
+def test_a_file_that_is_no_journal_is_refused(data: bytes, said: str, tmp_path: Path) -> None:
+    (tmp_path / "some.jsonl").write_bytes(data)
+    with pytest.raises(JournalError, match=said):
+        copy_began_with(tmp_path / "some.jsonl", tmp_path / "back")
+
+
+def test_from_goes_with_copy(recoil: Recoil) -> None:
+    done = recoil("configs", "--from", "some_journal.jsonl")
+    assert done.returncode == 2
+    assert "--from goes with --copy DIR" in done.stderr

@@ -1,0 +1,327 @@
+"""The start window on virtual screens, by real keys: it fits, opens as it was left, and ends when it is told to."""
+
+from __future__ import annotations
+
+import os
+import shutil
+import signal
+import subprocess
+import time
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from experiments.clock import VirtualClock
+from experiments.load import load_setup
+from experiments.register import read
+from experiments.roof.folders import new_study
+from experiments.run import Request, run
+from experiments.screens.synthetic import synthetic_screen
+from tests import watched_start
+from tests.at_display import AtDisplay, last_record, needs_display
+from tests.conftest import RECOIL
+from tests.watched_start import wait_for
+
+pytest.importorskip("PyQt6")
+pytestmark = needs_display
+needs_manager = pytest.mark.skipif(shutil.which("openbox") is None, reason="needs a window manager: openbox")
+
+LONG = "a-folder-with-a-name-that-has-no-blank-at-which-a-line-could-be-broken-and-goes-on-and-on"
+
+
+@contextmanager
+def virtual_screen(size: str, *, manager: bool = False) -> Iterator[str]:
+    """A virtual screen of a size, with or without a window manager; its name."""
+    read_end, write_end = os.pipe()
+    words = ["Xvfb", "-displayfd", str(write_end), "-screen", "0", f"{size}x24", "-nolisten", "tcp", "-noreset"]
+    programs = [subprocess.Popen(words, pass_fds=[write_end], stderr=subprocess.DEVNULL)]
+    os.close(write_end)
+    try:
+        with os.fdopen(read_end) as told:
+            name = f":{told.readline().strip()}"
+        if manager:
+            quiet = {"stdout": subprocess.DEVNULL, "stderr": subprocess.DEVNULL}
+            programs.append(subprocess.Popen(["openbox"], env=os.environ | {"DISPLAY": name}, **quiet))
+        yield name
+    finally:
+        for program in reversed(programs):
+            program.terminate()
+            program.wait()
+
+
+@pytest.fixture(scope="module")
+def display() -> Iterator[str]:
+    with virtual_screen("1280x800") as name:
+        yield name
+
+
+@pytest.fixture
+def pilot(tmp_path: Path) -> Path:
+    """A study in which P01 stopped, in a folder with a long name."""
+    new_study(tmp_path / "pilot")
+    setup = load_setup(str(tmp_path / "pilot" / "direction.toml"))
+    where = Request(setup=setup, participant_id="P01", results=tmp_path / LONG, seed=1)
+    journal = run(where, synthetic_screen, VirtualClock()).place.journal
+    journal.write_bytes(b"".join(journal.read_bytes().splitlines(keepends=True)[:40]))
+    return tmp_path
+
+
+@contextmanager
+def started(folder: Path, display: str, *more: object) -> Iterator[tuple[AtDisplay, Path]]:
+    """The start window under the eye: the program at the display, and what the eye saw."""
+    eye = folder / "eye.jsonl"
+    eye.unlink(missing_ok=True)
+    command = [RECOIL, "run", folder / "pilot" / "direction.toml", "--screen", "console", "--results", LONG, *more]
+    with AtDisplay(watched_start.words(eye, command), folder, display) as screen:
+        screen.focus_on("start")
+        yield screen, eye
+
+
+def having(*starts: str) -> Callable[[dict[str, Any]], bool]:
+    """Whether texts that begin so stand in the window, and nothing is cut."""
+
+    def right(look: dict[str, Any]) -> bool:
+        return not look["cut"] and all(any(text.startswith(start) for text in look["texts"]) for start in starts)
+
+    return right
+
+
+def enter(screen: AtDisplay, code: str = "P01") -> None:
+    """The read-back, and what the study asks for."""
+    keys = screen.keys
+    keys.type(code)
+    keys.press("Tab")
+    keys.type("25")
+    for _ in range(2):
+        keys.press("Tab")
+        keys.press("Down")
+
+
+# it fits
+
+
+SCREENS = [("1024x600", 1, False), ("1366x768", 1, True), ("1920x1080", 1, False), ("1536x1024", 1.5, True)]
+
+
+@pytest.mark.parametrize(
+    ("size", "scale", "manager"),
+    [pytest.param(*screen, marks=needs_manager if screen[2] else ()) for screen in SCREENS],
+)
+def test_nothing_is_cut_on_a_small_a_usual_a_large_and_a_scaled_screen(
+    size: str, scale: float, manager: bool, pilot: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("QT_SCALE_FACTOR", str(scale))
+    with virtual_screen(size, manager=manager) as display, started(pilot, display) as (screen, eye):
+        keys = screen.keys
+        look = wait_for(eye, having("SIMULATED GUN", "Start", "Quit", "Next: P01", "P01 stopped direction on "))
+        assert look["size"][0] == look["screen"][0]  # it opens as wide as the screen
+        keys.press("Return", "Control_L")
+        wait_for(eye, having("Read the code back: type"))
+        enter(screen)
+        keys.press("Return", "Control_L")
+        wait_for(eye, having("The gun is SIMULATED", "Start, simulated", "Leave it"))
+        keys.press("s", "Control_L")
+        wait_for(eye, having("P01 stopped direction on ", "Go on with it", "Set it aside, start anew"))
+        keys.press("n", "Control_L")
+        wait_for(eye, having("Type why, first.", "Go on with it"))
+        keys.press("e", "Alt_L")
+        wait_for(eye, having("Exclude P01?", "Exclude P01  ["))
+        keys.press("t", "Control_L")
+        wait_for(eye, having("STAND CLEAR", "EMERGENCY STOP  [F12]", "Call it off", "SIMULATED GUN"))
+        keys.press("F12")
+        wait_for(eye, having("EMERGENCY STOP", "Nothing was fired. The gun reports: disarmed.", "Back"))
+
+
+def test_type_is_larger_in_a_larger_window() -> None:
+    from experiments.screens.console.windows import type_scale
+
+    sizes = [(1024, 600), (1366, 749), (1536, 960), (1920, 1080), (3840, 2160)]
+    scales = [type_scale(*size) for size in sizes]
+    assert scales == sorted(set(scales))
+    assert type_scale(320, 200) < 1 < type_scale(10_000, 10_000) < 3
+
+
+# it opens as it was left
+
+
+@needs_manager
+def test_the_window_opens_maximised_and_then_as_it_was_left(pilot: Path) -> None:
+    with virtual_screen("1600x1000", manager=True) as display:
+        with started(pilot, display) as (screen, eye):
+            wait_for(eye, lambda look: look.get("maximised", False))
+            screen.keys.press("d", "Alt_L")  # a key that does nothing here
+            toggle(display)
+            left = wait_for(eye, lambda look: look.get("maximised") is False and look["size"][0] < 1600)
+            screen.keys.press("q", "Control_L")
+            assert screen.end()[0] == 0
+        with started(pilot, display) as (screen, eye):
+            assert wait_for(eye, lambda look: "size" in look)["size"] == left["size"]
+            screen.keys.press("q", "Control_L")
+            assert screen.end()[0] == 0
+
+
+def toggle(display: str) -> None:
+    """Have the window made smaller, as by its title bar: the window manager is asked, as a pager would."""
+    from Xlib import X
+    from Xlib.display import Display
+    from Xlib.protocol.event import ClientMessage
+
+    at = Display(display)
+    root = at.screen().root
+    (number,) = root.get_full_property(at.intern_atom("_NET_ACTIVE_WINDOW"), X.AnyPropertyType).value
+    window = at.create_resource_object("window", number)
+    across, down = (at.intern_atom(f"_NET_WM_STATE_MAXIMIZED_{axis}") for axis in ("HORZ", "VERT"))
+    message = ClientMessage(
+        window=window, client_type=at.intern_atom("_NET_WM_STATE"), data=(32, [0, across, down, 1, 0])
+    )
+    root.send_event(message, event_mask=X.SubstructureRedirectMask | X.SubstructureNotifyMask)
+    at.sync()
+    window.configure(width=1100, height=700)
+    at.sync()
+    at.close()
+
+
+# it ends when it is told to
+
+
+@pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGINT])
+def test_a_signal_ends_the_start_window(number: signal.Signals, pilot: Path, display: str) -> None:
+    with started(pilot, display) as (screen, eye):
+        wait_for(eye, having("Next: P01"))
+        screen.process.send_signal(number)
+        code, said = screen.end()
+    assert code == 130
+    assert said == f"recoil: ended by {number.name}\n"
+
+
+def test_a_signal_ends_the_question_of_an_unfinished_run(pilot: Path, display: str) -> None:
+    command = [RECOIL, "run", pilot / "pilot" / "direction.toml", "--screen", "console", "--participant", "P01"]
+    before = (pilot / LONG / "sub-P01" / "sub-P01_task-direction_journal.jsonl").read_bytes()
+    with AtDisplay([*command, "--results", LONG], pilot, display) as screen:
+        screen.focus_on("unfinished")
+        screen.process.terminate()
+        assert screen.end()[0] == 130
+    assert (pilot / LONG / "sub-P01" / "sub-P01_task-direction_journal.jsonl").read_bytes() == before
+
+
+def test_a_signal_in_a_test_shot_disarms_and_ends_it(pilot: Path, display: str) -> None:
+    with started(pilot, display) as (screen, eye):
+        wait_for(eye, having("Next: P01"))
+        screen.keys.press("t", "Control_L")
+        wait_for(eye, having("STAND CLEAR"))
+        screen.process.terminate()
+        code, _ = screen.end()
+    assert code == 130
+    assert not any("Fired" in look["texts"] for look in watched_start.seen(eye))
+
+
+def test_a_signal_in_a_run_ends_the_day_as_well(pilot: Path, display: str) -> None:
+    journal = pilot / LONG / "sub-P02" / "sub-P02_task-direction_journal.jsonl"
+    with started(pilot, display) as (screen, eye):
+        wait_for(eye, having("Next: P01"))
+        screen.keys.press("Tab", "Shift_L")
+        screen.keys.type("P02")
+        screen.keys.press("Tab")
+        enter(screen, "P02")
+        screen.keys.press("Return", "Control_L")
+        screen.keys.press("s", "Control_L")
+        wait_until(lambda: last_record(journal).get("kind") == "step")
+        opened = len(watched_start.seen(eye))
+        screen.process.terminate()
+        code, said = screen.end()
+    assert code == 130, said
+    assert last_record(journal)["kind"] == "stopped"
+    assert not any(look["texts"] for look in watched_start.seen(eye)[opened:])
+
+
+def wait_until(happened: Callable[[], bool], timeout_s: float = 60) -> None:
+    end_s = time.monotonic() + timeout_s
+    while not happened() and time.monotonic() < end_s:
+        time.sleep(0.02)
+    assert happened()
+
+
+# hands
+
+
+def test_a_key_that_is_held_tests_one_method(pilot: Path, display: str) -> None:
+    with started(pilot, display) as (screen, eye):
+        wait_for(eye, having("Next: P01"))
+        hold_down(screen, "Control_L", "t")
+        wait_for(eye, having("Fired", "Vibration: the gun vibrated"))
+        time.sleep(1.0)  # the server repeats a held key some 25 times a second
+        hold_down(screen, "t", "Control_L", down=False)
+        looks = watched_start.seen(eye)
+        screen.keys.press("Escape")
+        screen.keys.press("q", "Control_L")
+        assert screen.end()[0] == 0
+    begun = [look for look, before in zip(looks[1:], looks, strict=False) if began(look) and not began(before)]
+    assert len(begun) == 1
+
+
+def began(look: dict[str, Any]) -> bool:
+    return "STAND CLEAR" in look["texts"]
+
+
+def hold_down(screen: AtDisplay, *names: str, down: bool = True) -> None:
+    """Press keys and keep them down, or let them go."""
+    from Xlib import XK, X
+    from Xlib.ext import xtest
+
+    display = screen.keys._display
+    for name in names:
+        code = display.keysym_to_keycode(XK.string_to_keysym(name))
+        xtest.fake_input(display, X.KeyPress if down else X.KeyRelease, code)
+    display.sync()
+
+
+def test_a_double_press_of_practice_practises_once(pilot: Path, display: str) -> None:
+    practice = pilot / LONG / "sub-P01"
+    with started(pilot, display) as (screen, eye):
+        wait_for(eye, having("Next: P01"))
+        enter(screen)
+        for _ in range(2):
+            screen.keys.press("p", "Control_L")
+        wait_until(lambda: last_record(practice / "sub-P01_task-direction_practice_journal.jsonl") != {})
+        screen.process.terminate()
+        assert screen.end()[0] == 130
+    assert len(list(practice.glob("*practice_journal*"))) == 1
+
+
+def test_starting_anew_from_the_window_keeps_the_reason(pilot: Path, display: str) -> None:
+    folder = pilot / LONG / "sub-P01"
+    with started(pilot, display) as (screen, eye):
+        wait_for(eye, having("Next: P01"))
+        enter(screen)
+        screen.keys.press("Return", "Control_L")
+        screen.keys.press("s", "Control_L")
+        wait_for(eye, having("P01 stopped direction on ", "Go on with it"))
+        screen.keys.press("n", "Control_L")  # without a reason the line for it gets the keys
+        screen.keys.type("loose")
+        screen.keys.press("n", "Control_L")
+        wait_until(lambda: len(list(folder.glob("*journal*.jsonl"))) == 2)
+        wait_until(lambda: last_record(folder / "sub-P01_task-direction_journal.jsonl").get("kind") == "step")
+        screen.process.terminate()
+        assert screen.end()[0] == 130
+    said = [(one.kind, getattr(one, "reason", "")) for _, one in read(pilot / LONG).entries]
+    assert said == [("joined", ""), ("set-aside", "loose")]
+
+
+# what was asked for on the command line
+
+
+def test_what_was_asked_for_is_ticked_and_a_screen_that_is_not_there_is_refused(pilot: Path, display: str) -> None:
+    ticks = ("--participant-screen", "--participant-keys", "--noise", "--participant-monitor", 0)
+    with started(pilot, display, *ticks) as (screen, eye):
+        look = wait_for(eye, having("rates on a screen of their own"))
+        assert look["ticked"] == ["rates on a screen of their own", "answers with own keys", "hears masking noise"]
+        screen.keys.press("q", "Control_L")
+        assert screen.end()[0] == 0
+    command = [RECOIL, "run", pilot / "pilot" / "direction.toml", "--screen", "console", "--participant-monitor", 7]
+    with AtDisplay(command, pilot, display) as screen:
+        code, said = screen.end()
+    assert code == 2
+    assert "--participant-monitor 7: there is no such screen; known are 0: " in said

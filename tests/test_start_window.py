@@ -1,0 +1,783 @@
+"""The start window by keys, fields and clicks, off screen: what it proposes, asks, refuses, records and chooses."""
+
+from __future__ import annotations
+
+import os
+import shutil
+import tempfile
+import time
+from collections.abc import Callable, Iterator
+from functools import lru_cache
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+pytest.importorskip("PyQt6")
+os.environ.setdefault("QT_QPA_PLATFORM", "offscreen")
+
+from PyQt6.QtCore import QEvent, QPoint, QPointF, QRect, Qt
+from PyQt6.QtGui import QKeyEvent, QWheelEvent
+from PyQt6.QtTest import QTest
+from PyQt6.QtWidgets import QApplication, QPushButton, QWidget
+
+from experiments import enrolment, register
+from experiments.clock import RealClock, VirtualClock
+from experiments.journal import hold
+from experiments.load import load_setup
+from experiments.places import place
+from experiments.register import read
+from experiments.roof.folders import new_study
+from experiments.run import Request, run
+from experiments.screens.console import theme
+from experiments.screens.console.app import application
+from experiments.screens.console.form import Beside
+from experiments.screens.console.live import _study
+from experiments.screens.console.opening import Opening
+from experiments.screens.console.start import StartWindow
+from experiments.screens.synthetic import synthetic_screen
+from experiments.standings import StudyFolder, open_study
+from experiments.study import Facts
+
+FACTS = Facts(age_years=25, sex="female", handedness="right")
+PATIENCE_S = 60
+SERIAL = "serial:/dev/nowhere"
+
+
+@pytest.fixture(scope="module", autouse=True)
+def qt() -> None:
+    application()
+
+
+@pytest.fixture
+def study(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> StudyFolder:
+    monkeypatch.setenv("XDG_CONFIG_HOME", str(tmp_path / "config"))
+    new_study(tmp_path / "pilot")
+    return open_study(tmp_path / "pilot")
+
+
+Open = Callable[..., StartWindow]
+
+
+@pytest.fixture
+def opened(study: StudyFolder) -> Iterator[Open]:
+    """Opens start windows, with a real gun's address unless told otherwise; none opens the gun before a test shot."""
+    windows: list[StartWindow] = []
+
+    def open_(**how: Any) -> StartWindow:
+        window = StartWindow(study, Opening(**{"gun": SERIAL} | how), RealClock())
+        windows.append(window)
+        window.resize(1280, 800)
+        window.show()
+        window.activateWindow()
+        assert QTest.qWaitForWindowActive(window, 1000 * PATIENCE_S)
+        return window
+
+    yield open_
+    for window in windows:
+        window.close()
+        window.deleteLater()
+
+
+def do(study: StudyFolder, code: str, experiment: str = "direction", records: int | None = None) -> Path:
+    """A run by a synthetic participant, to its end or broken off after some records; its journal."""
+    where = place(study.results, code, experiment)
+    where.folder.mkdir(parents=True, exist_ok=True)
+    where.journal.write_bytes(b"".join(whole_run(code, experiment)[:records]))
+    return where.journal
+
+
+@lru_cache
+def whole_run(code: str, experiment: str) -> list[bytes]:
+    """The lines of the journal of a run with the shipped configs."""
+    with tempfile.TemporaryDirectory() as results:
+        request = Request(setup=load_setup(experiment), participant_id=code, results=Path(results))
+        return run(request, synthetic_screen, VirtualClock()).place.journal.read_bytes().splitlines(keepends=True)
+
+
+def join(study: StudyFolder, code: str, facts: Facts = FACTS) -> None:
+    enrolment.join(study, code, facts, VirtualClock())
+
+
+def key(window: QWidget, name: str, *held: Qt.KeyboardModifier) -> None:
+    """A key pressed and let go, with others held, wherever the keys go to."""
+    modifiers = Qt.KeyboardModifier.NoModifier
+    for one in held:
+        modifiers |= one
+    target = QApplication.focusWidget() or window
+    QTest.keyClick(target, getattr(Qt.Key, f"Key_{name}"), modifiers)
+
+
+CTRL, ALT = Qt.KeyboardModifier.ControlModifier, Qt.KeyboardModifier.AltModifier
+
+
+def until(happened: Callable[[], bool]) -> None:
+    end_s = time.monotonic() + PATIENCE_S
+    while not happened() and time.monotonic() < end_s:
+        QTest.qWait(5)
+    assert happened()
+
+
+def fill(window: StartWindow, code: str, facts: Facts | None = FACTS, again: str | None = None) -> None:
+    """Fill the form; `again` is what is read back."""
+    window.form.code.setText(code)
+    window.form.code_again.setText(code if again is None else again)
+    if facts is not None:
+        window.form.facts["age_years"].setText(str(facts.age_years))
+        for fact in ("sex", "handedness"):
+            window.form.facts[fact].setCurrentText(getattr(facts, fact))
+
+
+def question(window: StartWindow) -> str:
+    return window.question.text.toPlainText() if window.question is not None else ""
+
+
+def said(window: StartWindow) -> str:
+    return window.saved.toPlainText()
+
+
+def remark(window: StartWindow) -> str:
+    return window.form.remark.toPlainText()
+
+
+def experiment(window: StartWindow) -> str:
+    return str(window.form.experiment.currentText())
+
+
+def entries(study: StudyFolder) -> list[tuple[str, str]]:
+    return [(one.kind, one.participant_id) for _, one in read(study.results).entries]
+
+
+def table(window: StartWindow) -> dict[str, list[str]]:
+    rows = range(window.table.rowCount())
+    cells = [[window.table.item(row, column).text() for column in range(window.table.columnCount())] for row in rows]
+    return {line[0]: line[1:] for line in cells}
+
+
+# the experiment follows the code
+
+
+def test_a_code_that_is_typed_sets_the_first_experiment_that_they_have_not_done(
+    study: StudyFolder, opened: Open
+) -> None:
+    do(study, "P01")
+    window = opened()
+    assert (window.form.code.text(), experiment(window)) == ("P01", "preference")
+    window.form.code.clear()
+    QTest.keyClicks(window.form.code, "P02")
+    assert experiment(window) == "direction"
+    assert remark(window) == "P02 is new."
+    window.form.code.clear()
+    QTest.keyClicks(window.form.code, "P01")
+    assert experiment(window) == "preference"
+
+
+def test_a_row_that_is_chosen_sets_code_and_experiment(study: StudyFolder, opened: Open) -> None:
+    do(study, "P01")
+    do(study, "P02", records=40)
+    window = opened()
+    assert window.form.code.text() == "P02"
+    window.table.selectRow(0)
+    assert (window.form.code.text(), experiment(window)) == ("P01", "preference")
+
+
+def test_a_row_that_was_chosen_before_is_chosen_again_by_a_click(study: StudyFolder, opened: Open) -> None:
+    do(study, "P01")
+    window = opened()
+    window.table.selectRow(0)
+    window.form.code.setText("P09")
+    item = window.table.item(0, 0)
+    assert item is not None
+    place = window.table.visualItemRect(item).center()
+    QTest.mouseClick(window.table.viewport(), Qt.MouseButton.LeftButton, pos=place)
+    assert window.form.code.text() == "P01"
+
+
+def test_to_break_the_order_of_the_study_is_said_in_words_and_a_new_code_mends_it(
+    study: StudyFolder, opened: Open
+) -> None:
+    do(study, "P01")
+    window = opened()
+    window.form.code.setText("P02")
+    window.form.experiment.setCurrentText("preference")
+    assert remark(window) == "Order broken: direction comes before preference in this study, and P02 has not done it."
+    window.form.code.setText("P03")
+    assert experiment(window) == "direction"
+    assert remark(window) == "P03 is new."
+
+
+def test_who_was_there_stays_if_they_have_something_left_to_do(study: StudyFolder, opened: Open) -> None:
+    for code in ("P01", "P02"):
+        join(study, code)
+    assert opened(participant_id="P02").form.code.text() == "P02"
+    for name in study.experiments:
+        do(study, "P02", name)
+    assert opened(participant_id="P02").form.code.text() == "P01"
+
+
+@pytest.mark.parametrize(
+    ("named", "words"),
+    [
+        ("direction", "direction was named, but P01 has done it: preference is chosen."),
+        ("preference", ""),
+    ],
+)
+def test_where_the_experiment_is_not_the_one_that_was_named_it_is_said_why(
+    named: str, words: str, study: StudyFolder, opened: Open
+) -> None:
+    do(study, "P01")
+    window = opened(named=named)
+    assert (said(window), experiment(window)) == (words, "preference")
+
+
+def test_an_experiment_that_was_named_too_early_is_not_chosen(opened: Open) -> None:
+    window = opened(named="preference")
+    assert experiment(window) == "direction"
+    assert said(window) == "preference was named, but P01 comes to direction first: direction is chosen."
+
+
+def test_a_config_that_the_study_does_not_name_is_run_alone_by_the_rules_of_the_study(study: StudyFolder) -> None:
+    folder = study.source.parent
+    shutil.copy(folder / "direction.toml", folder / "mine.toml")
+    asked = Request(setup=load_setup(str(folder / "mine.toml")), participant_id="", results=study.results)
+    found = _study(asked)
+    assert [one.source.name for one in found.setups] == ["mine.toml"]
+    assert found.config == study.config
+    named = Request(setup=load_setup(str(folder / "preference.toml")), participant_id="", results=study.results)
+    assert [one.source.name for one in _study(named).setups] == ["direction.toml", "preference.toml"]
+
+
+def test_what_cannot_be_read_is_said_when_the_window_opens_below_what_there_is_to_say(
+    study: StudyFolder, opened: Open
+) -> None:
+    journal = do(study, "P01")
+    journal.write_bytes(b"damage\n")
+    first, second = said(opened(said="P02 stopped: emergency stop.")).splitlines()
+    assert first == "P02 stopped: emergency stop."
+    assert "line 1: not a JSON record" in second
+
+
+# starting
+
+
+def test_start_chooses_who_was_entered_and_has_their_facts_on_record(study: StudyFolder, opened: Open) -> None:
+    window = opened()
+    fill(window, "P01")
+    window.form.own_screen.setChecked(True)
+    key(window, "Return", CTRL)
+    choice = window.choice
+    assert choice is not None
+    assert (choice.participant_id, choice.setup.config.experiment, choice.again) == ("P01", "direction", "ask")
+    assert (choice.participant_screen, choice.participant_keys, choice.noise, choice.practice) == (
+        True,
+        False,
+        False,
+        False,
+    )
+    assert not window.isVisible()
+    assert read(study.results).members["P01"].facts == FACTS
+
+
+@pytest.mark.parametrize(
+    ("entered", "words"),
+    [
+        (("P01", FACTS, "P1"), "Read the code back"),
+        (("", FACTS, ""), "Type the participant's code"),
+        (("P 1", FACTS, "P 1"), "must be 1 to 32 letters and digits"),
+        (("P01", None, "P01"), "Not given: age_years, sex, handedness"),
+        (("P01", Facts(age_years=31, sex="male", handedness="right"), "P01"), "not eligible: age_years = 31"),
+    ],
+)
+@pytest.mark.parametrize("press", ["Return", "P"])
+def test_start_and_practice_refuse_alike_and_record_nothing(
+    press: str, entered: tuple[str, Facts | None, str], words: str, study: StudyFolder, opened: Open
+) -> None:
+    window = opened()
+    fill(window, *entered)
+    key(window, press, CTRL)
+    assert words in said(window)
+    assert window.choice is None
+    assert entries(study) == []
+
+
+def test_a_double_click_on_start_starts_once(study: StudyFolder, opened: Open) -> None:
+    window = opened()
+    closings: list[object] = []
+    window.closed.connect(lambda: closings.append(window.choice))
+    fill(window, "P01")
+    start = next(b for b in window.findChildren(QPushButton) if b.text().startswith("Start"))
+    QTest.mouseClick(start, Qt.MouseButton.LeftButton)
+    QTest.mouseDClick(start, Qt.MouseButton.LeftButton)
+    assert len(closings) == 1
+    assert entries(study) == [("joined", "P01")]
+
+
+def test_a_double_click_on_start_does_not_answer_the_question_that_it_raised(study: StudyFolder, opened: Open) -> None:
+    do(study, "P01", records=40)
+    window = opened()
+    fill(window, "P01")
+    start = next(b for b in window.findChildren(QPushButton) if b.text().startswith("Start"))
+    QTest.mouseClick(start, Qt.MouseButton.LeftButton)
+    QTest.mouseDClick(start, Qt.MouseButton.LeftButton)
+    assert window.choice is None
+    assert question(window).startswith("P01 stopped direction on ")
+
+
+def test_enter_in_a_field_goes_on_to_the_next_and_never_starts(opened: Open) -> None:
+    window = opened()
+    fill(window, "P01")
+    window.form.code.setFocus()
+    seen = []
+    for _ in range(3):
+        seen.append(QApplication.focusWidget())
+        key(window, "Return")
+    assert seen == [window.form.code, window.form.code_again, window.form.facts["age_years"]]
+    assert window.choice is None
+
+
+def test_a_code_that_a_scanner_types_at_once_keeps_its_double_digits(opened: Open) -> None:
+    window = opened()
+    window.form.code.clear()
+    for digit in "P0011":  # so fast that Qt takes the second of two for a key that is held
+        repeated = window.form.code.text().endswith(digit)
+        press = QKeyEvent(QEvent.Type.KeyPress, ord(digit), Qt.KeyboardModifier.NoModifier, digit, repeated)
+        QApplication.sendEvent(window.form.code, press)
+    assert window.form.code.text() == "P0011"
+
+
+def test_letters_that_are_typed_are_no_commands(opened: Open) -> None:
+    window = opened()
+    window.form.code.clear()
+    window.form.code.setFocus()
+    QTest.keyClicks(window.form.code, "qtpresgn")
+    assert window.form.code.text() == "qtpresgn"
+    assert window.isVisible()
+    assert not window.shots.is_running
+
+
+def held(widget: QWidget, name: str, modifiers: Qt.KeyboardModifier, text: str = "") -> None:
+    """What a key that is held sends again and again."""
+    for _ in range(5):
+        press = QKeyEvent(QEvent.Type.KeyPress, getattr(Qt.Key, f"Key_{name}"), modifiers, text, True)
+        QApplication.sendEvent(widget, press)
+
+
+def test_a_key_that_is_held_since_before_the_window_does_nothing(study: StudyFolder, opened: Open) -> None:
+    do(study, "P01", records=40)
+    window = opened()
+    fill(window, "P01")
+    window.form.code_again.setFocus()
+    for name in ("Return", "Q", "P", "R", "T"):
+        held(window.form.code_again, name, CTRL)
+    held(window.form.code_again, "Return", Qt.KeyboardModifier.NoModifier, "\r")
+    assert window.form.code_again.text() == "P01"
+    assert QApplication.focusWidget() is window.form.code_again
+    assert window.choice is None
+    assert question(window) == ""
+    assert window.isVisible()
+
+
+def test_the_wheel_over_a_list_does_not_turn_it(opened: Open) -> None:
+    window = opened()
+    box = window.form.experiment
+    wheel = QWheelEvent(
+        QPointF(5, 5),
+        box.mapToGlobal(QPointF(5, 5)),
+        QPoint(0, -120),
+        QPoint(0, -120),
+        Qt.MouseButton.NoButton,
+        Qt.KeyboardModifier.NoModifier,
+        Qt.ScrollPhase.NoScrollPhase,
+        False,
+    )
+    QApplication.sendEvent(box, wheel)
+    assert experiment(window) == "direction"
+
+
+# an unfinished run
+
+
+def ask_resume(window: StartWindow, code: str = "P01") -> None:
+    fill(window, code)
+    key(window, "Return", CTRL)
+    assert question(window).startswith(f"{code} stopped direction on ")
+
+
+def test_to_go_on_is_chosen_by_its_own_key(study: StudyFolder, opened: Open) -> None:
+    do(study, "P01", records=40)
+    window = opened()
+    ask_resume(window)
+    key(window, "G", CTRL)
+    assert window.choice is not None
+    assert (window.choice.again, window.choice.anew_reason) == ("resume", "")
+
+
+def test_to_start_anew_takes_a_reason(study: StudyFolder, opened: Open) -> None:
+    do(study, "P01", records=40)
+    window = opened()
+    ask_resume(window)
+    key(window, "N", CTRL)
+    assert window.choice is None
+    assert said(window) == "Type why, first."
+    QTest.keyClicks(QApplication.focusWidget(), "the gun came loose")
+    key(window, "Return")  # in the reason, as in every line, it starts nothing
+    assert window.choice is None
+    key(window, "N", CTRL)
+    assert window.choice is not None
+    assert (window.choice.again, window.choice.anew_reason) == ("fresh", "the gun came loose")
+
+
+EDITS: dict[str, Callable[[StartWindow], None]] = {
+    "code": lambda window: window.form.code.setText("P02"),
+    "read-back": lambda window: window.form.code_again.setText("P0"),
+    "experiment": lambda window: window.form.experiment.setCurrentText("preference"),
+    "age": lambda window: window.form.facts["age_years"].setText("26"),
+    "sex": lambda window: window.form.facts["sex"].setCurrentText("male"),
+    "handedness": lambda window: window.form.facts["handedness"].setCurrentText("left"),
+    "screen": lambda window: window.form.own_screen.setChecked(True),
+    "keys": lambda window: window.form.own_keys.setChecked(True),
+    "noise": lambda window: window.form.noise.setChecked(True),
+    "another row": lambda window: window.table.selectRow(1),
+}
+
+
+@pytest.mark.parametrize("edit", EDITS)
+@pytest.mark.parametrize("answer", ["G", "N"])
+def test_any_edit_takes_the_question_back_and_its_keys_with_it(
+    answer: str, edit: str, study: StudyFolder, opened: Open
+) -> None:
+    for code in ("P01", "P02"):
+        do(study, code, records=40)
+    window = opened()
+    ask_resume(window)
+    assert window.question is not None
+    window.question.reason.setText("why not")
+    EDITS[edit](window)
+    assert question(window) == ""
+    key(window, answer, CTRL)
+    assert window.choice is None
+
+
+def test_the_reason_is_no_field_of_the_form_and_takes_nothing_back(study: StudyFolder, opened: Open) -> None:
+    do(study, "P01", records=40)
+    window = opened()
+    ask_resume(window)
+    assert window.question is not None
+    window.question.reason.setText("why not")
+    assert question(window)
+
+
+@pytest.mark.parametrize("answer", ["G", "N"])
+def test_both_answers_check_once_more_what_may_have_changed_meanwhile(
+    answer: str, study: StudyFolder, opened: Open
+) -> None:
+    journal = do(study, "P01", records=40)
+    window = opened()
+    ask_resume(window)
+    assert window.question is not None
+    window.question.reason.setText("why not")
+    enrolment.exclude(study.results, "P01", "fell ill", VirtualClock())
+    key(window, answer, CTRL)
+    assert window.choice is None
+    assert "P01 is excluded (fell ill)" in said(window)
+    assert table(window)["P01"][-1] == "excluded: fell ill"
+    assert journal.exists()
+
+
+@pytest.mark.parametrize("answer", ["G", "N"])
+def test_a_run_that_was_opened_elsewhere_meanwhile_is_left_alone(answer: str, study: StudyFolder, opened: Open) -> None:
+    journal = do(study, "P01", records=40)
+    window = opened()
+    ask_resume(window)
+    assert window.question is not None
+    window.question.reason.setText("why not")
+    descriptor = hold(journal)
+    key(window, answer, CTRL)
+    assert window.choice is None
+    assert "P01 sits at another console" in said(window)
+    assert table(window)["P01"][0].startswith("open elsewhere")
+    os.close(descriptor)
+
+
+def test_a_run_that_is_open_elsewhere_is_shown_as_such(study: StudyFolder, opened: Open) -> None:
+    descriptor = hold(do(study, "P01", records=40))
+    window = opened()
+    assert table(window)["P01"][0].startswith("open elsewhere, ")
+    assert window.form.code.text() == "P02"
+    fill(window, "P01")
+    assert remark(window) == "P01 sits at another console."
+    key(window, "Return", CTRL)
+    assert question(window) == ""
+    os.close(descriptor)
+
+
+def test_escape_leaves_the_question(study: StudyFolder, opened: Open) -> None:
+    do(study, "P01", records=40)
+    window = opened()
+    ask_resume(window)
+    key(window, "Escape")
+    assert question(window) == ""
+    assert window.isVisible()
+
+
+# facts on record
+
+
+def test_facts_on_record_are_shown_when_somebody_is_chosen_again(study: StudyFolder, opened: Open) -> None:
+    join(study, "P01")
+    window = opened(participant_id="P01")
+    assert window.form.entered().facts == {"age_years": "25", "sex": "female", "handedness": "right"}
+    window.form.code_again.setText("P01")
+    key(window, "Return", CTRL)
+    assert window.choice is not None
+    assert entries(study) == [("joined", "P01")]
+
+
+def test_facts_of_one_person_do_not_stay_for_another(study: StudyFolder, opened: Open) -> None:
+    join(study, "P01")
+    window = opened()
+    window.form.code.setText("P02")
+    assert window.form.entered().facts == {"age_years": "", "sex": "", "handedness": ""}
+    window.form.code.setText("P01")
+    assert window.form.entered().facts["age_years"] == "25"
+
+
+def test_facts_typed_for_a_new_code_outlive_the_codes_on_its_way(study: StudyFolder, opened: Open) -> None:
+    join(study, "P1", Facts(age_years=22, sex="male", handedness="right"))
+    window = opened()
+    window.form.code.clear()
+    window.form.facts["age_years"].setText("28")
+    QTest.keyClicks(window.form.code, "P15")
+    assert window.form.entered().facts["age_years"] == "28"
+
+
+# excluding
+
+
+def test_somebody_is_excluded_for_a_reason_and_readmitted(study: StudyFolder, opened: Open) -> None:
+    do(study, "P01", records=40)
+    window = opened()
+    fill(window, "P01")
+    key(window, "E", ALT)
+    assert question(window).startswith("Exclude P01?")
+    key(window, "D", CTRL)
+    assert said(window) == "Type why, first."
+    QTest.keyClicks(QApplication.focusWidget(), "fell ill")
+    key(window, "D", CTRL)
+    assert register.excluded(study.results) == {"P01": "fell ill"}
+    assert (table(window)["P01"][-1], remark(window)) == ("excluded: fell ill", "P01 is excluded: fell ill.")
+    assert window.exclude_button.text().startswith("Readmit")
+    key(window, "E", ALT)
+    QTest.keyClicks(QApplication.focusWidget(), "well again")
+    key(window, "D", CTRL)
+    assert register.excluded(study.results) == {}
+    assert entries(study) == [("excluded", "P01"), ("readmitted", "P01")]
+
+
+def test_nobody_is_excluded_whom_the_study_does_not_know(study: StudyFolder, opened: Open) -> None:
+    window = opened()
+    fill(window, "P07")
+    key(window, "E", ALT)
+    assert question(window) == ""
+    assert said(window).startswith("Choose in the table who is to be excluded")
+
+
+def test_the_exclusion_is_of_the_code_it_was_asked_for(study: StudyFolder, opened: Open) -> None:
+    for code in ("P01", "P02"):
+        do(study, code, records=40)
+    window = opened()
+    fill(window, "P01")
+    key(window, "E", ALT)
+    assert window.question is not None
+    window.question.reason.setText("fell ill")
+    window.form.code.setText("P02")
+    key(window, "D", CTRL)
+    assert register.excluded(study.results) == {}
+
+
+# the simulated gun
+
+
+def test_a_person_is_run_on_a_simulated_gun_only_after_a_question(study: StudyFolder, opened: Open) -> None:
+    window = opened(gun="simulated")
+    fill(window, "P01")
+    key(window, "Return", CTRL)
+    assert question(window).startswith("The gun is SIMULATED: P01 will feel nothing.")
+    key(window, "Return", CTRL)
+    assert window.choice is None
+    key(window, "S", CTRL)
+    assert window.choice is not None
+
+
+def test_the_question_of_the_simulated_gun_comes_once_and_then_that_of_the_run(
+    study: StudyFolder, opened: Open
+) -> None:
+    do(study, "P01", records=40)
+    window = opened(gun="simulated")
+    fill(window, "P01")
+    key(window, "Return", CTRL)
+    key(window, "S", CTRL)
+    assert question(window).startswith("P01 stopped direction on ")
+    key(window, "Escape")
+    key(window, "Return", CTRL)
+    assert question(window).startswith("P01 stopped direction on ")
+
+
+def test_a_practice_and_a_training_need_no_question(study: StudyFolder, opened: Open) -> None:
+    practising = opened(gun="simulated")
+    fill(practising, "P01")
+    key(practising, "P", CTRL)
+    assert practising.choice is not None
+    assert (practising.choice.practice, practising.choice.training) == (True, False)
+    training = opened(gun="simulated")
+    key(training, "R", CTRL)
+    assert training.choice is not None
+    assert (training.choice.participant_id, training.choice.training) == ("training", True)
+
+
+@pytest.mark.parametrize(("gun", "text"), [("simulated", "SIMULATED GUN"), (SERIAL, f"Gun: {SERIAL}")])
+def test_which_gun_it_is_stands_in_the_window(gun: str, text: str, opened: Open) -> None:
+    from PyQt6.QtWidgets import QLabel
+
+    window = opened(gun=gun)
+    shown = [label for label in window.findChildren(QLabel) if label.objectName() == "gun"]
+    assert [label.text() for label in shown] == [text]
+    assert shown[0].property("mood") == ("ask" if gun == "simulated" else "wait")
+
+
+# what is ticked
+
+
+def test_what_was_asked_for_on_the_command_line_is_ticked(opened: Open) -> None:
+    beside = Beside(participant_screen=True, participant_keys=True, noise=True)
+    window = opened(beside=beside)
+    assert window.form.beside() == beside
+    assert opened().form.beside() == Beside()
+
+
+def colours_of_box(box: QWidget) -> set[str]:
+    image = box.grab(QRect(0, 0, box.height(), box.height())).toImage()
+    return {image.pixelColor(x, y).name() for x in range(image.width()) for y in range(image.height())}
+
+
+def test_where_there_are_several_monitors_the_participants_is_chosen_by_its_number(
+    opened: Open, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    assert opened().form.beside().monitor is None
+    screens = ["0: eDP-1, 1920 × 1080", "1: HDMI-1, 1280 × 800", "2: DP-1, 1280 × 800"]
+    monkeypatch.setattr("experiments.screens.console.form.monitors", lambda: screens)
+    assert opened().form.beside().monitor == 2
+    window = opened(beside=Beside(monitor=1))
+    assert window.form.monitor.currentText() == "1: HDMI-1, 1280 × 800"
+    fill(window, "P01")
+    window.form.monitor.setCurrentIndex(0)
+    key(window, "Return", CTRL)
+    assert window.choice is not None
+    assert window.choice.monitor == 0
+
+
+def test_a_ticked_box_shows_a_tick(opened: Open) -> None:
+    box = opened().form.noise
+    tick = theme.colour("dark", "ground")  # of a box that is ticked, on a ground of another colour
+    assert tick not in colours_of_box(box)
+    box.setChecked(True)
+    assert {tick, theme.colour("dark", "act")} <= colours_of_box(box)
+
+
+# test shots
+
+
+def test_each_method_of_the_experiment_is_tested_in_turn_and_the_next_one_is_named(
+    study: StudyFolder, opened: Open, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("experiments.screens.console.shot_check.COUNTDOWN_S", 0)
+    window = opened(gun="simulated")
+    for shown, title in [
+        ("Vibration", "Vibration: the gun vibrated"),
+        ("Asymmetric Force I, damper OFF", "Asymmetric Force I: the coil was driven at 16 V"),
+        ("Asymmetric Force II, damper ON", "Asymmetric Force II: the coil was driven at 16 V"),
+    ]:
+        assert window.test_button.text() == f"Test shot: {shown}  [Ctrl+T]"
+        key(window, "T", CTRL)
+        until(lambda: not window.shots.is_running)
+        assert window.shots.title.text() == "Fired"
+        assert window.shots.detail.toPlainText().startswith(title)
+        key(window, "Escape")
+        assert window.pages.currentIndex() == 0
+    assert window.test_button.text() == "Test shot: Vibration  [Ctrl+T]"
+
+
+def test_while_a_test_shot_is_under_way_nothing_else_can_be_begun(opened: Open) -> None:
+    window = opened(gun="simulated")
+    fill(window, "P01")
+    key(window, "T", CTRL)
+    until(lambda: window.shots.count.text() != "")
+    assert window.shots.title.text() == "STAND CLEAR"
+    for name in ("Return", "P", "R", "T"):
+        key(window, name, CTRL)
+    assert window.choice is None
+    key(window, "Escape")
+    until(lambda: not window.shots.is_running)
+    assert window.shots.title.text() == "Not fired"
+    assert window.shots.detail.toPlainText() == "Nothing was fired. The gun reports: disarmed."
+    assert window.shots.next_text() == "Test shot: Vibration"
+
+
+def test_a_double_click_on_the_button_of_the_test_shot_neither_stops_it_nor_calls_it_off(
+    opened: Open, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("experiments.screens.console.shot_check.COUNTDOWN_S", 1)
+    window = opened(gun="simulated")
+    place = window.test_button.mapTo(window, window.test_button.rect().center())
+    QTest.mouseClick(window.test_button, Qt.MouseButton.LeftButton)
+    until(lambda: window.shots.title.text() == "STAND CLEAR")  # and the page has taken its places
+    under = window.childAt(place)
+    QTest.mouseClick(under, Qt.MouseButton.LeftButton, pos=under.mapFrom(window, place))
+    until(lambda: not window.shots.is_running)
+    assert window.shots.title.text() == "Fired"
+
+
+def test_an_escape_that_is_held_calls_off_and_does_not_leave_what_came_of_it(opened: Open) -> None:
+    window = opened(gun="simulated")
+    key(window, "T", CTRL)
+    until(lambda: window.shots.count.text() != "")
+    key(window, "Escape")
+    until(lambda: not window.shots.is_running)
+    held(window.shots.call_off_button, "Escape", Qt.KeyboardModifier.NoModifier)
+    assert window.pages.currentWidget() is window.shots
+
+
+def test_the_emergency_stop_of_a_test_shot_says_what_the_gun_reports(opened: Open) -> None:
+    window = opened(gun="simulated")
+    key(window, "T", CTRL)
+    until(lambda: window.shots.count.text() != "")
+    key(window, "F12")
+    until(lambda: not window.shots.is_running)
+    assert window.shots.title.text() == "EMERGENCY STOP"
+    assert window.shots.detail.toPlainText() == "Nothing was fired. The gun reports: disarmed."
+
+
+def test_a_window_that_is_closed_in_a_test_shot_stops_it_first(opened: Open) -> None:
+    window = opened(gun="simulated")
+    key(window, "T", CTRL)
+    until(lambda: window.shots.count.text() != "")
+    window.close()
+    assert window.isVisible()
+    assert window.shots.title.text() == "EMERGENCY STOP"
+    until(lambda: not window.isVisible())
+    assert not window.shots.is_running
+
+
+# the table
+
+
+def test_the_table_shows_practice_and_no_numbers_of_its_own(study: StudyFolder, opened: Open) -> None:
+    setup = study.setups[0]
+    run(
+        Request(setup=setup, participant_id="P01", results=study.results, practice=True),
+        synthetic_screen,
+        VirtualClock(),
+    )
+    window = opened()
+    assert table(window)["P01"][0] == "–\npractice done"
+    assert not window.table.verticalHeader().isVisible()
