@@ -124,7 +124,7 @@ _ROWS: dict[type[Event], dict[State, Change]] = {
         **_each(_STEPS, Over(S.PAUSED)),
         **_each(ARMED, Over(S.PAUSED, under=S.SAVING)),
         S.CORRECTING: No("Nothing fires while a correction is open; leave it with Esc, then pause."),
-        S.CLOSING: No("Everything is answered: there is nothing to hold. Enter ends the run."),
+        S.CLOSING: No("Everything is answered, so there is nothing to hold: Enter ends the run."),
         S.PAUSED: No("The run is paused already: P goes on."),
     },
     events.GoOn: {**_each(_LIVE, No(_NOT_HELD)), S.PAUSED: BACK},
@@ -154,7 +154,7 @@ _ROWS: dict[type[Event], dict[State, Change]] = {
     events.LinkLost: {**_each(_LIVE, STAY), **_each(ARMED, To(S.SAVING))},
     events.ParticipantLost: {
         **_each(_LIVE, STAY),
-        **_each(_STEPS, Over(S.PAUSED)),
+        **_each((S.REARMING, *_STEPS), Over(S.PAUSED)),
         **_each(ARMED, Over(S.PAUSED, under=S.SAVING)),
         S.CORRECTING: BENEATH,
     },
@@ -173,10 +173,10 @@ TABLE: dict[type[Event], dict[State, Change]] = {
 class Position:
     """Where a live run is. `serial` counts the positions, `number` the steps.
 
-    `since_s` is since when the states are as they are; `until_s` is when a break ends; `onset_s` is when the last
-    stimulus began; `not_before_s` is from when on what carries the step on is taken at all; `paused_s` is since when
-    the run is paused; `correcting` is the entry that is open; `why` is the reason of a pause that nobody asked for, of
-    a halt or of a stop.
+    `since_s` is since when the states are as they are; `until_s` is when a break ends, but for the pause that is on;
+    `onset_s` is when the last stimulus began; `not_before_s` is from when on what carries the step on is taken at all;
+    `paused_s` is since when the run is paused; `correcting` is the entry that is open; `why` is the reason of a pause
+    that nobody asked for, of a halt or of a stop.
     """
 
     states: tuple[State, ...] = (S.SAVING,)
@@ -228,7 +228,7 @@ def after(position: Position, kind: type[Event], now_s: float) -> Position | No:
         serial=position.serial + (states != position.states),
         since_s=now_s if states != position.states else position.since_s,
         until_s=_until_s(position, states, now_s),
-        paused_s=(position.paused_s or now_s) if S.PAUSED in states else None,
+        paused_s=_paused_s(position, states, now_s),
         correcting=position.correcting if S.CORRECTING in states else None,
     )
 
@@ -250,6 +250,13 @@ def _states(states: tuple[State, ...], change: To | Over | Back | Stay, on_top: 
             return states
 
 
+def _paused_s(position: Position, states: tuple[State, ...], now_s: float) -> float | None:
+    """Since when a run is paused: a pause counts from its beginning, whatever happens in it."""
+    if S.PAUSED not in states:
+        return None
+    return now_s if position.paused_s is None else position.paused_s
+
+
 def _until_s(position: Position, states: tuple[State, ...], now_s: float) -> float | None:
     """When a break ends: what a pause took of it is given back."""
     if position.until_s is None or position.paused_s is None or S.PAUSED in states:
@@ -258,8 +265,13 @@ def _until_s(position: Position, states: tuple[State, ...], now_s: float) -> flo
 
 
 def entered(position: Position, state: State, now_s: float, step: Step | None, until_s: float | None) -> Position:
-    """The position at which the session's next step stands; what lay over the last one still lies over it."""
+    """The position at which the session's next step stands; what lay over the last one still lies over it.
+
+    A break that comes in a pause ends by as much later as the pause lasts from now on.
+    """
     new = step is not None and step is not position.step
+    if until_s is not None and position.paused_s is not None:
+        until_s -= now_s - position.paused_s  # the whole pause is given back at its end
     return replace(
         position,
         states=(state, *position.states[1:]),
