@@ -49,11 +49,13 @@ def recoil(tmp_path: Path) -> Recoil:
 
 @pytest.fixture
 def quick_configs(tmp_path: Path) -> Path:
-    """The shipped configs in a folder of their own, experiment 1 without breaks and with quick synthetic answers."""
+    """The shipped configs in a folder of their own, without the guard of an experimenter's hand, experiment 1 without
+    breaks and with quick synthetic answers.
+    """
     folder = tmp_path / "configs"
     folder.mkdir()
     for source in shipped_folder().glob("*.toml"):
-        (folder / source.name).write_bytes(source.read_bytes())
+        (folder / source.name).write_text(source.read_text().replace("guard_s = 0.25", "guard_s = 0.0"))
     config = folder / "direction.toml"
     text = re.sub(r"between_(sets|sessions)_s = [\d.]+", r"between_\1_s = 0.0", config.read_text())
     text = text.replace("max_trials_without_break = 10", "max_trials_without_break = 60")
