@@ -16,6 +16,7 @@ from typing import Any, Self
 import pytest
 
 from experiments.screens.console.keys import BY_NAME
+from tests import watched_participant
 from tests.watched_console import Look, Watch
 
 READY = all(map(shutil.which, ("Xvfb", "openbox")))
@@ -190,6 +191,18 @@ class AtConsole(AtDisplay):
         else:
             self.due(look)
         self.until(lambda now: now.serial != look.serial or now.ended)
+
+    def participant_shows(self, page: str, count: int = 1) -> None:
+        """Wait until the participant's screen has shown a page so many times, by its kind or words, now as well."""
+        wait_for(
+            lambda: (shown := self.pages) and page in shown[-1] and sum(page in one for one in shown) >= count,
+            lambda: f"{page} is not shown to the participant: {self.pages}",
+        )
+
+    @property
+    def pages(self) -> list[str]:
+        """The pages that were shown to the participant."""
+        return watched_participant.pages(self.watch.pages)
 
     def due(self, look: Look) -> None:
         """Press what is due at a state."""

@@ -142,7 +142,9 @@ def test_undo_flag_note_pause_and_repeat_by_keys(quick_configs: Path, tmp_path: 
         screen.to("preparing", trial=4)
         for trial in (3, 2):
             screen.keys.press("u")
-            screen.until(lambda look, trial=trial: look.says(f"Trial {trial} of 20") and look.says("Correct the answer"))
+            screen.until(
+                lambda look, trial=trial: look.says(f"Trial {trial} of 20") and look.says("Correct the answer")
+            )
         screen.at("correcting")
         screen.keys.press("f")
         screen.at("preparing")
@@ -162,7 +164,13 @@ def test_undo_flag_note_pause_and_repeat_by_keys(quick_configs: Path, tmp_path: 
     assert (third["attempts"], third["flags"]) == ("2", "repeated")
     assert (fourth["flags"], fourth["note"]) == ("door-slam", "a dog barked")
     assert first["flags"] == ""
-    assert [body["kind"] for body in remarks(journal)] == ["answer-corrected", "flagged", "noted", "paused", "continued"]
+    assert [body["kind"] for body in remarks(journal)] == [
+        "answer-corrected",
+        "flagged",
+        "noted",
+        "paused",
+        "continued",
+    ]
 
 
 def check_killed_console(configs: Path, folder: Path, display: str, seconds: float) -> int:

@@ -14,13 +14,15 @@ from dataclasses import asdict, dataclass, field
 from pathlib import Path
 from typing import Any
 
+from tests import watched_participant
+
 LOOK_MS = 10
 TAIL_BYTES = 1 << 16
 
 
 @dataclass(frozen=True)
 class Watch:
-    """Where the eye and the gun's book write; at which shots the gun hangs until told to go on; how slow the disk is."""
+    """Where eye and book write; at which shots the gun hangs until told to go on; how long a sync takes longer."""
 
     folder: str
     hangs: tuple[int, ...] = ()
@@ -33,6 +35,10 @@ class Watch:
     @property
     def book(self) -> Path:
         return Path(self.folder) / "gun.jsonl"
+
+    @property
+    def pages(self) -> Path:
+        return Path(self.folder) / "pages.txt"
 
     @property
     def go_on(self) -> Path:
@@ -212,6 +218,19 @@ def watch_guns(watch: Watch) -> None:
     run.open_gun = lambda *where, **how: WatchedGun(opened(*where, **how), watch)
 
 
+def watch_participants(watch: Watch) -> None:
+    """From now on every participant's screen that is started is watched."""
+    from experiments.screens.participant.link import ParticipantLink
+    from experiments.screens.participant.look import Look, arguments
+
+    start = ParticipantLink.start
+
+    def watched(look: Look | None = None, **how: Any) -> ParticipantLink:
+        return start(look, **how, command=watched_participant.words(watch.pages, arguments(look or Look())))
+
+    ParticipantLink.start = watched
+
+
 def slow_disk(sync_s: float) -> None:
     """From now on a sync takes its time."""
     from experiments import storage
@@ -231,6 +250,7 @@ if __name__ == "__main__":
 
     watch = Watch(**json.loads(sys.argv.pop(1)))
     watch_guns(watch)
+    watch_participants(watch)
     if watch.sync_s:
         slow_disk(watch.sync_s)
     application()

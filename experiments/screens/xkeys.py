@@ -38,7 +38,10 @@ class Hands:
         self._display.close()
 
     def key_down(self, name: str) -> float:
-        """Press a key by its X name and keep it down; the system repeats it. Gives back when, on the monotonic clock."""
+        """Press a key by its X name and keep it down, so that the system repeats it.
+
+        Gives back when, on the monotonic clock.
+        """
         return self._key(X.KeyPress, name)
 
     def key_up(self, name: str) -> float:

@@ -188,9 +188,9 @@ class ParticipantSide:
 
     def _restart(self) -> None:
         if self._link.failure is None:
-            self._tell(Trouble(text="The participant's screen is there."))
+            self._tell(Trouble(text="The participant's screen is there.", mood="good"))
             return
-        self._tell(Trouble(text="Starting the participant's screen …"))
+        self._tell(Trouble(text="Starting the participant's screen …", mood="wait"))
         try:
             link = self._open_link()
         except ParticipantError as error:
@@ -200,6 +200,7 @@ class ParticipantSide:
             self._link, self._shows = link, ("",)
         link.listen(self._heard, self._gone)
         self._tell(ParticipantSeen())
+        self._tell(Trouble(text="The participant's screen is there again.", mood="good"))
         self._offer(events.ParticipantBack())
         if self._live is not None:
             self.follow(self._live.position)
