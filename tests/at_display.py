@@ -115,7 +115,7 @@ class AtDisplay:
 
     def end(self) -> tuple[int, str]:
         """The exit code, and what was said."""
-        said, _ = self.process.communicate(timeout=PATIENCE_S)
+        said, _ = self.process.communicate(timeout=5 * PATIENCE_S)  # a whole run goes by
         return self.process.returncode, said
 
     def __enter__(self) -> Self:
