@@ -225,6 +225,12 @@ class AtConsole(AtDisplay):
         self.keys.press("Return")
         self.until(lambda look: not look.line)
 
+    def heard(self) -> Look:
+        """Wait until the window has heard every key and click so far: F2 comes after them and changes its colours."""
+        before = self.look().theme
+        self.keys.press("F2")
+        return self.until(lambda look: look.theme != before)
+
     def hold(self, key: str, until: Callable[[Look], object]) -> None:
         """Hold a key down until something stands in the windows."""
         self.keys.key_down(key)

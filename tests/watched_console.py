@@ -65,7 +65,7 @@ class Watch:
     def calls(self, name: str = "") -> list[dict[str, Any]]:
         """What the gun was asked, in order."""
         lines = self.book.read_bytes().split(b"\n")[:-1] if self.book.exists() else []
-        return [call for line in lines if not name or (call := json.loads(line))["call"] == name]
+        return [call for line in lines if name in ("", (call := json.loads(line))["call"])]
 
 
 @dataclass(frozen=True)
@@ -86,6 +86,7 @@ class Look:
     line: bool = False
     typed: str = ""
     page: bool = False
+    theme: str = ""
     texts: list[str] = field(default_factory=list)
     places: dict[str, list[int]] = field(default_factory=dict)
 
@@ -137,6 +138,7 @@ def _run(window: Any) -> dict[str, Any]:
         "line": window.controls.typing.line,
         "typed": window.typed("line" if window.controls.typing.line else "number"),
         "page": window.controls.page,
+        "theme": window.theme,
         "places": _places(window),
     }
 
