@@ -9,13 +9,13 @@ import signal
 import subprocess
 import time
 from collections.abc import Callable, Iterator, Sequence
-from contextlib import ExitStack, contextmanager
+from contextlib import ExitStack, contextmanager, suppress
 from pathlib import Path
 from typing import Any, Self
 
 import pytest
 
-from experiments.screens.console.keys import BY_NAME
+from experiments.screens.console.keys import BOUNCE_S, BY_NAME
 from tests import watched_participant
 from tests.watched_console import Look, Watch
 
@@ -25,6 +25,8 @@ needs_display = pytest.mark.skipif(not READY, reason="needs Xvfb and openbox")
 PATIENCE_S = 60.0
 """The longest that anything is waited for: no promise, but the end of a test that fails."""
 LOOK_S = 0.01
+HAND_S = 1.5 * BOUNCE_S
+"""A hand takes longer from what it sees to a press: a key that goes down again sooner has bounced."""
 BUSY = ("saving", "firing", "stopped")
 """States in which nobody is waited for."""
 
@@ -122,9 +124,12 @@ class AtDisplay:
         return self
 
     def __exit__(self, *_: object) -> None:
+        from Xlib.error import ConnectionClosedError
+
         if self.process.poll() is None:
             self.kill()
-        self.keys.close()
+        with suppress(ConnectionClosedError):  # its server may be gone
+            self.keys.close()
 
 
 class AtConsole(AtDisplay):
@@ -145,7 +150,7 @@ class AtConsole(AtDisplay):
         return self.watch.look()
 
     def until(self, what: Callable[[Look], object]) -> Look:
-        """Wait until something stands in the windows, as long as the program runs."""
+        """Wait until something stands in the windows while the program runs, and then as long as a hand takes."""
         look = Look()
 
         def there() -> bool:
@@ -155,6 +160,7 @@ class AtConsole(AtDisplay):
 
         wait_for(there, lambda: f"it does not come to that: {look}")
         assert what(look), f"the program has ended: {self.end()}"
+        time.sleep(HAND_S)
         return look
 
     def stands(self, title: str) -> Look:

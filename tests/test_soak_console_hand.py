@@ -52,7 +52,13 @@ def test_every_accident_that_fires_a_train(tmp_path: Path, display: str, soak: S
     "state", [State.PREPARING, State.TRAIN, State.RATING, State.DESCRIBING, State.PAUSED, State.CORRECTING]
 )
 def test_keys_on_the_participants_window(tmp_path: Path, display: str, soak: Soak, state: State) -> None:
-    cell = Cell(tmp_path, display, state, "--participant-screen", experiment="preference" if state is not State.CORRECTING else "")
+    cell = Cell(
+        tmp_path,
+        display,
+        state,
+        "--participant-screen",
+        experiment="preference" if state is not State.CORRECTING else "",
+    )
     with cell.reach() as screen:
         check_participants_keys(screen, cell, "p", "Escape", "space")
     check_gun(cell.watch, cell.journal)

@@ -22,11 +22,15 @@ TAIL_BYTES = 1 << 16
 
 @dataclass(frozen=True)
 class Watch:
-    """Where eye and book write; at which shots the gun hangs until told to go on; how long a sync takes longer."""
+    """Where eye and book write; at which shots the gun hangs until told to go on; how much longer a sync takes.
+
+    `participants`: how often the participant's screen can be started.
+    """
 
     folder: str
     hangs: tuple[int, ...] = ()
     sync_s: float = 0.0
+    participants: int = 99
 
     @property
     def eye(self) -> Path:
@@ -225,10 +229,13 @@ def watch_participants(watch: Watch) -> None:
     from experiments.screens.participant.link import ParticipantLink
     from experiments.screens.participant.look import Look, arguments
 
-    start = ParticipantLink.start
+    start, left = ParticipantLink.start, watch.participants
 
     def watched(look: Look | None = None, **how: Any) -> ParticipantLink:
-        return start(look, **how, command=watched_participant.words(watch.pages, arguments(look or Look())))
+        nonlocal left
+        left -= 1
+        words = watched_participant.words(watch.pages, arguments(look or Look())) if left >= 0 else ["false"]
+        return start(look, **how, command=words)
 
     ParticipantLink.start = watched
 
