@@ -1,4 +1,4 @@
-"""A person at a display: a program on a virtual screen (Xvfb), worked by real key events (XTest)."""
+"""A person at a display: a program on a virtual desktop (Xvfb with openbox), worked by real events (XTest)."""
 
 from __future__ import annotations
 
@@ -9,40 +9,92 @@ import signal
 import subprocess
 import time
 from collections.abc import Callable, Iterator, Sequence
-from contextlib import contextmanager
+from contextlib import ExitStack, contextmanager, suppress
 from pathlib import Path
 from typing import Any, Self
 
 import pytest
 
-READY = shutil.which("Xvfb") is not None
-needs_display = pytest.mark.skipif(not READY, reason="needs Xvfb")
+from experiments.screens.console.keys import BOUNCE_S, BY_NAME
+from tests import watched_participant
+from tests.watched_console import Look, Watch
+
+READY = all(map(shutil.which, ("Xvfb", "openbox")))
+needs_display = pytest.mark.skipif(not READY, reason="needs Xvfb and openbox")
+
+PATIENCE_S = 60.0
+"""The longest that anything is waited for: no promise, but the end of a test that fails."""
+LOOK_S = 0.01
+HAND_S = 1.5 * BOUNCE_S
+"""A hand takes longer from what it sees to a press: a key that goes down again sooner has bounced."""
+BUSY = ("saving", "firing", "stopped")
+"""States in which nobody is waited for."""
+
+
+def wait_for(what: Callable[[], Any], why: Callable[[], object] = lambda: "it did not happen") -> Any:
+    """Wait until something is so; gives it back."""
+    end_s = time.monotonic() + PATIENCE_S
+    while not (found := what()):
+        assert time.monotonic() < end_s, why()
+        time.sleep(LOOK_S)
+    return found
 
 
 @contextmanager
-def virtual_display() -> Iterator[str]:
-    """A virtual screen of 1280 by 800; its name."""
+def x_server(size: str = "1280x800") -> Iterator[tuple[str, subprocess.Popen[bytes]]]:
+    """A virtual screen: its name and its server."""
     read, write = os.pipe()
-    words = ["Xvfb", "-displayfd", str(write), "-screen", "0", "1280x800x24", "-nolisten", "tcp", "-noreset"]
+    words = ["Xvfb", "-displayfd", str(write), "-screen", "0", f"{size}x24", "-nolisten", "tcp", "-noreset"]
     server = subprocess.Popen(words, pass_fds=[write], stderr=subprocess.DEVNULL)
     os.close(write)
     try:
         with os.fdopen(read) as told:
-            yield f":{told.readline().strip()}"
+            yield f":{told.readline().strip()}", server
     finally:
         server.terminate()
         server.wait()
 
 
-class AtDisplay:
-    """A program on a virtual screen."""
+@contextmanager
+def window_manager(display: str) -> Iterator[None]:
+    """Openbox on a virtual screen, from when it manages windows."""
+    from Xlib.display import Display  # here: python-xlib is in the extra `gui`
 
-    def __init__(self, words: Sequence[object], folder: Path, display: str) -> None:
-        environment = os.environ | {"DISPLAY": display, "HOME": str(folder), "QT_QPA_PLATFORM": "xcb"}
+    manager = subprocess.Popen(
+        ["openbox", "--sm-disable"],
+        env=os.environ | {"DISPLAY": display},
+        stdout=subprocess.DEVNULL,
+        stderr=subprocess.DEVNULL,
+    )
+    looks = Display(display)
+    sign = looks.intern_atom("_NET_SUPPORTING_WM_CHECK")
+    try:
+        wait_for(lambda: looks.screen().root.get_full_property(sign, 0), lambda: "openbox does not start")
+        yield
+    finally:
+        looks.close()
+        manager.terminate()
+        manager.wait()
+
+
+@contextmanager
+def virtual_display(size: str = "1280x800") -> Iterator[str]:
+    """A virtual desktop; its name."""
+    with ExitStack() as stack:
+        name, _ = stack.enter_context(x_server(size))
+        stack.enter_context(window_manager(name))
+        yield name
+
+
+class AtDisplay:
+    """A program on a virtual desktop."""
+
+    def __init__(self, words: Sequence[object], folder: Path, display: str, **environment: str) -> None:
+        variables = {"DISPLAY": display, "HOME": str(folder), "QT_QPA_PLATFORM": "xcb", **environment}
         self.process = subprocess.Popen(
             [str(word) for word in words],
             cwd=folder,
-            env=environment,
+            env=os.environ | {"PYTHONPATH": str(Path(__file__).parent.parent)} | variables,
             stdout=subprocess.PIPE,
             stderr=subprocess.STDOUT,
             text=True,
@@ -52,54 +104,182 @@ class AtDisplay:
 
         self.keys = Hands(display)
 
-    def focus_on(self, title: str = "Recoil") -> None:
-        """Give the keys to the newest window of a title: no window manager does it here."""
-        assert self.keys.focus_on(title, timeout_s=30) is not None, f"no window {title!r} was shown"
+    def focus_on(self, title: str = "Recoil") -> tuple[int, int, int, int]:
+        """Give the keys to the newest window of a title; its place and size."""
+        place = self.keys.focus_on(title, timeout_s=PATIENCE_S)
+        assert place is not None, f"no window {title!r} was shown"
+        return place
 
     def kill(self) -> None:
         """`kill -9`."""
         os.killpg(self.process.pid, signal.SIGKILL)
         self.process.communicate()
 
-    def end(self, timeout_s: float = 60) -> tuple[int, str]:
+    def end(self) -> tuple[int, str]:
         """The exit code, and what was said."""
-        said, _ = self.process.communicate(timeout=timeout_s)
+        said, _ = self.process.communicate(timeout=5 * PATIENCE_S)  # a whole run goes by
         return self.process.returncode, said
 
     def __enter__(self) -> Self:
         return self
 
     def __exit__(self, *_: object) -> None:
+        from Xlib.error import ConnectionClosedError
+
         if self.process.poll() is None:
             self.kill()
-        self.keys.close()
+        with suppress(ConnectionClosedError):  # its server may be gone
+            self.keys.close()
 
 
-def last_record(journal: Path) -> dict[str, Any]:
-    """The last whole record of a journal that is being written, but for a train's shots; empty if there is none yet."""
+class AtConsole(AtDisplay):
+    """An experimenter at the console who looks first: what a key is pressed for stands there, and its time has come.
+
+    `answer` gives the answer to a trial by its number, `rating` what is typed for it.
+    """
+
+    def __init__(self, command: list[object], folder: Path, display: str, watch: Watch | None = None) -> None:
+        self.watch = watch or Watch(str(folder))
+        self.watch.eye.unlink(missing_ok=True)  # of a run before this one
+        super().__init__(self.watch.words(command), folder, display)
+        self.answer: Callable[[int], str] = lambda trial: "f" if trial % 2 else "b"
+        self.rating: Callable[[int], str] = lambda trial: "0" if trial == 1 else "7.5"
+
+    def look(self) -> Look:
+        """What stands in the windows now."""
+        return self.watch.look()
+
+    def until(self, what: Callable[[Look], object]) -> Look:
+        """Wait until something stands in the windows while the program runs, and then as long as a hand takes."""
+        look = Look()
+
+        def there() -> bool:
+            nonlocal look
+            look = self.look()
+            return bool(what(look)) or self.process.poll() is not None
+
+        wait_for(there, lambda: f"it does not come to that: {look}")
+        assert what(look), f"the program has ended: {self.end()}"
+        time.sleep(HAND_S)
+        return look
+
+    def stands(self, title: str) -> Look:
+        """Wait for a window, and give it the keys."""
+        self.until(lambda look: title in look.window)
+        self.focus_on(title)
+        return self.until(lambda look: look.active)
+
+    def at(self, *states: str) -> Look:
+        """Wait until the run stands at a state, and a press counts for it."""
+        return self.until(lambda look: look.state in states and look.ready)
+
+    def ready(self) -> Look:
+        """Wait until the run waits for somebody."""
+        return self.until(lambda look: (look.ready and look.state not in BUSY) or look.ended)
+
+    def to(self, state: str, trial: int = 0) -> Look:
+        """Work on as far as a state, of a trial if one is named."""
+        while not (look := self.ready()).ended:
+            if look.state == state and trial in (0, look.trial):
+                return look
+            self.go_on(look)
+        raise AssertionError(f"{state} is not reached: {look}")
+
+    def to_the_end(self) -> None:
+        """Work on until the run has ended."""
+        while not (look := self.ready()).ended:
+            self.go_on(look)
+
+    def go_on(self, look: Look) -> None:
+        """Do what is due at a state, and wait until it is done."""
+        if look.state == "rearming":
+            self.hold("t", until=lambda now: now.serial != look.serial)
+        else:
+            self.due(look)
+        self.until(lambda now: now.serial != look.serial or now.ended)
+
+    def participant_shows(self, page: str, count: int = 1) -> None:
+        """Wait until the participant's screen has shown a page so many times, by its kind or words, now as well."""
+        wait_for(
+            lambda: (shown := self.pages) and page in shown[-1] and sum(page in one for one in shown) >= count,
+            lambda: f"{page} is not shown to the participant: {self.pages}",
+        )
+
+    @property
+    def pages(self) -> list[str]:
+        """The pages that were shown to the participant."""
+        return watched_participant.pages(self.watch.pages)
+
+    def due(self, look: Look) -> None:
+        """Press what is due at a state."""
+        keys = {"setting": "m", "preparing": "space", "train": "space", "closing": "Return", "paused": "p"}
+        keys |= {"asking": self.answer(look.trial), "halted": "q", "correcting": "Escape"}
+        lines = {"rating": self.rating(look.trial), "describing": "like a toy", "resting": "enough"}
+        if look.state in keys:
+            self.keys.press(keys[look.state])
+        elif look.state == "resting":
+            self.line("e", lines["resting"])
+        else:
+            self.keys.type(f"{lines[look.state]}\n")
+
+    def line(self, key: str, text: str, *held: str) -> None:
+        """Ask for a line by its key, type it, and Enter."""
+        self.keys.press(key, *held)
+        self.until(lambda look: look.line)
+        self.keys.type(text)
+        self.until(lambda look: look.typed == text)
+        self.keys.press("Return")
+        self.until(lambda look: not look.line)
+
+    def heard(self) -> Look:
+        """Wait until the window has heard every key and click so far: F2 comes after them and changes its colours."""
+        before = self.look().theme
+        self.keys.press("F2")
+        return self.until(lambda look: look.theme != before)
+
+    def hold(self, key: str, until: Callable[[Look], object]) -> None:
+        """Hold a key down until something stands in the windows."""
+        self.keys.key_down(key)
+        try:
+            self.until(until)
+        finally:
+            self.keys.key_up(key)
+
+    def click(self, name: str) -> None:
+        """Click in the middle of a command's button."""
+        self.keys.click(*middle(self.look(), name))
+
+    def stop(self, reason: str = "enough") -> tuple[int, str]:
+        """Stop the run for a reason, close its window, and wait for the program's end."""
+        look = self.ready()
+        if not look.ended:
+            letters = look.state in ("rating", "describing")
+            self.line("q", reason, *(["Control_L"] if letters else []))
+        return self.close()
+
+    def close(self) -> tuple[int, str]:
+        """Close the window of a run that has ended, and wait for the program's end."""
+        self.until(lambda look: look.ended)
+        self.keys.press(BY_NAME["stop"].key.lower())
+        return self.end()
+
+
+def middle(look: Look, name: str) -> tuple[int, int]:
+    """The middle of a command's button."""
+    left, top, width, height = look.places[name]
+    return left + width // 2, top + height // 2
+
+
+def records(journal: Path) -> list[dict[str, Any]]:
+    """The whole records of a journal that is being written; none if it is not there yet."""
     try:
         lines = journal.read_bytes().split(b"\n")[:-1]
     except FileNotFoundError:
-        return {}
-    records = map(json.loads, reversed(lines))
-    return next((record for record in records if record["kind"] != "shot"), {})
+        return []
+    return [json.loads(line) for line in lines]
 
 
-def work_console(
-    screen: AtDisplay, journal: Path, key_for: Callable[[dict[str, Any]], None], timeout_s: float = 120
-) -> dict[str, Any]:
-    """Press what `key_for` presses at each step that waits, until the run ends or the program does; the last record.
-
-    A key that came before the window was painted is lost, as it would be for a person; it is pressed again.
-    """
-    deadline, pressed, at = time.monotonic() + timeout_s, -1, 0.0
-    while time.monotonic() < deadline and screen.process.poll() is None:
-        record = last_record(journal)
-        if record.get("kind") in ("finished", "stopped"):
-            return record
-        again = time.monotonic() - at > 0.5
-        if record.get("kind") == "step" and (record["n"] != pressed or again):
-            key_for(record["body"])
-            pressed, at = record["n"], time.monotonic()
-        time.sleep(0.002)
-    return last_record(journal)
+def remarks(journal: Path, *kinds: str) -> list[dict[str, Any]]:
+    """The remarks of some kinds, or all, in order."""
+    bodies = [record["body"] for record in records(journal) if record["kind"] == "remark"]
+    return [body for body in bodies if not kinds or body["kind"] in kinds]

@@ -1,23 +1,22 @@
-"""The console in a real window on a virtual screen, worked by real keys: whole runs, kills, faults."""
+"""The console in a real window on a virtual desktop, worked by real keys: whole runs, kills, the start window."""
 
 from __future__ import annotations
 
 import csv
-import json
+import os
 import random
 import re
-import threading
+import subprocess
 import time
 from collections.abc import Iterator
 from pathlib import Path
-from typing import Any
 
 import pytest
 
 from experiments.journal import read
 from experiments.replay import history
 from experiments.steps import Answered
-from tests.at_display import AtDisplay, last_record, needs_display, virtual_display, work_console
+from tests.at_display import AtConsole, AtDisplay, needs_display, records, remarks, virtual_display
 from tests.conftest import RECOIL
 
 pytest.importorskip("PyQt6")
@@ -25,6 +24,8 @@ pytestmark = needs_display
 
 DIRECTION = "results/sub-P01/sub-P01_task-direction"
 PREFERENCE = "results/sub-P01/sub-P01_task-preference"
+RUN = "Recoil – P01"
+START = "Recoil – start"
 
 
 @pytest.fixture(scope="module")
@@ -43,28 +44,17 @@ def rows(folder: Path, stem: str, kind: str) -> list[dict[str, str]]:
         return list(csv.DictReader(table))
 
 
-def answer_by(screen: AtDisplay, body: dict[str, Any]) -> None:
-    """What an experimenter presses at a step."""
-    kind = body["kind"]
-    if kind in ("prepare", "present"):
-        screen.keys.press("space")
-    elif kind == "ask":
-        screen.keys.press("f" if body["trial"]["trial"] % 2 else "b")
-    elif kind == "rate":
-        time.sleep(0.2)  # as a person would, look before typing
-        screen.keys.type("0\n" if body["trial"]["trial"] == 1 else "7.5\n")
-    elif kind == "describe":
-        time.sleep(0.2)
-        screen.keys.type("like a toy\n")
+def answers(journal: Path) -> list[str]:
+    return [outcome.response for _, outcome in history(read(journal)) if isinstance(outcome, Answered)]
 
 
-def start(screen: AtDisplay, code: str = "P01", later: int = 0) -> None:
+def start(screen: AtConsole, code: str = "P01", later: int = 0) -> None:
     """From the start window: read the code back, say what is asked, start, on the simulated gun as well.
 
     `later` is how many experiments of the study are passed over.
     """
     keys = screen.keys
-    screen.focus_on("start")
+    screen.stands(START)
     if later:
         for key, held in [("Tab", ["Shift_L"]), ("Tab", ["Shift_L"]), *([("Down", [])] * later), *([("Tab", [])] * 2)]:
             keys.press(key, *held)
@@ -77,58 +67,42 @@ def start(screen: AtDisplay, code: str = "P01", later: int = 0) -> None:
     keys.press("Down")
     keys.press("Return", "Control_L")
     keys.press("s", "Control_L")
+    screen.stands(RUN)
 
 
-def focus_on_console(screen: AtDisplay, journal: Path) -> None:
-    deadline = time.monotonic() + 30
-    while not last_record(journal) and time.monotonic() < deadline:
-        time.sleep(0.02)
-    time.sleep(0.3)
-    screen.focus_on("P01")
+def close_the_day(screen: AtConsole) -> tuple[int, str]:
+    """From an end screen back to the start window, and out of it."""
+    screen.until(lambda look: look.ended)
+    screen.keys.press("q")
+    screen.stands(START)
+    screen.keys.press("q", "Control_L")
+    return screen.end()
 
 
 def test_experiment_1_from_the_start_window_to_the_end_screen(
     quick_configs: Path, tmp_path: Path, display: str
 ) -> None:
-    journal = tmp_path / f"{DIRECTION}_journal.jsonl"
-    with AtDisplay(words(quick_configs, "direction"), tmp_path, display) as screen:
+    with AtConsole(words(quick_configs, "direction"), tmp_path, display) as screen:
         start(screen)
-        focus_on_console(screen, journal)
-        last = work_console(screen, journal, lambda body: answer_by(screen, body))
-        assert last["kind"] == "finished"
-        time.sleep(0.5)
-        screen.keys.press("q")
-        time.sleep(1.0)
-        screen.focus_on("start")
-        screen.keys.press("q", "Control_L")
-        code, said = screen.end()
+        screen.to_the_end()
+        screen.until(lambda look: look.says("Read back from the disk: 60 answers, all that were given."))
+        code, said = close_the_day(screen)
     assert code == 0, said
+    assert records(tmp_path / f"{DIRECTION}_journal.jsonl")[-1]["kind"] == "finished"
     table = rows(tmp_path, DIRECTION, "trials")
     assert [row["response"] for row in table] == ["forward", "backward"] * 30
     assert {row["response_source"] for row in table} == {"experimenter"}
+    assert {row["attempts"] for row in table} == {"1"}
     register = (tmp_path / "results" / "participants.jsonl").read_text()
     assert '"age_years":25' in register
-
-
-def close_the_day(screen: AtDisplay) -> tuple[int, str]:
-    """From an end screen back to the start window, and out of it."""
-    time.sleep(0.5)
-    screen.keys.press("q")
-    time.sleep(1.0)
-    screen.focus_on("start")
-    screen.keys.press("q", "Control_L")
-    return screen.end()
 
 
 def test_experiment_2_from_the_start_window_to_the_end_screen_with_a_rating_of_zero(
     quick_configs: Path, tmp_path: Path, display: str
 ) -> None:
-    journal = tmp_path / f"{PREFERENCE}_journal.jsonl"
-    with AtDisplay(words(quick_configs, "preference"), tmp_path, display) as screen:
+    with AtConsole(words(quick_configs, "preference"), tmp_path, display) as screen:
         start(screen, later=1)
-        focus_on_console(screen, journal)
-        last = work_console(screen, journal, lambda body: answer_by(screen, body))
-        assert last["kind"] == "finished"
+        screen.to_the_end()
         code, said = close_the_day(screen)
     assert code == 0, said
     table = rows(tmp_path, PREFERENCE, "ratings")
@@ -137,15 +111,11 @@ def test_experiment_2_from_the_start_window_to_the_end_screen_with_a_rating_of_z
 
 
 def test_a_training_leaves_nothing_behind(quick_configs: Path, tmp_path: Path, display: str) -> None:
-    with AtDisplay(words(quick_configs, "direction"), tmp_path, display) as screen:
-        screen.focus_on("start")
+    with AtConsole(words(quick_configs, "direction"), tmp_path, display) as screen:
+        screen.stands(START)
         screen.keys.press("r", "Control_L")
-        screen.focus_on("training")
-        for _ in range(14):  # six trials, and some keys for those that came before the window was ready
-            for key in ("space", "f"):
-                time.sleep(0.4)
-                screen.keys.press(key)
-        time.sleep(0.6)
+        screen.stands("training")
+        screen.to_the_end()
         code, said = close_the_day(screen)
     assert code == 0, said
     assert not list(tmp_path.glob("results/sub-*"))
@@ -156,105 +126,99 @@ def test_an_unfinished_run_is_shown_and_asked_about(
     quick_configs: Path, tmp_path: Path, display: str, key: str, kept: int
 ) -> None:
     journal = tmp_path / f"{DIRECTION}_journal.jsonl"
-
-    def two_answers(screen: AtDisplay) -> None:
-        work_console(
-            screen,
-            journal,
-            lambda body: screen.keys.press("F12") if body["trial"]["trial"] == 3 else answer_by(screen, body),
-        )
-        time.sleep(0.5)
-        screen.keys.press("q")
-
     run = words(quick_configs, "direction", "--participant", "P01")
-    with AtDisplay(run, tmp_path, display) as screen:
-        focus_on_console(screen, journal)
-        two_answers(screen)
-        assert screen.end()[0] == 130
-    with AtDisplay(run, tmp_path, display) as screen:
-        screen.focus_on("unfinished")
+    with AtConsole(run, tmp_path, display) as screen:
+        screen.stands(RUN)
+        screen.to("preparing", trial=3)
+        assert screen.stop()[0] == 130
+    with AtConsole(run, tmp_path, display) as screen:
+        screen.stands("unfinished")
         screen.keys.type("loose" if key == "n" else "")
         for _ in range(3):
             screen.keys.press("Return")  # as a hand that still holds Enter does: nothing is decided by it
         screen.keys.press(key, "Control_L")
-        time.sleep(2.0)
-        screen.focus_on("P01")
+        screen.stands(RUN)
+        screen.ready()
         answered = len(answers(journal))
-        screen.keys.press("F12")
-        time.sleep(0.5)
-        screen.keys.press("q")
-        assert screen.end()[0] == 130
+        assert screen.stop()[0] == 130
     assert answered == kept
     assert bool(list(journal.parent.glob("*aside*"))) is (kept == 0)
 
 
 def test_undo_flag_note_pause_and_repeat_by_keys(quick_configs: Path, tmp_path: Path, display: str) -> None:
     journal = tmp_path / f"{DIRECTION}_journal.jsonl"
-    done: list[str] = []
-
-    def key(body: dict[str, Any]) -> None:
-        trial = body["trial"]["trial"]
-        if body["kind"] == "prepare" and trial == 4 and not done:
-            done.append("all")
-            time.sleep(0.5)  # as a person would, look before undoing
-            for text in ("u", "u", "b", "gdoor slam\n", "na dog barked\n", "p", "p", "rnoise\n"):
-                screen.keys.type(text)
-                time.sleep(0.15)
-        elif trial == 5:
-            screen.keys.press("F12")
-        else:
-            answer_by(screen, body)
-
-    with AtDisplay(words(quick_configs, "direction", "--participant", "P01"), tmp_path, display) as screen:
-        focus_on_console(screen, journal)
-        last = work_console(screen, journal, key)
-        assert last["kind"] == "stopped"
-        assert last["reason"] == "emergency stop"
-        time.sleep(0.3)
-        screen.keys.press("q")
-        assert screen.end()[0] == 130
+    with AtConsole(words(quick_configs, "direction", "--participant", "P01"), tmp_path, display) as screen:
+        screen.stands(RUN)
+        screen.to("preparing", trial=4)
+        for trial in (3, 2):
+            screen.keys.press("u")
+            screen.until(
+                lambda look, trial=trial: look.says(f"Trial {trial} of 20") and look.says("Correct the answer")
+            )
+        screen.at("correcting")
+        screen.keys.press("f")
+        screen.at("preparing")
+        screen.line("g", "door slam")
+        screen.line("n", "a dog barked")
+        screen.keys.press("p")
+        screen.at("paused")
+        screen.keys.press("p")
+        screen.at("preparing")
+        screen.line("r", "noise")
+        screen.to("preparing", trial=5)
+        code, said = screen.stop()
+    assert code == 130, said
+    assert records(journal)[-1]["reason"] == "enough"
     first, second, third, fourth, *_ = rows(tmp_path, DIRECTION, "trials")
-    assert (second["response"], second["flags"], second["response_time_valid"]) == ("backward", "corrected", "0")
+    assert (second["response"], second["flags"], second["response_time_valid"]) == ("forward", "corrected", "0")
     assert (third["attempts"], third["flags"]) == ("2", "repeated")
     assert (fourth["flags"], fourth["note"]) == ("door-slam", "a dog barked")
     assert first["flags"] == ""
-    kinds = [json.loads(line)["body"]["kind"] for line in journal.read_text().splitlines() if '"remark"' in line]
-    assert kinds == ["answer-corrected", "flagged", "noted", "paused", "continued"]
+    assert [body["kind"] for body in remarks(journal)] == [
+        "answer-corrected",
+        "flagged",
+        "noted",
+        "paused",
+        "continued",
+    ]
 
 
-def answers(journal: Path) -> list[str]:
-    return [outcome.response for _, outcome in history(read(journal)) if isinstance(outcome, Answered)]
-
-
-def check_killed_console(configs: Path, folder: Path, display: str, seconds: float) -> None:
-    """A console killed some seconds into its run loses nothing, and goes on as an unbroken one would."""
+def check_killed_console(configs: Path, folder: Path, display: str, seconds: float) -> int:
+    """A console killed some seconds after its first trial stands there loses nothing, and goes on as an unbroken one
+    would; the answers that it had acknowledged.
+    """
     journal = folder / f"{DIRECTION}_journal.jsonl"
-    with AtDisplay(words(configs, "direction", "--participant", "P01"), folder, display) as screen:
-        focus_on_console(screen, journal)
-        killer = threading.Timer(seconds, screen.kill)
-        killer.start()
-        work_console(screen, journal, lambda body: answer_by(screen, body), timeout_s=seconds + 1)
-        killer.join()
+    with AtConsole(words(configs, "direction", "--participant", "P01"), folder, display) as screen:
+        screen.stands(RUN)
+        end_s = time.monotonic() + seconds
+        while time.monotonic() < end_s and not (look := screen.look()).ended:
+            if look.ready and look.state in ("setting", "preparing", "asking"):
+                screen.due(look)
+                _until_moved(screen, look.serial, end_s)
+        screen.kill()
+        said = {text for look in screen.watch.looks() for text in look.texts if re.fullmatch(r"Saved\. Trial .*", text)}
     before = answers(journal)
-    with AtDisplay(words(configs, "direction", "--participant", "P01", "--resume"), folder, display) as screen:
-        focus_on_console(screen, journal)
-        time.sleep(0.5)
-        screen.focus_on("P01")
+    assert len(before) - len(said) in (0, 1)  # the last is on the disk a moment before it is said
+    with AtConsole(words(configs, "direction", "--participant", "P01", "--resume"), folder, display) as screen:
+        screen.stands(RUN)
         goal = min(60, len(before) + 2)
-        limit = time.monotonic() + 30
-        while len(answers(journal)) < goal and time.monotonic() < limit:
-            work_console(screen, journal, lambda body: answer_by(screen, body), timeout_s=0.5)
-        screen.keys.press("F12")
-        time.sleep(0.5)
-        screen.keys.press("q")
-        screen.end()
+        while len(answers(journal)) < goal:
+            screen.go_on(screen.ready())
+        screen.ready()
+        screen.stop()
     assert answers(journal)[: len(before)] == before
     table = rows(folder, DIRECTION, "trials")
     assert len({(row["session"], row["trial"]) for row in table}) == len(table) == 60
-    assert [row["response"] for row in table[: goal - 1]] == (["forward", "backward"] * 30)[: goal - 1]
+    assert [row["response"] for row in table[:goal]] == (["forward", "backward"] * 30)[:goal]
+    return len(said)
 
 
-@pytest.mark.parametrize("kill", range(10))
+def _until_moved(screen: AtConsole, serial: int, end_s: float) -> None:
+    while time.monotonic() < end_s and screen.look().serial == serial:
+        time.sleep(0.002)
+
+
+@pytest.mark.parametrize("kill", range(4))
 def test_a_killed_console_loses_nothing_and_goes_on(
     quick_configs: Path, tmp_path: Path, display: str, kill: int
 ) -> None:
@@ -264,13 +228,12 @@ def test_a_killed_console_loses_nothing_and_goes_on(
 def test_a_synthetic_participant_at_the_console_answers_as_in_data_mode(
     quick_configs: Path, tmp_path: Path, display: str
 ) -> None:
-    import subprocess
-
     for experiment, kind in (("direction", "trials"), ("preference", "ratings")):
         with AtDisplay(
             words(quick_configs, experiment, "--participant", "P01", "--visual"), tmp_path, display
         ) as screen:
-            assert screen.end(90)[0] == 0
+            code, said = screen.end()
+            assert code == 0, said
         data = [RECOIL, "run", quick_configs / f"{experiment}.toml", "--participant", "P01", "--seed", "1"]
         data += ["--screen", "synthetic", "--results", "data"]
         subprocess.run(data, cwd=tmp_path, check=True, capture_output=True)
@@ -281,9 +244,6 @@ def test_a_synthetic_participant_at_the_console_answers_as_in_data_mode(
 
 
 def test_without_a_display_the_console_says_so(quick_configs: Path, tmp_path: Path) -> None:
-    import os
-    import subprocess
-
     environment = {key: value for key, value in os.environ.items() if key not in ("DISPLAY", "QT_QPA_PLATFORM")}
     done = subprocess.run(
         [str(word) for word in words(quick_configs, "direction", "--participant", "P01")],
@@ -295,14 +255,3 @@ def test_without_a_display_the_console_says_so(quick_configs: Path, tmp_path: Pa
     )
     assert done.returncode == 2
     assert "there is no display" in done.stderr
-
-
-def test_a_terminated_console_stops_in_order_and_says_so(quick_configs: Path, tmp_path: Path, display: str) -> None:
-    journal = tmp_path / f"{DIRECTION}_journal.jsonl"
-    with AtDisplay(words(quick_configs, "direction", "--participant", "P01"), tmp_path, display) as screen:
-        focus_on_console(screen, journal)
-        screen.process.terminate()
-        code, said = screen.end()
-    assert code == 130, said
-    assert last_record(journal)["kind"] == "stopped"
-    assert last_record(journal)["reason"] == "SIGTERM"

@@ -1,118 +1,64 @@
-"""The console with the participant's real screen beside it, on one virtual display, both worked by real events."""
+"""The console with the participant's real screen beside it, on one virtual desktop, both worked by real events."""
 
 from __future__ import annotations
 
 import importlib.util
-import json
 import os
 import re
-import signal
 import subprocess
 import sys
-import time
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from pathlib import Path
-from typing import Any
 
 import pytest
 
-from tests import watched_console
-from tests.at_display import AtDisplay, last_record, needs_display, virtual_display, work_console
+from tests.at_display import AtConsole, AtDisplay, needs_display, records, remarks, virtual_display, wait_for
 from tests.conftest import RECOIL
-from tests.test_console import DIRECTION, PREFERENCE, answer_by, rows, words
+from tests.test_console import DIRECTION, PREFERENCE, RUN, rows, words
 
 pytestmark = [
     needs_display,
     pytest.mark.skipif(importlib.util.find_spec("psychopy") is None, reason="PsychoPy is not installed: extra `gui`"),
 ]
 PARTICIPANT = "Recoil: participant"
-CONSOLE = "Recoil – P01"
-OPENS_S = 60
-GONE = "Enter the answer here: the participant's screen was killed by signal 9."
 LEFT_END, LINE_Y, BUTTON_Y = 0.1428, 0.56, 0.84
 
 
 @pytest.fixture(scope="module")
 def display() -> Iterator[str]:
-    with virtual_display() as name:
+    with virtual_display("1400x900") as name:  # the participant's window is there as a whole
         yield name
-
-
-def wait_for(what: Callable[[], object], timeout_s: float = 30) -> None:
-    end_s = time.monotonic() + timeout_s
-    while not what():
-        assert time.monotonic() < end_s, "it did not happen"
-        time.sleep(0.02)
-
-
-def console_stands(screen: AtDisplay, journal: Path) -> None:
-    wait_for(lambda: last_record(journal) or screen.process.poll() is not None, OPENS_S)
-    time.sleep(0.3)
-    screen.focus_on(CONSOLE)
-
-
-def is_at(journal: Path, kind: str, trial: int) -> bool:
-    body = last_record(journal).get("body", {})
-    return body.get("kind") == kind and body["trial"]["trial"] == trial
-
-
-def participant_pid(screen: AtDisplay) -> int:
-    """The participant's process: the console's child that runs its program."""
-    found = subprocess.run(
-        ["pgrep", "-P", str(screen.process.pid), "-f", "screens.participant"],
-        capture_output=True,
-        text=True,
-        check=True,
-    )
-    return int(found.stdout)
 
 
 def click(screen: AtDisplay, x: float, y: float) -> None:
     """Click on the participant's window at a place in parts of it."""
-    place = screen.keys.focus_on(PARTICIPANT)
-    assert place is not None
-    left, top, width, height = place
+    left, top, width, height = screen.focus_on(PARTICIPANT)
     screen.keys.click(left + int(x * width), top + int(y * height))
 
 
-def rate_by_mouse(screen: AtDisplay) -> None:
+def rate_by_mouse(screen: AtConsole) -> None:
     """0 by a click on the scale's left end, then a typed description, ended by the button."""
     click(screen, LEFT_END, LINE_Y)
     click(screen, 0.5, BUTTON_Y)
-    time.sleep(1.0)  # the page of the description is being built
+    screen.participant_shows("DescriptionPage")
     screen.keys.type("soft")
     click(screen, 0.5, BUTTON_Y)
 
 
-def rate_by_keys(screen: AtDisplay) -> None:
+def rate_by_keys(screen: AtConsole) -> None:
     """6.1 by keys alone, then a typed description, ended by keys."""
+    screen.focus_on(PARTICIPANT)
     for name in ("Right", "Next", "Right", "Return"):
         screen.keys.press(name)
-    time.sleep(1.0)
+    screen.participant_shows("DescriptionPage", 2)
     screen.keys.type("hard")
     screen.keys.press("Return", "Control_L")
 
 
-def fire(screen: AtDisplay, journal: Path, body: dict[str, Any]) -> None:
-    """What the experimenter presses until there is something to answer."""
-    if body["kind"] in ("prepare", "present"):
-        answer_by(screen, body)
-
-
-def until(screen: AtDisplay, journal: Path, kind: str, trial: int) -> None:
-    """Fire until a trial's question stands, on the participant's screen as well."""
-    end_s = time.monotonic() + 20
-    while not is_at(journal, kind, trial):
-        assert time.monotonic() < end_s, f"{kind} of trial {trial} did not come: {last_record(journal)}"
-        work_console(screen, journal, lambda body: fire(screen, journal, body), timeout_s=0.2)
-
-
-def enter_rating(screen: AtDisplay, journal: Path, trial: int) -> None:
+def rate_here(screen: AtConsole) -> None:
     """The experimenter's rating and the description they are told."""
-    for kind in ("rate", "describe"):
-        wait_for(lambda kind=kind: is_at(journal, kind, trial))
-        time.sleep(0.3)
-        screen.keys.type("7.5\n" if kind == "rate" else "like a toy\n")
+    for state in ("rating", "describing"):
+        screen.go_on(screen.at(state))
 
 
 def plays_sound(home: Path) -> bool:
@@ -123,51 +69,30 @@ def plays_sound(home: Path) -> bool:
     return asked.returncode == 0
 
 
-def told_at_hand_over(eye: Path, start: str) -> list[str]:
-    """What stands in the console's window at a hand-over and starts so."""
-    hand_overs = [texts for texts in watched_console.seen(eye) if any(text.startswith("Turn the") for text in texts)]
-    return [text for texts in hand_overs for text in texts if text.startswith(start)]
-
-
-def check_noise_is_told_of(eye: Path, home: Path) -> None:
-    """At the hand-over the console says why the noise stays off if nothing can play it, and else nothing."""
-    wait_for(lambda: told_at_hand_over(eye, "Turn the"))
-    if plays_sound(home):
-        assert not told_at_hand_over(eye, "Masking noise")
-    else:
-        wait_for(lambda: told_at_hand_over(eye, "Masking noise stays off: no sound device"))
-        assert "Connect headphones" in told_at_hand_over(eye, "Masking noise")[0]
-
-
-def kill_participants_process(screen: AtDisplay, eye: Path) -> None:
-    """The console says that the participant's screen is gone and where the answer goes now, and not before."""
-    assert not any(GONE in texts for texts in watched_console.seen(eye))
-    os.kill(participant_pid(screen), signal.SIGKILL)
-    wait_for(lambda: GONE in watched_console.seen(eye)[-1])
+def told_of_noise(screen: AtConsole) -> list[str]:
+    """What the console's window said of the noise so far."""
+    return [text for look in screen.watch.looks() for text in look.texts if text.startswith("Masking noise")]
 
 
 def test_two_ratings_by_the_participants_own_hand_and_one_entered_for_them(
     quick_configs: Path, tmp_path: Path, display: str
 ) -> None:
-    journal = tmp_path / f"{PREFERENCE}_journal.jsonl"
     run = words(quick_configs, "preference", "--participant", "P01", "--participant-screen")
-    with AtDisplay(run, tmp_path, display) as screen:
-        console_stands(screen, journal)
-        until(screen, journal, "rate", 1)
-        time.sleep(1.0)  # the page is being built
+    with AtConsole(run, tmp_path, display) as screen:
+        screen.stands(RUN)
+        screen.to("rating", trial=1)
+        screen.participant_shows("RatingPage")
         rate_by_mouse(screen)
-        wait_for(lambda: is_at(journal, "rate", 2))
-        time.sleep(1.0)
-        screen.focus_on(CONSOLE)
-        enter_rating(screen, journal, 2)
-        wait_for(lambda: is_at(journal, "rate", 3))
-        time.sleep(1.0)
-        screen.focus_on(PARTICIPANT)
+        screen.until(lambda look: look.state == "rating" and look.trial == 2)
+        screen.participant_shows("RatingPage", 2)
+        screen.focus_on(RUN)
+        rate_here(screen)
+        screen.until(lambda look: look.state == "rating" and look.trial == 3)
+        screen.participant_shows("RatingPage", 3)
         rate_by_keys(screen)
-        wait_for(lambda: last_record(journal)["kind"] == "finished")
-        time.sleep(0.5)
-        screen.keys.press("q")  # the console has the keys again
-        code, said = screen.end(15)
+        screen.until(lambda look: look.state == "closing" and look.active)  # the console has the keys again
+        screen.to_the_end()
+        code, said = screen.close()
     assert code == 0, said
     table = rows(tmp_path, PREFERENCE, "ratings")
     assert [row["rating"] for row in table] == ["0.0", "7.5", "6.1"]
@@ -175,91 +100,59 @@ def test_two_ratings_by_the_participants_own_hand_and_one_entered_for_them(
     assert [row["comment"] for row in table] == ["soft", "like a toy", "hard"]
 
 
-def test_a_participants_key_is_a_response_time_and_a_killed_participants_process_loses_nothing(
+def test_a_participants_key_is_a_response_time_from_the_onset_of_the_shot(
     quick_configs: Path, tmp_path: Path, display: str
 ) -> None:
-    journal, eye = tmp_path / f"{DIRECTION}_journal.jsonl", tmp_path / "seen.jsonl"
-    run = words(quick_configs, "direction", "--participant", "P01", "--participant-keys", "--noise")
+    journal = tmp_path / f"{DIRECTION}_journal.jsonl"
+    run = words(quick_configs, "direction", "--participant", "P01", "--participant-keys")
     pressed_s: list[float] = []
-    with AtDisplay(watched_console.words(eye, run), tmp_path, display) as screen:
-        console_stands(screen, journal)
-        check_noise_is_told_of(eye, tmp_path)
+    with AtConsole(run, tmp_path, display) as screen:
+        screen.stands(RUN)
         for trial, key in enumerate(("Up", "Down"), 1):
-            until(screen, journal, "ask", trial)
-            time.sleep(0.4)
+            asking = screen.to("asking", trial)
+            screen.participant_shows("DirectionPage", trial)
             pressed_s.append(screen.keys.press(key))
-        until(screen, journal, "ask", 3)
-        time.sleep(0.3)
-        kill_participants_process(screen, eye)
-        screen.keys.press("f")
-        wait_for(lambda: is_at(journal, "prepare", 4))
-        screen.keys.press("F12")
-        wait_for(lambda: last_record(journal)["kind"] == "stopped")
-        time.sleep(0.5)
-        screen.keys.press("q")
-        code, said = screen.end()
+            screen.until(lambda look, serial=asking.serial: look.serial != serial)
+        screen.to("preparing", trial=4)
+        code, said = screen.stop()
     assert code == 130, said
     first, second, third, *_ = rows(tmp_path, DIRECTION, "trials")
     assert [row["response"] for row in (first, second, third)] == ["forward", "backward", "forward"]
     assert [row["response_source"] for row in (first, second, third)] == ["participant"] * 2 + ["experimenter"]
     assert [row["response_time_valid"] for row in (first, second, third)] == ["1", "1", "0"]
     for row, key_s, onset_s in zip((first, second), pressed_s, onsets_s(journal), strict=False):
-        assert float(row["response_time_s"]) == pytest.approx(key_s - onset_s, abs=0.05)
-
-
-def test_of_a_masking_noise_that_plays_the_console_says_nothing(
-    quick_configs: Path, tmp_path: Path, display: str
-) -> None:
-    (tmp_path / ".asoundrc").write_text("pcm.!default { type null }\n")  # a device without a sound
-    if not plays_sound(tmp_path):
-        pytest.skip("the sound library does not take its devices from ALSA")
-    journal, eye = tmp_path / f"{DIRECTION}_journal.jsonl", tmp_path / "seen.jsonl"
-    run = words(quick_configs, "direction", "--participant", "P01", "--noise")
-    with AtDisplay(watched_console.words(eye, run), tmp_path, display) as screen:
-        console_stands(screen, journal)
-        check_noise_is_told_of(eye, tmp_path)
-        assert '"Masking noise plays."' in journal.read_text()
-        screen.keys.press("F12")
-        wait_for(lambda: last_record(journal)["kind"] == "stopped")
-        time.sleep(0.5)
-        screen.keys.press("q")
-        code, said = screen.end()
-    assert code == 130, said
+        assert float(row["response_time_s"]) == pytest.approx(key_s - onset_s, abs=0.1)  # the keys' own clock
 
 
 def onsets_s(journal: Path) -> list[float]:
     """When the shots began, on the machine's monotonic clock."""
-    bodies = [json.loads(line).get("body", {}) for line in journal.read_text().splitlines()]
+    bodies = [record.get("body", {}) for record in records(journal)]
     return [body["pulse_start_s"] for body in bodies if body.get("kind") == "fired"]
 
 
-def test_a_participants_process_killed_in_mid_rating_leaves_the_answer_to_the_experimenter(
-    quick_configs: Path, tmp_path: Path, display: str
+@pytest.mark.parametrize("device", ["", "pcm.!default { type null }\n"])  # what there is; one without a sound
+def test_of_masking_noise_the_console_says_why_it_stays_off_and_else_nothing(
+    quick_configs: Path, tmp_path: Path, display: str, device: str
 ) -> None:
-    journal, eye = tmp_path / f"{PREFERENCE}_journal.jsonl", tmp_path / "seen.jsonl"
-    run = words(quick_configs, "preference", "--participant", "P01", "--participant-screen")
-    with AtDisplay(watched_console.words(eye, run), tmp_path, display) as screen:
-        console_stands(screen, journal)
-        until(screen, journal, "rate", 1)
-        time.sleep(1.0)
-        click_scale_only(screen)
-        kill_participants_process(screen, eye)
-        time.sleep(1.0)
-        screen.focus_on(CONSOLE)  # as a window manager does when the window with the keys is gone
-        for trial in (1, 2, 3):
-            enter_rating(screen, journal, trial)
-        wait_for(lambda: last_record(journal)["kind"] == "finished")
-        time.sleep(0.5)
-        screen.keys.press("q")
-        code, said = screen.end()
-    assert code == 0, said
-    table = rows(tmp_path, PREFERENCE, "ratings")
-    assert [(row["rating"], row["rating_by"]) for row in table] == [("7.5", "experimenter")] * 3
-
-
-def click_scale_only(screen: AtDisplay) -> None:
-    """A marker that is not confirmed yet."""
-    click(screen, LEFT_END, LINE_Y)
+    if device:
+        (tmp_path / ".asoundrc").write_text(device)
+    plays = plays_sound(tmp_path)
+    if device and not plays:
+        pytest.skip("the sound library does not take its devices from ALSA")
+    journal = tmp_path / f"{DIRECTION}_journal.jsonl"
+    run = words(quick_configs, "direction", "--participant", "P01", "--noise")
+    with AtConsole(run, tmp_path, display) as screen:
+        screen.stands(RUN)
+        screen.ready()
+        noted = wait_for(lambda: remarks(journal, "noted"))[0]["text"]
+        if plays:
+            assert noted == "Masking noise plays."
+        else:
+            screen.until(lambda look: look.says("Masking noise stays off: no sound device"))
+            assert "Connect headphones" in told_of_noise(screen)[0]
+        code, said = screen.stop()
+    assert code == 130, said
+    assert not plays or not told_of_noise(screen)
 
 
 def test_a_synthetic_participant_rates_on_the_participants_screen_as_in_data_mode(
@@ -267,7 +160,7 @@ def test_a_synthetic_participant_rates_on_the_participants_screen_as_in_data_mod
 ) -> None:
     run = words(quick_configs, "preference", "--participant", "P01", "--visual", "--participant-screen")
     with AtDisplay(run, tmp_path, display) as screen:
-        code, said = screen.end(90)
+        code, said = screen.end()
     assert code == 0, said
     data = [RECOIL, "run", quick_configs / "preference.toml", "--participant", "P01", "--seed", "1"]
     subprocess.run([*data, "--screen", "synthetic", "--results", "data"], cwd=tmp_path, check=True, capture_output=True)

@@ -14,7 +14,7 @@ import pytest
 from experiments.journal import Contents, read
 from experiments.replay import history
 from experiments.steps import Answered
-from tests.at_terminal import ANSWERS, DAMPER, FIRES, AtTerminal, answer_until_killed
+from tests.at_terminal import ANSWERS, FIRES, AtTerminal, answer_until_killed
 from tests.conftest import RECOIL
 
 STEM = "sub-P01/sub-P01_task-direction"

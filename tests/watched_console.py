@@ -1,35 +1,104 @@
-"""`recoil` as it is, with an eye on its windows: called as a program with a file, then the words of the command.
+"""`recoil` as it is, with an eye on its windows, a book of what its gun is asked, and faults of gun and disk if wanted.
 
-Whenever what stands in the windows changes, the file gets a line of JSON: all texts that can be read whole.
+Called as a program with a `Watch` in JSON, then the words of the command. Whenever what stands in the windows changes,
+the eye's file gets a line of JSON, a `Look`.
 """
 
 from __future__ import annotations
 
 import json
 import sys
+import threading
+import time
+from dataclasses import asdict, dataclass, field
 from pathlib import Path
 from typing import Any
 
-LOOK_MS = 20
+from tests import watched_participant
+
+LOOK_MS = 10
+TAIL_BYTES = 1 << 16
 
 
-def words(file: Path, command: list[object]) -> list[object]:
-    """A `recoil` command, to be carried out under the eye."""
-    return [sys.executable, "-m", "tests.watched_console", file, *command[1:]]
+@dataclass(frozen=True)
+class Watch:
+    """Where eye and book write; at which shots the gun hangs until told to go on; how much longer a sync takes.
+
+    `participants`: how often the participant's screen can be started.
+    """
+
+    folder: str
+    hangs: tuple[int, ...] = ()
+    sync_s: float = 0.0
+    participants: int = 99
+
+    @property
+    def eye(self) -> Path:
+        return Path(self.folder) / "eye.jsonl"
+
+    @property
+    def book(self) -> Path:
+        return Path(self.folder) / "gun.jsonl"
+
+    @property
+    def pages(self) -> Path:
+        return Path(self.folder) / "pages.txt"
+
+    @property
+    def go_on(self) -> Path:
+        return Path(self.folder) / "go-on"
+
+    def words(self, command: list[object]) -> list[object]:
+        """A `recoil` command, to be carried out under the eye."""
+        return [sys.executable, "-m", "tests.watched_console", json.dumps(asdict(self)), *command[1:]]
+
+    def looks(self) -> list[Look]:
+        """What stood in the windows, from the first look to the last."""
+        lines = self.eye.read_bytes().split(b"\n")[:-1] if self.eye.exists() else []
+        return [Look(**json.loads(line)) for line in lines]
+
+    def look(self) -> Look:
+        """What stands in the windows now."""
+        if not self.eye.exists():
+            return Look()
+        with self.eye.open("rb") as file:
+            file.seek(max(0, self.eye.stat().st_size - TAIL_BYTES))
+            lines = file.read().split(b"\n")
+        return Look(**json.loads(lines[-2])) if len(lines) > 1 else Look()
+
+    def calls(self, name: str = "") -> list[dict[str, Any]]:
+        """What the gun was asked, in order."""
+        lines = self.book.read_bytes().split(b"\n")[:-1] if self.book.exists() else []
+        return [call for line in lines if name in ("", (call := json.loads(line))["call"])]
 
 
-def seen(file: Path) -> list[list[str]]:
-    """The texts that stood in the windows, from the first look to the last."""
-    lines = file.read_bytes().split(b"\n")[:-1] if file.exists() else []
-    return [json.loads(line) for line in lines]
+@dataclass(frozen=True)
+class Look:
+    """What stands in the windows, and where the run is. `ready`: a press would not come too soon for what stands there.
+
+    `places` are the buttons that are to be seen, by their commands: left, top, width, height on the display.
+    """
+
+    window: str = ""
+    active: bool = False
+    state: str = ""
+    base: str = ""
+    serial: int = -1
+    trial: int = 0
+    ready: bool = False
+    ended: bool = False
+    line: bool = False
+    typed: str = ""
+    page: bool = False
+    theme: str = ""
+    texts: list[str] = field(default_factory=list)
+    places: dict[str, list[int]] = field(default_factory=dict)
+
+    def says(self, words: str) -> bool:
+        return any(words in text for text in self.texts)
 
 
-def texts() -> list[str]:
-    """What stands in the windows now."""
-    from PyQt6.QtWidgets import QApplication, QLabel
-
-    windows = QApplication.topLevelWidgets()
-    return [label.text() for window in windows for label in window.findChildren(QLabel) if is_whole(label)]
+# the program
 
 
 def is_whole(label: Any) -> bool:
@@ -37,18 +106,70 @@ def is_whole(label: Any) -> bool:
     return not label.visibleRegion().isEmpty() and label.height() >= label.heightForWidth(label.width())
 
 
-def watch(file: Path) -> Any:
+def look_around() -> Look:
+    """A look at the windows of this program; the run's where there is one, else the newest."""
+    from PyQt6.QtWidgets import QApplication, QLabel
+
+    from experiments.screens.console.window import ConsoleWindow
+
+    windows = [window for window in QApplication.topLevelWidgets() if window.isVisible() and window.windowTitle()]
+    texts = [label.text() for one in windows for label in [*one.findChildren(QLabel), one] if _read(label)]
+    consoles = [window for window in windows if isinstance(window, ConsoleWindow)]
+    here = next(iter([*consoles, *reversed(windows)]), None)
+    named = {"window": here.windowTitle(), "active": here.isActiveWindow()} if here is not None else {}
+    found = _run(consoles[0]) if consoles else {}
+    return Look(texts=texts, **named, **found)
+
+
+def _read(label: Any) -> bool:
+    return hasattr(label, "heightForWidth") and hasattr(label, "text") and bool(label.text()) and is_whole(label)
+
+
+def _run(window: Any) -> dict[str, Any]:
+    """Where the run of a console's window is, as far as it is drawn."""
+    if window.live is None:
+        return {"ended": window.ended is not None}
+    drawn, live, now_s = window.drawn, window.live, window._clock.now()
+    not_before_s = live.position.not_before_s
+    in_time = not_before_s is None or now_s >= not_before_s
+    return {
+        "state": str(drawn.state),
+        "base": str(drawn.base),
+        "serial": drawn.serial,
+        "trial": live.trial.trial,
+        "ready": drawn.serial == live.position.serial and live.ready_at_s(now_s) and in_time,
+        "ended": window.ended is not None,
+        "line": window.controls.typing.line,
+        "typed": window.typed("line" if window.controls.typing.line else "number"),
+        "page": window.controls.page,
+        "theme": window.theme,
+        "places": _places(window),
+    }
+
+
+def _places(window: Any) -> dict[str, list[int]]:
+    from experiments.screens.console.actions import CommandButton
+
+    found = {}
+    for button in window.findChildren(CommandButton):
+        if button.isVisible():
+            corner = button.mapToGlobal(button.rect().topLeft())
+            found[button.name] = [corner.x(), corner.y(), button.width(), button.height()]
+    return found
+
+
+def watch_windows(file: Path) -> Any:
     """Look from now on, as long as the timer that is given back lives."""
     from PyQt6.QtCore import QTimer
 
-    last: list[str] = []
+    last = Look()
 
     def look() -> None:
         nonlocal last
-        if (now := texts()) != last:
+        if (now := look_around()) != last:
             last = now
             with file.open("a", encoding="utf-8") as out:
-                out.write(json.dumps(now) + "\n")
+                out.write(json.dumps(asdict(now)) + "\n")
 
     timer = QTimer()
     timer.timeout.connect(look)
@@ -56,10 +177,91 @@ def watch(file: Path) -> Any:
     return timer
 
 
+class WatchedGun:
+    """A gun that writes into a book what it is asked and when, and hangs at some of its shots until a file is there."""
+
+    def __init__(self, gun: Any, watch: Watch) -> None:
+        self._gun, self._watch = gun, watch
+        self._lock = threading.Lock()
+        self.shots = 0
+
+    def arm(self) -> None:
+        self._gun.arm()
+        self._write("armed")
+
+    def disarm(self) -> None:
+        self._write("disarm")
+        self._gun.disarm()
+
+    def fire(self, shot: Any, at_s: float | None = None) -> Any:
+        self.shots += 1
+        self._write("fire", at=at_s)
+        if self.shots in self._watch.hangs:
+            self._hang()
+        report = self._gun.fire(shot, at_s)
+        self._write("fired", start_s=report.pulse_start_s)
+        return report
+
+    def _hang(self) -> None:
+        self._write("hangs")
+        while not self._watch.go_on.exists():
+            time.sleep(0.002)
+
+    def _write(self, call: str, **how: Any) -> None:
+        line = json.dumps({"call": call, "s": time.monotonic(), "shot": self.shots, **how})
+        with self._lock, self._watch.book.open("a", encoding="utf-8") as out:
+            out.write(line + "\n")
+
+    def __getattr__(self, name: str) -> Any:
+        return getattr(self._gun, name)
+
+
+def watch_guns(watch: Watch) -> None:
+    """From now on every gun that is opened is watched."""
+    from experiments import run
+
+    opened = run.open_gun
+    run.open_gun = lambda *where, **how: WatchedGun(opened(*where, **how), watch)
+
+
+def watch_participants(watch: Watch) -> None:
+    """From now on every participant's screen that is started is watched."""
+    from experiments.screens.participant.link import ParticipantLink
+    from experiments.screens.participant.look import Look, arguments
+
+    start, left = ParticipantLink.start, watch.participants
+
+    def watched(look: Look | None = None, **how: Any) -> ParticipantLink:
+        nonlocal left
+        left -= 1
+        words = watched_participant.words(watch.pages, arguments(look or Look())) if left >= 0 else ["false"]
+        return start(look, **how, command=words)
+
+    ParticipantLink.start = watched
+
+
+def slow_disk(sync_s: float) -> None:
+    """From now on a sync takes its time."""
+    from experiments import storage
+
+    sync = storage.sync
+
+    def slow(descriptor: int) -> None:
+        time.sleep(sync_s)
+        sync(descriptor)
+
+    storage.sync = slow
+
+
 if __name__ == "__main__":
     from experiments.roof.cli import main
     from experiments.screens.console.app import application
 
+    watch = Watch(**json.loads(sys.argv.pop(1)))
+    watch_guns(watch)
+    watch_participants(watch)
+    if watch.sync_s:
+        slow_disk(watch.sync_s)
     application()
-    eye = watch(Path(sys.argv.pop(1)))
+    eye = watch_windows(watch.eye)
     main()

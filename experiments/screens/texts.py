@@ -140,7 +140,7 @@ def _remark_text(plan: Plan, remark: Outcome | Remark) -> str:
             return f"Saved. {ordinal(plan, remark.trial)}: description corrected."
         case Flagged():
             return f"Saved. Trial {remark.trial.trial} flagged {remark.flag}."
-        case Noted():
+        case Noted(trial=Trial()):  # one without a trial is the program's own
             return "Saved. Note."
         case HaltReason():
             return "Saved. Reason of the emergency stop."

@@ -37,15 +37,30 @@ class Hands:
         """Let go of the display."""
         self._display.close()
 
+    def key_down(self, name: str) -> float:
+        """Press a key by its X name and keep it down, so that the system repeats it.
+
+        Gives back when, on the monotonic clock.
+        """
+        return self._key(X.KeyPress, name)
+
+    def key_up(self, name: str) -> float:
+        """Let go of a key; gives back when."""
+        return self._key(X.KeyRelease, name)
+
+    def _key(self, event: int, name: str) -> float:
+        at_s = time.monotonic()
+        xtest.fake_input(self._display, event, self._display.keysym_to_keycode(XK.string_to_keysym(name)))
+        self._display.sync()
+        return at_s
+
     def press(self, name: str, *held: str) -> float:
         """Press a key by its X name, with others held; gives back when, on the monotonic clock."""
-        codes = [self._display.keysym_to_keycode(XK.string_to_keysym(key)) for key in (*held, name)]
-        pressed_s = time.monotonic()
-        for code in codes:
-            xtest.fake_input(self._display, X.KeyPress, code)
-        for code in reversed(codes):
-            xtest.fake_input(self._display, X.KeyRelease, code)
-        self._display.sync()
+        for key in held:
+            self.key_down(key)
+        pressed_s = self.key_down(name)
+        for key in (name, *reversed(held)):
+            self.key_up(key)
         return pressed_s
 
     def type(self, text: str) -> None:
@@ -54,12 +69,26 @@ class Hands:
             shifted = letter.isupper() or letter == "?"
             self.press(_NAMES.get(letter, letter.lower()), *(["Shift_L"] if shifted else []))
 
-    def click(self, x_px: int, y_px: int) -> None:
-        """Click at a place of the display, in pixels from its upper left."""
+    def move(self, x_px: int, y_px: int) -> None:
+        """Move the pointer to a place of the display, in pixels from its upper left."""
         xtest.fake_input(self._display, X.MotionNotify, x=x_px, y=y_px)
+        self._display.sync()
+
+    def button_down(self) -> None:
+        """Press the mouse's left button and keep it down."""
         xtest.fake_input(self._display, X.ButtonPress, 1)
+        self._display.sync()
+
+    def button_up(self) -> None:
+        """Let go of the mouse's left button."""
         xtest.fake_input(self._display, X.ButtonRelease, 1)
         self._display.sync()
+
+    def click(self, x_px: int, y_px: int) -> None:
+        """Click at a place of the display."""
+        self.move(x_px, y_px)
+        self.button_down()
+        self.button_up()
 
     def focus_on(self, title: str, timeout_s: float = 0.0) -> tuple[int, int, int, int] | None:
         """Raise the newest window whose title holds a text, and give it the keys.

@@ -34,6 +34,8 @@ WAIT, PAUSED, THANKS = "Please wait.", "Paused. Please wait.", "Thank you."
 
 Desire = tuple[Any, ...]
 """What is to stand on the participant's screen: a text, or a question by the number of its step."""
+Wanted = Callable[[], bool]
+"""Whether a question is still to be asked."""
 
 
 class ParticipantSide:
@@ -60,6 +62,7 @@ class ParticipantSide:
         self._live: LiveRun | None = None
         self._tell: Callable[[Message], None] = lambda _: None
         self._shows: Desire = (WAIT,)
+        self._serial = -1
         self._closed = False
 
     def begin(self, live: LiveRun, tell: Callable[[Message], None]) -> str:
@@ -80,19 +83,22 @@ class ParticipantSide:
         return self._link.asking
 
     def follow(self, position: Position) -> None:
-        """Have what belongs to a position on the participant's screen."""
+        """Have what belongs to a position on the participant's screen; one that is told late is out of date."""
         with self._lock:
+            if position.serial < self._serial:
+                return
+            self._serial = position.serial
             desire = self._desire(position)
             if desire == self._shows or self._closed:
                 return
             self._shows = desire
-            self._link.cancel()
             target = self._asks(desire, position)
-        if target is None:
-            told = tuple(KEYS) if self.own_keys and desire == (PAUSED,) else ()
-            self._link.show(str(desire[0]), tell=told)
-        else:
-            threading.Thread(target=target, daemon=True, name="participant").start()
+            if target is None:
+                told = tuple(KEYS) if self.own_keys and desire == (PAUSED,) else ()
+                self._link.show(str(desire[0]), tell=told)
+            else:
+                self._link.cancel()
+                threading.Thread(target=target, daemon=True, name="participant").start()
 
     def _desire(self, position: Position) -> Desire:
         if position.state is State.PAUSED or State.PAUSED in position.states:
@@ -106,20 +112,20 @@ class ParticipantSide:
     def _asks(self, desire: Desire, position: Position) -> Callable[[], None] | None:
         step = position.step
         if desire[0] == "direction" and isinstance(step, Ask):
-            return lambda: self._carefully(desire, lambda: self._judged(step, position))
+            return lambda: self._carefully(desire, lambda wanted: self._judged(step, position, wanted))
         if desire[0] == "rating" and isinstance(step, Rate):
-            return lambda: self._carefully(desire, lambda: self._rated(step, position))
+            return lambda: self._carefully(desire, lambda wanted: self._rated(step, position, wanted))
         return None
 
-    def _carefully(self, desire: Desire, ask: Callable[[], None]) -> None:
+    def _carefully(self, desire: Desire, ask: Callable[[Wanted], None]) -> None:
         """Ask; a question that was called off is over, one that fails otherwise leaves the answer to the console."""
         try:
-            ask()
+            ask(lambda: self._shows == desire)
         except ParticipantError as error:
             if self._shows == desire and self._link.failure is None:
                 self._tell(Trouble(text=f"Enter the answer here: {error}."))
 
-    def _judged(self, step: Ask, position: Position) -> None:
+    def _judged(self, step: Ask, position: Position, wanted: Wanted) -> None:
         onset_s = position.since_s if position.onset_s is None else position.onset_s
         paused = self._live is not None and self._live.paused_since(onset_s)
         given = self._link.ask_direction(
@@ -130,12 +136,13 @@ class ParticipantSide:
                 forward_key="up",
                 backward_key="down",
                 onset_s=position.since_s if paused else onset_s,  # a key in a pause is no answer
-            )
+            ),
+            wanted=wanted,
         )
         key = events.ParticipantKey(response=given.response, at_s=given.pressed_s, step=position.number, by=self._hand)
         self._offer(key)
 
-    def _rated(self, step: Rate, position: Position) -> None:
+    def _rated(self, step: Rate, position: Position, wanted: Wanted) -> None:
         config = self._setup.config
         given = self._link.ask_rating(
             AskRating(
@@ -148,7 +155,8 @@ class ParticipantSide:
                 maximum_text=step.maximum_text,
                 grain=step.grain,
                 describe=config.description.text,
-            )
+            ),
+            wanted=wanted,
         )
         rated = events.ParticipantRated(rating=given.rating, comment=given.comment, step=position.number, by=self._hand)
         self._offer(rated)
@@ -180,9 +188,9 @@ class ParticipantSide:
 
     def _restart(self) -> None:
         if self._link.failure is None:
-            self._tell(Trouble(text="The participant's screen is there."))
+            self._tell(Trouble(text="The participant's screen is there.", mood="good"))
             return
-        self._tell(Trouble(text="Starting the participant's screen …"))
+        self._tell(Trouble(text="Starting the participant's screen …", mood="wait"))
         try:
             link = self._open_link()
         except ParticipantError as error:
@@ -192,6 +200,7 @@ class ParticipantSide:
             self._link, self._shows = link, ("",)
         link.listen(self._heard, self._gone)
         self._tell(ParticipantSeen())
+        self._tell(Trouble(text="The participant's screen is there again.", mood="good"))
         self._offer(events.ParticipantBack())
         if self._live is not None:
             self.follow(self._live.position)

@@ -51,9 +51,10 @@ class ParticipantSeen:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Trouble:
-    """Something went wrong, and what."""
+    """Something went wrong, and what; or, by its mood, what is done about it."""
 
     text: str
+    mood: str = "bad"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -228,7 +228,7 @@ class ConsoleWindow(QMainWindow):
             case ParticipantSeen():
                 self.participant = message
             case Trouble():
-                self._last(message.text, "bad")
+                self._last(message.text, message.mood)
             case Ended():
                 self._end(message)
             case Shown():

@@ -63,6 +63,9 @@ class ParticipantLink:
         self._clock = clock
         self._mail = Mailbox()
         self._asking = threading.RLock()
+        self._page = threading.Lock()
+        self._stands = 0
+        """The question that was put on the screen last; 0 when something else was."""
         self._clocks: ClockMap | None = None
         self._heard: Callable[[Unasked], None] = lambda _: None
         self._gone: Callable[[str], None] = lambda _: None
@@ -113,8 +116,10 @@ class ParticipantLink:
 
     def show(self, text: str, tell: tuple[str, ...] = ()) -> None:
         """Show a plain message; a question that is being asked is called off. Keys in `tell` are told meanwhile."""
-        self._mail.call_off()
-        self._process.write(line(Show(text=text, tell=tell)))
+        with self._page:
+            self._mail.call_off()
+            self._stands = 0
+            self._process.write(line(Show(text=text, tell=tell)))
 
     def map_clocks(self, pings: int = PINGS) -> ClockMap:
         """Map the clocks anew."""
@@ -122,18 +127,28 @@ class ParticipantLink:
             self._clocks = clock_map([self._trip() for _ in range(pings)])
             return self._clocks
 
-    def ask_rating(self, question: AskRating, timeout_s: float | None = None) -> RatingGiven:
-        """Have a stimulus rated, and described if `describe` asks for it. Waits for the participant."""
+    def ask_rating(
+        self, question: AskRating, timeout_s: float | None = None, *, wanted: Callable[[], bool] = lambda: True
+    ) -> RatingGiven:
+        """Have a stimulus rated, and described if `describe` asks for it. Waits for the participant.
+
+        `wanted` is looked at just before the question is put on the screen; if it is not, it counts as called off.
+        """
         with self._alone():
             asked = replace(question, ask=self._mail.open_ask())
-            return self._answer(asked, RatingGiven, timeout_s)
+            return self._answer(asked, RatingGiven, timeout_s, wanted)
 
-    def ask_direction(self, question: AskDirection, timeout_s: float | None = None) -> DirectionGiven:
-        """Have a direction judged. Waits for the participant. `onset_s` and `pressed_s` are on this side's clock."""
+    def ask_direction(
+        self, question: AskDirection, timeout_s: float | None = None, *, wanted: Callable[[], bool] = lambda: True
+    ) -> DirectionGiven:
+        """Have a direction judged. Waits for the participant. `onset_s` and `pressed_s` are on this side's clock.
+
+        `wanted` as of a rating.
+        """
         with self._alone():
             ask, clocks = self._mail.open_ask(), self.map_clocks()
             asked = replace(question, ask=ask, onset_s=clocks.there(question.onset_s))
-            given = self._answer(asked, DirectionGiven, timeout_s)
+            given = self._answer(asked, DirectionGiven, timeout_s, wanted)
             moved_s = self.map_clocks().offset_s - clocks.offset_s
         if abs(moved_s) > MAX_CLOCK_STEP_S:
             raise ParticipantError(
@@ -144,7 +159,7 @@ class ParticipantLink:
     def noise(self, on: bool, level: float = 0.3) -> NoiseIs:
         """Turn the masking noise on or off; the answer says whether it plays, and if it cannot, why."""
         with self._alone():
-            return self._answer(Noise(on=on, level=level, ask=self._mail.open_ask()), NoiseIs, NOISE_S)
+            return self._answer(Noise(on=on, level=level, ask=self._mail.open_ask()), NoiseIs, NOISE_S, lambda: True)
 
     def cancel(self) -> bool:
         """Call off the question that is being asked, from another thread; true if there was one."""
@@ -173,16 +188,30 @@ class ParticipantLink:
         finally:
             self._asking.release()
 
-    def _answer(self, asked: Question, kind: type[Answer], timeout_s: float | None) -> Answer:
-        """Ask and wait; a question that gets no answer is taken off the screen."""
+    def _answer(
+        self, asked: Question, kind: type[Answer], timeout_s: float | None, wanted: Callable[[], bool]
+    ) -> Answer:
+        """Ask and wait; a question that gets no answer is taken off the screen, if it still stands there."""
         try:
-            self._process.write(line(asked))
+            self._put(asked, wanted)
             return self._mail.wait(kind, lambda given: given.ask == asked.ask, timeout_s, asked.ask)
         except ParticipantError:
-            self._process.write(line(Show(text="")))
+            self._take_off(asked)
             raise
         finally:
             self._mail.call_off()
+
+    def _put(self, asked: Question, wanted: Callable[[], bool]) -> None:
+        with self._page:
+            if not wanted():
+                raise ParticipantError("the question was called off")
+            self._stands = asked.ask
+            self._process.write(line(asked))
+
+    def _take_off(self, asked: Question) -> None:
+        with self._page:
+            if self._stands == asked.ask:
+                self._process.write(line(Show(text="")))
 
     def _trip(self) -> RoundTrip:
         """One ping, waited for where its return is stamped."""

@@ -1,0 +1,349 @@
+"""How runs at the console end that nobody ended in order: displays, folders, processes and windows that go away."""
+
+from __future__ import annotations
+
+import importlib.util
+import os
+import shutil
+import signal
+import subprocess
+import time
+from collections.abc import Callable, Iterator
+from contextlib import ExitStack
+from pathlib import Path
+
+import pytest
+
+from tests.at_display import (
+    AtConsole,
+    needs_display,
+    records,
+    remarks,
+    virtual_display,
+    window_manager,
+    x_server,
+)
+from tests.at_hand import check_gun
+from tests.test_console import DIRECTION, PREFERENCE, RUN, answers, rows, words
+from tests.watched_console import Watch
+
+pytest.importorskip("PyQt6")
+pytestmark = needs_display
+needs_psychopy = pytest.mark.skipif(
+    importlib.util.find_spec("psychopy") is None, reason="PsychoPy is not installed: extra `gui`"
+)
+
+
+@pytest.fixture(scope="module")
+def display() -> Iterator[str]:
+    with virtual_display() as name:
+        yield name
+
+
+def run_words(configs: Path, experiment: str = "direction", *more: object) -> list[object]:
+    return words(configs, experiment, "--participant", "P01", *more)
+
+
+def check_disarmed(watch: Watch) -> None:
+    """The last that the gun was told is to disarm."""
+    calls = [call["call"] for call in watch.calls()]
+    assert "disarm" in calls
+    assert "armed" not in calls[len(calls) - 1 - calls[::-1].index("disarm") :]
+
+
+def check_resumes(command: list[object], folder: Path, display: str, trial: int) -> None:
+    """The run goes on at a trial."""
+    with AtConsole([*command, "--resume"], folder, display) as screen:
+        screen.stands(RUN)
+        assert screen.to("preparing").trial == trial
+        assert screen.stop()[0] == 130
+
+
+# the display
+
+
+def lose_the_display(configs: Path, folder: Path, experiment: str, state: str) -> float:
+    """Kill the X server under a run at a state; how long the program then lives, in seconds."""
+    with ExitStack() as stack:
+        name, server = stack.enter_context(x_server())
+        stack.enter_context(window_manager(name))
+        screen = stack.enter_context(AtConsole(run_words(configs, experiment), folder, name))
+        screen.stands(RUN)
+        screen.to(state, trial=2)
+        return killed_s(server, screen)
+
+
+def killed_s(server: subprocess.Popen[bytes], screen: AtConsole) -> float:
+    at_s = time.monotonic()
+    server.kill()
+    code, said = screen.end()
+    assert code == 1, said
+    assert "the display was lost" in said
+    return time.monotonic() - at_s
+
+
+@pytest.mark.parametrize(("experiment", "state"), [("direction", "asking"), ("preference", "train")])
+def test_a_run_whose_display_is_lost_ends_disarmed_and_can_be_resumed(
+    quick_configs: Path, tmp_path: Path, display: str, experiment: str, state: str
+) -> None:
+    lose_the_display(quick_configs, tmp_path, experiment, state)
+    check_disarmed(Watch(str(tmp_path)))
+    stem = DIRECTION if experiment == "direction" else PREFERENCE
+    last = records(tmp_path / f"{stem}_journal.jsonl")[-1]
+    assert (last["kind"], last["reason"]) == ("stopped", "the display was lost")
+    check_resumes(run_words(quick_configs, experiment), tmp_path, display, trial=2)
+
+
+# the results
+
+
+def lose_the_results(screen: AtConsole, lose: Callable[[], object]) -> str:
+    """Take the results away at the second trial; what stands on the end screen."""
+    screen.stands(RUN)
+    screen.to("preparing", trial=2)
+    lose()
+    screen.keys.press("space")
+    look = screen.until(lambda look: look.ended)
+    assert not look.says("all that were given")
+    return next(text for text in look.texts if "the journal was" in text)
+
+
+def test_results_that_are_deleted_under_a_run_are_noticed_and_written_again(
+    quick_configs: Path, tmp_path: Path, display: str
+) -> None:
+    run = run_words(quick_configs)
+    with AtConsole(run, tmp_path, display) as screen:
+        said = lose_the_results(screen, lambda: shutil.rmtree(tmp_path / "results"))
+        screen.close()
+    assert "was deleted during the run" in said
+    assert "go on with --resume" in said
+    check_disarmed(Watch(str(tmp_path)))
+    assert answers(tmp_path / f"{DIRECTION}_journal.jsonl") == ["forward"]
+    check_resumes(run, tmp_path, display, trial=2)
+
+
+def test_results_that_are_moved_under_a_run_are_gone_on_with_where_they_are(
+    quick_configs: Path, tmp_path: Path, display: str
+) -> None:
+    run = run_words(quick_configs)
+    with AtConsole(run, tmp_path, display) as screen:
+        said = lose_the_results(screen, lambda: (tmp_path / "results").rename(tmp_path / "elsewhere"))
+        screen.close()
+    journal = tmp_path / DIRECTION.replace("results", "elsewhere")
+    assert f"was moved to {journal}_journal.jsonl" in said
+    check_disarmed(Watch(str(tmp_path)))
+    check_resumes([*run, "--results", "elsewhere"], tmp_path, display, trial=2)
+
+
+def test_results_that_cannot_be_written_again_in_their_place_are_written_to_another_that_is_named(
+    quick_configs: Path, tmp_path: Path, display: str
+) -> None:
+    run, results = run_words(quick_configs), tmp_path / "results"
+
+    def replace_by_a_file() -> None:
+        shutil.rmtree(results)
+        results.write_text("no folder")
+
+    with AtConsole(run, tmp_path, display) as screen:
+        said = lose_the_results(screen, replace_by_a_file)
+        screen.close()
+    there = tmp_path / f"{Path(DIRECTION).name}_journal.jsonl"
+    assert f"written again to {there}; put it back" in said
+    results.unlink()
+    back = tmp_path / f"{DIRECTION}_journal.jsonl"
+    back.parent.mkdir(parents=True)
+    there.rename(back)
+    check_resumes(run, tmp_path, display, trial=2)
+
+
+# windows and signals
+
+
+def test_closing_the_window_asks_why_and_ends_nothing_by_itself(
+    quick_configs: Path, tmp_path: Path, display: str
+) -> None:
+    journal = tmp_path / f"{DIRECTION}_journal.jsonl"
+    with AtConsole(run_words(quick_configs), tmp_path, display) as screen:
+        screen.stands(RUN)
+        screen.to("asking", trial=2)
+        screen.keys.press("F4", "Alt_L")  # by the window manager
+        screen.until(lambda look: look.line and look.says("Why does the run stop here?"))
+        screen.keys.press("Escape")
+        screen.until(lambda look: not look.line)
+        assert screen.to("preparing", trial=3)
+        screen.keys.press("F4", "Alt_L")
+        screen.until(lambda look: look.line)
+        screen.keys.type("fire alarm\n")
+        code, said = screen.close()
+    assert code == 130, said
+    assert records(journal)[-1]["reason"] == "fire alarm"
+    assert answers(journal) == ["forward", "backward"]
+
+
+@pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGINT])
+def test_a_signal_ends_run_and_window_in_order(
+    quick_configs: Path, tmp_path: Path, display: str, number: signal.Signals
+) -> None:
+    with AtConsole(run_words(quick_configs, "preference"), tmp_path, display) as screen:
+        screen.stands(RUN)
+        screen.to("train", trial=2)
+        screen.keys.press("n")  # whatever is open
+        screen.until(lambda look: look.line)
+        screen.process.send_signal(number)
+        code, said = screen.end()
+    assert code == 130, said
+    check_disarmed(Watch(str(tmp_path)))
+    last = records(tmp_path / f"{PREFERENCE}_journal.jsonl")[-1]
+    assert (last["kind"], last["reason"]) == ("stopped", number.name)
+
+
+# the emergency stop
+
+
+def test_a_note_that_is_half_typed_at_the_emergency_stop_is_kept_and_a_reason_can_be_added(
+    quick_configs: Path, tmp_path: Path, display: str
+) -> None:
+    journal = tmp_path / f"{PREFERENCE}_journal.jsonl"
+    with AtConsole(run_words(quick_configs, "preference"), tmp_path, display) as screen:
+        screen.stands(RUN)
+        screen.to("train", trial=1)
+        screen.keys.press("n")
+        screen.until(lambda look: look.line)
+        screen.keys.type("it got")
+        screen.keys.press("F12")
+        look = screen.until(lambda look: look.state == "halted")
+        assert look.line
+        screen.keys.type(" hot\n")
+        screen.until(lambda look: not look.line and look.says("The gun itself says that it is disarmed."))
+        screen.line("y", "smoke from the coil")
+        screen.at("halted")
+        screen.keys.press("q")
+        code, said = screen.close()
+    assert code == 130, said
+    halted, noted, reason = remarks(journal, "halted", "noted", "halt-reason")
+    assert halted["by"] == "experimenter"
+    assert (noted["text"], reason["text"]) == ("it got hot", "smoke from the coil")
+    assert records(journal)[-1]["reason"] == "emergency stop"
+    check_gun(Watch(str(tmp_path)), journal)
+
+
+def test_after_an_emergency_stop_a_run_goes_on_only_by_a_held_key_and_a_test_shot(
+    quick_configs: Path, tmp_path: Path, display: str
+) -> None:
+    journal, run, watch = tmp_path / f"{DIRECTION}_journal.jsonl", run_words(quick_configs), Watch(str(tmp_path))
+    with AtConsole(run, tmp_path, display) as screen:
+        screen.stands(RUN)
+        screen.to("asking", trial=2)
+        screen.keys.press("F12")
+        screen.at("halted")
+        screen.keys.press("q")
+        assert screen.close()[0] == 130
+    fired = len(watch.calls("fired"))
+    with AtConsole([*run, "--resume"], tmp_path, display) as screen:
+        screen.stands(RUN)
+        screen.at("rearming")
+        screen.keys.press("t")
+        screen.until(lambda look: look.says("Let go too soon: hold it for 1 s."))
+        assert len(watch.calls("fired")) == fired
+        screen.hold("t", until=lambda look: look.state in ("setting", "preparing"))
+        screen.to("preparing", trial=2)
+        assert len(watch.calls("fired")) == fired + 1
+        assert screen.stop()[0] == 130
+    (shot,) = remarks(journal, "test-shot")
+    assert shot["held_s"] >= 1.0
+    assert shot["cause"] == ""
+    check_gun(watch, journal)
+
+
+# the participant's screen
+
+
+def participant_pid(screen: AtConsole) -> int:
+    """The participant's process: the console's child that runs its program."""
+    found = subprocess.run(
+        ["pgrep", "-P", str(screen.process.pid), "-f", "watched_participant"],
+        capture_output=True,
+        text=True,
+        check=True,
+    )
+    return int(found.stdout)
+
+
+def kill_participant(screen: AtConsole) -> None:
+    """The run is paused and disarmed, and the console says why."""
+    os.kill(participant_pid(screen), signal.SIGKILL)
+    screen.until(lambda look: look.state == "paused")
+    screen.until(lambda look: look.says("the participant's screen was killed by signal 9") and look.says("S starts it"))
+    screen.focus_on(RUN)
+    screen.until(lambda look: look.active and look.ready)
+
+
+@needs_psychopy
+@pytest.mark.parametrize(
+    ("experiment", "side", "state", "page"),
+    [
+        ("preference", "--participant-screen", "train", "MessagePage Please wait."),
+        ("preference", "--participant-screen", "rating", "RatingPage"),
+        ("direction", "--participant-keys", "asking", "DirectionPage"),
+    ],
+)
+def test_a_killed_participants_screen_pauses_the_run_and_can_be_started_again(  # noqa: PLR0917 - each is looked at
+    quick_configs: Path, tmp_path: Path, display: str, experiment: str, side: str, state: str, page: str
+) -> None:
+    journal = tmp_path / f"{DIRECTION if experiment == 'direction' else PREFERENCE}_journal.jsonl"
+    with AtConsole(run_words(quick_configs, experiment, side), tmp_path, display) as screen:
+        screen.stands(RUN)
+        screen.to(state, trial=1)
+        screen.participant_shows(page)
+        kill_participant(screen)
+        check_gun(screen.watch, journal)
+        screen.keys.press("s")
+        screen.participant_shows("MessagePage Paused. Please wait.")
+        screen.until(lambda look: look.says("The participant's screen is there again."))
+        screen.focus_on(RUN)
+        screen.keys.press("p")
+        screen.until(lambda look: look.state != "paused")
+        if state != "train":
+            screen.until(lambda look: look.state == state)
+            screen.participant_shows(page, 2)
+            screen.focus_on(RUN)
+        screen.to({"train": "train", "rating": "describing", "asking": "preparing"}[state])
+        assert screen.stop()[0] == 130
+    paused, noted = remarks(journal, "paused", "noted")
+    assert "killed by signal 9" in paused["cause"]
+    assert noted["text"] == "The participant's screen was started again."
+
+
+@needs_psychopy
+def test_a_participants_screen_that_does_not_start_again_ends_the_run(
+    quick_configs: Path, tmp_path: Path, display: str
+) -> None:
+    journal, watch = tmp_path / f"{PREFERENCE}_journal.jsonl", Watch(str(tmp_path), participants=1)
+    run = run_words(quick_configs, "preference", "--participant-screen")
+    with AtConsole(run, tmp_path, display, watch) as screen:
+        screen.stands(RUN)
+        screen.to("preparing", trial=1)
+        kill_participant(screen)
+        screen.keys.press("s")
+        screen.until(lambda look: look.ended and look.says("the participant's screen did not start again"))
+        assert screen.close()[0] == 130
+    assert "did not start again" in records(journal)[-1]["reason"]
+
+
+@needs_psychopy
+def test_without_the_participants_screen_the_experimenter_can_enter_the_answers(
+    quick_configs: Path, tmp_path: Path, display: str
+) -> None:
+    run = run_words(quick_configs, "preference", "--participant-screen")
+    with AtConsole(run, tmp_path, display) as screen:
+        screen.stands(RUN)
+        screen.to("rating", trial=1)
+        screen.participant_shows("RatingPage")
+        kill_participant(screen)
+        screen.to_the_end()
+        code, said = screen.close()
+    assert code == 0, said
+    table = rows(tmp_path, PREFERENCE, "ratings")
+    assert [(row["rating"], row["rating_by"]) for row in table] == [
+        ("0.0", "experimenter"), ("7.5", "experimenter"), ("7.5", "experimenter"),
+    ]  # fmt: skip

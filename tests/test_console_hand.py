@@ -1,0 +1,101 @@
+"""What a hand does by accident, by real keys and clicks on the real window: held, doubled, ahead, beside.
+
+Every state with every accident is a table of `make soak`; here are those that hurt.
+"""
+
+from __future__ import annotations
+
+import importlib.util
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+
+from experiments.states import State
+from tests.at_display import AtConsole, needs_display, remarks, virtual_display
+from tests.at_hand import ACTIONS, Cell, check_cell, check_gun
+
+pytest.importorskip("PyQt6")
+pytestmark = needs_display
+needs_psychopy = pytest.mark.skipif(
+    importlib.util.find_spec("psychopy") is None, reason="PsychoPy is not installed: extra `gui`"
+)
+PARTICIPANT = "Recoil: participant"
+S = State
+
+
+@pytest.fixture(scope="module")
+def display() -> Iterator[str]:
+    with virtual_display() as name:
+        yield name
+
+
+@pytest.mark.parametrize(
+    ("state", "action"),
+    [
+        (S.SETTING, "double Space"),
+        (S.PREPARING, "Space held 3 s"),
+        (S.PREPARING, "double Space"),
+        (S.PREPARING, "double click on Fire"),
+        (S.PREPARING, "Tab Tab Space"),
+        (S.FIRING, "F12"),
+        (S.FIRING, "P"),
+        (S.TRAIN, "F12"),
+        (S.TRAIN, "P"),
+        (S.PAUSED, "Space held 3 s"),
+        (S.CORRECTING, "double Space"),
+        (S.HALTED, "double Space"),
+    ],
+)
+def test_an_accident_of_the_hand_does_what_the_table_says(
+    tmp_path: Path, display: str, state: State, action: str
+) -> None:
+    check_cell(Cell(tmp_path, display, state), ACTIONS[action])
+
+
+@pytest.mark.parametrize("action", ["Space held 3 s", "double Space", "double click on Fire"])
+def test_what_fires_a_train_does_not_end_it(tmp_path: Path, display: str, action: str) -> None:
+    check_cell(Cell(tmp_path, display, S.PREPARING, experiment="preference"), ACTIONS[action])
+
+
+def test_letters_beside_the_field_of_a_rating_are_text_and_no_commands(tmp_path: Path, display: str) -> None:
+    cell = Cell(tmp_path, display, S.RATING)
+    with cell.reach() as screen:
+        screen.keys.type("feels sharp\n")
+        screen.until(lambda look: look.says("Not a rating: type a number from 0 to 10."))
+        look = screen.heard()
+        assert (look.state, look.typed) == ("rating", "feels sharp")
+        screen.keys.press("a", "Control_L")
+        screen.keys.type("7.5\n")
+        screen.at("describing")
+        screen.keys.press("u", "Control_L")
+        screen.until(lambda look: look.says("It was entered as 7.5."))
+        screen.at("correcting")
+    assert not remarks(cell.journal)
+
+
+def check_participants_keys(screen: AtConsole, cell: Cell, *keys: str) -> None:
+    """Keys on the participant's window do nothing to the run; F12 there halts it."""
+    before = len(remarks(cell.journal))
+    screen.focus_on(PARTICIPANT)
+    screen.until(lambda look: not look.active)
+    for key in keys:
+        screen.keys.press(key)
+    screen.focus_on("Recoil – P01")
+    screen.until(lambda look: look.active)
+    look = screen.heard()
+    assert look.state == str(cell.state)
+    assert len(remarks(cell.journal)) == before
+    screen.focus_on(PARTICIPANT)
+    screen.until(lambda look: not look.active)
+    screen.keys.press("F12")
+    screen.until(lambda look: look.state == "halted" and look.says("The gun itself says that it is disarmed."))
+    assert remarks(cell.journal)[before:] == [{"by": "participant", "kind": "halted"}]
+
+
+@needs_psychopy
+def test_on_the_participants_window_f12_halts_a_train_and_other_keys_do_nothing(tmp_path: Path, display: str) -> None:
+    cell = Cell(tmp_path, display, S.TRAIN, "--participant-screen")
+    with cell.reach() as screen:
+        check_participants_keys(screen, cell, "p", "Escape", "space")
+    check_gun(cell.watch, cell.journal)

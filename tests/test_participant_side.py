@@ -1,0 +1,83 @@
+"""What stands on the participant's screen follows the run: the words that reach its program."""
+
+from __future__ import annotations
+
+import json
+import sys
+import threading
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+
+from experiments.load import load_setup
+from experiments.plan import Trial
+from experiments.screens.console.beside import ParticipantSide
+from experiments.screens.participant.link import ParticipantLink
+from experiments.states import Position, State
+from experiments.steps import Rate
+from tests.at_display import wait_for
+
+SETUP = load_setup("preference")
+PROGRAM = "import sys\nwith open(sys.argv[1], 'wb') as told:\n    for line in sys.stdin.buffer:\n        told.write(line)\n        told.flush()"  # noqa: E501 - a program
+TRIAL = Trial(session=1, method="vibration", set=1, trial=1, direction="forward")
+STEP = Rate(trial=TRIAL, question="?", minimum=0, maximum=10, minimum_text="", maximum_text="", grain=0.1)
+
+
+class Told:
+    """A participant's screen whose program writes down what it is told, and never answers."""
+
+    def __init__(self, folder: Path) -> None:
+        self._file = folder / "told"
+        self.link = ParticipantLink.start(command=(sys.executable, "-c", PROGRAM, str(self._file)))
+        self.side = ParticipantSide(self.link, lambda: self.link, SETUP, rates=True, own_keys=False)
+
+    def at(self, serial: int, *states: State) -> None:
+        self.side.follow(Position(states=states, serial=serial, number=3, step=STEP))
+
+    @property
+    def words(self) -> list[str]:
+        """The questions by their kind, and the texts."""
+        lines = self._file.read_bytes().split(b"\n")[:-1] if self._file.exists() else []
+        return [word.get("text", word["kind"]) for word in map(json.loads, lines)]
+
+    def end(self) -> list[str]:
+        """What was told until the end."""
+        self.link.show("end")
+        wait_for(lambda: "end" in self.words)
+        return self.words
+
+
+@pytest.fixture
+def told(tmp_path: Path) -> Iterator[Told]:
+    told = Told(tmp_path)
+    yield told
+    told.link.close()
+
+
+def test_a_position_that_is_told_late_takes_no_question_off_the_participants_screen(told: Told) -> None:
+    told.at(7, State.RATING)
+    wait_for(lambda: told.words)
+    told.at(6, State.SAVING)
+    assert told.link.asking
+    assert told.end() == ["ask-rating", "end"]
+
+
+def test_what_takes_a_question_off_the_participants_screen_stays_on_it(told: Told) -> None:
+    for serial in range(0, 100, 2):
+        told.at(serial, State.RATING)
+        wait_for(lambda: told.link.asking)
+        told.at(serial + 1, State.RATING, State.PAUSED)
+        wait_for(lambda: not any(thread.name == "participant" for thread in threading.enumerate()))
+    shown = told.end()
+    assert "" not in shown
+    assert shown[-2:] == ["Paused. Please wait.", "end"]
+
+
+def test_a_question_whose_time_is_over_before_it_is_asked_is_never_shown(told: Told) -> None:
+    for serial in range(0, 100, 2):
+        told.at(serial, State.RATING)
+        told.at(serial + 1, State.RATING, State.PAUSED)
+    wait_for(lambda: not any(thread.name == "participant" for thread in threading.enumerate()))
+    shown = told.end()
+    assert shown[-2:] == ["Paused. Please wait.", "end"]
