@@ -29,10 +29,10 @@ from experiments.screens.console.screen import ConsoleScreen
 from experiments.screens.console.state import State, coming, instruction, place_text
 from experiments.setup import Setup
 from experiments.steps import Answered
+from tests.waiting import PATIENCE_S
 
 BREAK_S = 0.02
 LONG_BREAK_S = 30.0
-PATIENCE_S = 20.0
 CORRECTNESS = re.compile(r"\b(correct|incorrect|correctly|wrong|right|score|hits?|points?)\b|%", re.IGNORECASE)
 
 

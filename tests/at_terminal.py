@@ -8,9 +8,12 @@ import pty
 import signal
 import subprocess
 import threading
+import time
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Self
+
+from tests.waiting import PATIENCE_S
 
 ANSWERS = "fbbffbfb"
 """What the person types, trial after trial, over and over."""
@@ -53,7 +56,7 @@ class AtTerminal:
         """Type a line."""
         os.write(self._ours, f"{text}\n".encode())
 
-    def wait_for(self, text: str, count: int = 1, timeout_s: float = 30) -> None:
+    def wait_for(self, text: str, count: int = 1, timeout_s: float = PATIENCE_S) -> None:
         """Wait until the screen has shown `text` so many times; `AssertionError` with the screen if it does not."""
         with self._news:
             self._news.wait_for(lambda: self._closed or self.seen.count(text) >= count, timeout_s)
@@ -72,17 +75,17 @@ class AtTerminal:
         """`kill -9`."""
         os.killpg(self.process.pid, signal.SIGKILL)
         self.process.wait()
-        self._reader.join(5)
+        self._reader.join(PATIENCE_S)
 
     def hang_up(self) -> None:
         """Close the terminal."""
         os.close(self._ours)
         self._ours = -1
 
-    def end(self, timeout_s: float = 30) -> int:
+    def end(self, timeout_s: float = PATIENCE_S) -> int:
         """The exit code."""
         code = self.process.wait(timeout_s)
-        self._reader.join(5)
+        self._reader.join(PATIENCE_S)
         return code
 
     def __enter__(self) -> Self:
@@ -95,9 +98,15 @@ class AtTerminal:
             os.close(self._ours)
 
 
-def answer_until_killed(screen: AtTerminal, seconds: float) -> None:
-    """Answer as fast as the gun allows, and be killed so many seconds from now."""
-    killer = threading.Timer(seconds, screen.kill)
+def answer_until_killed(screen: AtTerminal, seconds: float, saved: int = 0) -> None:
+    """Answer as fast as the gun allows, and be killed so many seconds after so many answers were saved."""
+
+    def kill() -> None:
+        screen.wait_for("Saved.", saved)
+        time.sleep(seconds)
+        screen.kill()
+
+    killer = threading.Thread(target=kill)
     killer.start()
     with contextlib.suppress(AssertionError, OSError):
         screen.answer_trials(60)

@@ -1,7 +1,8 @@
 """What a console's window does while gun or disk do not: it stays awake, says so, and records nothing that was not.
 
 Each case is a program of its own (this module, called with a case and a folder) in which the simulated gun or the disk
-is given a fault; a timer in the window's thread measures the longest pause between two of its ticks.
+is given a fault; a timer ticks in the window's thread, and what hangs does so until it has ticked on. The longest pause
+between two ticks is for `make soak`.
 """
 
 from __future__ import annotations
@@ -33,12 +34,13 @@ from experiments.runner import RunStopped
 from experiments.screens.console import theme
 from experiments.steps import Answered, Ask, Failed, Fire, Fired, Prepared, Rate, Rated, Step
 from tests.at_controls import short_direction
+from tests.waiting import PATIENCE_S
 
 pytest.importorskip("PyQt6")
 
-STALL_MS = 50
 TICK_MS = 5
-HANG_S = 1.0
+TICKS = 100
+"""So often the window's thread ticks while the gun hangs."""
 SLOW_SYNC_S = 0.2
 EMERGENCY_AFTER_S = 0.2
 
@@ -46,14 +48,35 @@ EMERGENCY_AFTER_S = 0.2
 # the program
 
 
+class Ticks:
+    """The ticks of the window's thread; who waits for some notes whether they came."""
+
+    def __init__(self) -> None:
+        self._news, self._count = threading.Condition(), 0
+        self.awake: list[bool] = []
+
+    def tick(self) -> None:
+        with self._news:
+            self._count += 1
+            self._news.notify_all()
+
+    def wait(self, count: int) -> None:
+        """Until so many have come, if they have begun."""
+        with self._news:
+            goal = self._count + count
+            if self._count:
+                self.awake.append(self._news.wait_for(lambda: self._count >= goal, PATIENCE_S))
+
+
 class FaultyGun:
     """The simulated gun with a fault at its second shot, or from then on. It keeps when it was disarmed."""
 
-    def __init__(self, gun: Gun, case: str) -> None:
-        self._gun, self._case = gun, case
+    def __init__(self, gun: Gun, case: str, ticks: Ticks) -> None:
+        self._gun, self._case, self._ticks = gun, case, ticks
         self.shots = 0
-        self.hangs = threading.Event()
+        self.hangs, self._disarmed = threading.Event(), threading.Event()
         self.disarmed_s: list[float] = []
+        self.disarmed_while_it_hung = False
 
     def fire(self, shot: Shot, at_s: float | None = None) -> ShotReport:
         self.shots += 1
@@ -63,12 +86,16 @@ class FaultyGun:
 
     def _trouble(self) -> None:
         match self._case:
-            case "hangs" | "hangs-emergency":
+            case "hangs":
+                self._ticks.wait(TICKS)
+                raise LinkError("no answer within 1 s")
+            case "hangs-emergency":
+                self._disarmed.clear()
                 self.hangs.set()
-                time.sleep(HANG_S)
+                self.disarmed_while_it_hung = self._disarmed.wait(PATIENCE_S)
                 raise LinkError("no answer within 1 s")
             case "late":
-                time.sleep(0.4)
+                self._ticks.wait(TICKS)
             case "link" | "vanishes":
                 raise LinkError("the line is dead")
             case _:
@@ -76,6 +103,7 @@ class FaultyGun:
 
     def disarm(self) -> None:
         self.disarmed_s.append(time.monotonic())
+        self._disarmed.set()
         self._answers()
         self._gun.disarm()
 
@@ -95,12 +123,13 @@ class FaultyGun:
         return getattr(self._gun, name)
 
 
-def slow_disk() -> None:
-    """From now on a sync takes its time."""
+def slow_disk(ticks: Ticks) -> None:
+    """From now on a sync takes its time, and no less than the window's next tick."""
     sync = storage.sync
 
     def slow(descriptor: int) -> None:
         time.sleep(SLOW_SYNC_S)
+        ticks.wait(1)
         sync(descriptor)
 
     storage.sync = slow
@@ -109,19 +138,20 @@ def slow_disk() -> None:
 class Watcher:
     """Ticks in the window's thread, measures its pauses, remembers what was shown, and presses the emergency stop."""
 
-    def __init__(self, console: Any, guns: list[FaultyGun], case: str) -> None:
+    def __init__(self, console: Any, guns: list[FaultyGun], case: str, ticks: Ticks) -> None:
         from PyQt6.QtCore import Qt, QTimer
 
-        self._console, self._guns = console, guns
+        self._console, self._guns, self._ticks = console, guns, ticks
         self._presses = case == "hangs-emergency"
         self._last_s: float | None = None
-        self.seen: dict[str, Any] = {"longest_ms": 0.0, "ticks": 0, "titles": [], "lines": []}
+        self.seen: dict[str, Any] = {"longest_ms": 0.0, "titles": [], "lines": []}
         self._timer = QTimer()
         self._timer.setTimerType(Qt.TimerType.PreciseTimer)
         self._timer.timeout.connect(self._tick)
         self._timer.start(TICK_MS)
 
     def _tick(self) -> None:
+        self._ticks.tick()
         now_s, window = time.perf_counter(), self._console.window
         if window is None or (window.state.waiting is None and self._last_s is None):
             return  # from the first step on: opening a window takes its time
@@ -130,7 +160,6 @@ class Watcher:
         else:
             self.seen["longest_ms"] = max(self.seen["longest_ms"], 1000 * (now_s - self._last_s))
         self._last_s = now_s
-        self.seen["ticks"] += 1
         self._read(window)
         if self._presses and self._guns[0].hangs.is_set():
             self._presses = False
@@ -157,12 +186,13 @@ def program(case: str, folder: Path) -> dict[str, Any]:
     from experiments.screens.console.app import run_console
     from experiments.screens.console.visual import VisualParticipant
 
-    guns, watchers, drivers, stopped = faulty_guns(case), [], [], None
+    ticks = Ticks()
+    guns, watchers, drivers, stopped = faulty_guns(case, ticks), [], [], None
     if case == "slow-disk":
-        slow_disk()
+        slow_disk(ticks)
 
     def watch(console: Any) -> None:
-        watchers.append(Watcher(console, guns, case))
+        watchers.append(Watcher(console, guns, case, ticks))
         drivers.append(VisualParticipant(console, clock))
 
     setup, clock = short_direction(sets=1, trials=3, set_break_s=0.0), RealClock()
@@ -171,16 +201,17 @@ def program(case: str, folder: Path) -> dict[str, Any]:
         run_console(request, clock, hand="synthetic", watch=watch)
     except RunStopped as stop:
         stopped = str(stop)
-    return watchers[0].seen | {"stopped": stopped, "disarmed_s": guns[0].disarmed_s, "shots": guns[0].shots}
+    told_of_gun = {name: getattr(guns[0], name) for name in ("disarmed_s", "disarmed_while_it_hung", "shots")}
+    return watchers[0].seen | told_of_gun | {"stopped": stopped, "awake": ticks.awake}
 
 
-def faulty_guns(case: str) -> list[FaultyGun]:
+def faulty_guns(case: str, ticks: Ticks) -> list[FaultyGun]:
     """From now on every gun that is opened has the fault of the case; they are kept in the list."""
     guns: list[FaultyGun] = []
     opened = runs.open_gun
 
     def open_faulty(*where: Any, **how: Any) -> Any:
-        guns.append(FaultyGun(opened(*where, **how), case))
+        guns.append(FaultyGun(opened(*where, **how), case, ticks))
         return guns[-1]
 
     runs.open_gun = open_faulty
@@ -239,7 +270,7 @@ def child(*words: object) -> dict[str, Any]:
         env=os.environ | {"QT_QPA_PLATFORM": "offscreen"},
         capture_output=True,
         text=True,
-        timeout=90,
+        timeout=4 * PATIENCE_S,
         check=False,
     )
     assert done.returncode == 0, done.stderr
@@ -263,9 +294,9 @@ def case(tmp_path: Path) -> Case:
 
 
 def check_awake(seen: dict[str, Any]) -> None:
-    """The window's thread was never away for longer than promised."""
-    assert seen["ticks"] > 20
-    assert seen["longest_ms"] < STALL_MS, seen["longest_ms"]
+    """The window's thread went on whenever something hung."""
+    assert seen["awake"]
+    assert all(seen["awake"])
 
 
 def check_answers(contents: Contents) -> None:
@@ -284,7 +315,8 @@ def test_a_shot_that_fails_is_marked_said_and_presented_again_while_the_window_s
     case: Case, fault: str, cause: str
 ) -> None:
     seen, contents, rows = case(fault)
-    check_awake(seen)
+    if fault == "hangs":
+        check_awake(seen)
     check_answers(contents)
     failed = [(step, word) for step, word in told(contents) if isinstance(word, Failed)]
     assert [(step.trial.trial, word.cause) for step, word in failed] == [(2, cause)]
@@ -304,7 +336,6 @@ def test_a_gun_that_answers_late_changes_nothing_but_the_time(case: Case) -> Non
 
 def test_a_gun_that_vanishes_stops_the_run_with_nothing_answered_for_it(case: Case) -> None:
     seen, contents, rows = case("vanishes")
-    check_awake(seen)
     check_answers(contents)
     assert "switch off its power" in seen["stopped"]
     assert contents.records[-1]["kind"] == "stopped"
@@ -328,12 +359,10 @@ def test_what_was_fired_when_the_gun_vanished_is_marked_and_presented_again_on_r
     assert all(row["response"] for row in rows)
 
 
-def test_the_emergency_stop_disarms_at_once_while_a_shot_hangs_and_stops_the_run(case: Case) -> None:
+def test_the_emergency_stop_disarms_while_a_shot_hangs_and_stops_the_run(case: Case) -> None:
     seen, contents, rows = case("hangs-emergency")
-    check_awake(seen)
     check_answers(contents)
-    after_s = [at_s - seen["pressed_s"] for at_s in seen["disarmed_s"] if at_s >= seen["pressed_s"]]
-    assert after_s[0] < 0.05  # the shot hangs for 0.8 s more
+    assert seen["disarmed_while_it_hung"]
     assert seen["shots"] == 2
     assert seen["stopped"] == "emergency stop"
     assert [bool(row["response"]) for row in rows] == [True] + [False] * 5

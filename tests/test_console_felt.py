@@ -47,7 +47,7 @@ def test_data_mode_and_the_console_give_the_same_answers_in_the_same_times(tmp_p
     subprocess.run(data, cwd=tmp_path, check=True, capture_output=True)
     seen = [*words, "--screen", "console", "--visual", "--results", tmp_path / "seen"]
     with AtDisplay(seen, tmp_path, display) as screen:
-        code, said = screen.end(90)
+        code, said = screen.end()
     assert code == 0, said
     assert len(answers(tmp_path / "data")) == 16
     assert answers(tmp_path / "seen") == answers(tmp_path / "data")
@@ -61,7 +61,7 @@ def test_numbers_that_make_nobody_end_the_console_with_one_message(tmp_path: Pat
     config = written(tmp_path, felt_text(sensitivity=1e6))
     words = [RECOIL, "run", config, "--participant", "P01", "--seed", "3", "--screen", "console", "--visual"]
     with AtDisplay([*words, "--results", tmp_path / "seen"], tmp_path, display) as screen:
-        code, said = screen.end(60)
+        code, said = screen.end()
     assert code == 2
     assert f"{config}: the numbers of [synthetic.*] make nobody: drift is" in said
     assert "Traceback" not in said

@@ -16,6 +16,7 @@ from experiments.replay import history
 from experiments.steps import Answered
 from tests.at_terminal import ANSWERS, AtTerminal, answer_until_killed
 from tests.conftest import RECOIL
+from tests.waiting import PATIENCE_S
 
 STEM = "sub-P01/sub-P01_task-direction"
 
@@ -39,14 +40,17 @@ def answers(contents: Contents) -> str:
     return "".join(outcome.response[0] for _, outcome in history(contents) if isinstance(outcome, Answered))
 
 
-def killed_run(configs: Path, folder: Path, seconds: float, *, begun: bool) -> tuple[str, Path]:
-    """A run killed some seconds after its start, or after it has `begun`: what was acknowledged, and the journal."""
+def killed_run(configs: Path, folder: Path, seconds: float, *, begun: bool, saved: int = 0) -> tuple[str, Path]:
+    """A run killed some seconds after its start, or after it has `begun`: what was acknowledged, and the journal.
+
+    The seconds count from when so many answers were `saved`.
+    """
     with AtTerminal(words(configs), folder) as screen:
         if begun:
             screen.wait_for("Enter fires:")
-        answer_until_killed(screen, seconds)
-        saved = screen.seen.count("Saved.")
-    return (ANSWERS * 8)[:saved], folder / "results" / f"{STEM}_journal.jsonl"
+        answer_until_killed(screen, seconds, saved)
+        acknowledged = screen.seen.count("Saved.")
+    return (ANSWERS * 8)[:acknowledged], folder / "results" / f"{STEM}_journal.jsonl"
 
 
 def check_killed_run(configs: Path, folder: Path, seconds: float, *, begun: bool) -> int:
@@ -68,7 +72,7 @@ def test_kill_9_at_a_random_moment_loses_no_acknowledged_answer(quick_configs: P
 def test_a_killed_run_goes_on_where_it_broke_off_and_ends_with_a_whole_table(
     quick_configs: Path, tmp_path: Path
 ) -> None:
-    acknowledged, journal = killed_run(quick_configs, tmp_path, 2.0, begun=True)
+    acknowledged, journal = killed_run(quick_configs, tmp_path, 0.5, begun=True, saved=1)
     assert acknowledged
     before = answers(read(journal))
     with AtTerminal(words(quick_configs, "--resume"), tmp_path) as screen:
@@ -88,7 +92,7 @@ def traced_run(configs: Path, folder: Path) -> list[str]:
         screen.answer_trials(3)
         screen.wait_for("Enter fires:", 4)
         screen.type("stop")
-        assert screen.end(60) == 130
+        assert screen.end() == 130
     return trace.read_text().splitlines()
 
 
@@ -119,7 +123,12 @@ def in_small_disk(script: str, folder: Path) -> subprocess.CompletedProcess[str]
     """A script in a private mount namespace, where it can mount a disk as small as it likes."""
     flags = ["-m"] if os.getuid() == 0 else ["-rm"]
     return subprocess.run(
-        ["unshare", *flags, "sh", "-c", script], cwd=folder, capture_output=True, text=True, timeout=120, check=False
+        ["unshare", *flags, "sh", "-c", script],
+        cwd=folder,
+        capture_output=True,
+        text=True,
+        timeout=PATIENCE_S,
+        check=False,
     )
 
 
