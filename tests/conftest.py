@@ -14,6 +14,7 @@ import pytest
 from hypothesis import settings
 
 from experiments.load import shipped_folder
+from tests.waiting import PATIENCE_S
 
 pytest.register_assert_rewrite("tests.at_controls", "tests.experimenters")
 
@@ -40,7 +41,7 @@ def recoil(tmp_path: Path) -> Recoil:
             cwd=tmp_path,
             env=environment | {"HOME": str(home)},
             stdin=subprocess.DEVNULL,
-            timeout=120,
+            timeout=PATIENCE_S,
             check=False,
         )
 

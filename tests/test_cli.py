@@ -5,13 +5,13 @@ from __future__ import annotations
 import csv
 import json
 import subprocess
-import time
 from pathlib import Path
 
 import pytest
 
 from experiments.load import shipped_folder
 from tests.conftest import RECOIL, Recoil
+from tests.waiting import PATIENCE_S, wait_for
 
 TABLE = "results/sub-P01/sub-P01_task-direction_trials.csv"
 JOURNAL = "results/sub-P01/sub-P01_task-direction_journal.jsonl"
@@ -30,15 +30,6 @@ def synthetic(
     recoil: Recoil, *more: object, config: object = "direction", participant: str = "P01"
 ) -> subprocess.CompletedProcess[str]:
     return recoil("run", config, "--participant", participant, "--screen", "synthetic", *more)
-
-
-def test_help_answers_in_less_than_three_tenths_of_a_second() -> None:
-    times = []
-    for _ in range(7):
-        start = time.perf_counter()
-        subprocess.run([RECOIL, "--help"], check=True, capture_output=True)
-        times.append(time.perf_counter() - start)
-    assert min(times) < 0.3
 
 
 @pytest.mark.parametrize("command", ["reproduce", "check", "run", "rebuild", "analyze", "simulate", "configs", "new"])
@@ -250,11 +241,10 @@ def test_balanced_orders_take_each_row_of_the_square_in_turn(recoil: Recoil, tmp
 def test_a_terminated_run_stops_at_a_whole_record_and_can_be_gone_on_with(recoil: Recoil, tmp_path: Path) -> None:
     words = [RECOIL, "reproduce", "--out", tmp_path / "out"]
     process = subprocess.Popen(words, stderr=subprocess.PIPE, stdout=subprocess.PIPE, text=True)
-    while not list((tmp_path / "out").glob("logs/*/*_journal.jsonl")):
-        time.sleep(0.02)
-        assert process.poll() is None
+    wait_for(lambda: list((tmp_path / "out").glob("logs/*/*_journal.jsonl")) or process.poll() is not None)
+    assert process.poll() is None
     process.terminate()
-    _, said = process.communicate(timeout=30)
+    _, said = process.communicate(timeout=PATIENCE_S)
     assert process.returncode == 130
     assert "Traceback" not in said
     assert "interrupted" in said

@@ -20,10 +20,9 @@ def test_a_virtual_clock_starts_at_zero_and_moves_only_by_waiting() -> None:
     assert clock.now() == 300.25
 
 
-def test_a_virtual_break_takes_no_time() -> None:
-    start = time.monotonic()
+def test_a_virtual_break_waits_for_nothing(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.delattr(time, "sleep")
     VirtualClock().sleep(1e6)
-    assert time.monotonic() - start < 0.5
 
 
 @pytest.mark.parametrize("seconds", [0.0, -1.0, -float("inf")])
@@ -50,10 +49,13 @@ def test_dates_are_utc_to_the_microsecond_even_when_it_is_zero() -> None:
 
 def test_the_real_clock_is_the_machines() -> None:
     clock = RealClock()
-    assert abs((moment(clock.utc()) - datetime.now(UTC)).total_seconds()) < 5
+    in_order = [time.monotonic(), clock.now(), time.monotonic()]
+    dates_in_order = [datetime.now(UTC), moment(clock.utc()), datetime.now(UTC)]
+    assert in_order == sorted(in_order)
+    assert dates_in_order == sorted(dates_in_order)
     before = clock.now()
     clock.sleep(0.01)
-    assert 0.01 <= clock.now() - before < 5
+    assert clock.now() >= before + 0.01
 
 
 def test_a_journal_can_tell_the_clocks_apart() -> None:

@@ -6,7 +6,6 @@ import csv
 import json
 import signal
 import subprocess
-import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import replace
@@ -26,6 +25,7 @@ from experiments.roof.design import run as roof
 from experiments.roof.design.critical import rate_at
 from experiments.roof.design.space import axis, make_space, span
 from tests.conftest import RECOIL, Recoil
+from tests.waiting import PATIENCE_S, wait_for
 
 PAPER = GunParameters()
 
@@ -211,12 +211,9 @@ def test_a_range_is_read_as_typed() -> None:
 def test_an_interrupted_search_ends_with_130_and_without_a_traceback(tmp_path: Path) -> None:
     words: list[str | Path] = [RECOIL, "design", "--grid", "60", "--workers", "1", "--out", tmp_path / "out"]
     with subprocess.Popen(words, stderr=subprocess.PIPE) as running:
-        until = time.monotonic() + 60
-        while not (tmp_path / "out").exists() and time.monotonic() < until:
-            time.sleep(0.05)
-        time.sleep(0.3)
+        wait_for((tmp_path / "out").exists)
         running.send_signal(signal.SIGINT)
-        _, errors = running.communicate(timeout=60)
+        _, errors = running.communicate(timeout=PATIENCE_S)
     assert running.returncode == 130, errors
     assert b"interrupted" in errors
     assert b"Traceback" not in errors

@@ -29,6 +29,7 @@ from experiments.screens.synthetic import synthetic_screen
 from tests.conftest import RECOIL, Recoil
 from tests.log_files import rating_rows, ratings_path, trial_rows, trials_path, write_rows, write_study
 from tests.test_cli import refused
+from tests.waiting import PATIENCE_S
 
 VALIDATOR = RECOIL.with_name("bids-validator-deno")
 NO_NETWORK = {"HTTP_PROXY": "http://127.0.0.1:9", "HTTPS_PROXY": "http://127.0.0.1:9"}
@@ -66,7 +67,7 @@ def validated(folder: Path, home: Path) -> list[dict[str, Any]]:
         text=True,
         env={"PATH": os.environ["PATH"], "HOME": str(home), "NO_COLOR": "1"} | NO_NETWORK,
         stdin=subprocess.DEVNULL,
-        timeout=120,
+        timeout=PATIENCE_S,
         check=False,
     )
     found: list[dict[str, Any]] = json.loads(done.stdout)["issues"]["issues"]
@@ -448,7 +449,7 @@ def test_a_kill_leaves_the_old_data_set_or_the_new_one(
     assert wholes["old"] != wholes["new"]
     kill = ["strace", "-qq", "-f", "-e", f"trace={call}", "-e", f"inject={call}:signal=KILL:when={when}"]
     words = [*kill, "-o", "trace", RECOIL, "export", "bids", "logs", "--free-text"]
-    done = subprocess.run(words, cwd=tmp_path, capture_output=True, timeout=120, check=False)
+    done = subprocess.run(words, cwd=tmp_path, capture_output=True, timeout=PATIENCE_S, check=False)
     assert done.returncode == -9, done
     assert tree(logs / "bids") == wholes[there]
     assert parts(logs)

@@ -22,6 +22,7 @@ from device.twin.scripts import random_script, transcript
 from device.wire import errors
 from device.wire.errors import TEXTS, message
 from device.wire.frame import Frame, encode
+from tests.waiting import PATIENCE_S
 
 ROOT = Path(__file__).parent.parent
 EMULATOR = "qemu-system-arm"
@@ -55,7 +56,7 @@ def told(core: str, script: Iterable[str]) -> list[str]:
         return list(transcript(script))
     text = "".join(f"{line}\n" for line in script)
     return subprocess.run(
-        command(core), input=text, capture_output=True, text=True, check=True, timeout=600
+        command(core), input=text, capture_output=True, text=True, check=True, timeout=PATIENCE_S
     ).stdout.splitlines()
 
 

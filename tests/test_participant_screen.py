@@ -14,6 +14,7 @@ import pytest
 from experiments.screens.participant.link import ParticipantError, ParticipantLink
 from experiments.screens.participant.look import Look
 from experiments.screens.participant.words import AskDirection, AskRating
+from tests.waiting import PATIENCE_S, wait_for
 
 pytestmark = [
     pytest.mark.skipif(shutil.which("Xvfb") is None, reason="Xvfb is not installed: a window needs a display"),
@@ -41,7 +42,10 @@ WHICH = AskDirection(
     onset_s=0.0,
 )
 LINE_Y, BUTTON_Y, OFF_LINE_Y = 0.56, 0.84, 0.30
+HINT = (0.5, 0.90)
 LEFT_END, RIGHT_END = 0.1428, 0.8572
+FAR_S = 0.5
+"""Further apart than the clocks' mapping is ever wrong."""
 LOOK = Look(full_screen=False, width_px=WIDTH, height_px=HEIGHT)
 
 
@@ -54,7 +58,7 @@ def display():
     with os.fdopen(ours) as told:  # the server picks a free number and tells it
         yield f":{told.readline().strip()}"
     server.terminate()
-    server.wait(10)
+    server.wait()
 
 
 class Hands:
@@ -97,23 +101,24 @@ class Hands:
         window.send_event(event.ClientMessage(window=window, client_type=protocols, data=(32, [delete, 0, 0, 0, 0])))
         self.display.sync()
 
-    def seen(self):
-        """All that the display shows."""
-        return bytes(self._root.get_image(0, 0, WIDTH, HEIGHT, self._X.ZPixmap, 0xFFFFFFFF).data)
+    def seen(self, left=0.0, top=0.0):
+        """All that the display shows to the right of and below a place, in parts of the screen."""
+        x, y = int(left * WIDTH), int(top * HEIGHT)
+        return bytes(self._root.get_image(x, y, WIDTH - x, HEIGHT - y, self._X.ZPixmap, 0xFFFFFFFF).data)
 
-    def settled(self):
-        """All that the display shows, once nothing changes any more."""
+    def settled(self, *where):
+        """What `seen` shows once nothing changes any more."""
         seen = None
-        while seen != (seen := self.seen()):
+        while seen != (seen := self.seen(*where)):
             time.sleep(0.15)
         return seen
 
-    def wait_for_change(self, before):
-        """Wait until the display shows something else."""
-        end_s = time.monotonic() + 10
-        while self.seen() == before:
-            assert time.monotonic() < end_s, "the display does not change"
-            time.sleep(0.02)
+    def changing(self, act, *where):
+        """Do what changes what `seen` shows, and come back when it has; what that gives back."""
+        before = self.settled(*where)
+        done = act()
+        wait_for(lambda: self.seen(*where) != before, "the display does not change")
+        return done
 
 
 @pytest.fixture(scope="module")
@@ -141,7 +146,7 @@ def started(display, home, look=LOOK):
 @pytest.fixture(scope="module")
 def link(display, tmp_path_factory):
     with started(display, tmp_path_factory.mktemp("home")) as link:
-        ready = link.wait_ready(60)
+        ready = link.wait_ready(PATIENCE_S)
         assert ready.window == f"{WIDTH}x{HEIGHT}"
         yield link
 
@@ -151,29 +156,29 @@ def ask(link, hands, console):
     """Ask, and come back when the question stands on the display."""
 
     def ask(question):
-        before = hands.seen()
-        link.show(f"Please wait ({time.monotonic()})")
-        hands.wait_for_change(before)
-        before = hands.settled()
-        answer = console.submit(link.ask_rating, question, 20)
-        hands.wait_for_change(before)
-        return answer
+        show(link, "Please wait")
+        return hands.changing(lambda: console.submit(link.ask_rating, question, PATIENCE_S))
 
     return ask
 
 
-def confirm_rating(hands):
-    """Confirm, and come back when the next page stands: what is typed before it does is typed nowhere."""
-    before = hands.settled()
-    hands.key("Return")
-    hands.wait_for_change(before)
+def show(link, text):
+    """Show a text, and come back when it stands on the display: words are obeyed in their order."""
+    link.show(text)
+    link.noise(on=False)
+
+
+def rate_and_confirm(hands, rate):
+    """Rate and confirm, and come back when the next page stands: what is typed before it does is typed nowhere."""
+    hands.changing(rate)
+    hands.changing(lambda: hands.key("Return"))
 
 
 def test_the_left_end_of_the_scale_is_a_rating_of_0(ask, hands):
     answer = ask(SCALE)
     hands.click(LEFT_END, LINE_Y)
     hands.click(0.5, BUTTON_Y)
-    assert answer.result(10).rating == 0.0
+    assert answer.result(PATIENCE_S).rating == 0.0
 
 
 @pytest.mark.parametrize(("x", "rating"), [(RIGHT_END, 10.0), (0.95, None), (0.5, 5.0), (0.643, 7.0)])
@@ -181,13 +186,11 @@ def test_a_click_rates_where_it_falls_and_beyond_the_line_nowhere(ask, hands, li
     answer = ask(SCALE)
     hands.click(x, LINE_Y)
     hands.click(0.5, BUTTON_Y)
-    if rating is None:
-        time.sleep(0.2)
-        assert not answer.done()
-        hands.key("End")
+    if rating is None:  # then what comes after it counts
+        hands.key("Home")
         hands.key("Return")
-        rating = 10.0
-    assert answer.result(10).rating == rating
+        rating = 0.0
+    assert answer.result(PATIENCE_S).rating == rating
 
 
 def test_nothing_is_confirmed_before_there_is_a_marker(ask, hands):
@@ -196,75 +199,85 @@ def test_nothing_is_confirmed_before_there_is_a_marker(ask, hands):
     hands.click(0.5, BUTTON_Y)
     hands.click(0.5, OFF_LINE_Y)
     hands.key("Return")
-    time.sleep(0.3)
-    assert not answer.done()
-    hands.key("Home")
+    hands.key("End")
     hands.key("Return")
-    assert answer.result(10).rating == 0.0
+    assert answer.result(PATIENCE_S).rating == 10.0  # neither none, nor the middle
 
 
 def test_a_scale_is_answered_by_keys_alone(ask, hands):
     answer = ask(SCALE)
     for name in ("Right", "Right", "Right", "Left", "Next", "KP_Enter"):  # to the middle, then by grains, then by ten
         hands.key(name)
-    assert answer.result(10).rating == 6.1
+    assert answer.result(PATIENCE_S).rating == 6.1
 
 
 def test_a_description_keeps_its_quotes_lines_and_asterisks(ask, hands):
     answer = ask(DESCRIBED)
-    hands.click(0.5, LINE_Y)
-    confirm_rating(hands)
+    rate_and_confirm(hands, lambda: hands.click(0.5, LINE_Y))
     for name in ("a", "quotedbl", "Return", "asterisk", "b", "x", "BackSpace", "asterisk", "Tab", "backslash"):
         hands.key(name, *(["Shift_L"] if name in ("quotedbl", "asterisk") else []))
     hands.key("Return", "Control_L")
-    given = answer.result(10)
+    given = answer.result(PATIENCE_S)
     assert given.rating == 5.0
     assert given.comment == 'a"\n*b*\\'
 
 
 def test_a_description_longer_than_its_box_is_taken_as_long_as_there_is_room(ask, hands):
     answer = ask(DESCRIBED)
-    hands.key("End")
-    confirm_rating(hands)
-    for line in range(30):
+    rate_and_confirm(hands, lambda: hands.key("End"))
+    hint, typed = hands.seen(*HINT), ""
+    while hands.seen(*HINT) == hint:  # until it says that there is no more room
+        assert len(typed) < 120
+        before = hands.seen()
         hands.key("Return")
-        hands.key("abc"[line % 3])
-        time.sleep(0.05)
-    time.sleep(0.5)
+        hands.key(letter := "abc"[len(typed) // 2 % 3])
+        typed += f"\n{letter}"
+        wait_for(lambda before=before: hands.seen() != before)
+    hands.settled()
     hands.key("Return", "Control_L")
-    lines = answer.result(10).comment.split()
-    assert 8 < len(lines) < 30
-    assert lines[:4] == ["a", "b", "c", "a"]
+    comment = answer.result(PATIENCE_S).comment
+    assert len(comment.split()) > 8
+    assert len(comment) < len(typed.strip())
+    assert comment.split()[:4] == ["a", "b", "c", "a"]
 
 
 def test_an_empty_description_is_one_and_the_button_ends_it(ask, hands):
     answer = ask(DESCRIBED)
-    hands.click(0.5, LINE_Y)
-    confirm_rating(hands)
+    rate_and_confirm(hands, lambda: hands.click(0.5, LINE_Y))
     hands.click(0.5, BUTTON_Y)
-    assert answer.result(10).comment == ""
+    assert answer.result(PATIENCE_S).comment == ""
 
 
-def test_a_key_tells_the_direction_and_when_it_went_down(link, hands, console):
-    answer = console.submit(link.ask_direction, replace(WHICH, onset_s=time.monotonic()), 20)
-    time.sleep(0.5)
+@pytest.fixture
+def maps(link, monkeypatch):
+    """The mappings of the clocks from now on."""
+    kept, map_clocks = [], link.map_clocks
+    monkeypatch.setattr(link, "map_clocks", lambda: kept.append(map_clocks()) or kept[-1])
+    return kept
+
+
+def test_a_key_tells_the_direction_and_when_it_went_down(link, hands, console, maps):
+    """After the press and before the answer came, as well as the clocks know; how close to it, `make soak` measures."""
+    show(link, "Please wait")
+    question = replace(WHICH, onset_s=time.monotonic())
+    answer = hands.changing(lambda: console.submit(link.ask_direction, question, PATIENCE_S))
     hands.key("x")
     pressed_s = hands.key("b")
-    given = answer.result(10)
+    given, unsure_s = answer.result(PATIENCE_S), maps[0].uncertainty_s
+    in_order = [pressed_s - unsure_s, given.pressed_s, time.monotonic() + unsure_s]
     assert given.response == "backward"
-    assert abs(given.pressed_s - pressed_s) < 0.05
+    assert in_order == sorted(in_order)
 
 
 def test_a_key_before_the_onset_is_no_answer_but_one_before_the_question_stands_is(link, hands):
+    question = replace(WHICH, onset_s=time.monotonic())
     hands.key("b")
-    time.sleep(0.1)
-    onset_s = time.monotonic()
-    time.sleep(0.1)
-    pressed_s = hands.key("f")
-    time.sleep(0.1)
-    given = link.ask_direction(replace(WHICH, onset_s=onset_s), 10)
-    assert given.response == "forward"
-    assert abs(given.pressed_s - pressed_s) < 0.05
+    before = link.ask_direction(question, PATIENCE_S)
+    time.sleep(2 * FAR_S)
+    hands.key("f")
+    given = link.ask_direction(replace(question, onset_s=before.pressed_s + FAR_S), PATIENCE_S)
+    assert (before.response, given.response) == ("backward", "forward")
+    assert given.pressed_s > before.pressed_s + FAR_S
 
 
 def test_without_a_sound_device_the_noise_stays_off_with_one_clear_message(link):
@@ -281,28 +294,28 @@ def test_a_question_that_is_called_off_leaves_the_screen_ready_for_the_next(ask,
     answer = ask(SCALE)
     assert link.cancel()
     with pytest.raises(ParticipantError, match="called off"):
-        answer.result(10)
+        answer.result(PATIENCE_S)
     again = ask(SCALE)
     hands.key("End")
     hands.key("Return")
-    assert again.result(10).rating == 10.0
+    assert again.result(PATIENCE_S).rating == 10.0
 
 
 def test_a_window_that_is_closed_in_mid_question_ends_it_with_an_error(ask, hands, link):
     answer = ask(SCALE)
     hands.close_window()
     with pytest.raises(ParticipantError, match="window was closed"):
-        answer.result(10)
+        answer.result(PATIENCE_S)
 
 
 def test_a_full_screen_in_a_home_that_takes_no_files_opens_and_an_interrupt_from_the_keyboard_is_told(display):
     with started(display, "/proc/no-home", Look(theme="light")) as link:
-        assert link.wait_ready(60).window == f"{WIDTH}x{HEIGHT}"
+        assert link.wait_ready(PATIENCE_S).window == f"{WIDTH}x{HEIGHT}"
         os.kill(link.pid, signal.SIGINT)
         with pytest.raises(ParticipantError, match="interrupted from the keyboard"):
-            link.ask_rating(SCALE, 10)
+            link.ask_rating(SCALE, PATIENCE_S)
 
 
 def test_without_a_display_the_error_says_so(tmp_path):
     with started(":999", tmp_path) as link, pytest.raises(ParticipantError, match=r"NoSuchDisplay|display"):
-        link.wait_ready(60)
+        link.wait_ready(PATIENCE_S)

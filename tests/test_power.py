@@ -7,7 +7,6 @@ import json
 import os
 import signal
 import subprocess
-import time
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
@@ -22,6 +21,7 @@ from experiments.roof.jobs import JobError, on_cluster, on_processes
 from experiments.roof.power import run as roof
 from experiments.roof.power.grid import Request, make_grid
 from tests.conftest import RECOIL, Recoil
+from tests.waiting import PATIENCE_S, wait_for
 
 SMALL = ("--participants", "8,14", "--effect", "0.75,1", "--studies", "300")
 CONFIG = load_setup("direction").config
@@ -130,11 +130,9 @@ def test_an_interrupted_job_goes_on_where_it_was(tmp_path: Path) -> None:
     whole, cut = tmp_path / "whole", tmp_path / "cut"
     subprocess.run([*words, whole], check=True, capture_output=True)
     with subprocess.Popen([*words, cut], stderr=subprocess.PIPE) as running:
-        until = time.monotonic() + 60
-        while not [kept for kept in cut.glob("unfinished*") if kept.stat().st_size] and time.monotonic() < until:
-            time.sleep(0.01)
+        wait_for(lambda: [kept for kept in cut.glob("unfinished*") if kept.stat().st_size])
         running.send_signal(signal.SIGINT)
-        _, errors = running.communicate(timeout=60)
+        _, errors = running.communicate(timeout=PATIENCE_S)
     assert running.returncode == 130, errors
     assert b"Traceback" not in errors
     kept = next(cut.glob("unfinished*"))
@@ -146,23 +144,20 @@ def test_an_interrupted_job_goes_on_where_it_was(tmp_path: Path) -> None:
     assert files(cut) == files(whole)
 
 
-def test_an_interrupted_job_on_processes_ends_soon_and_leaves_none(tmp_path: Path) -> None:
+def test_an_interrupted_job_on_processes_ends_and_leaves_none(tmp_path: Path) -> None:
     words = [RECOIL, "power", "direction", "--participants", "14", "--effect", "1", "--studies", "400000"]
     words += ["--workers", "2", "--out", tmp_path / "out"]
     with subprocess.Popen(words, stderr=subprocess.PIPE, start_new_session=True) as running:
-        until = time.monotonic() + 60
-        while not list((tmp_path / "out").glob("unfinished*")) and time.monotonic() < until:
-            time.sleep(0.05)
+        wait_for(lambda: list((tmp_path / "out").glob("unfinished*")))
         os.killpg(running.pid, signal.SIGINT)  # as a terminal does: to everybody
-        _, errors = running.communicate(timeout=60)
+        _, errors = running.communicate(timeout=PATIENCE_S)
     assert running.returncode == 130, errors
     assert b"Traceback" not in errors
-    until = time.monotonic() + 20  # the interpreter's own tracker of resources ends a moment later
-    while alive_in(running.pid) and time.monotonic() < until:
-        time.sleep(0.1)
-    assert not alive_in(running.pid), subprocess.run(
-        ["ps", "-eo", "pid,ppid,pgid,stat,cmd"], capture_output=True, check=False
-    ).stdout
+    wait_for(lambda: not alive_in(running.pid), processes)  # the interpreter's own tracker of resources ends later
+
+
+def processes() -> str:
+    return subprocess.run(["ps", "-eo", "pid,ppid,pgid,stat,cmd"], capture_output=True, text=True, check=False).stdout
 
 
 def alive_in(group: int) -> list[int]:

@@ -17,6 +17,7 @@ from experiments import register, storage
 from experiments.clock import VirtualClock
 from experiments.places import PlaceError, known_codes, place
 from experiments.register import NAME, Entry, RegisterError, append, entry, excluded, members, read
+from tests.waiting import PATIENCE_S
 
 ROOT = Path(__file__).parent.parent
 FACTS = {"age_years": 25, "sex": "female", "handedness": "right"}
@@ -238,7 +239,7 @@ def appending(results: Path, console: str, count: int, limit: int = 0) -> subpro
 def test_consoles_that_write_at_once_neither_lose_nor_tear_a_record(tmp_path: Path) -> None:
     consoles = [appending(tmp_path / "results", name, 20) for name in "ABCD"]
     for console in consoles:
-        _, said = console.communicate(timeout=60)
+        _, said = console.communicate(timeout=PATIENCE_S)
         assert (console.returncode, said) == (0, "")
     found = read(tmp_path / "results")
     assert found.problem == ""
@@ -250,7 +251,7 @@ def test_consoles_that_write_at_once_neither_lose_nor_tear_a_record(tmp_path: Pa
 def test_a_full_disk_is_said_and_leaves_whole_records(results: Path) -> None:
     before = (results / NAME).read_bytes()
     full = appending(results, "A", 1, limit=len(before) + 40)
-    _, said = full.communicate(timeout=60)
+    _, said = full.communicate(timeout=PATIENCE_S)
     assert full.returncode == 1
     assert "cannot be written" in said
     assert (results / NAME).read_bytes() == before

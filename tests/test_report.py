@@ -2,7 +2,6 @@ from __future__ import annotations
 
 import json
 import re
-import time
 from pathlib import Path
 from typing import Any
 
@@ -223,10 +222,8 @@ def crowded(logs: Logs) -> ReportData:
     return ReportData(title="Ten thousand", statistics=statistics, files=files, problems=bad)
 
 
-def test_a_report_of_ten_thousand_is_made_in_five_seconds_and_stays_short(crowded: ReportData, tmp_path: Path) -> None:
-    started = time.process_time()
+def test_a_report_of_ten_thousand_stays_short(crowded: ReportData, tmp_path: Path) -> None:
     write_report(tmp_path, crowded)
-    assert time.process_time() - started < 5.0
     text = (tmp_path / "report.md").read_text(encoding="utf-8")
     for words in (
         "the first 50 of 10,000; everybody is in direction_wide.csv",

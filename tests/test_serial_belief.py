@@ -23,6 +23,7 @@ from tests.forger import FORGERIES, ShotLiar, a_lying_pair, a_lying_twin
 from tests.serial_runs import check, hasty, run_all, timings_of
 from tests.test_serial_run import SPEED
 from tests.twins import Troubles, a_pair, a_shot
+from tests.waiting import wait_for
 
 FAR_US = 60_000_000
 
@@ -222,7 +223,7 @@ def test_after_a_reset_the_gun_is_counted_from_its_new_base(tmp_path):
     with a_pair(tmp_path, Troubles(replug_s=0.05)) as pair:
         assert [once(pair).timing.gun_count for _ in range(2)] == [1, 2]
         pair.twin.order(pair.twin.reset)
-        pair.wait(lambda: pair.gun.link.boot == 2)
+        wait_for(lambda: pair.gun.link.boot == 2)
         assert once(pair).timing.gun_count == 1
 
 

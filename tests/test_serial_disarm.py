@@ -12,6 +12,7 @@ from device.serial_gun import triggering
 from device.serial_gun.outcomes import CalledOff
 from tests.forger import a_lying_pair
 from tests.twins import Troubles, a_pair, a_shot, said
+from tests.waiting import wait_for
 
 ENDS_S = 30.0
 
@@ -97,7 +98,7 @@ def test_an_arming_whose_answer_was_lost_is_not_asked_for_again_after_a_disarmin
     with a_lying_pair(tmp_path, speed=1.0) as (pair, forger):
         asked, lost = answers_lost(forger, "ARM")
         arming = Doing(pair.gun.arm)
-        pair.wait(lambda: state(pair) == "ARMED", ENDS_S)
+        wait_for(lambda: state(pair) == "ARMED")
         pair.gun.disarm()
         armed_before = asked[: asked.index("ABOR")].count("ARM")
         lost.clear()
@@ -113,12 +114,12 @@ def test_an_arming_that_never_arrived_is_not_asked_for_again_after_the_line_was_
         heard = heard_by(forger, lost=lambda body: body == "ARM")
         turn = watched_turn(pair.gun)
         arming = Doing(pair.gun.arm)
-        pair.wait(lambda: turn.wait_for_it == 1, ENDS_S)
+        wait_for(lambda: turn.wait_for_it == 1)
         pair.gun.disarm()
         forger.swallow = heard.append
         pair.gun.link.drop("to be greeted again")
         assert isinstance(arming.ended(), CalledOff)
-        pair.wait(lambda: pair.gun.link.session == 2, ENDS_S)
+        wait_for(lambda: pair.gun.link.session == 2)
         assert "ARM" not in heard
         assert state(pair) == "DISARMED"
 
@@ -126,13 +127,13 @@ def test_an_arming_that_never_arrived_is_not_asked_for_again_after_the_line_was_
 def test_who_waits_for_a_gun_that_is_gone_does_not_arm_it_after_a_disarming(tmp_path):
     with a_pair(tmp_path, Troubles(replug_s=1.5), speed=1.0) as pair:
         pair.twin.order(pair.twin.unplug)
-        pair.wait(lambda: not pair.gun.link.is_up, ENDS_S)
+        wait_for(lambda: not pair.gun.link.is_up)
         turn = watched_turn(pair.gun)
         arming = Doing(pair.gun.arm)
-        pair.wait(lambda: turn.wait_for_it == 1, ENDS_S)
+        wait_for(lambda: turn.wait_for_it == 1)
         pair.gun.disarm()
         assert isinstance(arming.ended(), CalledOff)
-        pair.wait(lambda: pair.gun.link.is_up, ENDS_S)
+        wait_for(lambda: pair.gun.link.is_up)
         assert state(pair) == "DISARMED"
 
 
@@ -141,9 +142,9 @@ def test_what_waited_for_its_turn_when_the_gun_was_disarmed_is_called_off(tmp_pa
         pair.ready()
         heard, turn = heard_by(forger), watched_turn(pair.gun)
         firing = Doing(lambda: pair.gun.fire(a_shot(), pair.clock() + 1.9))
-        pair.wait(lambda: state(pair) == "WAITING", ENDS_S)
+        wait_for(lambda: state(pair) == "WAITING")
         others = [Doing(pair.gun.arm), Doing(lambda: pair.gun.fire(a_shot()))]
-        pair.wait(lambda: turn.wait_for_it == 3, ENDS_S)
+        wait_for(lambda: turn.wait_for_it == 3)
         pair.gun.disarm()
         assert "not fired: the gun was disarmed meanwhile" in str(firing.ended())
         assert isinstance(others[0].ended(), CalledOff)
@@ -190,7 +191,7 @@ def test_a_trigger_that_was_lost_is_not_written_again_after_a_disarming(tmp_path
 
         heard = heard_by(forger, lost)
         firing = Doing(lambda: pair.gun.fire(a_shot()))
-        pair.wait(lambda: triggers, ENDS_S)
+        wait_for(lambda: triggers)
         pair.gun.disarm()
         assert "not fired: the gun was disarmed meanwhile" in str(firing.ended())
         assert len(triggers) == 1
@@ -207,7 +208,7 @@ def test_the_status_is_read_back_after_a_disarming_while_a_shot_waits_for_its_lo
         pair.ready()
         forger.lie = lambda body: None if body.startswith(("SHOT ", "ERR ")) else body
         firing = Doing(lambda: pair.gun.fire(a_shot(), ahead_s and pair.clock() + ahead_s))
-        pair.wait(lambda: state(pair) == "WAITING" or pair.twin.body.ledger, ENDS_S)
+        wait_for(lambda: state(pair) == "WAITING" or pair.twin.body.ledger)
         pair.gun.disarm()
         assert pair.gun.status().state == "disarmed"
         assert firing.is_alive()
@@ -256,4 +257,4 @@ def test_no_shot_begins_after_a_disarming_that_threads_which_arm_and_fire_have_s
         late = [shot for shot in pair.twin.body.ledger if shot.start_s > disarmed_s]
         assert late == []
         assert len(pair.twin.body.ledger) > 0
-        pair.wait(lambda: state(pair) == "DISARMED", ENDS_S)
+        wait_for(lambda: state(pair) == "DISARMED")

@@ -12,7 +12,8 @@ from device.parameters import GunParameters, VibrationParameters
 from device.serial_gun.asked import FLOORS_US, asked
 from device.simulated import SimulatedGun
 from device.twin import budget
-from tests.twins import PULSE, Troubles, a_pair, a_shot, said
+from tests.twins import PULSE, SLOW, Troubles, a_pair, a_shot, said
+from tests.waiting import wait_for
 
 
 @pytest.fixture
@@ -23,8 +24,8 @@ def pair(tmp_path):
 
 @pytest.fixture
 def slow_pair(tmp_path):
-    """A twin that lives no faster than the world: the magnet is still out when a slow machine asks again."""
-    with a_pair(tmp_path, speed=1.0) as pair:
+    """A twin that lives slower than the world: the magnet is still out when a slow machine asks again."""
+    with a_pair(tmp_path, speed=SLOW) as pair:
         yield pair
 
 
@@ -39,9 +40,9 @@ def test_it_is_born_disarmed_and_says_who_it_is(pair):
 
 
 @pytest.mark.parametrize("tcp", [False, True])
-def test_a_shot_is_reported_on_the_hosts_clock_to_a_millisecond(tmp_path, tcp):
+def test_a_shot_is_reported_on_the_hosts_clock_to_within_its_bound(tmp_path, tcp):
     with a_pair(tmp_path, Troubles(jitter_s=0.005), speed=1.0, tcp=tcp, drift_ppm=80.0) as pair:
-        pair.wait(lambda: len(pair.gun.link.commands) >= 10)
+        wait_for(lambda: len(pair.gun.link.commands) >= 10)
         for _ in range(40):
             with_jitter = pair.gun.link.ask("TIME?")
             assert with_jitter.received_s > with_jitter.written_s
@@ -49,7 +50,6 @@ def test_a_shot_is_reported_on_the_hosts_clock_to_a_millisecond(tmp_path, tcp):
         report = pair.gun.fire(a_shot())
         (true,) = pair.twin.body.ledger
         timing = report.timing
-        assert abs(report.pulse_start_s - true.start_s) < 0.001
         assert abs(report.pulse_start_s - true.start_s) <= timing.uncertainty_s + 5e-6
         assert report.pulse_end_s - report.pulse_start_s == pytest.approx(0.010, abs=1e-4)
         assert timing.requested_s <= timing.written_s <= timing.accepted_s + timing.uncertainty_s
@@ -76,14 +76,12 @@ def test_all_methods_and_ways_are_rendered_as_the_simulated_gun_says(pair):
 
 
 def test_a_trains_shots_are_whole_ticks_of_the_guns_clock_apart_and_never_too_soon(tmp_path):
-    with a_pair(tmp_path, Troubles(jitter_s=0.003), speed=1.0, drift_ppm=80.0) as pair:
+    with a_pair(tmp_path, Troubles(jitter_s=0.003), speed=0.25, drift_ppm=80.0) as pair:
         pair.ready()
         first = pair.gun.fire(a_shot())
         ticks = []
         for shot in range(1, 6):
-            at_s = first.pulse_start_s + shot * 0.25
-            time.sleep(max(0.0, at_s - 0.2 - pair.clock()))
-            report = pair.gun.fire(a_shot(), at_s)
+            report = pair.gun.fire(a_shot(), first.pulse_start_s + shot * 0.25)
             ticks.append(report.timing.gun_start_us - first.timing.gun_start_us)
         assert ticks == [250_000 * shot for shot in range(1, 6)]
         assert not any(true.too_soon for true in pair.twin.body.ledger)
@@ -92,11 +90,12 @@ def test_a_trains_shots_are_whole_ticks_of_the_guns_clock_apart_and_never_too_so
 
 
 @pytest.mark.parametrize("ahead_s", [2.001, float("nan"), float("inf")])
-def test_a_shot_too_far_ahead_is_refused_before_a_byte_is_written(pair, ahead_s):
+def test_a_shot_too_far_ahead_is_refused_before_a_byte_is_written(slow_pair, ahead_s):
+    pair = slow_pair
     pair.ready()
     pair.gun.link.commands.clear()
     with pytest.raises(LimitError, match="at most 2 s ahead"):
-        pair.gun.fire(a_shot(), pair.clock() + ahead_s + 0.5)  # the clock is fast
+        pair.gun.fire(a_shot(), pair.clock() + ahead_s + 0.5)  # five seconds of the world
     assert said(pair.gun, "CONF", "TRIG") == []
 
 
@@ -112,12 +111,12 @@ def test_a_shot_that_waits_and_whose_answer_is_lost_is_looked_for_until_it_has_e
             write(data)
 
     pair.socket.write = lose
-    at_s = pair.clock() + 0.8
+    at_s, (now,) = pair.clock() + 0.2, pair.gun.link.host(pair.twin.clock_us())
     report = pair.gun.fire(a_shot(), at_s)
     (true,) = pair.twin.body.ledger
     assert len(lost) == 1
-    assert abs(true.start_s - at_s) < 0.002
-    assert abs(report.pulse_start_s - true.start_s) < 0.002
+    assert abs(true.start_s - at_s) <= now.uncertainty_s + 1e-4
+    assert abs(report.pulse_start_s - true.start_s) <= report.timing.uncertainty_s + 5e-6
 
 
 @pytest.mark.parametrize(
@@ -161,7 +160,8 @@ def test_a_method_whose_name_cannot_be_said_is_refused(tmp_path):
     assert FLOORS_US == budget.FLOOR_US
 
 
-def test_disarming_from_another_thread_cuts_a_shot_that_waits(pair):
+def test_disarming_from_another_thread_cuts_a_shot_that_waits(slow_pair):
+    pair = slow_pair
     pair.ready()
     outcome = []
 
@@ -173,7 +173,7 @@ def test_disarming_from_another_thread_cuts_a_shot_that_waits(pair):
 
     thread = threading.Thread(target=fire)
     thread.start()
-    time.sleep(0.02)
+    wait_for(lambda: pair.twin._core.machine.state == "WAITING")
     pair.gun.disarm()
     thread.join()
     assert outcome == ["not fired: the gun was disarmed meanwhile"]

@@ -5,7 +5,6 @@ import json
 import re
 import signal
 import subprocess
-import time
 from dataclasses import replace
 from pathlib import Path
 
@@ -19,6 +18,7 @@ from experiments.roof.twin import troubles_of
 from tests.conftest import RECOIL
 from tests.serial_runs import check, hasty, of_trains, one_run, resumed, run_all, timings_of
 from tests.twins import Troubles, a_twin
+from tests.waiting import PATIENCE_S, wait_for
 
 SPEED = 40.0
 TROUBLES = Troubles(
@@ -80,7 +80,7 @@ def plugged(tmp_path):
             text += line
         yield json.loads(text)["gun"]
         program.send_signal(signal.SIGINT)
-        assert program.wait(10) == 130
+        assert program.wait(PATIENCE_S) == 130
     assert not (tmp_path / "port").is_symlink()
 
 
@@ -129,30 +129,23 @@ def test_a_run_that_is_killed_leaves_the_gun_disarmed(tmp_path, quick_configs, n
         command = [str(RECOIL), *map(str, words), "--gun", f"serial:{socket.address}"]
         program = subprocess.Popen(command, cwd=tmp_path, stderr=subprocess.DEVNULL)
         try:
-            wait(lambda: len(twin.body.ledger) >= 2, 60)
-            assert twin._core.machine.state != "DISARMED"
+            wait_for(lambda: len(twin.body.ledger) >= 2 and twin._core.machine.state != "DISARMED")
+            twin._core._errors.clear()
             program.send_signal(number)
-            program.wait(60)
+            program.wait(PATIENCE_S)
         finally:
             program.kill()
             program.wait()
-        wait(lambda: twin._core.machine.state == "DISARMED", 30)
+        wait_for(lambda: twin._core.machine.state == "DISARMED")
         left_to_the_watchdog = errors.WATCHDOG in twin._core._errors
         assert left_to_the_watchdog == (number == signal.SIGKILL)
-        fired = len(twin.body.ledger)
-        time.sleep(1.0)
-        assert len(twin.body.ledger) == fired
+        assert twin._core.machine.due_us() is None  # nothing comes any more
 
 
-def wait(until, seconds):
-    end_s = time.monotonic() + seconds
-    while not until():
-        assert time.monotonic() < end_s
-        time.sleep(0.005)
-
-
-def test_the_doctor_measures_the_way_to_a_gun_on_a_line(recoil, plugged):
-    done = recoil("doctor", "--json", "--gun", plugged)
+def test_the_doctor_measures_the_way_to_a_gun_on_a_line(recoil, plugged, quick_configs):
+    patient = quick_configs / "gun.toml"
+    patient.write_text(f"{patient.read_text()}\n[serial]\nround_trip_limit_s = 1.0\n")
+    done = recoil("doctor", "--json", "--gun", plugged, "--gun-config", patient)
     (gun,) = [row for row in json.loads(done.stdout)["checks"] if row["check"] == "gun"]
     assert gun["verdict"] == "good"
     assert gun["measured"].startswith("haptic-gun:TWIN-1, disarmed; round trip median")
@@ -181,9 +174,7 @@ def test_the_twin_on_a_tcp_port_is_opened_by_url_and_measured_against_its_own_li
     strict = quick_configs / "gun.toml"
     strict.write_text(f"{strict.read_text()}\n[serial]\nround_trip_limit_s = 1e-6\n")
     with a_twin(tmp_path, tcp=True, speed=1.0) as (_, socket):
-        start_s = time.monotonic()
         done = recoil("doctor", "--json", "--gun", f"serial:{socket.address}", "--gun-config", strict)
-        assert time.monotonic() - start_s < 60
     (gun,) = [row for row in json.loads(done.stdout)["checks"] if row["check"] == "gun"]
     assert gun["verdict"] == "warning"
     assert "above the limit of 0.001 ms (the gun's serial.round_trip_limit_s)" in gun["advice"]

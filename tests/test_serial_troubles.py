@@ -1,5 +1,6 @@
 """A gun on a line that breaks, babbles or goes silent: each shot once, or said what may be so; disarmed in time."""
 
+import math
 import re
 import threading
 import time
@@ -11,8 +12,10 @@ from device.limits import DriveHistory
 from device.serial_gun.link import Link
 from device.serial_gun.outcomes import Disconnected
 from device.serial_gun.port import SerialPort
+from device.twin.twin import BUSY_US
 from tests.forger import a_lying_pair
-from tests.twins import Troubles, a_pair, a_shot, a_twin, disarmings_of, said
+from tests.twins import SLOW, Troubles, a_pair, a_shot, a_twin, disarmings_of, said
+from tests.waiting import PATIENCE_S, wait_for
 
 ALL = Troubles(lose=0.02, double=0.02, corrupt=0.02, partial=0.02, jitter_s=0.002)
 
@@ -24,7 +27,7 @@ def test_an_abandoned_gun_is_disarmed_by_its_watchdog(tmp_path):
         link._closing.set()  # the host dies: nothing is said any more, and nothing is said about it
         for thread in (link._thread, link._keeper):
             thread.join()
-        pair.wait(lambda: disarmings, 30)
+        wait_for(lambda: disarmings)
         heard_s = pair.twin.world_of(pair.twin._core._heard_us)
         assert disarmings[0] - heard_s == pytest.approx(link.watchdog_s, abs=1e-5)
         assert link.watchdog_s + 0.04 <= 0.4  # so long may the last frame have been under way
@@ -36,18 +39,19 @@ def test_disarming_a_gun_that_is_gone_waits_for_its_watchdog(tmp_path):
         pair.gun.arm()
         disarmings = disarmings_of(pair.twin)
         pair.twin.order(pair.twin.unplug)
-        pair.wait(lambda: not pair.gun.link.is_up, 30)
+        wait_for(lambda: not pair.gun.link.is_up)
         written_s = pair.gun.link._written_s
         pair.gun.disarm()
         assert time.monotonic() - written_s > pair.gun.link.watchdog_s
-        pair.wait(lambda: disarmings, 30)
+        wait_for(lambda: disarmings)
         assert pair.twin._core.machine.state == "DISARMED"
+        assert not pair.gun.link.is_up
 
 
 def away(pair):
     """This machine does nothing for the gun until its watchdog has disarmed it."""
     with pair.gun.link._lock:
-        pair.wait(lambda: not pair.twin._core.strict, 30)
+        wait_for(lambda: not pair.twin._core.strict)
 
 
 AWAY = r"the gun's watchdog disarmed it: this machine was away for \d{3,} ms, and the gun waits for 360 ms"
@@ -58,7 +62,7 @@ def test_a_gun_whose_watchdog_disarmed_it_in_a_train_says_why_it_does_not_fire(t
         pair.ready()
         pair.gun.fire(a_shot())
         away(pair)
-        pair.wait(lambda: pair.gun.link.session == 2, 30)
+        wait_for(lambda: pair.gun.link.session == 2)
         assert re.fullmatch(AWAY, pair.gun.status().fault)
         with pytest.raises(Disconnected, match=f"not fired: {AWAY}"):
             pair.gun.fire(a_shot())
@@ -82,7 +86,7 @@ def test_a_shot_that_waits_when_the_watchdog_disarms_the_gun_says_so(tmp_path):
 
         thread = threading.Thread(target=fire)
         thread.start()
-        pair.wait(lambda: pair.twin._core.machine.state == "WAITING", 30)
+        wait_for(lambda: pair.twin._core.machine.state == "WAITING")
         away(pair)
         thread.join()
         assert re.fullmatch(f"not fired: {AWAY}", causes[0])
@@ -93,9 +97,9 @@ def test_a_line_that_lost_every_frame_is_named_when_the_watchdog_disarms(tmp_pat
     with a_lying_pair(tmp_path, speed=1.0) as (pair, forger):
         pair.ready()
         forger.swallow = lambda _: True
-        pair.wait(lambda: not pair.twin._core.strict, 30)
+        wait_for(lambda: not pair.twin._core.strict)
         forger.swallow = lambda _: False
-        pair.wait(lambda: pair.gun.link.session == 2, 30)
+        wait_for(lambda: pair.gun.link.session == 2)
         with pytest.raises(Disconnected, match="nothing reached it for 360 ms, though this machine wrote; check the"):
             pair.gun.fire(a_shot())
 
@@ -104,7 +108,7 @@ def test_a_gun_that_was_reset_between_two_shots_says_so(tmp_path):
     with a_pair(tmp_path, speed=1.0) as pair:
         pair.ready()
         pair.twin.order(pair.twin.reset)
-        pair.wait(lambda: pair.gun.link.session == 2, 30)
+        wait_for(lambda: pair.gun.link.session == 2)
         with pytest.raises(Disconnected, match="not fired: the gun does not know its last session any more, so it was"):
             pair.gun.fire(a_shot())
 
@@ -151,8 +155,9 @@ def test_unplugged_between_shots_it_goes_on_after_replugging(tmp_path, tcp):
     with a_pair(tmp_path, Troubles(replug_s=0.1), tcp=tcp) as pair:
         pair.ready()
         pair.gun.fire(a_shot())
+        session = pair.gun.link.session
         pair.twin.order(pair.twin.unplug)
-        pair.wait(lambda: not pair.gun.link.is_up)
+        wait_for(lambda: not pair.gun.link.is_up or pair.gun.link.session != session)
         time.sleep(0.3 / pair.speed)  # the magnet is home
         with pytest.raises(Disconnected, match="not fired"):
             pair.gun.fire(a_shot())
@@ -167,7 +172,7 @@ def test_unplugged_in_mid_shot_the_shot_is_found_done(tmp_path):
         report = pair.gun.fire(a_shot())
         (true,) = pair.twin.body.ledger
         assert pair.twin.accidents == ["unplug"]
-        assert abs(report.pulse_start_s - true.start_s) < 0.001
+        assert abs(report.pulse_start_s - true.start_s) <= report.timing.uncertainty_s + 5e-6
         assert report.timing.acknowledged_s - report.pulse_end_s > 0.05
 
 
@@ -188,12 +193,12 @@ def test_unplugged_in_mid_answer_nothing_is_lost_and_nothing_done_twice(tmp_path
 
 
 def test_a_gun_that_is_reset_in_mid_shot_cannot_tell_and_the_error_says_so(tmp_path):
-    with a_pair(tmp_path, Troubles(reset=1.0), speed=1.0) as pair:
+    with a_pair(tmp_path, Troubles(reset=1.0), speed=SLOW) as pair:
         pair.ready()
         with pytest.raises(LinkError, match="may have been fired"):
             pair.gun.fire(a_shot())
         pair.gun.disarm()
-        pair.wait(lambda: pair.gun.link.is_up)
+        wait_for(lambda: pair.gun.link.is_up)
         assert pair.gun.status().shots == 0
         assert len(pair.twin.body.ledger) == 1
         pair.gun.arm()
@@ -202,46 +207,58 @@ def test_a_gun_that_is_reset_in_mid_shot_cannot_tell_and_the_error_says_so(tmp_p
 
 
 def test_a_reset_is_not_forgotten_when_the_first_greeting_after_it_breaks_off(tmp_path):
-    breaks = threading.Event()
+    opened = []
 
     class BreakingPort(SerialPort):
+        """The second one breaks in its greeting."""
+
+        def __init__(self, address):
+            super().__init__(address)
+            opened.append(self)
+
         def write(self, data):
-            if breaks.is_set() and b"TIME?" in data:
-                breaks.clear()
+            if opened.index(self) == 1 and b"TIME?" in data:
                 raise Disconnected("broken off in mid-greeting")
             super().write(data)
 
     with a_twin(tmp_path, speed=1.0) as (twin, socket):
         link = Link(lambda: socket.address, time.monotonic, open_port=BreakingPort)
-        link.start(5.0)
+        link.start(PATIENCE_S)
         session = link.session
         twin.order(twin.reset)
         link.drop("to see the greeting break off")
-        breaks.set()
-        link.wait_up(5.0)
-        while link.session == session:
-            time.sleep(0.005)
-        assert not breaks.is_set()
+        wait_for(lambda: link.is_up and link.session != session)
+        assert len(opened) == 3
         assert not link.remembers
         link.close()
 
 
 def test_a_pulse_that_does_not_end_is_cut_and_marked(tmp_path):
-    with a_pair(tmp_path, Troubles(busy=1.0), speed=1.0) as pair:
+    with a_pair(tmp_path, Troubles(busy=1.0), speed=SLOW) as pair:
         pair.ready()
         with pytest.raises(LinkError, match="fired and cut short"):
             pair.gun.fire(a_shot())
         (true,) = pair.twin.body.ledger
-        assert true.end_s - true.start_s < 1.0
+        assert true.end_s - true.start_s < BUSY_US / 1e6
         assert pair.gun.status().state == "disarmed"
 
 
 def test_a_trigger_that_was_held_up_does_not_fire_late(tmp_path):
     with a_pair(tmp_path, speed=1.0) as pair:
+
+        def hear_again():
+            wait_for(lambda: any(c.body.startswith("TRIG") and c.outcome == "timed out" for c in said()))
+            pair.twin._hangs_until_s = 0.0
+
+        def said():
+            return list(pair.gun.link.commands)
+
         pair.ready()
         pair.gun.fire(a_shot())  # so that it is set already
         pair.ready()
-        pair.twin._hangs_until_s = time.monotonic() + 0.4
+        pair.twin._hangs_until_s = math.inf
+        held_up = threading.Thread(target=hear_again)
+        held_up.start()
         try:
             report = pair.gun.fire(a_shot())
         except LinkError as error:
@@ -249,14 +266,13 @@ def test_a_trigger_that_was_held_up_does_not_fire_late(tmp_path):
             assert len(pair.twin.body.ledger) == 1
         else:
             _, true = pair.twin.body.ledger
-            assert abs(report.pulse_start_s - true.start_s) < 0.01
+            assert abs(report.pulse_start_s - true.start_s) <= report.timing.uncertainty_s + 5e-6
             assert report.timing.asked > 1
-        late = [c for c in pair.gun.link.commands if c.body.startswith("TRIG")]
-        assert late[1].outcome == "timed out"
+        held_up.join()
 
 
 def test_on_a_bad_line_every_shot_is_done_once_or_marked(tmp_path):
-    with a_pair(tmp_path) as pair:
+    with a_pair(tmp_path, speed=5.0) as pair:
         object.__setattr__(pair.twin._make, "troubles", ALL)
         done, marked = [], 0
         for number in range(60):
@@ -268,7 +284,8 @@ def test_on_a_bad_line_every_shot_is_done_once_or_marked(tmp_path):
                 marked += 1
         assert len(pair.twin.body.ledger) <= len(done) + marked
         for way, report in done:
-            (true,) = [t for t in pair.twin.body.ledger if abs(t.start_s - report.pulse_start_s) < 0.1]
+            true = min(pair.twin.body.ledger, key=lambda t: abs(t.start_s - report.pulse_start_s))
+            assert abs(true.start_s - report.pulse_start_s) <= report.timing.uncertainty_s + 5e-6
             assert true.way == {"forward": "FORW", "backward": "BACK"}[way]
         assert len(done) > 40
         assert {command.outcome for command in pair.gun.link.commands} >= {"done", "garbled"}

@@ -5,6 +5,7 @@ from __future__ import annotations
 import random
 from collections.abc import Iterator
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -13,6 +14,7 @@ from experiments.doctor.latencies import Latencies, latencies, together
 from experiments.journal import read
 from experiments.screens.xkeys import Hands
 from tests import test_console as console
+from tests import test_console_faults as faults
 from tests.at_display import AtDisplay, needs_display, virtual_display
 from tests.conftest import Soak
 
@@ -22,7 +24,8 @@ pytestmark = [pytest.mark.soak, needs_display]
 KILLS = 200
 PARTICIPANTS = 17
 """Of 60 trials each: a little more than 1,000 trials."""
-STEP_TO_SCREEN_MS, KEY_TO_DISK_MS = 50.0, 10.0
+STEP_TO_SCREEN_MS, KEY_TO_DISK_MS, STALL_MS = 50.0, 10.0, 50.0
+FAULTS = 5
 
 
 @pytest.fixture(scope="module")
@@ -70,3 +73,21 @@ def test_the_99th_percentiles_over_1000_trials(quick_configs: Path, tmp_path: Pa
     assert found.trials >= 1000
     assert screen_ms < STEP_TO_SCREEN_MS
     assert disk_ms < KEY_TO_DISK_MS
+
+
+@pytest.mark.parametrize("case", ["good", "hangs", "late", "link", "vanishes", "hangs-emergency", "slow-disk"])
+def test_the_windows_longest_pause_while_gun_or_disk_do_not(case: str, tmp_path: Path, soak: Soak) -> None:
+    found = [faults.child(case, tmp_path / str(number)) for number in range(FAULTS)]
+    longest_ms = float(np.median([seen["longest_ms"] for seen in found]))
+    how = f"median of {FAULTS} runs, {faults.TICK_MS} ms between two ticks of its thread"
+    soak(f"longest pause of the window, gun or disk: {case}", f"{longest_ms:.0f} ms", f"{STALL_MS:g} ms", how)
+    assert longest_ms < STALL_MS
+    if case == "hangs-emergency":
+        after_ms = float(np.median([1000 * disarmed_after_s(seen) for seen in found]))
+        soak("F12 to disarm while a shot hangs", f"{after_ms:.1f} ms", f"{STALL_MS:g} ms", f"median of {FAULTS} runs")
+        assert after_ms < STALL_MS
+
+
+def disarmed_after_s(seen: dict[str, Any]) -> float:
+    """How long after the key the gun was told."""
+    return min(at_s - seen["pressed_s"] for at_s in seen["disarmed_s"] if at_s >= seen["pressed_s"])

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import statistics
 import time
 from collections.abc import Iterator
 from functools import cache
@@ -16,12 +17,13 @@ from analysis.decision.distribution import distribution
 from analysis.decision.fit import DiffusionFit, fit
 from analysis.decision.moments import moments
 from analysis.decision.people import PeopleFit, fit_people
-from experiments.direction.diffusion import upper_probability
+from experiments.direction.diffusion import Diffusion, upper_probability
 from experiments.direction.diffusion_batch import decide_all
 from experiments.streams import generator
 from tests.conftest import Soak
 from tests.test_decision import reference
 from tests.test_decision_fit import RANGE_S, TRUTH, made
+from tests.test_diffusion import EXTREMES, law, scalar
 
 pytestmark = pytest.mark.soak
 
@@ -50,6 +52,24 @@ def test_the_sampler_against_closed_forms(soak: Soak) -> None:
         f"{checks} checks, {len(GRID)} places, {n:,} draws each, {each_us:.2f} us a draw",
     )
     assert worst < 4.5
+
+
+def test_extremes_beside_an_ordinary_draw(soak: Soak) -> None:
+    ordinary = scalar_s(law(1.0, 2.0, 0.5))
+    slowest = max(scalar_s(extreme) for extreme in EXTREMES) / ordinary
+    how = f"{len(EXTREMES)} extremes of drift, boundary and start, medians of 5 x 300; {ordinary * 1e6:.0f} us"
+    soak("the slowest extreme, times an ordinary draw", f"{slowest:.1f}", "20", how)
+    assert slowest < 20
+
+
+def scalar_s(diffusion: Diffusion) -> float:
+    """The median time of a draw, one at a time."""
+    times = []
+    for _ in range(5):
+        begun = time.perf_counter()
+        scalar(diffusion, 300)
+        times.append((time.perf_counter() - begun) / 300)
+    return statistics.median(times)
 
 
 def test_the_distribution_of_times(soak: Soak) -> None:

@@ -155,6 +155,7 @@ def test_extremes(soak: Soak) -> None:
     how = f"{counts.total()} shots: each extreme, and pairs of them, in all options; slowest {slowest:.2f} s"
     soak("extremes: a right answer or a named status, no NaN, no hang", each, "8 s each", how)
     assert set(counts) <= {"home", "no-break-away", "stuck", "not-home"}
+    assert slowest < 8
 
 
 def test_re_firing(soak: Soak) -> None:
@@ -223,9 +224,10 @@ def test_times(fidelity: str, drive_off: str, soak: Soak) -> None:
     soak(
         f"{fidelity}, coil {drive_off}: time a shot",
         f"{alone:.0f} us interpreted; batch {one_core:.2f} us a core, {many:.2f} us on {cores()}",
-        "5 us a core" if (fidelity, drive_off) == ("full", "open") else "stated",
+        "20 ms interpreted" + (", 5 us a core" if (fidelity, drive_off) == ("full", "open") else ""),
         f"median of {REPEATS}; batch of {BATCH:,}",
     )
+    assert alone < 20_000
 
 
 @pytest.mark.usefixtures("compiled")

@@ -6,7 +6,6 @@ import csv
 import itertools
 import json
 import re
-import time
 from pathlib import Path
 from typing import Any
 
@@ -456,17 +455,6 @@ def test_a_crowd_is_fitted_by_a_sample_of_people_whose_codes_are_evenly_spaced(t
     assert found.together.log_likelihood == pytest.approx(direct.log_likelihood)
     shown = summarize(logs)["direction"]["speed_accuracy"]
     assert (shown["people"], shown["diffusion"]["fitted"]) == (people, MOST_PEOPLE)
-
-
-def test_a_thousand_logs_take_a_second_more_at_most(tmp_path: Path) -> None:
-    """About half a second, nearly all of it fits; four times that is allowed, because machines are shared."""
-    logs = read_logs([write_many(tmp_path, 1_000)])
-    summarize(logs)
-    start = time.process_time()
-    summarize(logs, trade=False)
-    plain = time.process_time()
-    summarize(logs)
-    assert (time.process_time() - plain) - (plain - start) < 2.0
 
 
 # The report

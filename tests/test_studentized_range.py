@@ -4,7 +4,6 @@ import json
 import math
 import subprocess
 import sys
-import time
 from pathlib import Path
 
 import numpy as np
@@ -158,16 +157,6 @@ def test_impossible_parameters_are_refused(k: float, df: float, reason: str) -> 
 def test_a_probability_outside_its_range_is_refused() -> None:
     with pytest.raises(ValueError, match=r"0\.\.1, not 1\.5"):
         studentized_range_isf(1.5, 3, 26)
-
-
-def test_ten_thousand_values_take_no_longer_than_a_hundred_of_scipy() -> None:
-    q = np.linspace(0.1, 12.0, 10_000)
-    start = time.perf_counter()
-    studentized_range_sf(q, 7, 19)
-    ours = (time.perf_counter() - start) / q.size
-    start = time.perf_counter()
-    stats.studentized_range.sf([2.0, 4.0, 6.0], 7, 19)
-    assert (time.perf_counter() - start) / 3 > 100 * ours  # in truth thousands; the figures are in results/soak
 
 
 def test_importing_it_loads_neither_scipy_stats_nor_scipy_linalg() -> None:

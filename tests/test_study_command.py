@@ -19,6 +19,7 @@ from experiments.run import Request, run
 from experiments.screens.synthetic import synthetic_screen
 from tests.conftest import RECOIL, Recoil
 from tests.test_cli import refused
+from tests.waiting import PATIENCE_S
 
 RIGHT = ("--age", 25, "--sex", "female", "--handedness", "right")
 
@@ -339,5 +340,5 @@ def test_consoles_that_join_people_at_once_all_find_them_there(recoil: Recoil, p
         subprocess.Popen([*words, f"P{n:02d}"], cwd=pilot.parent, env=environment, stdout=subprocess.DEVNULL)
         for n in range(1, 7)
     ]
-    assert [one.wait(60) for one in started] == [0] * 6
+    assert [one.wait(PATIENCE_S) for one in started] == [0] * 6
     assert list(states(told(recoil))) == [f"P{n:02d}" for n in range(1, 7)]

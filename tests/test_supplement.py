@@ -19,6 +19,7 @@ from analysis.report.supplement import supplement_sections
 from analysis.summary import summarize
 from tests.log_files import METHODS, rating_rows, ratings_path, trial_rows, trials_path, write_rows, write_study
 from tests.test_sphericity import RIGHT
+from tests.waiting import PATIENCE_S
 
 Json = dict[str, Any]
 
@@ -229,5 +230,7 @@ def test_the_paired_tukey_is_the_one_of_the_core(found: Json) -> None:
 
 def test_nothing_slow_is_imported_before_it_is_used() -> None:
     program = "import sys, analysis.summary; print([m for m in ('pingouin', 'statsmodels') if m in sys.modules])"
-    done = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, check=True, timeout=120)
+    done = subprocess.run(
+        [sys.executable, "-c", program], capture_output=True, text=True, check=True, timeout=PATIENCE_S
+    )
     assert done.stdout.strip() == "[]"

@@ -5,7 +5,6 @@ import json
 import os
 import signal
 import subprocess
-import time
 from contextlib import contextmanager
 
 import numpy as np
@@ -16,6 +15,7 @@ from device.physics import GunParameters, simulate
 from experiments.load import ConfigError
 from experiments.roof.simulate import sweep, sweep_table
 from tests.conftest import RECOIL
+from tests.waiting import PATIENCE_S, wait_for
 
 GUN = GunParameters()
 
@@ -190,11 +190,10 @@ def test_an_interrupted_table_leaves_nothing_and_ends_with_130(tmp_path):
     process = subprocess.Popen(
         [RECOIL, "simulate", *words], cwd=tmp_path, stderr=subprocess.PIPE, text=True, env=os.environ
     )
-    while not part.exists():
-        time.sleep(0.05)
-        assert process.poll() is None
+    wait_for(lambda: part.exists() or process.poll() is not None)
+    assert process.poll() is None
     process.send_signal(signal.SIGINT)
-    _, said = process.communicate(timeout=60)
+    _, said = process.communicate(timeout=PATIENCE_S)
     assert process.returncode == 130
     assert "Traceback" not in said
     assert not list(tmp_path.iterdir())

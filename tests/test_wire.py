@@ -1,6 +1,5 @@
 """The wire's bytes and words: whatever comes, it is a word or a `LinkError`, soon, and in little memory."""
 
-import time
 import tracemalloc
 import zlib
 from contextlib import suppress
@@ -157,16 +156,14 @@ def test_the_longest_line_is_taken_and_a_longer_one_left_out(length, end):
     assert Splitter().feed(b"a" * (MAX_LINE + 1) + end + b"b\n") == [None, b"b"]
 
 
-def test_a_flood_without_an_end_takes_little_memory_and_time():
+def test_a_flood_without_an_end_takes_little_memory():
     splitter, chunk = Splitter(), b"\xff" * 65536
     tracemalloc.start()
-    start_s = time.process_time()
-    for _ in range(1000):
+    for _ in range(1000):  # 65 MB
         assert splitter.feed(chunk) == []
-    taken_s, (_, peak) = time.process_time() - start_s, tracemalloc.get_traced_memory()
+    _, peak = tracemalloc.get_traced_memory()
     tracemalloc.stop()
     assert peak < 500_000
-    assert taken_s < 5  # 65 MB
     assert splitter.feed(b"\nARM\n") == [None, b"ARM"]
 
 

@@ -13,8 +13,8 @@ from device import Pulse, Shot
 from device.methods import paper_methods
 from device.serial_gun.gun import SerialGun
 from device.serial_gun.opening import open_serial
-from device.twin.core import IDENTITY
 from device.twin.faults import Troubles
+from device.twin.machine import BOOT_REST_US
 from device.twin.ports import Pty, Socket, Tcp
 from device.twin.twin import Make, Twin
 
@@ -60,11 +60,9 @@ class Pair:
         self.gun.arm()
         time.sleep(max(0.0, (self.gun.status().ready_at_s - self.clock()) / self.speed))
 
-    def wait(self, until: Any, seconds: float = 5.0) -> None:
-        end_s = time.monotonic() + seconds
-        while not until():
-            assert time.monotonic() < end_s
-            time.sleep(0.002)
+
+SLOW = 0.1
+"""The speed of a twin to which no machine is slow: its magnet is out for two seconds."""
 
 
 def host_clock(speed: float) -> Callable[[], float]:
@@ -75,9 +73,12 @@ def host_clock(speed: float) -> Callable[[], float]:
 def a_twin(
     folder: Path, troubles: Troubles | None = None, *, speed: float = 20.0, tcp: bool = False, **make: Any
 ) -> Iterator[tuple[Twin, Socket]]:
+    """A twin that serves. A slow one has had its rest after the boot, which would take long."""
     socket: Socket = Tcp() if tcp else Pty(folder / "gun")
-    made = Make(speed=speed, troubles=troubles or Troubles(), **make)
-    with Twin(socket, paper_methods(), made) as twin:
+    twin = Twin(socket, paper_methods(), Make(speed=speed, troubles=troubles or Troubles(), **make))
+    if speed < 1:
+        twin._boot_s -= BOOT_REST_US / 1e6
+    with twin:
         yield twin, socket
 
 
@@ -92,4 +93,15 @@ def a_pair(folder: Path, troubles: Troubles | None = None, *, speed: float = 20.
             gun.close()
 
 
-__all__ = ["IDENTITY", "PULSE", "Pair", "Troubles", "a_pair", "a_shot", "a_twin", "disarmings_of", "host_clock", "said"]
+__all__ = [
+    "PULSE",
+    "SLOW",
+    "Pair",
+    "Troubles",
+    "a_pair",
+    "a_shot",
+    "a_twin",
+    "disarmings_of",
+    "host_clock",
+    "said",
+]

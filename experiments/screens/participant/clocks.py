@@ -31,6 +31,15 @@ class ClockMap:
         return here_s + self.offset_s
 
 
+def surely_moved_s(before: ClockMap, after: ClockMap) -> float:
+    """How far the clocks moved against each other between two maps, at least: what both leave open is no movement.
+
+    >>> surely_moved_s(ClockMap(offset_s=100.0, uncertainty_s=0.5), ClockMap(offset_s=102.0, uncertainty_s=0.25))
+    1.25
+    """
+    return max(0.0, abs(after.offset_s - before.offset_s) - before.uncertainty_s - after.uncertainty_s)
+
+
 def clock_map(trips: Iterable[RoundTrip]) -> ClockMap:
     """The map by the shortest of some round trips: the other clock was read somewhere between leaving and return.
 

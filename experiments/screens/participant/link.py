@@ -16,7 +16,7 @@ from typing import Self, TypeVar
 from pydantic import ValidationError
 
 from experiments.clock import Clock, RealClock
-from experiments.screens.participant.clocks import ClockMap, RoundTrip, clock_map
+from experiments.screens.participant.clocks import ClockMap, RoundTrip, clock_map, surely_moved_s
 from experiments.screens.participant.look import Look, arguments
 from experiments.screens.participant.mailbox import Mailbox, ParticipantError
 from experiments.screens.participant.process import ParticipantProcess
@@ -149,8 +149,9 @@ class ParticipantLink:
             ask, clocks = self._mail.open_ask(), self.map_clocks()
             asked = replace(question, ask=ask, onset_s=clocks.there(question.onset_s))
             given = self._answer(asked, DirectionGiven, timeout_s, wanted)
-            moved_s = self.map_clocks().offset_s - clocks.offset_s
-        if abs(moved_s) > MAX_CLOCK_STEP_S:
+            after = self.map_clocks()
+        if surely_moved_s(clocks, after) > MAX_CLOCK_STEP_S:
+            moved_s = after.offset_s - clocks.offset_s
             raise ParticipantError(
                 f"a clock was set by {moved_s:.3f} s while {given.response!r} was answered: the key's time is lost"
             )
