@@ -283,3 +283,13 @@ def remarks(journal: Path, *kinds: str) -> list[dict[str, Any]]:
     """The remarks of some kinds, or all, in order."""
     bodies = [record["body"] for record in records(journal) if record["kind"] == "remark"]
     return [body for body in bodies if not kinds or body["kind"] in kinds]
+
+
+def last_record(journal: Path) -> dict[str, Any]:
+    """The last whole record of a journal that is being written, but for a train's shots; empty if there is none yet."""
+    try:
+        lines = journal.read_bytes().split(b"\n")[:-1]
+    except FileNotFoundError:
+        return {}
+    records = map(json.loads, reversed(lines))
+    return next((record for record in records if record["kind"] != "shot"), {})

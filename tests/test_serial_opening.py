@@ -11,7 +11,8 @@ import pytest
 from device import LinkError, open_gun
 from device.serial_gun.address import parse
 from device.serial_gun.find import find
-from tests.twins import IDENTITY, a_twin
+from device.twin.core import IDENTITY
+from tests.twins import a_twin
 
 
 def test_a_gun_of_another_version_is_refused_by_name(tmp_path):

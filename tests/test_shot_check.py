@@ -279,6 +279,7 @@ TIMING = ShotTiming(
     gun_accepted_us=1,
     gun_start_us=2,
     gun_end_us=3,
+    gun_count=1,
     asked=1,
 )
 
