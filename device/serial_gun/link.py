@@ -96,7 +96,7 @@ class Link:
 
     def wait_up(self, patience_s: float) -> None:
         """Wait until the gun is there. `Disconnected`: it does not come back."""
-        if not self._up.wait(patience_s):
+        if self._closing.is_set() or not self._up.wait(patience_s):
             raise Disconnected(f"the gun is not there ({self._trouble or 'no answer'})")
 
     def host(self, *gun_us: int) -> list[HostTime]:
