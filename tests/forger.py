@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
 from dataclasses import replace
 from pathlib import Path
@@ -15,6 +15,7 @@ from device.twin.ports import Pty
 from device.twin.twin import Make, Twin
 from device.wire.frame import Frame, Garbled, Splitter, decode, encode
 from device.wire.records import Setting, ShotRecord
+from device.words import ShotTiming
 from tests.twins import Pair, host_clock
 
 HUGE_US = 9_000_000_000_000_000
@@ -101,11 +102,12 @@ class Forger(Pty):
 class ShotLiar:
     """Makes of a share of the records of shots that were done what each forgery makes of them, in turn.
 
-    `told` keeps the name of each lie.
+    `told` keeps the name of each lie, `spoiled` the shots that were lied about, as they were and as it was told.
     """
 
     def __init__(self, share: float, far_us: int, seed: int = 1, kinds: tuple[str, ...] = tuple(FORGERIES)) -> None:
         self.told: list[str] = []
+        self.spoiled: set[tuple[int, ...]] = set()
         self._share, self._far_us, self._draw, self._kinds = share, far_us, Random(seed), kinds
 
     def __call__(self, body: str) -> str:
@@ -113,7 +115,15 @@ class ShotLiar:
             return body
         kind = self._kinds[len(self.told) % len(self._kinds)]
         self.told.append(kind)
-        return FORGERIES[kind][0](ShotRecord.parse(body), self._far_us).text()
+        true = ShotRecord.parse(body)
+        forged = FORGERIES[kind][0](true, self._far_us)
+        self.spoiled |= {(one.count, one.accepted_us, one.start_us, one.end_us) for one in (true, forged)}
+        return forged.text()
+
+    def accepted(self, timings: Iterable[ShotTiming]) -> int:
+        """How many of these shots were lied about."""
+        told = ((one.gun_count, one.gun_accepted_us, one.gun_start_us, one.gun_end_us) for one in timings)
+        return len(self.spoiled.intersection(told))
 
 
 @contextmanager

@@ -181,12 +181,10 @@ def test_a_run_with_a_lying_gun_goes_on_and_each_row_has_one_valid_shot(tmp_path
         tally = run_all(hasty(quick_configs), tmp_path / "results", gun, range(1, 3))
         figures = check(tally, twin, slack_s=1e-4)
     assert figures["trials"] == figures["done"] == 120
-    assert figures["rendered and marked"] == figures["unsure"] == figures["marked"] == len(liar.told)
+    assert liar.accepted(fired.timing for _, fired in tally.done) == 0
     assert set(liar.told) == set(FORGERIES)
-    for kind in FORGERIES:
-        found = sum(n for cause, n in tally.causes.items() if re.search(FORGERIES[kind][1], cause))
-        same = {other for other in FORGERIES if FORGERIES[other][1] == FORGERIES[kind][1]}
-        assert found >= sum(told in same for told in liar.told)
+    for _, cause in FORGERIES.values():
+        assert any(re.search(cause, found) for found in tally.causes)
     counts = [one["gun_count"] for one in timings_of(read(place(tmp_path / "results", "P0001", "direction").journal))]
     assert counts == sorted(set(counts))
     assert len(counts) == 60 < counts[-1]  # the gaps are the shots that were not believed

@@ -22,9 +22,9 @@ from device.words import LinkError
 
 PATIENCE_S = 0.25
 """For an answer that the gun gives at once. All times here are of the real world, however fast a twin lives."""
-WATCHDOG_S = 0.36
-"""After so long without a frame the gun disarms itself: 0.4 s after its host died, less what may still be on the way
-(an adapter as it leaves the factory keeps bytes back for 16 ms, and may have a few frames in its buffer)."""
+WATCHDOG_S = 0.38
+"""After so long without a frame the gun disarms itself: 0.4 s after its host died, less 20 ms for what was still on the
+way (a frame takes 1 ms at 460,800 baud, and a USB adapter keeps back only what comes from the gun)."""
 KEEP_ALIVE_S = 0.06
 """Six in a watchdog's time: this machine may be away for 0.3 s, and a bad line may lose five in a row."""
 RECONNECT_EVERY_S = 0.1
@@ -96,7 +96,7 @@ class Link:
 
     def wait_up(self, patience_s: float) -> None:
         """Wait until the gun is there. `Disconnected`: it does not come back."""
-        if not self._up.wait(patience_s):
+        if self._closing.is_set() or not self._up.wait(patience_s):
             raise Disconnected(f"the gun is not there ({self._trouble or 'no answer'})")
 
     def host(self, *gun_us: int) -> list[HostTime]:

@@ -49,6 +49,7 @@ class Triggering:
                 raise Disconnected(f"not fired: {self._why_not(order)}") from error
             except Refused as error:
                 trouble = self._refused(error, order)
+                ask(self._link, "TIME?")  # too late by a clock that may have been misread
             except (TimedOut, Garbled, Disconnected) as error:
                 trouble = error
                 found = self._look(order, error)
