@@ -273,7 +273,7 @@ def kill_participant(screen: AtConsole) -> None:
     """The run is paused and disarmed, and the console says why."""
     os.kill(participant_pid(screen), signal.SIGKILL)
     screen.until(lambda look: look.state == "paused")
-    screen.until(lambda look: look.says("the participant's screen was killed by signal 9") and look.says("S starts it"))
+    screen.until(lambda look: look.says("The participant's screen was killed by signal 9") and look.says("S starts it"))
     screen.focus_on(RUN)
     screen.until(lambda look: look.active and look.ready)
 
@@ -283,7 +283,7 @@ def kill_participant(screen: AtConsole) -> None:
     ("experiment", "side", "state", "page"),
     [
         ("preference", "--participant-screen", "train", "MessagePage Please wait."),
-        ("preference", "--participant-screen", "rating", "RatingPage"),
+        pytest.param("preference", "--participant-screen", "rating", "RatingPage", marks=pytest.mark.soak),
         ("direction", "--participant-keys", "asking", "DirectionPage"),
     ],
 )
@@ -325,7 +325,7 @@ def test_a_participants_screen_that_does_not_start_again_ends_the_run(
         screen.to("preparing", trial=1)
         kill_participant(screen)
         screen.keys.press("s")
-        screen.until(lambda look: look.ended and look.says("the participant's screen did not start again"))
+        screen.until(lambda look: look.ended and look.says("The participant's screen did not start again"))
         assert screen.close()[0] == 130
     assert "did not start again" in records(journal)[-1]["reason"]
 

@@ -34,9 +34,8 @@ class CommandButton(QPushButton):
         self._press = self._pressed()
 
     def label(self, text: str = "", *, letters: bool = False) -> None:
-        """Show what it does and its key, on two lines where it is small."""
-        key, gap = shown_key(self.name, letters=letters), "  " if self.objectName() == "large" else "\n"
-        shown = f"{text or BY_NAME[self.name].text}{gap}[{key}]"
+        """Show what it does, and its key below."""
+        shown = f"{text or BY_NAME[self.name].text}\n[{shown_key(self.name, letters=letters)}]"
         if shown != self.text():
             self.setText(shown)
 

@@ -88,7 +88,7 @@ COMMANDS: tuple[Command, ...] = (
     _C(
         name="restart",
         key="S",
-        text="Start the participant's screen again",
+        text="Start it again",
         does="starts the participant's screen again",
     ),
     _C(name="list", key="L", text="List", does="lists flags, notes and corrections of the set"),

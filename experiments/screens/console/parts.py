@@ -97,8 +97,10 @@ def column(*widgets: QWidget) -> QWidget:
 
 
 def quiet_list() -> QListWidget:
-    """A list that is only looked at."""
+    """A list that is only looked at; long lines go on below."""
     made = QListWidget()
+    made.setWordWrap(True)
+    made.setHorizontalScrollBarPolicy(Qt.ScrollBarPolicy.ScrollBarAlwaysOff)
     made.setFocusPolicy(Qt.FocusPolicy.NoFocus)
     made.setSelectionMode(QListWidget.SelectionMode.SingleSelection)
     return made

@@ -112,7 +112,7 @@ def _labels_and_buttons(c: dict[str, str], px: Callable[[float], str]) -> str:
     QPushButton:focus {{ border: 3px solid {c["act"]}; }}
     QPushButton:hover {{ border-color: {c["act"]}; }}
     QPushButton:disabled, QPushButton[dim="yes"] {{ color: {c["dim"]}; border-style: dashed; }}
-    QPushButton#large {{ font-size: {px(26)}; font-weight: bold; padding: {px(18)} {px(4)}; }}
+    QPushButton#large {{ font-size: {px(26)}; font-weight: bold; padding: {px(8)} {px(4)}; }}
     QPushButton#stop {{ background: {c["stop"]}; color: {c["stop_text"]}; font-weight: bold; font-size: {px(22)};
         padding: {px(14)} {px(6)}; }}
     """

@@ -112,10 +112,22 @@ def instruction(seen: Seen, now_s: float) -> Instruction:
 
 def _end(about: About, ended: Ended) -> Instruction:
     safe = "" if ended.saved is None else f"Read back from the disk: {_answers(ended.saved)}, all that were given. "
+    close = "Q closes this window."
     if ended.reason is None:
-        return Instruction(title="Finished", detail=f"{safe}{about.last}\nQ closes this window.", mood="good")
-    resumed = "" if ended.saved is None else "The run can be resumed."
-    return Instruction(title="Stopped", detail=f"{ended.reason}\n{safe}{resumed}\nQ closes this window.", mood="bad")
+        return Instruction(title="Finished", detail=f"{safe}{about.last}\n{close}", mood="good")
+    resumed = "" if ended.saved is None else f"{safe}The run can be resumed."
+    detail = "\n".join(filter(None, (_sentence(ended.reason), resumed, close)))
+    return Instruction(title="Stopped", detail=detail, mood="bad")
+
+
+def _sentence(why: str) -> str:
+    """A reason as a sentence of its own; a path at its beginning stays as it is.
+
+    >>> _sentence("the gun is gone"), _sentence("results/a.jsonl: the journal was deleted")
+    ('The gun is gone.', 'results/a.jsonl: the journal was deleted.')
+    """
+    first = why if "/" in why.split(" ", 1)[0] else f"{why[:1].upper()}{why[1:]}"
+    return first if first.endswith((".", "!", "?")) else f"{first}."
 
 
 def _answers(count: int) -> str:
@@ -169,7 +181,7 @@ def _preparing(seen: Seen, now_s: float) -> Instruction:
 def _train(seen: Seen, now_s: float) -> Instruction:
     del now_s
     least_s = seen.position.step.least_exposure_s if isinstance(seen.position.step, Present) else 0.0
-    after = f", not before {least_s:g} s" if least_s else ""
+    after = f", not before {least_s:g}\N{NO-BREAK SPACE}s" if least_s else ""
     return Instruction(
         title="Wait for “next”",
         detail=f"The gun goes on firing until then. Press Space when the participant says it{after}.",
@@ -221,7 +233,7 @@ def _closing(seen: Seen, now_s: float) -> Instruction:
 def _paused(seen: Seen, now_s: float) -> Instruction:
     del now_s
     if seen.position.why:
-        detail = f"{seen.position.why}.\nS starts it again. P goes on without it: you enter the answers."
+        detail = f"{_sentence(seen.position.why)}\nS starts it again. P goes on without it: you enter the answers."
     else:
         detail = "The gun is disarmed, and nothing goes on. P goes on."
     return Instruction(title="Paused", detail=detail, mood="wait")

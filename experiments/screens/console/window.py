@@ -201,7 +201,9 @@ class ConsoleWindow(QMainWindow):
         self.page_title, self.page_text = parts.label("place"), QPlainTextEdit()
         self.page_text.setReadOnly(True)
         self.page_text.setFocusPolicy(parts.NO_FOCUS)
-        return parts.column(self.page_title, self.page_text)
+        page = parts.column(self.page_title, self.page_text)
+        page.setContentsMargins(10, 6, 10, 6)
+        return page
 
     def _keys(self) -> QWidget:
         self.key_buttons = {name: self._button(name, "") for name in _KEY_ROW}
@@ -334,7 +336,7 @@ class ConsoleWindow(QMainWindow):
         for label, text in ((self.title, shown.title), (self.damper, shown.damper), (self.detail, shown.detail)):
             if label.text() != text:
                 label.setText(text)
-                label.setVisible(bool(text))
+            label.setVisible(bool(text))
         parts.set_mood(self.title, shown.mood)
         parts.set_mood(self.damper, shown.mood)
         self.place.setText(view.place_text(seen))
