@@ -12,6 +12,7 @@ import subprocess
 import tempfile
 from collections.abc import Iterable, Iterator
 from functools import cache
+from math import exp
 from pathlib import Path
 
 import pytest
@@ -286,6 +287,18 @@ def test_the_rest_counts_from_when_a_late_pulse_truly_began(core):
     asked = by_hand((3_000_000, "SHOT?"), (3_000_000, "SYST:ERR?"))
     record, error = said(told(core, [*late, f"late {START_US + 1} 0", *again, *asked])).splitlines()
     assert (record.split(",")[0], error) == ("SHOT 2", message(102))
+
+
+@pytest.mark.parametrize("core", CORES)
+def test_the_coil_does_not_cool_twice_in_the_100_ms_into_which_a_pulse_came_late(core):
+    lines = [(2_000_000, "CONF a,FORW,PULS,24000,15000,150000"), (2_000_000, "ARM")]
+    lines += [(2_099_000 + 200_000 * shot, "TRIG") for shot in range(100)]
+    script = ["late 1 5000", *by_hand(*lines, (23_000_000, "STAT?"))]
+    assert differences(core, script) == []
+    coil_mC = int(said(told(core, script)).split(",")[4])
+    whole_mK = 100 * 24**2 / 2.9 * 0.015 / 20 * 1000  # V^2/R t over 20 J/K
+    left_mK = whole_mK * exp(-11 / 200)  # it cools for 11 s on average, by a time constant of 200 s
+    assert coil_mC - 25_000 == pytest.approx(left_mK, rel=0.003)
 
 
 @pytest.mark.parametrize("core", ALL)
