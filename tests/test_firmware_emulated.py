@@ -181,8 +181,8 @@ class Hand:
     def wait_for_ending(self, ending: str) -> None:
         wait_for(lambda: self.shot().ending == ending)
 
-    def wait_for_boot_rest(self) -> None:
-        """No shot in the first second after a boot."""
+    def wait_for_rest(self) -> None:
+        """No shot before the magnet is home, nor in the first second after a boot."""
         standing = self.standing()
         time.sleep(max(0, standing.ready_us - standing.clock_us) / 1e6)
 
@@ -256,7 +256,7 @@ def play_all(hand: Hand, seeds: range) -> int:
 
 
 def test_the_chip_in_real_time_says_and_does_what_the_twin_does_for_the_same_calls(hand):
-    hand.wait_for_boot_rest()
+    hand.wait_for_rest()
     assert play_all(hand, range(SCRIPTS)) > 10_000
     assert len(hand.chip.drives()) > 10
 
@@ -277,7 +277,7 @@ def test_its_clock_goes_as_the_worlds(hand):
 
 
 def test_a_train_at_its_rest_is_driven_to_the_microsecond(hand):
-    hand.wait_for_boot_rest()
+    hand.wait_for_rest()
     hand.say("CONF asymmetric-2,FORW,PULS,16000,10000,200000", "ARM")
     trains = list[list[int]]()
     wait_for(lambda: in_time(hand, trains), "the host was always too late")
@@ -299,7 +299,7 @@ def in_time(hand: Hand, trains: list[list[int]]) -> bool:
 
 
 def test_left_alone_it_switches_off_and_disarms_in_the_stated_time(hand):
-    hand.wait_for_boot_rest()
+    hand.wait_for_rest()
     hand.say("CONF vibration,FORW,EFF,1,1000000,1000000", "SYST:WATC 300", "ARM", "TRIG 1")
     wait_for(lambda: any(call.text.endswith("OFF") for call in hand.chip.drives()))
     standing, shot = hand.standing(), hand.shot()
@@ -311,7 +311,7 @@ def test_left_alone_it_switches_off_and_disarms_in_the_stated_time(hand):
 
 
 def test_a_driver_that_fails_in_mid_shot_is_switched_off_until_reset(hand):
-    hand.wait_for_boot_rest()
+    hand.wait_for_rest()
     hand.say("CONF vibration,FORW,EFF,1,1000000,1000000", "ARM", "TRIG 1")
     assert hand.standing().state == "FIRING"
     hand.chip.fail(7)
@@ -325,7 +325,7 @@ def test_a_driver_that_fails_in_mid_shot_is_switched_off_until_reset(hand):
 
 
 def test_a_pulse_that_the_board_begins_4_ms_late_is_told_as_cut_with_its_true_start(hand):
-    hand.wait_for_boot_rest()
+    hand.wait_for_rest()
     hand.say("CONF a,FORW,PULS,16000,10000,211000", "ARM")
     hand.standing()
     hand.chip.be_late(4)
@@ -338,7 +338,7 @@ def test_a_pulse_that_the_board_begins_4_ms_late_is_told_as_cut_with_its_true_st
 
 
 def test_a_pulse_that_the_board_would_begin_after_its_end_is_told_as_never_begun_and_fired_when_asked_again(hand):
-    hand.wait_for_boot_rest()
+    hand.wait_for_rest()
     hand.say("CONF a,FORW,PULS,16000,10000,211000", "ARM")
     hand.standing()
     hand.chip.be_late(12)
@@ -356,14 +356,14 @@ def test_a_pulse_that_the_board_would_begin_after_its_end_is_told_as_never_begun
     "setting", ["a,FORW,PULS,24001,10000,211000", "a,FORW,PULS,16000,20001,211000", "a,FORW,PULS,16000,10000,49999"]
 )
 def test_a_setting_beyond_the_limits_is_refused_and_nothing_driven(hand, setting):
-    hand.wait_for_boot_rest()
+    hand.wait_for_rest()
     hand.say(f"CONF {setting}", "ARM", "TRIG")
     assert [hand.ask("SYST:ERR?") for _ in range(2)] == [message(-222), message(106)]
     assert hand.chip.drives() == []
 
 
 def test_a_shot_before_the_magnet_is_home_is_refused(hand):
-    hand.wait_for_boot_rest()
+    hand.wait_for_rest()
     hand.say("CONF a,FORW,PULS,24000,20000,5000000", "ARM", "TRIG")
     hand.wait_until_driven()
     hand.say("TRIG")
@@ -372,13 +372,17 @@ def test_a_shot_before_the_magnet_is_home_is_refused(hand):
 
 
 def test_a_sixth_pulse_in_a_second_that_is_full_is_refused(hand):
-    hand.wait_for_boot_rest()
+    """As fast as this machine is; where it is away for long, the next five may fill a second."""
+    hand.wait_for_rest()
     hand.say("CONF a,FORW,PULS,24000,20000,50000", "ARM")
-    for _ in range(5):
+    error, end_s = message(0), time.monotonic() + 60
+    while error == message(0):
+        assert time.monotonic() < end_s
+        hand.wait_for_rest()
         hand.say("TRIG")
+        error = hand.ask("SYST:ERR?")
         hand.wait_until_driven()
-        while hand.standing().state == "RESETTING":
-            time.sleep(0.001)
-    hand.say("TRIG")
-    assert hand.ask("SYST:ERR?") == message(103)
+    starts = [call.due_us for call in hand.chip.drives() if "PULS" in call.text]
+    assert error == message(103)
+    assert starts[-1] - starts[-5] < 1_000_000
     assert agree(hand)

@@ -56,7 +56,7 @@ def test_a_dead_bus_holds_the_main_loop(soak):
 def test_random_scripts_in_real_time_on_the_emulated_chip_are_replayed_exactly_by_the_twin(tmp_path, soak):
     with emulated(tmp_path) as chip:
         hand = Hand(chip)
-        hand.wait_for_boot_rest()
+        hand.wait_for_rest()
         start_s = time.monotonic()
         said = play_all(hand, range(LIVE_SCRIPTS))
         detail = f"{len(chip.calls())} lines to it, {said} bytes from it, {time.monotonic() - start_s:.0f} s, own clock"
