@@ -2,6 +2,8 @@
 
 import dataclasses
 import math
+import subprocess
+import sys
 
 import numpy as np
 import pytest
@@ -83,11 +85,15 @@ def test_without_the_compiler_nothing_is_warm(monkeypatch):
 
 
 def test_a_session_never_loads_the_compiler():
-    import subprocess
-    import sys
-
     code = "import sys; from device.physics import *; simulate(GunParameters()); sys.exit('numba' in sys.modules)"
     assert subprocess.run([sys.executable, "-c", code], check=False).returncode == 0
+
+
+def test_what_one_process_compiled_is_found_by_the_next():
+    pytest.importorskip("numba")
+    code = "import sys; from device.physics.compiled import _digest; sys.stdout.write(_digest())"
+    names = {subprocess.run([sys.executable, "-c", code], check=True, capture_output=True).stdout for _ in range(2)}
+    assert len(names) == 1
 
 
 def test_a_name_of_the_kernel_stands_for_one_function():

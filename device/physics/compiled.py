@@ -9,7 +9,7 @@ from __future__ import annotations
 import hashlib
 from collections.abc import Callable
 from functools import lru_cache
-from types import FunctionType
+from types import CodeType, FunctionType
 from typing import Any, cast
 
 import numba
@@ -59,6 +59,12 @@ def _twin(function: Callable[..., object], name: str) -> tuple[FunctionType, dic
 def _digest() -> str:
     """Of the kernel's code and of how it is compiled: the compiler's own cache looks at one file only."""
     codes = (cast("FunctionType", function).__code__ for function in (*KERNEL.values(), compiled.__wrapped__))
-    text = "".join(f"{code.co_code.hex()}{code.co_consts}{code.co_names}" for code in codes)
+    text = "".join(map(_told, codes))
     sizes = f"{RESULT_SIZE} {STATE_SIZE} {WORK_SIZE}"
     return hashlib.sha256((text + sizes).encode()).hexdigest()[:16]
+
+
+def _told(code: CodeType) -> str:
+    """What a piece of code does, as text. Code within it by the same text: as a constant it is told by its address."""
+    constants = [_told(one) if isinstance(one, CodeType) else repr(one) for one in code.co_consts]
+    return f"{code.co_code.hex()}{constants}{code.co_names}"
