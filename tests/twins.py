@@ -9,8 +9,11 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+import pytest
+
 from device import Pulse, Shot
 from device.methods import paper_methods
+from device.serial_gun import link
 from device.serial_gun.gun import SerialGun
 from device.serial_gun.opening import open_serial
 from device.twin.core import IDENTITY
@@ -71,13 +74,31 @@ def host_clock(speed: float) -> Callable[[], float]:
     return lambda: time.monotonic() * speed
 
 
+PATIENT_S = 5.0
+"""The watchdog's time of twins that share an interpreter, and a busy machine, with their host: none lapses for that."""
+
+
+@contextmanager
+def plugged_in(socket: Socket, make: Make, watchdog_s: float = PATIENT_S) -> Iterator[Twin]:
+    """A twin at a socket, whose hosts in this process ask for this watchdog."""
+    with pytest.MonkeyPatch.context() as patch, Twin(socket, paper_methods(), make) as twin:
+        patch.setattr(link, "WATCHDOG_S", watchdog_s)
+        yield twin
+
+
 @contextmanager
 def a_twin(
-    folder: Path, troubles: Troubles | None = None, *, speed: float = 20.0, tcp: bool = False, **make: Any
+    folder: Path,
+    troubles: Troubles | None = None,
+    *,
+    speed: float = 20.0,
+    tcp: bool = False,
+    watchdog_s: float = PATIENT_S,
+    **make: Any,
 ) -> Iterator[tuple[Twin, Socket]]:
     socket: Socket = Tcp() if tcp else Pty(folder / "gun")
     made = Make(speed=speed, troubles=troubles or Troubles(), **make)
-    with Twin(socket, paper_methods(), made) as twin:
+    with plugged_in(socket, made, watchdog_s) as twin:
         yield twin, socket
 
 
@@ -92,4 +113,17 @@ def a_pair(folder: Path, troubles: Troubles | None = None, *, speed: float = 20.
             gun.close()
 
 
-__all__ = ["IDENTITY", "PULSE", "Pair", "Troubles", "a_pair", "a_shot", "a_twin", "disarmings_of", "host_clock", "said"]
+__all__ = [
+    "IDENTITY",
+    "PATIENT_S",
+    "PULSE",
+    "Pair",
+    "Troubles",
+    "a_pair",
+    "a_shot",
+    "a_twin",
+    "disarmings_of",
+    "host_clock",
+    "plugged_in",
+    "said",
+]
