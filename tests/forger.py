@@ -16,7 +16,7 @@ from device.twin.twin import Make, Twin
 from device.wire.frame import Frame, Garbled, Splitter, decode, encode
 from device.wire.records import Setting, ShotRecord
 from device.words import ShotTiming
-from tests.twins import Pair, host_clock
+from tests.twins import PATIENT_S, Pair, host_clock, plugged_in
 
 HUGE_US = 9_000_000_000_000_000
 """285 years; the most that the wire can say has one digit more."""
@@ -127,9 +127,11 @@ class ShotLiar:
 
 
 @contextmanager
-def a_lying_twin(folder: Path, *, speed: float = 20.0, **make: Any) -> Iterator[tuple[Twin, Forger]]:
+def a_lying_twin(
+    folder: Path, *, speed: float = 20.0, watchdog_s: float = PATIENT_S, **make: Any
+) -> Iterator[tuple[Twin, Forger]]:
     forger = Forger(folder / "gun")
-    with Twin(forger, paper_methods(), Make(speed=speed, **make)) as twin:
+    with plugged_in(forger, Make(speed=speed, **make), watchdog_s) as twin:
         yield twin, forger
 
 

@@ -25,7 +25,7 @@ def pair(tmp_path):
 @pytest.fixture
 def slow_pair(tmp_path):
     """A twin that lives slower than the world: the magnet is still out when a slow machine asks again."""
-    with a_pair(tmp_path, speed=SLOW) as pair:
+    with a_pair(tmp_path, speed=SLOW, rested=True) as pair:
         yield pair
 
 
@@ -76,15 +76,16 @@ def test_all_methods_and_ways_are_rendered_as_the_simulated_gun_says(pair):
 
 
 def test_a_trains_shots_are_whole_ticks_of_the_guns_clock_apart_and_never_too_soon(tmp_path):
-    with a_pair(tmp_path, Troubles(jitter_s=0.003), speed=0.25, drift_ppm=80.0) as pair:
+    with a_pair(tmp_path, Troubles(jitter_s=0.003), speed=0.25, rested=True, drift_ppm=80.0) as pair:
         pair.ready()
         first = pair.gun.fire(a_shot())
         ticks = []
         for shot in range(1, 6):
-            report = pair.gun.fire(a_shot(), first.pulse_start_s + shot * 0.25)
+            report = pair.gun.fire(a_shot(), first.pulse_start_s + shot * 0.75)
             ticks.append(report.timing.gun_start_us - first.timing.gun_start_us)
-        assert ticks == [250_000 * shot for shot in range(1, 6)]
+        assert ticks == [750_000 * shot for shot in range(1, 6)]
         assert not any(true.too_soon for true in pair.twin.body.ledger)
+        pair.gun._clock = lambda: report.pulse_end_s
         with pytest.raises(LimitError, match="not home yet"):
             pair.gun.fire(a_shot(), report.pulse_start_s + 0.2)
 
@@ -140,11 +141,12 @@ def test_what_is_beyond_a_limit_is_refused_before_a_byte_is_written(pair, shot, 
 
 def test_too_soon_and_too_hot_are_refused_before_a_byte_is_written(slow_pair):
     slow_pair.ready()
-    slow_pair.gun.fire(a_shot("asymmetric-1"))
+    report = slow_pair.gun.fire(a_shot("asymmetric-1"))
     slow_pair.gun.link.commands.clear()
+    slow_pair.gun._clock = lambda: report.pulse_end_s
     with pytest.raises(LimitError, match="not home yet"):
         slow_pair.gun.fire(a_shot("asymmetric-2"))
-    slow_pair.gun._history = DriveHistory(warmth_K=60.0, warmth_tick=round(slow_pair.clock() * 1e6))
+    slow_pair.gun._history = DriveHistory(warmth_K=60.0, warmth_tick=round(report.pulse_end_s * 1e6))
     assert slow_pair.gun.status().coil_temperature_C == pytest.approx(85.0, abs=1.0)
     with pytest.raises(LimitError, match="limit 80 degC"):
         slow_pair.gun.fire(a_shot("asymmetric-2", drive=Pulse(voltage_V=24.0, pulse_s=0.020)))

@@ -9,6 +9,7 @@ from random import Random
 import pytest
 
 from device.serial_gun.address import MAX_SPEED
+from device.serial_gun.link import WATCHDOG_S
 from experiments.journal import read
 from tests.forger import ShotLiar, a_lying_twin
 from tests.serial_runs import check, hasty, of_trains, one_run, run_all
@@ -23,7 +24,7 @@ PEOPLE = 167
 
 def test_ten_thousand_trials_on_a_bad_line(tmp_path, quick_configs, soak):
     start_s = time.monotonic()
-    with a_twin(tmp_path, TROUBLES, speed=SPEED, drift_ppm=60.0) as (twin, socket):
+    with a_twin(tmp_path, TROUBLES, speed=SPEED, drift_ppm=60.0, watchdog_s=WATCHDOG_S) as (twin, socket):
         gun = f"serial:{socket.address}?speed={SPEED:g}"
         tally = run_all(hasty(quick_configs), tmp_path / "results", gun, range(1, PEOPLE + 1))
         figures = check(tally, twin, slack_s=1e-4)
@@ -67,7 +68,7 @@ def test_the_shots_of_trains_in_real_time(tmp_path, quick_configs, soak):
 
 def test_ten_thousand_trials_with_forged_records(tmp_path, quick_configs, soak):
     start_s = time.monotonic()
-    with a_lying_twin(tmp_path, speed=MAX_SPEED, drift_ppm=60.0) as (twin, forger):
+    with a_lying_twin(tmp_path, speed=MAX_SPEED, drift_ppm=60.0, watchdog_s=WATCHDOG_S) as (twin, forger):
         forger.lie = liar = ShotLiar(0.2, far_us=round(2e6 * MAX_SPEED))  # 2 s of the world
         gun = f"serial:{forger.address}?speed={MAX_SPEED:g}"
         tally = run_all(hasty(quick_configs), tmp_path / "results", gun, range(1, PEOPLE + 1))

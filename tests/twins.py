@@ -9,8 +9,11 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+import pytest
+
 from device import Pulse, Shot
 from device.methods import paper_methods
+from device.serial_gun import link
 from device.serial_gun.gun import SerialGun
 from device.serial_gun.opening import open_serial
 from device.twin.faults import Troubles
@@ -69,16 +72,36 @@ def host_clock(speed: float) -> Callable[[], float]:
     return lambda: time.monotonic() * speed
 
 
+PATIENT_S = 5.0
+"""The watchdog's time of twins that share an interpreter, and a busy machine, with their host: none lapses for that."""
+
+
+@contextmanager
+def plugged_in(socket: Socket, make: Make, watchdog_s: float = PATIENT_S, *, rested: bool = False) -> Iterator[Twin]:
+    """A twin at a socket, whose hosts in this process ask for this watchdog; rested, it was switched on a while ago."""
+    twin = Twin(socket, paper_methods(), make)
+    if rested:
+        twin._boot_s -= BOOT_REST_US / 1e6
+    with pytest.MonkeyPatch.context() as patch, twin:
+        patch.setattr(link, "WATCHDOG_S", watchdog_s)
+        yield twin
+
+
 @contextmanager
 def a_twin(
-    folder: Path, troubles: Troubles | None = None, *, speed: float = 20.0, tcp: bool = False, **make: Any
+    folder: Path,
+    troubles: Troubles | None = None,
+    *,
+    speed: float = 20.0,
+    tcp: bool = False,
+    watchdog_s: float = PATIENT_S,
+    rested: bool = False,
+    **make: Any,
 ) -> Iterator[tuple[Twin, Socket]]:
-    """A twin that serves. A slow one has had its rest after the boot, which would take long."""
+    """A twin that serves."""
     socket: Socket = Tcp() if tcp else Pty(folder / "gun")
-    twin = Twin(socket, paper_methods(), Make(speed=speed, troubles=troubles or Troubles(), **make))
-    if speed < 1:
-        twin._boot_s -= BOOT_REST_US / 1e6
-    with twin:
+    made = Make(speed=speed, troubles=troubles or Troubles(), **make)
+    with plugged_in(socket, made, watchdog_s, rested=rested) as twin:
         yield twin, socket
 
 
@@ -94,6 +117,7 @@ def a_pair(folder: Path, troubles: Troubles | None = None, *, speed: float = 20.
 
 
 __all__ = [
+    "PATIENT_S",
     "PULSE",
     "SLOW",
     "Pair",
@@ -103,5 +127,6 @@ __all__ = [
     "a_twin",
     "disarmings_of",
     "host_clock",
+    "plugged_in",
     "said",
 ]
