@@ -18,7 +18,7 @@ from experiments import events
 from experiments.clock import Clock
 from experiments.entries import trial_at
 from experiments.journal import Journal
-from experiments.live_run import Held, LiveRun, RunHalted, RunStopped
+from experiments.live_run import Held, LiveRun, RunStopped
 from experiments.plan import Trial
 from experiments.preference.scale import on_scale
 from experiments.remarks import TestShot
@@ -95,13 +95,14 @@ def carry_out(session: Session, desk: Desk, standing: Standing) -> None:
     """Carry out a session from where it stands to its end.
 
     `RunStopped`, `JournalError` and interrupts pass through; whatever happens, the gun is disarmed. After an emergency
-    stop the run stays where it is until it is closed.
+    stop the run stays where it is until it is closed, also if the gun does not answer.
     """
     try:
         _Runner(session, desk).carry_out(standing)
-    except RunHalted as halt:
-        disarm(desk.gun)
-        raise RunStopped(desk.live.stay_halted()) from halt
+    except RunStopped as stop:
+        if desk.live.position.base is not State.HALTED:
+            raise
+        raise RunStopped(desk.live.stay_halted()) from stop
     finally:
         session.close()
         disarm(desk.gun)
@@ -201,11 +202,12 @@ class _Runner:
         if time_s is None:
             raise TypeError("an answer without a time")
         own = drawn_s is not None or isinstance(answer, events.ParticipantKey)
+        paused = self._live.paused_between(self._onset_s, self._onset_s + time_s)
         return Answered(
             response=answer.response,
             response_time_s=time_s,
             response_source=answer.by,
-            response_time_valid=own and not self._live.paused_since(self._onset_s),
+            response_time_valid=own and not paused,
             key_time_s=key_time_s if drawn_s is not None else None,
         )
 
@@ -273,7 +275,7 @@ class _Runner:
     def _fire(self, step: Fire) -> Fired | Failed | Interrupted:
         """One shot, armed for it alone."""
         try:
-            self._live.enter(State.FIRING, step)
+            self._get_ready(State.FIRING, step)
             onset_utc, report = self._first(step.trial)
         except Held:
             return Interrupted(presented=False, cause="pause")
@@ -289,8 +291,7 @@ class _Runner:
         """Shots at whole multiples of the interval since the first, until next is said."""
         train = _Train(step, self._desk)
         try:
-            self._live.enter(State.TRAIN, step)
-            self._live.felt(None)
+            self._get_ready(State.TRAIN, step)
             train.began(*self._first(step.trial))
             while (event := self._live.wait((at_s := train.due_s()) - LEAD_S)) is None:
                 if train.shots == step.max_shots:
@@ -305,16 +306,33 @@ class _Runner:
             disarm(self._desk.gun)
         return train.presented("next") if isinstance(event, events.Next) else train.interrupted()
 
-    def _first(self, trial: Trial) -> tuple[str, ShotReport]:
-        """The first shot of a stimulus, as soon as the magnet is home, and its date and time. Raises as `allow_shot`.
+    def _get_ready(self, state: State, step: Fire | Present) -> None:
+        """Enter a state in which the gun fires, and arm it. Raises as `allow_shot`.
 
-        Whether it may be fired is looked at after the gun was armed, and again just before it fires: what halts or
+        If the run ends before the shot, it is on the disk that nothing was felt.
+        """
+        try:
+            self._live.enter(state, step)
+            if state is State.TRAIN:
+                self._live.felt(None)
+            self._arm()
+        except RunStopped:
+            self._desk.journal.append("outcome", body=record(Interrupted(presented=False)))
+            raise
+
+    def _arm(self) -> None:
+        """Arm the gun, and wait until its magnet is home. Raises as `allow_shot`.
+
+        Whether a shot may be fired is looked at after the gun was armed, and again just before it fires: what halts or
         holds the run is set before the gun is told to disarm.
         """
         self._live.settle()
         self._live.allow_shot()
         self._desk.gun.arm()
         self._live.sleep(self._desk.gun.status().ready_at_s)
+
+    def _first(self, trial: Trial) -> tuple[str, ShotReport]:
+        """The first shot of a stimulus, and its date and time."""
         return self._desk.clock.utc(), self._shoot(trial)
 
     def _shoot(self, trial: Trial, at_s: float | None = None) -> ShotReport:
@@ -323,11 +341,11 @@ class _Runner:
 
     def _failed(self, error: DeviceError, *, felt: bool) -> Failed | Interrupted:
         """What became of a stimulus at which the gun failed; a pause that disarmed it is no fault of the gun's."""
-        if self._live.taken() is not None:
+        if isinstance(self._live.taken(), events.Pause | events.ParticipantLost):
             return Interrupted(presented=felt, cause="pause")
         lost = events.GunFault if isinstance(error, LimitError) else events.LinkLost
         self._live.offer(lost(cause=str(error)))
-        return Failed(cause=str(error))
+        return Failed(cause=str(error), presented=felt)
 
     def _rearm(self, trial: Trial) -> None:
         """After an emergency stop: a key held, and a test shot that the gun fires, before anything else."""
@@ -343,6 +361,7 @@ class _Runner:
     def _test_shot(self, trial: Trial, held_s: float | None) -> bool:
         """Fire a shot that nobody judges; whether it was fired."""
         try:
+            self._arm()
             _, report = self._first(trial)
         except (Held, DeviceError) as error:
             cause = str(error) or "paused"
