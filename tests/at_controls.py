@@ -356,7 +356,9 @@ class PaperWindow:
 
     def lose_keys(self) -> None:
         """The window loses the keys and gets them back."""
+        assert self.controls is not None
         self._presses.lost()
+        self.controls.let_go()
 
     def press(self, key: str, *, ctrl: bool = False) -> None:
         """A key goes down and up, with the pause of a hand before it."""
