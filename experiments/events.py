@@ -125,9 +125,10 @@ class Leave:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Repeat:
-    """The trial at hand, or the last one, was spoiled and is to be presented again."""
+    """The trial at hand, or the last one, was spoiled and is to be presented again; it is, if another is named."""
 
     reason: str
+    trial: Trial | None = None
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -21,11 +21,7 @@ from experiments.events import ACTS, DISARMS, Event, Press
 from experiments.journal import Journal, JournalGone
 from experiments.live_remarks import remark_of
 from experiments.plan import Plan, Trial
-from experiments.remarks import (
-    Refused,
-    Remark,
-    record,
-)
+from experiments.remarks import Refused, Remark, record
 from experiments.screen import Screen
 from experiments.states import ARMED, No, Position, State, after, entered
 from experiments.steps import Outcome, Step
@@ -46,10 +42,6 @@ class RunStopped(Exception):  # noqa: N818 - a stop is not an error
     """
 
     saved: int | None = None
-
-
-class RunHalted(RunStopped):
-    """The emergency stop: nothing in this run arms or fires any more."""
 
 
 class Held(Exception):  # noqa: N818 - what is so, not what went wrong
@@ -78,7 +70,7 @@ class LiveRun:
         self._told = list(told)
         self._position = Position(since_s=clock.now())
         self._painted_s: float | None = None
-        self._paused_s: float | None = None
+        self._pauses: list[tuple[float, float]] = []
         self.shown_s: float | None = None
         self._inbox: deque[Event] = deque()
         self._news = threading.Condition(threading.RLock())
@@ -108,9 +100,12 @@ class LiveRun:
         painted_s = self._painted_s
         return painted_s is not None and now_s - painted_s >= self.guard_s
 
-    def paused_since(self, at_s: float) -> bool:
-        """Whether the run was paused since a time."""
-        return self._paused_s is not None and self._paused_s >= at_s
+    def paused_between(self, from_s: float, to_s: float) -> bool:
+        """Whether the run was paused at any time between two."""
+        with self._news:
+            began_s = self._position.paused_s
+            pauses = self._pauses if began_s is None else [*self._pauses, (began_s, math.inf)]
+        return any(began_s <= to_s and ended_s >= from_s for began_s, ended_s in pauses)
 
     def painted(self, serial: int, at_s: float) -> None:
         """Take when a position was painted: from then on, and the guard time later, it can be worked."""
@@ -140,10 +135,11 @@ class LiveRun:
         self._position = self._after(before, event)
         if isinstance(event, DISARMS) and (before.base in ARMED or isinstance(event, events.EmergencyStop)):
             self._disarm_beside()
-        self._paused_s = self._position.paused_s or self._paused_s
+        if before.paused_s is not None and self._position.paused_s is None:
+            self._pauses.append((before.paused_s, self.clock.now()))
         if self._position.serial != before.serial:
             self._painted_s = None
-        if self._position.base != before.base:
+        if self._position.base not in (before.base, State.HALTED, State.STOPPED):
             self._inbox.append(event)
         self._news.notify_all()
 
@@ -175,7 +171,7 @@ class LiveRun:
     def wait(self, until_s: float | None = None) -> Event | None:
         """The event that carried the step on; `None` when its time is over, which it never is while it is held.
 
-        `RunStopped`: the run was stopped, `RunHalted`: for an emergency.
+        `RunStopped`: the run was stopped, or halted; but what was taken before is done first.
         """
         self._screen.act(self._position, until_s)
         with self._news:
@@ -185,7 +181,6 @@ class LiveRun:
                 if left_s is not None and left_s <= 0:
                     return None
                 self.clock.wait(self._news, left_s)
-            self._check()
             return self._inbox.popleft()
 
     def taken(self) -> Event | None:
@@ -213,7 +208,7 @@ class LiveRun:
         self._screen.show(position)
 
     def allow_shot(self) -> None:
-        """Nothing if a shot may be fired now. `RunStopped`, `RunHalted`, `Held`: it may not."""
+        """Nothing if a shot may be fired now. `RunStopped`, `Held`: it may not."""
         with self._news:
             self._check()
             if self._position.state not in ARMED:
@@ -276,7 +271,7 @@ class LiveRun:
         if not isinstance(event, ACTS):
             return ""
         position, not_before_s = self._position, self._position.not_before_s
-        if not_before_s is not None and self.clock.now() < not_before_s:
+        if isinstance(event, events.Next) and not_before_s is not None and self.clock.now() < not_before_s:
             return "Too soon: it is to be felt for longer."
         if press is None:
             return ""
@@ -287,18 +282,27 @@ class LiveRun:
         return ""
 
     def _impossible(self, event: Event) -> str:
-        """What the table cannot know: whether there is anything to undo or to repeat."""
+        """What the table cannot know: what a key was for, whether there is anything to undo or to repeat."""
         match event:
             case events.ParticipantKey() | events.ParticipantRated() if event.step != self._position.number:
                 return "It was the answer to an earlier question."
+            case events.ParticipantKey(at_s=at_s) if not self._counts(at_s):
+                return "It went down before the stimulus, or in a pause."
             case events.Undo() if self._further_back() is None:
                 return "There is nothing to undo in this set."
             case events.Repeat() if self._repeatable() is None:
                 return "There is no trial of this set to repeat now."
+            case events.Repeat(trial=Trial() as trial) if trial != self._repeatable():
+                return f"Trial {trial.trial} cannot be presented again any more."
             case events.Rearm(held_s=float() as held_s) if held_s < REARM_HELD_S:
                 return f"Hold it for {REARM_HELD_S:g} s."
             case _:
                 return ""
+
+    def _counts(self, at_s: float) -> bool:
+        """Whether a key of the participant's that went down at a time was for the stimulus."""
+        onset_s = self._position.onset_s
+        return (onset_s is None or at_s >= onset_s) and not self.paused_between(at_s, at_s)
 
     def _further_back(self) -> Entry | None:
         found = entries(self._told, self.trial)
@@ -369,9 +373,7 @@ class LiveRun:
     # the run's side
 
     def _check(self) -> None:
-        if self._position.base is State.HALTED:
-            raise RunHalted(self._position.why)
-        if self._position.base is State.STOPPED:
+        if self._position.base in (State.HALTED, State.STOPPED):
             raise RunStopped(self._position.why)
 
     def _left_s(self, until_s: float | None) -> float | None:

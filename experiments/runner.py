@@ -12,7 +12,7 @@ import math
 from device.words import Identity
 from experiments import events
 from experiments.entries import trial_at
-from experiments.live_run import RunHalted, RunStopped
+from experiments.live_run import RunStopped
 from experiments.plan import Trial
 from experiments.preference.scale import on_scale
 from experiments.replay import Standing
@@ -60,13 +60,14 @@ def carry_out(session: Session, desk: Desk, standing: Standing) -> None:
     """Carry out a session from where it stands to its end.
 
     `RunStopped`, `JournalError` and interrupts pass through; whatever happens, the gun is disarmed. After an emergency
-    stop the run stays where it is until it is closed.
+    stop the run stays where it is until it is closed, also if the gun does not answer.
     """
     try:
         _Runner(session, desk).carry_out(standing)
-    except RunHalted as halt:
-        disarm(desk.gun)
-        raise RunStopped(desk.live.stay_halted()) from halt
+    except RunStopped as stop:
+        if desk.live.position.base is not State.HALTED:
+            raise
+        raise RunStopped(desk.live.stay_halted()) from stop
     finally:
         session.close()
         disarm(desk.gun)
@@ -167,11 +168,12 @@ class _Runner:
         if time_s is None:
             raise TypeError("an answer without a time")
         own = drawn_s is not None or isinstance(answer, events.ParticipantKey)
+        paused = self._live.paused_between(self._onset_s, self._onset_s + time_s)
         return Answered(
             response=answer.response,
             response_time_s=time_s,
             response_source=answer.by,
-            response_time_valid=own and not self._live.paused_since(self._onset_s),
+            response_time_valid=own and not paused,
             key_time_s=key_time_s if drawn_s is not None else None,
         )
 

@@ -174,7 +174,7 @@ class Position:
     """Where a live run is. `serial` counts the positions, `number` the steps.
 
     `since_s` is since when the states are as they are; `until_s` is when a break ends, but for the pause that is on;
-    `onset_s` is when the last stimulus began; `not_before_s` is from when on what carries the step on is taken at all;
+    `onset_s` is when the last stimulus began; `not_before_s` is from when on the participant's next is taken at all;
     `paused_s` is since when the run is paused; `correcting` is the entry that is open; `why` is the reason of a pause
     that nobody asked for, of a halt or of a stop.
     """

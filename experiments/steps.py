@@ -214,9 +214,13 @@ class Closed:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Failed:
-    """The gun did not do it, or may not have: the trial is presented again."""
+    """The gun did not do it, or may not have: the trial is presented again.
+
+    `presented` tells whether its stimulus may have been felt: a shot that was refused was not.
+    """
 
     cause: str
+    presented: bool = True
     kind: Literal["failed"] = "failed"
 
 

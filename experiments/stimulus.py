@@ -58,7 +58,7 @@ class Stimulus:
     def fire(self, step: Fire) -> Fired | Failed | Interrupted:
         """One shot, armed for it alone."""
         try:
-            self._live.enter(State.FIRING, step)
+            self._get_ready(State.FIRING, step)
             onset_utc, report = self._first(step.trial)
         except Held:
             return Interrupted(presented=False, cause="pause")
@@ -73,8 +73,7 @@ class Stimulus:
         """Shots at whole multiples of the interval since the first, until next is said."""
         train = _Train(step, self._desk)
         try:
-            self._live.enter(State.TRAIN, step)
-            self._live.felt(None)
+            self._get_ready(State.TRAIN, step)
             train.began(*self._first(step.trial))
             while (event := self._live.wait((at_s := train.due_s()) - LEAD_S)) is None:
                 if train.shots == step.max_shots:
@@ -89,12 +88,29 @@ class Stimulus:
             disarm(self._desk.gun)
         return train.presented("next") if isinstance(event, events.Next) else train.interrupted()
 
-    def _first(self, trial: Trial) -> tuple[str, ShotReport]:
-        """The first shot, as soon as the magnet is home, and its date and time. Raises as `allow_shot`."""
+    def _get_ready(self, state: State, step: Fire | Present) -> None:
+        """Enter a state in which the gun fires, and arm it. Raises as `allow_shot`.
+
+        If the run ends before the shot, it is on the disk that nothing was felt.
+        """
+        try:
+            self._live.enter(state, step)
+            if state is State.TRAIN:
+                self._live.felt(None)
+            self._arm()
+        except RunStopped:
+            self._desk.journal.append("outcome", body=record(Interrupted(presented=False)))
+            raise
+
+    def _arm(self) -> None:
+        """Arm the gun, and wait until its magnet is home. Raises as `allow_shot`."""
         self._live.settle()
         self._live.allow_shot()
         self._desk.gun.arm()
         self._live.sleep(self._desk.gun.status().ready_at_s)
+
+    def _first(self, trial: Trial) -> tuple[str, ShotReport]:
+        """The first shot of a stimulus, and its date and time."""
         return self._desk.clock.utc(), self._shoot(trial)
 
     def _shoot(self, trial: Trial, at_s: float | None = None) -> ShotReport:
@@ -103,15 +119,16 @@ class Stimulus:
 
     def _failed(self, error: DeviceError, *, felt: bool) -> Failed | Interrupted:
         """What became of a stimulus at which the gun failed; a pause that disarmed it is no fault of the gun's."""
-        if self._live.taken() is not None:
+        if isinstance(self._live.taken(), events.Pause | events.ParticipantLost):
             return Interrupted(presented=felt, cause="pause")
         lost = events.GunFault if isinstance(error, LimitError) else events.LinkLost
         self._live.offer(lost(cause=str(error)))
-        return Failed(cause=str(error))
+        return Failed(cause=str(error), presented=felt)
 
     def test_shot(self, trial: Trial, held_s: float | None) -> bool:
         """Fire a shot that nobody judges; whether it was fired."""
         try:
+            self._arm()
             _, report = self._first(trial)
         except (Held, DeviceError) as error:
             cause = str(error) or "paused"

@@ -69,7 +69,7 @@ def presentation(story: Story, shown: type[Fired | Presented]) -> Row:
 
 def is_attempt(step: Step | None, word: Outcome | Remark) -> bool:
     """Whether a stimulus was felt, or may have been: what `attempts` counts."""
-    return isinstance(step, Fire | Present) and not (isinstance(word, Interrupted) and not word.presented)
+    return isinstance(step, Fire | Present) and not (isinstance(word, Failed | Interrupted) and not word.presented)
 
 
 def _flags(story: Story) -> list[str]:

@@ -10,15 +10,16 @@ import queue
 import re
 import threading
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, field, replace
 from datetime import UTC, datetime
 from pathlib import Path
-from typing import Any
+from typing import Any, Literal
 
-from device import Gun, GunStatus, Shot, ShotReport
+from device import Gun, GunStatus, LinkError, Shot, ShotReport
 from device.words import Direction
+from experiments import events, storage
 from experiments import run as runs
 from experiments.events import Press
 from experiments.journal import Contents, read
@@ -40,6 +41,8 @@ from experiments.states import Position, State
 from experiments.steps import Answered, Outcome, Step
 
 PATIENCE_S = 60.0
+BESIDE = "disarm"
+"""The name of the thread that disarms beside a run."""
 LOOK_S = 0.002
 CORRECTNESS = re.compile(r"\b(correct|incorrect|correctly|wrong|right|score|hits?|points?)\b|%", re.IGNORECASE)
 """Words of a running score; what a correction is called is none."""
@@ -118,49 +121,128 @@ class OwnClock:
 
 
 @dataclass(frozen=True)
-class FiredShot:
-    """A call of `fire`: when, and at which position of the run."""
+class GunCall:
+    """A word to the gun, and at which position of the run it was said; `disarmed` is the end of a `disarm`.
 
-    at_s: float
+    `beside`: it was said beside the run.
+    """
+
+    word: Literal["arm", "fire", "rendered", "disarm", "disarmed"]
     position: Position
+    beside: bool
 
 
 class WatchedGun:
-    """A gun that keeps what is asked of it, and does what the test wants of the next shot."""
+    """A gun that keeps what is asked of it, and does what the test wants of the next shot.
 
-    def __init__(self, gun: Gun, clock: OwnClock) -> None:
-        self._gun, self._clock = gun, clock
+    `fails` are raised by the next shots instead of firing. `hang`: the next such word waits in the gun until `release`.
+    `stubborn`: a shot that hung is fired although the gun was disarmed meanwhile. `slow`: a disarming beside the run
+    hangs as well. `mute`: nothing but the next shot is answered.
+    """
+
+    def __init__(self, gun: Gun) -> None:
+        self._gun = gun
         self.live: LiveRun | None = None
-        self.fired: list[FiredShot] = []
-        self.calls: list[str] = []
+        self.calls: list[GunCall] = []
         self.fails: list[Exception] = []
-        self.hang = False
-        self.hangs, self.released = threading.Event(), threading.Event()
+        self.hang: Literal["", "arm", "fire"] = ""
+        self.stubborn = self.slow = self.mute = False
+        self.hangs, self._released = threading.Event(), threading.Event()
+
+    def _asked(self, word: Literal["arm", "fire", "rendered", "disarm", "disarmed"]) -> None:
+        position = self.live.position if self.live is not None else Position()
+        self.calls.append(GunCall(word, position, beside=threading.current_thread().name == BESIDE))
+
+    @property
+    def words(self) -> list[str]:
+        """What was asked of the gun, in order."""
+        return [call.word for call in self.calls]
+
+    def _answers(self) -> None:
+        if self.mute:
+            raise LinkError("no answer")
 
     def arm(self) -> None:
-        self.calls.append("arm")
+        self._asked("arm")
+        self._hangs_at("arm")
+        self._answers()
         self._gun.arm()
 
     def disarm(self) -> None:
+        self._asked("disarm")
+        self._answers()
+        if self.slow and threading.current_thread().name == BESIDE:
+            self.slow = False
+            self._wait()
         self._gun.disarm()
-        self.calls.append("disarm")
+        self._asked("disarmed")
 
     def fire(self, shot: Shot, at_s: float | None = None) -> ShotReport:
-        assert self.live is not None
-        self.calls.append("fire")
-        self.fired.append(FiredShot(at_s=self._clock.now(), position=self.live.position))
-        if self.hang:
-            self.hang = False
-            self.released.clear()
-            self.hangs.set()
-            assert self.released.wait(PATIENCE_S)
-            self.hangs.clear()
+        self._asked("fire")
+        self._hangs_at("fire")
         if self.fails:
             raise self.fails.pop(0)
-        return self._gun.fire(shot, at_s)
+        if self.stubborn:
+            self._gun.arm()
+        report = self._gun.fire(shot, at_s)
+        self._asked("rendered")
+        return report
+
+    def status(self) -> GunStatus:
+        self._answers()
+        return self._gun.status()
+
+    def _hangs_at(self, word: str) -> None:
+        if self.hang == word:
+            self.hang = ""
+            self._wait()
+
+    def _wait(self) -> None:
+        self._released.clear()
+        self.hangs.set()
+        assert self._released.wait(PATIENCE_S)
+
+    def release(self) -> None:
+        """Let what hangs in the gun go on."""
+        self.hangs.clear()
+        self._released.set()
 
     def __getattr__(self, name: str) -> Any:
         return getattr(self._gun, name)
+
+
+class SyncGate:
+    """Stands where the journal is synced, and holds one sync from a test's word until the next."""
+
+    def __init__(self) -> None:
+        self._sync = storage.sync
+        self._lock = threading.Lock()
+        self._passing = 0
+        self._shut = False
+        self._opened = threading.Event()
+        self.holds = threading.Event()
+
+    def __call__(self, descriptor: int) -> None:
+        with self._lock:
+            held = self._shut and self._passing == 0
+            self._passing = max(0, self._passing - 1)
+        if held:
+            self.holds.set()
+            assert self._opened.wait(PATIENCE_S)
+        self._sync(descriptor)
+
+    def shut(self, after: int = 0) -> None:
+        """Hold every sync but the next few."""
+        with self._lock:
+            self._shut, self._passing = True, after
+            self._opened.clear()
+
+    def open(self) -> None:
+        """Let everything through."""
+        with self._lock:
+            self._shut = False
+        self.holds.clear()
+        self._opened.set()
 
 
 @dataclass
@@ -199,9 +281,14 @@ class PaperWindow:
         offer = live.offer
 
         def watched(event: Any, press: Press | None = None) -> Any:
-            position, painted_s = live.position, self.painted_s.get(live.position.serial)
-            verdict = offer(event, press)
-            self.offered.append(Offered(event, press, position, painted_s, verdict.taken))
+            with live._news:
+                waits = self._clock.idle.is_set()
+                self._clock.idle.clear()  # what is taken wakes the run, which is then at work until it waits again
+                position, painted_s = live.position, self.painted_s.get(live.position.serial)
+                verdict = offer(event, press)
+                self.offered.append(Offered(event, press, position, painted_s, verdict.taken))
+                if waits and not verdict.taken:
+                    self._clock.idle.set()
             return verdict
 
         live.offer = watched  # type: ignore[method-assign]
@@ -270,7 +357,9 @@ class PaperWindow:
 
     def lose_keys(self) -> None:
         """The window loses the keys and gets them back."""
+        assert self.controls is not None
         self._presses.lost()
+        self.controls.let_go()
 
     def press(self, key: str, *, ctrl: bool = False) -> None:
         """A key goes down and up, with the pause of a hand before it."""
@@ -340,6 +429,7 @@ class Sitting:
     results: Path
     resumed: bool = False
     clock: OwnClock = field(default_factory=OwnClock)
+    gate: SyncGate | None = None
 
     def __post_init__(self) -> None:
         again = "resume" if self.resumed else "ask"
@@ -373,7 +463,7 @@ class Sitting:
         opened = runs.open_gun
 
         def open_gun(*where: Any, **how: Any) -> Any:
-            self.guns.append(WatchedGun(opened(*where, **how), self.clock))
+            self.guns.append(WatchedGun(opened(*where, **how)))
             return self.guns[-1]
 
         runs.open_gun = open_gun
@@ -432,14 +522,14 @@ class Sitting:
         return self.guns[-1]
 
     def settle(self) -> None:
-        """Wait until the run waits for somebody, hangs at the gun, or has ended."""
+        """Wait until the run waits for somebody, hangs at the gun or the disk, or has ended."""
         end_s = time.monotonic() + PATIENCE_S
         while not self._settled():
             assert time.monotonic() < end_s, f"the run does not settle: {self.position}"
             time.sleep(LOOK_S / 4)
 
     def _settled(self) -> bool:
-        if self.ended.is_set() or self.gun.hangs.is_set():
+        if self.ended.is_set() or self.gun.hangs.is_set() or (self.gate is not None and self.gate.holds.is_set()):
             return True
         live = self.live
         moving = live.position.base in (State.SAVING, State.FIRING, State.STOPPED) or self._no_onset(live.position)
@@ -477,6 +567,7 @@ class Sitting:
 
     def go_on(self) -> None:
         """Do what is due at this state."""
+        self.settle()
         match self.state:
             case State.REARMING:
                 self.ready()
@@ -505,9 +596,7 @@ class Sitting:
 
     def stop(self) -> None:
         """Leave in the middle."""
-        from experiments import events
-
-        self.gun.released.set()
+        self.gun.release()
         self.live.offer(events.Stop(reason="enough"))
         self.finish()
 
@@ -523,9 +612,21 @@ _DUE = {
 
 
 @contextmanager
-def sat(setup: Setup[Any], results: Path, *, resumed: bool = False) -> Any:
+def gated() -> Iterator[SyncGate]:
+    """A gate before the disk, for as long as it lasts."""
+    gate = SyncGate()
+    passed, storage.sync = storage.sync, gate
+    try:
+        yield gate
+    finally:
+        storage.sync = passed
+        gate.open()
+
+
+@contextmanager
+def sat(setup: Setup[Any], results: Path, *, resumed: bool = False, gate: SyncGate | None = None) -> Any:
     """A sitting that a test leaves in the middle."""
-    sitting = Sitting(setup, results, resumed=resumed)
+    sitting = Sitting(setup, results, resumed=resumed, gate=gate)
     try:
         yield sitting
     finally:
@@ -560,3 +661,46 @@ def raw_answers(contents: Contents) -> list[tuple[str, Trial, Direction]]:
         elif isinstance(word, Answered):
             found.append((word.kind, step.trial, word.response))
     return found
+
+
+RATED = (State.TRAIN, State.RATING, State.DESCRIBING)
+"""The states that experiment 2 alone comes to."""
+
+
+@contextmanager
+def sat_at(state: State, results: Path) -> Any:
+    """A sitting that has come to a state, whichever it is; after an emergency stop in a run of its own."""
+    setup = PREFERENCE if state in RATED else DIRECTION
+    if state is State.REARMING:
+        with sat(setup, results) as halted:
+            halted.to(State.ASKING)
+            halted.press("F12")
+            halted.press("Q")
+    with gated() as gate, sat(setup, results, resumed=state is State.REARMING, gate=gate) as sitting:
+        try:
+            _bring(sitting, state, gate)
+            yield sitting
+        finally:
+            gate.open()
+
+
+def _bring(sitting: Sitting, state: State, gate: SyncGate) -> None:
+    match state:
+        case State.FIRING:
+            sitting.to(State.PREPARING)
+            sitting.gun.hang = "fire"
+            sitting.press("Space")
+        case State.SAVING:
+            sitting.to(State.ASKING)
+            gate.shut()
+            sitting.press("F")
+        case State.PAUSED | State.CORRECTING | State.HALTED | State.STOPPED:
+            sitting.to(State.ASKING)
+            sitting.press("F")
+            sitting.to(State.ASKING)
+            sitting.press({State.PAUSED: "P", State.CORRECTING: "U", State.HALTED: "F12"}.get(state, "Q"))
+            if state is State.STOPPED:
+                sitting.type("enough")
+        case _:
+            sitting.to(state)
+    assert sitting.state is state, sitting.position

@@ -279,7 +279,7 @@ class Controls:
         elif name == "stop" and self.drawn.base is State.HALTED:
             self._offer(events.Stop(reason=EMERGENCY))
         else:
-            trial = self._live.trial
+            trial = (self._live.repeated() if name == "repeat" else None) or self._live.trial
             self._enter = lambda line, press: self._line(name, trial, line, press)
             self._view.open_line(f"{self._question(name, trial)}  (Enter saves, Esc leaves it)")
 
@@ -294,7 +294,7 @@ class Controls:
             case "end break":
                 return "Why does the break end early?"
             case "repeat":
-                return f"Why is trial {(live.repeated() or trial).trial} to be presented again?"
+                return f"Why is trial {trial.trial} to be presented again?"
             case "flag":
                 return f"Flag {place} as (a word such as noise or late)"
             case "note":
@@ -325,7 +325,7 @@ class Controls:
             case "end break":
                 self._offer(events.EndBreak(reason=line), press)
             case "repeat":
-                self._offer(events.Repeat(reason=line), press)
+                self._offer(events.Repeat(reason=line, trial=trial), press)
             case "flag":
                 self._flag(line, trial)
             case "note":

@@ -51,6 +51,9 @@ class Hears(Protocol):
     def up(self, key: str) -> None:
         """A key was let go."""
 
+    def lost(self) -> None:
+        """The window has lost the keys: what was held may be let go unseen."""
+
 
 class Keyboard(QObject):
     """An event filter for a window (`QWindow`): what is a command is taken out, the rest is text for the widgets."""
@@ -65,6 +68,7 @@ class Keyboard(QObject):
         del watched
         if event is not None and event.type() == QEvent.Type.FocusOut:
             self._presses.lost()
+            self._hears.lost()
         if not isinstance(event, QKeyEvent):
             return False
         key, at_s = key_name(event), self._clock.at(event.timestamp(), self._now())

@@ -120,6 +120,8 @@ def command_for(key: str, *, ctrl: bool, typing: Typing, position: Position) -> 
         return {"F12": "emergency", "F1": "help", "F2": "theme", "Esc": "leave"}[key]  # type: ignore[return-value]
     if key == "Enter":
         return "enter"
+    if ctrl and key == "Space":
+        return None  # it changes the input method: nobody fires by that
     if ctrl and key == "X":
         return "no answer" if field_of(position) == "number" and not typing.line else None
     if ctrl != typing.letters:

@@ -279,8 +279,9 @@ class ConsoleWindow(QMainWindow):
             self.rating_ends.setText(
                 f"{step.minimum:g} = {step.minimum_text}     {step.maximum:g} = {step.maximum_text}"
             )
-        self.rating.setText(said)
-        self.words.setText(said)
+        for field in (self.rating, self.words):
+            field.setText(said)
+            field.selectAll()  # to be typed over
 
     def _focus(self) -> None:
         field = field_of(self.drawn)
@@ -475,6 +476,10 @@ class ConsoleWindow(QMainWindow):
         """A key was let go."""
         if self.controls is not None:
             self.controls.up(key)
+
+    def lost(self) -> None:
+        """The window has lost the keys: nothing is held any more."""
+        self._let_go()
 
     def do(self, name: Name, press: Press) -> None:
         """The button of a command was clicked."""

@@ -1,0 +1,822 @@
+"""A live run with a real journal and the simulated gun: who may do what, as the side that runs decides it."""
+
+from __future__ import annotations
+
+import threading
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from device import LimitError, LinkError
+from experiments import events
+from experiments import remarks as words
+from experiments.entries import Entry
+from experiments.events import Event, Press
+from experiments.live_run import EMERGENCY, RunStopped, Verdict
+from experiments.places import place
+from experiments.plan import Trial
+from experiments.remarks import (
+    AnswerCorrected,
+    Flagged,
+    Halted,
+    HaltReason,
+    Noted,
+    Paused,
+    RatingCorrected,
+    Refused,
+)
+from experiments.replay import told
+from experiments.screens.texts import again_text
+from experiments.states import State
+from experiments.steps import Failed, Fire, Interrupted, Prepare, Presented, Rated, Repeat, trial_of
+from tests.at_controls import (
+    DIRECTION,
+    GUARD_S,
+    PATIENCE_S,
+    PREFERENCE,
+    Sitting,
+    gated,
+    kept,
+    raw_answers,
+    remarks,
+    sat,
+    sat_at,
+)
+
+S = State
+LEAST_S: float = PREFERENCE.config.stimulus.least_exposure_s
+DUE: dict[State, Event] = {
+    S.REARMING: events.Rearm(held_s=1.0),
+    S.SETTING: events.DamperSet(),
+    S.PREPARING: events.Fire(),
+    S.TRAIN: events.Next(),
+    S.ASKING: events.Answer(response="forward", at_s=2000.0),
+    S.RATING: events.Rating(rating=7.0),
+    S.DESCRIBING: events.Description(text="like a toy"),
+    S.RESTING: events.EndBreak(reason="cold"),
+    S.CLOSING: events.Finish(),
+    S.PAUSED: events.GoOn(),
+    S.CORRECTING: events.Correct(value="backward"),
+}
+"""What carries a run on at each state."""
+LIVE = [state for state in State if state is not S.STOPPED]
+
+
+def own_key(sitting: Sitting, **changes: Any) -> events.ParticipantKey:
+    """The participant's own key for the question at hand, pressed now."""
+    position = sitting.position
+    known = {"response": "backward", "at_s": sitting.clock.now(), "step": position.number}
+    return events.ParticipantKey(**known | changes)
+
+
+def by_hand(sitting: Sitting, event: Event) -> Verdict:
+    """What somebody does who looks first and takes their time."""
+    sitting.ready()
+    verdict = sitting.live.offer(event, Press(at_s=sitting.clock.now(), serial=sitting.position.serial))
+    sitting.settle()
+    return verdict
+
+
+def experiment_of(sitting: Sitting) -> str:
+    return str(sitting.setup.config.experiment)
+
+
+def to_the_end(sitting: Sitting) -> tuple[Any, list[dict[str, str]]]:
+    """Work on to the end: the journal and the table."""
+    while not sitting.ended.is_set():
+        sitting.go_on()
+    sitting.finish()
+    assert sitting.error is None
+    _, contents, rows = kept(sitting.results, experiment_of(sitting))
+    return contents, rows
+
+
+def of_journal(sitting: Sitting) -> Any:
+    """The journal of a run that was left."""
+    if not sitting.ended.is_set():
+        sitting.stop()
+    sitting.finish()
+    return kept(sitting.results, experiment_of(sitting))[1]
+
+
+def presses(sitting: Sitting) -> tuple[float, int]:
+    """The position at hand, painted at a time of which the guard's is no rounded multiple."""
+    sitting.settle()
+    position = sitting.position
+    sitting.live.painted(position.serial, 4096.0)
+    return 4096.0, position.serial
+
+
+# the guard
+
+
+@pytest.mark.parametrize("state", DUE)
+def test_what_carries_on_counts_from_the_guard_time_after_its_position_was_painted(
+    state: State, tmp_path: Path
+) -> None:
+    event = DUE[state]
+    with sat_at(state, tmp_path) as sitting:
+        sitting.clock.skip(LEAST_S)
+        position = sitting.position
+        unpainted = sitting.live.offer(event, Press(at_s=4096.0, serial=position.serial))
+        painted_s, serial = presses(sitting)
+        for early_s in (-1.0, 0.0, 0.249):
+            verdict = sitting.live.offer(event, Press(at_s=painted_s + early_s, serial=serial))
+            assert verdict == Verdict(taken=False, text="Too soon after the change: press again.")
+        old = sitting.live.offer(event, Press(at_s=painted_s + 1.0, serial=serial - 1))
+        assert (
+            unpainted == old == Verdict(taken=False, text="That was pressed for what stood there before: press again.")
+        )
+        assert sitting.position == position
+        assert GUARD_S == 0.25
+        assert sitting.live.offer(event, Press(at_s=painted_s + 0.25, serial=serial))
+
+
+@pytest.mark.parametrize("state", DUE)
+def test_what_no_hand_pressed_is_not_guarded(state: State, tmp_path: Path) -> None:
+    with sat_at(state, tmp_path) as sitting:
+        sitting.clock.skip(LEAST_S)
+        assert sitting.live.offer(DUE[state])
+
+
+@pytest.mark.parametrize("event", [events.Pause(), events.EmergencyStop(), events.Stop(reason="lunch")])
+def test_what_stops_or_holds_is_not_guarded(event: Event, tmp_path: Path) -> None:
+    with sat_at(S.ASKING, tmp_path) as sitting:
+        assert sitting.live.offer(event, Press(at_s=0.0, serial=-1))
+
+
+def test_next_is_taken_from_the_least_exposure_on_and_not_before_the_first_shot(tmp_path: Path) -> None:
+    with sat(PREFERENCE, tmp_path) as sitting:
+        sitting.to(S.PREPARING)
+        sitting.gun.hang = "fire"
+        sitting.press("Space")
+        too_soon = Verdict(taken=False, text="Too soon: it is to be felt for longer.")
+        assert sitting.live.offer(events.Next()) == too_soon
+        sitting.gun.release()
+        sitting.settle()
+        onset_s = sitting.position.onset_s
+        assert onset_s is not None
+        sitting.clock.skip(onset_s + LEAST_S - 0.001 - sitting.clock.now())
+        assert sitting.live.offer(events.Next()) == too_soon
+        sitting.clock.skip(0.0011)
+        assert sitting.live.offer(events.Next())
+        contents = of_journal(sitting)
+    presented = next(word for _, word in told(contents) if isinstance(word, Presented))
+    assert presented.ended_by == "next"
+    assert presented.exposure_s >= LEAST_S
+
+
+def test_a_pause_ends_while_the_first_shot_of_a_train_still_hangs(tmp_path: Path) -> None:
+    with sat(PREFERENCE, tmp_path) as sitting:
+        sitting.to(S.PREPARING)
+        sitting.gun.hang = "fire"
+        sitting.press("Space")
+        assert sitting.live.offer(events.Pause())
+        assert sitting.live.offer(events.GoOn())
+        sitting.gun.release()
+        sitting.settle()
+        assert sitting.state is S.SETTING or sitting.state is S.PREPARING
+
+
+# the participant's own key
+
+
+def test_a_key_for_an_earlier_question_is_refused(tmp_path: Path) -> None:
+    with sat(DIRECTION, tmp_path) as sitting:
+        sitting.to(S.ASKING)
+        late = own_key(sitting)
+        sitting.press("F")
+        sitting.to(S.ASKING)
+        assert sitting.live.offer(late).text == "It was the answer to an earlier question."
+        assert sitting.live.offer(own_key(sitting))
+
+
+def test_a_key_counts_if_it_went_down_after_the_onset(tmp_path: Path) -> None:
+    with sat(DIRECTION, tmp_path) as sitting:
+        sitting.to(S.ASKING)
+        onset_s = sitting.position.onset_s
+        assert onset_s is not None
+        early = sitting.live.offer(own_key(sitting, at_s=onset_s - 0.001))
+        assert early == Verdict(taken=False, text="It went down before the stimulus, or in a pause.")
+        assert sitting.live.offer(own_key(sitting, at_s=onset_s + 0.05))
+        contents, rows = to_the_end(sitting)
+    assert (rows[0]["response_source"], rows[0]["response_time_valid"]) == ("participant", "1")
+    assert float(rows[0]["response_time_s"]) == pytest.approx(0.05)
+    assert rows[0]["flags"] == "anticipation"
+    assert [remark.by for remark in remarks(contents, Refused)] == ["participant"]
+
+
+def test_no_key_passes_through_a_pause_also_if_it_arrives_afterwards(tmp_path: Path) -> None:
+    with sat(DIRECTION, tmp_path) as sitting:
+        sitting.to(S.ASKING)
+        sitting.press("P")
+        in_the_pause = own_key(sitting)
+        assert sitting.live.offer(in_the_pause).text == "The run is paused: P goes on."
+        sitting.press("P")
+        assert sitting.live.offer(in_the_pause).text == "It went down before the stimulus, or in a pause."
+        sitting.clock.skip(0.5)
+        assert sitting.live.offer(own_key(sitting))
+        _, rows = to_the_end(sitting)
+    assert (rows[0]["response_source"], rows[0]["response_time_valid"]) == ("participant", "0")
+
+
+def test_a_pause_right_after_an_answer_does_not_spoil_its_time(tmp_path: Path) -> None:
+    with sat(DIRECTION, tmp_path) as sitting:
+        sitting.to(S.ASKING)
+        sitting.clock.skip(0.5)
+        with at_one_instant(sitting):
+            assert sitting.live.offer(own_key(sitting))
+            sitting.clock.skip(0.01)
+            assert sitting.live.offer(events.Pause())
+        _, rows = to_the_end(sitting)
+    assert rows[0]["response_time_valid"] == "1"
+
+
+def test_a_time_over_a_pause_that_began_before_the_shot_is_not_the_participants(tmp_path: Path) -> None:
+    with sat(DIRECTION, tmp_path) as sitting:
+        sitting.to(S.PREPARING)
+        sitting.gun.hang = "fire"
+        sitting.gun.stubborn = True
+        sitting.press("Space")
+        sitting.live.offer(events.Pause())  # too late to call off a shot that is on the line
+        sitting.clock.skip(0.1)
+        sitting.gun.release()
+        sitting.settle()
+        assert sitting.position.states == (S.ASKING, S.PAUSED)
+        sitting.press("P")
+        sitting.clock.skip(0.5)
+        assert sitting.live.offer(own_key(sitting))
+        _, rows = to_the_end(sitting)
+    assert (rows[0]["response_time_valid"], rows[0]["attempts"]) == ("0", "1")
+
+
+@contextmanager
+def at_one_instant(sitting: Sitting) -> Iterator[None]:
+    """What happens in here comes before the run looks."""
+    with sitting.live._news:
+        yield
+
+
+# what is kept
+
+
+@pytest.mark.parametrize("state", [state for state in DUE if state is not S.REARMING])
+def test_what_is_refused_is_in_the_journal_with_state_reason_and_hand(state: State, tmp_path: Path) -> None:
+    event = events.Answer(response="forward", at_s=0.0) if state is S.RATING else events.Rating(rating=1.0)
+    with sat_at(state, tmp_path) as sitting:
+        if state is S.RATING:
+            key: Event = own_key(sitting)
+        else:
+            key = events.ParticipantRated(rating=1.0, comment="", step=sitting.position.number)
+        hers, theirs = sitting.live.offer(event), sitting.live.offer(key)
+        assert not hers
+        assert not theirs
+        found = remarks(of_journal(sitting), Refused)[-2:]
+    assert found == [
+        Refused(event=events.word(type(event)), state=state, because=hers.text, by="experimenter"),
+        Refused(event=events.word(type(key)), state=state, because=theirs.text, by="participant"),
+    ]
+
+
+def test_what_was_taken_is_in_the_journal_also_if_the_run_is_stopped_the_next_moment(tmp_path: Path) -> None:
+    for name, end in (("stop", events.Stop(reason="lunch")), ("emergency", events.EmergencyStop())):
+        with sat(DIRECTION, tmp_path / name) as sitting:
+            sitting.to(S.ASKING)
+            with at_one_instant(sitting):
+                assert sitting.live.offer(own_key(sitting))
+                assert sitting.live.offer(end)
+            sitting.settle()
+            contents = of_journal(sitting)
+        assert [(kind, response) for kind, _, response in raw_answers(contents)] == [("answered", "backward")]
+
+
+def test_forward_corrected_to_forward_is_no_correction(tmp_path: Path) -> None:
+    with sat(DIRECTION, tmp_path) as sitting:
+        sitting.to(S.ASKING)
+        sitting.press("F")
+        assert by_hand(sitting, events.Undo())
+        same = by_hand(sitting, events.Correct(value="forward"))
+        assert same == Verdict(taken=True, text="That is what stands there: nothing was corrected.")
+        assert S.CORRECTING not in sitting.position.states
+        contents, rows = to_the_end(sitting)
+    assert not remarks(contents, AnswerCorrected)
+    assert rows[0]["flags"] == ""
+
+
+def test_undo_goes_back_one_by_one_through_the_answers_of_the_set_and_stops_at_the_first(tmp_path: Path) -> None:
+    with sat(DIRECTION, tmp_path) as sitting:
+        for _ in range(3):
+            sitting.to(S.ASKING)
+            sitting.press("F")
+        first_set = sitting.live.plan.trials[:3]
+        assert sitting.state is S.RESTING
+        assert opened(sitting, 4) == [Entry(trial=trial, what="answer") for trial in (*first_set[::-1], first_set[0])]
+        sitting.press("Esc")
+        sitting.to(S.PREPARING)
+        assert by_hand(sitting, events.Undo()).text == "There is nothing to undo in this set."
+
+
+def test_undo_goes_back_through_ratings_and_descriptions_as_they_were_entered(tmp_path: Path) -> None:
+    with sat(PREFERENCE, tmp_path) as sitting:
+        for _ in range(2):
+            sitting.to(S.RATING)
+            sitting.type("5")
+            sitting.type("like a toy")
+        one, two, _ = sitting.live.plan.trials
+        entered = [(one, "rating"), (one, "description"), (two, "rating"), (two, "description")]
+        back = [Entry(trial=trial, what=what) for trial, what in entered[::-1]]  # type: ignore[arg-type]
+        assert opened(sitting, 5) == [*back, back[-1]]
+
+
+def opened(sitting: Sitting, times: int) -> list[Entry | None]:
+    """What an undo opens, one after the other."""
+    found = []
+    for _ in range(times):
+        assert by_hand(sitting, events.Undo())
+        found.append(sitting.position.correcting)
+    return found
+
+
+def test_flags_and_notes_go_to_the_trial_that_they_were_opened_for(tmp_path: Path) -> None:
+    with sat(DIRECTION, tmp_path) as sitting:
+        sitting.to(S.ASKING)
+        sitting.press("G")  # the line of a flag, and then of a note, is open while the participant answers
+        sitting.window.fields["line"] = "noise"
+        first = sitting.live.trial
+        assert sitting.live.offer(own_key(sitting))
+        sitting.settle()
+        assert sitting.live.trial != first
+        sitting.press("Enter")
+        sitting.live.offer(events.Note(text="a dog barked", trial=first))
+        sitting.live.offer(events.Flag(flag="late"))
+        sitting.live.offer(events.Undo())
+        sitting.live.offer(events.Note(text="said so afterwards"))
+        contents = of_journal(sitting)
+    second = sitting.live.plan.trials[1]
+    assert remarks(contents, Flagged) == [Flagged(trial=first, flag="noise"), Flagged(trial=second, flag="late")]
+    assert remarks(contents, Noted) == [
+        Noted(trial=first, text="a dog barked"),
+        Noted(trial=first, text="said so afterwards"),
+    ]
+
+
+def test_a_repeat_that_was_asked_for_one_trial_is_not_taken_for_the_next(tmp_path: Path) -> None:
+    with sat(PREFERENCE, tmp_path) as sitting:
+        sitting.to(S.RATING)
+        sitting.ready()
+        sitting.window.press("R", ctrl=True)
+        sitting.window.fields["line"] = "moved"
+        number = sitting.position.number
+        assert sitting.live.offer(events.ParticipantRated(rating=3.0, comment="soft", step=number))
+        sitting.settle()
+        assert sitting.state is S.RATING
+        sitting.press("Enter")
+        assert sitting.window.heard.count("Trial 1 cannot be presented again any more.") == 1
+        contents = of_journal(sitting)
+    assert not [word for _, word in told(contents) if isinstance(word, Repeat)]
+
+
+# the emergency stop
+
+
+@pytest.mark.parametrize("state", LIVE)
+def test_an_emergency_stop_halts_before_the_gun_hears_of_it_and_nothing_arms_or_fires_afterwards(
+    state: State, tmp_path: Path
+) -> None:
+    with sat_at(state, tmp_path) as sitting:
+        before = len(sitting.gun.calls)
+        assert sitting.live.offer(events.EmergencyStop())
+        hands = [threading.Thread(target=all_at_once, args=(sitting,)) for _ in range(4)]
+        for hand in hands:
+            hand.start()
+        for hand in hands:
+            hand.join(PATIENCE_S)
+        sitting.gun.release()
+        if sitting.gate is not None:
+            sitting.gate.open()
+        sitting.settle()
+        sitting.live.settle()
+        assert sitting.position.base is S.HALTED
+        calls = sitting.gun.calls[before:]
+        assert {call.word for call in calls} == {"disarm", "disarmed"}
+        assert {call.position.base for call in calls} == {S.HALTED}
+        assert sitting.gun.status().state == "disarmed"
+        contents = of_journal(sitting)
+    assert isinstance(sitting.error, RunStopped)
+    assert str(sitting.error) == EMERGENCY
+    assert len(remarks(contents, Halted)) == 1 + (state is S.REARMING)
+
+
+def all_at_once(sitting: Sitting) -> None:
+    """Everything that a hand could do, but end the run."""
+    for event in (*DUE.values(), own_key(sitting), events.Leave(), events.Repeat(reason="moved"), events.Pause()):
+        sitting.live.offer(event)
+
+
+def test_the_gun_itself_is_asked_after_the_emergency_stop(tmp_path: Path) -> None:
+    with sat_at(S.TRAIN, tmp_path) as sitting:
+        assert sitting.gun.status().state != "disarmed"
+        sitting.live.offer(events.EmergencyStop())
+        sitting.live.settle()
+        assert sitting.window.gun is not None
+        assert sitting.window.gun.status is not None
+        assert (sitting.window.gun.status.state, sitting.window.gun.fault) == ("disarmed", "")
+        assert sitting.window.troubles == []
+
+
+@pytest.mark.parametrize("state", [S.TRAIN, S.FIRING, S.ASKING])
+def test_a_gun_that_does_not_answer_is_to_be_switched_off_and_the_reason_can_still_be_told(
+    state: State, tmp_path: Path
+) -> None:
+    with sat_at(state, tmp_path) as sitting:
+        sitting.gun.mute = True
+        sitting.live.offer(events.EmergencyStop())
+        sitting.live.settle()
+        sitting.gun.release()
+        sitting.settle()
+        assert sitting.window.gun is not None
+        assert sitting.window.gun.status is None
+        assert sitting.window.gun.fault == "no answer"
+        assert "switch off its power" in sitting.window.troubles[0]
+        assert sitting.state is S.HALTED
+        assert sitting.live.offer(events.Reason(text="it smelt"))
+        sitting.press("Q")
+        contents = of_journal(sitting)
+    assert "switch off its power" in str(sitting.error)
+    assert remarks(contents, HaltReason) == [HaltReason(text="it smelt")]
+
+
+PASSED = pytest.mark.parametrize("passed", [0, 1], ids=["hand-over", "shot"])
+"""Between the key and the shot two records are synced: that of the hand-over, and that of the step."""
+
+
+@PASSED
+def test_a_halt_between_the_key_and_the_shot_fires_nothing(passed: int, tmp_path: Path) -> None:
+    with gated() as gate, sat(DIRECTION, tmp_path, gate=gate) as sitting:
+        at_sync(sitting, passed)
+        assert sitting.live.offer(events.EmergencyStop())
+        gate.open()
+        sitting.settle()
+        assert "arm" not in sitting.gun.words
+        assert "fire" not in sitting.gun.words
+        sitting.press("Q")
+        sitting.finish()
+        with sat(DIRECTION, tmp_path, resumed=True) as again:
+            again.to(S.PREPARING)
+            assert again_text(again.live.told, prepare(again)) == ""
+            _, rows = to_the_end(again)
+    assert (rows[0]["attempts"], rows[0]["flags"]) == ("1", "")
+
+
+def at_sync(sitting: Sitting, passed: int) -> None:
+    """Press the key to fire, and have the disk hold one of the records before the shot."""
+    assert sitting.gate is not None
+    sitting.to(S.PREPARING)
+    sitting.ready()
+    sitting.gate.shut(after=passed)
+    sitting.window.press("Space")
+    assert sitting.gate.holds.wait(PATIENCE_S)
+    assert sitting.state is S.FIRING
+
+
+def prepare(sitting: Sitting) -> Prepare:
+    step = sitting.position.step
+    assert isinstance(step, Prepare)
+    return step
+
+
+@PASSED
+@pytest.mark.parametrize("gone_on", [False, True])
+def test_a_pause_between_the_key_and_the_shot_takes_the_shot_back_also_if_it_is_over_by_then(
+    passed: int, gone_on: bool, tmp_path: Path
+) -> None:
+    with gated() as gate, sat(DIRECTION, tmp_path, gate=gate) as sitting:
+        at_sync(sitting, passed)
+        assert sitting.live.offer(events.Pause())
+        if gone_on:
+            assert sitting.live.offer(events.GoOn())
+        gate.open()
+        sitting.settle()
+        assert "fire" not in sitting.gun.words
+        assert sitting.position.base in (S.SETTING, S.PREPARING)
+        assert again_text(sitting.live.told, prepare(sitting)) == ""
+        contents, rows = to_the_end(sitting)
+    given_up = next(word for step, word in told(contents) if isinstance(step, Fire))
+    assert given_up == Interrupted(presented=False, cause="pause")
+    assert (rows[0]["attempts"], rows[0]["flags"]) == ("1", "")
+
+
+@pytest.mark.parametrize("name", ["halt", "pause", "pause that is over"])
+@pytest.mark.parametrize("setup", [DIRECTION, PREFERENCE], ids=["one shot", "train"])
+def test_what_comes_while_the_gun_is_being_armed_takes_the_shot_back(setup: Any, name: str, tmp_path: Path) -> None:
+    with sat(setup, tmp_path) as sitting:
+        sitting.to(S.PREPARING)
+        sitting.gun.hang = "arm"
+        sitting.press("Space")
+        assert sitting.live.offer(events.EmergencyStop() if name == "halt" else events.Pause())
+        if name == "pause that is over":
+            assert sitting.live.offer(events.GoOn())
+        sitting.live.settle()  # the gun is disarmed, and then it arms
+        sitting.gun.release()
+        sitting.settle()
+        assert sitting.position.base is S.HALTED if name == "halt" else sitting.position.base is not S.HALTED
+        assert "fire" not in sitting.gun.words
+        assert sitting.gun.status().state == "disarmed"
+
+
+def test_a_stop_between_the_key_and_the_shot_is_no_attempt(tmp_path: Path) -> None:
+    with gated() as gate, sat(DIRECTION, tmp_path, gate=gate) as sitting:
+        at_sync(sitting, 1)
+        assert sitting.live.offer(events.Stop(reason="lunch"))
+        gate.open()
+        sitting.finish()
+        with sat(DIRECTION, tmp_path, resumed=True) as again:
+            _, rows = to_the_end(again)
+    assert (rows[0]["attempts"], rows[0]["flags"]) == ("1", "")
+
+
+def test_a_pause_while_a_shot_hangs_in_the_gun_takes_it_back(tmp_path: Path) -> None:
+    with sat_at(S.FIRING, tmp_path) as sitting:
+        assert sitting.live.offer(events.Pause())
+        sitting.live.settle()
+        sitting.gun.release()
+        sitting.settle()
+        assert "rendered" not in sitting.gun.words
+        assert sitting.position.states[-1] is S.PAUSED
+        contents, rows = to_the_end(sitting)
+    assert Interrupted(presented=False, cause="pause") in [word for _, word in told(contents)]
+    assert (rows[0]["attempts"], rows[0]["flags"]) == ("1", "")
+
+
+def test_a_pause_ends_a_train_and_its_trial_is_presented_again_with_both_exposures_kept(tmp_path: Path) -> None:
+    with sat_at(S.TRAIN, tmp_path) as sitting:
+        sitting.clock.skip(1.5)
+        sitting.settle()
+        sitting.press("P")
+        sitting.live.settle()
+        shots = sitting.gun.words.count("rendered")
+        assert shots == 2
+        sitting.clock.skip(60.0)
+        sitting.settle()
+        assert sitting.gun.words.count("rendered") == shots
+        assert sitting.gun.status().state == "disarmed"
+        contents, rows = to_the_end(sitting)
+    ended = next(word for _, word in told(contents) if isinstance(word, Interrupted))
+    assert (ended.presented, ended.cause, ended.shots) == (True, "pause", 2)
+    assert ended.exposure_s == pytest.approx(1.5 + 2 * 0.03 + GUARD_S + 0.01, abs=0.05)
+    assert (rows[0]["attempts"], rows[0]["flags"]) == ("2", "paused")
+    assert float(rows[0]["earlier_exposure_s"]) == ended.exposure_s
+    assert float(rows[0]["exposure_s"]) > LEAST_S
+
+
+def test_a_disarming_that_is_slow_does_not_disarm_the_next_shot(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    with sat_at(S.TRAIN, tmp_path) as sitting:
+        sitting.gun.slow = True
+        sitting.live.offer(events.Pause())
+        assert sitting.gun.hangs.wait(PATIENCE_S)
+        waits, settle = threading.Event(), sitting.live.settle
+
+        def watched() -> None:
+            waits.set()
+            settle()
+
+        monkeypatch.setattr(sitting.live, "settle", watched)
+        before = len(sitting.gun.calls)
+        sitting.gun.hangs.clear()  # the run goes on meanwhile
+        sitting.settle()
+        sitting.live.offer(events.GoOn())
+        sitting.settle()
+        assert sitting.state is S.PREPARING
+        sitting.live.offer(events.Fire())
+        assert waits.wait(PATIENCE_S)
+        sitting.gun.release()
+        sitting.settle()
+        said = [(call.word, call.beside) for call in sitting.gun.calls[before:]]
+        assert said.index(("disarmed", True)) < said.index(("arm", False)) < said.index(("rendered", False))
+
+
+def test_next_said_while_a_shot_fails_leaves_a_fault_of_the_gun_and_no_pause(tmp_path: Path) -> None:
+    with sat_at(S.TRAIN, tmp_path) as sitting:
+        sitting.gun.hang = "fire"
+        sitting.gun.fails = [LinkError("no answer")]
+        sitting.clock.skip(LEAST_S + 0.5)
+        sitting.settle()
+        assert sitting.gun.hangs.is_set()
+        assert sitting.live.offer(events.Next())
+        sitting.gun.release()
+        sitting.settle()
+        _, rows = to_the_end(sitting)
+    assert (rows[0]["attempts"], rows[0]["flags"]) == ("2", "device-error")
+
+
+@pytest.mark.parametrize(("error", "attempts"), [(LinkError("no answer"), "2"), (LimitError("too soon"), "1")])
+def test_a_shot_that_was_refused_was_not_felt_and_one_of_unknown_outcome_may_have_been(
+    error: Exception, attempts: str, tmp_path: Path
+) -> None:
+    with sat(DIRECTION, tmp_path) as sitting:
+        sitting.to(S.PREPARING)
+        sitting.gun.fails = [error]
+        sitting.press("Space")
+        sitting.to(S.PREPARING)
+        again = again_text(sitting.live.told, prepare(sitting))
+        contents, rows = to_the_end(sitting)
+    assert again == ("Presented again, for the second time." if attempts == "2" else "")
+    assert (rows[0]["attempts"], rows[0]["flags"]) == (attempts, "device-error")
+    assert [word.cause for _, word in told(contents) if isinstance(word, Failed)] == [str(error)]
+
+
+# after the emergency stop
+
+
+def test_after_an_emergency_stop_a_test_shot_comes_first_for_a_key_held_a_second(tmp_path: Path) -> None:
+    with sat_at(S.HALTED, tmp_path) as halted:
+        halted.live.offer(events.Reason(text="the cable was loose"))
+        halted.press("Q")
+    with sat(DIRECTION, tmp_path, resumed=True) as sitting:
+        assert sitting.state is S.REARMING
+        assert by_hand(sitting, events.Fire()).text.startswith("After an emergency stop a test shot comes first")
+        assert by_hand(sitting, events.Rearm(held_s=0.999)).text == "Hold it for 1 s."
+        assert sitting.gun.words == []
+        assert by_hand(sitting, events.Rearm(held_s=1.0))
+        assert sitting.gun.words.count("rendered") == 1
+        assert sitting.gun.status().state == "disarmed"
+        contents, rows = to_the_end(sitting)
+    [shot] = shots_of(contents)
+    assert (shot.held_s, shot.cause, shot.motion) == (1.0, "", "home")
+    assert shot.pulse_start_s is not None
+    assert remarks(contents, HaltReason) == [HaltReason(text="the cable was loose")]
+    assert rows[1]["attempts"] == "2"  # the shot that was fired and not answered, and that after the halt
+
+
+def shots_of(contents: Any) -> list[words.TestShot]:
+    return [shot for shot in remarks(contents, words.TestShot) if isinstance(shot, words.TestShot)]
+
+
+def test_a_test_shot_that_failed_is_asked_for_again(tmp_path: Path) -> None:
+    with sat_at(S.REARMING, tmp_path) as sitting:
+        sitting.gun.fails = [LinkError("no answer")]
+        assert by_hand(sitting, events.Rearm(held_s=1.5))
+        assert sitting.state is S.REARMING
+        assert by_hand(sitting, events.Rearm(held_s=1.5))
+        assert sitting.position.base in (S.SETTING, S.PREPARING)
+        contents = of_journal(sitting)
+    assert [shot.cause for shot in shots_of(contents)] == ["no answer", ""]
+
+
+def test_the_test_shot_is_owed_until_it_was_fired_however_often_the_run_ends(tmp_path: Path) -> None:
+    with sat_at(S.REARMING, tmp_path) as sitting:
+        assert by_hand(sitting, events.Stop(reason="not yet"))
+    for end in (events.EmergencyStop(), events.Stop(reason="nor now")):
+        with sat(DIRECTION, tmp_path, resumed=True) as sitting:
+            assert sitting.state is S.REARMING
+            sitting.live.offer(end)
+    with sat(DIRECTION, tmp_path, resumed=True) as sitting:
+        sitting.to(S.PREPARING)
+        assert sitting.gun.words.count("rendered") == 1
+    with sat(DIRECTION, tmp_path, resumed=True) as sitting:
+        assert sitting.position.base in (S.SETTING, S.PREPARING)
+
+
+@pytest.mark.parametrize("resumed", [False, True], ids=["in the halt", "before the test shot"])
+def test_the_test_shot_is_owed_also_if_the_process_died(resumed: bool, tmp_path: Path) -> None:
+    died = place(tmp_path / "died", "P01", "direction").journal
+    with sat_at(S.REARMING if resumed else S.HALTED, tmp_path / "lived") as sitting:
+        if not resumed:
+            sitting.live.offer(events.Note(text="n"))
+        wait_for_the_disk(sitting)
+        died.parent.mkdir(parents=True)
+        died.write_bytes(place(tmp_path / "lived", "P01", "direction").journal.read_bytes())
+    assert b'"stopped"' not in died.read_bytes() or resumed
+    with sat(DIRECTION, tmp_path / "died", resumed=True) as sitting:
+        assert sitting.state is S.REARMING
+
+
+def wait_for_the_disk(sitting: Sitting) -> None:
+    """Wait until what was written is on the disk."""
+    sitting.live._journal.append("remark", body={"kind": "noted", "trial": None, "text": "now"})
+
+
+def test_an_emergency_stop_during_the_test_shot_owes_another_one(tmp_path: Path) -> None:
+    with sat_at(S.REARMING, tmp_path) as sitting:
+        sitting.gun.hang = "fire"
+        sitting.ready()
+        sitting.live.offer(events.Rearm(held_s=1.0))
+        sitting.settle()
+        assert sitting.state is S.FIRING
+        sitting.live.offer(events.EmergencyStop())
+        sitting.live.settle()
+        sitting.gun.release()
+        sitting.settle()
+        assert "rendered" not in sitting.gun.words
+    with sat(DIRECTION, tmp_path, resumed=True) as sitting:
+        assert sitting.state is S.REARMING
+
+
+# ends
+
+
+def test_the_last_set_can_be_corrected_and_repeated_until_the_run_is_ended(tmp_path: Path) -> None:
+    with sat(DIRECTION, tmp_path) as sitting:
+        sitting.to(S.CLOSING)
+        assert not sitting.ended.is_set()
+        assert by_hand(sitting, events.Undo())
+        assert by_hand(sitting, events.Undo())
+        assert by_hand(sitting, events.Correct(value="backward"))
+        assert sitting.state is S.CLOSING
+        assert by_hand(sitting, events.Repeat(reason="a noise"))
+        assert sitting.position.base in (S.SETTING, S.PREPARING)
+        assert again_text(sitting.live.told, prepare(sitting)) == "Presented again, for the second time."
+        sitting.to(S.CLOSING)
+        contents, rows = to_the_end(sitting)
+    assert (rows[-2]["response"], rows[-2]["flags"]) == ("backward", "corrected")
+    assert (rows[-1]["attempts"], rows[-1]["flags"], rows[-1]["response"]) == ("2", "repeated", "forward")
+    assert contents.finished
+
+
+def test_a_trial_can_be_repeated_in_the_break_after_it_which_then_begins_anew(tmp_path: Path) -> None:
+    with sat(DIRECTION, tmp_path) as sitting:
+        sitting.to(S.RESTING)
+        last = trial_of(sitting.live.told[-1][0])
+        sitting.clock.skip(10.0)
+        assert by_hand(sitting, events.Repeat(reason="a noise"))
+        assert prepare(sitting).trial == last
+        sitting.to(S.RESTING)
+        assert sitting.position.until_s == pytest.approx(sitting.clock.now() + 30.0, abs=1.0)
+        _, rows = to_the_end(sitting)
+    assert [row["attempts"] for row in rows[:4]] == ["1", "1", "2", "1"]
+
+
+def test_a_presented_trial_can_be_repeated_until_its_rating_is_in(tmp_path: Path) -> None:
+    with sat(PREFERENCE, tmp_path) as sitting:
+        sitting.to(S.RATING)
+        assert by_hand(sitting, events.Repeat(reason="it slipped"))
+        assert prepare(sitting).trial == sitting.live.plan.trials[0]
+        sitting.to(S.RATING)
+        sitting.type("5")
+        assert by_hand(sitting, events.Repeat(reason="again")).text == "Its rating is in: it cannot be presented again."
+        sitting.to(S.CLOSING)
+        assert by_hand(sitting, events.Repeat(reason="again")).text == "There is no trial of this set to repeat now."
+        contents, rows = to_the_end(sitting)
+    assert [row["attempts"] for row in rows] == ["2", "1", "1"]
+    assert rows[0]["flags"] == "repeated"
+    assert [word.rating for _, word in told(contents) if isinstance(word, Rated)] == [5.0] * 3
+
+
+def test_a_rating_corrected_at_the_very_end_counts(tmp_path: Path) -> None:
+    with sat(PREFERENCE, tmp_path) as sitting:
+        sitting.to(S.CLOSING)
+        by_hand(sitting, events.Undo())
+        by_hand(sitting, events.Undo())
+        assert by_hand(sitting, events.Correct(value=0.0))
+        contents, rows = to_the_end(sitting)
+    assert (rows[-1]["rating"], rows[-1]["flags"]) == ("0.0", "corrected")
+    assert len(remarks(contents, RatingCorrected)) == 1
+
+
+def test_how_often_a_trial_was_presented_is_told_as_the_table_counts_it(tmp_path: Path) -> None:
+    told_by_trial: dict[Trial, str] = {}
+
+    def note(sitting: Sitting) -> None:
+        sitting.to(S.PREPARING)
+        told_by_trial[prepare(sitting).trial] = again_text(sitting.live.told, prepare(sitting))
+
+    def on(sitting: Sitting) -> None:
+        while not sitting.ended.is_set():
+            if sitting.state is S.PREPARING:
+                note(sitting)
+            sitting.go_on()
+
+    with sat(DIRECTION, tmp_path) as sitting:
+        note(sitting)
+        sitting.gun.fails = [LinkError("no answer")]
+        sitting.press("Space")
+        note(sitting)
+        sitting.press("Space")
+        by_hand(sitting, events.Repeat(reason="a noise"))
+        note(sitting)
+        sitting.press("Space")
+        sitting.live.offer(events.Stop(reason="lunch"))
+    with sat(DIRECTION, tmp_path, resumed=True) as again:
+        on(again)
+    _, _, rows = kept(tmp_path, "direction")
+    nth = {"1": "", "2": "second", "3": "third", "4": "4th"}
+    expected = [nth[row["attempts"]] for row in rows]
+    assert expected[:2] == ["4th", ""]
+    assert [text and text.split(" the ")[1].split()[0] for text in told_by_trial.values()] == expected
+
+
+def test_a_pause_that_was_asked_for_and_one_that_was_not_are_told_apart(tmp_path: Path) -> None:
+    with sat(DIRECTION, tmp_path) as sitting:
+        sitting.to(S.ASKING)
+        by_hand(sitting, events.Pause())
+        assert sitting.position.why == ""
+        by_hand(sitting, events.GoOn())
+        sitting.live.offer(events.ParticipantLost(cause="its process ended"))
+        assert sitting.position.why == "its process ended"
+        contents = of_journal(sitting)
+    assert remarks(contents, Paused) == [Paused(), Paused(cause="its process ended")]
