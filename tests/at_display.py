@@ -27,6 +27,7 @@ PATIENCE_S = 60.0
 LOOK_S = 0.01
 HAND_S = 1.5 * BOUNCE_S
 """A hand takes longer from what it sees to a press: a key that goes down again sooner has bounced."""
+OTHER = "another program's window"
 BUSY = ("saving", "firing", "stopped")
 """States in which nobody is waited for."""
 
@@ -84,6 +85,24 @@ def virtual_display(size: str = "1280x800") -> Iterator[str]:
         name, _ = stack.enter_context(x_server(size))
         stack.enter_context(window_manager(name))
         yield name
+
+
+@contextmanager
+def another_window(display: str) -> Iterator[None]:
+    """A window of another program, which may get the keys."""
+    from Xlib import X
+    from Xlib.display import Display
+
+    theirs = Display(display)
+    screen = theirs.screen()
+    window = screen.root.create_window(0, 0, 500, 300, 0, screen.root_depth, X.InputOutput)
+    window.set_wm_name(OTHER)
+    window.map()
+    theirs.sync()
+    try:
+        yield
+    finally:
+        theirs.close()
 
 
 class AtDisplay:
