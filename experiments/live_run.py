@@ -120,7 +120,7 @@ class LiveRun:
         self._told = list(told)
         self._position = Position(since_s=clock.now())
         self._painted_s: float | None = None
-        self._paused_s: float | None = None
+        self._paused_until_s = -math.inf
         self.shown_s: float | None = None
         self._inbox: deque[Event] = deque()
         self._news = threading.Condition(threading.RLock())
@@ -151,8 +151,8 @@ class LiveRun:
         return painted_s is not None and now_s - painted_s >= self.guard_s
 
     def paused_since(self, at_s: float) -> bool:
-        """Whether the run was paused since a time."""
-        return self._paused_s is not None and self._paused_s >= at_s
+        """Whether the run was paused at a time or after it."""
+        return self._paused_until_s >= at_s
 
     def painted(self, serial: int, at_s: float) -> None:
         """Take when a position was painted: from then on, and the guard time later, it can be worked."""
@@ -172,7 +172,10 @@ class LiveRun:
             before = self._position
             self._position = self._after(before, meant)
             self._keep(meant, before)
-            self._paused_s = self._position.paused_s or self._paused_s
+            if self._position.paused_s is not None:
+                self._paused_until_s = math.inf
+            elif before.paused_s is not None:
+                self._paused_until_s = self.clock.now()
             if self._position.serial != before.serial:
                 self._painted_s = None
             if self._position.states[0] != before.states[0]:
