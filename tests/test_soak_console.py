@@ -198,7 +198,7 @@ def test_a_lost_display_ends_the_run_in_time(quick_configs: Path, tmp_path: Path
 
 
 def test_f12_while_every_sync_is_slow(tmp_path: Path, display: str, soak: Soak) -> None:
-    draw, watch = random.Random(100), Watch(str(tmp_path), sync_s=SYNC_S, times=STOPS)
+    draw, watch = random.Random(100), Watch(str(tmp_path), sync_s=SYNC_S, times=STOPS, look_ms=50)
     configs, late_s, after_latch, fired = short_configs(tmp_path), [0.0], 0, 0
     with AtConsole(words(configs, "direction", "--fresh"), tmp_path, display, watch) as screen:
         for _ in range(STOPS):

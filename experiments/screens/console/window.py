@@ -538,9 +538,10 @@ class ConsoleWindow(QMainWindow):
         """Closing the window of a live run asks why it stops; once it has ended, the window goes."""
         if event is None:
             return
-        if self.ended is None and self.controls is not None:
+        if self.ended is None:
             event.ignore()
-            self.controls.ask_why_it_stops()
+            if self.controls is not None:
+                self.controls.ask_why_it_stops()
             return
         event.accept()
         self.closed.emit()
