@@ -9,7 +9,6 @@ import csv
 import queue
 import re
 import threading
-import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, field, replace
@@ -31,7 +30,7 @@ from experiments.remarks import AnswerCorrected, Remark
 from experiments.replay import told
 from experiments.run import Finished, Request, run, table
 from experiments.screen import Screen
-from experiments.screens.console import theme, view
+from experiments.screens.console import overview, theme, view
 from experiments.screens.console.controls import Controls, Field
 from experiments.screens.console.keys import Name, Presses
 from experiments.screens.console.messages import Ended, GunSeen
@@ -39,8 +38,10 @@ from experiments.screens.console.view import About, Seen
 from experiments.setup import Setup
 from experiments.states import Position, State
 from experiments.steps import Answered, Outcome, Step
+from tests.waiting import PATIENCE_S, wait_for
 
-PATIENCE_S = 60.0
+MOST_DEEDS = 2000
+"""More than any run takes."""
 BESIDE = "disarm"
 """The name of the thread that disarms beside a run."""
 LOOK_S = 0.002
@@ -335,7 +336,7 @@ class PaperWindow:
         seen = Seen(about=self.about, position=drawn, told=self.live.told, gun=self.gun)
         shown = view.instruction(seen, self._clock.now())
         self.heard += [shown.title, shown.damper, shown.detail, view.place_text(seen)]
-        self.heard += [*view.coming(seen), *view.answers(seen), *self.controls.help_lines()]
+        self.heard += [*overview.coming(seen), *overview.answers(seen), *self.controls.help_lines()]
 
     def down(self, key: str, *, ctrl: bool = False, repeated: bool = False) -> None:
         """A key goes down, or is repeated by the system."""
@@ -358,8 +359,8 @@ class PaperWindow:
     def lose_keys(self) -> None:
         """The window loses the keys and gets them back."""
         assert self.controls is not None
-        self._presses.lost()
-        self.controls.let_go()
+        for key in self._presses.lost():
+            self.controls.up(key)
 
     def press(self, key: str, *, ctrl: bool = False) -> None:
         """A key goes down and up, with the pause of a hand before it."""
@@ -523,10 +524,7 @@ class Sitting:
 
     def settle(self) -> None:
         """Wait until the run waits for somebody, hangs at the gun or the disk, or has ended."""
-        end_s = time.monotonic() + PATIENCE_S
-        while not self._settled():
-            assert time.monotonic() < end_s, f"the run does not settle: {self.position}"
-            time.sleep(LOOK_S / 4)
+        wait_for(self._settled, lambda: f"the run does not settle: {self.position}", look_s=LOOK_S / 4)
 
     def _settled(self) -> bool:
         if self.ended.is_set() or self.gun.hangs.is_set() or (self.gate is not None and self.gate.holds.is_set()):
@@ -559,11 +557,12 @@ class Sitting:
 
     def to(self, state: State) -> None:
         """Work on as far as a state, forward being the answer to everything."""
-        end_s = time.monotonic() + PATIENCE_S
-        while self.state is not state:
+        for _ in range(MOST_DEEDS):
+            if self.state is state:
+                return
             assert not self.ended.is_set(), self.error
-            assert time.monotonic() < end_s, f"{state} is not reached from {self.position}"
             self.go_on()
+        raise AssertionError(f"{state} is not reached from {self.position}")
 
     def go_on(self) -> None:
         """Do what is due at this state."""

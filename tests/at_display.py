@@ -17,27 +17,17 @@ import pytest
 
 from experiments.screens.console.keys import BOUNCE_S, BY_NAME
 from tests import watched_participant
+from tests.waiting import PATIENCE_S, wait_for
 from tests.watched_console import Look, Watch
 
 READY = all(map(shutil.which, ("Xvfb", "openbox")))
 needs_display = pytest.mark.skipif(not READY, reason="needs Xvfb and openbox")
 
-PATIENCE_S = 60.0
-"""The longest that anything is waited for: no promise, but the end of a test that fails."""
-LOOK_S = 0.01
 HAND_S = 1.5 * BOUNCE_S
 """A hand takes longer from what it sees to a press: a key that goes down again sooner has bounced."""
+OTHER = "another program's window"
 BUSY = ("saving", "firing", "stopped")
 """States in which nobody is waited for."""
-
-
-def wait_for(what: Callable[[], Any], why: Callable[[], object] = lambda: "it did not happen") -> Any:
-    """Wait until something is so; gives it back."""
-    end_s = time.monotonic() + PATIENCE_S
-    while not (found := what()):
-        assert time.monotonic() < end_s, why()
-        time.sleep(LOOK_S)
-    return found
 
 
 @contextmanager
@@ -84,6 +74,24 @@ def virtual_display(size: str = "1280x800") -> Iterator[str]:
         name, _ = stack.enter_context(x_server(size))
         stack.enter_context(window_manager(name))
         yield name
+
+
+@contextmanager
+def another_window(display: str) -> Iterator[None]:
+    """A window of another program, which may get the keys."""
+    from Xlib import X
+    from Xlib.display import Display
+
+    theirs = Display(display)
+    screen = theirs.screen()
+    window = screen.root.create_window(0, 0, 500, 300, 0, screen.root_depth, X.InputOutput)
+    window.set_wm_name(OTHER)
+    window.map()
+    theirs.sync()
+    try:
+        yield
+    finally:
+        theirs.close()
 
 
 class AtDisplay:

@@ -15,7 +15,9 @@ from pathlib import Path
 import pytest
 
 from tests.at_display import (
+    OTHER,
     AtConsole,
+    another_window,
     needs_display,
     records,
     remarks,
@@ -253,6 +255,31 @@ def test_after_an_emergency_stop_a_run_goes_on_only_by_a_held_key_and_a_test_sho
     assert shot["held_s"] >= 1.0
     assert shot["cause"] == ""
     check_gun(watch, journal)
+
+
+def test_a_key_that_is_held_for_the_test_shot_counts_as_let_go_when_another_window_gets_the_keys(
+    quick_configs: Path, tmp_path: Path, display: str
+) -> None:
+    run, watch = run_words(quick_configs), Watch(str(tmp_path))
+    with another_window(display):
+        with AtConsole(run, tmp_path, display) as screen:
+            screen.stands(RUN)
+            screen.to("preparing")
+            screen.keys.press("F12")
+            screen.at("halted")
+            screen.keys.press("q")
+            screen.close()
+        with AtConsole([*run, "--resume"], tmp_path, display) as screen:
+            screen.stands(RUN)
+            screen.at("rearming")
+            screen.keys.key_down("t")
+            screen.focus_on(OTHER)
+            screen.keys.key_up("t")
+            screen.until(lambda look: look.says("Let go too soon: hold it for 1 s.") and not look.active)
+            screen.focus_on(RUN)
+            screen.until(lambda look: look.active)
+            assert screen.stop()[0] == 130
+    assert not watch.calls("fired")
 
 
 # the participant's screen

@@ -153,7 +153,7 @@ class Watcher:
         self._act(window)
 
     def _read(self, window: Any) -> None:
-        for name, text in (("titles", window.title.text()), ("lines", window.saved.text())):
+        for name, text in (("titles", window.notice.title.text()), ("lines", window.saved.text())):
             if text not in self.seen[name]:
                 self.seen[name].append(text)
 

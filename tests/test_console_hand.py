@@ -78,7 +78,7 @@ def check_participants_keys(screen: AtConsole, cell: Cell, *keys: str) -> None:
     """Keys on the participant's window do nothing to the run; F12 there halts it."""
     before = len(remarks(cell.journal))
     screen.focus_on(PARTICIPANT)
-    screen.until(lambda look: not look.active)
+    screen.until(lambda look: not look.active and look.says("Keys: the participant's screen (F12 works there)"))
     for key in keys:
         screen.keys.press(key)
     screen.focus_on("Recoil – P01")

@@ -26,7 +26,8 @@ from experiments.load import load_setup, shipped_folder
 from experiments.plan import Plan
 from experiments.replay import told
 from experiments.run import Request, run, table
-from experiments.screens.console.view import About, Seen, coming, instruction
+from experiments.screens.console.overview import coming
+from experiments.screens.console.view import About, Seen, instruction
 from experiments.screens.synthetic import synthetic_screen
 from experiments.screens.terminal import TerminalScreen
 from experiments.screens.texts import read_out_text

@@ -14,6 +14,7 @@ from experiments.load import load_setup
 from experiments.plan import Trial
 from experiments.screens.console.beside import ParticipantSide
 from experiments.screens.participant.link import ParticipantLink
+from experiments.screens.participant.words import Focused, line
 from experiments.states import Position, State
 from experiments.steps import Rate
 from tests.at_display import wait_for
@@ -72,6 +73,19 @@ def test_what_takes_a_question_off_the_participants_screen_stays_on_it(told: Tol
     shown = told.end()
     assert "" not in shown
     assert shown[-2:] == ["Paused. Please wait.", "end"]
+
+
+def test_whose_the_keys_are_is_told_also_if_it_was_said_before_anybody_listened() -> None:
+    word = line(Focused(on=True)).decode().strip()
+    program = f"import sys, time; print({word!r}, flush=True); sys.stdin.read()"
+    heard: list[object] = []
+    link = ParticipantLink.start(command=(sys.executable, "-c", program))
+    try:
+        wait_for(lambda: link._focused)
+        link.listen(heard.append, lambda _: None)
+    finally:
+        link.close()
+    assert heard == [Focused(on=True)]
 
 
 def test_a_question_whose_time_is_over_before_it_is_asked_is_never_shown(told: Told) -> None:

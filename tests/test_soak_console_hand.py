@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import importlib.util
+from collections import Counter
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -12,10 +13,13 @@ from experiments.states import TABLE, No, State
 from tests.at_display import needs_display, virtual_display
 from tests.at_hand import ACTIONS, STATES, Action, Cell, check_cell, check_gun
 from tests.conftest import Soak
+from tests.random_hands import MOVES, check_random_hands
 from tests.test_console_hand import check_participants_keys
 
 pytest.importorskip("PyQt6")
 pytestmark = [pytest.mark.soak, needs_display]
+
+HANDS = 100
 
 
 @pytest.fixture(scope="module")
@@ -48,9 +52,7 @@ def test_every_accident_that_fires_a_train(tmp_path: Path, display: str, soak: S
 
 
 @pytest.mark.skipif(importlib.util.find_spec("psychopy") is None, reason="PsychoPy is not installed: extra `gui`")
-@pytest.mark.parametrize(
-    "state", [State.PREPARING, State.TRAIN, State.RATING, State.DESCRIBING, State.PAUSED, State.CORRECTING]
-)
+@pytest.mark.parametrize("state", [State.PREPARING, State.TRAIN, State.RATING, State.PAUSED, State.CORRECTING])
 def test_keys_on_the_participants_window(tmp_path: Path, display: str, soak: Soak, state: State) -> None:
     cell = Cell(
         tmp_path,
@@ -64,3 +66,14 @@ def test_keys_on_the_participants_window(tmp_path: Path, display: str, soak: Soa
     check_gun(cell.watch, cell.journal)
     how = "the participant's window has the keys"
     soak(f"{state} × P, Esc, Space there, then F12 there", "nothing; then halted", "nothing; then halted", how)
+
+
+def test_random_hands(tmp_path: Path, display: str, soak: Soak) -> None:
+    seen: Counter[str] = Counter()
+    for seed in range(HANDS):
+        folder = tmp_path / str(seed)
+        folder.mkdir()
+        seen.update(check_random_hands(folder, display, seed))
+    of = ", ".join(f"{count} {kind}" for kind, count in sorted(seen.items()))
+    how = f"{MOVES} moves a run, then worked to its end; {of}"
+    soak(f"rules broken in {HANDS} runs by random hands", 0, "0", how)

@@ -20,6 +20,7 @@ PLAIN = {"abs", "float", "int", "len", "max", "min", "round", "sorted", "sum"}
 ORDERS = {
     "test_clock.test_the_real_clock_is_the_machines",
     "test_firmware_emulated.test_its_clock_goes_as_the_worlds",
+    "test_serial_troubles.test_disarming_a_gun_that_is_gone_waits_for_its_watchdog",
     "test_participant_screen.test_a_key_tells_the_direction_and_when_it_went_down",
 }
 """Where readings are compared for their order alone: what lies between two others does so on any machine."""

@@ -4,16 +4,20 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable
+from typing import Any
 
 PATIENCE_S = 300.0
 """The end of every wait; also of programs that tests start. Only a test that fails ever sees it."""
 LOOK_S = 0.005
 
 
-def wait_for(what: Callable[[], object], why: Callable[[], str] | str = "it did not happen") -> None:
-    """Look until something holds; `AssertionError` with the reason if it never does."""
+def wait_for(
+    what: Callable[[], Any], why: Callable[[], object] | str = "it did not happen", *, look_s: float = LOOK_S
+) -> Any:
+    """Look until something holds, and give it back; `AssertionError` with the reason if it never does."""
     end_s = time.monotonic() + PATIENCE_S
-    while not what():
+    while not (found := what()):
         if time.monotonic() > end_s:
             raise AssertionError(why if isinstance(why, str) else why())
-        time.sleep(LOOK_S)
+        time.sleep(look_s)
+    return found

@@ -10,13 +10,13 @@ import json
 import sys
 import threading
 import time
+from contextlib import suppress
 from dataclasses import asdict, dataclass, field
 from pathlib import Path
 from typing import Any
 
 from tests import watched_participant
 
-LOOK_MS = 10
 TAIL_BYTES = 1 << 16
 
 
@@ -24,13 +24,15 @@ TAIL_BYTES = 1 << 16
 class Watch:
     """Where eye and book write; at which shots the gun hangs until told to go on; how much longer a sync takes.
 
-    `participants`: how often the participant's screen can be started.
+    `participants`: how often the participant's screen can be started; `times`: how often the command is carried out.
     """
 
     folder: str
     hangs: tuple[int, ...] = ()
     sync_s: float = 0.0
     participants: int = 99
+    times: int = 1
+    look_ms: int = 10
 
     @property
     def eye(self) -> Path:
@@ -158,7 +160,7 @@ def _places(window: Any) -> dict[str, list[int]]:
     return found
 
 
-def watch_windows(file: Path) -> Any:
+def watch_windows(watch: Watch) -> Any:
     """Look from now on, as long as the timer that is given back lives."""
     from PyQt6.QtCore import QTimer
 
@@ -168,12 +170,12 @@ def watch_windows(file: Path) -> Any:
         nonlocal last
         if (now := look_around()) != last:
             last = now
-            with file.open("a", encoding="utf-8") as out:
+            with watch.eye.open("a", encoding="utf-8") as out:
                 out.write(json.dumps(asdict(now)) + "\n")
 
     timer = QTimer()
     timer.timeout.connect(look)
-    timer.start(LOOK_MS)
+    timer.start(watch.look_ms)
     return timer
 
 
@@ -182,7 +184,6 @@ class WatchedGun:
 
     def __init__(self, gun: Any, watch: Watch) -> None:
         self._gun, self._watch = gun, watch
-        self._lock = threading.Lock()
         self.shots = 0
 
     def arm(self) -> None:
@@ -208,12 +209,33 @@ class WatchedGun:
             time.sleep(0.002)
 
     def _write(self, call: str, **how: Any) -> None:
-        line = json.dumps({"call": call, "s": time.monotonic(), "shot": self.shots, **how})
-        with self._lock, self._watch.book.open("a", encoding="utf-8") as out:
-            out.write(line + "\n")
+        write_down(self._watch, {"call": call, "s": time.monotonic(), "shot": self.shots, **how})
 
     def __getattr__(self, name: str) -> Any:
         return getattr(self._gun, name)
+
+
+_writing = threading.Lock()
+
+
+def write_down(watch: Watch, call: dict[str, Any]) -> None:
+    with _writing, watch.book.open("a", encoding="utf-8") as out:
+        out.write(json.dumps(call) + "\n")
+
+
+def watch_lines(watch: Watch) -> None:
+    """From now on it is written down when a gun's line has taken the bytes of `ABOR`."""
+    from device.serial_gun.port import SerialPort
+
+    write = SerialPort.write
+
+    def watched(port: SerialPort, data: bytes) -> None:
+        write(port, data)
+        at_s = time.monotonic()
+        if b"ABOR" in data:
+            write_down(watch, {"call": "ABOR", "s": at_s})
+
+    SerialPort.write = watched
 
 
 def watch_guns(watch: Watch) -> None:
@@ -259,9 +281,13 @@ if __name__ == "__main__":
 
     watch = Watch(**json.loads(sys.argv.pop(1)))
     watch_guns(watch)
+    watch_lines(watch)
     watch_participants(watch)
     if watch.sync_s:
         slow_disk(watch.sync_s)
     application()
-    eye = watch_windows(watch.eye)
+    eye = watch_windows(watch)
+    for _ in range(watch.times - 1):
+        with suppress(SystemExit):
+            main()
     main()

@@ -40,6 +40,14 @@ if TYPE_CHECKING:
 _DIRECTIONS: dict[str, Direction] = {"f": "forward", "forward": "forward", "b": "backward", "backward": "backward"}
 _HELP = """At any time: `!` is the emergency stop, `stop` and a reason stops. `pause`, `undo`, `repeat` and
 a reason; `flag` and a word, `note` and words. Where words are asked for, put a / in front: /stop, /note ..."""
+_REARMING = (
+    "\n  There was an emergency stop. Stand clear: a test shot comes first. Type `test shot` and Enter to fire it: "
+)
+_CLOSING = "\nEverything is answered. `undo` opens the last answer, `note` and `flag` mark.\n  Enter ends the run: "
+_HALTED = (
+    "\n  EMERGENCY STOP. Nothing fires in this run any more.\n"
+    "  Type why, and Enter; Enter alone closes the run, which can be resumed: "
+)
 _COMMANDS = ("stop", "pause", "undo", "repeat", "flag", "note", "skip", "help")
 _TICK_S = 1.0
 
@@ -103,10 +111,7 @@ class TerminalScreen:
         step = position.step
         match position.state:
             case State.REARMING:
-                return (
-                    "\n  There was an emergency stop. Stand clear: a test shot comes first. "
-                    "Type `test shot` and Enter to fire it: "
-                )
+                return _REARMING
             case State.SETTING if isinstance(step, Prepare):
                 return f"{self._head(step)}\n  Set the damper: {step.damper.upper()}. Then type d and Enter: "
             case State.PREPARING if isinstance(step, Prepare):
@@ -125,20 +130,14 @@ class TerminalScreen:
             case State.RESTING:
                 return f"\nBreak {_between(position)}. (`skip` and a reason ends it early.)\n"
             case State.CLOSING:
-                return (
-                    "\nEverything is answered. `undo` opens the last answer, `note` and `flag` mark.\n"
-                    "  Enter ends the run: "
-                )
+                return _CLOSING
             case State.PAUSED:
                 why = f" {position.why}." if position.why else ""
                 return f"\n  Paused.{why} Type `go on` and Enter: "
             case State.CORRECTING if position.correcting is not None:
                 return self._correction(position.correcting)
             case State.HALTED:
-                return (
-                    "\n  EMERGENCY STOP. Nothing fires in this run any more.\n"
-                    "  Type why, and Enter; Enter alone closes the run, which can be resumed: "
-                )
+                return _HALTED
             case _:
                 return ""
 

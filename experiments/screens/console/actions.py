@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 
 from PyQt6.QtCore import Qt
 from PyQt6.QtGui import QMouseEvent
@@ -57,7 +57,7 @@ class HeldButton(CommandButton):
 class Slots(QWidget):
     """Three places side by side, each for buttons of its own: what comes after Fire is never where Fire was."""
 
-    def __init__(self, left: list[QWidget], middle: list[QWidget], right: list[QWidget]) -> None:
+    def __init__(self, left: Sequence[QWidget], middle: Sequence[QWidget], right: Sequence[QWidget]) -> None:
         super().__init__()
         across = QHBoxLayout(self)
         across.setContentsMargins(0, 0, 0, 0)

@@ -68,8 +68,8 @@ class ParticipantSide:
     def begin(self, live: LiveRun, tell: Callable[[Message], None]) -> str:
         """Take the place beside a console. Gives back what the record is to say of the noise, if anything."""
         self._live, self._tell = live, tell
-        self._link.listen(self._heard, self._gone)
         self._tell(ParticipantSeen())
+        self._link.listen(self._heard, self._gone)
         if self._noise is None:
             return ""
         if not self._noise.on:
@@ -198,8 +198,8 @@ class ParticipantSide:
             return
         with self._lock:
             self._link, self._shows = link, ("",)
-        link.listen(self._heard, self._gone)
         self._tell(ParticipantSeen())
+        link.listen(self._heard, self._gone)
         self._tell(Trouble(text="The participant's screen is there again.", mood="good"))
         self._offer(events.ParticipantBack())
         if self._live is not None:

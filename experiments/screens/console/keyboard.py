@@ -5,11 +5,13 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Protocol
 
-from PyQt6.QtCore import QEvent, QObject, Qt
+from PyQt6.QtCore import QEvent, QObject, Qt, QTimer
 from PyQt6.QtGui import QKeyEvent
 
-from experiments.screens.console.keys import EventClock, Name, Presses
+from experiments.screens.console.keys import BOUNCE_S, EventClock, Name, Presses
 
+LET_GO_MS = round(2000 * BOUNCE_S)
+"""A key is let go when it is not down again after so long: a busy machine tells an auto-repeat as two events."""
 _NAMES = {
     Qt.Key.Key_Space: "Space",
     Qt.Key.Key_Return: "Enter",
@@ -51,9 +53,6 @@ class Hears(Protocol):
     def up(self, key: str) -> None:
         """A key was let go."""
 
-    def lost(self) -> None:
-        """The window has lost the keys: what was held may be let go unseen."""
-
 
 class Keyboard(QObject):
     """An event filter for a window (`QWindow`): what is a command is taken out, the rest is text for the widgets."""
@@ -67,19 +66,24 @@ class Keyboard(QObject):
         """Take a key that is a command; true keeps it from everybody else."""
         del watched
         if event is not None and event.type() == QEvent.Type.FocusOut:
-            self._presses.lost()
-            self._hears.lost()
+            for key in self._presses.lost():
+                self._hears.up(key)
         if not isinstance(event, QKeyEvent):
             return False
         key, at_s = key_name(event), self._clock.at(event.timestamp(), self._now())
         if event.type() == QEvent.Type.KeyRelease:
             self._presses.up(key, at_s, repeated=event.isAutoRepeat())
             if not event.isAutoRepeat():
-                self._hears.up(key)
+                QTimer.singleShot(LET_GO_MS, lambda: self._let_go(key))
             return False
         if event.type() != QEvent.Type.KeyPress:
             return False
         return self._pressed(key, event, at_s)
+
+    def _let_go(self, key: str) -> None:
+        """Say that a key was let go, unless it is down again by now: then the system only repeated it."""
+        if not self._presses.is_down(key):
+            self._hears.up(key)
 
     def _pressed(self, key: str, event: QKeyEvent, at_s: float) -> bool:
         acts = self._presses.down(key, at_s, repeated=event.isAutoRepeat())

@@ -199,9 +199,14 @@ class Presses:
             self._down.discard(key)
             self._up_s[key] = at_s
 
-    def lost(self) -> None:
-        """The window has lost the keys: what was down may be let go unseen."""
-        self._down.clear()
+    def is_down(self, key: str) -> bool:
+        """Whether a key is down."""
+        return key in self._down
+
+    def lost(self) -> set[str]:
+        """The window has lost the keys: what was down, which may be let go unseen."""
+        were, self._down = self._down, set()
+        return were
 
 
 class EventClock:

@@ -111,7 +111,7 @@ class VisualParticipant:
         if rating is None:
             _key(handle, Qt.Key.Key_X, Qt.KeyboardModifier.ControlModifier)
         else:
-            window.rating.clear()
+            window.fields.rating.clear()
             _type(repr(rating), handle)
 
 

@@ -6,16 +6,12 @@ It decides nothing: keys and buttons become events, and the table of states judg
 from __future__ import annotations
 
 from collections.abc import Callable
-from datetime import datetime
 from typing import Any
 
 from PyQt6.QtCore import QObject, QTimer, pyqtSignal
 from PyQt6.QtGui import QCloseEvent, QResizeEvent, QShowEvent
 from PyQt6.QtWidgets import (
     QHBoxLayout,
-    QLabel,
-    QLineEdit,
-    QListWidget,
     QMainWindow,
     QPlainTextEdit,
     QStackedWidget,
@@ -27,11 +23,11 @@ from experiments.clock import Clock
 from experiments.events import Hand, Press
 from experiments.live_run import LiveRun
 from experiments.remarks import Halted
-from experiments.screens.console import parts, theme, tone, view
-from experiments.screens.console.actions import CommandButton, HeldButton, Slots
+from experiments.screens.console import overview, parts, theme, tone, view
+from experiments.screens.console.buttons import Buttons
 from experiments.screens.console.controls import Controls, Field
 from experiments.screens.console.keyboard import Keyboard
-from experiments.screens.console.keys import Name, Typing, field_of
+from experiments.screens.console.keys import Name, Typing
 from experiments.screens.console.messages import (
     Began,
     Ended,
@@ -42,13 +38,15 @@ from experiments.screens.console.messages import (
     Shown,
     Trouble,
 )
-from experiments.screens.console.pace import Pace, clock_text, end_text, progress, remaining_s
-from experiments.screens.console.strip import Strip
+from experiments.screens.console.notice import FITS, Notice
+from experiments.screens.console.pace import Pace, progress
+from experiments.screens.console.side import Side
+from experiments.screens.console.text_fields import TextFields
 from experiments.screens.console.view import About, Seen
 from experiments.screens.console.windows import remember
 from experiments.screens.texts import saved_text
 from experiments.states import Position, State
-from experiments.steps import Failed, Rate, Rated, Rested
+from experiments.steps import Failed, Rated, Rested
 
 REFRESH_MS = 100
 BRIEF_S = 4.0
@@ -57,11 +55,6 @@ WIDE_PX, HIGH_PX = 1280.0, 760.0
 """The size at which type has its own size."""
 SMALLEST, LARGEST = 0.55, 2.2
 """How far type shrinks and grows with the window."""
-SIZES_PX = {"title": 46, "damper": 34, "detail": 23}
-FITS = (1.0, 0.88, 0.76, 0.66, 0.56)
-"""How far the instruction shrinks until all of it is there."""
-
-_KEY_ROW: tuple[Name, ...] = ("undo", "repeat", "flag", "note", "list", "pause", "stop", "help")
 
 
 class Bridge(QObject):
@@ -97,7 +90,6 @@ class ConsoleWindow(QMainWindow):
         self._pace = Pace()
         self._brief_until_s: float | None = None
         self._lasting = ("", "good")
-        self._field_of: tuple[object, ...] = ()
         self.theme: theme.Theme = "dark"
         self._scale = 0.0
         self._build()
@@ -114,21 +106,19 @@ class ConsoleWindow(QMainWindow):
         self.setWindowTitle(f"Recoil – {self.about.plan.participant_id}, {what}")
         self.bands = [parts.label("band", wrap=False) for _ in range(2)]
         self.place, self.saved = parts.label("place"), parts.label("saved")
-        self.title, self.damper, self.detail = (parts.label(name) for name in SIZES_PX)
         self.bars = [parts.bar(what) for what in ("set", "session", "experiment")]
-        self._build_fields()
-        self._build_actions()
+        self.notice, self.fields, self.side, self.buttons = Notice(), TextFields(), Side(self.about), Buttons(self)
         self._main = QWidget()
         left = QVBoxLayout(self._main)
         left.setContentsMargins(0, 0, 0, 0)
-        for line in (self.title, self.damper, self.detail):
+        for line in self.notice.labels:
             left.addWidget(line)
         left.addStretch(1)
-        for below in (self.fields, self.slots, self.entry_bar, self.saved):
+        for below in (self.fields.pages, self.buttons.slots, self.fields.bar, self.saved):
             left.addWidget(below)
         across = QHBoxLayout()
         across.addWidget(self._main, 3)
-        across.addWidget(self._side(), 1)
+        across.addWidget(self.side, 1)
         down = QVBoxLayout(whole := QWidget())
         down.setContentsMargins(10, 6, 10, 6)
         down.addWidget(parts.row(*self.bands))
@@ -141,61 +131,11 @@ class ConsoleWindow(QMainWindow):
         outer = QVBoxLayout(central := QWidget())
         outer.setContentsMargins(0, 0, 0, 4)
         outer.addWidget(self.pages, 1)
-        outer.addWidget(self._keys())
+        outer.addWidget(self.buttons.row)
         self.setCentralWidget(central)
         central.setMinimumSize(1, 1)
         self.setMinimumSize(640, 400)
         self.resize(1280, 800)
-
-    def _build_fields(self) -> None:
-        """What is typed: a number, words, or a line that was asked for."""
-        self.rating_ends, self.rating, self.words = parts.label("quiet"), QLineEdit(), QLineEdit()
-        self.rating.setPlaceholderText("type a number, Enter saves")
-        self.rating.setAccessibleName("rating")
-        self.words.setPlaceholderText("type the participant's words, Enter saves")
-        self.words.setAccessibleName("description")
-        self.fields = QStackedWidget()
-        self.fields.addWidget(QWidget())
-        self.fields.addWidget(parts.column(self.rating_ends, self.rating))
-        self.fields.addWidget(parts.column(self.words))
-        self.entry_label, self.entry = parts.label("quiet"), QLineEdit()
-        self.entry.setAccessibleName("line of text")
-        self.entry_bar = parts.column(self.entry_label, self.entry)
-        self.entry_bar.hide()
-
-    def _build_actions(self) -> None:
-        """The buttons of what can be done, in places of their own."""
-        make = self._button
-        self.forward, self.fire, self.backward = make("forward"), make("fire"), make("backward")
-        self.next, self.end_break, self.damper_set = make("next"), make("end break"), make("damper")
-        self.no_answer, self.finish, self.go_on = make("no answer"), make("enter"), make("go on")
-        self.reason, self.restart = make("reason"), make("restart")
-        self.rearm = HeldButton("rearm", self._press, self._hold, self._let_go)
-        middle = [self.fire, self.next, self.go_on, self.finish, self.rearm, self.reason]
-        left, right = [self.forward, self.damper_set, self.restart], [self.backward, self.end_break, self.no_answer]
-        self.slots = Slots([*left], [*middle], [*right])
-
-    def _button(self, name: Name, style: str = "large") -> CommandButton:
-        return CommandButton(name, self._press, self.do, style)
-
-    def _side(self) -> QWidget:
-        self.gun_label, self.times, self.focus = parts.label("quiet"), parts.label("quiet"), parts.label("quiet")
-        self.coming, self.answers = parts.quiet_list(), parts.quiet_list()
-        self.strip = Strip()
-        self.strip.setVisible(self.about.setup.config.console.response_times)
-        titles = parts.label("quiet", "Coming next"), parts.label("quiet", "Answers of this set")
-        side = parts.column(
-            parts.panel(self.gun_label, self.focus),
-            parts.panel(self.times),
-            titles[0],
-            self.coming,
-            titles[1],
-            self.answers,
-            self.strip,
-        )
-        for lines in (self.coming, self.answers):
-            lines.setMinimumHeight(1)
-        return side
 
     def _text_page(self) -> QWidget:
         self.page_title, self.page_text = parts.label("place"), QPlainTextEdit()
@@ -204,17 +144,6 @@ class ConsoleWindow(QMainWindow):
         page = parts.column(self.page_title, self.page_text)
         page.setContentsMargins(10, 6, 10, 6)
         return page
-
-    def _keys(self) -> QWidget:
-        self.key_buttons = {name: self._button(name, "") for name in _KEY_ROW}
-        stop = self._button("emergency", "stop")
-        holder = QWidget()
-        across = QHBoxLayout(holder)
-        across.setContentsMargins(10, 0, 10, 2)
-        for button in self.key_buttons.values():
-            across.addWidget(button, 2)
-        across.addWidget(stop, 5)
-        return holder
 
     # messages
 
@@ -265,28 +194,8 @@ class ConsoleWindow(QMainWindow):
         self._pace.at(self.drawn, self._clock.now())
         if self.drawn.state is State.HALTED and self.controls is not None:
             self.controls.uncover()
-        belongs = (field_of(self.drawn), self.drawn.number, self.drawn.correcting)
-        if belongs != self._field_of:
-            self._field_of = belongs
-            self._fill_field()
-        if not self.entry_bar.isVisibleTo(self._main):
-            self._focus()
-
-    def _fill_field(self) -> None:
-        said = self.controls.entered_so_far() if self.controls is not None else ""
-        step = self.drawn.step
-        if isinstance(step, Rate):
-            self.rating_ends.setText(
-                f"{step.minimum:g} = {step.minimum_text}     {step.maximum:g} = {step.maximum_text}"
-            )
-        for field in (self.rating, self.words):
-            field.setText(said)
-            field.selectAll()  # to be typed over
-
-    def _focus(self) -> None:
-        field = field_of(self.drawn)
-        self.fields.setCurrentIndex({"number": 1, "words": 2}.get(field or "", 0))
-        {"number": self.rating, "words": self.words}.get(field or "", self).setFocus()
+        self.fields.at(self.drawn, self.controls.entered_so_far() if self.controls is not None else "")
+        self.fields.focus(self.drawn, self)
 
     def _acknowledge(self, message: Saved) -> None:
         """Say that it is safe; a tone at the end of a break."""
@@ -333,17 +242,12 @@ class ConsoleWindow(QMainWindow):
         if self.controls is not None:
             self.controls.tick()
         now_s, seen = self._clock.now(), self.seen
-        shown = view.instruction(seen, now_s)
-        for label, text in ((self.title, shown.title), (self.damper, shown.damper), (self.detail, shown.detail)):
-            if label.text() != text:
-                label.setText(text)
-            label.setVisible(bool(text))
-        parts.set_mood(self.title, shown.mood)
-        parts.set_mood(self.damper, shown.mood)
+        self.notice.put(view.instruction(seen, now_s))
         self.place.setText(view.place_text(seen))
         self._show_bands(seen)
-        self._show_side(seen, now_s)
-        self._show_buttons()
+        self._show_progress(seen)
+        self.side.put(seen, self._pace, now_s)
+        self.buttons.put(self.drawn, over=self.ended is not None, letters=self._typing.letters, idle=self._idle)
         if self._brief_until_s is not None and now_s > self._brief_until_s:
             self._brief_until_s = None
             self._show_line(*self._lasting)
@@ -356,66 +260,11 @@ class ConsoleWindow(QMainWindow):
             label.setText(text)
             parts.set_mood(label, name)
 
-    def _show_side(self, seen: Seen, now_s: float) -> None:
+    def _show_progress(self, seen: Seen) -> None:
         done = progress(seen.about.plan, seen.told, seen.here)
         for bar, (count, planned) in zip(self.bars, (done.in_set, done.in_session, done.in_all), strict=True):
             bar.setMaximum(planned)
             bar.setValue(count)
-        for label, (text, mood) in (
-            (self.gun_label, view.gun_text(seen.gun)),
-            (self.focus, view.focus_text(seen, here=self.isActiveWindow())),
-        ):
-            label.setText(text)
-            label.setVisible(bool(text))
-            parts.set_mood(label, mood)
-        self.times.setText(self._times(seen, now_s))
-        _fill(self.coming, view.coming(seen))
-        _fill(self.answers, view.answers(seen))
-        if self.strip.isVisibleTo(self):
-            self.strip.put(view.response_times(seen))
-
-    def _times(self, seen: Seen, now_s: float) -> str:
-        elapsed = f"Elapsed {clock_text(self._pace.elapsed_s(now_s))}"
-        if seen.ended is not None:
-            return elapsed
-        config = seen.about.setup.config
-        left_s = remaining_s(config, seen.about.plan, seen.told, self._pace, seen.position, now_s)
-        return f"{elapsed}\nEnds {end_text(left_s, datetime.now())}"
-
-    def _show_buttons(self) -> None:
-        """The buttons of what can be done now, and which of the keys below do something."""
-        over, letters, state = self.ended is not None, self._typing.letters, self.drawn.state
-        self.slots.show_only(set() if over else self._actions(state))
-        for button in (self.forward, self.backward, self.no_answer, self.restart, self.end_break, self.reason):
-            button.label(letters=letters)
-        self.finish.label("End the run")
-        for name, button in self.key_buttons.items():
-            held = name == "pause" and state is State.PAUSED
-            button.name = "go on" if held else name
-            button.label("Close" if name == "stop" and over else "", letters=letters)
-            dim = "yes" if self._idle(button.name) else "no"
-            if button.property("dim") != dim:
-                button.setProperty("dim", dim)
-                parts.restyle(button)
-
-    def _actions(self, state: State) -> set[QWidget]:
-        held = self.drawn.state is State.PAUSED and bool(self.drawn.why)
-        shown: dict[State, tuple[QWidget, ...]] = {
-            State.REARMING: (self.rearm,),
-            State.SETTING: (self.damper_set,),
-            State.PREPARING: (self.fire,),
-            State.TRAIN: (self.next,),
-            State.ASKING: (self.forward, self.backward),
-            State.RATING: (self.no_answer,),
-            State.RESTING: (self.end_break,),
-            State.CLOSING: (self.finish,),
-            State.PAUSED: (self.go_on, self.restart) if held else (self.go_on,),
-            State.HALTED: (self.reason,),
-        }
-        if state is State.CORRECTING:
-            field = field_of(self.drawn)
-            return {self.forward, self.backward} if field is None else {self.no_answer} if field == "number" else set()
-        return set(shown.get(state, ()))
 
     def _idle(self, name: Name) -> bool:
         """Whether a command does nothing now."""
@@ -429,8 +278,7 @@ class ConsoleWindow(QMainWindow):
         if layout is None or not self.isVisible():
             return
         for fit in FITS:
-            for name, label in (("title", self.title), ("damper", self.damper), ("detail", self.detail)):
-                _size(label, round(SIZES_PX[name] * self._scale * fit), bold=name != "detail")
+            self.notice.size(self._scale * fit)
             if layout.heightForWidth(self._main.width()) <= self._main.height():
                 return
 
@@ -459,7 +307,8 @@ class ConsoleWindow(QMainWindow):
     def _typing(self) -> Typing:
         return Typing() if self.controls is None else self.controls.typing
 
-    def _press(self) -> Press:
+    def press(self) -> Press:
+        """A press of a button that begins now."""
         return Press(at_s=self._clock.now(), serial=self.drawn.serial)
 
     def command(self, key: str, *, ctrl: bool) -> Name | None:
@@ -477,10 +326,6 @@ class ConsoleWindow(QMainWindow):
         if self.controls is not None:
             self.controls.up(key)
 
-    def lost(self) -> None:
-        """The window has lost the keys: nothing is held any more."""
-        self._let_go()
-
     def do(self, name: Name, press: Press) -> None:
         """The button of a command was clicked."""
         if self.controls is not None:
@@ -489,11 +334,13 @@ class ConsoleWindow(QMainWindow):
             self.close()
         self.refresh()
 
-    def _hold(self, press: Press) -> None:
+    def hold(self, press: Press) -> None:
+        """The button that has to be held went down."""
         if self.controls is not None:
             self.controls.hold(press)
 
-    def _let_go(self) -> None:
+    def let_go(self) -> None:
+        """It was let go."""
         if self.controls is not None:
             self.controls.let_go()
 
@@ -501,19 +348,16 @@ class ConsoleWindow(QMainWindow):
 
     def open_line(self, question: str) -> None:
         """Let a line be typed."""
-        self.entry_label.setText(question)
-        self.entry.clear()
-        self.entry_bar.show()
-        self.entry.setFocus()
+        self.fields.open_line(question)
 
     def close_line(self) -> None:
         """Take the line away."""
-        self.entry_bar.hide()
-        self._focus()
+        self.fields.bar.hide()
+        self.fields.focus(self.drawn, self)
 
     def typed(self, field: Field) -> str:
         """What is typed in a field."""
-        return {"line": self.entry, "number": self.rating, "words": self.words}[field].text()
+        return self.fields.typed(field)
 
     def show_page(self, title: str, lines: list[str]) -> None:
         """Cover the run with a page of text."""
@@ -528,7 +372,7 @@ class ConsoleWindow(QMainWindow):
     def show_list(self) -> None:
         """Cover the run with the marks of the set."""
         self.show_page(
-            "Flags, notes, corrections and repeats of this set. Esc leaves this page.", view.marks(self.seen)
+            "Flags, notes, corrections and repeats of this set. Esc leaves this page.", overview.marks(self.seen)
         )
 
     def other_theme(self) -> None:
@@ -544,24 +388,11 @@ class ConsoleWindow(QMainWindow):
         """Closing the window of a live run asks why it stops; once it has ended, the window goes."""
         if event is None:
             return
-        if self.ended is None and self.controls is not None:
+        if self.ended is None:
             event.ignore()
-            self.controls.ask_why_it_stops()
+            if self.controls is not None:
+                self.controls.ask_why_it_stops()
             return
         remember(self, "run")
         event.accept()
         self.closed.emit()
-
-
-def _size(label: QLabel, size_px: int, *, bold: bool) -> None:
-    """Give a label's type a size in pixels; the window's style sheet would win over a font."""
-    style = f"font-size: {max(8, size_px)}px; font-weight: {'bold' if bold else 'normal'};"
-    if label.styleSheet() != style:
-        label.setStyleSheet(style)
-
-
-def _fill(shown: QListWidget, lines: list[str]) -> None:
-    if [item.text() for i in range(shown.count()) if (item := shown.item(i))] != lines:
-        shown.clear()
-        shown.addItems(lines)
-        shown.scrollToBottom()

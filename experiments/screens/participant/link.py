@@ -26,6 +26,7 @@ from experiments.screens.participant.words import (
     Close,
     DirectionGiven,
     Failed,
+    Focused,
     Noise,
     NoiseIs,
     Ping,
@@ -64,6 +65,8 @@ class ParticipantLink:
         self._mail = Mailbox()
         self._asking = threading.RLock()
         self._page = threading.Lock()
+        self._focused: Focused | None = None
+        """Whose the keys are, as far as it was said."""
         self._stands = 0
         """The question that was put on the screen last; 0 when something else was."""
         self._clocks: ClockMap | None = None
@@ -111,6 +114,8 @@ class ParticipantLink:
     def listen(self, heard: Callable[[Unasked], None], gone: Callable[[str], None]) -> None:
         """Have somebody told what is said without a question, and why the screen is gone if it goes."""
         self._heard, self._gone = heard, gone
+        if self._focused is not None:
+            heard(self._focused)
         if self.failure is not None:
             gone(self.failure)
 
@@ -230,6 +235,7 @@ class ParticipantLink:
         if isinstance(word, Failed):
             self._failed(f"the participant's screen failed: {word.message}")
         elif isinstance(word, Unasked):
+            self._focused = word if isinstance(word, Focused) else self._focused
             self._heard(word)
         else:
             self._mail.put(word)

@@ -1,0 +1,40 @@
+"""The instruction in large type, which shrinks until all of it is there."""
+
+from __future__ import annotations
+
+from PyQt6.QtWidgets import QLabel
+
+from experiments.screens.console import parts
+from experiments.screens.console.view import Instruction
+
+SIZES_PX = {"title": 46, "damper": 34, "detail": 23}
+FITS = (1.0, 0.88, 0.76, 0.66, 0.56)
+"""How far the type shrinks."""
+
+
+class Notice:
+    """What to do now, the damper, and what belongs to it: three labels."""
+
+    def __init__(self) -> None:
+        self.title, self.damper, self.detail = self.labels = [parts.label(name) for name in SIZES_PX]
+
+    def put(self, shown: Instruction) -> None:
+        """Show an instruction."""
+        for label, text in zip(self.labels, (shown.title, shown.damper, shown.detail), strict=True):
+            if label.text() != text:
+                label.setText(text)
+            label.setVisible(bool(text))
+        parts.set_mood(self.title, shown.mood)
+        parts.set_mood(self.damper, shown.mood)
+
+    def size(self, factor: float) -> None:
+        """Give the type so many times its own size."""
+        for label, size_px in zip(self.labels, SIZES_PX.values(), strict=True):
+            _size(label, round(size_px * factor), bold=label is not self.detail)
+
+
+def _size(label: QLabel, size_px: int, *, bold: bool) -> None:
+    """Give a label's type a size in pixels; the window's style sheet would win over a font."""
+    style = f"font-size: {max(8, size_px)}px; font-weight: {'bold' if bold else 'normal'};"
+    if label.styleSheet() != style:
+        label.setStyleSheet(style)

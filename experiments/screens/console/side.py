@@ -1,0 +1,67 @@
+"""What stands beside the instruction in the console's window."""
+
+from __future__ import annotations
+
+from datetime import datetime
+
+from PyQt6.QtWidgets import QListWidget, QVBoxLayout, QWidget
+
+from experiments.screens.console import overview, parts
+from experiments.screens.console.pace import Pace, clock_text, end_text, remaining_s
+from experiments.screens.console.strip import Strip
+from experiments.screens.console.view import About, Seen
+
+
+class Side(QWidget):
+    """The gun, whose the keys are, the time, what comes next, and the answers of the set."""
+
+    def __init__(self, about: About) -> None:
+        super().__init__()
+        self._gun, self._times, self._focus = parts.label("quiet"), parts.label("quiet"), parts.label("quiet")
+        self._coming, self._answers = parts.quiet_list(), parts.quiet_list()
+        self._strip = Strip()
+        self._strip.setVisible(about.setup.config.console.response_times)
+        down = QVBoxLayout(self)
+        down.setContentsMargins(0, 0, 0, 0)
+        for widget in (
+            parts.panel(self._gun, self._focus),
+            parts.panel(self._times),
+            parts.label("quiet", "Coming next"),
+            self._coming,
+            parts.label("quiet", "Answers of this set"),
+            self._answers,
+            self._strip,
+        ):
+            down.addWidget(widget)
+        for lines in (self._coming, self._answers):
+            lines.setMinimumHeight(1)
+
+    def put(self, seen: Seen, pace: Pace, now_s: float) -> None:
+        """Show what is so now."""
+        for label, (text, mood) in (
+            (self._gun, overview.gun_text(seen.gun)),
+            (self._focus, overview.focus_text(seen, here=self.isActiveWindow())),
+        ):
+            label.setText(text)
+            label.setVisible(bool(text))
+            parts.set_mood(label, mood)
+        self._times.setText(_times(seen, pace, now_s))
+        _fill(self._coming, overview.coming(seen))
+        _fill(self._answers, overview.answers(seen))
+        if self._strip.isVisibleTo(self):
+            self._strip.put(overview.response_times(seen))
+
+
+def _times(seen: Seen, pace: Pace, now_s: float) -> str:
+    elapsed = f"Elapsed {clock_text(pace.elapsed_s(now_s))}"
+    if seen.ended is not None:
+        return elapsed
+    left_s = remaining_s(seen.about.setup.config, seen.about.plan, seen.told, pace, seen.position, now_s)
+    return f"{elapsed}\nEnds {end_text(left_s, datetime.now())}"
+
+
+def _fill(shown: QListWidget, lines: list[str]) -> None:
+    if [item.text() for i in range(shown.count()) if (item := shown.item(i))] != lines:
+        shown.clear()
+        shown.addItems(lines)
+        shown.scrollToBottom()
