@@ -52,6 +52,17 @@ def _entry(step: Step | None, word: Outcome | Remark) -> Entry | None:
             return None
 
 
+def fits(entry: Entry, value: Value) -> bool:
+    """Whether a value is of an entry's kind."""
+    match entry.what:
+        case "answer":
+            return value in ("forward", "backward")
+        case "rating":
+            return value is None or isinstance(value, float)
+        case "description":
+            return isinstance(value, str)
+
+
 def value(told: Told, entry: Entry) -> Value:
     """What an entry says, as it counts: the last that was entered. `None`: no answer."""
     said = [_value(step, word, entry) for step, word in told]

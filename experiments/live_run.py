@@ -16,18 +16,17 @@ from dataclasses import dataclass, replace
 from device import DeviceError, Gun
 from experiments import events
 from experiments.clock import Clock
-from experiments.entries import Entry, entries, repeatable, trial_at, value
+from experiments.entries import Entry, entries, fits, repeatable, trial_at, value
 from experiments.events import ACTS, DISARMS, Event, Press
 from experiments.journal import Journal, JournalGone
 from experiments.live_remarks import remark_of
 from experiments.plan import Plan, Trial
 from experiments.remarks import Refused, Remark, record
 from experiments.screen import Screen
-from experiments.states import ARMED, No, Position, State, after, entered
+from experiments.states import ARMED, No, Position, State, after, entered, why_after
 from experiments.steps import Outcome, Step
 from experiments.tables import Told
 
-EMERGENCY = "emergency stop"
 REARM_HELD_S = 1.0
 """For so long a key is held to go on after an emergency stop."""
 
@@ -60,7 +59,7 @@ class Verdict:
 
 
 class LiveRun:
-    """The position of a run, and what was told so far. Every method but `enter`, `wait` and `sleep` from any thread."""
+    """Where a run is, and what was told so far. Every method but `enter`, `wait` and `sleep` from any thread."""
 
     def __init__(
         self, *, plan: Plan, gun: Gun, journal: Journal, clock: Clock, screen: Screen, guard_s: float, told: Told = ()
@@ -201,10 +200,8 @@ class LiveRun:
     def end(self, why: str) -> None:
         """The run is over: finished, or stopped for a reason. Nothing is taken any more."""
         with self._news:
-            states = (State.STOPPED,)
-            self._position = replace(self._position, states=states, serial=self._position.serial + 1, why=why)
-            self._position = replace(self._position, correcting=None, paused_s=None)
-            position = self._position
+            stopped = replace(self._position, states=(State.STOPPED,), correcting=None, paused_s=None)
+            position = self._position = replace(stopped, serial=stopped.serial + 1, why=why)
         self._screen.show(position)
 
     def allow_shot(self) -> None:
@@ -288,6 +285,8 @@ class LiveRun:
                 return "It was the answer to an earlier question."
             case events.ParticipantKey(at_s=at_s) if not self._counts(at_s):
                 return "It went down before the stimulus, or in a pause."
+            case events.Correct() if (entry := self._position.correcting) is not None and not fits(entry, event.value):
+                return f"That is no {entry.what}."
             case events.Undo() if self._further_back() is None:
                 return "There is nothing to undo in this set."
             case events.Repeat() if self._repeatable() is None:
@@ -329,23 +328,12 @@ class LiveRun:
         position = after(before, type(event), self.clock.now())
         if isinstance(position, No):  # it was judged under the same lock
             raise TypeError(position.because)
-        match event:
-            case events.Undo():
-                entry = self._further_back()
-                moved = position.serial + (entry != before.correcting and position.serial == before.serial)
-                return replace(position, correcting=entry, serial=moved)
-            case events.EmergencyStop():
-                return replace(position, why=EMERGENCY)
-            case events.Stop():
-                return replace(position, why=_stopped(before, event.reason))
-            case events.DisplayLost():
-                return replace(position, why=_stopped(before, "the display was lost"))
-            case events.ParticipantLost() | events.ResultsGone():
-                return replace(position, why=event.cause)
-            case events.Pause() | events.GoOn() | events.ParticipantBack():
-                return replace(position, why="")
-            case _:
-                return position
+        if isinstance(event, events.Undo):
+            entry = self._further_back()
+            moved = position.serial + (entry != before.correcting and position.serial == before.serial)
+            return replace(position, correcting=entry, serial=moved)
+        why = why_after(before, event)
+        return position if why is None else replace(position, why=why)
 
     # keeping
 
@@ -394,8 +382,3 @@ class LiveRun:
         except DeviceError as error:
             self._screen.gun_seen(None, str(error))
             self._screen.trouble(f"The gun does not say that it is disarmed ({error}): switch off its power!")
-
-
-def _stopped(before: Position, reason: str) -> str:
-    """Why a run stopped: after an emergency stop for that, whatever closed it."""
-    return EMERGENCY if before.base is State.HALTED else reason

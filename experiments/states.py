@@ -36,6 +36,7 @@ class State(StrEnum):
 
 
 S = State
+EMERGENCY = "emergency stop"
 ARMED = (S.FIRING, S.TRAIN)
 """The states in which the gun may be armed, and no others."""
 
@@ -283,3 +284,25 @@ def entered(position: Position, state: State, now_s: float, step: Step | None, u
         onset_s=None if state in ARMED else position.onset_s,
         not_before_s=None,
     )
+
+
+def why_after(before: Position, event: Event) -> str | None:
+    """The reason that belongs to the position after an event; `None`: that which was there before.
+
+    After an emergency stop the run stopped for that, whatever closed it.
+    """
+    match event:
+        case events.EmergencyStop():
+            return EMERGENCY
+        case events.Stop() | events.DisplayLost() if before.base is State.HALTED:
+            return EMERGENCY
+        case events.Stop():
+            return event.reason
+        case events.DisplayLost():
+            return "the display was lost"
+        case events.ParticipantLost() | events.ResultsGone():
+            return event.cause
+        case events.Pause() | events.GoOn() | events.ParticipantBack():
+            return ""
+        case _:
+            return None

@@ -57,13 +57,15 @@ class Stimulus:
 
     def fire(self, step: Fire) -> Fired | Failed | Interrupted:
         """One shot, armed for it alone."""
+        asked = False
         try:
             self._get_ready(State.FIRING, step)
+            asked = True
             onset_utc, report = self._first(step.trial)
         except Held:
             return Interrupted(presented=False, cause="pause")
         except DeviceError as error:
-            return self._failed(error, felt=not isinstance(error, LimitError))
+            return self._failed(error, felt=asked and not isinstance(error, LimitError))
         finally:
             disarm(self._desk.gun)
         self._live.felt(report.pulse_start_s)
@@ -71,9 +73,10 @@ class Stimulus:
 
     def present(self, step: Present) -> Presented | Failed | Interrupted:
         """Shots at whole multiples of the interval since the first, until next is said."""
-        train = _Train(step, self._desk)
+        train, asked = _Train(step, self._desk), False
         try:
             self._get_ready(State.TRAIN, step)
+            asked = True
             train.began(*self._first(step.trial))
             while (event := self._live.wait((at_s := train.due_s()) - LEAD_S)) is None:
                 if train.shots == step.max_shots:
@@ -83,7 +86,7 @@ class Stimulus:
         except Held:
             return train.interrupted()
         except DeviceError as error:
-            return self._failed(error, felt=train.shots > 0 or not isinstance(error, LimitError))
+            return self._failed(error, felt=train.shots > 0 or (asked and not isinstance(error, LimitError)))
         finally:
             disarm(self._desk.gun)
         return train.presented("next") if isinstance(event, events.Next) else train.interrupted()

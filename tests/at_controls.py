@@ -16,7 +16,7 @@ from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any, Literal
 
-from device import Gun, GunStatus, LinkError, Shot, ShotReport
+from device import Gun, GunStatus, LimitError, LinkError, Shot, ShotReport
 from device.words import Direction
 from experiments import events, storage
 from experiments import run as runs
@@ -37,7 +37,7 @@ from experiments.screens.console.messages import Ended, GunSeen
 from experiments.screens.console.view import About, Seen
 from experiments.setup import Setup
 from experiments.states import Position, State
-from experiments.steps import Answered, Outcome, Step
+from experiments.steps import Answered, Fire, Outcome, Step
 from tests.waiting import PATIENCE_S, wait_for
 
 MOST_DEEDS = 2000
@@ -136,7 +136,8 @@ class GunCall:
 class WatchedGun:
     """A gun that keeps what is asked of it, and does what the test wants of the next shot.
 
-    `fails` are raised by the next shots instead of firing. `hang`: the next such word waits in the gun until `release`.
+    `felt`: the trials of the single shots that were felt, or may have been, test shots apart. `fails` are raised by the
+    next shots instead of firing. `hang`: the next such word waits in the gun until `release`.
     `stubborn`: a shot that hung is fired although the gun was disarmed meanwhile. `slow`: a disarming beside the run
     hangs as well. `mute`: nothing but the next shot is answered.
     """
@@ -145,6 +146,7 @@ class WatchedGun:
         self._gun = gun
         self.live: LiveRun | None = None
         self.calls: list[GunCall] = []
+        self.felt: list[Trial] = []
         self.fails: list[Exception] = []
         self.hang: Literal["", "arm", "fire"] = ""
         self.stubborn = self.slow = self.mute = False
@@ -181,13 +183,25 @@ class WatchedGun:
     def fire(self, shot: Shot, at_s: float | None = None) -> ShotReport:
         self._asked("fire")
         self._hangs_at("fire")
-        if self.fails:
-            raise self.fails.pop(0)
-        if self.stubborn:
-            self._gun.arm()
-        report = self._gun.fire(shot, at_s)
+        step = self.live.position.step if self.live is not None else None
+        try:
+            if self.fails:
+                raise self.fails.pop(0)
+            if self.stubborn:
+                self._gun.arm()
+            report = self._gun.fire(shot, at_s)
+        except LimitError:
+            raise
+        except Exception:
+            self._feel(step)
+            raise
+        self._feel(step)
         self._asked("rendered")
         return report
+
+    def _feel(self, step: Step | None) -> None:
+        if isinstance(step, Fire):
+            self.felt.append(step.trial)
 
     def status(self) -> GunStatus:
         self._answers()
@@ -255,6 +269,7 @@ class Offered:
     position: Position
     painted_s: float | None
     taken: bool
+    text: str
 
 
 class PaperWindow:
@@ -287,7 +302,7 @@ class PaperWindow:
                 self._clock.idle.clear()  # what is taken wakes the run, which is then at work until it waits again
                 position, painted_s = live.position, self.painted_s.get(live.position.serial)
                 verdict = offer(event, press)
-                self.offered.append(Offered(event, press, position, painted_s, verdict.taken))
+                self.offered.append(Offered(event, press, position, painted_s, verdict.taken, verdict.text))
                 if waits and not verdict.taken:
                     self._clock.idle.set()
             return verdict

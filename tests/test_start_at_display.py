@@ -21,7 +21,7 @@ from experiments.roof.folders import new_study
 from experiments.run import Request, run
 from experiments.screens.synthetic import synthetic_screen
 from tests import watched_start
-from tests.at_display import AtDisplay, last_record, needs_display
+from tests.at_display import HAND_S, AtDisplay, last_record, needs_display
 from tests.conftest import RECOIL
 from tests.watched_start import wait_for
 
@@ -301,6 +301,7 @@ def test_starting_anew_from_the_window_keeps_the_reason(pilot: Path, display: st
         wait_for(eye, having("P01 stopped direction on ", "Go on with it"))
         screen.keys.press("n", "Control_L")  # without a reason the line for it gets the keys
         screen.keys.type("loose")
+        time.sleep(HAND_S)
         screen.keys.press("n", "Control_L")
         wait_until(lambda: len(list(folder.glob("*journal*.jsonl"))) == 2)
         wait_until(lambda: last_record(folder / "sub-P01_task-direction_journal.jsonl").get("kind") == "step")

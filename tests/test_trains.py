@@ -107,7 +107,7 @@ def test_a_train_that_fails_keeps_the_shots_that_were_felt_before(tmp_path: Path
     desk, gun = listening(tmp_path, {("fire", 5): LinkError("no answer")})
     desk.carry_out()
     (felt, outcome), (_, again), *_ = of_trains(read(desk.where.journal))
-    assert outcome == {"kind": "failed", "cause": "no answer"}
+    assert outcome == {"kind": "failed", "cause": "no answer", "presented": True}
     assert [shot["shot"] for shot in felt] == [1, 2, 3, 4]
     assert [shot["pulse_start_s"] for shot in felt] == [report.pulse_start_s for report in gun.reports[:4]]
     assert again is not None

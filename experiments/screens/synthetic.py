@@ -10,12 +10,12 @@ from experiments import catalogue, events
 from experiments.clock import Clock
 from experiments.config import ExperimentConfig
 from experiments.events import Event
-from experiments.live_run import EMERGENCY, REARM_HELD_S, LiveRun
+from experiments.live_run import REARM_HELD_S, LiveRun
 from experiments.load import ConfigError
 from experiments.plan import Plan
 from experiments.remarks import Remark
 from experiments.setup import Setup
-from experiments.states import Position, State
+from experiments.states import EMERGENCY, Position, State
 from experiments.steps import Ask, Outcome, Present, Rate, Rest, Step
 
 

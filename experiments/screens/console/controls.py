@@ -13,7 +13,7 @@ from experiments import events
 from experiments.clock import Clock
 from experiments.entries import trial_at, value
 from experiments.events import Event, Hand, Press
-from experiments.live_run import EMERGENCY, REARM_HELD_S, LiveRun
+from experiments.live_run import REARM_HELD_S, LiveRun
 from experiments.plan import Trial
 from experiments.preference.config import RatingScale
 from experiments.remarks import flag_word
@@ -28,7 +28,7 @@ from experiments.screens.console.keys import (
     why_not,
 )
 from experiments.screens.texts import FLAG_RULE, short_place, typed_number
-from experiments.states import State
+from experiments.states import EMERGENCY, State
 from experiments.steps import Ask
 
 Field = Literal["line", "number", "words"]

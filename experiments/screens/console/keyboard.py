@@ -7,6 +7,7 @@ from typing import Protocol
 
 from PyQt6.QtCore import QEvent, QObject, Qt, QTimer
 from PyQt6.QtGui import QKeyEvent
+from PyQt6.QtWidgets import QWidget
 
 from experiments.screens.console.keys import BOUNCE_S, EventClock, Name, Presses
 
@@ -93,6 +94,47 @@ class Keyboard(QObject):
         if acts:
             self._hears.down(name, at_s)
         return True
+
+
+class FreshShortcuts(QObject):
+    """Has each shortcut of a window act once a press, however long its key is held.
+
+    Qt itself takes a repeated key for a new one when the machine is too busy to read its two events together.
+    """
+
+    def __init__(self, widget: QWidget, now: Callable[[], float]) -> None:
+        super().__init__(widget)
+        self._now, self._presses, self._clock = now, Presses(), EventClock()
+        self._stale = ""
+        widget.winId()  # it has no window (`QWindow`) before
+        if (window := widget.windowHandle()) is not None:
+            window.installEventFilter(self)
+
+    def eventFilter(self, watched: QObject | None, event: QEvent | None) -> bool:  # noqa: N802 - Qt's name
+        """Take a key that is held still; true keeps it from everybody else. Text repeats as it always does."""
+        del watched
+        if event is not None and event.type() == QEvent.Type.FocusOut:
+            self._presses.lost()
+        if not isinstance(event, QKeyEvent):
+            return False
+        key, at_s = key_name(event), self._clock.at(event.timestamp(), self._now())
+        if event.type() == QEvent.Type.KeyRelease:
+            if self._presses.is_down(key):
+                self._presses.up(key, at_s, repeated=event.isAutoRepeat())
+            return False
+        if event.type() == QEvent.Type.ShortcutOverride and _may_be_shortcut(event):
+            acts = self._presses.down(key, at_s, repeated=event.isAutoRepeat())
+            self._stale = "" if acts else key
+            event.setAccepted(not acts)
+        elif event.type() == QEvent.Type.ShortcutOverride:
+            self._stale = ""
+        return key == self._stale
+
+
+def _may_be_shortcut(event: QKeyEvent) -> bool:
+    """Whether a key is no text, nor moves within it."""
+    held = event.modifiers() & (Qt.KeyboardModifier.ControlModifier | Qt.KeyboardModifier.AltModifier)
+    return bool(held) or event.key() == Qt.Key.Key_Escape or Qt.Key.Key_F1 <= event.key() <= Qt.Key.Key_F12
 
 
 def key_name(event: QKeyEvent) -> str:

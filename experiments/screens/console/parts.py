@@ -53,7 +53,9 @@ def button(parent: QWidget, text: str, key: str, slot: Slot, *, name: str = "") 
         if made.isVisible():
             slot()
 
-    QShortcut(QKeySequence(key), parent).activated.connect(pressed)
+    shortcut = QShortcut(QKeySequence(key), parent)
+    shortcut.setAutoRepeat(False)
+    shortcut.activated.connect(pressed)
     return made
 
 

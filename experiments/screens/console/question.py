@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass
 
-from PyQt6.QtGui import QShortcut
 from PyQt6.QtWidgets import QFrame, QHBoxLayout, QVBoxLayout, QWidget
 
 from experiments.register import MAX_REASON, RegisterError, check_reason
@@ -44,7 +43,6 @@ class Question(QFrame):
         for answer in answers:
             across.addWidget(self._button(answer))
         down.addLayout(across)
-        once_a_press(self)
 
     def _button(self, answer: Answer) -> QWidget:
         return parts.button(self, answer.text, answer.key, lambda: answer.do(self.reason.text().strip()))
@@ -59,9 +57,3 @@ def unfit(reason: str) -> str:
     except RegisterError as error:
         return f"{error}."
     return ""
-
-
-def once_a_press(widget: QWidget) -> None:
-    """Have a key that is held act once."""
-    for shortcut in widget.findChildren(QShortcut):
-        shortcut.setAutoRepeat(False)

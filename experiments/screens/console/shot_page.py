@@ -11,7 +11,6 @@ from PyQt6.QtWidgets import QVBoxLayout, QWidget
 from experiments.clock import Clock
 from experiments.screens.console import parts
 from experiments.screens.console.fields import Lines
-from experiments.screens.console.question import once_a_press
 from experiments.screens.console.shot_check import SWITCH_OFF, ShotCheck, Told
 from experiments.setup import Setup
 
@@ -46,7 +45,6 @@ class ShotPage(QWidget):
         down.addStretch(1)
         for button in (self.stop_button, self.call_off_button, self.next_button):
             down.addWidget(button)
-        once_a_press(self)
         # its place stays empty: there the second click of a double click on the window's own button falls
         kept = self.next_button.sizePolicy()
         kept.setRetainSizeWhenHidden(True)

@@ -24,9 +24,10 @@ from experiments.run import Again
 from experiments.screens.console import parts, people, theme
 from experiments.screens.console.fields import Lines, sheet
 from experiments.screens.console.form import Form
+from experiments.screens.console.keyboard import FreshShortcuts
 from experiments.screens.console.opening import Choice, Opening
 from experiments.screens.console.people_table import PeopleTable
-from experiments.screens.console.question import WHY, Answer, Question, once_a_press, unfit
+from experiments.screens.console.question import WHY, Answer, Question, unfit
 from experiments.screens.console.shot_page import ShotPage
 from experiments.screens.console.signals import signals_to
 from experiments.screens.console.windows import let_go, open_as_left, remember, scaled, type_scale
@@ -85,7 +86,6 @@ class StartWindow(QWidget):
         down.addWidget(self.saved)
         down.addLayout(self._foot)
         down.addLayout(self._buttons(page))
-        once_a_press(page)
         return page
 
     def _gun(self) -> QWidget:
@@ -362,6 +362,7 @@ def choose(study: StudyFolder, opening: Opening, clock: Clock) -> Choice | None:
     window.closed.connect(loop.quit)
     with signals_to(window.leave_for):
         open_as_left(window, NAME)
+        FreshShortcuts(window, clock.now)
         window.activateWindow()
         loop.exec()
     choice = window.choice

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import time
 from dataclasses import replace
 
 from PyQt6.QtWidgets import QDialog, QPushButton, QVBoxLayout
@@ -11,6 +12,7 @@ from experiments.places import place
 from experiments.run import Again, Request
 from experiments.screens.console import people, theme
 from experiments.screens.console.fields import Lines, sheet
+from experiments.screens.console.keyboard import FreshShortcuts
 from experiments.screens.console.question import WHY, Answer, Question, unfit
 from experiments.screens.console.signals import signals_to
 from experiments.screens.console.windows import let_go
@@ -70,6 +72,7 @@ def ask(request: Request) -> Request | None:
     `KeyboardInterrupt` if a signal ended the question.
     """
     dialog = Unfinished(request)
+    FreshShortcuts(dialog, time.monotonic)
     with signals_to(lambda _: dialog.reject()) as signalled:
         dialog.exec()
     decided = dialog.decided
