@@ -546,7 +546,8 @@ class Sitting:
             return True
         live = self.live
         moving = live.position.base in (State.SAVING, State.FIRING, State.STOPPED) or self._no_onset(live.position)
-        return self.clock.idle.is_set() and not moving and not live._inbox
+        untold = live._inbox and live.position.base is not State.HALTED  # after a halt nobody looks at it any more
+        return self.clock.idle.is_set() and not moving and not untold
 
     def paint(self) -> None:
         """Let the run get where it waits, and draw it."""

@@ -1,0 +1,280 @@
+"""What the console shows, without its window: no method's name too many, text that stands out, the time to go."""
+
+from __future__ import annotations
+
+from datetime import datetime
+from pathlib import Path
+from typing import Any
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from experiments import catalogue
+from experiments.plan import Plan, Trial
+from experiments.remarks import AnswerCorrected, Flagged, Noted
+from experiments.screens.console import overview, theme, view
+from experiments.screens.console.messages import Ended, GunSeen, ParticipantSeen
+from experiments.screens.console.pace import Pace, clock_text, end_text, remaining_s
+from experiments.screens.console.view import About, Seen
+from experiments.setup import Setup
+from experiments.states import Position, State
+from experiments.steps import Answered, Ask, Prepare, Present, Presented, Rate, Rated, Repeat, Rest
+from tests.at_controls import DIRECTION, PREFERENCE, sat_at, tells_correctness
+
+SAID = Answered(response="forward", response_time_s=1.0, response_source="experimenter", response_time_valid=False)
+
+
+def plan_of(setup: Setup[Any]) -> Plan:
+    return catalogue.experiment(setup).make_plan(setup.config, "P01", 1, None)
+
+
+def ask(trial: Trial) -> Ask:
+    return Ask(trial=trial, attempt=1, question="Which way?", forward="forward", backward="backward")
+
+
+def prepare(trial: Trial) -> Prepare:
+    return Prepare(trial=trial, attempt=2, damper=DIRECTION.gun.methods[trial.method].damper)
+
+
+def seen(setup: Setup[Any], position: Position, *told: Any, **more: Any) -> Seen:
+    return Seen(about=About(setup=setup, plan=plan_of(setup)), position=position, told=told, **more)
+
+
+def shown_texts(here: Seen) -> list[str]:
+    shown = view.instruction(here, 10.0)
+    texts = [shown.title, shown.damper, shown.detail, view.place_text(here), *overview.coming(here)]
+    return [*texts, *overview.answers(here), *overview.marks(here), overview.gun_text(here.gun)[0]]
+
+
+# what is never told
+
+
+@pytest.mark.parametrize("number", range(6))
+def test_a_method_is_named_only_where_its_damper_is_set_by_hand(number: int) -> None:
+    for make_step, state in ((prepare, State.SETTING), (prepare, State.PREPARING), (ask, State.ASKING)):
+        trial = plan_of(DIRECTION).trials[number]
+        here = seen(DIRECTION, Position(states=(state,), step=make_step(trial)))
+        said = "\n".join(shown_texts(here)).lower()
+        for name in DIRECTION.config.design.methods:
+            method = DIRECTION.gun.methods[name]
+            if not (method.damper and trial.method == name):
+                assert name not in said
+                assert method.label.lower() not in said
+        assert not tells_correctness(said)
+
+
+@pytest.mark.parametrize("state", State)
+def test_every_state_says_what_to_do_and_none_says_anything_of_how_good_the_participant_is(
+    state: State, tmp_path: Path
+) -> None:
+    with sat_at(state, tmp_path) as sitting:
+        sitting.window.paint()
+        assert view.instruction(Seen(about=sitting.window.about, position=sitting.position), 0.0).title
+        assert not [text for text in sitting.window.heard if tells_correctness(text)]
+
+
+def test_whoever_looks_finds_the_word_they_need_in_each_state(tmp_path: Path) -> None:
+    needed = {
+        State.REARMING: "hold T",
+        State.SETTING: "Confirm the damper with M",
+        State.PREPARING: "fire with Space",
+        State.TRAIN: "Press Space",
+        State.ASKING: "F or B",
+        State.CLOSING: "Enter ends the run",
+        State.PAUSED: "P goes on",
+        State.CORRECTING: "Esc leaves it",
+        State.HALTED: "Q closes it",
+    }
+    for state, word in needed.items():
+        with sat_at(state, tmp_path / state) as sitting:
+            sitting.window.paint()
+            assert any(word in text for text in sitting.window.heard), (state, sitting.window.heard)
+
+
+# what is told
+
+
+def test_the_gun_is_shown_as_it_says_itself_and_never_as_safe_when_it_says_nothing() -> None:
+    halted = Position(states=(State.HALTED,))
+    silent = view.instruction(seen(DIRECTION, halted, gun=GunSeen(status=None, fault="no answer")), 0.0)
+    assert "SWITCH OFF ITS POWER" in silent.damper
+    assert "SWITCH OFF ITS POWER" in view.instruction(seen(DIRECTION, halted), 0.0).damper
+    assert overview.gun_text(GunSeen(status=None, fault="no answer"))[1] == "bad"
+
+
+def test_a_run_that_stopped_says_what_is_safe_only_if_it_was_read_back() -> None:
+    def end(**how: Any) -> str:
+        return view.instruction(seen(DIRECTION, Position(), ended=Ended(**how)), 0.0).detail
+
+    assert "1 answer," in end(reason="lunch", saved=1)
+    assert "2 answers," in end(reason="lunch", saved=2)
+    assert "can be resumed" in end(reason="lunch", saved=0)
+    unread = end(reason="the gun is gone", saved=None)
+    assert unread == "The gun is gone.\nQ closes this window."
+
+
+def test_whose_the_keys_are_is_said_where_somebody_else_can_have_them() -> None:
+    beside = ParticipantSeen(focused=True)
+    assert overview.focus_text(seen(DIRECTION, Position(), participant=beside), here=False)[0].startswith(
+        "Keys: the participant's screen"
+    )
+    assert overview.focus_text(seen(DIRECTION, Position(), participant=beside), here=True) == (
+        "Keys: this window",
+        "good",
+    )
+    assert overview.focus_text(seen(DIRECTION, Position()), here=True)[0] == ""
+    assert "ANOTHER WINDOW" in overview.focus_text(seen(DIRECTION, Position()), here=False)[0]
+
+
+def test_the_list_of_marks_has_those_of_this_set_and_an_answer_that_was_given_again_counts() -> None:
+    trials = plan_of(DIRECTION).trials
+    first, other = trials[0], trials[-1]
+    step, given = ask(first), (ask(first), SAID)
+    corrected = (None, AnswerCorrected(trial=first, response="backward"))
+    spoiled = (Prepare(trial=trials[1], attempt=1, damper=""), Repeat(trial=first, reason="noise"))
+    flagged, noted = (None, Flagged(trial=other, flag="late")), (None, Noted(trial=first, text="a dog"))
+    here = Position(states=(State.ASKING,), step=step)
+    marks = overview.marks(seen(DIRECTION, here, given, corrected, spoiled, flagged, noted))
+    assert marks == [
+        f"Trial {first.trial}: corrected to BACKWARD",
+        f"Trial {first.trial}: to be presented again (noise)",
+        f"Trial {first.trial}: “a dog”",
+    ]
+    assert overview.answers(seen(DIRECTION, here, given, corrected)) != overview.answers(seen(DIRECTION, here, given))
+    assert overview.answers(seen(DIRECTION, here, given, corrected, spoiled, given)) == overview.answers(
+        seen(DIRECTION, here, given)
+    )
+
+
+def test_the_strip_shows_the_own_hands_times_of_the_session_alone() -> None:
+    first, second, *_ = trials = plan_of(DIRECTION).trials
+    own = Answered(response="forward", response_time_s=0.7, response_source="participant", response_time_valid=True)
+    told = ((ask(first), own), (ask(second), SAID))
+    here = Position(states=(State.ASKING,), step=ask(trials[2]))
+    assert overview.response_times(seen(DIRECTION, here, *told)) == [0.7]
+    later = next(trial for trial in trials if trial.session != first.session)
+    assert overview.response_times(seen(DIRECTION, Position(states=(State.ASKING,), step=ask(later)), *told)) == []
+
+
+# colours
+
+
+@pytest.mark.parametrize("name", ["dark", "light"])
+def test_text_of_every_mood_stands_out_on_ground_and_panel_seven_to_one(name: theme.Theme) -> None:
+    for ground in ("ground", "panel"):
+        for colour in (*theme.MOODS, "text", "quiet"):
+            assert theme.contrast(name, colour, ground) >= 7, (colour, ground)
+
+
+@pytest.mark.parametrize("name", ["dark", "light"])
+@pytest.mark.parametrize("ground", ["stop", *theme.BANDS])
+def test_the_text_of_stop_button_and_bands_stands_out(name: theme.Theme, ground: str) -> None:
+    assert theme.contrast(name, f"{ground}_text", ground) >= 4.5  # WCAG 2 AA; it is large and bold
+
+
+def test_contrast_is_that_of_the_published_definition(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setitem(theme._COLOURS["light"], "grey", "#767676")
+    assert theme.contrast("light", "grey") == pytest.approx(4.54, abs=0.005)
+    # WCAG 2: a colour on itself is 1 to 1; #767676 is the lightest grey with 4.5 to 1 on white
+    assert theme.contrast("light", "ground", "ground") == 1
+    assert theme.contrast("light", "stop_text", "ground") == 1
+
+
+# the time to go
+
+
+class Day:
+    """A run whose trials take what they are told to."""
+
+    def __init__(self, setup: Setup[Any]) -> None:
+        self.setup, self.plan, self.pace = setup, plan_of(setup), Pace()
+        self.told: list[Any] = []
+        self.now_s = 100.0
+        self.position = Position()
+
+    def begin(self, trial: Trial) -> None:
+        self.at(Position(states=(State.PREPARING,), step=prepare(trial)))
+
+    def at(self, position: Position) -> None:
+        self.position = position
+        self.pace.at(position, self.now_s)
+
+    def answer(self, trial: Trial, duration_s: float) -> None:
+        self.begin(trial)
+        self.now_s += duration_s
+        self.told.append((ask(trial), SAID))
+        self.pace.saved(SAID, self.now_s)
+
+    @property
+    def left_s(self) -> float:
+        return remaining_s(self.setup.config, self.plan, self.told, self.pace, self.position, self.now_s)
+
+
+@given(durations=st.lists(st.floats(1, 300), min_size=1, max_size=6))
+def test_the_estimate_moves_from_the_plan_towards_what_is_measured_and_never_beyond(durations: list[float]) -> None:
+    day = Day(DIRECTION)
+    planned_s = DIRECTION.config.trial_s
+    for trial, duration_s in zip(day.plan.trials, durations, strict=False):
+        before_s, left = day.left_s, len(day.plan.trials) - len(day.told)
+        day.answer(trial, duration_s)
+        # a trial less; the others by at most a sixth of what this one was off, as the plan counts like five trials
+        assert abs(before_s - day.left_s - planned_s) <= (left + 1) * 300 / 6
+    measured_s = (5 * planned_s + sum(durations)) / (5 + len(durations))
+    left = len(day.plan.trials) - len(durations)
+    assert day.left_s == pytest.approx(left * measured_s + DIRECTION.config.break_s)
+
+
+@pytest.mark.parametrize("pause_s", [60.0, 3600.0])
+def test_a_pause_does_not_count_as_a_trials_time(pause_s: float) -> None:
+    day, quick = Day(DIRECTION), Day(DIRECTION)
+    first = day.plan.trials[0]
+    day.begin(first)
+    day.at(Position(states=(State.PREPARING, State.PAUSED), step=prepare(first), paused_s=day.now_s))
+    day.now_s += pause_s
+    day.at(Position(states=(State.PREPARING,), step=prepare(first)))
+    for one in (day, quick):
+        one.answer(first, 15.0)
+    assert day.left_s == pytest.approx(quick.left_s)
+
+
+def test_a_break_that_is_on_counts_as_what_is_left_of_it_and_stands_still_in_a_pause() -> None:
+    day = Day(DIRECTION)
+    whole_s = day.left_s
+    rest = Rest(duration_s=30.0, between="sets")
+    day.at(Position(states=(State.RESTING,), step=rest, until_s=day.now_s + 30.0))
+    day.now_s += 20.0
+    assert day.left_s == pytest.approx(whole_s - 20.0)
+    day.at(Position(states=(State.RESTING, State.PAUSED), step=rest, until_s=day.now_s + 10.0, paused_s=day.now_s))
+    day.now_s += 500.0
+    assert day.left_s == pytest.approx(whole_s - 20.0)
+
+
+def test_ratings_still_to_come_are_counted() -> None:
+    day = Day(PREFERENCE)
+    felt = Presented(gun="simulated", onset_utc="", shots=3, exposure_s=2.0, ended_by="next")
+    day.told = [
+        (Present(trial=trial, attempt=1, repeat_every_s=0.5, max_shots=9, least_exposure_s=1.0), felt)
+        for trial in day.plan.trials
+    ]
+    assert day.left_s == pytest.approx(len(day.plan.trials) * PREFERENCE.config.rating_s)
+    assert day.left_s > 0
+    rated = Rated(rating=5.0, rating_by="experimenter")
+    rate = Rate(
+        trial=day.plan.trials[0], question="?", minimum=0, maximum=10, minimum_text="", maximum_text="", grain=0.1
+    )
+    day.told.append((rate, rated))
+    assert day.left_s == pytest.approx((len(day.plan.trials) - 1) * PREFERENCE.config.rating_s)
+
+
+def test_the_end_is_a_time_of_day_also_over_midnight() -> None:
+    assert end_text(1200.0, datetime(2026, 1, 1, 23, 50)) == "about 00:10"
+    assert end_text(0.0, datetime(2026, 1, 1, 9, 0, 29)) == "about 09:00"
+    assert clock_text(0.4) == "0:00"
+
+
+def test_no_time_has_gone_by_before_the_run_begins() -> None:
+    pace = Pace()
+    assert pace.elapsed_s(5_000.0) == 0.0
+    pace.began_s = 5_000.0
+    assert pace.elapsed_s(5_030.0) == 30.0
