@@ -26,7 +26,7 @@ from tests.twins import a_shot, a_twin, disarmings_of
 
 pytestmark = pytest.mark.soak
 
-KILLS = 8
+KILLS = 50
 BUSY = 8
 TRAIN_SHOTS, TRAINS = 100, 3
 STOPS = 20
