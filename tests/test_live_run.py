@@ -15,7 +15,7 @@ from experiments import events
 from experiments import remarks as words
 from experiments.entries import Entry
 from experiments.events import Event, Press
-from experiments.live_run import EMERGENCY, RunStopped, Verdict
+from experiments.live_run import RunStopped, Verdict
 from experiments.places import place
 from experiments.plan import Trial
 from experiments.remarks import (
@@ -30,7 +30,7 @@ from experiments.remarks import (
 )
 from experiments.replay import told
 from experiments.screens.texts import again_text
-from experiments.states import State
+from experiments.states import EMERGENCY, State
 from experiments.steps import Failed, Fire, Interrupted, Prepare, Presented, Rated, Repeat, trial_of
 from tests.at_controls import (
     DIRECTION,
