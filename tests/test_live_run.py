@@ -527,6 +527,22 @@ def test_what_comes_while_the_gun_is_being_armed_takes_the_shot_back(setup: Any,
         assert sitting.gun.status().state == "disarmed"
 
 
+@pytest.mark.parametrize("setup", [DIRECTION, PREFERENCE], ids=["one shot", "train"])
+def test_an_emergency_stop_right_before_the_gun_is_armed_leaves_it_unarmed(setup: Any, tmp_path: Path) -> None:
+    with sat(setup, tmp_path) as sitting:
+        sitting.to(S.PREPARING)
+        settle = sitting.live.settle
+
+        def stopped_meanwhile() -> None:
+            settle()
+            sitting.live.offer(events.EmergencyStop())
+
+        sitting.live.settle = stopped_meanwhile
+        sitting.press("Space")
+        assert sitting.position.base is S.HALTED
+        assert "arm" not in sitting.gun.words
+
+
 def test_a_stop_between_the_key_and_the_shot_is_no_attempt(tmp_path: Path) -> None:
     with gated() as gate, sat(DIRECTION, tmp_path, gate=gate) as sitting:
         at_sync(sitting, 1)

@@ -65,8 +65,9 @@ class ConsoleScreen:
 
     def _look(self, gun: Gun) -> None:
         """Look at the gun until the run ends."""
-        while not self._stop_looking.wait(GUN_LOOK_S):
+        while not self._stop_looking.is_set():
             try:
                 self.gun_seen(gun.status(), "")
             except DeviceError as error:
                 self.gun_seen(None, str(error))
+            self._stop_looking.wait(GUN_LOOK_S)
