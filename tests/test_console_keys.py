@@ -239,6 +239,12 @@ def test_a_key_that_is_still_held_when_the_window_gets_the_keys_back_does_not_ac
     assert not any(repeat(presses, "Space", 1.5 + 0.033 * count, how) for count in range(10))
 
 
+def test_a_key_that_goes_down_twice_without_having_come_up_acts_once() -> None:
+    presses = Presses()
+    assert presses.down("Space", 1.0, repeated=False)
+    assert not presses.down("Space", 2.0, repeated=False)
+
+
 def test_a_release_without_a_press_is_none() -> None:
     presses = Presses()
     presses.up("Space", 1.0, repeated=False)

@@ -10,15 +10,20 @@ from typing import Any
 
 import numpy as np
 import pytest
+from matplotlib.backends.backend_agg import FigureCanvasAgg
+from matplotlib.figure import Figure
+from matplotlib.text import Text
 
 from analysis.logs.reading import read_logs
 from analysis.report.figures import (
     ShotPanel,
+    directions,
     display_name,
     figure_5,
     figure_8,
     figure_directions,
     figure_response_times,
+    results,
     stars,
 )
 from analysis.summary import summarize
@@ -111,8 +116,31 @@ def test_figure_8_shows_both_experiments_or_the_one_there_is(statistics: dict[st
     one, *_ = figure_8({"preference": statistics["preference"]}, tmp_path / "one")
     assert _png_size(both)[0] > 1.7 * _png_size(one)[0]
     text = both_svg.read_text(encoding="utf-8")
-    for words in ("correct rate, forward [%]", "rating (0 dislike", "Force II", "(6 synthetic participants)", "chance"):
+    for words in ("correct rate, forward [%]", "rating (0 dislike", "Force II", "6 synthetic participants", "chance"):
         assert words in text
+    assert "mean and SD" not in text  # its caption says it
+
+
+def test_nothing_that_is_written_in_a_figure_touches_its_neighbour(
+    statistics: dict[str, Any], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    for module, draw, found in (
+        (results, figure_8, statistics),
+        (directions, figure_directions, statistics["direction"]),
+    ):
+        drawn: list[Figure] = []
+        monkeypatch.setattr(module, "save", lambda figure, _, drawn=drawn: drawn.append(figure))
+        draw(found, tmp_path / "never")
+        (figure,) = drawn
+        canvas = FigureCanvasAgg(figure)
+        canvas.draw()
+        boxes = [
+            text.get_window_extent(canvas.get_renderer()).padded(2.0)
+            for text in figure.findobj(Text)
+            if text.get_visible() and text.get_text().strip()
+        ]
+        assert len(boxes) > 20
+        assert not [one for i, one in enumerate(boxes) for other in boxes[:i] if one.overlaps(other)]
 
 
 def test_figures_are_the_same_bytes_each_time(statistics: dict[str, Any], tmp_path: Path) -> None:
@@ -174,7 +202,6 @@ def test_beyond_200_people_their_distribution_is_drawn_instead_of_each(
     crowd = one | {"n": people, "participants": {f"P{i}": rows[i % len(rows)] for i in range(people)}}
     _, svg, _ = figure_8({"preference": crowd}, tmp_path / "crowd")
     text = svg.read_text(encoding="utf-8")
-    assert ("shaded: histograms over participants" in text) is (people > 200)
     assert (text.count("<use ") > 3 * 200) is (people <= 200)
 
 

@@ -235,6 +235,25 @@ def test_a_pause_right_after_an_answer_does_not_spoil_its_time(tmp_path: Path) -
     assert rows[0]["response_time_valid"] == "1"
 
 
+@pytest.mark.parametrize("said", ["forward", "backward"])
+def test_a_corrected_answer_of_the_own_hand_keeps_its_time_and_is_not_valid(said: Any, tmp_path: Path) -> None:
+    times = []
+    for number, corrected in enumerate((False, True)):
+        with sat(DIRECTION, tmp_path / str(number)) as sitting:
+            sitting.to(S.ASKING)
+            sitting.clock.skip(0.5)
+            assert sitting.live.offer(own_key(sitting, response=said))
+            sitting.settle()
+            sitting.to(S.PREPARING)
+            if corrected:
+                sitting.press("U")
+                sitting.press("B" if said == "forward" else "F")
+            _, rows = to_the_end(sitting)
+        assert (rows[0]["response"] == said, rows[0]["response_time_valid"]) == (not corrected, str(int(not corrected)))
+        times.append(rows[0]["response_time_s"])
+    assert times[0] == times[1]
+
+
 def test_a_time_over_a_pause_that_began_before_the_shot_is_not_the_participants(tmp_path: Path) -> None:
     with sat(DIRECTION, tmp_path) as sitting:
         sitting.to(S.PREPARING)

@@ -53,6 +53,14 @@ def test_nothing_sticks_out_and_every_figure_is_there(page: Path, tmp_path: Path
     assert "<title>wide: broken:0 images:6</title>" in shown
 
 
+def test_what_is_wider_than_a_small_screen_says_that_it_scrolls(page: Path) -> None:
+    text = page.read_text(encoding="utf-8")
+    (sign,) = re.findall(r"@media \(max-width: 40rem\) \{\s*([^{]*)\{ content: \"([^\"]*)\"", text)
+    assert "scroll" in sign[1]
+    assert "figcaption::after" in sign[0]
+    assert ".wide caption" in sign[0]
+
+
 def test_the_page_is_painted_in_more_than_two_colours(page: Path, tmp_path: Path) -> None:
     picture = tmp_path / "report.png"
     browse(page, tmp_path, f"--screenshot={picture}", "--window-size=1280,3000")

@@ -15,11 +15,6 @@ MANY = 200
 """More people than this are drawn as histograms: points and lines would be a grey wall."""
 
 
-def drawn_as(people: int) -> str:
-    """What stands for the participants, for the note under a figure."""
-    return "shaded: histograms over participants" if people > MANY else "points and thin lines: participants"
-
-
 def places(people: int, half_width: float, gap: float = 0.0) -> FloatArray:
     """Where a column's people stand, left and right of its centre, which `gap` keeps free for a whisker.
 

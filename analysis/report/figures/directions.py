@@ -15,7 +15,7 @@ from matplotlib.lines import Line2D
 
 from analysis.core.arrays import FloatArray
 from analysis.core.detection import yes_no
-from analysis.report.figures.crowd import MANY, draw_histogram, draw_mean, draw_points, drawn_as, places
+from analysis.report.figures.crowd import MANY, draw_histogram, draw_mean, draw_points, places
 from analysis.report.figures.names import people, wrapped
 from analysis.report.figures.style import (
     BLACK,
@@ -174,7 +174,4 @@ def _explain(figure: Figure, found: Statistics) -> None:
         for (direction, marker), fill in zip(DIRECTION_MARKERS.items(), (BLACK, "white"), strict=True)
     ]
     figure.legend(handles=handles, loc="outside upper right", ncols=2, frameon=False, fontsize=8.5)
-    crowd = drawn_as(found["n"])
-    if found["n"] > MANY:
-        crowd += ", forward left, backward right in (a)"
-    figure.supxlabel(f"large marks and whiskers: mean and SD; {crowd}\n({people(found)})", fontsize=8.0)
+    figure.supxlabel(people(found), fontsize=8.0)

@@ -12,7 +12,7 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.colors import to_rgba
 
-from analysis.report.figures.crowd import MANY, draw_histogram, draw_mean, draw_points, drawn_as, places
+from analysis.report.figures.crowd import MANY, draw_histogram, draw_mean, draw_points, places
 from analysis.report.figures.names import people, stars, wrapped
 from analysis.report.figures.style import (
     BLACK,
@@ -94,8 +94,7 @@ def _draw_panel(axes: Axes, panel: _Panel, found: Statistics, letter: str) -> No
     axes.set_yticks(np.linspace(0.0, panel.top, 6))
     bounded(axes, 0.0, panel.top)
     axes.set_xticks(range(len(methods)), [wrapped(method) for method in methods])
-    note = f"bars: mean and SD; {drawn_as(found['n'])}\n({people(found)})"
-    axes.set_xlabel(note, fontsize=8.0, labelpad=8.0)
+    axes.set_xlabel(people(found), fontsize=8.0, labelpad=8.0)
     axes.set_ylabel(panel.label)
     axes.set_title(f"({letter}) {panel.title}", loc="left", fontweight="bold")
 

@@ -186,12 +186,12 @@ def _limit_points(axes: Axes, trade: Statistics) -> None:
 
 
 def _join(axes: Axes, columns: Sequence[tuple[float, Sequence[float]]], shares: Sequence[float]) -> None:
-    """Lines through equal quantiles in the order of their probabilities; the first and the last are named."""
+    """Lines through equal quantiles in the order of their probabilities, each named."""
     ordered = sorted(columns, key=lambda column: column[0])
     for k, share in enumerate(shares):
         heights = [quantiles[k] for _, quantiles in ordered]
         axes.plot([probability for probability, _ in ordered], heights, color="#999999", linewidth=0.8, zorder=2.0)
-        if heights and k in (0, len(shares) - 1):
+        if heights:
             axes.annotate(
                 f"{100.0 * share:.0f} %",
                 xy=(ordered[-1][0], heights[-1]),
