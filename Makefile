@@ -22,6 +22,7 @@ test: full
 # The full figures of every promise, kept as tables under results/soak/
 soak: full
 	scripts/system-packages
+	rm -f results/soak/*.md
 	PATH="$(CURDIR)/.venv/bin:$$PATH" .venv/bin/pytest -m soak --durations 10
 
 # The locks, from pyproject.toml

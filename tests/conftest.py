@@ -74,15 +74,27 @@ Soak = Callable[..., None]
 SOAK_FOLDER = Path(__file__).parent.parent / "results" / "soak"
 
 
+def table_rows(table: Path) -> list[tuple[str, ...]]:
+    """The rows of a table of figures, as they are kept; none if there is no table."""
+    lines = table.read_text(encoding="utf-8").splitlines() if table.exists() else []
+    return [tuple(line.removeprefix("| ").removesuffix(" |").split(" | ")) for line in lines if line[:1] == "|"][2:]
+
+
 @pytest.fixture(scope="module")
 def soak(request: pytest.FixtureRequest) -> Iterator[Soak]:
-    """Keeps measured figures: `soak(promise, figure, bound, detail)`; a module's become its table in results/soak/."""
+    """Keeps measured figures: `soak(promise, figure, bound, detail)`; a module's become its table in results/soak/.
+
+    Where only some are measured anew, the table keeps the others.
+    """
     rows: list[tuple[str, ...]] = []
     yield lambda *cells: rows.append(tuple(map(str, cells)))
     name = request.module.__name__.removeprefix("tests.test_soak_")
     machine = f"Python {platform.python_version()}, {platform.system()} {platform.machine()}, {os.cpu_count()} cores"
     header = ["| promise | figure | bound | how |", "| --- | --- | --- | --- |"]
+    table = SOAK_FOLDER / f"{name}.md"
+    measured = {row[0] for row in rows}
+    rows[:0] = [row for row in table_rows(table) if row[0] not in measured]
     lines = [f"# {name.capitalize()}", "", f"Made by `make soak` on {machine}.", "", *header]
     lines += [f"| {' | '.join(row)} |" for row in rows]
     SOAK_FOLDER.mkdir(parents=True, exist_ok=True)
-    (SOAK_FOLDER / f"{name}.md").write_text("\n".join(lines) + "\n", encoding="utf-8")
+    table.write_text("\n".join(lines) + "\n", encoding="utf-8")
