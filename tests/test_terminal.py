@@ -54,9 +54,10 @@ def test_experiment_1_from_the_first_hand_over_to_the_table(short_configs: Path,
             screen.type("f" if trial % 2 else "B")
             screen.wait_for("Saved.", trial + 1)
             if trial in (3, 7):
-                screen.wait_for("Break between sessions: 60 s", 1 + (trial == 7))
+                second = trial == 7
+                screen.wait_for("Break between sessions: 60 s", 3 if second else 1)  # what is refused says it anew
                 screen.type("skip")
-                screen.wait_for("type `skip` and the reason")
+                screen.wait_for("type `skip` and the reason", 2 if second else 1)
                 screen.type("skip fire drill")
             if trial == 0:  # one prompt more was shown for the answer that was none
                 screen.seen = screen.seen.replace("b = backward:", "", 1)
