@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from typing import Literal
 
 Theme = Literal["dark", "light"]
@@ -78,59 +77,55 @@ def _with_mood(mood: str) -> str:
     return ", ".join(f'QLabel{name}[mood="{mood}"]' for name in ("", "#saved", "#quiet", "#title", "#damper"))
 
 
-def sheet(theme: Theme, scale: float = 1.0) -> str:
-    """The Qt style sheet of a theme; type and padding grow and shrink with `scale`."""
+def sheet(theme: Theme) -> str:
+    """The Qt style sheet of a theme, in the sizes of the window that it was designed for."""
     c = _COLOURS[theme]
     moods = "\n".join(f"{_with_mood(mood)} {{ color: {c[mood]}; }}" for mood in MOODS)
     bands = "\n".join(
         f'QLabel#band[mood="{band}"] {{ background: {c[band]}; color: {c[f"{band}_text"]}; }}' for band in BANDS
     )
-
-    def px(size: float) -> str:
-        return f"{max(1, round(size * scale))}px"
-
     return f"""
-    QWidget {{ background: {c["ground"]}; color: {c["text"]}; font-size: {px(17)};
+    QWidget {{ background: {c["ground"]}; color: {c["text"]}; font-size: 17px;
         font-family: "DejaVu Sans", "Noto Sans"; }}
     {moods}
     {bands}
-    {_labels_and_buttons(c, px)}
-    {_fields_and_lists(c, px)}
+    {_labels_and_buttons(c)}
+    {_fields_and_lists(c)}
     """
 
 
-def _labels_and_buttons(c: dict[str, str], px: Callable[[float], str]) -> str:
+def _labels_and_buttons(c: dict[str, str]) -> str:
     return f"""
     QFrame#panel {{ background: {c["panel"]}; border: 1px solid {c["line"]}; border-radius: 8px; }}
     QFrame#panel QLabel, QFrame#panel QCheckBox, QWidget#form {{ background: transparent; }}
-    QLabel#place {{ font-size: {px(22)}; color: {c["quiet"]}; }}
-    QLabel#band {{ font-size: {px(20)}; font-weight: bold; padding: {px(4)} {px(10)}; border-radius: 4px; }}
-    QLabel#quiet {{ font-size: {px(18)}; color: {c["quiet"]}; }}
-    QLabel#saved {{ font-size: {px(22)}; color: {c["good"]}; }}
+    QLabel#place {{ font-size: 22px; color: {c["quiet"]}; }}
+    QLabel#band {{ font-size: 20px; font-weight: bold; padding: 4px 10px; border-radius: 4px; }}
+    QLabel#quiet {{ font-size: 18px; color: {c["quiet"]}; }}
+    QLabel#saved {{ font-size: 22px; color: {c["good"]}; }}
     QPushButton {{ background: {c["panel"]}; border: 2px solid {c["line"]}; border-radius: 8px;
-        padding: {px(6)} {px(4)}; font-size: {px(16)}; }}
+        padding: 6px 4px; font-size: 16px; }}
     QPushButton:focus {{ border: 3px solid {c["act"]}; }}
     QPushButton:hover {{ border-color: {c["act"]}; }}
     QPushButton:disabled, QPushButton[dim="yes"] {{ color: {c["dim"]}; border-style: dashed; }}
-    QPushButton#large {{ font-size: {px(26)}; font-weight: bold; padding: {px(8)} {px(4)}; }}
-    QPushButton#stop {{ background: {c["stop"]}; color: {c["stop_text"]}; font-weight: bold; font-size: {px(22)};
-        padding: {px(14)} {px(6)}; }}
+    QPushButton#large {{ font-size: 26px; font-weight: bold; padding: 8px 4px; }}
+    QPushButton#stop {{ background: {c["stop"]}; color: {c["stop_text"]}; font-weight: bold; font-size: 22px;
+        padding: 14px 6px; }}
     """
 
 
-def _fields_and_lists(c: dict[str, str], px: Callable[[float], str]) -> str:
+def _fields_and_lists(c: dict[str, str]) -> str:
     return f"""
     QLineEdit, QDoubleSpinBox, QSpinBox, QComboBox {{ background: {c["panel"]}; border: 2px solid {c["line"]};
-        border-radius: 6px; padding: {px(8)}; font-size: {px(24)}; }}
+        border-radius: 6px; padding: 8px; font-size: 24px; }}
     QLineEdit:focus, QDoubleSpinBox:focus, QSpinBox:focus, QComboBox:focus {{ border: 3px solid {c["act"]}; }}
     QProgressBar {{ border: 1px solid {c["line"]}; border-radius: 6px; text-align: center; background: {c["panel"]};
-        color: {c["text"]}; min-height: {px(24)}; }}
+        color: {c["text"]}; min-height: 24px; }}
     QProgressBar::chunk {{ background: {c["filled"]}; }}
     QCheckBox::indicator {{ width: 22px; height: 22px; border: 2px solid {c["line"]}; border-radius: 4px; }}
     QCheckBox::indicator:checked {{ background: {c["act"]}; }}
     QCheckBox:focus {{ color: {c["act"]}; }}
     QListWidget, QTableWidget, QPlainTextEdit {{ background: {c["panel"]}; border: 1px solid {c["line"]};
-        font-size: {px(19)}; }}
+        font-size: 19px; }}
     QPlainTextEdit {{ font-family: "DejaVu Sans Mono", monospace; }}
     QListWidget::item:selected, QTableWidget::item:selected {{ background: {c["act"]}; color: {c["ground"]}; }}
     QHeaderView::section {{ background: {c["ground"]}; color: {c["quiet"]}; border: none; padding: 6px; }}

@@ -43,7 +43,7 @@ from experiments.screens.console.pace import Pace, progress
 from experiments.screens.console.side import Side
 from experiments.screens.console.text_fields import TextFields
 from experiments.screens.console.view import About, Seen
-from experiments.screens.console.windows import remember
+from experiments.screens.console.windows import remember, scaled
 from experiments.screens.texts import saved_text
 from experiments.states import Position, State
 from experiments.steps import Failed, Rated, Rested
@@ -291,7 +291,7 @@ class ConsoleWindow(QMainWindow):
             self._restyle()
 
     def _restyle(self) -> None:
-        self.setStyleSheet(theme.sheet(self.theme, self._scale))
+        self.setStyleSheet(scaled(theme.sheet(self.theme), self._scale))
 
     def showEvent(self, event: QShowEvent | None) -> None:  # noqa: N802 - Qt's name
         """Hear the keys before any widget does."""
