@@ -59,6 +59,8 @@ def open_gun(
     >>> gun.fire(Shot(method="vibration", direction="forward", drive=Effect(effect=1))).motion
     'rendered'
     """
+    if not isinstance(address, str):
+        raise ValueError(f'address is {address!r}; it must be text: "simulated" or "serial:PORT"')
     if address.startswith("serial:"):
         return _serial(address, parameters, clock)
     if address != "simulated":
@@ -74,9 +76,12 @@ def _serial(address: str, parameters: GunParameters | Mapping[str, Method] | Non
 
 def _methods(parameters: GunParameters | Mapping[str, Method] | None) -> Mapping[str, Method]:
     from device.methods import paper_methods  # noqa: PLC0415 - importing the words alone stays cheap
+    from device.parameters import GunParameters  # noqa: PLC0415
 
     if isinstance(parameters, Mapping):
         return parameters
+    if not isinstance(parameters, GunParameters | None):
+        raise ValueError(f"parameters is {parameters!r}; it must be a gun, or rendering methods by name")
     return paper_methods() if parameters is None else paper_methods(parameters)
 
 

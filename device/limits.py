@@ -9,8 +9,9 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from itertools import chain
 
-from device.words import Drive, LimitError, Pulse
+from device.words import Drive, Effect, LimitError, Pulse, is_finite, is_whole_number, shown
 
 MAX_DUTY = 0.10
 """Of any second: the paper's drive, 10 ms in 100 ms."""
@@ -42,25 +43,30 @@ class Load:
 
     def __post_init__(self) -> None:
         for name, value in (("on_s", self.on_s), ("heat_J", self.heat_J)):
-            if not 0 <= value < math.inf:
-                raise LimitError(f"{name} is {value}; it must be a finite number of at least 0")
+            if not (is_finite(value) and value >= 0):
+                raise LimitError(f"{name} is {shown(value)}; it must be a finite number of at least 0")
 
 
 def planned_start_s(now_s: float, at_s: float | None) -> float:
     """When a shot starts that is asked for now: at a time, or at once. `LimitError`: a time too far ahead, or none."""
+    _tick("now_s", now_s)
     if at_s is None:
         return now_s
-    if not at_s - now_s <= MAX_AHEAD_S:  # NaN compares false, so it is refused as well
+    _tick("at_s", at_s)
+    if at_s - now_s > MAX_AHEAD_S:
         raise LimitError(f"at_s is {at_s - now_s:.6f} s ahead; it must be at most {MAX_AHEAD_S:g} s ahead")
     return max(now_s, at_s)
 
 
 def load_of(drive: Drive, resistance_ohm: float) -> Load:
     """The load of a drive. Heat is V^2/R over the pulse, an upper bound; a vibration does not use the coil."""
-    if not isinstance(drive, Pulse):
+    if not isinstance(drive, Pulse | Effect):
+        raise LimitError(f"drive is {drive!r}; it must be a Pulse or an Effect")
+    if isinstance(drive, Effect):
         return Load(on_s=0.0, heat_J=0.0)
-    if not resistance_ohm > 0:
-        raise LimitError(f"resistance_ohm is {resistance_ohm}; it must be above 0 to estimate the coil's heat")
+    if not (is_finite(resistance_ohm) and resistance_ohm > 0):
+        shown_ohm = shown(resistance_ohm)
+        raise LimitError(f"resistance_ohm is {shown_ohm}; it must be finite and above 0 to estimate the coil's heat")
     return Load(on_s=drive.pulse_s, heat_J=drive.voltage_V**2 / resistance_ohm * drive.pulse_s)
 
 
@@ -76,6 +82,13 @@ class DriveHistory:
     ready_tick: int | None = None
     warmth_K: float = 0.0
     warmth_tick: int = 0
+
+    def __post_init__(self) -> None:
+        ticks = (self.warmth_tick, *(() if self.ready_tick is None else (self.ready_tick,)), *chain(*self.pulses))
+        if not all(map(is_whole_number, ticks)):
+            raise LimitError("a history of shots counts in whole microseconds")
+        if not (is_finite(self.warmth_K) and self.warmth_K >= 0):
+            raise LimitError(f"warmth_K is {shown(self.warmth_K)}; it must be a finite number of at least 0")
 
     def earliest_s(self, load: Load) -> float:
         """The earliest time at which `load` may start, -inf if nothing was fired yet, inf if never.
@@ -161,8 +174,8 @@ class DriveHistory:
 
 
 def _tick(name: str, time_s: float) -> int:
-    if not math.isfinite(time_s):
-        raise LimitError(f"{name} is {time_s}; it must be a finite time in seconds")
+    if not is_finite(time_s):
+        raise LimitError(f"{name} is {shown(time_s)}; it must be a finite time in seconds")
     return round(time_s * _TICKS)
 
 

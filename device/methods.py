@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 from functools import lru_cache
 
 from device.parameters import GunParameters, VibrationParameters
-from device.words import Drive, Effect, LimitError, Pulse
+from device.words import Drive, Effect, LimitError, Pulse, is_finite, shown
 
 Method = GunParameters | VibrationParameters
 
@@ -25,6 +25,10 @@ class Rendering:
     motion: str
     settle_s: float
 
+    def __post_init__(self) -> None:
+        if not (is_finite(self.settle_s) and self.settle_s >= 0):
+            raise ValueError(f"settle_s is {shown(self.settle_s)}; it must be a finite number of at least 0")
+
 
 def paper_methods(gun: GunParameters = _PAPER_GUN) -> dict[str, Method]:
     """The paper's three methods; all but the friction of the two asymmetric ones comes from `gun`."""
@@ -39,6 +43,8 @@ def drive_of(method: Method) -> Drive:
     """The drive that the method's own numbers ask for. `LimitError`: beyond what a command may be."""
     if isinstance(method, VibrationParameters):
         return Effect(effect=method.effect)
+    if not isinstance(method, GunParameters):
+        raise LimitError(f"method is {method!r}; it must be GunParameters or VibrationParameters")
     return Pulse(voltage_V=method.voltage_V, pulse_s=method.pulse_s)
 
 

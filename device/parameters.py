@@ -5,11 +5,10 @@
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass, fields
 from typing import Literal, get_args
 
-from device.words import MAX_EFFECT, is_number, is_whole_number, shown
+from device.words import MAX_EFFECT, is_finite, is_whole_number, shown
 
 DriveOff = Literal["shorted", "open"]
 Emf = Literal["printed", "reciprocal"]
@@ -101,20 +100,12 @@ def _take_numbers(
         if value is None and name in may_be_none:
             continue
         strict = name in above_zero
-        if not (_is_finite(value) and (value > 0 if strict else value >= 0)):
+        if not (is_finite(value) and (value > 0 if strict else value >= 0)):
             raise ValueError(
                 f"{name} is {shown(value)}; it must be a finite number {'above 0' if strict else 'of at least 0'}"
             )
         if type(value) is not float:
             object.__setattr__(parameters, name, float(value))
-
-
-def _is_finite(value: object) -> bool:
-    """Whether a value is a number within a float's range."""
-    try:
-        return is_number(value) and math.isfinite(value)
-    except OverflowError:  # a whole number beyond all floats
-        return False
 
 
 def _is_one_of(name: str, value: str, options: tuple[str, ...]) -> None:

@@ -44,6 +44,8 @@ class SimulatedGun:
         self._is_open()
         if not self._armed:
             raise LimitError("the gun is disarmed; arm it before it may fire")
+        if not isinstance(shot, Shot):
+            raise LimitError(f"shot is {shot!r}; it must be a Shot")
         method = self._method(shot.method)
         rendering = rendering_of(method, shot.drive)
         load = _load(method, shot)

@@ -6,6 +6,7 @@ and no config can lift the limit.
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from numbers import Integral, Real
 from typing import Literal, Protocol, TypeGuard, get_args
@@ -40,6 +41,18 @@ def is_number(value: object) -> TypeGuard[float]:
     (True, False, False)
     """
     return type(value) is float or (isinstance(value, Real) and not isinstance(value, bool))
+
+
+def is_finite(value: object) -> TypeGuard[float]:
+    """Whether a value is a number within a float's range.
+
+    >>> is_finite(1), is_finite(float("nan")), is_finite(10**400), is_finite(None)
+    (True, False, False, False)
+    """
+    try:
+        return is_number(value) and math.isfinite(value)
+    except OverflowError:  # a whole number beyond all floats
+        return False
 
 
 def is_whole_number(value: object) -> TypeGuard[int]:

@@ -96,16 +96,23 @@ def refusal(person: Participant, entered: Entered, facts: Facts, rules: Eligibil
             "another experiment or another code."
         )
     if missing:
-        return f"Not given: {', '.join(missing)}; the study asks for it (eligibility.ask)."
+        return f"The study asks for what was not given: {', '.join(map(fact_text, missing))}."
     if reasons:
-        return f"{code} is not eligible: {'; '.join(reasons)}. Correct what was entered, or use another code."
+        return f"{code} is not eligible: {'; '.join(reasons)}. Correct what was entered, or let somebody else come."
     return ""
+
+
+def fact_text(name: str) -> str:
+    """A fact of a person as people call it: `age_years` is an age."""
+    return name.removesuffix("_years")
 
 
 def read_back_refusal(entered: Entered) -> str:
     """Why the code is not sure yet; empty if it is."""
     if not entered.participant_id:
         return "Type the participant's code, and read it back."
-    if entered.participant_id != entered.read_back:
+    if not entered.read_back:
         return "Read the code back: type it a second time, just as it stands above."
+    if entered.participant_id != entered.read_back:
+        return f"The two codes differ: {entered.participant_id} and {entered.read_back}. Type the second one again."
     return ""

@@ -173,12 +173,16 @@ class EmergencyStop:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ParticipantKey:
-    """A key of the participant's own; `step` is the number of the step that asked, `at_s` when it went down."""
+    """A key of the participant's own; `step` is the number of the step that asked, `at_s` when it went down.
+
+    `typed`: a line or a page was open on the console, which may have been what the key was for.
+    """
 
     response: Direction
     at_s: float
     step: int
     by: OwnHand = "participant"
+    typed: bool = False
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -318,6 +322,9 @@ ACTS: tuple[type[Event], ...] = (
     Correct,
 )
 """What carries the run on: by the experimenter's hand it counts only for the screen on which its press began."""
+
+TYPED: tuple[type[Event], ...] = (Flag, Note, Reason)
+"""What is typed in a line that lay over what stands there: its Enter is not to act a second time."""
 
 DISARMS: tuple[type[Event], ...] = (Pause, Stop, EmergencyStop, ParticipantLost, DisplayLost, ResultsGone)
 """What has the gun disarmed at once, beside the run, where it may be armed; the emergency stop everywhere."""

@@ -79,6 +79,7 @@ class Journal:
         self._length = before.whole_bytes if before else 0
         self._link = before.link if before else ""
         self._synced_s: float | None = None
+        self._gone = ""
         self._writer = ThreadPoolExecutor(max_workers=1, thread_name_prefix="journal")
 
     @classmethod
@@ -116,6 +117,8 @@ class Journal:
         return self._writer.submit(self._write, {"kind": kind, **times, **body})
 
     def _write(self, record: dict[str, object]) -> None:
+        if self._gone:  # what stands written again is whole: nothing more goes where nobody finds it
+            raise JournalGone(self._gone)
         try:
             line = canonical_json({"n": self._count, "link": self._link, "synced_s": self._synced_s, **record}) + b"\n"
             storage.write_all(self._descriptor, line)
@@ -132,7 +135,8 @@ class Journal:
         self._length += len(line)
         self._link = link(line)
         if not storage.is_at(self._descriptor, self.path):
-            raise JournalGone(self._rescue())
+            self._gone = self._rescue()
+            raise JournalGone(self._gone)
 
     def _rescue(self) -> str:
         """Write a journal again that was deleted, from what is open; where it is now, and what to do."""

@@ -17,7 +17,7 @@ from device import DeviceError, Gun
 from experiments import events
 from experiments.clock import Clock
 from experiments.entries import Entry, entries, fits, repeatable, trial_at, value
-from experiments.events import ACTS, DISARMS, Event, Press
+from experiments.events import ACTS, DISARMS, TYPED, Event, Press
 from experiments.journal import Journal, JournalGone
 from experiments.live_remarks import remark_of
 from experiments.plan import Plan, Trial
@@ -138,6 +138,8 @@ class LiveRun:
             self._pauses.append((before.paused_s, self.clock.now()))
         if self._position.serial != before.serial:
             self._painted_s = None
+        elif self._painted_s is not None and isinstance(event, TYPED):  # a second Enter is not for what stands behind
+            self._painted_s = self.clock.now()
         if self._position.base not in (before.base, State.HALTED, State.STOPPED):
             self._inbox.append(event)
         self._news.notify_all()
@@ -281,10 +283,8 @@ class LiveRun:
     def _impossible(self, event: Event) -> str:
         """What the table cannot know: what a key was for, whether there is anything to undo or to repeat."""
         match event:
-            case events.ParticipantKey() | events.ParticipantRated() if event.step != self._position.number:
-                return "It was the answer to an earlier question."
-            case events.ParticipantKey(at_s=at_s) if not self._counts(at_s):
-                return "It went down before the stimulus, or in a pause."
+            case events.ParticipantKey() | events.ParticipantRated():
+                return self._not_asked(event)
             case events.Correct() if (entry := self._position.correcting) is not None and not fits(entry, event.value):
                 return f"That is no {entry.what}."
             case events.Undo() if self._further_back() is None:
@@ -297,6 +297,16 @@ class LiveRun:
                 return f"Hold it for {REARM_HELD_S:g} s."
             case _:
                 return ""
+
+    def _not_asked(self, event: events.ParticipantKey | events.ParticipantRated) -> str:
+        """Why what the participant did is no answer to what is asked."""
+        if event.step != self._position.number:
+            return "It was the answer to an earlier question."
+        if not isinstance(event, events.ParticipantKey):
+            return ""
+        if event.typed:
+            return "It went into what is open on the console: leave that (Esc), then have it pressed again."
+        return "" if self._counts(event.at_s) else "It went down before the stimulus, or in a pause."
 
     def _counts(self, at_s: float) -> bool:
         """Whether a key of the participant's that went down at a time was for the stimulus."""
@@ -354,7 +364,8 @@ class LiveRun:
         if error is None:
             self._screen.acknowledge(None, remark)
             return
-        self._screen.trouble(str(error))
+        text = getattr(remark, "text", "")
+        self._screen.trouble(f"{error}. Not saved: “{text}”" if text else str(error))
         if isinstance(error, JournalGone):
             self.offer(events.ResultsGone(cause=str(error)))
 

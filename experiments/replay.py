@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 from pydantic import ValidationError
 
 from experiments.journal import Contents, JournalError
 from experiments.remarks import Halted, Remark, TestShot, remark_from
+from experiments.states import EMERGENCY
 from experiments.steps import (
     Ask,
     Fire,
@@ -30,21 +31,24 @@ from experiments.tables import Told
 class Standing:
     """Where a run stands: its next step, `None` at the end, and what was told before.
 
-    `halted`: an emergency stop ended it, and no test shot was fired since.
+    `halted`: an emergency stop ended it, and no test shot was fired since; one must come before anything else.
     """
 
     step: Step | None
     told: Told = ()
-
-    @property
-    def halted(self) -> bool:
-        """Whether a test shot must come before anything else."""
-        last = [word for _, word in self.told if isinstance(word, Halted) or _went_well(word)]
-        return bool(last) and isinstance(last[-1], Halted)
+    halted: bool = False
 
 
-def _went_well(word: Outcome | Remark) -> bool:
-    return isinstance(word, TestShot) and not word.cause
+def _halted(contents: Contents) -> bool:
+    """Whether the last word on it is an emergency stop: its record, or, where the disk took none, the stop's reason."""
+    halted = False
+    for entry in contents.records:
+        word = _read(contents, entry, remark_from) if entry["kind"] == "remark" else None
+        if isinstance(word, Halted) or (entry["kind"] == "stopped" and entry.get("reason") == EMERGENCY):
+            halted = True
+        elif isinstance(word, TestShot) and not word.cause:
+            halted = False
+    return halted
 
 
 def told(contents: Contents) -> Told:
@@ -77,7 +81,7 @@ def replay(session: Session, contents: Contents) -> Standing:
     for number, (recorded, outcome) in enumerate(done, start=1):
         _compare(contents, number, step, recorded)
         step = _send(session, outcome)
-    return Standing(step=step, told=tale)
+    return Standing(step=step, told=tale, halted=_halted(contents))
 
 
 def go_on(session: Session, contents: Contents, standing: Standing, append: Callable[..., None]) -> Standing:
@@ -94,7 +98,7 @@ def go_on(session: Session, contents: Contents, standing: Standing, append: Call
     felt = isinstance(step, Ask) or (announced and isinstance(step, Fire | Present))
     outcome = Interrupted(presented=felt)
     append("outcome", body=record(outcome))
-    return Standing(step=_send(session, outcome), told=[*standing.told, (step, outcome)])
+    return replace(standing, step=_send(session, outcome), told=[*standing.told, (step, outcome)])
 
 
 def _last_step_is_open(contents: Contents) -> bool:

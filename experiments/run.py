@@ -17,6 +17,7 @@ from device import Gun, open_gun
 from experiments import catalogue, limits, orders, places, register, replay, storage
 from experiments.clock import Clock
 from experiments.columns import FILE_SUFFIX, LATER
+from experiments.dates import date_text
 from experiments.journal import Contents, Journal, JournalError, hold, is_empty
 from experiments.journal import read as read_journal
 from experiments.live_run import LiveRun, RunStopped
@@ -127,6 +128,11 @@ def _open_gun(request: Request, clock: Clock) -> Gun:
 def _before(where: Place, request: Request, clock: Clock) -> Contents | None:
     """The unfinished run to go on with, if there is one and it is wanted."""
     if not where.journal.exists():
+        if request.again == "resume":
+            raise PlaceError(
+                f"{where.journal}: there is no run of {where.experiment} by {where.participant_id} to resume here; "
+                "look at --results, or leave out --resume to begin one"
+            )
         return None
     if request.again == "fresh" or request.practice or is_empty(where.journal):
         _refuse_finished(where, _readable(where))
@@ -167,7 +173,7 @@ def _unfinished(where: Place, contents: Contents) -> str:
     last = contents.records[-1]
     return (
         f"participant {where.participant_id} has an unfinished run of {where.experiment}, stopped at "
-        f"{last['utc']} after record {last['n']}: {where.journal}; "
+        f"{date_text(str(last['utc']))} after record {last['n']}: {where.journal}; "
         "--resume goes on with it, --fresh sets it aside and starts anew"
     )
 
@@ -226,7 +232,7 @@ def _refuse_changes(request: Request, before: Contents) -> None:
         given_back = f"`recoil configs --from {shlex.quote(str(before.path))} --copy DIR`"
         raise PlaceError(
             f"{before.path}: the run began with another config or gun file (setup {began[:12]}, now {now[:12]}); "
-            f"resume with the files it began with, which {given_back} gives back, or start anew with --fresh"
+            f"resume with the files it began with, which {given_back} gives back, or start anew (--fresh)"
         )
     seed = before.header["plan"]["seed"]
     if request.seed is not None and request.seed != seed:

@@ -138,6 +138,8 @@ class _Runner:
 
     def _prepare(self, step: Prepare) -> Prepared | Repeat:
         to_be_set = step.damper not in ("", self._damper)
+        if to_be_set:
+            self._damper = ""  # it may be set by now, or not: known again when that is said
         self._live.enter(State.SETTING if to_be_set else State.PREPARING, step)
         while True:
             match self._live.wait():

@@ -84,8 +84,8 @@ BACK, STAY, BENEATH = Back(), Stay(), Beneath()
 
 WHY_NOT: dict[State, str] = {
     S.SAVING: "One moment: the last step is being saved.",
-    S.REARMING: "After an emergency stop a test shot comes first: hold T for a second.",
-    S.SETTING: "Set the damper first, and confirm it with M.",
+    S.REARMING: "After an emergency stop a test shot comes first.",
+    S.SETTING: "Set the damper first, and confirm it.",
     S.PREPARING: "Nothing was fired yet.",
     S.FIRING: "The shot is on its way.",
     S.TRAIN: "The gun is firing until the participant says next.",
@@ -93,10 +93,10 @@ WHY_NOT: dict[State, str] = {
     S.RATING: "The rating is awaited.",
     S.DESCRIBING: "The description is awaited.",
     S.RESTING: "It is a break.",
-    S.CLOSING: "Everything is answered: Enter ends the run.",
-    S.PAUSED: "The run is paused: P goes on.",
-    S.CORRECTING: "A correction is open: enter it, or leave it with Esc.",
-    S.HALTED: "After the emergency stop nothing fires in this run: close it with Q, then resume it.",
+    S.CLOSING: "Everything is answered: the run can be ended.",
+    S.PAUSED: "The run is paused: go on first.",
+    S.CORRECTING: "A correction is open: enter it, or leave it.",
+    S.HALTED: "After the emergency stop nothing fires in this run: close it, then resume it.",
     S.STOPPED: "The run has ended.",
 }
 """Why something does not happen, where no better reason is known."""
@@ -124,9 +124,9 @@ _ROWS: dict[type[Event], dict[State, Change]] = {
     events.Pause: {
         **_each(_STEPS, Over(S.PAUSED)),
         **_each(ARMED, Over(S.PAUSED, under=S.SAVING)),
-        S.CORRECTING: No("Nothing fires while a correction is open; leave it with Esc, then pause."),
-        S.CLOSING: No("Everything is answered, so there is nothing to hold: Enter ends the run."),
-        S.PAUSED: No("The run is paused already: P goes on."),
+        S.CORRECTING: No("Nothing fires while a correction is open; leave it, then pause."),
+        S.CLOSING: No("Everything is answered, so there is nothing to hold: the run can be ended."),
+        S.PAUSED: No("The run is paused already."),
     },
     events.GoOn: {**_each(_LIVE, No(_NOT_HELD)), S.PAUSED: BACK},
     events.Undo: {
@@ -161,7 +161,7 @@ _ROWS: dict[type[Event], dict[State, Change]] = {
     },
     events.ParticipantBack: _each(_LIVE, STAY),
     events.DisplayLost: _each(_LIVE, To(S.STOPPED)),
-    events.ResultsGone: _each(_LIVE, To(S.STOPPED)),
+    events.ResultsGone: {**_each(_LIVE, To(S.STOPPED)), S.HALTED: STAY},
 }
 
 TABLE: dict[type[Event], dict[State, Change]] = {
@@ -300,6 +300,8 @@ def why_after(before: Position, event: Event) -> str | None:
             return event.reason
         case events.DisplayLost():
             return "the display was lost"
+        case events.ResultsGone() if before.base is State.HALTED:
+            return None
         case events.ParticipantLost() | events.ResultsGone():
             return event.cause
         case events.Pause() | events.GoOn() | events.ParticipantBack():

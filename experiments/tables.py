@@ -11,7 +11,21 @@ from typing import TypeVar
 from experiments import columns
 from experiments.plan import Trial
 from experiments.remarks import AnswerCorrected, DescriptionCorrected, Flagged, Noted, RatingCorrected, Remark
-from experiments.steps import Failed, Fire, Fired, Interrupted, Outcome, Present, Presented, Repeat, Step, trial_of
+from experiments.steps import (
+    Answered,
+    Described,
+    Failed,
+    Fire,
+    Fired,
+    Interrupted,
+    Outcome,
+    Present,
+    Presented,
+    Rated,
+    Repeat,
+    Step,
+    trial_of,
+)
 
 Row = dict[str, object]
 Word = TypeVar("Word")
@@ -79,10 +93,23 @@ def _flags(story: Story) -> list[str]:
         "interrupted": any(one.presented and one.cause == "break-off" for one in story.all(Interrupted)),
         "paused": any(one.presented and one.cause == "pause" for one in story.all(Interrupted)),
         "repeated": story.repeated,
-        "corrected": bool(story.all(AnswerCorrected) or story.all(RatingCorrected) or story.all(DescriptionCorrected)),
+        "corrected": any(_is_corrected(story, given) for given in _CORRECTIONS),
     }
     own = [remark.flag for remark in story.all(Flagged)]
     return list(dict.fromkeys([flag for flag, there in found.items() if there] + own))
+
+
+_CORRECTIONS: dict[type[Outcome], type[Remark]] = {
+    Answered: AnswerCorrected,
+    Rated: RatingCorrected,
+    Described: DescriptionCorrected,
+}
+
+
+def _is_corrected(story: Story, given: type[Outcome]) -> bool:
+    """Whether what counts is a correction: what was entered anew, because its trial was presented again, is none."""
+    both = [word for word in story.words if isinstance(word, (given, _CORRECTIONS[given]))]
+    return bool(both) and not isinstance(both[-1], given)
 
 
 def table_bytes(experiment: str, rows: Iterable[Row], without: Sequence[str] = ()) -> bytes:

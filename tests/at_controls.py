@@ -31,9 +31,10 @@ from experiments.replay import told
 from experiments.run import Finished, Request, run, table
 from experiments.screen import Screen
 from experiments.screens.console import overview, theme, view
-from experiments.screens.console.controls import Controls, Field
+from experiments.screens.console.controls import Controls
 from experiments.screens.console.keys import Name, Presses
 from experiments.screens.console.messages import Ended, GunSeen
+from experiments.screens.console.needs import Field
 from experiments.screens.console.view import About, Seen
 from experiments.setup import Setup
 from experiments.states import Position, State

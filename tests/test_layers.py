@@ -34,7 +34,7 @@ PURE = {
         "study",
         "tables",
         "toml_text",
-        "screens.console.dates",
+        "dates",
         "screens.console.people",
     },
 }

@@ -8,7 +8,7 @@ from zoneinfo import ZoneInfo
 
 import pytest
 
-from experiments.screens.console.dates import date_text, time_text
+from experiments.dates import date_text, time_text
 from experiments.screens.console.people import cell_text, coming_text, note_text, remark, stopped_text
 from experiments.standings import Overview
 from experiments.study import Next, Participant, RunStanding, State

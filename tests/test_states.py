@@ -166,6 +166,9 @@ def test_a_stop_a_lost_display_and_lost_results_end_a_run_from_everywhere() -> N
     for stack in REACHED:
         for kind in (events.Stop, events.DisplayLost, events.ResultsGone):
             later = after_on(stack, kind)
+            if kind is events.ResultsGone and stack == (S.HALTED,):  # that there was an emergency stop stays to be seen
+                assert later == stack
+                continue
             assert isinstance(later, No) if stack == (S.STOPPED,) else later == (S.STOPPED,)
 
 

@@ -16,6 +16,7 @@ from rich.text import Text
 
 from experiments import enrolment
 from experiments.clock import RealClock
+from experiments.dates import date_text
 from experiments.places import PlaceError
 from experiments.standings import Overview, StudyFolder, open_study, overview
 from experiments.study import Facts, Participant, RunStanding, eligible
@@ -155,14 +156,9 @@ def _cells(found: Found, one: Participant) -> Iterator[str]:
 
 
 def _state(run: RunStanding) -> str:
-    counts = f", {run.answered} of {run.planned} trials, last record {_minute(run.last_utc)}"
+    counts = f", {run.answered} of {run.planned} trials, last record {date_text(run.last_utc)}"
     lines = [f"{run.state}{counts if run.state in _UNDER_WAY and run.planned else ''}", " > ".join(run.methods)]
     return "\n".join(filter(None, [*lines, "practice done" if run.practised else ""]))
-
-
-def _minute(utc: str) -> str:
-    """Date and time to the minute: `2026-03-01 09:30 UTC`."""
-    return f"{utc[:16].replace('T', ' ')} UTC"
 
 
 def _count_lines(found: Found) -> Iterator[str]:

@@ -38,14 +38,15 @@ if TYPE_CHECKING:
     from experiments.plan import Plan
 
 _DIRECTIONS: dict[str, Direction] = {"f": "forward", "forward": "forward", "b": "backward", "backward": "backward"}
-_HELP = """At any time: `!` is the emergency stop, `stop` and a reason stops. `pause`, `undo`, `repeat` and
+_HELP = """At any time: `!` and Enter is the emergency stop, `stop` and a reason stops. `pause`, `undo`, `repeat` and
 a reason; `flag` and a word, `note` and words. Where words are asked for, put a / in front: /stop, /note ..."""
 _REARMING = (
     "\n  There was an emergency stop. Stand clear: a test shot comes first. Type `test shot` and Enter to fire it: "
 )
 _CLOSING = "\nEverything is answered. `undo` opens the last answer, `note` and `flag` mark.\n  Enter ends the run: "
 _HALTED = (
-    "\n  EMERGENCY STOP. Nothing fires in this run any more.\n"
+    "\n  EMERGENCY STOP. Nothing fires in this run any more. If the gun does not say at once that it is disarmed, "
+    "SWITCH OFF ITS POWER.\n"
     "  Type why, and Enter; Enter alone closes the run, which can be resumed: "
 )
 _COMMANDS = ("stop", "pause", "undo", "repeat", "flag", "note", "skip", "help")
@@ -184,7 +185,7 @@ class TerminalScreen:
 
     def _meant(self, line: str, position: Position, now_s: float) -> Event | str | None:
         """The event that a line means there, or what to say about it."""
-        if line == "!":
+        if line.startswith("!"):
             return events.EmergencyStop()
         word, _, rest = line.removeprefix("/").partition(" ")
         free = position.state in (State.DESCRIBING, State.HALTED) or _corrects_words(position)

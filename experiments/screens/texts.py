@@ -159,6 +159,17 @@ def shots_text(count: int) -> str:
     return f"{count} shot{'' if count == 1 else 's'}"
 
 
+def duration_text(seconds: float) -> str:
+    """A duration as people say it.
+
+    >>> duration_text(45), duration_text(600), duration_text(90)
+    ('45 s', '10 min', '1 min 30 s')
+    """
+    minutes, rest = divmod(round(seconds), 60)
+    parts = [f"{minutes} min"] * (minutes > 0) + [f"{rest} s"] * (rest > 0 or not minutes)
+    return " ".join(parts)
+
+
 def typed_number(text: str, minimum: float, maximum: float) -> float | None:
     """A number as people type it, comma or point, if it lies on the scale.
 

@@ -121,9 +121,8 @@ class Console:
 
     def _open(self, about: About) -> None:
         """Make the window, in Qt's own thread."""
-        restart = self._beside.restart if self._beside is not None else lambda: None
         self.window = ConsoleWindow(
-            about, self._bridge, self._clock, hand=self._hand, restart=restart, observer=self.observer
+            about, self._bridge, self._clock, hand=self._hand, beside=self._beside, observer=self.observer
         )
         self.window.closed.connect(self.closed)
         self._bridge.message.connect(self._ends)

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import threading
 from collections.abc import Callable
+from dataclasses import replace
 from typing import Any
 
 from device.words import Direction
@@ -63,7 +64,9 @@ class ParticipantSide:
         self._tell: Callable[[Message], None] = lambda _: None
         self._shows: Desire = (WAIT,)
         self._serial = -1
-        self._closed = False
+        self._closed = self._starting = False
+        self.covered = False
+        """Whether a line or a page of the console takes what is typed: the participant's keys are not told from it."""
 
     def begin(self, live: LiveRun, tell: Callable[[Message], None]) -> str:
         """Take the place beside a console. Gives back what the record is to say of the noise, if anything."""
@@ -128,19 +131,30 @@ class ParticipantSide:
     def _judged(self, step: Ask, position: Position, wanted: Wanted) -> None:
         onset_s = position.since_s if position.onset_s is None else position.onset_s
         paused = self._live is not None and self._live.paused_between(onset_s, position.since_s)
-        given = self._link.ask_direction(
-            AskDirection(
-                question=step.question,
-                forward=step.forward,
-                backward=step.backward,
-                forward_key="up",
-                backward_key="down",
-                onset_s=position.since_s if paused else onset_s,  # a key in a pause is no answer
-            ),
-            wanted=wanted,
+        question = AskDirection(
+            question=step.question,
+            forward=step.forward,
+            backward=step.backward,
+            forward_key="up",
+            backward_key="down",
+            onset_s=position.since_s if paused else onset_s,  # a key in a pause is no answer
         )
-        key = events.ParticipantKey(response=given.response, at_s=given.pressed_s, step=position.number, by=self._hand)
-        self._offer(key)
+        while wanted() and not self._keyed(question, position, wanted):
+            question = replace(question, onset_s=self._now_s())  # it was refused: the next key counts
+
+    def _keyed(self, question: AskDirection, position: Position, wanted: Wanted) -> bool:
+        """Have the participant press a key; whether it was taken for the answer."""
+        given = self._link.ask_direction(question, wanted=wanted)
+        key = events.ParticipantKey(
+            response=given.response, at_s=given.pressed_s, step=position.number, by=self._hand, typed=self.covered
+        )
+        verdict = self._live.offer(key) if self._live is not None else None
+        if verdict is not None and verdict.text:
+            self._tell(Trouble(text=f"The participant’s key was not taken. {verdict.text}"))
+        return bool(verdict)
+
+    def _now_s(self) -> float:
+        return 0.0 if self._live is None else self._live.clock.now()
 
     def _rated(self, step: Rate, position: Position, wanted: Wanted) -> None:
         config = self._setup.config
@@ -182,22 +196,28 @@ class ParticipantSide:
             self._tell(ParticipantSeen(failure=cause))
             self._offer(events.ParticipantLost(cause=cause))
 
+    @property
+    def lost(self) -> bool:
+        """Whether the program has ended, and is not being started again."""
+        return self._link.failure is not None and not self._starting and not self._closed
+
     def restart(self) -> None:
         """Start the program again, beside everything else; the run ends if that fails."""
+        with self._lock:
+            if not self.lost:
+                return
+            self._starting = True
         threading.Thread(target=self._restart, daemon=True, name="participant again").start()
 
     def _restart(self) -> None:
-        if self._link.failure is None:
-            self._tell(Trouble(text="The participant's screen is there.", mood="good"))
-            return
-        self._tell(Trouble(text="Starting the participant's screen …", mood="wait"))
+        self._tell(Trouble(text="Starting the participant's screen … it takes some seconds.", mood="wait"))
         try:
             link = self._open_link()
         except ParticipantError as error:
             self._offer(events.Stop(reason=f"the participant's screen did not start again: {error}"))
             return
         with self._lock:
-            self._link, self._shows = link, ("",)
+            self._link, self._shows, self._starting = link, ("",), False
         self._tell(ParticipantSeen())
         link.listen(self._heard, self._gone)
         self._tell(Trouble(text="The participant's screen is there again.", mood="good"))

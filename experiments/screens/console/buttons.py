@@ -72,7 +72,7 @@ class Buttons:
 
         `over`: the run has ended; `letters`: letters are text, commands take Ctrl as well.
         """
-        shown = set[str]() if over else set(_shown(position))
+        shown = set[str]() if over else set(_shown(position, screen_lost=not idle("restart")))
         self.slots.show_only({button for name, button in self._large.items() if name in shown})
         for name, button in self._large.items():
             button.label("End the run" if name == "enter" else "", letters=letters)
@@ -86,8 +86,7 @@ class Buttons:
                 parts.restyle(button)
 
 
-def _shown(position: Position) -> tuple[Name, ...]:
+def _shown(position: Position, *, screen_lost: bool) -> tuple[Name, ...]:
     if position.state is State.CORRECTING:
         return _OF_CORRECTION.get(field_of(position), ())
-    screen_gone = position.state is State.PAUSED and position.why
-    return (*_OF_STATE.get(position.state, ()), *(("restart",) if screen_gone else ()))
+    return (*_OF_STATE.get(position.state, ()), *(("restart",) if screen_lost else ()))

@@ -6,7 +6,7 @@ What a press means depends on what is on the screen: a page over it, a line that
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import Any, Literal, Protocol
+from typing import Any
 
 from device.words import Direction
 from experiments import events
@@ -27,13 +27,15 @@ from experiments.screens.console.keys import (
     shown_key,
     why_not,
 )
+from experiments.screens.console.needs import Beside, View
 from experiments.screens.texts import FLAG_RULE, short_place, typed_number
 from experiments.states import EMERGENCY, State
 from experiments.steps import Ask
 
-Field = Literal["line", "number", "words"]
 PAGE_COMMANDS: tuple[Name, ...] = ("help", "list", "leave", "emergency", "theme")
-"""What is done while a page covers the run; the rest would be done unseen."""
+"""What is done while a page covers the run."""
+HOLDS: tuple[Name, ...] = ("pause", "next")
+"""What makes the gun silent: done from a page as well, which goes. The rest would be done unseen."""
 
 _LINES: tuple[Name, ...] = ("end break", "repeat", "flag", "note", "reason", "stop")
 _EVENTS: dict[Name, Event] = {
@@ -45,37 +47,6 @@ _EVENTS: dict[Name, Event] = {
     "undo": events.Undo(),
     "emergency": events.EmergencyStop(),
 }
-
-
-class View(Protocol):
-    """What the controls need of the window."""
-
-    def say(self, text: str, mood: str) -> None:
-        """Show a line of answer, for a few seconds."""
-
-    def open_line(self, question: str) -> None:
-        """Let a line be typed."""
-
-    def close_line(self) -> None:
-        """Take the line away."""
-
-    def typed(self, field: Field) -> str:
-        """What is typed in a field."""
-
-    def show_page(self, title: str, lines: list[str]) -> None:
-        """Cover the run with a page of text."""
-
-    def close_page(self) -> None:
-        """Show the run again."""
-
-    def show_list(self) -> None:
-        """Cover the run with the marks of the set."""
-
-    def other_theme(self) -> None:
-        """Change the colours."""
-
-    def shut(self) -> None:
-        """Close the window of a run that has ended."""
 
 
 class Controls:
@@ -92,16 +63,16 @@ class Controls:
         *,
         scale: RatingScale | None = None,
         hand: Hand = "experimenter",
-        restart: Callable[[], None] = lambda: None,
+        beside: Beside | None = None,
         observer: Any = None,
     ) -> None:
         self._live, self._clock, self._view = live, clock, view
-        self._scale, self._hand, self._restart = scale, hand, restart
+        self._scale, self._hand, self._beside = scale, hand, beside
         self._observer = observer
         self._enter: Callable[[str, Press], None] | None = None
         self._held: Press | None = None
         self.drawn = live.position
-        self.page = False
+        self.page: Name | None = None
         self.ended = False
 
     # keys and buttons
@@ -110,6 +81,11 @@ class Controls:
     def typing(self) -> Typing:
         """What is being typed."""
         return Typing(line=self._enter is not None, field=field_of(self.drawn) is not None)
+
+    @property
+    def covered(self) -> bool:
+        """Whether something that is open takes what is typed: a line, or a page."""
+        return self._enter is not None or self.page is not None
 
     def command(self, key: str, *, ctrl: bool) -> Name | None:
         """The command that a key is now; `None` if it is none, and so may be text."""
@@ -155,8 +131,9 @@ class Controls:
         """Carry out a command."""
         if name == "emergency":
             self._offer(events.EmergencyStop())
-        elif self.page and name not in PAGE_COMMANDS:
-            self._view.say("Leave this page first: Esc.", "wait")
+        elif self.page and name not in PAGE_COMMANDS + HOLDS:
+            self.uncover()
+            self._view.say("Here is the run again: press again.", "wait")
         elif name in _WINDOWS:
             _WINDOWS[name](self, press)
         elif self.ended:
@@ -171,6 +148,7 @@ class Controls:
             self._view.say("The run has ended: Q closes the window.", "wait")
 
     def _run(self, name: Name, press: Press) -> None:
+        self.uncover()
         if name in _LINES:
             self._ask_for(name)
         elif name in ("forward", "backward"):
@@ -199,10 +177,20 @@ class Controls:
         if name == "leave" and (self._enter is not None or self.page):
             return ""
         if name == "restart":
-            return (
-                "" if self.drawn.state is State.PAUSED and self.drawn.why else "The participant's screen is not lost."
-            )
+            return self._no_restart()
         return why_not(name, self.drawn) or self._nothing_to(name)
+
+    def _no_restart(self) -> str:
+        if self._beside is None or not self._beside.lost:
+            return "The participant's screen is not lost."
+        return "" if self.drawn.state is State.PAUSED else "Pause first: a new window takes the keys."
+
+    def _restart(self) -> None:
+        refused = self._no_restart()
+        if refused or self._beside is None:
+            self._view.say(refused, "bad")
+        else:
+            self._beside.restart()
 
     def _nothing_to(self, name: Name) -> str:
         if name == "repeat" and self._live.repeated() is None:
@@ -355,12 +343,21 @@ class Controls:
 
     def uncover(self) -> None:
         """Show the run."""
-        self.page = False
-        self._view.close_page()
+        if self.page:
+            self.page = None
+            self._view.close_page()
+
+    def _toggle(self, page: Name) -> bool:
+        """Whether a page is to be shown now; the key that opened it closes it."""
+        shown, self.page = self.page != page, page
+        if not shown:
+            self.uncover()
+        return shown
 
     def _help(self, press: Press) -> None:
         del press
-        self.page = True
+        if not self._toggle("help"):
+            return
         self._view.show_page("Keys, and what each does now. Esc leaves this page.", self.help_lines())
 
     def help_lines(self) -> list[str]:
@@ -374,8 +371,8 @@ class Controls:
 
     def _list(self, press: Press) -> None:
         del press
-        self.page = True
-        self._view.show_list()
+        if self._toggle("list"):
+            self._view.show_list()
 
     def _theme(self, press: Press) -> None:
         del press

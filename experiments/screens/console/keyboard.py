@@ -7,12 +7,14 @@ from typing import Protocol
 
 from PyQt6.QtCore import QEvent, QObject, Qt, QTimer
 from PyQt6.QtGui import QKeyEvent
-from PyQt6.QtWidgets import QWidget
+from PyQt6.QtWidgets import QApplication, QWidget
 
-from experiments.screens.console.keys import BOUNCE_S, EventClock, Name, Presses
+from experiments.screens.console.keys import EventClock, Name, Presses
 
-LET_GO_MS = round(2000 * BOUNCE_S)
-"""A key is let go when it is not down again after so long: a busy machine tells an auto-repeat as two events."""
+LET_GO_MS = 100
+"""A key is let go when it is not down again after so long: a busy machine tells an auto-repeat as two events, and they
+may come apart.
+"""
 _NAMES = {
     Qt.Key.Key_Space: "Space",
     Qt.Key.Key_Return: "Enter",
@@ -62,6 +64,10 @@ class Keyboard(QObject):
         super().__init__()
         self._hears, self._now = hears, now
         self._presses, self._clock = Presses(), EventClock()
+        self._released: dict[str, int] = {}
+        """How often a key was released: a repeat that comes as two events lets go of nothing."""
+        self._into: dict[str, QWidget | None] = {}
+        """Where a key went as text when it went down."""
 
     def eventFilter(self, watched: QObject | None, event: QEvent | None) -> bool:  # noqa: N802 - Qt's name
         """Take a key that is a command; true keeps it from everybody else."""
@@ -75,25 +81,34 @@ class Keyboard(QObject):
         if event.type() == QEvent.Type.KeyRelease:
             self._presses.up(key, at_s, repeated=event.isAutoRepeat())
             if not event.isAutoRepeat():
-                QTimer.singleShot(LET_GO_MS, lambda: self._let_go(key))
+                number = self._released[key] = self._released.get(key, 0) + 1
+                QTimer.singleShot(LET_GO_MS, lambda: self._let_go(key, number))
             return False
         if event.type() != QEvent.Type.KeyPress:
             return False
         return self._pressed(key, event, at_s)
 
-    def _let_go(self, key: str) -> None:
-        """Say that a key was let go, unless it is down again by now: then the system only repeated it."""
-        if not self._presses.is_down(key):
+    def _let_go(self, key: str, number: int) -> None:
+        """Say that a key was let go by its last release, unless it is down again: then the system only repeated it."""
+        if number == self._released[key] and not self._presses.is_down(key):
             self._hears.up(key)
 
     def _pressed(self, key: str, event: QKeyEvent, at_s: float) -> bool:
         acts = self._presses.down(key, at_s, repeated=event.isAutoRepeat())
         name = self._hears.command(key, ctrl=bool(event.modifiers() & Qt.KeyboardModifier.ControlModifier))
         if name is None:
-            return False
+            return self._is_stale_text(key, fresh=acts)
+        self._into.pop(key, None)
         if acts:
             self._hears.down(name, at_s)
         return True
+
+    def _is_stale_text(self, key: str, *, fresh: bool) -> bool:
+        """Whether text comes from a key that went down for something else and is held still."""
+        into = QApplication.focusWidget()
+        if fresh:
+            self._into[key] = into
+        return key not in self._into or self._into[key] is not into
 
 
 class FreshShortcuts(QObject):

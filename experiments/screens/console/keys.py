@@ -157,12 +157,14 @@ def field_of(position: Position) -> Literal["number", "words"] | None:
 
 
 def shown_key(name: Name, *, letters: bool) -> str:
-    """The key of a command as it stands on its button: letters that are text need Ctrl.
+    """The key of a command as it stands on its button: letters that are text need Ctrl, a blank first Esc.
 
-    >>> shown_key("undo", letters=True), shown_key("help", letters=True)
-    ('Ctrl+U', 'F1')
+    >>> shown_key("undo", letters=True), shown_key("help", letters=True), shown_key("fire", letters=True)
+    ('Ctrl+U', 'F1', 'Esc, then Space')
     """
     key = BY_NAME[name].key
+    if letters and key == "Space":
+        return f"Esc, then {key}"
     return f"Ctrl+{key}" if letters and len(key) == 1 else key
 
 

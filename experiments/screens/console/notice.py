@@ -1,8 +1,8 @@
-"""The instruction in large type, which shrinks until all of it is there."""
+"""The instruction in large type, which shrinks until all of it is there, and the page of text that may cover it."""
 
 from __future__ import annotations
 
-from PyQt6.QtWidgets import QLabel
+from PyQt6.QtWidgets import QLabel, QPlainTextEdit, QVBoxLayout, QWidget
 
 from experiments.screens.console import parts
 from experiments.screens.console.view import Instruction
@@ -31,6 +31,25 @@ class Notice:
         """Give the type so many times its own size."""
         for label, size_px in zip(self.labels, SIZES_PX.values(), strict=True):
             _size(label, round(size_px * factor), bold=label is not self.detail)
+
+
+class TextPage(QWidget):
+    """A page of text that is only looked at."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self._title, self._text = parts.label("place"), QPlainTextEdit()
+        self._text.setReadOnly(True)
+        self._text.setFocusPolicy(parts.NO_FOCUS)
+        down = QVBoxLayout(self)
+        down.setContentsMargins(10, 6, 10, 6)
+        down.addWidget(self._title)
+        down.addWidget(self._text)
+
+    def put(self, title: str, lines: list[str]) -> None:
+        """Show lines of text."""
+        self._title.setText(title)
+        self._text.setPlainText("\n".join(lines))
 
 
 def _size(label: QLabel, size_px: int, *, bold: bool) -> None:

@@ -16,7 +16,7 @@ from experiments.remarks import (
 from experiments.screens import texts
 from experiments.screens.console.messages import GunSeen
 from experiments.screens.console.view import About, Seen
-from experiments.steps import Answered, Ask, Describe, Outcome, Rate, Repeat, Rest, Step
+from experiments.steps import Answered, Ask, Close, Describe, Outcome, Rate, Repeat, Rest, Step
 
 STRIP = 40
 """So many response times are shown at most."""
@@ -27,6 +27,8 @@ def coming(seen: Seen, count: int = 3) -> list[str]:
     step = seen.position.step
     if isinstance(step, Rate | Describe):
         return _still_to_rate(seen, step)[:count]
+    if isinstance(step, Close):
+        return ["the end"]
     trials, here = seen.about.plan.trials, seen.here
     after = trials.index(here) + 1
     lines: list[str] = []
@@ -59,7 +61,7 @@ def _break_between(about: About, before: Trial, trial: Trial) -> list[str]:
     if breaks is None or (before.session, before.set) == (trial.session, trial.set):
         return []
     seconds = breaks.between_sets_s if before.session == trial.session else breaks.between_sessions_s
-    return [f"break of {seconds:g} s"] if seconds else []
+    return [f"break of {texts.duration_text(seconds)}"] if seconds else []
 
 
 def answers(seen: Seen) -> list[str]:

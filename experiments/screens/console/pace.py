@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import dataclass, field
 from datetime import datetime, timedelta
 
@@ -11,7 +11,7 @@ from experiments.entries import done, together
 from experiments.plan import Plan, Trial
 from experiments.remarks import Remark
 from experiments.states import Position, State
-from experiments.steps import Answered, Outcome, Presented, Rated, Rest, Rested, Step
+from experiments.steps import Answered, Outcome, Presented, Rated, Rest, Rested, Step, trial_of
 from experiments.tables import Told
 
 PRIOR_TRIALS = 5
@@ -23,26 +23,29 @@ ROUGH_S = 1200.0
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Progress:
-    """Trials done of planned: in the set, in the session, in the experiment."""
+    """How many trials are done of those planned, and of what."""
 
-    in_set: tuple[int, int]
-    in_session: tuple[int, int]
-    in_all: tuple[int, int]
+    what: str
+    count: int
+    planned: int
 
 
-def progress(plan: Plan, told: Told, current: Trial) -> Progress:
-    """How far the run is, seen from the current trial."""
-    finished = done(told)
+def progress(plan: Plan, told: Told, current: Trial, *, rated_last: bool) -> list[Progress]:
+    """How far the run is, seen from the current trial.
 
-    def count(trials: Sequence[Trial]) -> tuple[int, int]:
-        return sum(trial in finished for trial in trials), len(trials)
-
+    Trials of the set, of the session and of the experiment; where all are rated after all were felt, felt and rated.
+    """
+    felt, rated = done(told), {trial_of(step) for step, word in told if isinstance(word, Rated)}
+    if rated_last:
+        return [_progress("felt", plan.trials, felt), _progress("rated", plan.trials, rated)]
     session = [trial for trial in plan.trials if trial.session == current.session]
-    return Progress(
-        in_set=count([trial for trial in session if together(trial, current)]),
-        in_session=count(session),
-        in_all=count(plan.trials),
-    )
+    here = [trial for trial in session if together(trial, current)]
+    parts = {"set": here, "session": session, "experiment": plan.trials}
+    return [_progress(what, trials, felt) for what, trials in parts.items()]
+
+
+def _progress(what: str, trials: Sequence[Trial], finished: Collection[Trial | None]) -> Progress:
+    return Progress(what=what, count=sum(trial in finished for trial in trials), planned=len(trials))
 
 
 @dataclass(slots=True)

@@ -11,7 +11,6 @@ from PyQt6.QtWidgets import (
     QHBoxLayout,
     QLabel,
     QListWidget,
-    QProgressBar,
     QPushButton,
     QVBoxLayout,
     QWidget,
@@ -105,12 +104,4 @@ def quiet_list() -> QListWidget:
     made.setHorizontalScrollBarPolicy(Qt.ScrollBarPolicy.ScrollBarAlwaysOff)
     made.setFocusPolicy(Qt.FocusPolicy.NoFocus)
     made.setSelectionMode(QListWidget.SelectionMode.SingleSelection)
-    return made
-
-
-def bar(what: str) -> QProgressBar:
-    """A progress bar that says what of what is done."""
-    made = QProgressBar()
-    made.setAccessibleName(what)
-    made.setFormat(f"{what}: %v of %m")
     return made

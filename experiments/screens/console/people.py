@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 
 from experiments.beginnings import left_to_do, passed_over, run_of
-from experiments.screens.console.dates import date_text
+from experiments.dates import date_text
 from experiments.standings import Overview
 from experiments.study import Participant, RunStanding
 

@@ -27,6 +27,7 @@ class ShotPage(QWidget):
         self._check: ShotCheck | None = None
         self._setup: Setup[Any] | None = None
         self._stopped = False
+        """The emergency stop: nothing is fired from this page until it was left."""
         self._method_at = 0
         self.over: Callable[[], None] = lambda: None
         self.told.connect(self._take)
@@ -55,6 +56,10 @@ class ShotPage(QWidget):
         """Whether a test shot is under way."""
         return self._check is not None
 
+    def enter(self) -> None:
+        """The page was entered anew."""
+        self._stopped = False
+
     def choose(self, setup: Setup[Any]) -> None:
         """Test the methods of an experiment, from the first on."""
         if self._setup is not setup:
@@ -74,10 +79,9 @@ class ShotPage(QWidget):
 
     def begin(self) -> None:
         """Test the next method."""
-        if self._check is not None or self._setup is None:
+        if self._check is not None or self._setup is None or self._stopped:
             return
         method = self._next_method(self._setup)
-        self._stopped = False
         self._shown = self.next_text().removeprefix("Test shot: ")
         self._show("One moment", f"Looking for the gun. Test shot of {self._shown}.", "wait")
         self._running(True)
@@ -110,7 +114,7 @@ class ShotPage(QWidget):
         elif self._stopped:
             return
         elif told.phase == "counting":
-            self._show("STAND CLEAR", f"{self._shown} will be fired. Nobody holds the gun. Esc calls it off.", "ask")
+            self._show("STAND CLEAR", f"{self._shown} will be fired. Nobody may hold the gun. Esc calls it off.", "ask")
             self.count.setText(str(told.seconds))
         elif told.phase == "firing":
             self._show("Firing", self._shown, "wait")
@@ -132,6 +136,6 @@ class ShotPage(QWidget):
 
     def _running(self, running: bool) -> None:
         self.stop_button.setVisible(running)
-        self.next_button.setVisible(not running)
+        self.next_button.setVisible(not (running or self._stopped))
         self.next_button.setText(f"{self.next_text()}  [Ctrl+T]")
         self.call_off_button.setText("Call it off  [Esc]" if running else "Back  [Esc]")

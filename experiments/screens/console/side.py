@@ -1,13 +1,13 @@
-"""What stands beside the instruction in the console's window."""
+"""What stands beside and below the instruction in the console's window."""
 
 from __future__ import annotations
 
 from datetime import datetime
 
-from PyQt6.QtWidgets import QListWidget, QVBoxLayout, QWidget
+from PyQt6.QtWidgets import QHBoxLayout, QListWidget, QProgressBar, QVBoxLayout, QWidget
 
 from experiments.screens.console import overview, parts
-from experiments.screens.console.pace import Pace, clock_text, end_text, remaining_s
+from experiments.screens.console.pace import Pace, clock_text, end_text, progress, remaining_s
 from experiments.screens.console.strip import Strip
 from experiments.screens.console.view import About, Seen
 
@@ -50,6 +50,28 @@ class Side(QWidget):
         _fill(self._answers, overview.answers(seen))
         if self._strip.isVisibleTo(self):
             self._strip.put(overview.response_times(seen))
+
+
+class Bars(QWidget):
+    """How far the run is, as bars side by side."""
+
+    def __init__(self, about: About) -> None:
+        super().__init__()
+        self._rated_last = about.setup.config.rating_s > 0
+        self._bars = [QProgressBar() for _ in range(2 if self._rated_last else 3)]
+        across = QHBoxLayout(self)
+        across.setContentsMargins(0, 0, 0, 0)
+        for bar in self._bars:
+            across.addWidget(bar)
+
+    def put(self, seen: Seen) -> None:
+        """Show what is so now."""
+        found = progress(seen.about.plan, seen.told, seen.here, rated_last=self._rated_last)
+        for bar, one in zip(self._bars, found, strict=True):
+            bar.setAccessibleName(one.what)
+            bar.setFormat(f"{one.what}: %v of %m")
+            bar.setMaximum(one.planned)
+            bar.setValue(one.count)
 
 
 def _times(seen: Seen, pace: Pace, now_s: float) -> str:

@@ -78,13 +78,14 @@ class StartWindow(QWidget):
     def _page(self) -> QWidget:
         down = QVBoxLayout(page := QWidget())
         down.setContentsMargins(0, 0, 0, 0)
-        middle, self._foot = QHBoxLayout(), QVBoxLayout()
-        middle.addWidget(self.table, 3)
+        middle, left, self._foot = QHBoxLayout(), QVBoxLayout(), QVBoxLayout()
+        left.addWidget(self.table, 1)
+        left.addLayout(self._foot)
+        middle.addLayout(left, 3)
         middle.addWidget(self.form, 2)
         down.addWidget(self.next)
         down.addLayout(middle, 1)
         down.addWidget(self.saved)
-        down.addLayout(self._foot)
         down.addLayout(self._buttons(page))
         return page
 
@@ -343,6 +344,7 @@ class StartWindow(QWidget):
     def _test_shot(self) -> None:
         self._take_back()
         self.pages.setCurrentWidget(self.shots)
+        self.shots.enter()
         self.shots.begin()
 
     def _shot_over(self) -> None:

@@ -4,11 +4,15 @@ from __future__ import annotations
 
 from PyQt6.QtWidgets import QLineEdit, QStackedWidget, QWidget
 
+from experiments.entries import Entry
 from experiments.screens.console import parts
-from experiments.screens.console.controls import Field
 from experiments.screens.console.keys import field_of
+from experiments.screens.console.needs import Field
 from experiments.states import Position
 from experiments.steps import Rate
+
+_Belongs = tuple[str | None, int, Entry | None]
+"""What a field is for: its kind, the number of the step, and the entry that is corrected."""
 
 
 class TextFields:
@@ -29,26 +33,44 @@ class TextFields:
             self.pages.addWidget(page)
         self.bar = parts.column(self._question, self.line)
         self.bar.hide()
-        self._belongs: tuple[object, ...] = ()
+        self._belongs: _Belongs = (None, -1, None)
+        self._drafts: dict[_Belongs, str] = {}
 
     def at(self, position: Position, said: str) -> None:
-        """Take a position: a field that was not there before begins with what was said so far, to be typed over."""
+        """Take a position: a new field begins with what was half typed there before, else with what was said so far."""
         belongs = (field_of(position), position.number, position.correcting)
         if belongs == self._belongs:
             return
+        self._keep(self._belongs)
         self._belongs = belongs
+        draft = self._drafts.pop(belongs, "") if position.correcting is None else ""
         if isinstance(step := position.step, Rate):
             self._ends.setText(f"{step.minimum:g} = {step.minimum_text}     {step.maximum:g} = {step.maximum_text}")
         for field in (self.rating, self.words):
-            field.setText(said)
-            field.selectAll()
+            field.setText(draft or said)
+            if not draft:
+                field.selectAll()
+
+    def _keep(self, belongs: _Belongs) -> None:
+        """Keep what is half typed in the field that is left; of other steps nothing is kept any more."""
+        name, number, _ = belongs
+        typed = {"number": self.rating.text(), "words": self.words.text()}.get(name or "", "")
+        self._drafts = {one: text for one, text in self._drafts.items() if one[1] == number} | {belongs: typed}
 
     def focus(self, position: Position, otherwise: QWidget) -> None:
         """Show the field of a position, and put the cursor into it; an open line keeps the cursor."""
         name = field_of(position) or ""
         self.pages.setCurrentIndex({"number": 1, "words": 2}.get(name, 0))
         if self.bar.isHidden():
-            {"number": self.rating, "words": self.words}.get(name, otherwise).setFocus()
+            self._field(position, otherwise).setFocus()
+
+    def close_line(self, position: Position, otherwise: QWidget) -> None:
+        """Take the line away; the cursor goes back to where it was."""
+        self._field(position, otherwise).setFocus()
+        self.bar.hide()
+
+    def _field(self, position: Position, otherwise: QWidget) -> QWidget:
+        return {"number": self.rating, "words": self.words}.get(field_of(position) or "", otherwise)
 
     def open_line(self, question: str) -> None:
         """Let a line be typed."""

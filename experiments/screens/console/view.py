@@ -12,6 +12,7 @@ from typing import Any
 from experiments.entries import trial_at, value
 from experiments.plan import Plan, Trial
 from experiments.screens import texts
+from experiments.screens.console.keys import Name, shown_key
 from experiments.screens.console.messages import Ended, GunSeen, ParticipantSeen
 from experiments.setup import Setup
 from experiments.states import Position, State
@@ -46,6 +47,12 @@ class Seen:
     gun: GunSeen | None = None
     participant: ParticipantSeen | None = None
     ended: Ended | None = None
+    letters: bool = False
+    """Whether letters are text now."""
+
+    def key(self, name: Name) -> str:
+        """The key of a command as it is now."""
+        return shown_key(name, letters=self.letters)
 
     @property
     def here(self) -> Trial:
@@ -156,14 +163,16 @@ def _turned(seen: Seen, *, damper: str, then: str) -> Instruction:
 
 def _setting(seen: Seen, now_s: float) -> Instruction:
     del now_s
-    return _turned(seen, damper="Set the damper {damper} ({method})", then="Confirm the damper with M.")
+    return _turned(
+        seen, damper="Set the damper {damper} ({method})", then=f"Confirm the damper with {seen.key('damper')}."
+    )
 
 
 def _preparing(seen: Seen, now_s: float) -> Instruction:
     del now_s
     step = seen.position.step
     damper = "Damper {damper} ({method})" if isinstance(step, Prepare) and step.damper else ""
-    return _turned(seen, damper=damper, then="Then fire with Space.")
+    return _turned(seen, damper=damper, then=f"Then fire with {seen.key('fire')}.")
 
 
 def _train(seen: Seen, now_s: float) -> Instruction:
@@ -205,7 +214,9 @@ def _resting(seen: Seen, now_s: float) -> Instruction:
     left_s = max(0, round((now_s if until_s is None else until_s) - now_s))
     between = step.between if isinstance(step, Rest) else ""
     return Instruction(
-        title=f"Break: {left_s} s", detail=f"Between {between}. It ends by itself with a tone.", mood="rest"
+        title=f"Break: {texts.duration_text(left_s)}",
+        detail=f"Between {between}. It ends by itself with a tone.",
+        mood="rest",
     )
 
 
@@ -221,9 +232,10 @@ def _closing(seen: Seen, now_s: float) -> Instruction:
 def _paused(seen: Seen, now_s: float) -> Instruction:
     del now_s
     if seen.position.why:
-        detail = f"{_sentence(seen.position.why)}\nS starts it again. P goes on without it: you enter the answers."
+        again = f"{seen.key('restart')} starts it again. {seen.key('go on')} goes on without it: you enter the answers."
+        detail = f"{_sentence(seen.position.why)}\n{again}"
     else:
-        detail = "The gun is disarmed, and nothing goes on. P goes on."
+        detail = f"The gun is disarmed, and nothing goes on. {seen.key('go on')} goes on."
     return Instruction(title="Paused", detail=detail, mood="wait")
 
 
@@ -257,7 +269,8 @@ def _halted(seen: Seen, now_s: float) -> Instruction:
     return Instruction(
         title="EMERGENCY STOP",
         damper=gun,
-        detail="Nothing fires in this run any more. Y says why, Q closes it. Resumed, it begins with a test shot.",
+        detail=f"Nothing fires in this run any more. {seen.key('reason')} says why, {seen.key('stop')} closes it. "
+        "Resumed, it begins with a test shot.",
         mood="bad",
     )
 

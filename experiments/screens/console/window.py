@@ -5,7 +5,6 @@ It decides nothing: keys and buttons become events, and the table of states judg
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from typing import Any
 
 from PyQt6.QtCore import QObject, QTimer, pyqtSignal
@@ -13,7 +12,6 @@ from PyQt6.QtGui import QCloseEvent, QResizeEvent, QShowEvent
 from PyQt6.QtWidgets import (
     QHBoxLayout,
     QMainWindow,
-    QPlainTextEdit,
     QStackedWidget,
     QVBoxLayout,
     QWidget,
@@ -24,8 +22,9 @@ from experiments.events import Hand, Press
 from experiments.live_run import LiveRun
 from experiments.remarks import Halted
 from experiments.screens.console import overview, parts, theme, tone, view
+from experiments.screens.console.beside import ParticipantSide
 from experiments.screens.console.buttons import Buttons
-from experiments.screens.console.controls import Controls, Field
+from experiments.screens.console.controls import Controls
 from experiments.screens.console.keyboard import Keyboard
 from experiments.screens.console.keys import Name, Typing
 from experiments.screens.console.messages import (
@@ -38,14 +37,15 @@ from experiments.screens.console.messages import (
     Shown,
     Trouble,
 )
-from experiments.screens.console.notice import FITS, Notice
-from experiments.screens.console.pace import Pace, progress
-from experiments.screens.console.side import Side
+from experiments.screens.console.needs import Field
+from experiments.screens.console.notice import FITS, Notice, TextPage
+from experiments.screens.console.pace import Pace
+from experiments.screens.console.side import Bars, Side
 from experiments.screens.console.text_fields import TextFields
 from experiments.screens.console.view import About, Seen
 from experiments.screens.console.windows import remember, scaled
 from experiments.screens.texts import saved_text
-from experiments.states import Position, State
+from experiments.states import Position
 from experiments.steps import Failed, Rated, Rested
 
 REFRESH_MS = 100
@@ -75,12 +75,12 @@ class ConsoleWindow(QMainWindow):
         clock: Clock,
         *,
         hand: Hand = "experimenter",
-        restart: Callable[[], None] = lambda: None,
+        beside: ParticipantSide | None = None,
         observer: Any = None,
     ) -> None:
         super().__init__()
         self.about, self._clock = about, clock
-        self._hand, self._restart, self._observer = hand, restart, observer
+        self._hand, self._beside, self._observer = hand, beside, observer
         self.live: LiveRun | None = None
         self.controls: Controls | None = None
         self.drawn = Position()
@@ -89,6 +89,7 @@ class ConsoleWindow(QMainWindow):
         self.ended: Ended | None = None
         self._pace = Pace()
         self._brief_until_s: float | None = None
+        self._brief_for = -1
         self._lasting = ("", "good")
         self.theme: theme.Theme = "dark"
         self._scale = 0.0
@@ -106,8 +107,8 @@ class ConsoleWindow(QMainWindow):
         self.setWindowTitle(f"Recoil – {self.about.plan.participant_id}, {what}")
         self.bands = [parts.label("band", wrap=False) for _ in range(2)]
         self.place, self.saved = parts.label("place"), parts.label("saved")
-        self.bars = [parts.bar(what) for what in ("set", "session", "experiment")]
         self.notice, self.fields, self.side, self.buttons = Notice(), TextFields(), Side(self.about), Buttons(self)
+        self.bars = Bars(self.about)
         self._main = QWidget()
         left = QVBoxLayout(self._main)
         left.setContentsMargins(0, 0, 0, 0)
@@ -121,29 +122,21 @@ class ConsoleWindow(QMainWindow):
         across.addWidget(self.side, 1)
         down = QVBoxLayout(whole := QWidget())
         down.setContentsMargins(10, 6, 10, 6)
-        down.addWidget(parts.row(*self.bands))
         down.addWidget(self.place)
         down.addLayout(across, 1)
-        down.addWidget(parts.row(*self.bars))
-        self.pages = QStackedWidget()
+        down.addWidget(self.bars)
+        self.pages, self.page = QStackedWidget(), TextPage()
         self.pages.addWidget(whole)
-        self.pages.addWidget(self._text_page())
+        self.pages.addWidget(self.page)
         outer = QVBoxLayout(central := QWidget())
         outer.setContentsMargins(0, 0, 0, 4)
+        outer.addWidget(parts.row(*self.bands))
         outer.addWidget(self.pages, 1)
         outer.addWidget(self.buttons.row)
         self.setCentralWidget(central)
         central.setMinimumSize(1, 1)
         self.setMinimumSize(640, 400)
         self.resize(1280, 800)
-
-    def _text_page(self) -> QWidget:
-        self.page_title, self.page_text = parts.label("place"), QPlainTextEdit()
-        self.page_text.setReadOnly(True)
-        self.page_text.setFocusPolicy(parts.NO_FOCUS)
-        page = parts.column(self.page_title, self.page_text)
-        page.setContentsMargins(10, 6, 10, 6)
-        return page
 
     # messages
 
@@ -173,7 +166,7 @@ class ConsoleWindow(QMainWindow):
         self.live = live
         scale = getattr(self.about.setup.config, "rating", None)
         self.controls = Controls(
-            live, self._clock, self, scale=scale, hand=self._hand, restart=self._restart, observer=self._observer
+            live, self._clock, self, scale=scale, hand=self._hand, beside=self._beside, observer=self._observer
         )
         self._arrive()
 
@@ -188,12 +181,14 @@ class ConsoleWindow(QMainWindow):
         """Draw the newest position: its field, and where the cursor goes; a line that is being typed keeps it."""
         if self.live is None:
             return
-        self.drawn = self.live.position
+        before, self.drawn = self.drawn.state, self.live.position
         if self.controls is not None:
             self.controls.drawn = self.drawn
+            if self.drawn.state is not before:
+                self.controls.uncover()  # what stands there now is to be seen
+            if self.drawn.serial != self._brief_for:
+                self._unbrief()
         self._pace.at(self.drawn, self._clock.now())
-        if self.drawn.state is State.HALTED and self.controls is not None:
-            self.controls.uncover()
         self.fields.at(self.drawn, self.controls.entered_so_far() if self.controls is not None else "")
         self.fields.focus(self.drawn, self)
 
@@ -201,7 +196,9 @@ class ConsoleWindow(QMainWindow):
         """Say that it is safe; a tone at the end of a break."""
         self._pace.saved(message.word, self._clock.now())
         text = saved_text(self.about.plan, message.step, message.word)
-        if text:
+        if isinstance(message.word, Rested):
+            self.say(text, "good")
+        elif text:
             self._last(text, "bad" if isinstance(message.word, Failed | Halted) else "good")
         if isinstance(message.word, Rested):
             tone.play()
@@ -210,8 +207,14 @@ class ConsoleWindow(QMainWindow):
 
     def say(self, text: str, mood: str) -> None:
         """Show a line of answer, for a few seconds."""
-        self._brief_until_s = self._clock.now() + BRIEF_S
+        self._brief_until_s, self._brief_for = self._clock.now() + BRIEF_S, self.drawn.serial
         self._show_line(text, mood)
+
+    def _unbrief(self) -> None:
+        """Show again what was saved last."""
+        if self._brief_until_s is not None:
+            self._brief_until_s = None
+            self._show_line(*self._lasting)
 
     def _last(self, text: str, mood: str) -> None:
         """Show a line until the next."""
@@ -235,22 +238,24 @@ class ConsoleWindow(QMainWindow):
             gun=self.gun,
             participant=self.participant,
             ended=self.ended,
+            letters=self._typing.letters,
         )
 
     def refresh(self) -> None:
         """Show what is so now."""
         if self.controls is not None:
             self.controls.tick()
+            if self._beside is not None:
+                self._beside.covered = self.controls.covered and self.isActiveWindow()
         now_s, seen = self._clock.now(), self.seen
         self.notice.put(view.instruction(seen, now_s))
         self.place.setText(view.place_text(seen))
         self._show_bands(seen)
-        self._show_progress(seen)
+        self.bars.put(seen)
         self.side.put(seen, self._pace, now_s)
         self.buttons.put(self.drawn, over=self.ended is not None, letters=self._typing.letters, idle=self._idle)
         if self._brief_until_s is not None and now_s > self._brief_until_s:
-            self._brief_until_s = None
-            self._show_line(*self._lasting)
+            self._unbrief()
         self._fit()
 
     def _show_bands(self, seen: Seen) -> None:
@@ -259,12 +264,6 @@ class ConsoleWindow(QMainWindow):
             label.setVisible(bool(text))
             label.setText(text)
             parts.set_mood(label, name)
-
-    def _show_progress(self, seen: Seen) -> None:
-        done = progress(seen.about.plan, seen.told, seen.here)
-        for bar, (count, planned) in zip(self.bars, (done.in_set, done.in_session, done.in_all), strict=True):
-            bar.setMaximum(planned)
-            bar.setValue(count)
 
     def _idle(self, name: Name) -> bool:
         """Whether a command does nothing now."""
@@ -352,8 +351,7 @@ class ConsoleWindow(QMainWindow):
 
     def close_line(self) -> None:
         """Take the line away."""
-        self.fields.bar.hide()
-        self.fields.focus(self.drawn, self)
+        self.fields.close_line(self.drawn, self)
 
     def typed(self, field: Field) -> str:
         """What is typed in a field."""
@@ -361,8 +359,7 @@ class ConsoleWindow(QMainWindow):
 
     def show_page(self, title: str, lines: list[str]) -> None:
         """Cover the run with a page of text."""
-        self.page_title.setText(title)
-        self.page_text.setPlainText("\n".join(lines))
+        self.page.put(title, lines)
         self.pages.setCurrentIndex(1)
 
     def close_page(self) -> None:
