@@ -338,9 +338,7 @@ class PaperWindow:
         drawn = self.live.position
         if drawn.serial != self.controls.drawn.serial:
             self.fields["number"] = self.fields["words"] = ""
-        self.controls.drawn = drawn
-        if drawn.state is State.HALTED:
-            self.controls.uncover()
+        self.controls.draw(drawn)
         self._look(drawn)
         if drawn.serial not in self.painted_s:
             self.painted_s[drawn.serial] = self._clock.now()

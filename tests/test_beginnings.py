@@ -108,7 +108,12 @@ def test_a_code_has_to_be_read_back_as_it_stands(code: str, again: str, may: boo
         (someone("open elsewhere", "not begun"), FACTS, True, "P01 sits at another console"),
         (someone("in progress", "not begun", excluded="fell ill"), FACTS, False, "P01 is excluded (fell ill): readmit"),
         (someone("not begun", "not begun", excluded="fell ill"), FACTS, True, "P01 is excluded (fell ill): readmit"),
-        (someone("not begun", "not begun"), Facts(handedness="right"), False, "Not given: age_years; the study asks"),
+        (
+            someone("not begun", "not begun"),
+            Facts(handedness="right"),
+            False,
+            "was not given: age",
+        ),
         (
             someone("in progress", "not begun", facts=FACTS),
             Facts(age_years=31, handedness="left"),
@@ -212,12 +217,12 @@ def test_how_an_unfinished_run_stands_is_given_back(study: StudyFolder) -> None:
     ("what", "said"),
     [
         (entered(""), "Type the participant's code"),
-        (replace(entered(), read_back="P1"), "Read the code back"),
+        (replace(entered(), read_back="P1"), "The two codes differ"),
         (entered("P 1"), "participant code 'P 1'"),
         (entered("p01"), "differs from 'P01' .* in case alone"),
         (entered(facts=RIGHT | {"age_years": "old"}), "age_years = 'old': must be whole years"),
         (entered(facts=RIGHT | {"age_years": "31"}), "P01 is not eligible: age_years = 31"),
-        (entered(facts=RIGHT | {"sex": ""}), "Not given: sex"),
+        (entered(facts=RIGHT | {"sex": ""}), "was not given: sex"),
     ],
 )
 def test_who_may_not_begin_is_refused_and_nothing_is_recorded(what: Entered, said: str, study: StudyFolder) -> None:

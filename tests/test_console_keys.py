@@ -280,3 +280,16 @@ def test_a_stamp_whose_zero_has_jumped_is_not_believed(jump_s: int) -> None:
     clock.at(4_294_967_000, 100.0)  # X counts milliseconds in 32 bits: after 49.7 days it begins anew
     assert clock.at(4_294_967_000 - 1000 * jump_s, 101.0) == 101.0
     assert STRANGE_S == 2.0
+
+
+def test_a_key_that_is_held_is_not_let_go_by_repeats_that_come_as_releases_and_presses_apart() -> None:
+    presses = Presses()
+    presses.down("T", 0.0, repeated=False)
+    for at_s in (0.5, 0.54, 0.58):
+        number = presses.up("T", at_s, repeated=False)
+        assert presses.was_let_go("T", number)
+        presses.down("T", at_s + 0.02, repeated=False)
+        assert not presses.was_let_go("T", number)
+        presses.up("T", at_s + 0.04, repeated=False)
+        assert not presses.was_let_go("T", number)  # it is the release after it that may have been a hand's
+        presses.down("T", at_s + 0.04, repeated=False)

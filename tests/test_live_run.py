@@ -11,7 +11,7 @@ from typing import Any
 import pytest
 
 from device import LimitError, LinkError
-from experiments import events
+from experiments import events, storage
 from experiments import remarks as words
 from experiments.entries import Entry
 from experiments.events import Event, Press
@@ -38,6 +38,7 @@ from tests.at_controls import (
     PATIENCE_S,
     PREFERENCE,
     Sitting,
+    changed,
     gated,
     kept,
     raw_answers,
@@ -45,6 +46,7 @@ from tests.at_controls import (
     sat,
     sat_at,
 )
+from tests.waiting import wait_for
 
 S = State
 LEAST_S: float = PREFERENCE.config.stimulus.least_exposure_s
@@ -214,7 +216,7 @@ def test_no_key_passes_through_a_pause_also_if_it_arrives_afterwards(tmp_path: P
         sitting.to(S.ASKING)
         sitting.press("P")
         in_the_pause = own_key(sitting)
-        assert sitting.live.offer(in_the_pause).text == "The run is paused: P goes on."
+        assert sitting.live.offer(in_the_pause).text == "The run is paused: go on first."
         sitting.press("P")
         assert sitting.live.offer(in_the_pause).text == "It went down before the stimulus, or in a pause."
         sitting.clock.skip(0.5)
@@ -855,3 +857,60 @@ def test_a_pause_that_was_asked_for_and_one_that_was_not_are_told_apart(tmp_path
         assert sitting.position.why == "its process ended"
         contents = of_journal(sitting)
     assert remarks(contents, Paused) == [Paused(), Paused(cause="its process ended")]
+
+
+# what a hand does in passing
+
+
+def test_the_second_enter_behind_a_note_is_not_for_what_stands_there(tmp_path: Path) -> None:
+    with sat_at(S.CLOSING, tmp_path) as sitting:
+        sitting.press("N")
+        sitting.type("a dog")
+        sitting.window.press("Enter")
+        assert sitting.state is S.CLOSING
+        assert remarks(of_journal(sitting), Refused)
+        assert [remark.text for remark in remarks(of_journal(sitting), Noted)] == ["a dog"]
+
+
+def test_a_key_that_went_into_what_is_open_on_the_console_is_nobodys_answer(tmp_path: Path) -> None:
+    with sat_at(S.ASKING, tmp_path) as sitting:
+        assert not sitting.live.offer(own_key(sitting, typed=True))
+        assert sitting.state is S.ASKING
+        assert sitting.live.offer(own_key(sitting))
+        assert len(raw_answers(of_journal(sitting))) == 1
+
+
+def test_a_damper_that_may_have_been_set_is_confirmed_before_anything_fires(tmp_path: Path) -> None:
+    ratings = PREFERENCE.config.model_dump()["synthetic"]["ratings"] | {"lowest": None, "same": None}
+    both = {"methods": ("asymmetric-1", "asymmetric-2")}
+    with sat(changed("preference", design=both, synthetic={"ratings": ratings}), tmp_path) as sitting:
+        sitting.to(S.SETTING)
+        first = sitting.position.step
+        while sitting.state is not S.SETTING or sitting.position.step == first:
+            sitting.go_on()
+        assert sitting.position.step.damper != first.damper
+        sitting.press("R")
+        sitting.type("too short")
+        assert sitting.position.step.damper == first.damper
+        assert sitting.state is S.SETTING
+
+
+def test_an_emergency_stop_stays_to_be_seen_when_the_results_are_gone(tmp_path: Path) -> None:
+    with sat_at(S.HALTED, tmp_path) as sitting:
+        assert sitting.live.offer(events.ResultsGone(cause="the journal was deleted"))
+        assert sitting.state is S.HALTED
+        assert sitting.position.why == EMERGENCY
+
+
+def test_a_note_that_cannot_be_written_is_given_back_in_words(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    def full(descriptor: int) -> None:
+        raise OSError(28, "No space left on device")
+
+    with sat_at(S.ASKING, tmp_path) as sitting:
+        with monkeypatch.context() as disk:
+            disk.setattr(storage, "sync", full)
+            sitting.press("N")
+            sitting.type("the dog barked")
+            wait_for(lambda: sitting.window.troubles, "it is not said")
+        assert "No space left" in sitting.window.troubles[0]
+        assert "the dog barked" in sitting.window.troubles[0]

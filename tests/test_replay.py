@@ -20,9 +20,10 @@ from experiments.places import PlaceError, place
 from experiments.plan import Plan
 from experiments.register import RegisterError
 from experiments.replay import go_on, history, replay
-from experiments.run import Again, Request, rebuild, run
+from experiments.run import Again, Request, plan_of, rebuild, run
 from experiments.screens.synthetic import synthetic_screen
 from experiments.setup import Setup
+from experiments.states import EMERGENCY
 
 SETUPS = {name: load_setup(name) for name in ("direction", "preference")}
 EVERY = {"direction": 7, "preference": 1}
@@ -307,6 +308,25 @@ def test_an_outcome_without_its_step_is_refused_with_its_line(unbroken: dict[str
     journal.write_bytes(forged(doubled))
     with pytest.raises(JournalError, match="line 4: an outcome without its step"):
         history(read(journal))
+
+
+def test_an_emergency_stop_that_the_disk_did_not_take_is_known_from_the_reason_of_the_stop(
+    unbroken: dict[str, Unbroken], tmp_path: Path
+) -> None:
+    whole = unbroken["direction"]
+    stopped = {"kind": "stopped", "reason": EMERGENCY, "monotonic_s": 1.0, "utc": "2026-01-01T00:00:00Z"}
+    journal = broken_off(whole, tmp_path, 1)
+    for reason, halted in ((EMERGENCY, True), ("lunch", False)):
+        journal.write_bytes(forged([*(whole.records[number] for number in (0, 1, 2)), stopped | {"reason": reason}]))
+        session = catalogue.CATALOGUE["direction"].session(plan_of(read(journal)), SETUPS["direction"])
+        assert replay(session, read(journal)).halted == halted
+
+
+@pytest.mark.parametrize("name", SETUPS)
+def test_where_there_is_no_run_there_is_none_to_resume(name: str, tmp_path: Path) -> None:
+    with pytest.raises(PlaceError, match=r"there is no run of .* to resume here"):
+        run(request(name, tmp_path, "resume"), synthetic_screen, VirtualClock())
+    assert not any(tmp_path.iterdir())
 
 
 @pytest.mark.parametrize("name", SETUPS)

@@ -131,7 +131,7 @@ def test_a_closed_gun_is_disarmed_and_answers_only_its_status(gun):
 
 def test_a_clock_that_is_no_number_refuses_the_shot(gun, clock):
     clock.now_s = math.nan
-    with pytest.raises(LimitError, match="at_s"):
+    with pytest.raises(LimitError, match="now_s"):
         gun.fire(a_shot())
 
 

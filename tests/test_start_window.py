@@ -281,10 +281,11 @@ def test_start_chooses_who_was_entered_and_has_their_facts_on_record(study: Stud
 @pytest.mark.parametrize(
     ("entered", "words"),
     [
-        (("P01", FACTS, "P1"), "Read the code back"),
+        (("P01", FACTS, ""), "Read the code back"),
+        (("P01", FACTS, "P1"), "The two codes differ: P01 and P1"),
         (("", FACTS, ""), "Type the participant's code"),
         (("P 1", FACTS, "P 1"), "must be 1 to 32 letters and digits"),
-        (("P01", None, "P01"), "Not given: age_years, sex, handedness"),
+        (("P01", None, "P01"), "The study asks for what was not given: age, sex, handedness"),
         (("P01", Facts(age_years=31, sex="male", handedness="right"), "P01"), "not eligible: age_years = 31"),
     ],
 )
@@ -755,6 +756,14 @@ def test_the_emergency_stop_of_a_test_shot_says_what_the_gun_reports(opened: Ope
     until(lambda: not window.shots.is_running)
     assert window.shots.title.text() == "EMERGENCY STOP"
     assert window.shots.detail.toPlainText() == "Nothing was fired. The gun reports: disarmed."
+    key(window, "T", CTRL)
+    assert not window.shots.is_running
+    assert not window.shots.next_button.isVisible()
+    key(window, "Escape")
+    key(window, "T", CTRL)
+    assert window.shots.is_running
+    key(window, "Escape")
+    until(lambda: not window.shots.is_running)
 
 
 def test_a_window_that_is_closed_in_a_test_shot_stops_it_first(opened: Open) -> None:

@@ -13,6 +13,7 @@ from experiments.load import load_setup
 from experiments.plan import Plan
 from experiments.preference.plan import make_plan as preference_plan
 from experiments.preference.rows import rows as preference_rows
+from experiments.remarks import AnswerCorrected
 from experiments.steps import (
     Answered,
     Ask,
@@ -197,6 +198,13 @@ def test_attempts_count_stimuli_that_may_have_been_felt_and_flags_say_why_there_
 ) -> None:
     row = written(told(0, *outcomes))[0]
     assert (row["attempts"], row["flags"]) == (attempts, flags)
+
+
+def test_an_answer_is_flagged_corrected_only_if_what_counts_is_a_correction() -> None:
+    given = told(0, ("fire", FIRED), ("ask", answer("forward")))
+    corrected = (None, AnswerCorrected(trial=DIRECTION.trials[0], response="backward"))
+    assert written([*given, corrected])[0]["flags"] == "corrected"
+    assert written([*given, corrected, *given])[0]["flags"] == ""
 
 
 def test_what_happens_to_one_trial_or_in_a_break_shows_in_no_other_row() -> None:

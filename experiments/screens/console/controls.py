@@ -29,7 +29,7 @@ from experiments.screens.console.keys import (
 )
 from experiments.screens.console.needs import Beside, View
 from experiments.screens.texts import FLAG_RULE, short_place, typed_number
-from experiments.states import EMERGENCY, State
+from experiments.states import EMERGENCY, Position, State
 from experiments.steps import Ask
 
 PAGE_COMMANDS: tuple[Name, ...] = ("help", "list", "leave", "emergency", "theme")
@@ -74,6 +74,12 @@ class Controls:
         self.drawn = live.position
         self.page: Name | None = None
         self.ended = False
+
+    def draw(self, position: Position) -> None:
+        """Another position is on the screen; a page that covers it goes when there is something new to do."""
+        if position.state is not self.drawn.state:
+            self.uncover()
+        self.drawn = position
 
     # keys and buttons
 

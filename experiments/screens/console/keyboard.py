@@ -64,8 +64,6 @@ class Keyboard(QObject):
         super().__init__()
         self._hears, self._now = hears, now
         self._presses, self._clock = Presses(), EventClock()
-        self._released: dict[str, int] = {}
-        """How often a key was released: a repeat that comes as two events lets go of nothing."""
         self._into: dict[str, QWidget | None] = {}
         """Where a key went as text when it went down."""
 
@@ -79,9 +77,8 @@ class Keyboard(QObject):
             return False
         key, at_s = key_name(event), self._clock.at(event.timestamp(), self._now())
         if event.type() == QEvent.Type.KeyRelease:
-            self._presses.up(key, at_s, repeated=event.isAutoRepeat())
+            number = self._presses.up(key, at_s, repeated=event.isAutoRepeat())
             if not event.isAutoRepeat():
-                number = self._released[key] = self._released.get(key, 0) + 1
                 QTimer.singleShot(LET_GO_MS, lambda: self._let_go(key, number))
             return False
         if event.type() != QEvent.Type.KeyPress:
@@ -89,8 +86,8 @@ class Keyboard(QObject):
         return self._pressed(key, event, at_s)
 
     def _let_go(self, key: str, number: int) -> None:
-        """Say that a key was let go by its last release, unless it is down again: then the system only repeated it."""
-        if number == self._released[key] and not self._presses.is_down(key):
+        """Say that a key was let go by a release, if it was."""
+        if self._presses.was_let_go(key, number):
             self._hears.up(key)
 
     def _pressed(self, key: str, event: QKeyEvent, at_s: float) -> bool:

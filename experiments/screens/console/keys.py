@@ -187,6 +187,7 @@ class Presses:
     def __init__(self) -> None:
         self._down: set[str] = set()
         self._up_s: dict[str, float] = {}
+        self._ups: dict[str, int] = {}
 
     def down(self, key: str, at_s: float, *, repeated: bool) -> bool:
         """Whether this press acts: the key was up, and a hand let it go."""
@@ -195,11 +196,20 @@ class Presses:
             self._down.add(key)
         return fresh and not repeated
 
-    def up(self, key: str, at_s: float, *, repeated: bool) -> None:
-        """A key was let go, unless the system only repeats it."""
+    def up(self, key: str, at_s: float, *, repeated: bool) -> int:
+        """A key was let go, unless the system only repeats it. Gives back the number of the release."""
         if not repeated:
             self._down.discard(key)
             self._up_s[key] = at_s
+            self._ups[key] = self._ups.get(key, 0) + 1
+        return self._ups.get(key, 0)
+
+    def was_let_go(self, key: str, number: int) -> bool:
+        """Whether a hand let a key go by a release a while ago: it was the last one, and the key is not down again.
+
+        A busy machine tells an auto-repeat as two events, a release and a press that may come apart.
+        """
+        return key not in self._down and self._ups.get(key) == number
 
     def is_down(self, key: str) -> bool:
         """Whether a key is down."""

@@ -181,11 +181,9 @@ class ConsoleWindow(QMainWindow):
         """Draw the newest position: its field, and where the cursor goes; a line that is being typed keeps it."""
         if self.live is None:
             return
-        before, self.drawn = self.drawn.state, self.live.position
+        self.drawn = self.live.position
         if self.controls is not None:
-            self.controls.drawn = self.drawn
-            if self.drawn.state is not before:
-                self.controls.uncover()  # what stands there now is to be seen
+            self.controls.draw(self.drawn)
             if self.drawn.serial != self._brief_for:
                 self._unbrief()
         self._pace.at(self.drawn, self._clock.now())
