@@ -38,6 +38,8 @@ def find(name: str) -> Path:
         if path.is_file():
             return path
     known = ", ".join(sorted(path.stem for path in shipped_folder().glob("*.toml")))
+    if Path(name).is_dir():
+        raise ConfigError(f"{name}: a folder, not a config; name a file in it, or a shipped config: {known}")
     raise ConfigError(f"{name}: no such file and no shipped config; shipped are {known}")
 
 
@@ -59,7 +61,8 @@ def load_setup(name: str) -> Setup[Any]:
 def load_gun(path: Path) -> GunConfig:
     """A gun's config."""
     if not path.is_file():
-        raise ConfigError(f"{path}: no such file; the config's key `gun` names it")
+        what = "a folder, not a file" if path.is_dir() else "no such file"
+        raise ConfigError(f"{path}: {what}; the config's key `gun` names it")
     return _checked(GunConfig, path, read_toml(path))
 
 

@@ -48,9 +48,14 @@ class Place:
         return self.folder / f"{self.stem}_{columns.FILE_SUFFIX[self.experiment]}.csv"
 
 
+def is_code(text: str) -> bool:
+    """Whether a text can be a participant's code."""
+    return _CODE.fullmatch(text) is not None
+
+
 def place(results: Path, participant_id: str, experiment: str) -> Place:
     """The place of a run. `PlaceError` if the code breaks a rule or differs from a known one in case alone."""
-    if not _CODE.fullmatch(participant_id):
+    if not is_code(participant_id):
         shown = participant_id if len(participant_id) <= 40 else f"{participant_id[:40]}..."
         raise PlaceError(
             f"participant code {shown!r} ({len(participant_id)} characters): must be 1 to 32 letters and digits "

@@ -317,8 +317,8 @@ def test_starting_anew_from_the_window_keeps_the_reason(pilot: Path, display: st
 def test_what_was_asked_for_is_ticked_and_a_screen_that_is_not_there_is_refused(pilot: Path, display: str) -> None:
     ticks = ("--participant-screen", "--participant-keys", "--noise", "--participant-monitor", 0)
     with started(pilot, display, *ticks) as (screen, eye):
-        look = wait_for(eye, having("rates on an own screen"))
-        assert look["ticked"] == ["rates on an own screen", "answers with own keys", "hears masking noise"]
+        look = wait_for(eye, having("rates on their own screen"))
+        assert look["ticked"] == ["rates on their own screen", "answers with own keys", "hears masking noise"]
         screen.keys.press("q", "Control_L")
         assert screen.end()[0] == 0
     command = [RECOIL, "run", pilot / "pilot" / "direction.toml", "--screen", "console", "--participant-monitor", 7]

@@ -126,8 +126,16 @@ class Timing(Model):
     """How long a trial takes, how much of it the hand-over, and how long the whole is said to take."""
 
     trial_s: Seconds
-    planned_s: Seconds
+    planned_s: Annotated[float, Field(gt=0, le=86_400)]
     hand_over_s: Seconds
+
+    @model_validator(mode="after")
+    def _hand_over_is_part_of_the_trial(self) -> Self:
+        if self.hand_over_s > self.trial_s:
+            raise ValueError(
+                f"hand_over_s = {self.hand_over_s:g} is part of trial_s = {self.trial_s:g}; make it shorter"
+            )
+        return self
 
 
 class Rates(Model):

@@ -95,7 +95,7 @@ class Timing(Model):
     exposure_s: Annotated[float, Field(gt=0, le=86_400)]
     rating_s: Seconds
     description_s: Seconds
-    planned_s: Seconds
+    planned_s: Annotated[float, Field(gt=0, le=86_400)]
 
 
 class Ratings(Model):

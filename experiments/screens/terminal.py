@@ -23,6 +23,7 @@ from experiments.remarks import Remark, flag_word
 from experiments.screens.texts import (
     FLAG_RULE,
     again_text,
+    one_line,
     ordinal,
     place_text,
     read_out_text,
@@ -161,7 +162,7 @@ class TerminalScreen:
     def _read(self) -> None:
         with suppress(OSError):  # a terminal that vanishes ends like one that is closed
             for line in self._source:
-                self._typed(line.strip())
+                self._typed(one_line(line))
         self._closed()
 
     def _typed(self, line: str) -> None:

@@ -5,6 +5,8 @@ Neither correctness nor a score is in here, nor a method's name.
 
 from __future__ import annotations
 
+import unicodedata
+
 from experiments.entries import Entry, Value, together, value
 from experiments.plan import Plan, Trial
 from experiments.remarks import (
@@ -168,6 +170,15 @@ def duration_text(seconds: float) -> str:
     minutes, rest = divmod(round(seconds), 60)
     parts = [f"{minutes} min"] * (minutes > 0) + [f"{rest} s"] * (rest > 0 or not minutes)
     return " ".join(parts)
+
+
+def one_line(text: str) -> str:
+    r"""What was typed or pasted into a line, without what no line holds: control characters become blanks.
+
+    >>> one_line("a\x00b\nc  ")
+    'a b c'
+    """
+    return "".join(" " if unicodedata.category(letter) == "Cc" else letter for letter in text).strip()
 
 
 def typed_number(text: str, minimum: float, maximum: float) -> float | None:

@@ -28,7 +28,7 @@ from experiments.screens.console.keys import (
     why_not,
 )
 from experiments.screens.console.needs import Beside, View
-from experiments.screens.texts import FLAG_RULE, short_place, typed_number
+from experiments.screens.texts import FLAG_RULE, one_line, short_place, typed_number
 from experiments.states import EMERGENCY, Position, State
 from experiments.steps import Ask
 
@@ -232,7 +232,7 @@ class Controls:
             case "number":
                 self._number(self._view.typed("number"), press)
             case "words":
-                self._words(self._view.typed("words").strip(), press)
+                self._words(one_line(self._view.typed("words")), press)
             case None if self.drawn.state is State.CLOSING:
                 self._offer(events.Finish(), press)
             case _:
@@ -299,7 +299,7 @@ class Controls:
                 return "Why does the run stop here? It can be resumed."
 
     def _enter_line(self, press: Press) -> None:
-        text, enter = self._view.typed("line").strip(), self._enter
+        text, enter = one_line(self._view.typed("line")), self._enter
         if not text:
             self._view.say("Type a word or two, or leave it with Esc.", "bad")
             return

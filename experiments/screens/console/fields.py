@@ -134,6 +134,7 @@ def sheet() -> str:
     return f"""
     QTextEdit {{ background: transparent; border: none; font-size: 19px; }}
     QTextEdit#place {{ font-size: 22px; color: {theme.colour("dark", "quiet")}; }}
+    QLabel#title {{ font-size: 56px; font-weight: bold; }}
     QTextEdit#detail {{ font-size: 26px; }}
     QTextEdit#saved, QTextEdit#question {{ font-size: 22px; }}
     QLabel#gun {{ font-size: 22px; font-weight: bold; }}

@@ -44,7 +44,7 @@ class Form(QFrame):
         self.setObjectName("panel")
         self.experiment, self.code, self.code_again = ListBox(experiments), LineEdit(), LineEdit()
         self.facts: dict[str, LineEdit | ListBox] = {fact: _fact(fact) for fact in asked}
-        self.own_screen, self.own_keys = TickBox("rates on an own screen"), TickBox("answers with own keys")
+        self.own_screen, self.own_keys = TickBox("rates on their own screen"), TickBox("answers with own keys")
         self.noise, self.monitor = TickBox("hears masking noise"), ListBox(monitors())
         self.remark = Lines("remark")
         self._typed: dict[str, str] | None = None

@@ -6,6 +6,7 @@ from collections.abc import Iterator, Sequence
 
 from experiments.beginnings import left_to_do, passed_over, run_of
 from experiments.dates import date_text
+from experiments.places import is_code
 from experiments.standings import Overview
 from experiments.study import Participant, RunStanding
 
@@ -73,7 +74,7 @@ def _remarks(
         first = " and ".join(before)
         yield f"Order broken: {first} comes before {experiment} in this study, and {code} has not done it.", "ask"
     if person is None:
-        yield f"{code} is new.", "good"
+        yield (f"{code} is new.", "good") if is_code(code) else (f"{code} is no code: letters and digits only.", "bad")
     else:
         yield _progress(person, experiment), "good"
 
