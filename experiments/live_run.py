@@ -17,7 +17,7 @@ from device import DeviceError, Gun
 from experiments import events
 from experiments.clock import Clock
 from experiments.entries import Entry, entries, fits, repeatable, trial_at, value
-from experiments.events import ACTS, DISARMS, Event, Press
+from experiments.events import ACTS, DISARMS, OWN, Event, Press
 from experiments.journal import Journal, JournalGone
 from experiments.live_remarks import remark_of
 from experiments.plan import Plan, Trial
@@ -281,7 +281,7 @@ class LiveRun:
     def _impossible(self, event: Event) -> str:
         """What the table cannot know: what a key was for, whether there is anything to undo or to repeat."""
         match event:
-            case events.ParticipantKey() | events.ParticipantRated() if event.step != self._position.number:
+            case _ if isinstance(event, OWN) and event.step != self._position.number:
                 return "It was the answer to an earlier question."
             case events.ParticipantKey(at_s=at_s) if not self._counts(at_s):
                 return "It went down before the stimulus, or in a pause."
@@ -339,7 +339,7 @@ class LiveRun:
 
     def _refused(self, event: Event, because: str) -> Refused | None:
         """What is kept of an event that would have carried the run on, and was refused."""
-        own = isinstance(event, events.ParticipantKey | events.ParticipantRated)
+        own = isinstance(event, OWN)
         if not (own or isinstance(event, ACTS)) or self._position.base is State.STOPPED:
             return None
         return Refused(
