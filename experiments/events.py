@@ -187,10 +187,18 @@ class ParticipantKey:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ParticipantRated:
-    """A rating and a description on the participant's own screen; `step` is the number of the step that asked."""
+    """A rating on the participant's own screen; `step` is the number of the step that asked."""
 
     rating: float
-    comment: str
+    step: int
+    by: OwnHand = "participant"
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ParticipantDescribed:
+    """A description on the participant's own screen, may be empty; `step` is the number of the step that asked."""
+
+    text: str
     step: int
     by: OwnHand = "participant"
 
@@ -264,6 +272,7 @@ Event = (
     | EmergencyStop
     | ParticipantKey
     | ParticipantRated
+    | ParticipantDescribed
     | BreakOver
     | GunFault
     | LinkLost
@@ -296,6 +305,7 @@ _WORDS: dict[type[Event], str] = {
     EmergencyStop: "emergency stop",
     ParticipantKey: "participant's key",
     ParticipantRated: "participant's rating",
+    ParticipantDescribed: "participant's description",
     BreakOver: "break over",
     GunFault: "gun fault",
     LinkLost: "link lost",
@@ -307,6 +317,9 @@ _WORDS: dict[type[Event], str] = {
 
 KINDS: tuple[type[Event], ...] = tuple(_WORDS)
 """Every kind of event."""
+
+OWN = (ParticipantKey, ParticipantRated, ParticipantDescribed)
+"""What the participant says by their own hand."""
 
 ACTS: tuple[type[Event], ...] = (
     DamperSet,

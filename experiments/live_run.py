@@ -17,7 +17,7 @@ from device import DeviceError, Gun
 from experiments import events
 from experiments.clock import Clock
 from experiments.entries import Entry, entries, fits, repeatable, trial_at, value
-from experiments.events import ACTS, DISARMS, TYPED, Event, Press
+from experiments.events import ACTS, DISARMS, OWN, TYPED, Event, Press
 from experiments.journal import Journal, JournalGone
 from experiments.live_remarks import remark_of
 from experiments.plan import Plan, Trial
@@ -283,7 +283,7 @@ class LiveRun:
     def _impossible(self, event: Event) -> str:
         """What the table cannot know: what a key was for, whether there is anything to undo or to repeat."""
         match event:
-            case events.ParticipantKey() | events.ParticipantRated():
+            case _ if isinstance(event, OWN):
                 return self._not_asked(event)
             case events.Correct() if (entry := self._position.correcting) is not None and not fits(entry, event.value):
                 return f"That is no {entry.what}."
@@ -298,7 +298,7 @@ class LiveRun:
             case _:
                 return ""
 
-    def _not_asked(self, event: events.ParticipantKey | events.ParticipantRated) -> str:
+    def _not_asked(self, event: events.ParticipantKey | events.ParticipantRated | events.ParticipantDescribed) -> str:
         """Why what the participant did is no answer to what is asked."""
         if event.step != self._position.number:
             return "It was the answer to an earlier question."
@@ -349,7 +349,7 @@ class LiveRun:
 
     def _refused(self, event: Event, because: str) -> Refused | None:
         """What is kept of an event that would have carried the run on, and was refused."""
-        own = isinstance(event, events.ParticipantKey | events.ParticipantRated)
+        own = isinstance(event, OWN)
         if not (own or isinstance(event, ACTS)) or self._position.base is State.STOPPED:
             return None
         return Refused(

@@ -83,8 +83,6 @@ class _Runner:
         self._onset_s = math.nan
         self._damper = ""
         """As it was set in this sitting; unknown at its beginning."""
-        self._comment: str | None = None
-        """What the participant wrote beside their rating."""
 
     def carry_out(self, standing: Standing) -> None:
         step = standing.step
@@ -199,13 +197,9 @@ class _Runner:
         return Rested(rested_s=round(self._desk.clock.now() - start_s, 6), cut_reason=reason)
 
     def _rate(self, step: Rate) -> Rated | Repeat:
-        self._comment = None
         self._live.enter(State.RATING, step)
         match self._live.wait():
-            case events.ParticipantRated() as given:
-                self._comment = given.comment
-                return Rated(rating=_kept(given.rating, step), rating_by=given.by)
-            case events.Rating(rating=rating, by=by):
+            case events.Rating(rating=rating, by=by) | events.ParticipantRated(rating=rating, by=by):
                 return Rated(rating=None if rating is None else _kept(rating, step), rating_by=by)
             case events.Repeat(reason=reason):
                 return self._repeat(reason)
@@ -213,11 +207,9 @@ class _Runner:
                 raise Unforeseen(other)
 
     def _describe(self, step: Describe) -> Described:
-        if self._comment is not None:
-            return Described(comment=self._comment)
         self._live.enter(State.DESCRIBING, step)
         match self._live.wait():
-            case events.Description(text=text):
+            case events.Description(text=text) | events.ParticipantDescribed(text=text):
                 return Described(comment=text)
             case other:
                 raise Unforeseen(other)

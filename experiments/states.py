@@ -150,6 +150,7 @@ _ROWS: dict[type[Event], dict[State, Change]] = {
     events.EmergencyStop: {**_each(_LIVE, To(S.HALTED)), S.HALTED: STAY},
     events.ParticipantKey: {S.ASKING: To(S.SAVING), S.CORRECTING: BENEATH},
     events.ParticipantRated: {S.RATING: To(S.SAVING), S.CORRECTING: BENEATH},
+    events.ParticipantDescribed: {S.DESCRIBING: To(S.SAVING), S.CORRECTING: BENEATH},
     events.BreakOver: {S.RESTING: To(S.SAVING)},
     events.GunFault: {**_each(_LIVE, STAY), **_each(ARMED, To(S.SAVING))},
     events.LinkLost: {**_each(_LIVE, STAY), **_each(ARMED, To(S.SAVING))},

@@ -53,6 +53,7 @@ _DRAWN: dict[str, tuple[int, tuple[st.SearchStrategy[Any], ...]]] = {
     "halt": (1, (st.sampled_from(("key", "participant")),)),
     "own": (4, (_SAID, st.sampled_from((-5.0, -0.3, 0.05, 0.6)), st.integers(-1, 0))),
     "own rating": (2, (st.sampled_from((0.0, 5.5, 10.0)),)),
+    "own description": (2, (st.sampled_from(("by myself", "")), st.integers(-1, 0))),
     "gun": (3, (st.sampled_from(("refuses", "is silent", "hangs", "hangs at arm")),)),
     "disk": (2, (st.integers(0, 2),)),
     "release": (2, ()),
@@ -254,7 +255,12 @@ class Hand:
 
     def own_rating(self, rating: float) -> None:
         step = self.sitting.position.number
-        self.sitting.live.offer(events.ParticipantRated(rating=rating, comment="by myself", step=step))
+        self.sitting.live.offer(events.ParticipantRated(rating=rating, step=step))
+
+    def own_description(self, text: str, earlier: int) -> None:
+        """The participant's own words, to the question at hand or an earlier one."""
+        step = self.sitting.position.number + earlier
+        self.sitting.live.offer(events.ParticipantDescribed(text=text, step=step))
 
     def gun(self, what: str) -> None:
         gun = self.sitting.gun
@@ -313,6 +319,7 @@ _MOVES: dict[str, Callable[..., None]] = {
     "halt": Hand.halt,
     "own": Hand.own,
     "own rating": Hand.own_rating,
+    "own description": Hand.own_description,
     "gun": Hand.gun,
     "disk": Hand.disk,
     "release": Hand.release,
@@ -374,12 +381,9 @@ def taken(offered: list[Offered]) -> Iterator[tuple[str, Trial, Any]]:
         match one.event:
             case events.Answer() | events.ParticipantKey():
                 yield "answered", trial, one.event.response
-            case events.Rating():
+            case events.Rating() | events.ParticipantRated():
                 yield "rated", trial, one.event.rating
-            case events.ParticipantRated():
-                yield "rated", trial, one.event.rating
-                yield "described", trial, one.event.comment
-            case events.Description():
+            case events.Description() | events.ParticipantDescribed():
                 yield "described", trial, one.event.text
             case events.Correct() if one.position.correcting is not None and not one.text:
                 yield "corrected", one.position.correcting.trial, one.event.value
@@ -405,11 +409,10 @@ def written(contents: Contents) -> Iterator[tuple[str, Trial, Any]]:
 
 def refused(offered: list[Offered]) -> list[tuple[str, str]]:
     """What would have carried the run on and was refused, each with the state; not after the run."""
-    own = (events.ParticipantKey, events.ParticipantRated)
     return [
         (events.word(type(one.event)), str(one.position.state))
         for one in offered
-        if not one.taken and isinstance(one.event, (*own, *ACTS)) and one.position.base is not State.STOPPED
+        if not one.taken and isinstance(one.event, (*events.OWN, *ACTS)) and one.position.base is not State.STOPPED
     ]
 
 

@@ -335,6 +335,9 @@ def test_a_killed_participants_screen_pauses_the_run_and_can_be_started_again(  
             screen.participant_shows(page, 2)
             screen.focus_on(RUN)
         screen.to({"train": "train", "rating": "describing", "asking": "preparing"}[state])
+        if state == "rating":
+            screen.participant_shows("DescriptionPage")
+            screen.focus_on(RUN)
         assert screen.stop()[0] == 130
     paused, noted = remarks(journal, "paused", "noted")
     assert "killed by signal 9" in paused["cause"]

@@ -50,15 +50,18 @@ def rate_by_keys(screen: AtConsole) -> None:
     screen.focus_on(PARTICIPANT)
     for name in ("Right", "Next", "Right", "Return"):
         screen.keys.press(name)
-    screen.participant_shows("DescriptionPage", 2)
+    screen.participant_shows("DescriptionPage", 3)
     screen.keys.type("hard")
     screen.keys.press("Return", "Control_L")
 
 
 def rate_here(screen: AtConsole) -> None:
-    """The experimenter's rating and the description they are told."""
-    for state in ("rating", "describing"):
-        screen.go_on(screen.at(state))
+    """The experimenter's rating and the description they are told, although the participant's screen asks for both."""
+    screen.go_on(screen.at("rating"))
+    screen.participant_shows("DescriptionPage", 2)
+    screen.focus_on(RUN)
+    screen.until(lambda look: look.active)
+    screen.go_on(screen.at("describing"))
 
 
 def plays_sound(home: Path) -> bool:
@@ -98,6 +101,72 @@ def test_two_ratings_by_the_participants_own_hand_and_one_entered_for_them(
     assert [row["rating"] for row in table] == ["0.0", "7.5", "6.1"]
     assert [row["rating_by"] for row in table] == ["participant", "experimenter", "participant"]
     assert [row["comment"] for row in table] == ["soft", "like a toy", "hard"]
+
+
+def rated_and_half_described(screen: AtConsole, journal: Path) -> None:
+    """Trial 1 is rated on the participant's screen, which had the keys ever since, and half a word is typed there."""
+    screen.stands(RUN)
+    screen.to("rating", trial=1)
+    screen.participant_shows("RatingPage")
+    click(screen, LEFT_END, LINE_Y)
+    screen.until(lambda look: not look.active)
+    before = len(screen.watch.looks())
+    click(screen, 0.5, BUTTON_Y)
+    screen.participant_shows("DescriptionPage")
+    assert records(journal)[-2]["body"]["kind"] == "rated"
+    look = screen.at("describing")
+    assert look.says("Awaited: the participant's description")
+    assert not any(look.active for look in screen.watch.looks()[before:])
+    screen.keys.type("so")
+
+
+def test_a_pause_in_a_description_keeps_the_rating_and_the_words_so_far(
+    quick_configs: Path, tmp_path: Path, display: str
+) -> None:
+    journal = tmp_path / f"{PREFERENCE}_journal.jsonl"
+    run = words(quick_configs, "preference", "--participant", "P01", "--participant-screen")
+    with AtConsole(run, tmp_path, display) as screen:
+        rated_and_half_described(screen, journal)
+        screen.focus_on(RUN)
+        screen.until(lambda look: look.active)
+        screen.keys.press("p", "Control_L")
+        screen.until(lambda look: look.state == "paused" and look.ready)
+        screen.participant_shows("MessagePage Paused. Please wait.")
+        screen.keys.press("p")
+        screen.participant_shows("DescriptionPage", 2)
+        screen.until(lambda look: look.says("Keys: the participant's screen"))
+        screen.keys.type("ft")
+        screen.keys.press("Return", "Control_L")
+        screen.until(lambda look: look.state == "rating" and look.trial == 2)
+        screen.participant_shows("RatingPage", 2)
+        screen.focus_on(RUN)
+        screen.until(lambda look: look.active)
+        code, said = screen.stop()
+    assert code == 130, said
+    first = rows(tmp_path, PREFERENCE, "ratings")[0]
+    assert (first["rating"], first["rating_by"], first["comment"]) == ("0.0", "participant", "soft")
+
+
+def test_f12_in_a_description_keeps_the_rating_and_all_that_was_given_is_what_was_read_back(
+    quick_configs: Path, tmp_path: Path, display: str
+) -> None:
+    journal = tmp_path / f"{PREFERENCE}_journal.jsonl"
+    run = words(quick_configs, "preference", "--participant", "P01", "--participant-screen")
+    with AtConsole(run, tmp_path, display) as screen:
+        rated_and_half_described(screen, journal)
+        screen.keys.press("F12")
+        screen.until(lambda look: look.state == "halted")
+        screen.participant_shows("MessagePage Please wait.")
+        screen.focus_on(RUN)
+        screen.until(lambda look: look.active)
+        screen.to_the_end()
+        screen.until(lambda look: look.says("Read back from the disk: 1 answer, all that were given."))
+        code, said = screen.close()
+    assert code == 130, said
+    assert remarks(journal, "halted") == [{"by": "participant", "kind": "halted"}]
+    rated = [record["body"]["rating"] for record in records(journal) if record.get("body", {}).get("kind") == "rated"]
+    assert rated == [0.0]
+    assert rows(tmp_path, PREFERENCE, "ratings")[0]["rating"] == "0.0"
 
 
 def test_a_participants_key_is_a_response_time_from_the_onset_of_the_shot(

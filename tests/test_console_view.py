@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from datetime import datetime
 from pathlib import Path
 from typing import Any
@@ -19,7 +20,7 @@ from experiments.screens.console.pace import Pace, clock_text, end_text, remaini
 from experiments.screens.console.view import About, Seen
 from experiments.setup import Setup
 from experiments.states import Position, State
-from experiments.steps import Answered, Ask, Prepare, Present, Presented, Rate, Rated, Repeat, Rest
+from experiments.steps import Answered, Ask, Describe, Prepare, Present, Presented, Rate, Rated, Repeat, Rest
 from tests.at_controls import DIRECTION, PREFERENCE, sat_at, tells_correctness
 
 SAID = Answered(response="forward", response_time_s=1.0, response_source="experimenter", response_time_valid=False)
@@ -101,6 +102,30 @@ def test_the_gun_is_shown_as_it_says_itself_and_never_as_safe_when_it_says_nothi
     assert "SWITCH OFF ITS POWER" in silent.damper
     assert "SWITCH OFF ITS POWER" in view.instruction(seen(DIRECTION, halted), 0.0).damper
     assert overview.gun_text(GunSeen(status=None, fault="no answer"))[1] == "bad"
+
+
+def test_rating_and_description_are_awaited_from_the_participants_screen_where_there_is_one() -> None:
+    trial = plan_of(PREFERENCE).trials[0]
+    rate = Rate(trial=trial, question="?", minimum=0, maximum=10, minimum_text="", maximum_text="", grain=0.1)
+    for state, step, what in (
+        (State.RATING, rate, "rating"),
+        (State.DESCRIBING, Describe(trial=trial, question="?"), "description"),
+    ):
+        here = seen(PREFERENCE, Position(states=(state,), step=step))
+        there = replace(here, about=replace(here.about, participant_rates=True))
+        awaited = f"Awaited: the participant's {what} on their own screen, or type it here."
+        assert view.instruction(here, 0.0).detail == "?"
+        assert view.instruction(there, 0.0).detail == f"?\n{awaited}"
+
+
+def test_the_participants_screen_has_the_keys_from_one_rating_or_description_to_the_next_and_no_longer() -> None:
+    here = seen(PREFERENCE, Position()).about
+    step = Describe(trial=plan_of(PREFERENCE).trials[0], question="?")
+    there = replace(here, participant_rates=True)
+    typed = {state for state in State if view.typed_there(there, Position(states=(state,), step=step))}
+    assert typed == {State.RATING, State.DESCRIBING, State.SAVING}
+    assert not any(view.typed_there(here, Position(states=(state,), step=step)) for state in State)
+    assert not view.typed_there(there, Position(states=(State.SAVING,)))
 
 
 def test_a_run_that_stopped_says_what_is_safe_only_if_it_was_read_back() -> None:

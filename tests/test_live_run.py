@@ -46,6 +46,7 @@ from tests.at_controls import (
     sat,
     sat_at,
 )
+from tests.at_display import records
 from tests.waiting import wait_for
 
 S = State
@@ -274,6 +275,95 @@ def test_a_time_over_a_pause_that_began_before_the_shot_is_not_the_participants(
     assert (rows[0]["response_time_valid"], rows[0]["attempts"]) == ("0", "1")
 
 
+# the participant's own rating and description
+
+
+def own_rating(sitting: Sitting) -> Verdict:
+    """A rating of 3 on the participant's own screen."""
+    verdict = sitting.live.offer(events.ParticipantRated(rating=3.0, step=sitting.position.number))
+    sitting.settle()
+    return verdict
+
+
+def own_words(sitting: Sitting, text: str = "soft") -> Verdict:
+    """A description on the participant's own screen."""
+    verdict = sitting.live.offer(events.ParticipantDescribed(text=text, step=sitting.position.number))
+    sitting.settle()
+    return verdict
+
+
+def rate_and_describe(sitting: Sitting) -> None:
+    assert own_rating(sitting)
+    assert own_words(sitting)
+
+
+def bodies(results: Path) -> list[dict[str, Any]]:
+    """What is in the journal of experiment 2 so far, whether it is still written or not."""
+    return [record.get("body", {}) for record in records(place(results, "P01", "preference").journal)]
+
+
+def test_the_participants_own_rating_is_in_the_journal_before_the_description_is_asked_for(tmp_path: Path) -> None:
+    with sat(PREFERENCE, tmp_path) as sitting:
+        sitting.to(S.RATING)
+        assert own_rating(sitting)
+        assert sitting.state is S.DESCRIBING
+        rated, asked = bodies(tmp_path)[-2:]
+        assert (rated["kind"], rated["rating"], rated["rating_by"]) == ("rated", 3.0, "participant")
+        assert asked["kind"] == "describe"
+        assert own_words(sitting)
+        assert sitting.state is S.RATING
+        _, rows = to_the_end(sitting)
+    assert [(row["rating"], row["rating_by"], row["comment"]) for row in rows] == [
+        ("3.0", "participant", "soft"), ("5.0", "experimenter", "like a toy"), ("5.0", "experimenter", "like a toy"),
+    ]  # fmt: skip
+
+
+def test_a_pause_before_the_description_keeps_the_rating_and_takes_no_words_until_it_is_over(tmp_path: Path) -> None:
+    with sat(PREFERENCE, tmp_path) as sitting:
+        sitting.to(S.RATING)
+        assert own_rating(sitting)
+        assert by_hand(sitting, events.Pause())
+        assert own_words(sitting, "in the pause").text == "The run is paused: P goes on."
+        assert by_hand(sitting, events.GoOn())
+        assert sitting.state is S.DESCRIBING
+        assert own_words(sitting)
+        contents, rows = to_the_end(sitting)
+    assert (rows[0]["rating"], rows[0]["rating_by"], rows[0]["comment"]) == ("3.0", "participant", "soft")
+    assert [(remark.event, remark.by) for remark in remarks(contents, Refused)] == [
+        ("participant's description", "participant")
+    ]
+
+
+@pytest.mark.parametrize("end", [events.EmergencyStop(by="participant"), events.Stop(reason="lunch")])
+def test_what_ends_the_run_before_the_description_keeps_the_rating_and_the_words_are_asked_for_when_it_is_resumed(
+    end: Event, tmp_path: Path
+) -> None:
+    with sat(PREFERENCE, tmp_path) as sitting:
+        sitting.to(S.RATING)
+        assert own_rating(sitting)
+        assert sitting.live.offer(end)
+        sitting.settle()
+        assert not own_words(sitting)
+        contents = of_journal(sitting)
+    assert [word.rating for _, word in told(contents) if isinstance(word, Rated)] == [3.0]
+    assert isinstance(sitting.error, RunStopped)
+    assert sitting.error.saved == 1
+    with sat(PREFERENCE, tmp_path, resumed=True) as sitting:
+        sitting.to(S.DESCRIBING)
+        assert own_words(sitting)
+        _, rows = to_the_end(sitting)
+    assert (rows[0]["rating"], rows[0]["rating_by"], rows[0]["comment"]) == ("3.0", "participant", "soft")
+
+
+def test_words_for_an_earlier_stimulus_are_refused(tmp_path: Path) -> None:
+    with sat(PREFERENCE, tmp_path) as sitting:
+        sitting.to(S.DESCRIBING)
+        late = events.ParticipantDescribed(text="late", step=sitting.position.number)
+        sitting.type("like a toy")
+        sitting.to(S.DESCRIBING)
+        assert sitting.live.offer(late).text == "It was the answer to an earlier question."
+
+
 @contextmanager
 def at_one_instant(sitting: Sitting) -> Iterator[None]:
     """What happens in here comes before the run looks."""
@@ -291,7 +381,7 @@ def test_what_is_refused_is_in_the_journal_with_state_reason_and_hand(state: Sta
         if state is S.RATING:
             key: Event = own_key(sitting)
         else:
-            key = events.ParticipantRated(rating=1.0, comment="", step=sitting.position.number)
+            key = events.ParticipantRated(rating=1.0, step=sitting.position.number)
         hers, theirs = sitting.live.offer(event), sitting.live.offer(key)
         assert not hers
         assert not theirs
@@ -390,9 +480,7 @@ def test_a_repeat_that_was_asked_for_one_trial_is_not_taken_for_the_next(tmp_pat
         sitting.ready()
         sitting.window.press("R", ctrl=True)
         sitting.window.fields["line"] = "moved"
-        number = sitting.position.number
-        assert sitting.live.offer(events.ParticipantRated(rating=3.0, comment="soft", step=number))
-        sitting.settle()
+        rate_and_describe(sitting)
         assert sitting.state is S.RATING
         sitting.press("Enter")
         assert sitting.window.heard.count("Trial 1 cannot be presented again any more.") == 1

@@ -11,12 +11,19 @@ from contextlib import contextmanager
 import pytest
 
 from experiments.screens.participant.link import ParticipantError, ParticipantLink
-from experiments.screens.participant.words import AskDirection, AskRating, RatingGiven
+from experiments.screens.participant.words import (
+    AskDescription,
+    AskDirection,
+    AskRating,
+    DescriptionGiven,
+    RatingGiven,
+)
 from tests.waiting import PATIENCE_S, wait_for
 
 SCALE = AskRating(
     number=1, of=3, question='"?"\n很', minimum=0, maximum=10, minimum_text="low", maximum_text="high", grain=0.1
 )
+WORDS = AskDescription(number=1, of=3, question='"?"\n很')
 WHICH = AskDirection(
     question="?", forward="forward", backward="backward", forward_key="f", backward_key="b", onset_s=0.0
 )
@@ -27,7 +34,8 @@ step_s = 0.0
 def now(): return time.monotonic() + 1000 + step_s
 def say(**word): print(json.dumps(word), flush=True)
 def ready(): say(kind="ready", psychopy="none", window="1x1", refresh_Hz=None)
-def rate(word, rating=0): say(kind="rating-given", rating=rating, comment=word["question"], ask=word["ask"])
+def rate(word, rating=0): say(kind="rating-given", rating=rating, ask=word["ask"])
+def describe(word): say(kind="description-given", comment=word["question"], ask=word["ask"])
 def direct(word): say(kind="direction-given", response="backward", pressed_s=word["onset_s"] + 0.5, ask=word["ask"])
 def words():
     for line in sys.stdin:
@@ -52,10 +60,25 @@ def child():
 
 
 def test_a_rating_of_0_and_any_text_come_through(child):
-    link = child("ready()\nfor word in words(): rate(word)")
+    link = child("ready()\nfor word in words(): {'ask-rating': rate, 'ask-description': describe}[word['kind']](word)")
     assert link.wait_ready(PATIENCE_S).psychopy == "none"
-    given = link.ask_rating(SCALE, PATIENCE_S)
-    assert given == RatingGiven(rating=0.0, comment='"?"\n很', ask=given.ask)
+    rated, described = link.ask_rating(SCALE, PATIENCE_S), link.ask_description(WORDS, PATIENCE_S)
+    assert rated == RatingGiven(rating=0.0, ask=rated.ask)
+    assert described == DescriptionGiven(comment='"?"\n很', ask=described.ask)
+    assert described.ask > rated.ask
+
+
+def test_a_description_that_is_called_off_is_not_taken_for_the_next_one(child):
+    link = child(
+        "ready()\nasked = []\n"
+        "for word in words():\n"
+        "    if word['kind'] == 'ask-description': asked.append(word)\n"
+        "    if len(asked) == 2: asked[0]['question'] = 'late'; describe(asked[0]); describe(asked[1])"
+    )
+    link.wait_ready(PATIENCE_S)
+    with while_asking(link, link.cancel), pytest.raises(ParticipantError, match="called off"):
+        link.ask_description(WORDS)
+    assert link.ask_description(WORDS, PATIENCE_S).comment == WORDS.question
 
 
 def test_moments_are_mapped_there_and_back(child):

@@ -13,7 +13,7 @@ import pytest
 
 from experiments.screens.participant.link import ParticipantError, ParticipantLink
 from experiments.screens.participant.look import Look
-from experiments.screens.participant.words import AskDirection, AskRating
+from experiments.screens.participant.words import AskDescription, AskDirection, AskRating
 from tests.waiting import PATIENCE_S, wait_for
 
 pytestmark = [
@@ -32,7 +32,7 @@ SCALE = AskRating(
     maximum_text="like very much",
     grain=0.1,
 )
-DESCRIBED = replace(SCALE, describe="Please describe this feedback in your own words.")
+WORDS = AskDescription(number=2, of=3, question="Please describe this feedback in your own words.")
 WHICH = AskDirection(
     question="Which way did it shoot?",
     forward="forward",
@@ -153,11 +153,14 @@ def link(display, tmp_path_factory):
 
 @pytest.fixture
 def ask(link, hands, console):
-    """Ask, and come back when the question stands on the display."""
+    """Ask, and come back when the question stands on the display. Nothing is left of what was written before."""
+    with pytest.raises(ParticipantError, match="no answer"):
+        link.ask_rating(SCALE, 0.0)
 
     def ask(question):
         show(link, "Please wait")
-        return hands.changing(lambda: console.submit(link.ask_rating, question, PATIENCE_S))
+        how = link.ask_rating if isinstance(question, AskRating) else link.ask_description
+        return hands.changing(lambda: console.submit(how, question, PATIENCE_S))
 
     return ask
 
@@ -166,12 +169,6 @@ def show(link, text):
     """Show a text, and come back when it stands on the display: words are obeyed in their order."""
     link.show(text)
     link.noise(on=False)
-
-
-def rate_and_confirm(hands, rate):
-    """Rate and confirm, and come back when the next page stands: what is typed before it does is typed nowhere."""
-    hands.changing(rate)
-    hands.changing(lambda: hands.key("Return"))
 
 
 def test_the_left_end_of_the_scale_is_a_rating_of_0(ask, hands):
@@ -212,19 +209,15 @@ def test_a_scale_is_answered_by_keys_alone(ask, hands):
 
 
 def test_a_description_keeps_its_quotes_lines_and_asterisks(ask, hands):
-    answer = ask(DESCRIBED)
-    rate_and_confirm(hands, lambda: hands.click(0.5, LINE_Y))
+    answer = ask(WORDS)
     for name in ("a", "quotedbl", "Return", "asterisk", "b", "x", "BackSpace", "asterisk", "Tab", "backslash"):
         hands.key(name, *(["Shift_L"] if name in ("quotedbl", "asterisk") else []))
     hands.key("Return", "Control_L")
-    given = answer.result(PATIENCE_S)
-    assert given.rating == 5.0
-    assert given.comment == 'a"\n*b*\\'
+    assert answer.result(PATIENCE_S).comment == 'a"\n*b*\\'
 
 
-def test_a_description_longer_than_its_box_is_taken_as_long_as_there_is_room(ask, hands):
-    answer = ask(DESCRIBED)
-    rate_and_confirm(hands, lambda: hands.key("End"))
+def test_a_description_longer_than_its_box_is_taken_as_long_as_there_is_room(ask, hands, link):
+    answer = ask(WORDS)
     hint, typed = hands.seen(*HINT), ""
     while hands.seen(*HINT) == hint:  # until it says that there is no more room
         assert len(typed) < 120
@@ -234,18 +227,65 @@ def test_a_description_longer_than_its_box_is_taken_as_long_as_there_is_room(ask
         typed += f"\n{letter}"
         wait_for(lambda before=before: hands.seen() != before)
     hands.settled()
+    call_off(link, answer)
+    again = ask(WORDS)  # as it was
+    hands.settled()
     hands.key("Return", "Control_L")
-    comment = answer.result(PATIENCE_S).comment
+    comment = again.result(PATIENCE_S).comment
     assert len(comment.split()) > 8
     assert len(comment) < len(typed.strip())
     assert comment.split()[:4] == ["a", "b", "c", "a"]
 
 
 def test_an_empty_description_is_one_and_the_button_ends_it(ask, hands):
-    answer = ask(DESCRIBED)
-    rate_and_confirm(hands, lambda: hands.click(0.5, LINE_Y))
+    answer = ask(WORDS)
     hands.click(0.5, BUTTON_Y)
     assert answer.result(PATIENCE_S).comment == ""
+
+
+def call_off(link, answer):
+    """Call off a question, as a pause does."""
+    show(link, "Paused. Please wait.")
+    with pytest.raises(ParticipantError, match="called off"):
+        answer.result(PATIENCE_S)
+
+
+def type_on(hands, *names):
+    for name in names:
+        hands.key(name)
+
+
+def describe(hands, answer, *names):
+    """Type on, confirm, and give back the description."""
+    type_on(hands, *names)
+    hands.key("Return", "Control_L")
+    return answer.result(PATIENCE_S).comment
+
+
+def test_a_description_that_was_called_off_goes_on_where_it_was(ask, hands, link):
+    answer = ask(WORDS)
+    type_on(hands, "a", "space")
+    call_off(link, answer)
+    answer = ask(WORDS)
+    type_on(hands, "b", "Return")
+    call_off(link, answer)
+    assert describe(hands, ask(WORDS), "c") == "a b\nc"
+
+
+def test_a_description_that_was_given_but_not_taken_goes_on_where_it_was_until_the_next_rating(ask, hands):
+    assert describe(hands, ask(WORDS), "a") == "a"
+    assert describe(hands, ask(WORDS), "b") == "ab"
+    answer = ask(SCALE)
+    type_on(hands, "End", "Return")
+    assert answer.result(PATIENCE_S).rating == 10.0
+    assert describe(hands, ask(WORDS), "c") == "c"
+
+
+def test_what_was_written_of_one_stimulus_never_stands_in_the_description_of_another(ask, hands, link):
+    answer = ask(WORDS)
+    type_on(hands, "a")
+    call_off(link, answer)
+    assert describe(hands, ask(replace(WORDS, number=3)), "b") == "b"
 
 
 @pytest.fixture

@@ -7,16 +7,17 @@ import sys
 import threading
 from collections.abc import Iterator
 from pathlib import Path
+from typing import Any
 
 import pytest
 
 from experiments.load import load_setup
 from experiments.plan import Trial
-from experiments.screens.console.beside import ParticipantSide
+from experiments.screens.console.beside import PAUSED, ParticipantSide
 from experiments.screens.participant.link import ParticipantLink
-from experiments.screens.participant.words import Focused, line
+from experiments.screens.participant.words import BETWEEN, Focused, line
 from experiments.states import Position, State
-from experiments.steps import Rate
+from experiments.steps import Describe, Rate
 from tests.at_display import wait_for
 
 SETUP = load_setup("preference")
@@ -33,14 +34,19 @@ class Told:
         self.link = ParticipantLink.start(command=(sys.executable, "-c", PROGRAM, str(self._file)))
         self.side = ParticipantSide(self.link, lambda: self.link, SETUP, rates=True, own_keys=False)
 
-    def at(self, serial: int, *states: State) -> None:
-        self.side.follow(Position(states=states, serial=serial, number=3, step=STEP))
+    def at(self, serial: int, *states: State, step: Rate | Describe = STEP) -> None:
+        self.side.follow(Position(states=states, serial=serial, number=3, step=step))
 
     @property
     def words(self) -> list[str]:
         """The questions by their kind, and the texts."""
+        return [word.get("text", word["kind"]) for word in self.all]
+
+    @property
+    def all(self) -> list[dict[str, Any]]:
+        """What was told, in full."""
         lines = self._file.read_bytes().split(b"\n")[:-1] if self._file.exists() else []
-        return [word.get("text", word["kind"]) for word in map(json.loads, lines)]
+        return [json.loads(line) for line in lines]
 
     def end(self) -> list[str]:
         """What was told until the end."""
@@ -73,6 +79,29 @@ def test_what_takes_a_question_off_the_participants_screen_stays_on_it(told: Tol
     shown = told.end()
     assert "" not in shown
     assert shown[-2:] == ["Paused. Please wait.", "end"]
+
+
+def test_between_a_rating_and_its_description_the_participants_window_keeps_the_keys_but_not_in_a_pause(
+    told: Told,
+) -> None:
+    described = Describe(trial=TRIAL, question="In your own words?")
+    told.at(1, State.RATING)
+    wait_for(lambda: told.words == ["ask-rating"])
+    told.at(2, State.SAVING)
+    told.at(3, State.DESCRIBING, step=described)
+    wait_for(lambda: told.words.count("ask-description") == 1)
+    told.at(4, State.DESCRIBING, State.PAUSED, step=described)
+    told.at(5, State.DESCRIBING, step=described)
+    wait_for(lambda: told.words.count("ask-description") == 2)
+    told.at(6, State.SAVING, step=described)
+    assert told.end() == [
+        "ask-rating", BETWEEN, "ask-description", PAUSED, "ask-description", BETWEEN, "end"
+    ]  # fmt: skip
+    assert {word["text"]: word["keep_keys"] for word in told.all if word["kind"] == "show"} == {
+        BETWEEN: True, PAUSED: False, "end": False
+    }  # fmt: skip
+    asked = next(word for word in told.all if word["kind"] == "ask-description")
+    assert (asked["number"], asked["of"], asked["question"]) == (1, 3, "In your own words?")
 
 
 def test_whose_the_keys_are_is_told_also_if_it_was_said_before_anybody_listened() -> None:

@@ -9,9 +9,11 @@ from experiments.screens.participant.clocks import ClockMap, RoundTrip, clock_ma
 from experiments.screens.participant.look import Look, arguments, look_from
 from experiments.screens.participant.marker import move, put
 from experiments.screens.participant.words import (
+    AskDescription,
     AskDirection,
     AskRating,
     Close,
+    DescriptionGiven,
     DirectionGiven,
     Failed,
     Noise,
@@ -32,7 +34,7 @@ COUNT = st.integers(0, 10_000)
 SHARE = st.floats(0, 1)
 
 TO = st.one_of(
-    st.builds(Show, text=TEXT),
+    st.builds(Show, text=TEXT, tell=st.tuples(TEXT), keep_keys=st.booleans()),
     st.builds(
         AskRating,
         number=COUNT,
@@ -43,9 +45,9 @@ TO = st.one_of(
         minimum_text=TEXT,
         maximum_text=TEXT,
         grain=st.floats(1e-6, 10),
-        describe=TEXT,
         ask=COUNT,
     ),
+    st.builds(AskDescription, number=COUNT, of=COUNT, question=TEXT, ask=COUNT),
     st.builds(
         AskDirection,
         question=TEXT,
@@ -63,7 +65,8 @@ TO = st.one_of(
 FROM = st.one_of(
     st.builds(Ready, psychopy=TEXT, window=TEXT, refresh_Hz=st.none() | NUMBER),
     st.builds(Pong, sent_s=NUMBER, there_s=NUMBER),
-    st.builds(RatingGiven, rating=NUMBER, comment=TEXT, ask=COUNT),
+    st.builds(RatingGiven, rating=NUMBER, ask=COUNT),
+    st.builds(DescriptionGiven, comment=TEXT, ask=COUNT),
     st.builds(DirectionGiven, response=st.sampled_from(["forward", "backward"]), pressed_s=NUMBER, ask=COUNT),
     st.builds(NoiseIs, on=st.booleans(), message=TEXT, ask=COUNT),
     st.builds(Failed, message=TEXT),
@@ -87,10 +90,10 @@ def test_every_word_from_the_participant_comes_back_from_its_line_whatever_its_t
 
 
 def test_quotes_newlines_and_chinese_keep_to_one_line_of_ascii():
-    wire = line(RatingGiven(rating=0.0, comment='he said "hm",\nthen 很好\u2028\r'))
+    wire = line(DescriptionGiven(comment='he said "hm",\nthen 很好\u2028\r'))
     assert wire.isascii()
     assert wire.count(b"\n") == 1
-    assert from_participant_from(wire) == RatingGiven(rating=0.0, comment='he said "hm",\nthen 很好\u2028\r')
+    assert from_participant_from(wire) == DescriptionGiven(comment='he said "hm",\nthen 很好\u2028\r')
 
 
 GARBAGE = [
@@ -100,9 +103,10 @@ GARBAGE = [
     b"[]",
     b"{}",
     b'{"kind": "rating"}',
-    b'{"kind": "rating-given", "rating": NaN, "comment": ""}',
-    b'{"kind": "rating-given", "rating": 1e999, "comment": ""}',
-    b'{"kind": "rating-given", "rating": null, "comment": ""}',
+    b'{"kind": "rating-given", "rating": NaN}',
+    b'{"kind": "rating-given", "rating": 1e999}',
+    b'{"kind": "rating-given", "rating": null}',
+    b'{"kind": "description-given", "comment": null}',
     b'{"kind": "direction-given", "response": "up", "pressed_s": 1}',
     b'{"kind": "failed", "message": "half',
     b"\xff\xfe",

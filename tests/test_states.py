@@ -39,10 +39,11 @@ ENDS = (events.EmergencyStop, events.Stop, events.DisplayLost, events.ResultsGon
 """What may end a run from wherever it is."""
 CARRY_ON = (
     *(events.DamperSet, events.Fire, events.Answer, events.Next, events.Rating, events.Description, events.EndBreak),
-    *(events.Finish, events.Rearm, events.Repeat, events.BreakOver, events.ParticipantKey, events.ParticipantRated),
+    *(events.Finish, events.Rearm, events.Repeat, events.BreakOver, *events.OWN),
 )
 """What takes a run to its next step."""
-OWN = (events.ParticipantKey, events.ParticipantRated)
+OWN = {S.ASKING: events.ParticipantKey, S.RATING: events.ParticipantRated, S.DESCRIBING: events.ParticipantDescribed}
+"""What the participant says by their own hand, and when."""
 STEPS = (S.REARMING, S.SETTING, S.PREPARING, S.ASKING, S.RATING, S.DESCRIBING, S.RESTING, S.CLOSING)
 """The states that a run enters by itself, apart from those in which it fires."""
 
@@ -204,7 +205,7 @@ def test_while_a_correction_is_open_nothing_moves_the_step_but_the_participants_
     stack: Stack,
 ) -> None:
     taken = {kind for at, kind, later in MOVES if at == stack and later[0] is not stack[0]}
-    own = {S.ASKING: {events.ParticipantKey}, S.RATING: {events.ParticipantRated}}.get(stack[0], set())
+    own = {OWN[stack[0]]} if stack[0] in OWN else set()
     assert taken == own | {end for end in ENDS if stack[0] is not S.HALTED or end is not events.EmergencyStop}
     assert all(after_on(stack, kind) == (S.SAVING, S.CORRECTING) for kind in own)
 
@@ -214,7 +215,7 @@ def test_while_a_correction_is_open_nothing_moves_the_step_but_the_participants_
 def test_what_carries_a_run_on_is_not_taken_where_it_is_held_or_busy(kind: Kind, state: State) -> None:
     change = TABLE[kind][state]
     exceptions = {(events.GoOn, S.PAUSED): BACK, (events.Correct, S.CORRECTING): BACK}
-    exceptions |= {(own, S.CORRECTING): BENEATH for own in OWN}
+    exceptions |= {(own, S.CORRECTING): BENEATH for own in OWN.values()}
     if (kind, state) in exceptions:
         assert change == exceptions[kind, state]
     else:
@@ -234,6 +235,7 @@ def test_each_state_takes_what_is_asked_for_there_and_nothing_else_of_the_kind()
         (events.Rating, S.RATING),
         (events.ParticipantRated, S.RATING),
         (events.Description, S.DESCRIBING),
+        (events.ParticipantDescribed, S.DESCRIBING),
         (events.EndBreak, S.RESTING),
         (events.BreakOver, S.RESTING),
         (events.Finish, S.CLOSING),

@@ -18,6 +18,8 @@ from experiments.screens.console.messages import Message, ParticipantSeen, Troub
 from experiments.screens.participant.link import ParticipantLink
 from experiments.screens.participant.mailbox import ParticipantError
 from experiments.screens.participant.words import (
+    BETWEEN,
+    AskDescription,
     AskDirection,
     AskRating,
     EmergencyPressed,
@@ -27,7 +29,7 @@ from experiments.screens.participant.words import (
 )
 from experiments.setup import Setup
 from experiments.states import Position, State
-from experiments.steps import Ask, Rate
+from experiments.steps import Ask, Describe, Rate
 
 KEYS: dict[str, Direction] = {"up": "forward", "down": "backward"}
 """The participant's keys, by PsychoPy's names, and what they say."""
@@ -98,7 +100,7 @@ class ParticipantSide:
             target = self._asks(desire, position)
             if target is None:
                 told = tuple(KEYS) if self.own_keys and desire == (PAUSED,) else ()
-                self._link.show(str(desire[0]), tell=told)
+                self._link.show(str(desire[0]), tell=told, keep_keys=desire == (BETWEEN,))
             else:
                 self._link.cancel()
                 threading.Thread(target=target, daemon=True, name="participant").start()
@@ -110,6 +112,10 @@ class ParticipantSide:
             return ("direction", position.number)
         if position.base is State.RATING and self.rates:
             return ("rating", position.number)
+        if position.base is State.DESCRIBING and self.rates:
+            return ("description", position.number)
+        if position.base is State.SAVING and self.rates and isinstance(position.step, Rate | Describe):
+            return (BETWEEN,)
         return (THANKS,) if position.base in (State.CLOSING, State.STOPPED) else (WAIT,)
 
     def _asks(self, desire: Desire, position: Position) -> Callable[[], None] | None:
@@ -118,6 +124,8 @@ class ParticipantSide:
             return lambda: self._carefully(desire, lambda wanted: self._judged(step, position, wanted))
         if desire[0] == "rating" and isinstance(step, Rate):
             return lambda: self._carefully(desire, lambda wanted: self._rated(step, position, wanted))
+        if desire[0] == "description" and isinstance(step, Describe):
+            return lambda: self._carefully(desire, lambda wanted: self._described(step, position, wanted))
         return None
 
     def _carefully(self, desire: Desire, ask: Callable[[Wanted], None]) -> None:
@@ -157,23 +165,27 @@ class ParticipantSide:
         return 0.0 if self._live is None else self._live.clock.now()
 
     def _rated(self, step: Rate, position: Position, wanted: Wanted) -> None:
-        config = self._setup.config
         given = self._link.ask_rating(
             AskRating(
                 number=step.trial.trial,
-                of=config.design.trials,
+                of=self._setup.config.design.trials,
                 question=step.question,
                 minimum=step.minimum,
                 maximum=step.maximum,
                 minimum_text=step.minimum_text,
                 maximum_text=step.maximum_text,
                 grain=step.grain,
-                describe=config.description.text,
             ),
             wanted=wanted,
         )
-        rated = events.ParticipantRated(rating=given.rating, comment=given.comment, step=position.number, by=self._hand)
-        self._offer(rated)
+        self._offer(events.ParticipantRated(rating=given.rating, step=position.number, by=self._hand))
+
+    def _described(self, step: Describe, position: Position, wanted: Wanted) -> None:
+        of = self._setup.config.design.trials
+        given = self._link.ask_description(
+            AskDescription(number=step.trial.trial, of=of, question=step.question), wanted=wanted
+        )
+        self._offer(events.ParticipantDescribed(text=given.comment, step=position.number, by=self._hand))
 
     def _offer(self, event: events.Event) -> None:
         if self._live is not None:

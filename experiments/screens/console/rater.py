@@ -1,4 +1,4 @@
-"""A synthetic participant on the participant's own screen: its rating is clicked, its empty description confirmed."""
+"""A synthetic participant on the participant's own screen: its ratings are clicked, its descriptions left empty."""
 
 from __future__ import annotations
 
@@ -35,15 +35,28 @@ class Rater:
         self._at_s = 0.0
 
     def rate(self, step: Rate, rating: float) -> None:
-        """Click the rating and confirm the page; the description's page takes the same for an end without words."""
-        if time.monotonic() - self._at_s < AGAIN_S:
-            return
-        self._at_s = time.monotonic()
-        place = self._hands.focus_on(TITLE)
+        """Click the rating and confirm it. A page that asks for a description takes the same for an empty one."""
+        place = self._place()
         if place is not None:
             x_px, y_px = _spot(step, rating, width_px=place[2], height_px=place[3])
             self._hands.click(place[0] + x_px, place[1] + y_px)
-            self._hands.press("Return", "Control_L")
+            self._confirm()
+
+    def describe(self) -> None:
+        """Confirm an empty description. A page that asks for a rating takes none by that, as none is clicked on it."""
+        if self._place() is not None:
+            self._confirm()
+
+    def _place(self) -> tuple[int, int, int, int] | None:
+        """Where the participant's window lies, now that it has the keys; `None` if there is none, or it is too soon."""
+        if time.monotonic() - self._at_s < AGAIN_S:
+            return None
+        self._at_s = time.monotonic()
+        return self._hands.focus_on(TITLE)
+
+    def _confirm(self) -> None:
+        """With Ctrl, as Enter alone begins a new line of a description."""
+        self._hands.press("Return", "Control_L")
 
 
 def _spot(step: Rate, rating: float, *, width_px: int, height_px: int) -> tuple[int, int]:

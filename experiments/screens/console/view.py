@@ -73,6 +73,12 @@ class Instruction:
     mood: str = "act"
 
 
+def typed_there(about: About, position: Position) -> bool:
+    """Whether the participant's own screen has the keys, for as long as one rating or description follows the other."""
+    asked = position.base in (State.RATING, State.DESCRIBING, State.SAVING)
+    return about.participant_rates and asked and isinstance(position.step, Rate | Describe)
+
+
 def code(plan: Plan, trial: Trial) -> str:
     """The name under which the experimenter meets a method: A, B, C in the order of the run."""
     return f"Method {chr(ord('A') + plan.methods.index(trial.method))}"
@@ -200,12 +206,9 @@ def _rating(seen: Seen, now_s: float) -> Instruction:
     step = seen.position.step
     if not isinstance(step, Rate | Describe):
         return _moment(seen, 0.0)
-    own = (
-        "\nAwaited: the participant's rating on their own screen, or type it here."
-        if seen.about.participant_rates
-        else ""
-    )
-    detail = f"{step.question}{own if isinstance(step, Rate) else ''}"
+    what = "rating" if isinstance(step, Rate) else "description"
+    own = f"\nAwaited: the participant's {what} on their own screen, or type it here."
+    detail = f"{step.question}{own if seen.about.participant_rates else ''}"
     return Instruction(title=texts.ordinal(seen.about.plan, step.trial), detail=detail, mood="ask")
 
 

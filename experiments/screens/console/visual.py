@@ -46,7 +46,7 @@ class VisualParticipant:
 
     def _look(self) -> None:
         window = self._console.window
-        if window is None or window.live is None or self._rates_beside(window):
+        if window is None or window.live is None or self._answers_beside(window):
             return
         if not window.isActiveWindow():
             window.activateWindow()  # keys reach the window that has the focus
@@ -61,17 +61,23 @@ class VisualParticipant:
             self._done, self._done_s = position.serial, now_s
             self._press(window, position)
 
-    def _rates_beside(self, window: ConsoleWindow) -> bool:
-        """Whether a rating is being given on the participant's screen. No answer has no place there."""
+    def _answers_beside(self, window: ConsoleWindow) -> bool:
+        """Whether a rating or description is being given on the participant's screen. No answer has no place there."""
         step = window.drawn.step
-        if self._rater is None or self._beside is None or window.drawn.state is not State.RATING:
+        if self._rater is None or self._beside is None:
             return False
-        rating = self._observer.rate(step.trial) if isinstance(step, Rate) else None
-        if rating is None or not isinstance(step, Rate):
-            return False
-        if self._beside.asking:  # only then: what comes later would be done to the next question
-            self._rater.rate(step, rating)
-        return True
+        asking = self._beside.asking  # only then: what comes later would be done to the next question
+        match window.drawn.state:
+            case State.RATING if isinstance(step, Rate) and (rating := self._observer.rate(step.trial)) is not None:
+                if asking:
+                    self._rater.rate(step, rating)
+                return True
+            case State.DESCRIBING:
+                if asking:
+                    self._rater.describe()
+                return True
+            case _:
+                return False
 
     @property
     def _observer(self) -> Any:

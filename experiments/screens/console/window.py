@@ -46,7 +46,7 @@ from experiments.screens.console.view import About, Seen
 from experiments.screens.console.windows import remember, scaled
 from experiments.screens.texts import saved_text
 from experiments.states import Position
-from experiments.steps import Failed, Rated, Rested
+from experiments.steps import Failed, Rested
 
 REFRESH_MS = 100
 BRIEF_S = 4.0
@@ -181,7 +181,9 @@ class ConsoleWindow(QMainWindow):
         """Draw the newest position: its field, and where the cursor goes; a line that is being typed keeps it."""
         if self.live is None:
             return
-        self.drawn = self.live.position
+        before, self.drawn = self.drawn, self.live.position
+        if view.typed_there(self.about, before) and not view.typed_there(self.about, self.drawn):
+            self.activateWindow()  # the participant's screen took the keys
         if self.controls is not None:
             self.controls.draw(self.drawn)
             if self.drawn.serial != self._brief_for:
@@ -200,8 +202,6 @@ class ConsoleWindow(QMainWindow):
             self._last(text, "bad" if isinstance(message.word, Failed | Halted) else "good")
         if isinstance(message.word, Rested):
             tone.play()
-        if isinstance(message.word, Rated) and message.word.rating_by == "participant":
-            self.activateWindow()  # the participant's screen took the keys to be rated on
 
     def say(self, text: str, mood: str) -> None:
         """Show a line of answer, for a few seconds."""

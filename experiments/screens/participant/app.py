@@ -7,20 +7,22 @@ import time
 import traceback
 from typing import BinaryIO
 
+from experiments.screens.participant.description_page import DescriptionPage
 from experiments.screens.participant.keys import Keys
 from experiments.screens.participant.look import Look
 from experiments.screens.participant.noise import MaskingNoise
 from experiments.screens.participant.pages import DirectionPage, MessagePage
 from experiments.screens.participant.rating_page import RatingPage
-from experiments.screens.participant.stage import Page, Stage
+from experiments.screens.participant.stage import Stage
 from experiments.screens.participant.toolkit import load
 from experiments.screens.participant.wire import Wire
 from experiments.screens.participant.words import (
+    BETWEEN,
+    AskDescription,
     AskDirection,
     AskRating,
     Close,
     Failed,
-    FromParticipant,
     KeyPressed,
     Noise,
     Ready,
@@ -30,8 +32,6 @@ from experiments.screens.participant.words import (
 
 _STEP_S = 0.004
 """How long the program rests between two looks at words, mouse and keys."""
-
-_THANKS = "Thank you. Please wait."
 
 
 def run(look: Look, heard: BinaryIO, said: BinaryIO) -> int:
@@ -65,6 +65,8 @@ class App:
         self._noise = MaskingNoise()
         self._told: tuple[str, ...] = ()
         self._told_s = 0.0
+        self._drafts: dict[int, str] = {}
+        """What was written on the stimuli by their numbers, until the next rating is asked for."""
 
     def begin(self) -> None:
         """Show an empty window and say that it is ready."""
@@ -85,7 +87,7 @@ class App:
                 self._wire.say(self._stage.unasked.popleft())
             self._keys.poll()
             self._tell_keys()
-            self._follow(self._stage.page.outcome() if self._stage.page else None)
+            self._answer()
             time.sleep(_STEP_S)
         self._noise.stop()
         self._stage.close()
@@ -104,20 +106,21 @@ class App:
         self._told_s = self._stage.toolkit.now()
         match word:
             case Show():
-                self._stage.put(MessagePage(self._stage, word.text))
+                self._stage.put(MessagePage(self._stage, word.text), keep_keys=word.keep_keys)
             case AskRating():
                 self._stage.put(RatingPage(self._stage, word))
+                self._drafts.clear()  # only now: what is given as a pause begins is not taken, and asked for again
+            case AskDescription():
+                self._stage.put(DescriptionPage(self._stage, word, self._drafts))
             case AskDirection():
                 self._stage.put(DirectionPage(self._stage, word, self._keys))
             case Noise():
                 self._wire.say(self._noise.turn(word))
 
-    def _follow(self, outcome: Page | FromParticipant | None) -> None:
-        """Go on to the next page, or say the answer and thank for it."""
-        if outcome is None:
-            return
-        if isinstance(outcome, FromParticipant):
-            self._wire.say(outcome)
-            self._stage.put(MessagePage(self._stage, _THANKS))
-        else:
-            self._stage.put(outcome)
+    def _answer(self) -> None:
+        """Say what the page came to, if it did, and thank for it. After a page to type on another is likely to come."""
+        page = self._stage.page
+        given = None if page is None else page.outcome()
+        if page is not None and given is not None:
+            self._wire.say(given)
+            self._stage.put(MessagePage(self._stage, BETWEEN), keep_keys=page.typed)

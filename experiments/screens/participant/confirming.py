@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import Any
 
 from experiments.screens.participant.stage import Box, Stage
-from experiments.screens.participant.words import AskRating
+from experiments.screens.participant.words import AskDescription, AskRating
 
 ENTER = ("RETURN", "ENTER", "NUM_ENTER")
 """Keys that confirm, as pyglet names them."""
@@ -31,13 +31,13 @@ class Button:
         return abs(x - self._box.x) <= self._box.width / 2 and abs(y - self._box.y) <= self._box.height / 2
 
 
-def heading(stage: Stage, asked: AskRating, question: str) -> list[Any]:
+def heading(stage: Stage, asked: AskRating | AskDescription) -> list[Any]:
     """Which stimulus is meant, by its order of presentation, and the question."""
     width = 2 * stage.half_width
     which = f"Feedback {asked.number} of {asked.of}"
     return [
         stage.text(which, Box(y=0.46, width=width, height=0.07), 0.05, stage.palette.accent),
-        stage.text(question, Box(y=0.37, width=width, height=0.3), 0.045, stage.palette.ink),
+        stage.text(asked.question, Box(y=0.37, width=width, height=0.3), 0.045, stage.palette.ink),
     ]
 
 

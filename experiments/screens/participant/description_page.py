@@ -7,7 +7,7 @@ from typing import Any
 from experiments.screens.participant.confirming import ENTER, Button, heading, hint
 from experiments.screens.participant.pages import QuietPage
 from experiments.screens.participant.stage import Box, Stage
-from experiments.screens.participant.words import AskRating, RatingGiven
+from experiments.screens.participant.words import AskDescription, DescriptionGiven
 
 MOST_CHARACTERS = 1_000
 """What a description may hold: PsychoPy lays the text out anew at every key, and beyond this typing would lag."""
@@ -20,21 +20,25 @@ _FULL = "There is no more room. When you are done: the button, or Ctrl and Enter
 
 
 class DescriptionPage(QuietPage):
-    """A box to type in. Letters get smaller as it fills; a key that finds no room is not taken, and that is said."""
+    """A box to type in. Letters get smaller as it fills; a key that finds no room is not taken, and that is said.
+
+    `drafts` holds what was written so far, by the stimulus's number: it stands there at first, and is kept at last.
+    """
 
     redraw_s = 1 / 30
     pointer = True
     typed = True
 
-    def __init__(self, stage: Stage, asked: AskRating, rating: float) -> None:
-        self._asked, self._rating, self._done, self._full = asked, rating, False, False
+    def __init__(self, stage: Stage, asked: AskDescription, drafts: dict[int, str]) -> None:
+        self._asked, self._drafts = asked, drafts
+        self._done = self._full = False
         place = Box(y=-0.03, width=2 * stage.half_width, height=0.44)
         self._size = 0
         self._height_px = stage.height_px
         self._room_px = (place.height - 2 * _PADDING) * stage.height_px
-        self._box = _text_box(stage, place)
+        self._box = _text_box(stage, place, drafts.get(asked.number, ""))
         self._button = Button(stage, "Done")
-        self._drawn = [*heading(stage, asked, asked.describe), self._box]
+        self._drawn = [*heading(stage, asked), self._box]
         self._hints = {False: hint(stage, _HINT), True: hint(stage, _FULL)}
 
     def draw(self) -> None:
@@ -53,15 +57,14 @@ class DescriptionPage(QuietPage):
         self._done = self._done or (ctrl and name in ENTER)
         return self._done or name == "TAB"
 
-    def outcome(self) -> RatingGiven | None:
-        """Rating and description, once they are done."""
-        if not self._done:
-            return None
-        return RatingGiven(rating=self._rating, comment=self._box.text.strip(), ask=self._asked.ask)
+    def outcome(self) -> DescriptionGiven | None:
+        """The description, once it is done."""
+        return DescriptionGiven(comment=self._box.text.strip(), ask=self._asked.ask) if self._done else None
 
     def leave(self) -> None:
-        """No more typing."""
+        """No more typing; what was written is kept."""
         self._box.editable = False
+        self._drafts[self._asked.number] = self._box.text
 
     def _fit(self) -> None:
         """Smaller letters if the text is too high; where there are none, the last letter goes again."""
@@ -84,10 +87,10 @@ class DescriptionPage(QuietPage):
         self._box.text = self._box.text
 
 
-def _text_box(stage: Stage, place: Box) -> Any:
+def _text_box(stage: Stage, place: Box, text: str) -> Any:
     return stage.toolkit.visual.TextBox2(
         stage.window,
-        text="",
+        text=text,
         font=stage.look.font,
         pos=(place.x, place.y),
         size=(place.width, place.height),

@@ -21,9 +21,11 @@ from experiments.screens.participant.look import Look, arguments
 from experiments.screens.participant.mailbox import Mailbox, ParticipantError
 from experiments.screens.participant.process import ParticipantProcess
 from experiments.screens.participant.words import (
+    AskDescription,
     AskDirection,
     AskRating,
     Close,
+    DescriptionGiven,
     DirectionGiven,
     Failed,
     Focused,
@@ -51,8 +53,8 @@ NOISE_S = 15.0
 MAX_CLOCK_STEP_S = 0.02
 """How far the clocks may move against each other while a direction is asked; a clock that was set moves further."""
 
-Question = AskRating | AskDirection | Noise
-Answer = TypeVar("Answer", RatingGiven, DirectionGiven, NoiseIs)
+Question = AskRating | AskDescription | AskDirection | Noise
+Answer = TypeVar("Answer", RatingGiven, DescriptionGiven, DirectionGiven, NoiseIs)
 
 __all__ = ["ParticipantError", "ParticipantLink"]
 
@@ -119,12 +121,15 @@ class ParticipantLink:
         if self.failure is not None:
             gone(self.failure)
 
-    def show(self, text: str, tell: tuple[str, ...] = ()) -> None:
-        """Show a plain message; a question that is being asked is called off. Keys in `tell` are told meanwhile."""
+    def show(self, text: str, tell: tuple[str, ...] = (), *, keep_keys: bool = False) -> None:
+        """Show a plain message; a question that is being asked is called off. Keys in `tell` are told meanwhile.
+
+        `keep_keys`: keys that the participant's window has stay there for the next question.
+        """
         with self._page:
             self._mail.call_off()
             self._stands = 0
-            self._process.write(line(Show(text=text, tell=tell)))
+            self._process.write(line(Show(text=text, tell=tell, keep_keys=keep_keys)))
 
     def map_clocks(self, pings: int = PINGS) -> ClockMap:
         """Map the clocks anew."""
@@ -135,13 +140,21 @@ class ParticipantLink:
     def ask_rating(
         self, question: AskRating, timeout_s: float | None = None, *, wanted: Callable[[], bool] = lambda: True
     ) -> RatingGiven:
-        """Have a stimulus rated, and described if `describe` asks for it. Waits for the participant.
+        """Have a stimulus rated. Waits for the participant.
 
         `wanted` is looked at just before the question is put on the screen; if it is not, it counts as called off.
         """
         with self._alone():
             asked = replace(question, ask=self._mail.open_ask())
             return self._answer(asked, RatingGiven, timeout_s, wanted)
+
+    def ask_description(
+        self, question: AskDescription, timeout_s: float | None = None, *, wanted: Callable[[], bool] = lambda: True
+    ) -> DescriptionGiven:
+        """Have a stimulus described. Waits for the participant. `wanted` as of a rating."""
+        with self._alone():
+            asked = replace(question, ask=self._mail.open_ask())
+            return self._answer(asked, DescriptionGiven, timeout_s, wanted)
 
     def ask_direction(
         self, question: AskDirection, timeout_s: float | None = None, *, wanted: Callable[[], bool] = lambda: True

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from experiments.screens.participant.keys import Keys
-from experiments.screens.participant.stage import Box, Page, Stage
+from experiments.screens.participant.stage import Box, Stage
 from experiments.screens.participant.words import AskDirection, DirectionGiven, FromParticipant
 
 STILL_S = 0.1
@@ -34,7 +34,7 @@ class QuietPage:
     def motion(self, name: str) -> None:
         """Nothing."""
 
-    def outcome(self) -> Page | FromParticipant | None:
+    def outcome(self) -> FromParticipant | None:
         """Nothing."""
         return None
 

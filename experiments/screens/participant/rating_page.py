@@ -5,10 +5,9 @@ from __future__ import annotations
 from typing import Any
 
 from experiments.screens.participant.confirming import ENTER, Button, heading, hint
-from experiments.screens.participant.description_page import DescriptionPage
 from experiments.screens.participant.marker import Move, move, put
 from experiments.screens.participant.pages import QuietPage
-from experiments.screens.participant.stage import Box, Page, Stage, half_width
+from experiments.screens.participant.stage import Box, Stage, half_width
 from experiments.screens.participant.words import AskRating, RatingGiven
 
 _HINT = "Click on the line or use the arrow keys, then Confirm or Enter"
@@ -54,7 +53,7 @@ class RatingPage(QuietPage):
         self._half = _LENGTH * stage.half_width
         self._slider = self._scale()
         self._button = Button(stage, "Confirm")
-        self._drawn = [*heading(stage, asked, asked.question), *self._ends(), hint(stage, _HINT)]
+        self._drawn = [*heading(stage, asked), *self._ends(), hint(stage, _HINT)]
 
     def draw(self) -> None:
         """The question, the scale with its marker if there is one, the button."""
@@ -92,13 +91,11 @@ class RatingPage(QuietPage):
         if name in _MOVES:
             self._rating = move(self._asked, self._rating, _MOVES[name])
 
-    def outcome(self) -> Page | RatingGiven | None:
-        """The rating, or the page that asks for the description, once it is confirmed. 0 is a rating."""
+    def outcome(self) -> RatingGiven | None:
+        """The rating, once it is confirmed. 0 is a rating."""
         if not self._done or self._rating is None:
             return None
-        if self._asked.describe:
-            return DescriptionPage(self._stage, self._asked, self._rating)
-        return RatingGiven(rating=self._rating, comment="", ask=self._asked.ask)
+        return RatingGiven(rating=self._rating, ask=self._asked.ask)
 
     def _confirm(self) -> None:
         self._done = self._rating is not None

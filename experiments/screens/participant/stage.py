@@ -51,8 +51,8 @@ class Page(Protocol):
     def motion(self, name: str) -> None:
         """A key that moves something went down, or is held."""
 
-    def outcome(self) -> Page | FromParticipant | None:
-        """What it comes to: a word to say, another page, or nothing yet."""
+    def outcome(self) -> FromParticipant | None:
+        """What it comes to: a word to say, or nothing yet."""
 
     def leave(self) -> None:
         """It is taken off the window."""
@@ -97,10 +97,11 @@ class Stage:
         measured = self.window.getActualFrameRate(nIdentical=_STEADY_FLIPS, nMaxFrames=_MOST_FLIPS, nWarmUpFrames=2)
         return None if measured is None else round(float(measured), 2)
 
-    def put(self, page: Page) -> None:
+    def put(self, page: Page, *, keep_keys: bool = False) -> None:
         """Fill the window with another page; one that is typed on borrows the keys for as long as it stands.
 
         What was done before it stands is done to the page that stood there: a second click is no rating.
+        `keep_keys`: until the next one to type on the keys stay, so that no key goes to another window meanwhile.
         """
         self.window.winHandle.dispatch_events()
         if self.page is not None:
@@ -109,7 +110,7 @@ class Stage:
         self.window.mouseVisible = page.pointer
         if page.typed:
             self._focus.take()
-        else:
+        elif not keep_keys:
             self._focus.give_back()
         self._drawn_s = 0.0
 

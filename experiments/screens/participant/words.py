@@ -19,22 +19,26 @@ Finite = Annotated[float, Field(allow_inf_nan=False)]
 Positive = Annotated[float, Field(gt=0, allow_inf_nan=False)]
 Share = Annotated[float, Field(ge=0, le=1, allow_inf_nan=False)]
 
+BETWEEN = "Thank you. Please wait."
+"""What stands between two questions: put there by the window at once, and then by the console until it asks."""
+
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Show:
-    """Show a plain message; whatever was asked is asked no longer. Keys in `tell` are told if they go down."""
+    """Show a plain message; whatever was asked is asked no longer. Keys in `tell` are told if they go down.
+
+    `keep_keys`: the next page is likely one to type on, so the window gives the keys to nobody meanwhile.
+    """
 
     text: str
     tell: tuple[str, ...] = ()
+    keep_keys: bool = False
     kind: Literal["show"] = "show"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class AskRating:
-    """Ask for a rating of one of several stimuli, named by its order of presentation, then for a description.
-
-    An empty `describe` asks for no description.
-    """
+    """Ask for a rating of one of several stimuli, named by its order of presentation."""
 
     number: int
     of: int
@@ -44,9 +48,22 @@ class AskRating:
     minimum_text: str
     maximum_text: str
     grain: Positive
-    describe: str = ""
     ask: int = 0
     kind: Literal["ask-rating"] = "ask-rating"
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class AskDescription:
+    """Ask for a description of one of several stimuli, named by its order of presentation.
+
+    Asked again for the same one, it begins with what was written before.
+    """
+
+    number: int
+    of: int
+    question: str
+    ask: int = 0
+    kind: Literal["ask-description"] = "ask-description"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -109,12 +126,20 @@ class Pong:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class RatingGiven:
-    """A confirmed rating, of which 0 is one, and the participant's own words; may be empty."""
+    """A confirmed rating, of which 0 is one."""
 
     rating: Finite
-    comment: str
     ask: int = 0
     kind: Literal["rating-given"] = "rating-given"
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class DescriptionGiven:
+    """The participant's own words; may be empty."""
+
+    comment: str
+    ask: int = 0
+    kind: Literal["description-given"] = "description-given"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -168,10 +193,10 @@ class Failed:
     kind: Literal["failed"] = "failed"
 
 
-ToParticipant = Show | AskRating | AskDirection | Ping | Noise | Close
+ToParticipant = Show | AskRating | AskDescription | AskDirection | Ping | Noise | Close
 Unasked = EmergencyPressed | Focused | KeyPressed
 """What the participant's screen says without being asked."""
-FromParticipant = Ready | Pong | RatingGiven | DirectionGiven | NoiseIs | Unasked | Failed
+FromParticipant = Ready | Pong | RatingGiven | DescriptionGiven | DirectionGiven | NoiseIs | Unasked | Failed
 
 _TO: TypeAdapter[ToParticipant] = TypeAdapter(Annotated[ToParticipant, Field(discriminator="kind")])
 _FROM: TypeAdapter[FromParticipant] = TypeAdapter(Annotated[FromParticipant, Field(discriminator="kind")])
