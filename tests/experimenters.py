@@ -250,7 +250,8 @@ class Hand:
         position = self.sitting.position
         onset_s = position.since_s if position.onset_s is None else position.onset_s
         at_s = min(onset_s + late_s, self.sitting.clock.now())
-        key = events.ParticipantKey(response=response, at_s=at_s, step=position.number + earlier)
+        typed = self.sitting.controls.covered
+        key = events.ParticipantKey(response=response, at_s=at_s, step=position.number + earlier, typed=typed)
         self.sitting.live.offer(key)
 
     def own_rating(self, rating: float) -> None:
@@ -349,15 +350,20 @@ def check(someone: Experimenter) -> Counter[str]:
 
 
 def check_gun(gun: WatchedGun) -> None:
-    """Nothing is armed or fired but where the table allows it, nor rendered after a halt or in a pause.
+    """Nothing is armed or fired but where the table allows it, nor rendered once a halt or a pause has disarmed.
 
-    A shot of a train that was asked for when "next" came is rendered still.
+    A shot that was asked for before it was halted or held may be rendered as long as the gun was not disarmed.
     """
+    disarmed = False
     for call in gun.calls:
         if call.word in ("arm", "fire"):
             assert call.position.state in ARMED, call
-        if call.word == "rendered":
-            assert not call.position.held, call
+        if call.word == "fire":
+            disarmed = False
+        elif call.word == "disarmed":
+            disarmed = True
+        elif call.word == "rendered":
+            assert not (disarmed and (call.position.held or call.position.base is State.HALTED)), call
 
 
 def check_hand(offered: list[Offered], repeats_s: set[float]) -> None:
