@@ -206,7 +206,7 @@ def line(word: ToParticipant | FromParticipant) -> bytes:
     r"""A word as a line of the wire: JSON in ASCII. `ValueError` for a number that is none.
 
     >>> line(Show(text="one\ntwo"))
-    b'{"text": "one\\ntwo", "tell": [], "kind": "show"}\n'
+    b'{"text": "one\\ntwo", "tell": [], "keep_keys": false, "kind": "show"}\n'
     """
     return json.dumps(asdict(word), allow_nan=False).encode("ascii") + b"\n"
 
