@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from typing import Any
 
 from experiments.screens.participant.confirming import ENTER, Button, heading, hint
@@ -11,6 +12,9 @@ from experiments.screens.participant.words import AskDescription, DescriptionGiv
 
 MOST_CHARACTERS = 1_000
 """What a description may hold: PsychoPy lays the text out anew at every key, and beyond this typing would lag."""
+
+STOOD_S = 0.5
+"""Done is taken from so long after the page was drawn: it lies where Confirm was, and people click twice."""
 
 _PADDING = 0.02
 _BELOW = 0.3  # of a letter: what a line may have below its base
@@ -31,6 +35,7 @@ class DescriptionPage(QuietPage):
 
     def __init__(self, stage: Stage, asked: AskDescription, drafts: dict[int, str]) -> None:
         self._asked, self._drafts = asked, drafts
+        self._now, self._drawn_s = stage.toolkit.now, math.inf
         self._done = self._full = False
         place = Box(y=-0.03, width=2 * stage.half_width, height=0.44)
         self._size = 0
@@ -46,11 +51,13 @@ class DescriptionPage(QuietPage):
         for stimulus in (*self._drawn, self._hints[self._full]):
             stimulus.draw()
         self._button.draw(enabled=True)
+        self._drawn_s = min(self._drawn_s, self._now())
         self._fit()
 
     def pressed(self, x: float, y: float) -> None:
-        """On the button: done."""
-        self._done = self._done or self._button.holds(x, y)
+        """On the button: done, once the page has stood there."""
+        stood = self._now() - self._drawn_s >= STOOD_S
+        self._done = self._done or (stood and self._button.holds(x, y))
 
     def key(self, name: str, ctrl: bool) -> bool:
         """Enter with Ctrl: done. Tab does nothing; all else is PsychoPy's."""
