@@ -38,7 +38,7 @@ def find(name: str) -> Path:
         if path.is_file():
             return path
     known = ", ".join(sorted(path.stem for path in shipped_folder().glob("*.toml")))
-    if Path(name).is_dir():
+    if name and Path(name).is_dir():
         raise ConfigError(f"{name}: a folder, not a config; name a file in it, or a shipped config: {known}")
     raise ConfigError(f"{name}: no such file and no shipped config; shipped are {known}")
 

@@ -128,11 +128,6 @@ def _open_gun(request: Request, clock: Clock) -> Gun:
 def _before(where: Place, request: Request, clock: Clock) -> Contents | None:
     """The unfinished run to go on with, if there is one and it is wanted."""
     if not where.journal.exists():
-        if request.again == "resume":
-            raise PlaceError(
-                f"{where.journal}: there is no run of {where.experiment} by {where.participant_id} to resume here; "
-                "look at --results, or leave out --resume to begin one"
-            )
         return None
     if request.again == "fresh" or request.practice or is_empty(where.journal):
         _refuse_finished(where, _readable(where))

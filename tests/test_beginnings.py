@@ -112,7 +112,7 @@ def test_a_code_has_to_be_read_back_as_it_stands(code: str, again: str, may: boo
             someone("not begun", "not begun"),
             Facts(handedness="right"),
             False,
-            "was not given: age",
+            "The study asks for what was not given",
         ),
         (
             someone("in progress", "not begun", facts=FACTS),

@@ -86,6 +86,11 @@ def test_without_a_seed_one_is_drawn_and_stored(recoil: Recoil, tmp_path: Path) 
     assert seeds[0] != seeds[1]
 
 
+def test_a_code_that_has_no_run_has_none_to_resume(recoil: Recoil, tmp_path: Path) -> None:
+    refused(synthetic(recoil, "--resume"), "there is no run of direction by P01 to resume here", "leave out --resume")
+    assert not (tmp_path / JOURNAL).exists()
+
+
 def test_a_participant_who_has_finished_is_refused_and_nothing_changes(recoil: Recoil, tmp_path: Path) -> None:
     synthetic(recoil)
     before = {name: (tmp_path / name).read_bytes() for name in (TABLE, JOURNAL)}

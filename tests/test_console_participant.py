@@ -42,7 +42,12 @@ def rate_by_mouse(screen: AtConsole) -> None:
     click(screen, 0.5, BUTTON_Y)
     screen.participant_shows("DescriptionPage")
     screen.keys.type("soft")
-    click(screen, 0.5, BUTTON_Y)
+
+    def clicked_again() -> bool:  # a click soon after the page came may be the second one on Confirm, and is none
+        click(screen, 0.5, BUTTON_Y)
+        return screen.look().state != "describing"
+
+    wait_for(clicked_again, "the description does not end")
 
 
 def rate_by_keys(screen: AtConsole) -> None:

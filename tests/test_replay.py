@@ -323,13 +323,6 @@ def test_an_emergency_stop_that_the_disk_did_not_take_is_known_from_the_reason_o
 
 
 @pytest.mark.parametrize("name", SETUPS)
-def test_where_there_is_no_run_there_is_none_to_resume(name: str, tmp_path: Path) -> None:
-    with pytest.raises(PlaceError, match=r"there is no run of .* to resume here"):
-        run(request(name, tmp_path, "resume"), synthetic_screen, VirtualClock())
-    assert not any(tmp_path.iterdir())
-
-
-@pytest.mark.parametrize("name", SETUPS)
 def test_an_unfinished_run_is_neither_gone_on_with_nor_written_over_unasked(
     name: str, unbroken: dict[str, Unbroken], tmp_path: Path
 ) -> None:

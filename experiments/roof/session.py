@@ -13,7 +13,7 @@ from experiments import storage
 from experiments.clock import Clock, RealClock, VirtualClock
 from experiments.live_run import RunStopped
 from experiments.load import load_setup
-from experiments.places import Place, PlaceError, set_aside_file
+from experiments.places import Place, PlaceError, place, set_aside_file
 from experiments.plan import Plan
 from experiments.run import Again, Finished, Request, rebuild, run
 from experiments.screen import Screen
@@ -55,12 +55,24 @@ def run_session(asked: Asked) -> Place:
         again=_again(asked),
         anew_reason=asked.reason,
     )
+    if asked.resume:
+        _check_resumable(request)
     try:
         return _SCREENS[asked.screen](request, asked).place
     except RunStopped as stop:
         with suppress(OSError):  # where the terminal is gone, nobody reads it
             sys.stderr.write(f"recoil: stopped: {stop}. Go on with --resume.\n")
         raise KeyboardInterrupt from stop
+
+
+def _check_resumable(request: Request) -> None:
+    """`PlaceError` if there is nothing to go on with: a mistyped code is not to begin a run."""
+    where = place(request.results, request.participant_id, request.setup.config.experiment)
+    if not where.journal.exists():
+        raise PlaceError(
+            f"{where.journal}: there is no run of {where.experiment} by {where.participant_id} to resume here; "
+            "look at --participant and --results, or leave out --resume to begin one"
+        )
 
 
 def _check_screen(asked: Asked) -> None:
