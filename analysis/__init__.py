@@ -1,10 +1,10 @@
 """Log tables into the statistics, figures and report of a paper. Importing this loads numpy and scipy, nothing more."""
 
-from analysis.core.anova import Anova, RepeatedMeasuresAnova, one_way_anova, rm_anova
-from analysis.core.binomial import BinomialTest, binomial_test
-from analysis.core.detection import Detection, yes_no
-from analysis.core.studentized_range import studentized_range_isf, studentized_range_logsf, studentized_range_sf
-from analysis.core.tukey import Comparison, rm_tukey_hsd, rm_tukey_hsd_paired, tukey_hsd
+from analysis.stats.anova import Anova, RepeatedMeasuresAnova, one_way_anova, rm_anova
+from analysis.stats.binomial import BinomialTest, binomial_test
+from analysis.stats.detection import Detection, yes_no
+from analysis.stats.studentized_range import studentized_range_isf, studentized_range_logsf, studentized_range_sf
+from analysis.stats.tukey import Comparison, rm_tukey_hsd, rm_tukey_hsd_paired, tukey_hsd
 
 __all__ = [
     "Anova",

@@ -12,10 +12,10 @@ from device.limits import MAX_SHOTS_PER_MINUTE, DriveHistory, Load, load_of
 from device.methods import drive_of, rendering_of
 from device.parameters import GunParameters
 from device.words import Drive, Pulse
-from experiments.gun import GunConfig
+from experiments.config.gun import GunConfig
 from experiments.load import ConfigError
 from experiments.preference.config import PreferenceConfig
-from experiments.setup import Setup
+from experiments.config.setup import Setup
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

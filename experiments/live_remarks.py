@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from experiments import events
-from experiments.entries import Entry
-from experiments.events import Event
-from experiments.plan import Trial
-from experiments.remarks import (
+from experiments.session import events
+from experiments.session.entries import Entry
+from experiments.session.events import Event
+from experiments.design.plan import Trial
+from experiments.session.remarks import (
     AnswerCorrected,
     Continued,
     DescriptionCorrected,
@@ -18,7 +18,7 @@ from experiments.remarks import (
     RatingCorrected,
     Remark,
 )
-from experiments.states import Position, State
+from experiments.session.states import Position, State
 
 
 def remark_of(  # noqa: C901, PLR0911 - one case an event

@@ -13,9 +13,9 @@ from typing import Any, TypeVar
 from pydantic import BaseModel, ValidationError
 
 from experiments.catalogue import CATALOGUE
-from experiments.config import ExperimentConfig, StudyConfig
-from experiments.gun import GunConfig
-from experiments.setup import Setup
+from experiments.config.models import ExperimentConfig, StudyConfig
+from experiments.config.gun import GunConfig
+from experiments.config.setup import Setup
 
 SomeModel = TypeVar("SomeModel", bound=BaseModel)
 

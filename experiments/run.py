@@ -14,24 +14,29 @@ from typing import Any, Literal
 from pydantic import ValidationError
 
 from device import Gun, open_gun
-from experiments import catalogue, limits, orders, places, register, replay, storage
+from experiments import catalogue, limits
+from experiments.design import orders
+from experiments.study import places
+from experiments.study import register
+from experiments.record import replay
+from experiments.record import storage
 from experiments.clock import Clock
-from experiments.columns import FILE_SUFFIX, LATER
+from experiments.record.columns import FILE_SUFFIX, LATER
 from experiments.dates import date_text
-from experiments.journal import Contents, Journal, JournalError, hold, is_empty
-from experiments.journal import read as read_journal
+from experiments.record.journal import Contents, Journal, JournalError, hold, is_empty
+from experiments.record.journal import read as read_journal
 from experiments.live_run import LiveRun, RunStopped
-from experiments.places import Place, PlaceError
-from experiments.plan import Plan
-from experiments.provenance import provenance
-from experiments.replay import Standing
+from experiments.study.places import Place, PlaceError
+from experiments.design.plan import Plan
+from experiments.record.provenance import provenance
+from experiments.record.replay import Standing
 from experiments.runner import carry_out, gun_name
 from experiments.screen import Screen
-from experiments.setup import Setup
-from experiments.steps import Answered, Rated, Session
+from experiments.config.setup import Setup
+from experiments.session.steps import Answered, Rated, Session
 from experiments.stimulus import Desk
-from experiments.streams import draw_seed
-from experiments.tables import table_bytes
+from experiments.design.streams import draw_seed
+from experiments.record.tables import table_bytes
 
 Again = Literal["ask", "resume", "fresh"]
 """What to do with an unfinished run: refuse and say what is there, go on with it, or set it aside."""

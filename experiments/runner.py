@@ -10,14 +10,14 @@ from __future__ import annotations
 import math
 
 from device.words import Identity
-from experiments import events
-from experiments.entries import trial_at
+from experiments.session import events
+from experiments.session.entries import trial_at
 from experiments.live_run import RunStopped
-from experiments.plan import Trial
-from experiments.preference.scale import on_scale
-from experiments.replay import Standing
-from experiments.states import State
-from experiments.steps import (
+from experiments.design.plan import Trial
+from experiments.synthetic.scale import on_scale
+from experiments.record.replay import Standing
+from experiments.session.states import State
+from experiments.session.steps import (
     Answered,
     Ask,
     Close,

@@ -5,9 +5,9 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Protocol
 
 from device import GunStatus
-from experiments.remarks import Remark
-from experiments.states import Position
-from experiments.steps import Outcome, Step
+from experiments.session.remarks import Remark
+from experiments.session.states import Position
+from experiments.session.steps import Outcome, Step
 
 if TYPE_CHECKING:
     from experiments.live_run import LiveRun

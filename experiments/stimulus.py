@@ -13,14 +13,14 @@ from typing import Any, Literal
 
 from device import DeviceError, Gun, LimitError, Shot, ShotReport
 from device.words import Drive
-from experiments import events
+from experiments.session import events
 from experiments.clock import Clock
-from experiments.journal import Journal
+from experiments.record.journal import Journal
 from experiments.live_run import Held, LiveRun, RunStopped
-from experiments.plan import Trial
-from experiments.remarks import TestShot
-from experiments.states import State
-from experiments.steps import Failed, Fire, Fired, Interrupted, Present, Presented, TrainShot, record
+from experiments.design.plan import Trial
+from experiments.session.remarks import TestShot
+from experiments.session.states import State
+from experiments.session.steps import Failed, Fire, Fired, Interrupted, Present, Presented, TrainShot, record
 
 LEAD_S = 0.03
 """How long before its tick a shot of a train is asked for; a `next` within that time comes too late for it.

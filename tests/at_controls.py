@@ -18,16 +18,17 @@ from typing import Any, Literal
 
 from device import Gun, GunStatus, LimitError, LinkError, Shot, ShotReport
 from device.words import Direction
-from experiments import events, storage
+from experiments.session import events
+from experiments.record import storage
 from experiments import run as runs
-from experiments.events import Press
-from experiments.journal import Contents, read
+from experiments.session.events import Press
+from experiments.record.journal import Contents, read
 from experiments.live_run import LiveRun
 from experiments.load import load_setup
-from experiments.places import Place, place
-from experiments.plan import Plan, Trial
-from experiments.remarks import AnswerCorrected, Remark
-from experiments.replay import told
+from experiments.study.places import Place, place
+from experiments.design.plan import Plan, Trial
+from experiments.session.remarks import AnswerCorrected, Remark
+from experiments.record.replay import told
 from experiments.run import Finished, Request, run, table
 from experiments.screen import Screen
 from experiments.screens.console import overview, theme, view
@@ -36,9 +37,9 @@ from experiments.screens.console.keys import Name, Presses
 from experiments.screens.console.messages import Ended, GunSeen
 from experiments.screens.console.needs import Field
 from experiments.screens.console.view import About, Seen
-from experiments.setup import Setup
-from experiments.states import Position, State
-from experiments.steps import Answered, Fire, Outcome, Step
+from experiments.config.setup import Setup
+from experiments.session.states import Position, State
+from experiments.session.steps import Answered, Fire, Outcome, Step
 from tests.waiting import PATIENCE_S, wait_for
 
 MOST_DEEDS = 2000

@@ -9,10 +9,10 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from experiments import events
-from experiments.events import ACTS, Event
+from experiments.session import events
+from experiments.session.events import ACTS, Event
 from experiments.load import shipped_folder
-from experiments.states import TABLE, No, State
+from experiments.session.states import TABLE, No, State
 from tests.at_display import AtConsole, middle, records, remarks
 from tests.conftest import RECOIL
 from tests.watched_console import Watch

@@ -14,18 +14,18 @@ from typing import Any, Literal
 from hypothesis import strategies as st
 
 from device import LimitError, LinkError
-from experiments import events
-from experiments.events import ACTS
-from experiments.journal import Contents
+from experiments.session import events
+from experiments.session.events import ACTS
+from experiments.record.journal import Contents
 from experiments.live_run import RunStopped
-from experiments.plan import Plan, Trial
-from experiments.remarks import AnswerCorrected, DescriptionCorrected, RatingCorrected, Refused
-from experiments.replay import told
+from experiments.design.plan import Plan, Trial
+from experiments.session.remarks import AnswerCorrected, DescriptionCorrected, RatingCorrected, Refused
+from experiments.record.replay import told
 from experiments.screens.console.keys import COMMANDS, Name
-from experiments.setup import Setup
-from experiments.states import ARMED, State
-from experiments.steps import Answered, Described, Rated
-from experiments.tables import is_attempt
+from experiments.config.setup import Setup
+from experiments.session.states import ARMED, State
+from experiments.session.steps import Answered, Described, Rated
+from experiments.record.tables import is_attempt
 from tests.at_controls import GUARD_S, Offered, Sitting, WatchedGun, gated, kept, remarks, tells_correctness
 
 KEYS = (*"MFBPUERGNYLST7", "Space", "Enter", "Esc", "Tab", "F1", "F2")

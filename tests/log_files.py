@@ -1,4 +1,4 @@
-"""Valid logs for tests: rows as text, in the layout of `experiments.columns`, and a writer."""
+"""Valid logs for tests: rows as text, in the layout of `experiments.record.columns`, and a writer."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from pathlib import Path
 
 import numpy as np
 
-from experiments import columns
+from experiments.record import columns
 
 METHODS = ("vibration", "asymmetric-1", "asymmetric-2")
 FORWARD_RATES = {"vibration": 0.557, "asymmetric-1": 0.793, "asymmetric-2": 0.929}

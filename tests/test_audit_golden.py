@@ -9,8 +9,8 @@ from typing import Any
 
 import pytest
 
-from analysis.audit import Result, Rounding, debit, grim, grimmer, p_against_statistic, read
-from analysis.audit.means import scale_of
+from analysis.paper.audit import Result, Rounding, debit, grim, grimmer, p_against_statistic, read
+from analysis.paper.audit.means import scale_of
 
 GOLDEN = Path(__file__).parent / "golden" / "audit"
 SCRUTINY: dict[str, Any] = tomllib.loads((GOLDEN / "scrutiny.toml").read_text(encoding="utf-8"))

@@ -9,8 +9,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from analysis.audit import CHECKS, Finding, audit, load_paper_file, parse_paper, repeated_f
-from analysis.audit.claims import AnyClaim
+from analysis.paper.audit import CHECKS, Finding, audit, load_paper_file, parse_paper, repeated_f
+from analysis.paper.audit.claims import AnyClaim
 from tests.exact import exact_rm_F
 
 ROOT = Path(__file__).parent

@@ -13,14 +13,14 @@ import numpy as np
 import pytest
 
 from analysis import rm_anova, rm_tukey_hsd
-from analysis.audit import repeated_f
-from analysis.audit.annealing import Order
-from analysis.audit.means import scale_of
-from analysis.audit.participants import attainable_f, backward_counts, forward_counts, rating_grains
-from analysis.audit.printed import Interval, read
-from analysis.audit.reconstruct import Column, Constraints, meets, printed_constraints, reconstruct
-from analysis.core.binomial import binomial_test
-from analysis.paper import Paper, load_paper
+from analysis.paper.audit import repeated_f
+from analysis.paper.audit.annealing import Order
+from analysis.paper.audit.means import scale_of
+from analysis.paper.audit.participants import attainable_f, backward_counts, forward_counts, rating_grains
+from analysis.paper.audit.printed import Interval, read
+from analysis.paper.audit.reconstruct import Column, Constraints, meets, printed_constraints, reconstruct
+from analysis.stats.binomial import binomial_test
+from analysis.paper.paper import Paper, load_paper
 from tests.exact import exact_rm_F
 
 METHODS = ["vibration", "asymmetric-1", "asymmetric-2"]

@@ -9,12 +9,13 @@ from pathlib import Path
 
 import pytest
 
-from analysis.audit import audit, binomial_p, debit, degrees_of_freedom, grim, grimmer, load_paper_file
-from analysis.audit.page import as_json, as_text, counts, page
-from analysis.audit.predictions import ELSEWHERE, other_rows, predictions
-from analysis.audit.run import Finding
-from analysis.audit.sentences import nearest_text, sentences
-from analysis.audit.words import Result
+from analysis.paper.audit import audit, debit, degrees_of_freedom, grim, grimmer, load_paper_file
+from analysis.paper.audit import binomial_p
+from analysis.paper.audit.page import as_json, as_text, counts, page
+from analysis.paper.audit.predictions import ELSEWHERE, other_rows, predictions
+from analysis.paper.audit.run import Finding
+from analysis.paper.audit.sentences import nearest_text, sentences
+from analysis.paper.audit.words import Result
 from tests.conftest import Recoil
 
 CONFIGS = Path(__file__).parent.parent / "configs"

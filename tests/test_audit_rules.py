@@ -10,13 +10,14 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from analysis.audit import Rounding, Term, between_f, binomial_p, grimmer, p_against_statistic, read, repeated_f, total
-from analysis.audit.between_lattice import find_groups
-from analysis.audit.power_sums import BudgetError, numbers_with_sums
-from analysis.audit.printed import Interval, decimal
-from analysis.audit.repeated_lattice import Levels, effect, find, ratio, search, within
-from analysis.audit.tails import p_bounds
-from analysis.audit.words import NONE_EXISTS, UNKNOWN, Found, decide
+from analysis.paper.audit import Rounding, Term, between_f, grimmer, p_against_statistic, read, repeated_f, total
+from analysis.paper.audit import binomial_p
+from analysis.paper.audit.between_lattice import find_groups
+from analysis.paper.audit.power_sums import BudgetError, numbers_with_sums
+from analysis.paper.audit.printed import Interval, decimal
+from analysis.paper.audit.repeated_lattice import Levels, effect, find, ratio, search, within
+from analysis.paper.audit.tails import p_bounds
+from analysis.paper.audit.words import NONE_EXISTS, UNKNOWN, Found, decide
 from tests.exact import exact_rm_F
 
 

@@ -10,12 +10,12 @@ from typing import Any
 
 import pytest
 
-from experiments.canonical import canonical_json, sha256
+from experiments.config.canonical import canonical_json, sha256
 from experiments.clock import VirtualClock
-from experiments.journal import JournalError, read
+from experiments.record.journal import JournalError, read
 from experiments.load import ConfigError, load_setup, shipped_folder
-from experiments.places import PlaceError
-from experiments.roof.began_with import copy_began_with
+from experiments.study.places import PlaceError
+from recoil.began_with import copy_began_with
 from experiments.run import Request, run
 from experiments.screens.synthetic import synthetic_screen
 from tests.conftest import Recoil

@@ -11,8 +11,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from experiments import register
-from experiments.beginnings import (
+from experiments.study import register
+from experiments.study.beginnings import (
     Entered,
     facts_of,
     is_news,
@@ -24,14 +24,14 @@ from experiments.beginnings import (
     typed_facts,
 )
 from experiments.clock import VirtualClock
-from experiments.config import EligibilityConfig
-from experiments.enrolment import admit, exclude, join, readmit
-from experiments.journal import JournalError, hold
-from experiments.places import PlaceError
+from experiments.config.models import EligibilityConfig
+from experiments.study.enrolment import admit, exclude, join, readmit
+from experiments.record.journal import JournalError, hold
+from experiments.study.places import PlaceError
 from experiments.run import Request, run
 from experiments.screens.synthetic import synthetic_screen
-from experiments.standings import StudyFolder, open_study
-from experiments.study import Facts, Participant, RunStanding, State
+from experiments.study.progress import StudyFolder, open_study
+from experiments.study.study import Facts, Participant, RunStanding, State
 
 ORDER = ("direction", "preference")
 RULES = EligibilityConfig(ask=("age_years", "handedness"), handedness=("right",), age_years_max=29)
@@ -173,7 +173,7 @@ def test_only_a_change_of_what_is_asked_is_news() -> None:
 
 @pytest.fixture
 def study(tmp_path: Path) -> StudyFolder:
-    from experiments.roof.folders import new_study
+    from experiments.study.folders import new_study
 
     new_study(tmp_path / "pilot")
     return open_study(tmp_path / "pilot")

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from scipy import stats
 
-from analysis.around.clustering import NO_SPREAD, ONE_PERSON, ONE_TRIAL, clustering
+from analysis.stats.clustering import NO_SPREAD, ONE_PERSON, ONE_TRIAL, clustering
 from tests.test_sphericity import RIGHT
 
 

@@ -10,7 +10,7 @@ import pytest
 from analysis.logs.column_map import ColumnMap
 from analysis.logs.reading import Logs, read_logs
 from analysis.logs.toml_model import load_model
-from analysis.summary import summarize
+from analysis.summary.summary import summarize
 from tests.log_files import TextRow, trial_rows, write_study
 
 EXAMPLE = Path(__file__).parent.parent / "configs" / "examples" / "columns.toml"

@@ -13,9 +13,9 @@ from pathlib import Path
 
 import pytest
 
-from experiments.journal import read
-from experiments.replay import history
-from experiments.steps import Answered
+from experiments.record.journal import read
+from experiments.record.replay import history
+from experiments.session.steps import Answered
 from tests.at_display import AtConsole, AtDisplay, needs_display, records, remarks, virtual_display
 from tests.conftest import RECOIL
 

@@ -21,18 +21,19 @@ from typing import Any
 import pytest
 
 from device import Gun, LinkError, Shot, ShotReport
-from experiments import catalogue, storage
+from experiments import catalogue
+from experiments.record import storage
 from experiments import run as runs
 from experiments.clock import RealClock
-from experiments.journal import Contents, read
+from experiments.record.journal import Contents, read
 from experiments.live_run import RunStopped
 from experiments.load import load_setup
-from experiments.places import place
-from experiments.replay import told
+from experiments.study.places import place
+from experiments.record.replay import told
 from experiments.run import Request
 from experiments.screens.console import theme
-from experiments.states import State
-from experiments.steps import Answered, Ask, Failed, Fire, Fired
+from experiments.session.states import State
+from experiments.session.steps import Answered, Ask, Failed, Fire, Fired
 from tests.at_controls import short_direction
 
 pytest.importorskip("PyQt6")

@@ -9,9 +9,9 @@ from pathlib import Path
 
 import pytest
 
-from experiments.journal import read
-from experiments.replay import history
-from experiments.steps import Answered
+from experiments.record.journal import read
+from experiments.record.replay import history
+from experiments.session.steps import Answered
 from tests.at_display import AtDisplay, needs_display, virtual_display
 from tests.conftest import RECOIL
 from tests.felt_configs import felt_text, written

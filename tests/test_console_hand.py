@@ -11,7 +11,7 @@ from pathlib import Path
 
 import pytest
 
-from experiments.states import State
+from experiments.session.states import State
 from tests.at_display import AtConsole, needs_display, remarks, virtual_display
 from tests.at_hand import ACTIONS, Cell, check_cell, check_gun
 

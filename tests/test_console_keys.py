@@ -8,9 +8,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from experiments import events
-from experiments.entries import Entry, What
-from experiments.plan import Trial
+from experiments.session import events
+from experiments.session.entries import Entry, What
+from experiments.design.plan import Trial
 from experiments.screens.console.keys import (
     BOUNCE_S,
     COMMANDS,
@@ -23,7 +23,7 @@ from experiments.screens.console.keys import (
     field_of,
     why_not,
 )
-from experiments.states import TABLE, No, Position, State
+from experiments.session.states import TABLE, No, Position, State
 
 S = State
 LETTERS = sorted({command.key for command in COMMANDS if len(command.key) == 1})

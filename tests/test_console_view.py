@@ -12,15 +12,15 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from experiments import catalogue
-from experiments.plan import Plan, Trial
-from experiments.remarks import AnswerCorrected, Flagged, Noted
+from experiments.design.plan import Plan, Trial
+from experiments.session.remarks import AnswerCorrected, Flagged, Noted
 from experiments.screens.console import overview, theme, view
 from experiments.screens.console.messages import Ended, GunSeen, ParticipantSeen
 from experiments.screens.console.pace import Pace, clock_text, end_text, remaining_s
 from experiments.screens.console.view import About, Seen
-from experiments.setup import Setup
-from experiments.states import Position, State
-from experiments.steps import Answered, Ask, Describe, Prepare, Present, Presented, Rate, Rated, Repeat, Rest
+from experiments.config.setup import Setup
+from experiments.session.states import Position, State
+from experiments.session.steps import Answered, Ask, Describe, Prepare, Present, Presented, Rate, Rated, Repeat, Rest
 from tests.at_controls import DIRECTION, PREFERENCE, sat_at, tells_correctness
 
 SAID = Answered(response="forward", response_time_s=1.0, response_source="experimenter", response_time_valid=False)

@@ -7,13 +7,13 @@ import math
 import numpy as np
 import pytest
 
-from analysis.decision.density import log_density
-from analysis.decision.fit import fit, starts
-from analysis.decision.likelihood import Trials, coordinates, log_likelihood, model_of, natural, trials_of
-from analysis.decision.people import fit_people
-from analysis.decision.profile import profile
-from experiments.direction.diffusion_batch import decide_all
-from experiments.streams import generator
+from analysis.times.density import log_density
+from analysis.times.fit import fit, starts
+from analysis.times.likelihood import Trials, coordinates, log_likelihood, model_of, natural, trials_of
+from analysis.times.people import fit_people
+from analysis.times.profile import profile
+from experiments.synthetic.diffusion_batch import decide_all
+from experiments.design.streams import generator
 
 METHODS = ("asymmetric-1", "asymmetric-2", "vibration")
 DRIFTS = (1.0, 1.8, 0.0)

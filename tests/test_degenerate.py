@@ -10,7 +10,7 @@ import pandas as pd
 import pytest
 
 from analysis import one_way_anova, rm_anova, rm_tukey_hsd, rm_tukey_hsd_paired, tukey_hsd
-from analysis.core.anova import NO_ERROR, NO_VARIANCE
+from analysis.stats.anova import NO_ERROR, NO_VARIANCE
 from tests.exact import exact_rm_F
 
 PEOPLE, COLUMNS = np.arange(14)[:, None] * 0.1, np.array([0.0, 0.1, 0.3])

@@ -18,12 +18,12 @@ from device.limits import DriveHistory, load_of
 from device.parameters import GunParameters
 from device.physics.trains import highest_rate_Hz
 from device.words import Pulse
-from experiments.direction.percept import PerceptParameters
-from experiments.direction.percept_fit import PAPER_RATES
+from experiments.synthetic.percept import PerceptParameters
+from analysis.predict.fit.percept_model import PAPER_RATES
 from experiments.load import ConfigError
-from experiments.roof.design import run as roof
-from experiments.roof.design.critical import rate_at
-from experiments.roof.design.space import axis, make_space, span
+from analysis.predict.design_search import run as roof
+from analysis.predict.design_search.critical import rate_at
+from analysis.predict.design_search.space import axis, make_space, span
 from tests.conftest import RECOIL, Recoil
 from tests.waiting import PATIENCE_S, wait_for
 

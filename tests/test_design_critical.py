@@ -9,9 +9,9 @@ import numpy as np
 import pytest
 
 from device.methods import paper_methods
-from experiments.direction.percept import percept_of
-from experiments.direction.percept_fit import PAPER_RATES, PerceptFit, fit_percept, predicted_rate
-from experiments.roof.design.critical import (
+from experiments.synthetic.percept import percept_of
+from analysis.predict.fit.percept_model import PAPER_RATES, PerceptFit, fit_percept, predicted_rate
+from analysis.predict.design_search.critical import (
     LEVEL,
     Contour,
     band_of,
@@ -20,10 +20,10 @@ from experiments.roof.design.critical import (
     drawn_contours,
     rate_at,
 )
-from experiments.roof.design.rates import Floats
-from experiments.roof.design.shots import Layer, layers, rows_of, simulate_rows
-from experiments.roof.design.space import Request, Space, make_space
-from experiments.roof.jobs import on_processes
+from analysis.predict.design_search.rates import Floats
+from analysis.predict.design_search.shots import Layer, layers, rows_of, simulate_rows
+from analysis.predict.design_search.space import Request, Space, make_space
+from analysis.predict.jobs import on_processes
 
 SPACE = make_space(Request(grid=9, voltage="1-24", pulse="0.01"))
 

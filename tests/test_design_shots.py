@@ -16,8 +16,8 @@ from device.methods import paper_methods
 from device.parameters import GunParameters
 from device.physics import simulate, trace
 from device.words import LimitError, Pulse
-from experiments.direction.diffusion import People
-from experiments.direction.percept import (
+from experiments.synthetic.diffusion import People
+from experiments.synthetic.percept import (
     Percept,
     PerceptParameters,
     evidence,
@@ -25,12 +25,12 @@ from experiments.direction.percept import (
     percept_of_summary,
     percept_of_trace,
 )
-from experiments.direction.percept_fit import PAPER_RATES, fit_percept, predicted_rate
-from experiments.roof.design import shots as design_shots
-from experiments.roof.design.assumed import both_ways
-from experiments.roof.design.limits import DUTY, HEAT, PULSE, VOLTAGE, broken_limit, steady_coil_C
-from experiments.roof.design.rates import evidences, logits, predict, rates
-from experiments.roof.design.shots import COIL_POINTS, FREE_POINTS, HOME, Row, felt_of, shots, summarised
+from analysis.predict.fit.percept_model import PAPER_RATES, fit_percept, predicted_rate
+from analysis.predict.design_search import shots as design_shots
+from analysis.predict.design_search.assumed import both_ways
+from analysis.predict.design_search.limits import DUTY, HEAT, PULSE, VOLTAGE, broken_limit, steady_coil_C
+from analysis.predict.design_search.rates import evidences, logits, predict, rates
+from analysis.predict.design_search.shots import COIL_POINTS, FREE_POINTS, HOME, Row, felt_of, shots, summarised
 
 DEFAULT = PerceptParameters()
 GUN = GunParameters()

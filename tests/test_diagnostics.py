@@ -3,7 +3,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from analysis.around.diagnostics import NO_RESIDUALS, TOO_MANY, ends, normality, outliers
+from analysis.stats.diagnostics import NO_RESIDUALS, TOO_MANY, ends, normality, outliers
 from tests.test_sphericity import RIGHT
 
 

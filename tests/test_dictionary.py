@@ -1,7 +1,7 @@
 from pathlib import Path
 
-from experiments import columns
-from experiments.dictionary import dictionary
+from experiments.record import columns
+from experiments.record.dictionary import dictionary
 
 PAGE = Path(__file__).parent.parent / "DATA_DICTIONARY.md"
 

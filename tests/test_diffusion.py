@@ -10,11 +10,11 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.stats import kstwo
 
-from analysis.decision.distribution import distribution
-from analysis.decision.moments import moments
-from experiments.direction.diffusion import Decision, Diffusion, Lapses, People, decide, person, upper_probability
-from experiments.direction.diffusion_batch import decide_all, upper_probabilities
-from experiments.streams import Stream, generator
+from analysis.times.distribution import distribution
+from analysis.times.moments import moments
+from experiments.synthetic.diffusion import Decision, Diffusion, Lapses, People, decide, person, upper_probability
+from experiments.synthetic.diffusion_batch import decide_all, upper_probabilities
+from experiments.design.streams import Stream, generator
 
 GRID = [(v, a, w) for v in (-2.0, 0.0, 0.5, 3.0) for a in (0.7, 2.0) for w in (0.2, 0.5, 0.9)]
 

@@ -9,9 +9,9 @@ import numpy as np
 import pytest
 
 from device.methods import paper_methods
-from experiments.direction.diffusion import Lapses, People
-from experiments.direction.felt import NEUTRAL, FeltParticipant, Mind
-from experiments.direction.percept import evidence, forward_rate, percepts_of
+from experiments.synthetic.diffusion import Lapses, People
+from experiments.synthetic.felt import NEUTRAL, FeltParticipant, Mind
+from experiments.synthetic.percept import evidence, forward_rate, percepts_of
 from experiments.direction.plan import make_plan
 from experiments.load import load_setup
 

@@ -9,13 +9,13 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from pydantic import ValidationError
 
-from experiments.canonical import canonical_json
+from experiments.config.canonical import canonical_json
 from experiments.direction.plan import make_plan
 from experiments.direction.session import session
 from experiments.load import load_setup
-from experiments.plan import Plan, Trial
-from experiments.setup import Setup
-from experiments.steps import (
+from experiments.design.plan import Plan, Trial
+from experiments.config.setup import Setup
+from experiments.session.steps import (
     Answered,
     Ask,
     Close,

@@ -21,7 +21,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from device import LinkError
-from experiments.canonical import sha256
+from experiments.config.canonical import sha256
 from experiments.clock import VirtualClock
 from experiments.doctor import children, verdicts
 from experiments.doctor.checks import Check, carry_out, checks, no_display
@@ -32,10 +32,10 @@ from experiments.doctor.latencies import Latencies, latencies, together
 from experiments.doctor.link import adapters
 from experiments.doctor.measures import APPENDS, appends, ticks
 from experiments.doctor.spread import Spread, percentile, spread
-from experiments.journal import Journal
+from experiments.record.journal import Journal
 from experiments.load import ConfigError, find, load_gun
-from experiments.places import PlaceError
-from experiments.roof.doctor import as_text
+from experiments.study.places import PlaceError
+from recoil.doctor import as_text
 from tests.conftest import RECOIL, Recoil
 from tests.test_durability import can_mount, in_small_disk
 from tests.waiting import PATIENCE_S

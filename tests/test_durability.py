@@ -11,9 +11,9 @@ from pathlib import Path
 
 import pytest
 
-from experiments.journal import Contents, read
-from experiments.replay import history
-from experiments.steps import Answered
+from experiments.record.journal import Contents, read
+from experiments.record.replay import history
+from experiments.session.steps import Answered
 from tests.at_terminal import ANSWERS, FIRES, AtTerminal, answer_until_killed
 from tests.conftest import RECOIL
 

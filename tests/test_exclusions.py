@@ -9,7 +9,7 @@ import pytest
 from analysis.logs.exclusions import Effect, Rules, apply_rules
 from analysis.logs.reading import Logs, read_logs
 from analysis.logs.toml_model import load_model
-from analysis.summary import summarize
+from analysis.summary.summary import summarize
 from tests.log_files import TextRow, rating_rows, ratings_path, trial_rows, trials_path, write_rows, write_study
 
 EXAMPLE = Path(__file__).parent.parent / "configs" / "examples" / "rules.toml"

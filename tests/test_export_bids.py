@@ -14,16 +14,16 @@ from typing import Any
 import pandas as pd
 import pytest
 
-from analysis.bids import files as data_set
-from analysis.bids import words
+from analysis.archive.bids import files as data_set
+from analysis.archive.bids import vocabulary as words
 from analysis.logs.reading import read_logs
-from experiments import columns
+from experiments.record import columns
 from experiments.clock import RealClock, VirtualClock
 from experiments.load import load_setup, shipped_folder
-from experiments.places import PlaceError
-from experiments.register import append, entry
-from experiments.roof import bids as roof
-from experiments.roof.folders import new_study
+from experiments.study.places import PlaceError
+from experiments.study.register import append, entry
+from analysis.archive.bids import export as roof
+from experiments.study.folders import new_study
 from experiments.run import Request, run
 from experiments.screens.synthetic import synthetic_screen
 from tests.conftest import RECOIL, Recoil

@@ -8,12 +8,12 @@ from pathlib import Path
 import pytest
 
 from experiments.clock import VirtualClock
-from experiments.direction.felt import Mind, mind_of
+from experiments.synthetic.felt import Mind, mind_of
 from experiments.direction.plan import make_plan
 from experiments.load import ConfigError, load_setup
-from experiments.percept_config import PerceptConfig
+from experiments.synthetic.percept_config import PerceptConfig
 from experiments.preference.config import Appeal
-from experiments.roof.check import as_text, check
+from analysis.predict.check import as_text, check
 from experiments.screens.synthetic import synthetic_screen
 from tests.felt_configs import BALANCE, changed, felt_text, shipped_text, written
 

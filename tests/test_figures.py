@@ -15,18 +15,10 @@ from matplotlib.figure import Figure
 from matplotlib.text import Text
 
 from analysis.logs.reading import read_logs
-from analysis.report.figures import (
-    ShotPanel,
-    directions,
-    display_name,
-    figure_5,
-    figure_8,
-    figure_directions,
-    figure_response_times,
-    results,
-    stars,
-)
-from analysis.summary import summarize
+from analysis.report.figures import ShotPanel, display_name, figure_5, figure_8, figure_directions, figure_response_times, stars
+from analysis.summary.figures import directions
+from analysis.summary.figures import results
+from analysis.summary.summary import summarize
 from tests.log_files import write_study
 
 

@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 
 from device.serial_gun.asked import WAYS
-from experiments.journal import read
+from experiments.record.journal import read
 from tests.conftest import Recoil
 from tests.serial_runs import hasty, timings_of
 from tests.test_firmware_emulated import Emulated, emulated

@@ -15,16 +15,16 @@ import numpy as np
 import pytest
 from scipy import stats
 
-from analysis.paper import load_paper
+from analysis.paper.paper import load_paper
 from device.methods import paper_methods
-from experiments.direction.diffusion import People
-from experiments.direction.percept import PerceptParameters
-from experiments.direction.percept_fit import PAPER_RATES, PAPER_TRIALS
+from experiments.synthetic.diffusion import People
+from experiments.synthetic.percept import PerceptParameters
+from analysis.predict.fit.percept_model import PAPER_RATES, PAPER_TRIALS
 from experiments.load import ConfigError, find, load_setup, shipped_folder
-from experiments.roof.fit.percept import percept
-from experiments.roof.fit.request import ASSUMED_SPREAD, Request, read
-from experiments.roof.fit.studies import Case, Judged, cases_of, judge, place_of
-from experiments.roof.fit.words import fragment, verdict_sentence
+from analysis.predict.fit.percept import percept
+from analysis.predict.fit.request import ASSUMED_SPREAD, Request, read
+from analysis.predict.fit.studies import Case, Judged, cases_of, judge, place_of
+from analysis.predict.fit.words import fragment, verdict_sentence
 from tests.conftest import Recoil
 
 METHODS = paper_methods()

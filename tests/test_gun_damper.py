@@ -11,7 +11,7 @@ from device.physics.hand import Hand, simulate_held
 from device.physics.trains import highest_rate_Hz, train
 from device.simulated import SimulatedGun
 from device.words import Pulse, Shot
-from experiments.gun import GunConfig
+from experiments.config.gun import GunConfig
 from experiments.load import find, load_gun
 
 BACK = GunParameters(return_friction_N=1.12)

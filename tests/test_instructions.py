@@ -15,25 +15,25 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from experiments.canonical import canonical_json
+from experiments.config.canonical import canonical_json
 from experiments.clock import VirtualClock
-from experiments.columns import LATER
+from experiments.record.columns import LATER
 from experiments.direction.config import DirectionConfig
 from experiments.direction.plan import make_plan, make_practice
 from experiments.direction.session import session
-from experiments.journal import read
+from experiments.record.journal import read
 from experiments.load import load_setup, shipped_folder
-from experiments.plan import Plan
-from experiments.replay import told
+from experiments.design.plan import Plan
+from experiments.record.replay import told
 from experiments.run import Request, run, table
 from experiments.screens.console.overview import coming
 from experiments.screens.console.view import About, Seen, instruction
 from experiments.screens.synthetic import synthetic_screen
 from experiments.screens.terminal import TerminalScreen
 from experiments.screens.texts import read_out_text
-from experiments.setup import Setup
-from experiments.states import Position, State
-from experiments.steps import Prepare, outcome_from, record, step_from
+from experiments.config.setup import Setup
+from experiments.session.states import Position, State
+from experiments.session.steps import Prepare, outcome_from, record, step_from
 
 HURRY = load_setup(str(shipped_folder() / "examples" / "hurry.toml"))
 PLAIN = load_setup("direction")

@@ -9,10 +9,10 @@ from typing import Any
 
 import pytest
 
-from experiments import storage
-from experiments.canonical import sha256
+from experiments.record import storage
+from experiments.config.canonical import sha256
 from experiments.clock import VirtualClock
-from experiments.journal import Contents, Journal, JournalError, head, read
+from experiments.record.journal import Contents, Journal, JournalError, head, read
 
 PARTS = {"plan": {"trials": [1, 2]}, "setup": {"title": "é – 20 °C"}}
 HEAD = PARTS | {f"{name}_sha256": sha256(part) for name, part in PARTS.items()}
@@ -135,7 +135,7 @@ def test_a_record_that_was_written_in_part_is_taken_back(path: Path) -> None:
 import resource, signal, sys
 from pathlib import Path
 from experiments.clock import VirtualClock
-from experiments.journal import Journal, JournalError, read
+from experiments.record.journal import Journal, JournalError, read
 signal.signal(signal.SIGXFSZ, signal.SIG_IGN)
 contents = read(Path({str(path)!r}))
 with Journal.reopen(contents, VirtualClock()) as journal:
@@ -302,7 +302,7 @@ def test_a_second_holder_is_refused_in_another_process_and_loses_nothing(tmp_pat
 import sys
 from pathlib import Path
 from experiments.clock import VirtualClock
-from experiments.journal import Journal, JournalError, read
+from experiments.record.journal import Journal, JournalError, read
 try:
     Journal.reopen(read(Path({str(path)!r})), VirtualClock()).append("step", body="other")
 except JournalError as error:

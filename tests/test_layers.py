@@ -10,7 +10,7 @@ import pytest
 
 ROOT = Path(__file__).parent.parent
 ROOMS = ("device", "experiments", "analysis")
-READERS = ("experiments.columns", "experiments.journal", "experiments.register")
+READERS = ("experiments.record.columns", "experiments.record.journal", "experiments.study.register")
 """What the analysis may know of the experiments: the names of columns, and the readers of what runs leave."""
 PURE = {
     "device": {
@@ -46,7 +46,7 @@ HEAVY = {
     "serial": "device.serial_gun",
     "rich": "experiments.roof",
     "typer": "experiments.roof",
-    "numba": ("device.physics.compiled", "experiments.roof.bench.peers"),
+    "numba": ("device.physics.compiled", "analysis.predict.bench.peers"),
 }
 
 
@@ -89,10 +89,10 @@ def test_a_room_imports_only_what_the_design_allows(name: str) -> None:
 @pytest.mark.parametrize(
     ("importer", "imported"),
     [
-        ("device.words", "experiments.plan"),
-        ("experiments.plan", "analysis.core.anova"),
-        ("experiments.session", "experiments.roof.cli"),
-        ("analysis.logs.reading", "experiments.plan"),
+        ("device.words", "experiments.design.plan"),
+        ("experiments.design.plan", "analysis.stats.anova"),
+        ("experiments.session", "recoil.cli"),
+        ("analysis.logs.reading", "experiments.design.plan"),
         ("analysis.logs.reading", "device.words"),
     ],
 )
@@ -114,8 +114,8 @@ SESSIONS = [
 
 @pytest.mark.parametrize("name", [f"{room}.{module}" for room in PURE for module in sorted(PURE[room])] + SESSIONS)
 def test_a_pure_module_touches_neither_files_nor_clock_nor_terminal(name: str) -> None:
-    touching = {"os", "sys", "time", "socket", "subprocess", "threading", "serial", "fcntl", "experiments.storage"}
-    found = {i for i in imports(MODULES[name]) if i.split(".")[0] in touching or i.startswith("experiments.storage")}
+    touching = {"os", "sys", "time", "socket", "subprocess", "threading", "serial", "fcntl", "experiments.record.storage"}
+    found = {i for i in imports(MODULES[name]) if i.split(".")[0] in touching or i.startswith("experiments.record.storage")}
     assert not found, f"{name} is pure and must not import {found}"
 
 

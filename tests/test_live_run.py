@@ -11,14 +11,15 @@ from typing import Any
 import pytest
 
 from device import LimitError, LinkError
-from experiments import events, storage
-from experiments import remarks as words
-from experiments.entries import Entry
-from experiments.events import Event, Press
+from experiments.session import events
+from experiments.record import storage
+from experiments.session import remarks as words
+from experiments.session.entries import Entry
+from experiments.session.events import Event, Press
 from experiments.live_run import RunStopped, Verdict
-from experiments.places import place
-from experiments.plan import Trial
-from experiments.remarks import (
+from experiments.study.places import place
+from experiments.design.plan import Trial
+from experiments.session.remarks import (
     AnswerCorrected,
     Flagged,
     Halted,
@@ -28,10 +29,10 @@ from experiments.remarks import (
     RatingCorrected,
     Refused,
 )
-from experiments.replay import told
+from experiments.record.replay import told
 from experiments.screens.texts import again_text
-from experiments.states import EMERGENCY, State
-from experiments.steps import Failed, Fire, Interrupted, Prepare, Presented, Rated, Repeat, trial_of
+from experiments.session.states import EMERGENCY, State
+from experiments.session.steps import Failed, Fire, Interrupted, Prepare, Presented, Rated, Repeat, trial_of
 from tests.at_controls import (
     DIRECTION,
     GUARD_S,

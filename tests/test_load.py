@@ -8,7 +8,7 @@ import pytest
 
 from experiments.limits import check_limits
 from experiments.load import ConfigError, find, line_of, load_gun, load_setup, load_study, read_toml, shipped_folder
-from experiments.roof.check import check
+from analysis.predict.check import check
 
 EXPERIMENTS = ("direction", "preference")
 DIRECTION, PREFERENCE, GUN = "direction.toml", "preference.toml", "gun.toml"

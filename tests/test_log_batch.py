@@ -21,7 +21,7 @@ from analysis.logs.frames import Block, joined
 from analysis.logs.reading import read_logs
 from analysis.logs.records import records
 from analysis.logs.rules import BadLogError
-from experiments import columns
+from experiments.record import columns
 from tests.log_files import TextRow, rating_rows, trial_rows, trials_path, write_rows, write_study
 
 Rows = list[TextRow]

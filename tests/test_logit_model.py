@@ -8,8 +8,8 @@ import pytest
 import statsmodels.api as sm
 from scipy import stats
 
-from analysis.around.logit_model import NO_SPREAD, logit_model
-from analysis.around.paired import holm
+from analysis.stats.logit_model import NO_SPREAD, logit_model
+from analysis.stats.paired import holm
 from tests.test_sphericity import RIGHT
 
 TEN = np.full_like(RIGHT, 10)

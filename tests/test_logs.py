@@ -8,7 +8,8 @@ from pathlib import Path
 import pytest
 
 from analysis.logs.reading import read_logs
-from experiments import columns, register
+from experiments.record import columns
+from experiments.study import register
 from experiments.clock import RealClock
 from tests.log_files import TextRow, rating_rows, ratings_path, trial_rows, trials_path, write_rows, write_study
 

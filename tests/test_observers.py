@@ -15,10 +15,10 @@ from experiments.load import ConfigError, load_setup
 from experiments.preference.observer import RatingsObserver, draw_ratings
 from experiments.preference.observer import observer as preference_observer
 from experiments.preference.plan import make_plan as preference_plan
-from experiments.preference.scale import on_scale
+from experiments.synthetic.scale import on_scale
 from experiments.screens.synthetic import synthetic_screen
-from experiments.setup import Setup
-from experiments.streams import Stream
+from experiments.config.setup import Setup
+from experiments.design.streams import Stream
 
 DIRECTION, PREFERENCE = load_setup("direction"), load_setup("preference")
 PLAN = direction_plan(DIRECTION.config, "P01", 1, None)

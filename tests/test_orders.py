@@ -5,8 +5,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from experiments.orders import method_order, next_row, rows
-from experiments.streams import Stream
+from experiments.design.orders import method_order, next_row, rows
+from experiments.design.streams import Stream
 
 COUNTS = range(2, 9)
 SQUARES = ("latin-square", "williams")

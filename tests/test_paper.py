@@ -4,7 +4,7 @@ from pathlib import Path
 
 import pytest
 
-from analysis.paper import load_paper
+from analysis.paper.paper import load_paper
 
 SHIPPED = Path(__file__).parent.parent / "configs" / "paper.toml"
 

@@ -12,12 +12,12 @@ from typing import Any
 import pytest
 
 from experiments.load import load_setup
-from experiments.plan import Trial
+from experiments.design.plan import Trial
 from experiments.screens.console.beside import PAUSED, ParticipantSide
 from experiments.screens.participant.link import ParticipantLink
 from experiments.screens.participant.words import BETWEEN, Focused, line
-from experiments.states import Position, State
-from experiments.steps import Describe, Rate
+from experiments.session.states import Position, State
+from experiments.session.steps import Describe, Rate
 from tests.at_display import wait_for
 
 SETUP = load_setup("preference")

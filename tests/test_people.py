@@ -10,8 +10,8 @@ import pytest
 
 from experiments.dates import date_text, time_text
 from experiments.screens.console.people import cell_text, coming_text, note_text, remark, stopped_text
-from experiments.standings import Overview
-from experiments.study import Next, Participant, RunStanding, State
+from experiments.study.progress import Overview
+from experiments.study.study import Next, Participant, RunStanding, State
 from tests.test_beginnings import ORDER, someone
 
 STOPPED = RunStanding(

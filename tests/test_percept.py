@@ -13,8 +13,8 @@ from hypothesis import strategies as st
 from device.methods import paper_methods
 from device.parameters import GunParameters, VibrationParameters
 from device.physics import simulate, trace
-from experiments.direction.diffusion import Diffusion, Lapses, People, upper_probability
-from experiments.direction.percept import (
+from experiments.synthetic.diffusion import Diffusion, Lapses, People, upper_probability
+from experiments.synthetic.percept import (
     SILENT,
     Percept,
     PerceptParameters,
@@ -26,7 +26,7 @@ from experiments.direction.percept import (
     percept_of_summary,
     percepts_of,
 )
-from experiments.direction.percept_fit import PAPER_RATES, PerceptFit, fit_percept, predicted_rate
+from analysis.predict.fit.percept_model import PAPER_RATES, PerceptFit, fit_percept, predicted_rate
 
 DEFAULT = PerceptParameters()
 METHODS = paper_methods()

@@ -16,7 +16,7 @@ from device.physics import FIDELITIES, SCENES, GunParameters, Scene, choose, sim
 from device.physics.contact import compliant_collision, rigid_collision
 from device.physics.scenes import COSTS, NEEDED, choose_contact
 from device.physics.tiers import FRICTION_N, NEAR, stated_error
-from experiments.roof.bench.flops import operations
+from analysis.predict.bench.flops import operations
 from tests.conftest import Recoil
 
 PAPER = GunParameters()

@@ -5,8 +5,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from experiments.canonical import canonical_json, sha256
-from experiments.places import Place, PlaceError, journals, known_codes, place, set_aside, set_aside_file, used_rows
+from experiments.config.canonical import canonical_json, sha256
+from experiments.study.places import Place, PlaceError, journals, known_codes, place, set_aside, set_aside_file, used_rows
 
 RESULTS = Path("/nowhere/results")
 EXPERIMENTS = ("direction", "preference")

@@ -14,12 +14,12 @@ from typing import Any
 import psutil
 import pytest
 
-from analysis.power.planned import ALL_PAIRS, ANOVA
-from experiments.config import leaves
+from analysis.predict.power.planned import ALL_PAIRS, ANOVA
+from experiments.config.models import leaves
 from experiments.load import ConfigError, load_setup, shipped_folder
-from experiments.roof.jobs import JobError, on_cluster, on_processes
-from experiments.roof.power import run as roof
-from experiments.roof.power.grid import Request, make_grid
+from analysis.predict.jobs import JobError, on_cluster, on_processes
+from analysis.predict.power import run as roof
+from analysis.predict.power.grid import Request, make_grid
 from tests.conftest import RECOIL, Recoil
 from tests.waiting import PATIENCE_S, wait_for
 
@@ -204,7 +204,8 @@ BAD = {
 def test_what_cannot_be_is_refused_in_one_message(
     words: str, tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    from experiments.roof import cli, jobs
+    from recoil import cli
+    from analysis.predict import jobs
 
     monkeypatch.setattr(jobs, "CONNECT_S", 1)
     monkeypatch.setattr("sys.argv", ["recoil", "power", "direction", *words.split(), "--out", str(tmp_path / "out")])
@@ -281,8 +282,8 @@ def test_methods_can_be_compared_in_sets(tmp_path: Path) -> None:
 
 def test_a_worker_without_this_recoil_is_named() -> None:
     """The check itself, on what a worker might say."""
-    from experiments.provenance import versions
-    from experiments.roof import jobs
+    from experiments.record.provenance import versions
+    from analysis.predict import jobs
 
     class Client:
         def wait_for_workers(self, number: int, timeout: float) -> None: ...

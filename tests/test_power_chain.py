@@ -11,16 +11,16 @@ import pytest
 
 from analysis.logs.reading import read_logs
 from analysis.power import Findings, analysed_directions, analysed_ratings
-from analysis.power.planned import ANOVA, ANY_PAIR
-from analysis.summary import summarize
+from analysis.predict.power.planned import ANOVA, ANY_PAIR
+from analysis.summary.summary import summarize
 from experiments.clock import VirtualClock
-from experiments.config import participant_codes
+from experiments.config.models import participant_codes
 from experiments.load import load_setup
-from experiments.roof.power.grid import Request as PowerRequest
-from experiments.roof.power.grid import make_grid
+from analysis.predict.power.grid import Request as PowerRequest
+from analysis.predict.power.grid import make_grid
 from experiments.run import Request, run
 from experiments.screens.synthetic import synthetic_screen
-from experiments.setup import Setup
+from experiments.config.setup import Setup
 
 EQUAL = [0.0, 0.0, 0.0]
 

@@ -11,29 +11,21 @@ import numpy as np
 import pytest
 from scipy import stats
 
-from analysis.core.tukey import rm_tukey_hsd
-from analysis.odds import WHOLE_PATTERN
-from analysis.paper import load_paper
-from analysis.power import (
-    Findings,
-    Tally,
-    analysed_directions,
-    analysed_ratings,
-    merged,
-    precisions,
-    shares,
-    tallied,
-)
-from analysis.power.planned import ALL_PAIRS, ANOVA, ANY_PAIR
+from analysis.stats.tukey import rm_tukey_hsd
+from analysis.paper.odds import WHOLE_PATTERN
+from analysis.paper.paper import load_paper
+from analysis.power import Findings, Tally, analysed_directions, analysed_ratings, merged, precisions, tallied
+from analysis.predict.power import shares
+from analysis.predict.power.planned import ALL_PAIRS, ANOVA, ANY_PAIR
 from experiments.direction.observer import RatesObserver
 from experiments.direction.plan import make_plan
 from experiments.load import find, load_setup
 from experiments.preference.config import RatingScale
 from experiments.preference.observer import draw_ratings
-from experiments.preference.scale import on_scale as one_on_scale
-from experiments.roof.odds import direction_odds, preference_odds
-from experiments.roof.power.grid import Request, make_grid
-from experiments.roof.power.studies import (
+from experiments.synthetic.scale import on_scale as one_on_scale
+from analysis.predict.reproduction.odds import direction_odds, preference_odds
+from analysis.predict.power.grid import Request, make_grid
+from analysis.predict.power.studies import (
     Chunk,
     Design,
     direction_counts,
@@ -42,7 +34,7 @@ from experiments.roof.power.studies import (
     preference_scores,
     run_chunk,
 )
-from experiments.streams import Stream, generator
+from experiments.design.streams import Stream, generator
 
 DIRECTION, PREFERENCE = load_setup("direction").config, load_setup("preference").config
 METHODS = DIRECTION.design.methods

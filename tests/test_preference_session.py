@@ -7,7 +7,7 @@ from hypothesis import strategies as st
 from experiments.load import load_setup
 from experiments.preference.plan import make_plan
 from experiments.preference.session import session
-from experiments.steps import (
+from experiments.session.steps import (
     Close,
     Closed,
     Describe,

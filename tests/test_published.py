@@ -8,9 +8,9 @@ import pytest
 from scipy import stats
 
 from analysis import rm_anova, rm_tukey_hsd
-from analysis.odds import WHOLE_PATTERN, chance_recurs, odds_of, recurs, wilson_interval
-from analysis.paper import Paper, load_paper
-from analysis.published import Prediction, Row, compare, rounds_to
+from analysis.paper.odds import WHOLE_PATTERN, chance_recurs, odds_of, recurs, wilson_interval
+from analysis.paper.paper import Paper, load_paper
+from analysis.paper.published import Prediction, Row, compare, rounds_to
 
 METHODS = ("vibration", "asymmetric-1", "asymmetric-2")
 

@@ -8,7 +8,7 @@ import pingouin
 import pytest
 from scipy import stats
 
-from analysis.around.rank_tests import (
+from analysis.stats.rank_tests import (
     ALL_EQUAL,
     ALL_TIED,
     TWO_CONDITIONS,

@@ -13,10 +13,11 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from experiments import register, storage
+from experiments.study import register
+from experiments.record import storage
 from experiments.clock import VirtualClock
-from experiments.places import PlaceError, known_codes, place
-from experiments.register import NAME, Entry, RegisterError, append, entry, excluded, members, read
+from experiments.study.places import PlaceError, known_codes, place
+from experiments.study.register import NAME, Entry, RegisterError, append, entry, excluded, members, read
 from tests.waiting import PATIENCE_S
 
 ROOT = Path(__file__).parent.parent
@@ -221,7 +222,7 @@ APPEND = """
 import resource, signal, sys
 from pathlib import Path
 from experiments.clock import RealClock
-from experiments.register import append, entry
+from experiments.study.register import append, entry
 console, count, limit = sys.argv[2], int(sys.argv[3]), int(sys.argv[4])
 if limit:
     signal.signal(signal.SIGXFSZ, signal.SIG_IGN)

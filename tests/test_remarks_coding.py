@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 from analysis.logs.reading import read_logs
-from analysis.remarks_coding import Codebook, Remark, code_remarks, load_codebook, section
+from analysis.summary.remarks_coding import Codebook, Remark, code_remarks, load_codebook, section
 from tests.conftest import Recoil
 from tests.log_files import write_study
 

@@ -5,7 +5,7 @@ from pathlib import Path
 import pytest
 
 from analysis.report.parts import Section
-from analysis.report.supplement import TITLES, supplement_sections
+from analysis.summary.sections.supplement import TITLES, supplement_sections
 from tests.test_sphericity import RIGHT
 from tests.test_supplement import CEILING, ONE_AT_CEILING, _ratings, _study
 

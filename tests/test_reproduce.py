@@ -14,8 +14,8 @@ from statsmodels.stats.anova import AnovaRM
 
 from analysis.logs.reading import read_logs
 from experiments.load import load_setup
-from experiments.roof import reproduce
-from experiments.roof.odds import direction_counts, preference_scores
+from analysis.predict.reproduction import reproduce
+from analysis.predict.reproduction.odds import direction_counts, preference_scores
 from tests.conftest import RECOIL
 
 EXPERIMENTS = ("direction", "preference")

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from analysis.logs.reading import read_logs
-from analysis.response_times import response_times
+from analysis.times.response_times import response_times
 from tests.log_files import METHODS, TextRow, trial_rows, trials_path, write_rows
 
 

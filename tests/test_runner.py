@@ -9,21 +9,23 @@ import pytest
 
 from device import Identity, LimitError, LinkError, Shot, ShotReport, open_gun
 from device.words import GunStatus
-from experiments import catalogue, limits, replay, storage
+from experiments import catalogue, limits
+from experiments.record import replay
+from experiments.record import storage
 from experiments.clock import Clock, VirtualClock
-from experiments.journal import Journal, read
+from experiments.record.journal import Journal, read
 from experiments.live_run import LiveRun, RunStopped
 from experiments.load import load_setup
-from experiments.places import Place, place
-from experiments.plan import Plan
-from experiments.remarks import Remark
-from experiments.replay import Standing
+from experiments.study.places import Place, place
+from experiments.design.plan import Plan
+from experiments.session.remarks import Remark
+from experiments.record.replay import Standing
 from experiments.run import Request, run, table
 from experiments.runner import MAX_FAILURES, carry_out
 from experiments.screens.synthetic import SyntheticScreen, synthetic_screen
-from experiments.setup import Setup
-from experiments.states import Position, State
-from experiments.steps import History, Outcome, Step, record
+from experiments.config.setup import Setup
+from experiments.session.states import Position, State
+from experiments.session.steps import History, Outcome, Step, record
 from experiments.stimulus import Desk
 
 SETUPS = {name: load_setup(name) for name in ("direction", "preference")}

@@ -17,8 +17,8 @@ from device.serial_gun.outcomes import Contradiction, CutShort
 from device.serial_gun.pending import Reply
 from device.serial_gun.reports import Told, ready_s
 from device.wire.records import ShotRecord, Standing
-from experiments.journal import read
-from experiments.places import place
+from experiments.record.journal import read
+from experiments.study.places import place
 from tests.forger import FORGERIES, ShotLiar, a_lying_pair, a_lying_twin
 from tests.serial_runs import check, hasty, run_all, timings_of
 from tests.test_serial_run import SPEED

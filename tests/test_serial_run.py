@@ -11,12 +11,12 @@ from pathlib import Path
 import pytest
 
 from device.wire import errors
-from experiments.journal import read
-from experiments.places import PlaceError
-from experiments.replay import told
-from experiments.roof.session import check_pace
-from experiments.roof.twin import troubles_of
-from experiments.steps import Failed
+from experiments.record.journal import read
+from experiments.study.places import PlaceError
+from experiments.record.replay import told
+from recoil.session import check_pace
+from recoil.twin import troubles_of
+from experiments.session.steps import Failed
 from tests.conftest import RECOIL
 from tests.serial_runs import check, hasty, of_trains, one_run, resumed, run_all, timings_of
 from tests.twins import Troubles, a_twin

@@ -11,10 +11,10 @@ from pathlib import Path
 
 import pytest
 
-from analysis.audit import Result, audit, debit, grim, grimmer, load_paper_file, p_against_statistic
-from analysis.audit.participants import forward_counts, rating_grains
-from analysis.audit.reconstruct import meets, reconstruct
-from analysis.paper import load_paper
+from analysis.paper.audit import Result, audit, debit, grim, grimmer, load_paper_file, p_against_statistic
+from analysis.paper.audit.participants import forward_counts, rating_grains
+from analysis.paper.audit.reconstruct import meets, reconstruct
+from analysis.paper.paper import load_paper
 from tests import test_audit_brute as brute
 from tests import test_audit_golden as golden
 from tests import test_audit_reconstruct as rebuilt

@@ -13,7 +13,7 @@ from tests.conftest import Soak
 
 pytestmark = pytest.mark.soak
 
-RUN = "from experiments.roof.cli import main; main()"
+RUN = "from recoil.cli import main; main()"
 OURS = ("Recoil, one at a time", "Recoil, batch")
 SLOWER = {"scipy DOP853": 500.0, "heyoka": 2.0}
 """So many times as long as ours they take with an open coil, at an error of at most 1e-9."""

@@ -17,7 +17,7 @@ import numpy as np
 import pytest
 
 from experiments.doctor.latencies import Latencies, latencies, together
-from experiments.journal import read
+from experiments.record.journal import read
 from tests import test_console as console
 from tests import test_console_faults as faults
 from tests.at_display import AtConsole, AtDisplay, needs_display, records, virtual_display

@@ -9,7 +9,7 @@ from pathlib import Path
 
 import pytest
 
-from experiments.states import TABLE, No, State
+from experiments.session.states import TABLE, No, State
 from tests.at_display import needs_display, virtual_display
 from tests.at_hand import ACTIONS, STATES, Action, Cell, check_cell, check_gun
 from tests.conftest import Soak

@@ -12,14 +12,14 @@ import numpy as np
 import pytest
 from scipy.stats import kstwo
 
-from analysis.decision.density import log_density
-from analysis.decision.distribution import distribution
-from analysis.decision.fit import DiffusionFit, fit
-from analysis.decision.moments import moments
-from analysis.decision.people import PeopleFit, fit_people
-from experiments.direction.diffusion import Diffusion, upper_probability
-from experiments.direction.diffusion_batch import decide_all
-from experiments.streams import generator
+from analysis.times.density import log_density
+from analysis.times.distribution import distribution
+from analysis.times.fit import DiffusionFit, fit
+from analysis.times.moments import moments
+from analysis.times.people import PeopleFit, fit_people
+from experiments.synthetic.diffusion import Diffusion, upper_probability
+from experiments.synthetic.diffusion_batch import decide_all
+from experiments.design.streams import generator
 from tests.conftest import Soak
 from tests.test_decision import reference
 from tests.test_decision_fit import RANGE_S, TRUTH, made

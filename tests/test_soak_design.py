@@ -15,9 +15,9 @@ import pytest
 
 from device.parameters import GunParameters
 from device.physics.trains import highest_rate_Hz
-from experiments.direction.percept import PerceptParameters
-from experiments.roof.design.critical import LEVEL, rate_at
-from experiments.roof.jobs import cores
+from experiments.synthetic.percept import PerceptParameters
+from analysis.predict.design_search.critical import LEVEL, rate_at
+from analysis.predict.jobs import cores
 from tests.conftest import RECOIL, Soak
 from tests.test_power import files
 

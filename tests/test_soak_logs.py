@@ -27,7 +27,7 @@ import json, sys, time
 from pathlib import Path
 import pandas as pd
 from analysis.logs.reading import read_logs
-from analysis.summary import summarize
+from analysis.summary.summary import summarize
 folder = Path(sys.argv[1])
 files = sorted(folder.rglob("*_trials.csv"))
 times = {"loop": [], "read": [], "summarize": [], "trade": []}
@@ -50,7 +50,7 @@ ALONE = """
 import resource, sys
 from pathlib import Path
 from analysis.logs.reading import read_logs
-from analysis.summary import summarize
+from analysis.summary.summary import summarize
 summarize(read_logs([Path(sys.argv[1])]))
 print(resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024)
 """

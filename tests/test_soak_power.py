@@ -15,12 +15,12 @@ from typing import Any
 
 import pytest
 
-from analysis.odds import WHOLE_PATTERN, wilson_interval
-from analysis.paper import load_paper
-from analysis.power.planned import ANOVA, ANY_PAIR
+from analysis.paper.odds import WHOLE_PATTERN, wilson_interval
+from analysis.paper.paper import load_paper
+from analysis.predict.power.planned import ANOVA, ANY_PAIR
 from experiments.load import find, load_setup
-from experiments.roof.jobs import cores, on_processes
-from experiments.roof.odds import direction_odds, preference_odds
+from analysis.predict.jobs import cores, on_processes
+from analysis.predict.reproduction.odds import direction_odds, preference_odds
 from tests.conftest import RECOIL, Soak
 from tests.test_power import files
 from tests.test_power_chain import counted, null_setup, said, through_the_chain

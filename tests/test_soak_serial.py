@@ -10,7 +10,7 @@ import pytest
 
 from device.serial_gun.address import MAX_SPEED
 from device.serial_gun.link import WATCHDOG_S
-from experiments.journal import read
+from experiments.record.journal import read
 from tests.forger import ShotLiar, a_lying_twin
 from tests.serial_runs import check, hasty, of_trains, one_run, run_all
 from tests.test_serial_run import SPEED, TROUBLES

@@ -13,7 +13,7 @@ import pytest
 from scipy import stats
 
 from analysis import studentized_range_isf, studentized_range_logsf, studentized_range_sf
-from analysis.core.studentized_tail import TABLE_PAYS, lower_table, upper_table
+from analysis.stats.studentized_tail import TABLE_PAYS, lower_table, upper_table
 from tests.conftest import Soak
 from tests.golden.make_studentized_range import value
 from tests.test_studentized_range import AS_DOUBLE, DF, DFS, KS, LOG_P, K, P, Q

@@ -17,7 +17,7 @@ import pytest
 
 from device import LinkError
 from device.serial_gun import triggering
-from experiments.journal import read
+from experiments.record.journal import read
 from tests import armed_host
 from tests.conftest import RECOIL
 from tests.forger import a_lying_pair

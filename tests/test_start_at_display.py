@@ -16,8 +16,8 @@ import pytest
 
 from experiments.clock import VirtualClock
 from experiments.load import load_setup
-from experiments.register import read
-from experiments.roof.folders import new_study
+from experiments.study.register import read
+from experiments.study.folders import new_study
 from experiments.run import Request, run
 from experiments.screens.synthetic import synthetic_screen
 from tests import watched_start

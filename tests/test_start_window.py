@@ -21,13 +21,14 @@ from PyQt6.QtGui import QKeyEvent, QWheelEvent
 from PyQt6.QtTest import QTest
 from PyQt6.QtWidgets import QApplication, QPushButton, QWidget
 
-from experiments import enrolment, register
+from experiments.study import enrolment
+from experiments.study import register
 from experiments.clock import RealClock, VirtualClock
-from experiments.journal import hold
+from experiments.record.journal import hold
 from experiments.load import load_setup
-from experiments.places import place
-from experiments.register import read
-from experiments.roof.folders import new_study
+from experiments.study.places import place
+from experiments.study.register import read
+from experiments.study.folders import new_study
 from experiments.run import Request, run
 from experiments.screens.console import theme
 from experiments.screens.console.app import application
@@ -36,8 +37,8 @@ from experiments.screens.console.live import _study
 from experiments.screens.console.opening import Opening
 from experiments.screens.console.start import StartWindow
 from experiments.screens.synthetic import synthetic_screen
-from experiments.standings import StudyFolder, open_study
-from experiments.study import Facts
+from experiments.study.progress import StudyFolder, open_study
+from experiments.study.study import Facts
 
 FACTS = Facts(age_years=25, sex="female", handedness="right")
 PATIENCE_S = 60

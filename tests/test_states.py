@@ -11,10 +11,10 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from experiments import events
-from experiments.events import ACTS, KINDS, Event
+from experiments.session import events
+from experiments.session.events import ACTS, KINDS, Event
 from experiments.screens.console.keys import COMMANDS
-from experiments.states import (
+from experiments.session.states import (
     ARMED,
     BACK,
     BENEATH,
@@ -28,8 +28,8 @@ from experiments.states import (
     change_of,
     entered,
 )
-from experiments.states_page import page
-from experiments.steps import Rest
+from experiments.session.states_page import page
+from experiments.session.steps import Rest
 
 S = State
 Stack = tuple[State, ...]

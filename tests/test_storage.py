@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from experiments import storage
+from experiments.record import storage
 
 pytestmark = pytest.mark.skipif(sys.platform == "win32", reason="a lock for all who look is Unix's")
 

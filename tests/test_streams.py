@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from experiments.streams import MAX_SEED, Stream, draw_seed, generator
+from experiments.design.streams import MAX_SEED, Stream, draw_seed, generator
 
 # chi-square values that a fair source exceeds once in 10,000 times, by degrees of freedom
 # (scipy.stats.chi2.isf(1e-4, df)); seeds are fixed, so these tests never flicker

@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 from scipy import special, stats
 
 from analysis import studentized_range_isf, studentized_range_logsf, studentized_range_sf
-from analysis.core.studentized_tail import TABLE_PAYS
+from analysis.stats.studentized_tail import TABLE_PAYS
 
 GOLDEN = json.loads((Path(__file__).parent / "golden" / "studentized_range.json").read_text())["rows"]
 K, DF, Q, P, LOG_P = np.array(GOLDEN, dtype=np.float64).T
@@ -161,6 +161,6 @@ def test_a_probability_outside_its_range_is_refused() -> None:
 
 def test_importing_it_loads_neither_scipy_stats_nor_scipy_linalg() -> None:
     code = (
-        "import sys, analysis.core.studentized_tail; sys.exit(bool({'scipy.stats', 'scipy.linalg'} & set(sys.modules)))"
+        "import sys, analysis.stats.studentized_tail; sys.exit(bool({'scipy.stats', 'scipy.linalg'} & set(sys.modules)))"
     )
     assert subprocess.run([sys.executable, "-c", code], check=False).returncode == 0

@@ -11,10 +11,10 @@ from typing import Any
 import pytest
 
 from experiments.clock import VirtualClock
-from experiments.journal import hold
+from experiments.record.journal import hold
 from experiments.load import load_setup
-from experiments.register import append, entry
-from experiments.roof.folders import new_study
+from experiments.study.register import append, entry
+from experiments.study.folders import new_study
 from experiments.run import Request, run
 from experiments.screens.synthetic import synthetic_screen
 from tests.conftest import RECOIL, Recoil

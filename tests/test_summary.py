@@ -10,7 +10,7 @@ import pytest
 
 from analysis import binomial_test, rm_anova, rm_tukey_hsd, yes_no
 from analysis.logs.reading import Logs, read_logs
-from analysis.summary import summarize
+from analysis.summary.summary import summarize
 from tests.log_files import METHODS, rating_rows, ratings_path, trial_rows, trials_path, write_rows, write_study
 
 

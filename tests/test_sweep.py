@@ -13,7 +13,8 @@ import pytest
 
 from device.physics import GunParameters, simulate
 from experiments.load import ConfigError
-from experiments.roof.simulate import sweep, sweep_table
+from analysis.predict.simulate import sweep
+from analysis.predict.simulate import sweep_table
 from tests.conftest import RECOIL
 from tests.waiting import PATIENCE_S, wait_for
 

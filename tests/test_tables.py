@@ -5,16 +5,16 @@ import pytest
 from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
-from experiments import columns
-from experiments.columns import guard, unguard
+from experiments.record import columns
+from experiments.record.columns import guard, unguard
 from experiments.direction.plan import make_plan as direction_plan
 from experiments.direction.rows import rows as direction_rows
 from experiments.load import load_setup
-from experiments.plan import Plan
+from experiments.design.plan import Plan
 from experiments.preference.plan import make_plan as preference_plan
 from experiments.preference.rows import rows as preference_rows
-from experiments.remarks import AnswerCorrected
-from experiments.steps import (
+from experiments.session.remarks import AnswerCorrected
+from experiments.session.steps import (
     Answered,
     Ask,
     Describe,
@@ -34,7 +34,7 @@ from experiments.steps import (
     Rested,
     Step,
 )
-from experiments.tables import Row, table_bytes
+from experiments.record.tables import Row, table_bytes
 
 FORMULA_STARTS = tuple("=+-@\t\r")
 DIRECTION: Plan = direction_plan(load_setup("direction").config, "P01", 1, None)

@@ -9,9 +9,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from experiments.canonical import canonical_json
+from experiments.config.canonical import canonical_json
 from experiments.load import read_toml, shipped_folder
-from experiments.toml_text import toml_text
+from experiments.config.toml_text import toml_text
 
 texts = st.text(st.characters(exclude_categories=["Cs"]), max_size=20)
 numbers = st.integers() | st.floats(allow_nan=False, allow_infinity=False)

@@ -35,7 +35,7 @@ def test_installed_elsewhere_recoil_works_from_any_folder(wheel: Path, tmp_path:
     """Unpacked as an installer would, without the checkout in sight; the dependencies are this environment's."""
     site = tmp_path / "site"
     zipfile.ZipFile(wheel).extractall(site)
-    program = f"import sys; sys.path.insert(0, {str(site)!r}); from experiments.roof.cli import main; main()"
+    program = f"import sys; sys.path.insert(0, {str(site)!r}); from recoil.cli import main; main()"
     elsewhere = tmp_path / "elsewhere"
     elsewhere.mkdir()
 

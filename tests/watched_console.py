@@ -264,7 +264,7 @@ def watch_participants(watch: Watch) -> None:
 
 def slow_disk(sync_s: float) -> None:
     """From now on a sync takes its time."""
-    from experiments import storage
+    from experiments.record import storage
 
     sync = storage.sync
 
@@ -276,7 +276,7 @@ def slow_disk(sync_s: float) -> None:
 
 
 if __name__ == "__main__":
-    from experiments.roof.cli import main
+    from recoil.cli import main
     from experiments.screens.console.app import application
 
     watch = Watch(**json.loads(sys.argv.pop(1)))

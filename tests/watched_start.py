@@ -125,7 +125,7 @@ def watch(file: Path) -> Any:
 
 
 if __name__ == "__main__":
-    from experiments.roof.cli import main
+    from recoil.cli import main
     from experiments.screens.console.app import application
 
     application()

@@ -18,8 +18,8 @@ from numpy.typing import NDArray
 from analysis.logs import cells as log_cells
 from analysis.logs.frames import Block, Cells, Coded, Texts, chosen, is_category
 from analysis.logs.rules import BadLogError, Cell, experiment_of, is_code, parse_cell
-from experiments import columns
-from experiments.columns import Column
+from experiments.record import columns
+from experiments.record.columns import Column
 
 Flags = NDArray[np.bool_]
 Integers = NDArray[np.int64]

@@ -16,7 +16,7 @@ import pyarrow.csv
 from numpy.typing import NDArray
 
 from analysis.logs.frames import Texts
-from experiments import columns
+from experiments.record import columns
 
 TEXT = pa.large_string()
 _FEW = pa.dictionary(pa.int32(), pa.string())

@@ -7,7 +7,7 @@ from collections.abc import Iterable, Sequence
 import numpy as np
 import pandas as pd
 
-from analysis.core.cells import codes_of, places_among
+from analysis.stats.cells import codes_of, places_among
 
 _MEASURES = {"direction": ("correct", "trials unanswered"), "preference": ("rating", "ratings missing")}
 

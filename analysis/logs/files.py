@@ -12,7 +12,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from analysis.logs.rules import BadLogError
-from experiments import columns
+from experiments.record import columns
 
 ENDINGS = tuple(f"_{suffix}.csv" for suffix in columns.FILE_SUFFIX.values())
 _BEHIND_STEM = re.compile(rf"(_({'|'.join(columns.FILE_SUFFIX.values())}))?\.[^.]*$")

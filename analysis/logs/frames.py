@@ -12,8 +12,8 @@ import pyarrow as pa
 from numpy.typing import NDArray
 
 from analysis.logs.rules import Cell, Row
-from experiments import columns
-from experiments.columns import Column
+from experiments.record import columns
+from experiments.record.columns import Column
 
 STUDY = "study"
 

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 
 from analysis.logs.column_map import ColumnMap, Skip
 from analysis.logs.rules import BadLogError, Table, check_table
-from experiments import columns
+from experiments.record import columns
 
 _Row = dict[str, str]
 

@@ -20,7 +20,7 @@ from analysis.logs.mapped import MappedLog, is_recoils, read_mapped
 from analysis.logs.records import records
 from analysis.logs.rules import BadLogError, check_table
 from analysis.logs.studies import study_names
-from experiments import register
+from experiments.study import register
 
 __all__ = ["Logs", "Problem", "Track", "read_logs"]
 
@@ -40,7 +40,7 @@ Quick = tuple[list[Block], dict[int, str]]
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Logs:
-    """The rows of all good files, with the columns of `experiments.columns` and the study; empty cells are NA.
+    """The rows of all good files, with the columns of `experiments.record.columns` and the study; empty cells are NA.
 
     With several studies a participant is `study/code`: the same code in another study is another person.
     """

@@ -7,8 +7,8 @@ import re
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 
-from experiments import columns
-from experiments.columns import Column
+from experiments.record import columns
+from experiments.record.columns import Column
 
 Cell = str | int | float | None
 Row = dict[str, Cell]

@@ -10,8 +10,8 @@ from pathlib import Path
 from jinja2 import Environment, PackageLoader, StrictUndefined, select_autoescape
 
 from analysis.report.parts import Picture, ReportData, Section, Table
-from analysis.report.pictures import write_figures
-from analysis.report.sections import sections
+from analysis.summary.sections.pictures import write_figures
+from analysis.summary.sections.sections import sections
 
 __all__ = ["Picture", "ReportData", "Section", "Table", "write_page", "write_report"]
 

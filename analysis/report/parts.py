@@ -8,8 +8,8 @@ from pathlib import Path
 from typing import Any
 
 from analysis.logs.reading import Problem
-from analysis.odds import Odds
-from analysis.published import Row
+from analysis.paper.odds import Odds
+from analysis.paper.published import Row
 from analysis.report.figures import ShotPanel
 
 EXPERIMENTS = {"direction": "direction recognition", "preference": "preference"}

@@ -6,7 +6,7 @@ from typing import Annotated, Any, ClassVar, Literal, Self
 
 from pydantic import AfterValidator, Field, SerializerFunctionWrapHandler, model_serializer, model_validator
 
-from experiments.config import (
+from experiments.config.models import (
     Count,
     ExperimentConfig,
     InnerShare,
@@ -22,8 +22,8 @@ from experiments.config import (
     once,
     where_told,
 )
-from experiments.direction.felt_config import DiffusionConfig, PeopleConfig
-from experiments.percept_config import PerceptConfig
+from experiments.synthetic.felt_config import DiffusionConfig, PeopleConfig
+from experiments.synthetic.percept_config import PerceptConfig
 
 Balance = Literal["session", "set", "set-exact"]
 InstructionName = Annotated[str, Field(pattern=r"^[A-Za-z0-9][A-Za-z0-9_-]{0,31}$")]

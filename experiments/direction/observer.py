@@ -16,11 +16,11 @@ from statistics import NormalDist
 
 from device.words import DIRECTIONS, Direction
 from experiments.direction.config import DirectionConfig, Rates, ResponseTime
-from experiments.direction.felt import NEUTRAL, FeltParticipant, Mind, mind_of
-from experiments.direction.percept import Percept, percepts_of
-from experiments.plan import Plan, Trial
-from experiments.setup import Setup
-from experiments.streams import Stream
+from experiments.synthetic.felt import NEUTRAL, FeltParticipant, Mind, mind_of
+from experiments.synthetic.percept import Percept, percepts_of
+from experiments.design.plan import Plan, Trial
+from experiments.config.setup import Setup
+from experiments.design.streams import Stream
 
 _NORMAL = NormalDist()
 

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from device.words import Direction
 from experiments.direction.config import Design, DirectionConfig
-from experiments.orders import method_order
-from experiments.plan import Plan, Trial
-from experiments.streams import Stream
+from experiments.design.orders import method_order
+from experiments.design.plan import Plan, Trial
+from experiments.design.streams import Stream
 
 
 def make_plan(config: DirectionConfig, participant_id: str, seed: int, order_row: int | None) -> Plan:

@@ -6,10 +6,10 @@ from functools import partial
 from itertools import pairwise
 
 from experiments.direction.config import Breaks, DirectionConfig
-from experiments.plan import Plan, Trial
-from experiments.presenting import Presenter
-from experiments.setup import Setup
-from experiments.steps import Ask, Fire, Prepare, Rest, Session, Step
+from experiments.design.plan import Plan, Trial
+from experiments.session.presenting import Presenter
+from experiments.config.setup import Setup
+from experiments.session.steps import Ask, Fire, Prepare, Rest, Session, Step
 
 
 def session(plan: Plan, setup: Setup[DirectionConfig]) -> Session:

@@ -11,15 +11,15 @@ from pathlib import Path
 from typing import Any
 
 from device import DeviceError
-from experiments import journal
+from experiments.record import journal
 from experiments.doctor import children, link, measures, verdicts
 from experiments.doctor.children import Answer
 from experiments.doctor.deadline import within
 from experiments.doctor.figures import Display, Keys, Sound, Stage
 from experiments.doctor.finding import Finding
 from experiments.doctor.latencies import Latencies, latencies, together
-from experiments.journal import JournalError
-from experiments.places import PlaceError
+from experiments.record.journal import JournalError
+from experiments.study.places import PlaceError
 
 DEADLINE_S = 20.0
 PSYCHOPY_DEADLINE_S = 60.0

@@ -12,7 +12,7 @@ from experiments.clock import RealClock
 from experiments.doctor.figures import Adapter, Link
 from experiments.doctor.measures import timed_ms
 from experiments.doctor.spread import spread
-from experiments.places import PlaceError
+from experiments.study.places import PlaceError
 from experiments.runner import gun_name
 
 ROUND_TRIPS = 200

@@ -12,10 +12,10 @@ from importlib import metadata
 from itertools import pairwise
 from pathlib import Path
 
-from experiments import storage
+from experiments.record import storage
 from experiments.doctor.figures import Appends, Machine, Ticks
 from experiments.doctor.spread import spread
-from experiments.provenance import recoil_version
+from experiments.record.provenance import recoil_version
 
 PACKAGES = ("numpy", "scipy", "PyQt6", "psychopy")
 READINGS = 20_000

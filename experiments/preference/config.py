@@ -7,7 +7,7 @@ from typing import Annotated, ClassVar, Literal, Self
 from pydantic import Field, model_validator
 
 from device.words import Direction
-from experiments.config import (
+from experiments.config.models import (
     Count,
     ExperimentConfig,
     Methods,
@@ -21,7 +21,7 @@ from experiments.config import (
     check_covered,
     check_duration,
 )
-from experiments.percept_config import PerceptConfig
+from experiments.synthetic.percept_config import PerceptConfig
 
 Points = Annotated[float, Field(ge=-100, le=100)]
 """Points of the rating scale, and beyond its ends."""
@@ -115,7 +115,7 @@ class Ratings(Model):
 
 
 class Appeal(Model):
-    """How a shot that is felt appeals: the numbers of `experiments.preference.appeal`, all of them assumed.
+    """How a shot that is felt appeals: the numbers of `experiments.synthetic.preference`, all of them assumed.
 
     `base` and `gain` meet the assumed means of `[synthetic.ratings]` to 0.2, `jnd` the published 2 of 14 who tied, and
     `criterion_sd` the published F in half of all studies. Points of the scale but for `jnd`, a Weber fraction.

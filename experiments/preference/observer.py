@@ -5,14 +5,14 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 
-from experiments.direction.percept import evidence, percepts_of
-from experiments.plan import Plan, Trial
-from experiments.preference.appeal import felt_ratings
+from experiments.synthetic.percept import evidence, percepts_of
+from experiments.design.plan import Plan, Trial
+from experiments.synthetic.preference import felt_ratings
 from experiments.preference.config import PreferenceConfig, RatingScale
 from experiments.preference.config import Ratings as RatingsLaw
-from experiments.preference.scale import on_scale
-from experiments.setup import Setup
-from experiments.streams import Stream
+from experiments.synthetic.scale import on_scale
+from experiments.config.setup import Setup
+from experiments.design.streams import Stream
 
 TABLE_COLUMNS = ("participant_id", "method", "rating")
 """The table of answers: each participant's rating of each method."""

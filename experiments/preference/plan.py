@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from experiments.orders import method_order
-from experiments.plan import Plan, Trial
+from experiments.design.orders import method_order
+from experiments.design.plan import Plan, Trial
 from experiments.preference.config import PreferenceConfig
-from experiments.streams import Stream
+from experiments.design.streams import Stream
 
 
 def make_plan(config: PreferenceConfig, participant_id: str, seed: int, order_row: int | None) -> Plan:

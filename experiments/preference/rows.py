@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from experiments.plan import Plan
-from experiments.remarks import DescriptionCorrected, RatingCorrected
-from experiments.steps import Described, Interrupted, Presented, Rated
-from experiments.tables import Row, Story, Told, presentation, stories
+from experiments.design.plan import Plan
+from experiments.session.remarks import DescriptionCorrected, RatingCorrected
+from experiments.session.steps import Described, Interrupted, Presented, Rated
+from experiments.record.tables import Row, Story, Told, presentation, stories
 
 
 def rows(plan: Plan, told: Told) -> list[Row]:

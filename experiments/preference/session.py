@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from functools import partial
 
-from experiments.plan import Plan, Trial
+from experiments.design.plan import Plan, Trial
 from experiments.preference.config import PreferenceConfig
-from experiments.presenting import Presenter
-from experiments.setup import Setup
-from experiments.steps import Describe, Prepare, Present, Rate, Session, Step
+from experiments.session.presenting import Presenter
+from experiments.config.setup import Setup
+from experiments.session.steps import Describe, Prepare, Present, Rate, Session, Step
 
 
 def session(plan: Plan, setup: Setup[PreferenceConfig]) -> Session:

@@ -6,17 +6,18 @@ from collections.abc import Callable
 from typing import Any
 
 from device import GunStatus
-from experiments import catalogue, events
+from experiments import catalogue
+from experiments.session import events
 from experiments.clock import Clock
-from experiments.config import ExperimentConfig
-from experiments.events import Event
+from experiments.config.models import ExperimentConfig
+from experiments.session.events import Event
 from experiments.live_run import REARM_HELD_S, LiveRun
 from experiments.load import ConfigError
-from experiments.plan import Plan
-from experiments.remarks import Remark
-from experiments.setup import Setup
-from experiments.states import EMERGENCY, Position, State
-from experiments.steps import Ask, Outcome, Present, Rate, Rest, Step
+from experiments.design.plan import Plan
+from experiments.session.remarks import Remark
+from experiments.config.setup import Setup
+from experiments.session.states import EMERGENCY, Position, State
+from experiments.session.steps import Ask, Outcome, Present, Rate, Rest, Step
 
 
 def observer_of(setup: Setup[Any], plan: Plan) -> Any:

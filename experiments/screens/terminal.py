@@ -14,12 +14,12 @@ from contextlib import suppress
 from typing import TYPE_CHECKING, TextIO
 
 from device import GunStatus
-from experiments import events
+from experiments.session import events
 from experiments.clock import Clock
-from experiments.entries import Entry, value
-from experiments.events import Event, Press
+from experiments.session.entries import Entry, value
+from experiments.session.events import Event, Press
 from experiments.live_run import LiveRun
-from experiments.remarks import Remark, flag_word
+from experiments.session.remarks import Remark, flag_word
 from experiments.screens.texts import (
     FLAG_RULE,
     again_text,
@@ -31,12 +31,12 @@ from experiments.screens.texts import (
     typed_number,
     value_text,
 )
-from experiments.states import Position, State
-from experiments.steps import Ask, Describe, Outcome, Prepare, Rate, Rest, Step
+from experiments.session.states import Position, State
+from experiments.session.steps import Ask, Describe, Outcome, Prepare, Rate, Rest, Step
 
 if TYPE_CHECKING:
     from device.words import Direction
-    from experiments.plan import Plan
+    from experiments.design.plan import Plan
 
 _DIRECTIONS: dict[str, Direction] = {"f": "forward", "forward": "forward", "b": "backward", "backward": "backward"}
 _HELP = """At any time: `!` and Enter is the emergency stop, `stop` and a reason stops. `pause`, `undo`, `repeat` and

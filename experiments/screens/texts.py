@@ -7,9 +7,9 @@ from __future__ import annotations
 
 import unicodedata
 
-from experiments.entries import Entry, Value, together, value
-from experiments.plan import Plan, Trial
-from experiments.remarks import (
+from experiments.session.entries import Entry, Value, together, value
+from experiments.design.plan import Plan, Trial
+from experiments.session.remarks import (
     MAX_FLAG,
     AnswerCorrected,
     DescriptionCorrected,
@@ -20,7 +20,7 @@ from experiments.remarks import (
     Remark,
     TestShot,
 )
-from experiments.steps import (
+from experiments.session.steps import (
     Answered,
     Described,
     Failed,
@@ -34,7 +34,7 @@ from experiments.steps import (
     Step,
     trial_of,
 )
-from experiments.tables import Told, is_attempt
+from experiments.record.tables import Told, is_attempt
 
 FLAG_RULE = f"A flag is a word of at most {MAX_FLAG} letters, digits and hyphens."
 

@@ -3,12 +3,12 @@
 matplotlib enters the project's analysis here alone.
 """
 
-from analysis.report.figures.directions import figure_directions
+from analysis.summary.figures.directions import figure_directions
 from analysis.report.figures.names import display_name, named, people, stars
-from analysis.report.figures.results import figure_8
+from analysis.summary.figures.results import figure_8
 from analysis.report.figures.shot import ShotPanel, figure_5
-from analysis.report.figures.times import figure_response_times
-from analysis.report.figures.trade import (
+from analysis.summary.figures.times import figure_response_times
+from analysis.summary.figures.trade import (
     figure_conditional_accuracy,
     figure_quantile_probability,
     has_curve,

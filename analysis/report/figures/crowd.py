@@ -8,7 +8,7 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.collections import LineCollection
 
-from analysis.core.arrays import FloatArray
+from analysis.stats.arrays import FloatArray
 from analysis.report.figures.style import BLACK, INK
 
 MANY = 200

@@ -11,7 +11,7 @@ import matplotlib as mpl
 import numpy as np
 from matplotlib.axes import Axes
 
-from analysis.core.arrays import FloatArray
+from analysis.stats.arrays import FloatArray
 from analysis.report.figures.style import BLACK, BLUE, GREEN, PURPLE, VERMILION, light_grid, new_figure, save, style
 
 STAGES = ("recoil", "bullet firing", "resetting", "ready")

@@ -8,7 +8,7 @@ from pathlib import Path
 import matplotlib as mpl
 import numpy as np
 
-from analysis.core.arrays import FloatArray
+from analysis.stats.arrays import FloatArray
 from analysis.report.figures.style import BLACK, BLUE, INK, light_grid, new_figure, reference_line, save, style
 
 

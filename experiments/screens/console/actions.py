@@ -8,7 +8,7 @@ from PyQt6.QtCore import Qt
 from PyQt6.QtGui import QMouseEvent
 from PyQt6.QtWidgets import QGridLayout, QHBoxLayout, QPushButton, QSizePolicy, QWidget
 
-from experiments.events import Press
+from experiments.session.events import Press
 from experiments.screens.console.keys import BY_NAME, Name, shown_key
 
 Pressed = Callable[[], Press]

@@ -13,14 +13,14 @@ from typing import Any
 from PyQt6.QtCore import QEventLoop, QObject, QTimer, pyqtSignal
 from PyQt6.QtWidgets import QApplication
 
-from experiments import events
+from experiments.session import events
 from experiments.clock import Clock
-from experiments.events import Hand
-from experiments.journal import JournalError
+from experiments.session.events import Hand
+from experiments.record.journal import JournalError
 from experiments.live_run import LiveRun, RunStopped
 from experiments.load import ConfigError
-from experiments.places import PlaceError
-from experiments.plan import Plan
+from experiments.study.places import PlaceError
+from experiments.design.plan import Plan
 from experiments.run import Finished, Request, run
 from experiments.screen import Screen
 from experiments.screens.console import display
@@ -32,7 +32,7 @@ from experiments.screens.console.view import About
 from experiments.screens.console.window import Bridge, ConsoleWindow
 from experiments.screens.console.windows import let_go, open_as_left
 from experiments.screens.synthetic import observer_of
-from experiments.setup import Setup
+from experiments.config.setup import Setup
 
 WAKE_MS = 100
 SWITCH_S = 0.0005

@@ -11,8 +11,8 @@ from dataclasses import replace
 from typing import Any
 
 from device.words import Direction
-from experiments import events
-from experiments.events import OwnHand
+from experiments.session import events
+from experiments.session.events import OwnHand
 from experiments.live_run import LiveRun
 from experiments.screens.console.messages import Message, ParticipantSeen, Trouble
 from experiments.screens.participant.link import ParticipantLink
@@ -27,9 +27,9 @@ from experiments.screens.participant.words import (
     KeyPressed,
     NoiseIs,
 )
-from experiments.setup import Setup
-from experiments.states import Position, State
-from experiments.steps import Ask, Describe, Rate
+from experiments.config.setup import Setup
+from experiments.session.states import Position, State
+from experiments.session.steps import Ask, Describe, Rate
 
 KEYS: dict[str, Direction] = {"up": "forward", "down": "backward"}
 """The participant's keys, by PsychoPy's names, and what they say."""

@@ -7,11 +7,11 @@ from typing import Protocol
 
 from PyQt6.QtWidgets import QHBoxLayout, QWidget
 
-from experiments.events import Press
+from experiments.session.events import Press
 from experiments.screens.console import parts
 from experiments.screens.console.actions import CommandButton, HeldButton, Slots
 from experiments.screens.console.keys import Name, field_of
-from experiments.states import Position, State
+from experiments.session.states import Position, State
 
 _LEFT: tuple[Name, ...] = ("forward", "damper", "restart")
 _MIDDLE: tuple[Name, ...] = ("fire", "next", "go on", "enter", "rearm", "reason")

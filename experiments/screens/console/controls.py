@@ -9,14 +9,14 @@ from collections.abc import Callable
 from typing import Any
 
 from device.words import Direction
-from experiments import events
+from experiments.session import events
 from experiments.clock import Clock
-from experiments.entries import trial_at, value
-from experiments.events import Event, Hand, Press
+from experiments.session.entries import trial_at, value
+from experiments.session.events import Event, Hand, Press
 from experiments.live_run import REARM_HELD_S, LiveRun
-from experiments.plan import Trial
+from experiments.design.plan import Trial
 from experiments.preference.config import RatingScale
-from experiments.remarks import flag_word
+from experiments.session.remarks import flag_word
 from experiments.screens.console.keys import (
     BY_NAME,
     COMMANDS,
@@ -29,8 +29,8 @@ from experiments.screens.console.keys import (
 )
 from experiments.screens.console.needs import Beside, View
 from experiments.screens.texts import FLAG_RULE, one_line, short_place, typed_number
-from experiments.states import EMERGENCY, Position, State
-from experiments.steps import Ask
+from experiments.session.states import EMERGENCY, Position, State
+from experiments.session.steps import Ask
 
 PAGE_COMMANDS: tuple[Name, ...] = ("help", "list", "leave", "emergency", "theme")
 """What is done while a page covers the run."""

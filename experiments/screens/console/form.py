@@ -10,11 +10,11 @@ from PyQt6.QtCore import Qt, pyqtSignal
 from PyQt6.QtGui import QGuiApplication, QScreen
 from PyQt6.QtWidgets import QFormLayout, QFrame, QLabel, QScrollArea, QSizePolicy, QVBoxLayout, QWidget
 
-from experiments.beginnings import Entered, typed_facts
-from experiments.config import Fact, Handedness, Sex
+from experiments.study.beginnings import Entered, typed_facts
+from experiments.config.models import Fact, Handedness, Sex
 from experiments.screens.console import parts
 from experiments.screens.console.fields import LineEdit, Lines, ListBox, TickBox
-from experiments.study import Participant
+from experiments.study.study import Participant
 
 _LEVELS: dict[str, tuple[str, ...]] = {"sex": get_args(Sex), "handedness": get_args(Handedness)}
 _FACT_TEXT = {"age_years": "Age in years", "sex": "Sex", "handedness": "Handedness"}

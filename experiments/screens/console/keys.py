@@ -9,10 +9,10 @@ import math
 from dataclasses import dataclass
 from typing import Literal
 
-from experiments import events
-from experiments.entries import What
-from experiments.events import Event
-from experiments.states import No, Position, State, change_of
+from experiments.session import events
+from experiments.session.entries import What
+from experiments.session.events import Event
+from experiments.session.states import No, Position, State, change_of
 
 BOUNCE_S = 0.02
 """A key that goes down again so soon was not let go by a hand: an auto-repeat told as two events, or a bounce."""

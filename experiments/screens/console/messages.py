@@ -6,9 +6,9 @@ from dataclasses import dataclass
 
 from device import GunStatus
 from experiments.live_run import LiveRun
-from experiments.remarks import Remark
-from experiments.states import Position
-from experiments.steps import Outcome, Step
+from experiments.session.remarks import Remark
+from experiments.session.states import Position
+from experiments.session.steps import Outcome, Step
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -7,7 +7,7 @@ from typing import Any
 
 from experiments.run import Again
 from experiments.screens.console.form import Beside
-from experiments.setup import Setup
+from experiments.config.setup import Setup
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 from device import GunStatus
-from experiments.entries import entries
-from experiments.plan import Trial
-from experiments.remarks import (
+from experiments.session.entries import entries
+from experiments.design.plan import Trial
+from experiments.session.remarks import (
     AnswerCorrected,
     DescriptionCorrected,
     Flagged,
@@ -16,7 +16,7 @@ from experiments.remarks import (
 from experiments.screens import texts
 from experiments.screens.console.messages import GunSeen
 from experiments.screens.console.view import About, Seen
-from experiments.steps import Answered, Ask, Close, Describe, Outcome, Rate, Repeat, Rest, Step
+from experiments.session.steps import Answered, Ask, Close, Describe, Outcome, Rate, Repeat, Rest, Step
 
 STRIP = 40
 """So many response times are shown at most."""

@@ -6,13 +6,13 @@ from collections.abc import Collection, Sequence
 from dataclasses import dataclass, field
 from datetime import datetime, timedelta
 
-from experiments.config import ExperimentConfig
-from experiments.entries import done, together
-from experiments.plan import Plan, Trial
-from experiments.remarks import Remark
-from experiments.states import Position, State
-from experiments.steps import Answered, Outcome, Presented, Rated, Rest, Rested, Step, trial_of
-from experiments.tables import Told
+from experiments.config.models import ExperimentConfig
+from experiments.session.entries import done, together
+from experiments.design.plan import Plan, Trial
+from experiments.session.remarks import Remark
+from experiments.session.states import Position, State
+from experiments.session.steps import Answered, Outcome, Presented, Rated, Rest, Rested, Step, trial_of
+from experiments.record.tables import Told
 
 PRIOR_TRIALS = 5
 """The plan counts as much as so many measured trials, so that the estimate does not jump with the first."""

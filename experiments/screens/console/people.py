@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 
-from experiments.beginnings import left_to_do, passed_over, run_of
+from experiments.study.beginnings import left_to_do, passed_over, run_of
 from experiments.dates import date_text
-from experiments.places import is_code
-from experiments.standings import Overview
-from experiments.study import Participant, RunStanding
+from experiments.study.places import is_code
+from experiments.study.progress import Overview
+from experiments.study.study import Participant, RunStanding
 
 _CELL = {"done": "done", "not begun": "–", "unreadable": "cannot be read"}
 

@@ -8,7 +8,7 @@ from PyQt6.QtCore import pyqtSignal
 from PyQt6.QtWidgets import QHeaderView, QTableWidget, QTableWidgetItem
 
 from experiments.screens.console.people import cell_text, note_text
-from experiments.study import Participant
+from experiments.study.study import Participant
 
 
 class PeopleTable(QTableWidget):

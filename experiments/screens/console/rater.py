@@ -5,10 +5,10 @@ from __future__ import annotations
 import time
 from typing import Protocol
 
-from experiments.preference.scale import on_scale
+from experiments.synthetic.scale import on_scale
 from experiments.screens.participant.rating_page import spot_px
 from experiments.screens.participant.stage import TITLE
-from experiments.steps import Rate
+from experiments.session.steps import Rate
 
 AGAIN_S = 0.2
 """How long hands wait before they try again: what is done before the page stands is lost, as a person's would be."""

@@ -7,11 +7,11 @@ from collections.abc import Callable
 
 from device import DeviceError, Gun, GunStatus
 from experiments.live_run import LiveRun
-from experiments.remarks import Noted, Remark
+from experiments.session.remarks import Noted, Remark
 from experiments.screens.console.beside import ParticipantSide
 from experiments.screens.console.messages import Began, GunSeen, Message, Saved, Shown, Trouble
-from experiments.states import Position
-from experiments.steps import Outcome, Step
+from experiments.session.states import Position
+from experiments.session.steps import Outcome, Step
 
 GUN_LOOK_S = 0.2
 """How often the gun's state is looked at."""

@@ -16,7 +16,7 @@ from device import DeviceError, Gun, GunStatus, Shot, ShotReport, open_gun
 from device.words import Drive, Effect
 from experiments.clock import Clock
 from experiments.limits import drives
-from experiments.setup import Setup
+from experiments.config.setup import Setup
 
 COUNTDOWN_S = 3
 SWITCH_OFF = "SWITCH OFF ITS POWER."

@@ -12,7 +12,7 @@ from experiments.clock import Clock
 from experiments.screens.console import parts
 from experiments.screens.console.fields import Lines
 from experiments.screens.console.shot_check import SWITCH_OFF, ShotCheck, Told
-from experiments.setup import Setup
+from experiments.config.setup import Setup
 
 
 class ShotPage(QWidget):

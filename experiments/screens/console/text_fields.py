@@ -4,12 +4,12 @@ from __future__ import annotations
 
 from PyQt6.QtWidgets import QLineEdit, QStackedWidget, QWidget
 
-from experiments.entries import Entry
+from experiments.session.entries import Entry
 from experiments.screens.console import parts
 from experiments.screens.console.keys import field_of
 from experiments.screens.console.needs import Field
-from experiments.states import Position
-from experiments.steps import Rate
+from experiments.session.states import Position
+from experiments.session.steps import Rate
 
 _Belongs = tuple[str | None, int, Entry | None]
 """What a field is for: its kind, the number of the step, and the entry that is corrected."""

@@ -17,8 +17,8 @@ from experiments.screens.console.app import Console
 from experiments.screens.console.beside import ParticipantSide
 from experiments.screens.console.rater import Rater
 from experiments.screens.console.window import ConsoleWindow
-from experiments.states import Position, State
-from experiments.steps import Ask, Rate
+from experiments.session.states import Position, State
+from experiments.session.steps import Ask, Rate
 
 LOOK_MS = 10
 AGAIN_S = 0.5

@@ -18,9 +18,9 @@ from PyQt6.QtWidgets import (
 )
 
 from experiments.clock import Clock
-from experiments.events import Hand, Press
+from experiments.session.events import Hand, Press
 from experiments.live_run import LiveRun
-from experiments.remarks import Halted
+from experiments.session.remarks import Halted
 from experiments.screens.console import overview, parts, theme, tone, view
 from experiments.screens.console.beside import ParticipantSide
 from experiments.screens.console.buttons import Buttons
@@ -45,8 +45,8 @@ from experiments.screens.console.text_fields import TextFields
 from experiments.screens.console.view import About, Seen
 from experiments.screens.console.windows import remember, scaled
 from experiments.screens.texts import saved_text
-from experiments.states import Position
-from experiments.steps import Failed, Rested
+from experiments.session.states import Position
+from experiments.session.steps import Failed, Rested
 
 REFRESH_MS = 100
 BRIEF_S = 4.0

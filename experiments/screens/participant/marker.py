@@ -8,7 +8,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Literal
 
-from experiments.preference.scale import on_scale
+from experiments.synthetic.scale import on_scale
 from experiments.screens.participant.words import AskRating
 
 Move = Literal["left", "right", "far left", "far right", "first", "last"]

@@ -1,0 +1,183 @@
+"""`recoil export bids`: the logs of a folder as a BIDS data set, put in its place whole or not at all."""
+
+from __future__ import annotations
+
+import ctypes
+import json
+import os
+import shutil
+import sys
+import tempfile
+from collections.abc import Mapping
+from contextlib import suppress
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from analysis.archive.bids import files as bids
+from analysis.logs.reading import Logs, Track, read_logs
+from experiments.study import places
+from experiments.study import register
+from experiments.record import storage
+from experiments.load import load_study
+from experiments.study.places import PlaceError
+from experiments.record.provenance import recoil_version
+from experiments.study.register import Member, RegisterError
+
+_AT_FDCWD, _RENAME_EXCHANGE = -100, 2
+"""Linux's words for exchanging two names at once: renameat2(2)."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Exported:
+    """Where the data set lies, what is in it, and what was left out with the reason."""
+
+    out: Path
+    runs: bids.Runs
+    files: int
+    problems: tuple[str, ...]
+
+    def as_json(self) -> dict[str, Any]:
+        """The counts as plain JSON values."""
+        people, runs = self.runs.by_code, self.runs.runs
+        return {
+            "out": str(self.out),
+            "bids_version": bids.BIDS_VERSION,
+            "participants": len(people),
+            "synthetic": sum(any("synthetic" in run.hands for run in done) for done in people.values()),
+            "runs": {task: sum(run.experiment == task for run in runs) for task in self.runs.experiments},
+            "rows": {
+                task: sum(len(run.rows) for run in runs if run.experiment == task) for task in self.runs.experiments
+            },
+            "files": self.files,
+            "left_out": list(self.problems),
+        }
+
+    def as_text(self) -> str:
+        """The counts for people."""
+        people, runs = len(self.runs.by_code), len(self.runs.runs)
+        return f"BIDS data set: {self.out} (participants: {people}, runs: {runs}, files: {self.files})"
+
+
+def export(folder: Path, out: Path, *, free_text: bool = False, track: Track = iter) -> Exported:
+    """Write the usable logs in `folder` as the data set `out`; an earlier export there is replaced.
+
+    `PlaceError` if no log is usable, if they are of several studies, or if `out` holds what no export wrote;
+    `RegisterError` if the register cannot be trusted, since someone who was excluded might be published.
+    """
+    if not folder.is_dir():
+        raise PlaceError(f"{folder}: no such folder; name the folder that holds the logs")
+    target = out.resolve()
+    earlier = _earlier(target)
+    logs = read_logs([folder], track)
+    if not logs.files:
+        raise PlaceError("\n".join([f"no usable log in {folder}", *map(str, logs.problems)]))
+    results = _results(folder, logs)
+    runs = bids.runs_of(logs)
+    files = bids.data_set(runs, _members(results), _name(results), recoil_version(), free_text=free_text)
+    _put(target, files | _filled_in(earlier, files))
+    problems = (*map(str, logs.problems), *runs.problems)
+    return Exported(out=out, runs=runs, files=len(files), problems=problems)
+
+
+def _earlier(target: Path) -> Path | None:
+    """An earlier export that is to be replaced, if there is one. `PlaceError` for anything else that is there."""
+    if not target.exists() or (target.is_dir() and not any(target.iterdir())):
+        return None
+    if not _is_export(target):
+        raise PlaceError(f"{target}: exists and is no data set that Recoil exported; choose another --out")
+    paths = (path.relative_to(target).as_posix() for path in sorted(target.rglob("*")))
+    foreign = [path for path in paths if not bids.is_ours(path)]
+    if foreign:
+        shown = ", ".join(foreign[:3]) + (f" and {len(foreign) - 3} more" if len(foreign) > 3 else "")
+        raise PlaceError(f"{target}: holds what no export wrote ({shown}); move that away, or choose another --out")
+    return target
+
+
+def _is_export(target: Path) -> bool:
+    generators = _read_json(target / bids.DESCRIPTION).get("GeneratedBy")
+    if not isinstance(generators, list):
+        return False
+    return any(isinstance(one, dict) and one.get("Name") == bids.GENERATOR for one in generators)
+
+
+def _read_json(path: Path) -> dict[str, Any]:
+    """What a JSON file holds; nothing if there is none."""
+    try:
+        values = json.loads(path.read_bytes())
+    except (OSError, ValueError):
+        return {}
+    return values if isinstance(values, dict) else {}
+
+
+def _results(folder: Path, logs: Logs) -> Path:
+    """The results folder whose logs these are. `PlaceError` if there are several: P01 here may not be P01 there."""
+    found = {file.parent.parent if file.parent.name.startswith("sub-") else folder for file in logs.files}
+    if len(found) > 1:
+        shown = ", ".join(sorted(map(str, found)))
+        raise PlaceError(f"{folder}: holds the logs of several studies ({shown}); export each by itself")
+    return found.pop()
+
+
+def _members(results: Path) -> dict[str, Member]:
+    """What the register says of everyone."""
+    found = register.read(results)
+    if found.problem:
+        raise RegisterError(f"{found.problem}\nnothing was exported: someone might be excluded")
+    return found.members
+
+
+def _name(results: Path) -> str:
+    """The title of the study whose logs these are; a plain name where there is no study."""
+    here = Path(os.path.normpath(results.absolute()))
+    study = next((one / "study.toml" for one in (here, here.parent) if (one / "study.toml").is_file()), None)
+    return load_study(str(study))[0].title if study else "Psychophysics of a haptic gun"
+
+
+def _filled_in(earlier: Path | None, files: Mapping[str, bytes]) -> dict[str, bytes]:
+    """The JSON files that people have added keys of BIDS to, with these keys. A name that they gave is kept."""
+    found = {}
+    for path in (path for path in files if path.endswith(".json") and earlier):
+        ours, theirs = json.loads(files[path]), _read_json((earlier or Path()) / path)
+        kept = {key for key in theirs if key[:1].isupper()} - (set(ours) - {"Name"})
+        if kept:
+            found[path] = bids.json_bytes(ours | {key: theirs[key] for key in theirs if key in kept})
+    return found
+
+
+def _put(target: Path, files: Mapping[str, bytes]) -> None:
+    """Write a folder beside `target` and put it in its place at once: whoever looks sees the old one or the new one."""
+    storage.make_folder(target.parent)
+    prefix = f".{target.name}.part-"
+    for left_over in (path for path in target.parent.iterdir() if path.name.startswith(prefix)):
+        shutil.rmtree(left_over, ignore_errors=True)  # of an export that was killed
+    part = Path(tempfile.mkdtemp(prefix=prefix, dir=target.parent))
+    try:
+        for path, data in files.items():
+            storage.make_folder((part / path).parent)
+            storage.write_whole(part / path, data)
+        _replace(target, part)
+        storage.sync_folder(target.parent)
+    finally:
+        shutil.rmtree(part, ignore_errors=True)
+
+
+def _replace(target: Path, part: Path) -> None:
+    if target.exists() and not any(target.iterdir()):
+        target.rmdir()
+    if not target.exists():
+        part.rename(target)
+    elif not _exchange(target, part):  # in two steps: killed between them, the old one is there under another name
+        aside = places.set_aside_file(target)
+        part.rename(target)
+        shutil.rmtree(aside)
+
+
+def _exchange(one: Path, other: Path) -> bool:
+    """Exchange two names at once; false where system or file system cannot."""
+    if sys.platform != "linux":
+        return False
+    with suppress(OSError, AttributeError):  # no such call in this C library
+        renameat2 = ctypes.CDLL(None, use_errno=True).renameat2
+        return bool(renameat2(_AT_FDCWD, os.fsencode(one), _AT_FDCWD, os.fsencode(other), _RENAME_EXCHANGE) == 0)
+    return False

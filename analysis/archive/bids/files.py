@@ -1,0 +1,224 @@
+"""Logs as the files of a BIDS data set of behavioural runs. Pure: what stands in each file, nothing is written here.
+
+Task and participant stand in the names of the files; every column is described in the data set itself. Nothing that
+says when someone came, or in whose words, is in it: times count from the first pulse of a run, ages end at 89, and
+free text is left out unless asked for.
+
+Reference: the Brain Imaging Data Structure, version 1.11.1, https://bids-specification.readthedocs.io
+"""
+
+from __future__ import annotations
+
+import json
+import re
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
+from datetime import UTC, datetime
+from typing import Any
+
+import pandas as pd
+
+from analysis.archive.bids import vocabulary as words
+from analysis.logs.reading import Logs
+from experiments.record import columns
+from experiments.record.columns import Column
+from experiments.study.register import Member
+
+BIDS_VERSION = "1.11.1"
+GENERATOR = "Recoil"
+DESCRIPTION = "dataset_description.json"
+MISSING = "n/a"
+OLDEST_AGE = 89
+"""Ages above are given as this one: people so old are so few that their age might tell who they are."""
+
+_FREE_TEXT = ("comment", "note")
+_IN_THE_NAME = ("participant_id", "experiment")
+_NAMES = {"response_time_s": "response_time", "onset_utc": "onset"}
+"""Columns that BIDS has a name for, and what it means by it."""
+_SEX = {"female": "female", "male": "male", "other": "other"}
+_HANDEDNESS = {"right": "right", "left": "left", "both": "ambidextrous"}
+_OURS = re.compile(
+    r"README|participants\.(tsv|json)|dataset_description\.json|task-[a-z]+_beh\.json"
+    r"|sub-([A-Za-z0-9]+)(/beh(/sub-\2_task-[a-z]+_beh\.tsv)?)?"
+)
+
+Row = dict[str, Any]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Run:
+    """One participant's rows of one experiment; `None` where the log has none."""
+
+    participant_id: str
+    experiment: str
+    rows: tuple[Row, ...]
+
+    @property
+    def hands(self) -> set[str]:
+        """Whose hands gave the answers."""
+        return {row[words.ANSWERED_BY[self.experiment]] for row in self.rows} - {None}
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Runs:
+    """The runs that a data set is made of, and what of the logs could not be taken over."""
+
+    runs: tuple[Run, ...]
+    problems: tuple[str, ...] = field(default=())
+
+    @property
+    def by_code(self) -> dict[str, tuple[Run, ...]]:
+        """The runs of each participant, in order of their codes."""
+        found: dict[str, tuple[Run, ...]] = {}
+        for run in sorted(self.runs, key=lambda run: run.participant_id):
+            found[run.participant_id] = (*found.get(run.participant_id, ()), run)
+        return found
+
+    @property
+    def experiments(self) -> tuple[str, ...]:
+        """The experiments that anyone has done."""
+        return tuple(dict.fromkeys(run.experiment for run in self.runs))
+
+
+def is_ours(path: str) -> bool:
+    """Whether a path inside a data set, with slashes, is one that an export writes.
+
+    >>> is_ours("sub-P01/beh/sub-P01_task-direction_beh.tsv"), is_ours("derivatives")
+    (True, False)
+    """
+    return bool(_OURS.fullmatch(path))
+
+
+def runs_of(logs: Logs) -> Runs:
+    """The runs in the logs. A code that differs from another in case alone would share its folder: it is left out."""
+    runs, problems, known = [], list[str](), dict[str, str]()
+    for run in (*_runs("direction", logs.trials), *_runs("preference", logs.ratings)):
+        first = known.setdefault(run.participant_id.casefold(), run.participant_id)
+        if first != run.participant_id:
+            rule = f"differs from {first!r} in case alone (rule: one code a participant)"
+            problems.append(f"participant {run.participant_id!r}, {run.experiment}: {rule}")
+            continue
+        runs.append(run)
+        problems += _unreadable_onsets(run)
+    return Runs(runs=tuple(runs), problems=tuple(problems))
+
+
+def _runs(experiment: str, table: pd.DataFrame) -> Iterator[Run]:
+    names = columns.names(experiment)
+    plain = table[names].astype(object).where(table[names].notna(), None)
+    for code, rows in plain.groupby("participant_id", sort=False):
+        cells = rows.itertuples(index=False, name=None)
+        named = tuple(dict(zip(names, row, strict=True)) for row in cells)
+        yield Run(participant_id=str(code), experiment=experiment, rows=named)
+
+
+def _unreadable_onsets(run: Run) -> Iterator[str]:
+    bad = [row["onset_utc"] for row in run.rows if row["onset_utc"] and _moment(row["onset_utc"]) is None]
+    if bad:
+        where = f"onset of {len(bad)} trials of participant {run.participant_id!r}, {run.experiment}"
+        yield f"{where}: onset_utc = {bad[0][:80]!r} is no ISO 8601 time"
+
+
+def data_set(
+    runs: Runs, members: Mapping[str, Member], name: str, version: str, *, free_text: bool = False
+) -> dict[str, bytes]:
+    """Every file of the data set by its path in it. `members` is what the register says, `version` is Recoil's."""
+    people = [_participant(code, done, members.get(code)) for code, done in runs.by_code.items()]
+    synthetic = sum(person["synthetic"] == "true" for person in people)
+    return {
+        DESCRIPTION: json_bytes(_description(name, version)),
+        "README": words.readme(len(people), synthetic, free_text=free_text).encode(),
+        "participants.tsv": _tsv(list(people[0]), (person.values() for person in people)),
+        "participants.json": json_bytes(words.PARTICIPANTS),
+        **{f"task-{task}_beh.json": json_bytes(_sidecar(task, free_text)) for task in runs.experiments},
+        **{_path(run): _beh(run, free_text) for run in runs.runs},
+    }
+
+
+def json_bytes(values: object) -> bytes:
+    """JSON for people to read and to fill in."""
+    return (json.dumps(values, indent=2, ensure_ascii=False) + "\n").encode()
+
+
+def _description(name: str, version: str) -> Row:
+    generator = {"Name": GENERATOR, "Version": version, "Description": "recoil export bids"}
+    return {"Name": name, "BIDSVersion": BIDS_VERSION, "DatasetType": "raw", "GeneratedBy": [generator]}
+
+
+def _participant(code: str, done: Sequence[Run], member: Member | None) -> dict[str, str]:
+    """The participant's row. A person is of the species that BIDS takes for granted; a synthetic participant is not."""
+    facts = member.facts if member else None
+    hands = set[str]().union(*(run.hands for run in done))
+    synthetic = {True: "true", False: "false"}["synthetic" in hands] if hands else MISSING
+    return {
+        "participant_id": f"sub-{code}",
+        "species": "homo sapiens" if synthetic == "false" else MISSING,
+        "age": str(min(facts.age_years, OLDEST_AGE)) if facts and facts.age_years is not None else MISSING,
+        "sex": _SEX.get(facts.sex or "", MISSING) if facts else MISSING,
+        "handedness": _HANDEDNESS.get(facts.handedness or "", MISSING) if facts else MISSING,
+        "synthetic": synthetic,
+    }
+
+
+def _path(run: Run) -> str:
+    return f"sub-{run.participant_id}/beh/sub-{run.participant_id}_task-{run.experiment}_beh.tsv"
+
+
+def _exported(experiment: str, free_text: bool) -> list[Column]:
+    left_out = _IN_THE_NAME if free_text else (*_IN_THE_NAME, *_FREE_TEXT)
+    return [column for column in columns.TABLES[experiment] if column.name not in left_out]
+
+
+def _name(column: Column) -> str:
+    return _NAMES.get(column.name, column.name)
+
+
+def _sidecar(experiment: str, free_text: bool) -> Row:
+    described = {_name(column): words.described(column, _name(column)) for column in _exported(experiment, free_text)}
+    return {"TaskName": experiment, "TaskDescription": words.TASKS[experiment], **described}
+
+
+def _beh(run: Run, free_text: bool) -> bytes:
+    table = _exported(run.experiment, free_text)
+    rows = [row | {"onset_utc": onset} for row, onset in zip(run.rows, _onsets(run), strict=True)]
+    cells = ([_cell(column, row[column.name]) for column in table] for row in rows)
+    return _tsv([_name(column) for column in table], cells)
+
+
+def _onsets(run: Run) -> list[float | None]:
+    """Seconds since the earliest pulse in the rows; `None` where there was no pulse."""
+    moments = [_moment(row["onset_utc"]) for row in run.rows]
+    start = min(filter(None, moments), default=None)
+    return [(moment - start).total_seconds() if moment and start else None for moment in moments]
+
+
+def _moment(text: str | None) -> datetime | None:
+    """When that was; nothing if there is none, or if it is no time."""
+    try:
+        moment = datetime.fromisoformat(text or "")
+    except ValueError:
+        return None
+    return moment if moment.tzinfo else moment.replace(tzinfo=UTC)
+
+
+def _cell(column: Column, value: Any) -> str:
+    if value is None:
+        return MISSING
+    if isinstance(value, float):
+        return repr(float(value))
+    text = one_line(str(value))
+    return (columns.guard(text) if column.type == "text" else text) or MISSING
+
+
+def one_line(text: str) -> str:
+    """Text that stays in its cell wherever it is read: one line, single blanks, no double quotes.
+
+    >>> one_line(f'strong,{chr(9)}like "a kick"')
+    "strong, like 'a kick'"
+    """
+    printable = "".join(letter if letter.isprintable() else " " for letter in text)
+    return " ".join(printable.replace('"', "'").split())
+
+
+def _tsv(header: Sequence[str], rows: Iterable[Iterable[str]]) -> bytes:
+    return "".join("\t".join(cells) + "\n" for cells in (header, *rows)).encode()

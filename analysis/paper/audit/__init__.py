@@ -1,0 +1,55 @@
+"""Are published numbers attainable and consistent? Exact checks of what a paper prints, and the audit of a whole one.
+
+"not attainable" is said by proof only, "attainable" only with data that give the number; else "undecided".
+`reconstruct` finds data that meet many printed numbers at once.
+"""
+
+from analysis.paper.audit.annealing import Order
+from analysis.paper.audit.binomial_p import binomial_p
+from analysis.paper.audit.freedom import degrees_of_freedom
+from analysis.paper.audit.means import grim, percent_of_count, scale_of
+from analysis.paper.audit.p_values import p_against_statistic
+from analysis.paper.audit.paper_file import PaperFile, load_paper_file, parse_paper
+from analysis.paper.audit.printed import Interval, PrintedNumber, Rounding, read
+from analysis.paper.audit.reconstruct import Constraints, Reconstruction, printed_constraints, reconstruct
+from analysis.paper.audit.registry import CHECKS
+from analysis.paper.audit.run import Finding, audit
+from analysis.paper.audit.spreads import debit, grimmer
+from analysis.paper.audit.totals import Term, total
+from analysis.paper.audit.tukey_pattern import Comparison, tukey_pattern
+from analysis.paper.audit.variance_ratios import between_f, repeated_f
+from analysis.paper.audit.words import Result, Verdict
+
+__all__ = [
+    "CHECKS",
+    "Comparison",
+    "Constraints",
+    "Finding",
+    "Interval",
+    "Order",
+    "PaperFile",
+    "PrintedNumber",
+    "Reconstruction",
+    "Result",
+    "Rounding",
+    "Term",
+    "Verdict",
+    "audit",
+    "between_f",
+    "binomial_p",
+    "debit",
+    "degrees_of_freedom",
+    "grim",
+    "grimmer",
+    "load_paper_file",
+    "p_against_statistic",
+    "parse_paper",
+    "percent_of_count",
+    "printed_constraints",
+    "read",
+    "reconstruct",
+    "repeated_f",
+    "scale_of",
+    "total",
+    "tukey_pattern",
+]

@@ -1,0 +1,251 @@
+"""The claims of a paper's file: where it says what, and the arguments of the check, one model a kind.
+
+A number that is rounded is text, as printed; a whole number of TOML is exact, such as a count. `run` calls the check.
+"""
+
+from __future__ import annotations
+
+from typing import Annotated, Any, ClassVar, Literal
+
+from pydantic import AfterValidator, BaseModel, ConfigDict, Field
+
+from analysis.paper.audit.freedom import Design
+from analysis.paper.audit.printed import read
+from analysis.paper.audit.registry import CHECKS
+from analysis.paper.audit.tails import Sides, Statistic
+from analysis.paper.audit.totals import Bound, Term
+from analysis.paper.audit.tukey_pattern import Comparison
+from analysis.paper.audit.words import Result
+
+
+def _is_printed(text: str) -> str:
+    read(text)
+    return text
+
+
+PrintedText = Annotated[str, AfterValidator(_is_printed)]
+"""A number or a bound as printed: "28.45", ".205", "< .001", "64.3%"."""
+Count = Annotated[int, Field(ge=1)]
+
+
+class Strict(BaseModel):
+    """No unknown keys, no changes, no conversions."""
+
+    model_config = ConfigDict(extra="forbid", frozen=True, strict=True)
+
+
+class Claim(Strict):
+    """One printed number: `place` in the paper, a short `quote`, and a `note` on how the file reads it.
+
+    `about`: the numbers of Recoil's own comparison that it is about, such as "direction: ANOVA F".
+    """
+
+    place: str
+    quote: str
+    note: str = ""
+    about: list[str] = []
+    not_arguments: ClassVar[frozenset[str]] = frozenset({"place", "quote", "note", "about", "kind"})
+
+    def run(self) -> Result:
+        """The check of this kind with this claim's numbers; `ValueError` where they make no such claim."""
+        return CHECKS[self.kind](**self.arguments())  # type: ignore[attr-defined]
+
+    def arguments(self) -> dict[str, Any]:
+        """The check's arguments."""
+        return {name: getattr(self, name) for name in type(self).model_fields if name not in self.not_arguments}
+
+
+class GrimClaim(Claim):
+    """A mean of n scores in steps of `grain`; see `grim`."""
+
+    kind: Literal["grim"]
+    mean: PrintedText
+    n: Count
+    grain: PrintedText = "1"
+    items: Count = 1
+    low: PrintedText | None = None
+    high: PrintedText | None = None
+
+
+class PercentClaim(Claim):
+    """A percentage with its count of n; see `percent_of_count`."""
+
+    kind: Literal["percent"]
+    percent: PrintedText
+    count: Annotated[int, Field(ge=0)]
+    n: Count
+
+
+class GrimmerClaim(GrimClaim):
+    """A mean with its SD; see `grimmer`."""
+
+    kind: Literal["grimmer"]  # type: ignore[assignment]
+    sd: PrintedText
+
+
+class DebitClaim(Claim):
+    """Mean and SD of answers of 0 or 1; see `debit`."""
+
+    kind: Literal["debit"]
+    mean: PrintedText
+    sd: PrintedText
+    n: Count
+
+
+class DfClaim(Claim):
+    """Degrees of freedom of a design; see `degrees_of_freedom`."""
+
+    kind: Literal["df"]
+    df: Annotated[list[PrintedText], Field(min_length=1)]
+    design: Design
+    counts: Annotated[list[Count], Field(min_length=1)]
+
+
+class PClaim(Claim):
+    """A p-value, or its bound, of a statistic; see `p_against_statistic`."""
+
+    kind: Literal["p"]
+    statistic: Statistic
+    value: PrintedText
+    df: list[PrintedText] = []
+    p: PrintedText
+    sides: Sides = "two-sided"
+
+
+class BinomialClaim(Claim):
+    """A binomial test's p, for any count of n or some; see `binomial_p`."""
+
+    kind: Literal["binomial"]
+    p: PrintedText
+    n: Count
+    chance: str = "1/2"
+    counts: list[int] | None = None
+
+
+class RepeatedFClaim(Claim):
+    """F within participants, against its means; see `repeated_f`."""
+
+    kind: Literal["repeated-f"]
+    F: PrintedText
+    n: Count
+    k: Count
+    means: list[PrintedText] | None = None
+    grain: PrintedText = "1"
+    low: PrintedText | None = None
+    high: PrintedText | None = None
+    transforms: list[str] = []
+    other_grains: list[PrintedText] = []
+
+
+class BetweenFClaim(Claim):
+    """F between groups, against their means; see `between_f`."""
+
+    kind: Literal["between-f"]
+    F: PrintedText
+    sizes: Annotated[list[Count], Field(min_length=2)]
+    means: list[PrintedText] | None = None
+    grain: PrintedText = "1"
+    low: PrintedText | None = None
+    high: PrintedText | None = None
+
+
+class TukeyPair(Strict):
+    """Mean `higher` above mean `lower`, by their places from 0; see `Comparison`."""
+
+    higher: int
+    lower: int
+    p: PrintedText
+    p_at_least: PrintedText | None = None
+
+
+class TukeyClaim(Claim):
+    """The pattern of a Tukey test; see `tukey_pattern`."""
+
+    kind: Literal["tukey"]
+    F: PrintedText
+    sizes: Annotated[list[Count], Field(min_length=2)]
+    comparisons: Annotated[list[TukeyPair], Field(min_length=1)]
+    means: list[PrintedText] | None = None
+    repeated: bool = True
+    grain: PrintedText | None = None
+    low: PrintedText | None = None
+    high: PrintedText | None = None
+
+    def arguments(self) -> dict[str, Any]:
+        """The check's arguments, the pairs as its own words."""
+        pairs = [Comparison(**pair.model_dump()) for pair in self.comparisons]
+        return super().arguments() | {"comparisons": pairs}
+
+
+class TermModel(Strict):
+    """A product of factors over divisors; see `Term`."""
+
+    times: Annotated[list[int | PrintedText], Field(min_length=1)]
+    over: list[int | PrintedText] = []
+
+
+class TotalClaim(Claim):
+    """A number that others add up to, or bound; see `total`."""
+
+    kind: Literal["total"]
+    printed: PrintedText
+    terms: Annotated[list[TermModel], Field(min_length=1)]
+    bound: Bound = "equals"
+
+    def arguments(self) -> dict[str, Any]:
+        """The check's arguments, the terms as its own words."""
+        return super().arguments() | {"terms": [Term(times=term.times, over=term.over) for term in self.terms]}
+
+
+class StatedClaim(Claim):
+    """A number that nothing else printed bears on, such as one measured constant."""
+
+    kind: Literal["stated"]
+    printed: PrintedText
+    unit: str = ""
+
+    def run(self) -> Result:
+        """Undecided: there is nothing to check it against."""
+        return Result(
+            check="stated",
+            printed=f"{self.printed} {self.unit}".strip(),
+            verdict="undecided",
+            reason="no other printed number bears on it",
+            source="the paper",
+        )
+
+
+class UnpublishedClaim(Claim):
+    """A quantity that a reader needs and the paper does not print."""
+
+    kind: Literal["unpublished"]
+    quantity: str
+
+    def run(self) -> Result:
+        """Not published."""
+        return Result(
+            check="unpublished",
+            printed="",
+            verdict="not published",
+            reason=f"{self.quantity}: not printed",
+            source="the paper",
+        )
+
+
+AnyClaim = Annotated[
+    GrimClaim
+    | PercentClaim
+    | GrimmerClaim
+    | DebitClaim
+    | DfClaim
+    | PClaim
+    | BinomialClaim
+    | RepeatedFClaim
+    | BetweenFClaim
+    | TukeyClaim
+    | TotalClaim
+    | StatedClaim
+    | UnpublishedClaim,
+    Field(discriminator="kind"),
+]
+"""Any claim; its `kind` says which."""

@@ -1,0 +1,144 @@
+"""Degrees of freedom against the design that is said to have given them."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Sequence
+from fractions import Fraction
+from typing import Literal
+
+from analysis.paper.audit.means import check_count
+from analysis.paper.audit.printed import PrintedNumber, Rounding, decimal, read
+from analysis.paper.audit.words import NONE_EXISTS, Attempt, Found, Result, decide, listed
+
+Design = Literal["between", "repeated", "one sample", "paired", "two samples", "correlation", "contingency"]
+Freedom = tuple[Fraction, ...]
+_SOURCE = "Winer 1971, Statistical Principles in Experimental Design; Greenhouse & Geisser 1959; Welch 1947"
+
+
+_COUNTS = {"repeated": 2, "two samples": 2, "contingency": 2, "one sample": 1, "paired": 1, "correlation": 1}
+_DF: dict[Design, Callable[[Sequence[int]], list[int]]] = {
+    "between": lambda sizes: [len(sizes) - 1, sum(sizes) - len(sizes)],
+    "repeated": lambda counts: [counts[1] - 1, (counts[0] - 1) * (counts[1] - 1)],
+    "two samples": lambda sizes: [sum(sizes) - 2],
+    "correlation": lambda counts: [counts[0] - 2],
+    "contingency": lambda counts: [(counts[0] - 1) * (counts[1] - 1)],
+    "one sample": lambda counts: [counts[0] - 1],
+    "paired": lambda counts: [counts[0] - 1],
+}
+
+
+def degrees_of_freedom(df: Sequence[str], design: Design, counts: Sequence[int]) -> Result:
+    """Are these the degrees of freedom of this design?
+
+    `counts`: "between" the size of each group, df (k - 1, N - k); "repeated" participants n and conditions k, df
+    (k - 1, (n - 1)(k - 1)); "one sample" and "paired" n, df n - 1; "two samples" the two sizes, df n1 + n2 - 2;
+    "correlation" n, df n - 2; "contingency" rows and columns, df (r - 1)(c - 1).
+    Readings: the other error term of a one-way design, Greenhouse-Geisser's correction, Welch's, fewer participants.
+    `ValueError`: counts that make no such design, or another number of df than it has.
+    Sources: Winer 1971, chapter 4; Greenhouse & Geisser 1959, Psychometrika 24, 95; Welch 1947, Biometrika 34, 28.
+
+    >>> degrees_of_freedom(["2", "26"], "repeated", [14, 3]).verdict
+    'attainable'
+    """
+    printed = [read(text) for text in df]
+    expected = expected_df(design, counts)
+    if len(printed) != len(expected):
+        raise ValueError(f"a {design} design has {len(expected)} degrees of freedom, not {len(printed)}")
+    others = [(name, _same(printed, other)) for name, other in _readings(design, counts)]
+    others += [(name, test) for name, test in _corrections(printed, design, counts)]
+    decision = decide(_same(printed, expected), others)
+    return Result(
+        check="df",
+        printed=f"({', '.join(number.text for number in printed)})",
+        verdict=decision.verdict,
+        reason=f"a {design} design of {listed(counts)} has df ({', '.join(map(decimal, expected))})",
+        source=_SOURCE,
+        step=Fraction(1),
+        readings=decision.readings,
+        tried=decision.tried,
+        contradicts=() if decision.verdict == "attainable" else (f"{design} design", f"counts {listed(counts)}"),
+        numbers=(("df of the design", ", ".join(map(decimal, expected))),),
+        witness=decision.witness,
+    )
+
+
+def expected_df(design: Design, counts: Sequence[int]) -> Freedom:
+    """The degrees of freedom of a design without any correction; `ValueError` if the counts make none."""
+    if (len(counts) < 2) if design == "between" else (len(counts) != _COUNTS[design]):
+        raise ValueError(f"a {design} design cannot be made of the counts {listed(counts)}")
+    for count in counts:
+        check_count(count, "each count")
+    values = _DF[design](counts)
+    if min(values) < 1:
+        raise ValueError(f"a {design} design of {listed(counts)} leaves no degrees of freedom")
+    return tuple(map(Fraction, values))
+
+
+def _same(printed: Sequence[PrintedNumber], values: Freedom) -> Attempt:
+    def attempt(rounding: Rounding) -> Found:
+        fits = all(n.interval(rounding).holds(value) for n, value in zip(printed, values, strict=True))
+        return Found(True, (values,)) if fits else NONE_EXISTS
+
+    return attempt
+
+
+def _readings(design: Design, counts: Sequence[int]) -> Iterator[tuple[str, Freedom]]:
+    """Other whole degrees of freedom that the same data could have been given."""
+    if design == "repeated":
+        yield from _repeated_readings(*counts)
+    elif design == "between":
+        yield from _between_readings(counts)
+    elif design != "contingency":
+        full = int(expected_df(design, counts)[0])
+        yield from ((f"{full - df} participants fewer", (Fraction(df),)) for df in range(1, full))
+
+
+def _repeated_readings(n: int, k: int) -> Iterator[tuple[str, Freedom]]:
+    yield "error term of a between-subjects design", (Fraction(k - 1), Fraction(k * (n - 1)))
+    if n > k:
+        yield "multivariate test", (Fraction(k - 1), Fraction(n - k + 1))
+    for m in range(2, n):
+        yield f"{m} participants instead of {n}", expected_df("repeated", [m, k])
+
+
+def _between_readings(sizes: Sequence[int]) -> Iterator[tuple[str, Freedom]]:
+    k, everyone = len(sizes), sum(sizes)
+    if len(set(sizes)) == 1 and sizes[0] > 1:
+        yield "error term of a repeated-measures design", expected_df("repeated", [sizes[0], k])
+    for total in range(k + 1, everyone):
+        yield f"{total} participants instead of {everyone}", (Fraction(k - 1), Fraction(total - k))
+
+
+def _corrections(
+    printed: Sequence[PrintedNumber], design: Design, counts: Sequence[int]
+) -> Iterator[tuple[str, Attempt]]:
+    if design == "repeated":
+        yield "Greenhouse-Geisser or Huynh-Feldt correction", _corrected(printed, counts[0], counts[1])
+    if design == "two samples":
+        yield "Welch's correction", _welch(printed[0], min(counts) - 1, sum(counts) - 2)
+
+
+def _corrected(printed: Sequence[PrintedNumber], n: int, k: int) -> Attempt:
+    """Both df times an epsilon from 1 / (k - 1) to 1: is there one that prints so?"""
+
+    def attempt(rounding: Rounding) -> Found:
+        first, second = (number.interval(rounding) for number in printed)
+        mapped = second.mapped(lambda df: df / (n - 1))
+        ends = [x for x in (first.low, first.high, mapped.low, mapped.high, Fraction(1), Fraction(k - 1)) if x]
+        middles = [(a + b) / 2 for a in ends for b in ends]
+        fits = (x for x in middles if 1 <= x <= k - 1 and first.holds(x) and mapped.holds(x))
+        df = next(fits, None)
+        return NONE_EXISTS if df is None else Found(True, ((df, df * (n - 1)),))
+
+    return attempt
+
+
+def _welch(printed: PrintedNumber, low: int, high: int) -> Attempt:
+    def attempt(rounding: Rounding) -> Found:
+        interval = printed.interval(rounding)
+        ends = [x for x in (interval.low, interval.high, Fraction(low), Fraction(high)) if x is not None]
+        fits = (x for a in ends for b in ends if interval.holds(x := (a + b) / 2) and low <= x <= high)
+        df = next(fits, None)
+        return NONE_EXISTS if df is None else Found(True, ((df,),))
+
+    return attempt

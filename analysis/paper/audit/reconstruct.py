@@ -1,0 +1,253 @@
+"""Data sets that meet all constraints at once: n participants in k conditions, whole numbers on a scale.
+
+Constraints are column sums (or the printed means they give), spreads, a repeated-measures F, and how many participants
+rank two conditions in which order. Small spaces are enumerated, which also proves that there are none; others are
+searched from many starts. Whatever is returned has been checked exactly.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass
+from fractions import Fraction
+from itertools import combinations_with_replacement, islice, product
+from math import comb, prod, sqrt
+from random import Random
+
+from analysis.paper.audit.annealing import Order, Table
+from analysis.paper.audit.column_draws import drawn, with_squares
+from analysis.paper.audit.means import Scale
+from analysis.paper.audit.power_sums import greatest_squares, least_squares
+from analysis.paper.audit.printed import Interval, Rounding, read
+from analysis.paper.audit.repeated_lattice import Levels, Rows, affordable, candidates, every_sum, ratio
+
+Sums = tuple[int, ...]
+_STEPS, _STEPS_EACH = 8_000, 20
+"""Of one start: at most, and for each pair of cells of a column."""
+_DRAWS, _LISTED, _SMALL = 2_000, 5_000, 20_000
+"""Column sums drawn before a start gives up, sets of them that are listed, data sets that are enumerated."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Column:
+    """A condition: the sums its numbers may have, and their variance (with n - 1), None where any will do."""
+
+    sums: Sequence[int]
+    variance: Interval | None = None
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Constraints:
+    """What `n` rows of whole numbers `0..top` must meet.
+
+    `accepts` says of column sums whether they will do, as where a pattern of post-hoc tests follows from them and F.
+    `person_sd`: how much rows differ when a search starts; it steers, and binds nothing.
+    """
+
+    n: int
+    top: int
+    columns: tuple[Column, ...]
+    F: Interval | None = None
+    orders: tuple[Order, ...] = ()
+    accepts: Callable[[Sums], bool] | None = None
+    person_sd: float = 0.0
+
+    @property
+    def levels(self) -> Levels:
+        """The whole numbers of a cell."""
+        return Levels(self.top)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Reconstruction:
+    """Data sets found, how many starts were made and succeeded, and whether such data exist (None: not settled).
+
+    `space`: how many data sets meet the constraints, the order of participants aside, if all were enumerated.
+    """
+
+    data: tuple[Rows, ...]
+    starts: int
+    succeeded: int
+    exists: bool | None
+    space: int | None = None
+
+
+def printed_constraints(
+    n: int,
+    means: Sequence[str],
+    scale: Scale,
+    *,
+    sds: Sequence[str] | None = None,
+    F: str | None = None,
+    orders: Sequence[Order] = (),
+    rounding: Rounding = Rounding.HALF_UP,
+) -> Constraints:
+    """The constraints that printed means, SDs and F make of n participants on a scale with both ends.
+
+    Data count in grains above the scale's lower end: `scale.value` gives their values.
+    `ValueError` for text that is no number, or a scale without ends.
+    """
+    if scale.low is None or scale.high is None:
+        raise ValueError("a reconstruction needs a scale with both ends")
+    spreads = [None] * len(means) if sds is None else [read(sd).interval(rounding).squared() for sd in sds]
+    columns = tuple(
+        Column(
+            sums=scale.sums(read(mean).interval(rounding), n),
+            variance=None if spread is None else spread.mapped(lambda value: value / scale.grain**2),
+        )
+        for mean, spread in zip(means, spreads, strict=True)
+    )
+    interval = None if F is None else read(F).interval(rounding)
+    return Constraints(n=n, top=scale.high, columns=columns, F=interval, orders=tuple(orders))
+
+
+def reconstruct(wanted: Constraints, seed: int = 0, *, count: int = 1, starts: int = 60) -> Reconstruction:
+    """`count` different data sets that meet the constraints, or as many as are found within so many starts.
+
+    The same for the same seed. `exists` is False only by proof: every data set, or every sum, was looked at.
+
+    >>> from analysis.paper.audit.means import scale_of
+    >>> found = reconstruct(printed_constraints(5, ["2.40"], scale_of("1", "0", "6"), sds=["1.52"]), count=9)
+    >>> found.space, sorted(sorted(value for (value,) in rows) for rows in found.data)
+    (3, [[0, 2, 3, 3, 4], [1, 1, 2, 4, 4], [1, 2, 2, 2, 5]])
+    """
+    random = Random(seed)  # noqa: S311 a search, no secret
+    if _size(wanted) <= _SMALL:
+        return _from_all(wanted, count, random)
+    found: dict[Rows, Rows] = {}
+    tried = succeeded = 0
+    sums = _sums(wanted, random)
+    for chosen in islice(sums, starts):
+        tried += 1
+        rows = _searched(wanted, chosen, random)
+        if rows is not None and meets(rows, wanted):
+            succeeded += 1
+            found.setdefault(tuple(sorted(rows)), rows)
+        if len(found) == count:
+            break
+    data = tuple(found.values())
+    exists = True if data else False if _impossible(wanted) else None
+    return Reconstruction(data=data, starts=tried, succeeded=succeeded, exists=exists)
+
+
+def meets(rows: Rows, wanted: Constraints) -> bool:
+    """Do these rows meet every constraint? Exact."""
+    sums = tuple(map(sum, zip(*rows, strict=True)))
+    return (
+        len(rows) == wanted.n
+        and all(0 <= value <= wanted.top for row in rows for value in row)
+        and all(total in column.sums for total, column in zip(sums, wanted.columns, strict=True))
+        and all(map(_spread_fits, zip(*rows, strict=True), wanted.columns))
+        and (wanted.accepts is None or wanted.accepts(sums))
+        and (wanted.F is None or _f_fits(rows, sums, wanted.F))
+        and all(_order_fits(rows, order) for order in wanted.orders)
+    )
+
+
+def _spread_fits(values: Sums, column: Column) -> bool:
+    n, total = len(values), sum(values)
+    squares = sum(value * value for value in values)
+    return column.variance is None or column.variance.holds(Fraction(n * squares - total**2, n * (n - 1)))
+
+
+def _f_fits(rows: Rows, sums: Sums, F: Interval) -> bool:
+    w = sum(len(row) * sum(value * value for value in row) - sum(row) ** 2 for row in rows)
+    found = ratio(sums, w, len(rows))
+    return found is not None and F.holds(found)
+
+
+def _order_fits(rows: Rows, order: Order) -> bool:
+    above = sum(row[order.one] > row[order.other] for row in rows)
+    tied = sum(row[order.one] == row[order.other] for row in rows)
+    return order.above in {None, above} and order.tied in {None, tied}
+
+
+def _size(wanted: Constraints) -> int:
+    """How many data sets there are, the order of participants aside."""
+    return comb(wanted.n + (wanted.top + 1) ** len(wanted.columns) - 1, wanted.n)
+
+
+def _from_all(wanted: Constraints, count: int, random: Random) -> Reconstruction:
+    kinds = product(range(wanted.top + 1), repeat=len(wanted.columns))
+    every = [rows for rows in combinations_with_replacement(kinds, wanted.n) if meets(rows, wanted)]
+    picked = random.sample(every, min(count, len(every)))
+    data = tuple(tuple(random.sample(rows, len(rows))) for rows in picked)
+    return Reconstruction(data=data, starts=1, succeeded=int(bool(data)), exists=bool(every), space=len(every))
+
+
+def _impossible(wanted: Constraints) -> bool:
+    """Is it proved that no data have such sums and F? Where all sums can be listed, by all of their W."""
+    choices = prod(len(column.sums) for column in wanted.columns)
+    if choices > _LISTED:
+        return False
+    every = product(*(column.sums for column in wanted.columns))
+    return not any(_possible(wanted, sums) and _has_w(wanted, sums) for sums in every)
+
+
+def _has_w(wanted: Constraints, sums: Sums) -> bool:
+    """False only by proof: these sums have none of the W that F needs."""
+    if wanted.F is None or not affordable(wanted.n, len(sums), wanted.levels):
+        return True
+    exact = every_sum(wanted.n, len(sums), wanted.top).get(sums, 0)
+    return any(exact >> w & 1 for w in candidates(sums, wanted.n, wanted.F, wanted.levels))
+
+
+def _possible(wanted: Constraints, sums: Sums) -> bool:
+    """Will the sums do, and is there any W for them that gives F?"""
+    if wanted.accepts is not None and not wanted.accepts(sums):
+        return False
+    return wanted.F is None or bool(candidates(sums, wanted.n, wanted.F, wanted.levels))
+
+
+def _sums(wanted: Constraints, random: Random) -> Iterator[Sums]:
+    """Column sums that will do, each start its own; ends where none are met."""
+    choices = [list(column.sums) for column in wanted.columns]
+    if prod(map(len, choices)) <= _LISTED:
+        fitting = [sums for sums in product(*choices) if _possible(wanted, sums)]
+        while fitting:
+            yield random.choice(fitting)
+    while all(choices):
+        draws = (tuple(map(random.choice, choices)) for _ in range(_DRAWS))
+        fitting_one = next((sums for sums in draws if _possible(wanted, sums)), None)
+        if fitting_one is None:
+            return
+        yield fitting_one
+
+
+def _searched(wanted: Constraints, sums: Sums, random: Random) -> Rows | None:
+    """One start: columns that meet their own constraints, then moves that keep them until the joint ones are met."""
+    targets = None if wanted.F is None else candidates(sums, wanted.n, wanted.F, wanted.levels)
+    people = [random.gauss(0, wanted.person_sd) for _ in range(wanted.n)]
+    sd = _start_sd(wanted, sums, targets)
+    columns = []
+    for total, column in zip(sums, wanted.columns, strict=True):
+        if column.variance is None:
+            around = [total / wanted.n + person for person in people]
+            share = total / wanted.n / max(wanted.top, 1)
+            binomial = (wanted.top * share * (1 - share)) ** 0.5
+            columns.append(drawn(total, around, sd or binomial, wanted.top, random))
+            continue
+        values = with_squares(wanted.n, total, _squares(wanted, total, column.variance), wanted.top, random)
+        if values is None:
+            return None
+        columns.append(values)
+    table = Table(columns, wanted.top, [column.variance is not None for column in wanted.columns], wanted.orders)
+    steps = min(_STEPS, _STEPS_EACH * wanted.n**2 * len(sums))
+    return table.rows if table.anneal(targets, steps, random) else None
+
+
+def _start_sd(wanted: Constraints, sums: Sums, targets: range | None) -> float | None:
+    """The SD of the error that F implies: MS = (n W - A) / (n k (n - 1)(k - 1))."""
+    if not targets:
+        return None
+    n, k = wanted.n, len(sums)
+    a = k * sum(c * c for c in sums) - sum(sums) ** 2
+    return sqrt(max((n * targets[0] - a) / (n * k * (n - 1) * (k - 1)), 0.0))
+
+
+def _squares(wanted: Constraints, total: int, variance: Interval) -> range:
+    """The sums of squares that go with a sum and a variance, of the sum's parity."""
+    n = wanted.n
+    interval = variance.mapped(lambda value: value * (n - 1) + Fraction(total**2, n))
+    whole = interval.integers(least_squares(n, total), greatest_squares(n, total, 0, wanted.top))
+    return range(whole.start + (whole.start - total) % 2, whole.stop, 2)

@@ -1,0 +1,274 @@
+"""A printed F against the printed means, at the grain of the data: within participants, or between groups.
+
+Column sums and sums of squares of whole numbers are whole, so the possible F are a lattice. A printed F off it is
+proved impossible; one on it is believed only with data that give it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass
+from fractions import Fraction
+from random import Random
+
+from analysis.paper.audit import between_lattice as between
+from analysis.paper.audit import repeated_lattice as repeated
+from analysis.paper.audit.means import Scale, check_count, scale_of
+from analysis.paper.audit.printed import Interval, PrintedNumber, Rounding, decimal, read
+from analysis.paper.audit.repeated_lattice import Levels, column_choices
+from analysis.paper.audit.transformed import find_transformed
+from analysis.paper.audit.words import NONE_EXISTS, UNKNOWN, Attempt, Decision, Found, Result, Witness, decide
+
+Search = Callable[[Sequence[int], Interval], tuple[tuple[int, ...], ...] | bool | None]
+"""From column sums and the F allowed: data in grains, False if proved that there are none, None if not settled."""
+_SOURCE = "Winer 1971, chapter 4; lattice of whole sums as in Brown & Heathers 2017 and Anaya 2016"
+_GUESSES = 3_000
+
+
+@dataclass(frozen=True, slots=True)
+class _Claim:
+    """A printed F with the printed means of groups of `sizes` on a scale."""
+
+    F: PrintedNumber
+    means: tuple[PrintedNumber, ...] | None
+    sizes: tuple[int, ...]
+    scale: Scale
+
+    @property
+    def levels(self) -> Levels:
+        return Levels(self.scale.high if self.scale.low is not None else None)
+
+    @property
+    def n(self) -> int:
+        return self.sizes[0]
+
+    def sums(self, rounding: Rounding) -> list[range]:
+        """The column sums, in grains, that print as the means."""
+        pairs = zip(self.means or (), self.sizes, strict=True)
+        return [self.scale.sums(mean.interval(rounding), n) for mean, n in pairs]
+
+
+def repeated_f(
+    F: str,
+    n: int,
+    k: int,
+    means: Sequence[str] | None = None,
+    *,
+    grain: str = "1",
+    low: str | None = None,
+    high: str | None = None,
+    transforms: Sequence[str] = (),
+    other_grains: Sequence[str] = (),
+) -> Result:
+    """Can n participants in k conditions, scores in steps of `grain`, have these means and this repeated-measures F?
+
+    Exact: F = (n - 1) A / (n W - A) with A = k sum C^2 - T^2 of the column sums C, and W the sum of squared differences
+    between conditions within participants, both whole in grains squared, W of known parity. Without means every set of
+    column sums is allowed. Readings: another error term (between), `transforms` of the scores as shares of the scale,
+    scores in `other_grains` with any means. `ValueError`: text that is no number, n or k below 2, a wrong scale.
+    Source: Winer 1971, chapter 4; the lattice by the identity in `repeated_lattice`.
+
+    >>> repeated_f("28.45", 14, 3, ["55.7%", "79.3%", "92.9%"], grain="0.1", low="0", high="1").verdict
+    'not attainable'
+    """
+    check_count(n - 1, "n - 1")
+    claim = _claimed(F, means, (n,) * k, scale_of(grain, low, high))
+    others: list[tuple[str, Attempt]] = [("error term of a between-subjects design", _attempt(claim, _between(claim)))]
+    others += [(f"{name} transform", _attempt(claim, _transformed(claim, name))) for name in transforms]
+    for step in other_grains:
+        free = _claimed(F, None, (n,) * k, scale_of(step, low, high))
+        others.append((f"scores in steps of {step} with other means", _attempt(free, _repeated(free))))
+    decision = decide(_attempt(claim, _repeated(claim)), others)
+    return _result("repeated-measures F", claim, decision, _neighbours(claim, _w_steps))
+
+
+def between_f(
+    F: str,
+    sizes: Sequence[int],
+    means: Sequence[str] | None = None,
+    *,
+    grain: str = "1",
+    low: str | None = None,
+    high: str | None = None,
+) -> Result:
+    """Can groups of these sizes, scores in steps of `grain`, have these means and this between-subjects F?
+
+    Exact: F = ((B - T^2 / N) / (k - 1)) / ((S - B) / (N - k)), B = sum C^2 / n of the groups' sums C, and S, the sum of
+    all squares, whole in grains squared and odd with T. Reading: a repeated-measures error term, in equal groups.
+    `ValueError`: text that is no number, fewer than two groups, no group of two, a wrong scale.
+    Source: Fisher 1925, Statistical Methods for Research Workers.
+
+    >>> between_f("21.00", [3, 3, 3], ["2.00", "3.00", "7.00"]).verdict
+    'attainable'
+    """
+    claim = _claimed(F, means, tuple(sizes), scale_of(grain, low, high))
+    equal = len(set(sizes)) == 1 and claim.n > 1
+    others = [("error term of a repeated-measures design", _attempt(claim, _repeated(claim)))] if equal else []
+    decision = decide(_attempt(claim, _between(claim)), others)
+    return _result("between-subjects F", claim, decision, _neighbours(claim, _s_steps))
+
+
+def _claimed(F: str, means: Sequence[str] | None, sizes: tuple[int, ...], scale: Scale) -> _Claim:
+    check_count(len(sizes) - 1, "number of groups less 1")
+    for size in sizes:
+        check_count(size, "each group")
+    check_count(max(sizes) - 1, "size of the largest group less 1")
+    if (scale.low is None) != (scale.high is None):
+        raise ValueError("a scale needs both ends or none")
+    if means is not None and len(means) != len(sizes):
+        raise ValueError(f"{len(sizes)} means are needed, not {len(means)}")
+    printed = read(F)
+    if printed.relation != "=":
+        raise ValueError(f"F must be a number, not the bound {printed.text}")
+    return _Claim(printed, None if means is None else tuple(map(read, means)), sizes, scale)
+
+
+def _repeated(claim: _Claim) -> Search:
+    def search(columns: Sequence[int], F: Interval) -> tuple[tuple[int, ...], ...] | bool | None:
+        targets = repeated.candidates(columns, claim.n, F, claim.levels)
+        return repeated.find(columns, claim.n, targets, claim.levels)
+
+    return search
+
+
+def _between(claim: _Claim) -> Search:
+    def search(columns: Sequence[int], F: Interval) -> tuple[tuple[int, ...], ...] | bool | None:
+        targets = between.between_candidates(columns, claim.sizes, F, claim.levels.top)
+        return between.find_groups(columns, claim.sizes, targets, claim.levels.top)
+
+    return search
+
+
+def _transformed(claim: _Claim, name: str) -> Search:
+    top = claim.levels.top
+    if top is None or claim.means is None:
+        raise ValueError(f"the {name} transform needs a scale with both ends, and means")
+    return lambda columns, F: find_transformed(name, columns, claim.n, top, F)
+
+
+def _attempt(claim: _Claim, search: Search) -> Attempt:
+    def attempt(rounding: Rounding) -> Found:
+        F = claim.F.interval(rounding)
+        if F.high is not None and F.high < 0:
+            return NONE_EXISTS
+        columns, complete = _columns(claim, rounding)
+        for sums in columns:
+            found = search(sums, F)
+            if found is None:
+                complete = False
+            elif found is not False and found is not True:
+                return Found(True, _in_data_units(found, claim.scale))
+        return NONE_EXISTS if complete else UNKNOWN
+
+    return attempt
+
+
+def _in_data_units(rows: tuple[tuple[int, ...], ...], scale: Scale) -> Witness:
+    return tuple(tuple(scale.value(value) for value in row) for row in rows)
+
+
+def _columns(claim: _Claim, rounding: Rounding) -> tuple[Iterator[tuple[int, ...]], bool]:
+    """Column sums to try, and whether they are all there are."""
+    if claim.means is not None:
+        ranges = claim.sums(rounding)
+        every = column_choices(ranges)
+        return (every, True) if every is not None else (_guessed(ranges), False)
+    top = claim.levels.top
+    ranges = [range(n * (top if top is not None else 100) + 1) for n in claim.sizes]
+    every = column_choices(ranges, 20_000) if top is not None else None
+    return (every, True) if every is not None else (map(tuple, map(sorted, _guessed(ranges))), False)
+
+
+def _guessed(ranges: Sequence[range]) -> Iterator[tuple[int, ...]]:
+    random = Random(1)  # noqa: S311 a search, no secret
+    if not all(ranges):
+        return iter(())
+    return (tuple(random.choice(sums) for sums in ranges) for _ in range(_GUESSES))
+
+
+Steps = Callable[[_Claim, tuple[int, ...]], Iterator[tuple[Fraction, int]]]
+"""From column sums: the F of the lattice next to the printed one with the side (-1 below, 1 above), if proved."""
+
+
+def _neighbours(claim: _Claim, steps: Steps) -> tuple[Fraction | None, Fraction | None]:
+    """The nearest F below and above the printed one that data give, for the column sums that print the means."""
+    if claim.means is None:
+        return None, None
+    choices = column_choices(claim.sums(Rounding.ANY), 12)
+    found = [pair for sums in choices or () for pair in steps(claim, sums)]
+    below = max((F for F, side in found if side < 0), default=None)
+    return below, min((F for F, side in found if side > 0), default=None)
+
+
+def _w_steps(claim: _Claim, sums: tuple[int, ...]) -> Iterator[tuple[Fraction, int]]:
+    value = claim.F.value
+    edge = repeated.needed(sums, claim.n, Interval(value, value)).low
+    if value <= 0 or edge is None:
+        return
+    start = int(edge) + (int(edge) - (sum(sums) if len(sums) % 2 == 0 else 0)) % 2
+    for side in (1, -1):
+        places = (start - 2 * i if side > 0 else start + 2 * i for i in range(6))
+        for w in places:
+            F = repeated.ratio(sums, w, claim.n)
+            on_side = F is not None and (F - value) * side >= 0
+            if F is not None and on_side and repeated.find(sums, claim.n, range(w, w + 1), claim.levels):
+                yield F, side
+                break
+
+
+def _s_steps(claim: _Claim, sums: tuple[int, ...]) -> Iterator[tuple[Fraction, int]]:
+    value = claim.F.value
+    if value <= 0:
+        return
+    b, explained = between.between_terms(sums, claim.sizes)
+    edge = int(b + explained * (sum(claim.sizes) - len(sums)) / ((len(sums) - 1) * value))
+    start = edge + (edge - sum(sums)) % 2
+    for side in (1, -1):
+        places = (start - 2 * i if side > 0 else start + 2 * i for i in range(6))
+        for s in places:
+            F = between.between_ratio(sums, s, claim.sizes)
+            on_side = F is not None and (F - value) * side >= 0
+            targets = range(s, s + 1)
+            if F is not None and on_side and between.find_groups(sums, claim.sizes, targets, claim.levels.top):
+                yield F, side
+                break
+
+
+def _result(check: str, claim: _Claim, decision: Decision, sides: tuple[Fraction | None, Fraction | None]) -> Result:
+    means = "unprinted means" if claim.means is None else f"means {', '.join(m.text for m in claim.means)}"
+    return Result(
+        check=check,
+        printed=f"F = {claim.F.text}",
+        verdict=decision.verdict,
+        reason=f"scores in steps of {decimal(claim.scale.grain)} with {means}: the error's sum of squares comes in "
+        f"steps{_next_to(sides)}",
+        source=_SOURCE,
+        step=2 * claim.scale.grain**2 / (len(claim.sizes) if check.startswith("repeated") else 1),
+        below=sides[0],
+        above=sides[1],
+        readings=decision.readings,
+        tried=decision.tried,
+        contradicts=() if decision.verdict in {"attainable", "undecided"} else (means, f"sizes {claim.sizes}"),
+        numbers=_numbers(claim, check),
+        witness=decision.witness,
+    )
+
+
+def _next_to(sides: tuple[Fraction | None, Fraction | None]) -> str:
+    shown = [decimal(F, 4) for F in sides if F is not None]
+    return f"; the nearest F with data that give it: {' and '.join(shown)}" if shown else ""
+
+
+def _numbers(claim: _Claim, check: str) -> tuple[tuple[str, str], ...]:
+    """The sums of the columns and the sum of squares that F would need, for one set of column sums."""
+    if claim.means is None or claim.F.value <= 0:
+        return ()
+    ranges = claim.sums(Rounding.ANY)
+    if any(len(sums) != 1 for sums in ranges):
+        return (("column sums in grains", "; ".join(f"{s.start} to {s.stop - 1}" for s in ranges)),)
+    columns = [sums[0] for sums in ranges]
+    interval = claim.F.interval(Rounding.ANY)
+    shown = [("column sums in grains", ", ".join(map(str, columns)))]
+    if check.startswith("repeated"):
+        shown += [("A", str(repeated.effect(columns))), ("W needed", str(repeated.needed(columns, claim.n, interval)))]
+    return tuple(shown)

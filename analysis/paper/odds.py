@@ -1,0 +1,127 @@
+"""How often published claims recur over many replications: one replication is luck."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+from functools import lru_cache
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+from scipy import special
+
+from analysis.stats.anova import check_scores, rm_anova
+from analysis.stats.binomial import binomial_test
+from analysis.stats.studentized_range import studentized_range_isf
+from analysis.stats.tukey import PairStatistics, pairs_of, pooled_pairs
+from analysis.paper.paper import PublishedDirection, PublishedExperiment, TukeyClaim
+
+WHOLE_PATTERN = "whole pattern"
+SIGNIFICANT = 0.05
+
+Recurrence = NDArray[np.bool_]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class OddsRow:
+    """The share of replications in which a claim held, with its 95 % Wilson interval."""
+
+    claim: str
+    share: float
+    ci_low: float
+    ci_high: float
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Odds:
+    """Replicability of an experiment's claims under `assumptions`, a sentence that says what was simulated."""
+
+    experiment: str
+    replications: int
+    rows: tuple[OddsRow, ...]
+    assumptions: str
+
+
+def recurs(scores: ArrayLike, published: PublishedExperiment) -> dict[str, Recurrence]:
+    """Which published claims hold in which replication.
+
+    `scores`: (..., n participants, k methods), methods in the order of `published.methods`. One array (...) a claim:
+    the ANOVA's p below its bound; each Tukey comparison significant at its bound (by the critical q, pooled
+    repeated-measures error) and in the published direction. Where nothing varies (0/0) a claim does not hold.
+    `ValueError`: as in `rm_anova`, or if k is not the number of methods.
+    """
+    checked = check_scores(scores)
+    if checked.shape[-1] != len(published.methods):
+        raise ValueError(f"scores must have {len(published.methods)} methods, not {checked.shape[-1]}")
+    bound = published.anova.p_below
+    claims = {f"ANOVA p < {bound}": np.asarray(np.asarray(rm_anova(checked).p) < float(bound))}
+    pairs = pooled_pairs(checked)
+    for claim in published.tukey:
+        name = f"{claim.higher} above {claim.lower}, p < {claim.p_below}"
+        claims[name] = _holds(pairs, claim, published.methods)
+    return claims
+
+
+def chance_recurs(correct: ArrayLike, trials: int, published: PublishedDirection) -> dict[str, Recurrence]:
+    """In which replication the exact binomial test comes out as published: rejecting one half, or not, at 5 %.
+
+    `correct`: (..., k methods, 2 directions), counts of correct answers pooled over participants, of `trials` each;
+    methods in the order of `published.methods`, forward before backward.
+    """
+    counts = np.asarray(correct)
+    claims = {}
+    for claim in published.binomial:
+        method, direction = published.methods.index(claim.method), ("forward", "backward").index(claim.direction)
+        rejected = np.asarray(binomial_test(counts[..., method, direction], trials).p) < SIGNIFICANT
+        expected = float(claim.p) < SIGNIFICANT
+        outcome = "p < .05" if expected else "p not below .05"
+        claims[f"binomial, {claim.method} {claim.direction}, {outcome}"] = np.asarray(rejected == expected)
+    return claims
+
+
+def odds_of(experiment: str, recurrences: Mapping[str, ArrayLike], assumptions: str) -> Odds:
+    """The share of replications in which each claim recurred, and all of them together under `whole pattern`.
+
+    `ValueError` without any replication.
+    """
+    flags = {claim: np.asarray(held, dtype=np.bool_).ravel() for claim, held in recurrences.items()}
+    sizes = {held.size for held in flags.values()}
+    if len(sizes) != 1 or 0 in sizes:
+        raise ValueError(f"{experiment}: every claim needs the same number of replications, not {sorted(sizes)}")
+    flags[WHOLE_PATTERN] = np.logical_and.reduce(list(flags.values()))
+    rows = [_row(claim, int(held.sum()), held.size) for claim, held in flags.items()]
+    return Odds(experiment=experiment, replications=sizes.pop(), rows=tuple(rows), assumptions=assumptions)
+
+
+def wilson_interval(successes: int, trials: int, confidence: float = 0.95) -> tuple[float, float]:
+    """Wilson's score interval of a proportion. Source: Wilson 1927, JASA 22, 209.
+
+    >>> [round(x, 4) for x in wilson_interval(2, 10)]
+    [0.0567, 0.5098]
+    """
+    z = float(special.ndtri(0.5 + confidence / 2.0))
+    share = successes / trials
+    centre = share + z * z / (2.0 * trials)
+    half = z * math.sqrt(share * (1.0 - share) / trials + z * z / (4.0 * trials * trials))
+    scale = 1.0 + z * z / trials
+    low = 0.0 if successes == 0 else (centre - half) / scale
+    return low, 1.0 if successes == trials else (centre + half) / scale
+
+
+def _row(claim: str, held: int, replications: int) -> OddsRow:
+    low, high = wilson_interval(held, replications)
+    return OddsRow(claim=claim, share=held / replications, ci_low=low, ci_high=high)
+
+
+def _holds(pairs: PairStatistics, claim: TukeyClaim, methods: list[str]) -> Recurrence:
+    higher, lower = methods.index(claim.higher), methods.index(claim.lower)
+    i = pairs_of(pairs.k).index((max(higher, lower), min(higher, lower)))
+    difference = pairs.difference[..., i] if higher > lower else -pairs.difference[..., i]
+    above: Recurrence = (difference > 0.0) & (pairs.q[..., i] > _critical(float(claim.p_below), pairs.k, pairs.df))
+    return above
+
+
+@lru_cache(maxsize=64)
+def _critical(p: float, k: int, df: int) -> float:
+    return float(studentized_range_isf(p, k, df))

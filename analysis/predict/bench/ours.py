@@ -1,0 +1,130 @@
+"""Our own ways to a shot, as `bench physics` times them: from Python one at a time, and in batches."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass, fields
+from typing import Any
+
+import numpy as np
+
+from device.parameters import DriveOff, GunParameters
+from device.physics import FIDELITIES, ShotSummary, simulate, simulate_batch, warm
+from device.physics.layout import pack
+from device.physics.results import summary_of
+from device.physics.single import interpret, model_of
+from device.physics.tiers import FRICTION_N, NEAR, OUTPUTS
+from analysis.predict.bench.peers.problem import Outputs, Peer, guns
+from analysis.predict.jobs import cores
+
+SINGLE, INTERPRETED, BATCH = "Recoil, one at a time", "Recoil, interpreted", "Recoil, batch"
+_FIXED = ("friction_N", "return_friction_N", "pulse_s", "contact_depth_m", "drive_off", "emf")
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Ready:
+    """A prepared way to the shots. `run` does `shots` of them; `found` gives the outputs of the paper's two."""
+
+    run: Callable[[], object]
+    shots: float
+    found: Callable[[], Sequence[Outputs]]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Contender:
+    """One way at one setting: a row of the table. `package` must be there for it."""
+
+    family: str
+    setting: str
+    package: str
+    models: str
+    prepare: Callable[[DriveOff], Ready]
+    is_peer: bool = False
+
+
+def one_at_a_time(drive_off: DriveOff) -> Ready:
+    """`simulate` on ready parameters, as a program calls it: compiled where the compiler is."""
+    warm()
+    asked = guns(drive_off)
+
+    def run() -> None:
+        for gun in asked:
+            simulate(gun)
+
+    return Ready(run=run, shots=len(asked), found=lambda: [_outputs(simulate(gun)) for gun in asked])
+
+
+def contenders(batch: int, seed: int) -> Iterator[Contender]:
+    """Ours. A batch holds so many random guns near the paper's; its time is that of a shot and core."""
+    yield Contender(family=SINGLE, setting="full, compiled", package="numba", models="all", prepare=one_at_a_time)
+    for fidelity in FIDELITIES:
+        yield Contender(
+            family=INTERPRETED,
+            setting=fidelity,
+            package="recoil",
+            models="all" if fidelity == "full" else "reduced",
+            prepare=lambda drive_off, fidelity=fidelity: _interpreted(drive_off, fidelity),  # type: ignore[misc]
+        )
+    for fidelity, used in [*((fidelity, 1) for fidelity in FIDELITIES), ("full", cores())]:
+        yield Contender(
+            family=BATCH,
+            setting=f"{fidelity}, {used} core{'s' if used > 1 else ''}",
+            package="numba",
+            models="all" if fidelity == "full" else "reduced",
+            prepare=lambda drive_off, fidelity=fidelity, used=used: _batch(drive_off, fidelity, used, batch, seed),  # type: ignore[misc]
+        )
+
+
+def contender_of(peer: Peer) -> Contender:
+    """A peer as a row."""
+
+    def prepare(drive_off: DriveOff) -> Ready:
+        shoot, asked = peer.build(drive_off), guns(drive_off)
+
+        def run() -> list[Outputs]:
+            return [shoot(gun) for gun in asked]
+
+        return Ready(run=run, shots=len(asked), found=run)
+
+    return Contender(
+        family=peer.family,
+        setting=peer.setting,
+        package=peer.package,
+        models=peer.models,
+        prepare=prepare,
+        is_peer=True,
+    )
+
+
+def _interpreted(drive_off: DriveOff, fidelity: str) -> Ready:
+    rows = [pack(gun, model_of(fidelity)) for gun in guns(drive_off)]
+
+    def run() -> list[ShotSummary]:
+        return [summary_of(interpret(row)) for row in rows]
+
+    return Ready(run=run, shots=len(rows), found=lambda: [_outputs(shot) for shot in run()])
+
+
+def _batch(drive_off: DriveOff, fidelity: str, used: int, count: int, seed: int) -> Ready:
+    gun = GunParameters(drive_off=drive_off)
+    arrays = near_guns(np.random.default_rng(seed), count)
+
+    def found() -> list[Outputs]:
+        few = simulate_batch(gun, fidelity=fidelity, friction_N=[one.friction_N for one in guns(drive_off)])
+        return list(zip(*(getattr(few, name).tolist() for name in OUTPUTS), strict=True))
+
+    return Ready(
+        run=lambda: simulate_batch(gun, fidelity=fidelity, cores=used, **arrays), shots=count / used, found=found
+    )
+
+
+def near_guns(rng: np.random.Generator, count: int) -> dict[str, Any]:
+    """Random guns within the bounds for which the reduced models state their errors."""
+    plain = GunParameters()
+    varied = [field.name for field in fields(GunParameters) if field.name not in _FIXED]
+    numbers = {name: getattr(plain, name) * rng.uniform(1.0 - NEAR, 1.0 + NEAR, count) for name in varied}
+    return numbers | {"friction_N": rng.uniform(*FRICTION_N, count)}
+
+
+def _outputs(shot: ShotSummary) -> Outputs:
+    return tuple(getattr(shot, name) for name in OUTPUTS)

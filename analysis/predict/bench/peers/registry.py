@@ -1,0 +1,16 @@
+"""All peers. A package enters when its peer is prepared, and only if it is installed."""
+
+from __future__ import annotations
+
+from analysis.predict.bench.peers import by_diffrax
+from analysis.predict.bench.peers import by_game_loop
+from analysis.predict.bench.peers import by_heyoka
+from analysis.predict.bench.peers import by_mujoco
+from analysis.predict.bench.peers import by_scipy
+from analysis.predict.bench.peers.problem import Peer
+
+
+def peers() -> list[Peer]:
+    """Every peer at every setting."""
+    modules = (by_scipy, by_game_loop, by_heyoka, by_diffrax, by_mujoco)
+    return [peer for module in modules for peer in module.peers()]

@@ -1,0 +1,168 @@
+"""The critical conditions of a directional percept: the voltage at which 75 % are right, over the damper's friction.
+
+At each friction it is the lowest voltage of the sweep from which on the next one of the grid is felt well enough; -inf
+if the first that brings the magnet home is, inf if none is, NaN if no voltage brings it home.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, replace
+
+import numpy as np
+from scipy import special
+from scipy.optimize import brentq
+
+from device.parameters import GunParameters
+from device.physics import simulate
+from experiments.synthetic.percept import PerceptParameters
+from analysis.predict.fit.percept_model import FITTED, PerceptFit
+from analysis.predict.design_search.rates import Floats, evidences, logits, rates
+from analysis.predict.design_search.shots import Layer, shot_of
+from analysis.predict.design_search.space import Space
+from experiments.design.streams import generator
+
+LEVEL = 0.75
+"""Halfway between guessing and certainty: the usual threshold of a choice between two."""
+DRAWS = 2000
+INSIDE = 0.95
+_CLOSE_V = 1e-3
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Band:
+    """Between which voltages 95 % of the drawn contours lie over their whole length, and at each friction alone."""
+
+    low_V: Floats
+    high_V: Floats
+    alone_low_V: Floats
+    alone_high_V: Floats
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Contour:
+    """The contour, voltages over the frictions; `lasting`: every higher voltage of the sweep is felt as well."""
+
+    voltage_V: Floats
+    interpolated_V: Floats  # from the grid alone, as the band and the alternatives have it
+    lasting: tuple[bool, ...]
+    band: Band
+
+
+def contour_of(space: Space, layer: Layer, fit: PerceptFit, seed: int) -> Contour:
+    """The contour of a layer, solved with shots of its own, and its band by draws from the fit."""
+    felt = layer.felt[fit.parameters.leak_s]
+    volts, gun = np.array(space.voltage_V), replace(space.gun, pulse_s=layer.pulse_s)
+    rough = crossings(rates(felt, fit.parameters), volts)
+    exact = [
+        _solved(replace(gun, friction_N=f), volts, float(v), fit.parameters)
+        for f, v in zip(space.friction_N, rough, strict=True)
+    ]
+    return Contour(
+        voltage_V=np.array(exact),
+        interpolated_V=rough,
+        lasting=tuple(_lasts(row) for row in rates(felt, fit.parameters)),
+        band=band_of(drawn_contours(felt, volts, fit, seed)),
+    )
+
+
+def crossings(found: Floats, volts: Floats) -> Floats:
+    """Where each row (frictions, voltages) of rates first reaches the level, linear between two voltages."""
+    return np.array([_crossing(row, volts) for row in found])
+
+
+def _crossing(row: Floats, volts: Floats) -> float:
+    some = np.flatnonzero(np.isfinite(row))
+    reached = np.flatnonzero(np.isfinite(row) & (row >= LEVEL))
+    if not some.size:
+        return math.nan
+    if not reached.size:
+        return math.inf
+    at = int(reached[0])
+    if at == some[0]:
+        return -math.inf
+    before = some[some < at][-1]
+    share = (LEVEL - row[before]) / (row[at] - row[before])
+    return float(volts[before] + share * (volts[at] - volts[before]))
+
+
+def _lasts(row: Floats) -> bool:
+    reached = np.flatnonzero(row >= LEVEL)
+    return bool(reached.size) and bool(np.all(row[reached[0] :][np.isfinite(row[reached[0] :])] >= LEVEL))
+
+
+def rate_at(gun: GunParameters, parameters: PerceptParameters) -> float:
+    """The predicted rate of one gun, simulated alone; NaN if its magnet does not come home."""
+    shot = shot_of(gun, simulate(gun), (parameters.leak_s,))
+    numbers = [(one.first, one.reaction, one.second) for one in shot.felt]
+    return float(rates(np.array(numbers), parameters)[0]) if numbers else math.nan
+
+
+def _solved(gun: GunParameters, volts: Floats, rough_V: float, parameters: PerceptParameters) -> float:
+    """The crossing to a millivolt by shots of its own, within the two voltages of the grid around it."""
+    if not math.isfinite(rough_V):
+        return rough_V
+    place = int(np.searchsorted(volts, rough_V))
+    low, high = float(volts[max(place - 1, 0)]), float(volts[place])
+
+    def above(voltage_V: float) -> float:
+        return rate_at(replace(gun, voltage_V=voltage_V), parameters) - LEVEL
+
+    ends = above(low), above(high)
+    if not ends[0] * ends[1] < 0.0:
+        return rough_V
+    return float(brentq(above, low, high, xtol=_CLOSE_V))
+
+
+def drawn_contours(felt: Floats, volts: Floats, fit: PerceptFit, seed: int, draws: int = DRAWS) -> Floats:
+    """Contours (draws, frictions) of numbers drawn from the fit: normal, on logarithms and for the start on its logit.
+
+    Only the fitted numbers vary: the assumed ones and the model are held.
+    """
+    best = fit.parameters
+    centre = [getattr(best, name) for name in FITTED]
+    normal = generator(seed, "design", "contours").standard_normal((draws, len(FITTED)))
+    moved = normal @ _root(np.array(fit.covariance)).T
+    sensitivity, confusion = centre[0] * np.exp(moved[:, 0]), centre[1] * np.exp(moved[:, 1])
+    start = special.expit(special.logit(centre[2]) + moved[:, 2] / (1.0 - centre[2]))
+    found = np.empty((draws, len(felt)))
+    for n in range(draws):
+        evidence = evidences(felt, best.exponent, sensitivity[n], confusion[n])
+        found[n] = crossings(np.asarray(special.expit(logits(evidence, start[n]))), volts)
+    return found
+
+
+def _root(covariance: Floats) -> Floats:
+    """A square root of a covariance, which may be singular or 0; NaN if the fit has none."""
+    if not np.isfinite(covariance).all():
+        return np.full_like(covariance, math.nan)
+    values, vectors = np.linalg.eigh(covariance)
+    return np.asarray(vectors * np.sqrt(np.maximum(values, 0.0)))
+
+
+def band_of(contours: Floats, inside: float = INSIDE) -> Band:
+    """The global rank envelope of drawn contours (draws, frictions), and quantiles of each friction alone.
+
+    A contour's depth is its most extreme rank over the frictions; the envelope is between the k-th lowest and k-th
+    highest voltage of each friction, k the largest for which at least the share `inside` is as deep (Myllymaki et al.
+    2017, J R Stat Soc B 79, 381).
+    """
+    known = np.isfinite(contours).any(axis=0) | np.isinf(contours).all(axis=0)
+    low, high, alone_low, alone_high = (np.full(contours.shape[1], math.nan) for _ in range(4))
+    if known.any():
+        ordered = np.sort(contours[:, known], axis=0)
+        k = _depth(contours[:, known], inside)
+        tail = round((1.0 - inside) / 2.0 * len(contours))
+        low[known], high[known] = ordered[k - 1], ordered[-k]
+        alone_low[known], alone_high[known] = ordered[tail], ordered[-1 - tail]
+    return Band(low_V=low, high_V=high, alone_low_V=alone_low, alone_high_V=alone_high)
+
+
+def _depth(contours: Floats, inside: float) -> int:
+    """The largest depth that the share `inside` of the contours has; equals count as the deepest of them."""
+    ordered = np.sort(contours, axis=0)
+    depths = np.full(len(contours), len(contours))
+    for column, row in zip(ordered.T, contours.T, strict=True):
+        below, not_above = np.searchsorted(column, row, side="right"), np.searchsorted(column, row, side="left")
+        depths = np.minimum(depths, np.minimum(below, len(row) - not_above))
+    return int(np.sort(depths)[math.floor((1.0 - inside) * len(depths))])

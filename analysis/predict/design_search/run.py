@@ -1,0 +1,153 @@
+"""`recoil design`: which damper, voltage and pulse would be felt best, and where a direction begins to be felt."""
+
+from __future__ import annotations
+
+import csv
+import io
+import json
+import math
+from collections.abc import Sequence
+from dataclasses import asdict, dataclass, replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from analysis.report.page import write_page
+from device.methods import Method, paper_methods
+from device.parameters import GunParameters
+from device.physics.layout import STATUSES
+from experiments.record import storage
+from analysis.predict.fit.percept_model import PAPER_RATES, PerceptFit, fit_percept
+from experiments.record.provenance import provenance
+from analysis.report.terminal import Progress
+from analysis.predict.design_search.assumed import Alternative, alternatives
+from analysis.predict.design_search.choice import Designs, front, summary_error
+from analysis.predict.design_search.critical import Contour, contour_of
+from analysis.predict.design_search.facts import (
+    assumptions,
+    best_facts,
+    counted,
+    critical_facts,
+    design_facts,
+    fit_facts,
+    own_facts,
+    plane_facts,
+)
+from analysis.predict.design_search.limits import LIMITS
+from analysis.predict.design_search.page import sections
+from analysis.predict.design_search.search import Search, search
+from analysis.predict.design_search.space import Request, Space, make_space
+from analysis.predict.design_search.words import as_text
+from analysis.predict.jobs import cores, on_processes
+
+__all__ = ["Request", "as_text", "design"]
+
+Facts = dict[str, Any]
+
+COLUMNS = (
+    *("friction_N", "voltage_V", "pulse_s", "status", "limit", "shooting_rate_Hz"),
+    *("evidence", "predicted", "ci_low", "ci_high", "predicted_by_summary"),
+)
+"""Of `designs.csv`; an empty cell means that there is no prediction, or that no limit is broken."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class _Found:
+    """What was worked out, before it becomes plain values."""
+
+    space: Space
+    fit: PerceptFit
+    search: Search
+    contour: Contour
+    others: tuple[Alternative, ...]
+
+
+def design(request: Request, workers: int | None, out: Path, progress: Progress) -> Facts:
+    """Sweep, choose, write `design.json`, `designs.csv`, report and figures into `out`; give the JSON's content back.
+
+    The same request gives the same bytes however many workers there are. `ConfigError`: a request that cannot be met.
+    """
+    space = make_space(request)
+    storage.make_folder(out)
+    methods = readings(space.gun)
+    fit = fit_percept(PAPER_RATES, methods)
+    found = search(space, fit, request.rate_above_Hz, lambda: on_processes(workers or cores()), progress)
+    own = found.layers[space.gun.pulse_s]
+    with progress("report", 3) as tell:
+        contour = contour_of(space, own, fit, request.seed)
+        tell("contour")
+        others = tuple(alternatives(methods, own, space.voltage_V))
+        tell("assumptions")
+        facts = _facts(request, _Found(space=space, fit=fit, search=found, contour=contour, others=others))
+        _write(out, facts, found.designs)
+        tell("written")
+    return facts
+
+
+def readings(gun: GunParameters) -> dict[str, Method]:
+    """The paper's methods under this gun's reading of what the paper leaves open: the coil after the pulse, the EMF."""
+    return paper_methods(replace(GunParameters(), drive_off=gun.drive_off, emf=gun.emf))
+
+
+def _facts(request: Request, found: _Found) -> Facts:
+    """The content of `design.json`."""
+    space, fit, rate_Hz = found.space, found.fit, request.rate_above_Hz
+    designs, chosen = found.search.designs, found.search.chosen
+    map_pulse_s = space.pulse_s[-1] if chosen is None else float(designs.pulse_s[chosen])
+    facts: Facts = {
+        "title": space.title,
+        "gun": space.source.name,
+        "parameters": asdict(space.gun),
+        "seed": request.seed,
+        "rate_above_Hz": rate_Hz,
+        "axes": {"friction_N": space.friction_N, "voltage_V": space.voltage_V, "pulse_s": space.pulse_s},
+        "designs": counted(designs, rate_Hz),
+        "best": None if chosen is None else best_facts(space, designs, chosen, rate_Hz, found.others),
+        "own": [own_facts(space, label, fit, rate_Hz) for label in space.own],
+        "front": [design_facts(designs, place, space.gun, rate_Hz) for place in front(designs)],
+        "map": plane_facts(space, found.search.layers[map_pulse_s], fit, rate_Hz),
+        "critical": critical_facts(space, found.search.layers[space.gun.pulse_s], fit, found.contour, found.others),
+        "percept": fit_facts(fit, summary_error(designs)),
+        "assumptions": assumptions(space, rate_Hz),
+        "provenance": provenance(),
+    }
+    made: Facts = plain(facts)
+    return made
+
+
+def plain(value: Any) -> Any:
+    """The value for JSON: arrays as lists, what is not finite as None."""
+    if isinstance(value, dict):
+        return {key: plain(one) for key, one in value.items()}
+    if isinstance(value, list | tuple):
+        return [plain(one) for one in value]
+    if isinstance(value, np.ndarray | np.generic):
+        return plain(value.tolist())
+    return None if isinstance(value, float) and not math.isfinite(value) else value
+
+
+def _write(out: Path, facts: Facts, designs: Designs) -> None:
+    data = json.dumps(facts, indent=1, ensure_ascii=False, allow_nan=False) + "\n"
+    storage.write_whole(out / "design.json", data.encode())
+    storage.write_whole(out / "designs.csv", _table(designs).encode())
+    write_page(out, f"Design search: {facts['title']}", sections(facts, designs, out / "figures"))
+
+
+def _table(designs: Designs) -> str:
+    text = io.StringIO(newline="")
+    writer = csv.writer(text, lineterminator="\r\n")
+    writer.writerow(COLUMNS)
+    writer.writerows(_cells(designs, place) for place in range(len(designs)))
+    return text.getvalue()
+
+
+def _cells(designs: Designs, place: int) -> Sequence[object]:
+    numbers = (designs.shooting_rate_Hz, designs.evidence, designs.predicted, designs.ci_low, designs.ci_high)
+    limit = int(designs.limit[place])
+    return (
+        *(float(axis[place]) for axis in (designs.friction_N, designs.voltage_V, designs.pulse_s)),
+        STATUSES[int(designs.status[place])],
+        LIMITS[limit] if limit >= 0 else "",
+        *("" if np.isnan(array[place]) else float(array[place]) for array in (*numbers, designs.by_summary)),
+    )

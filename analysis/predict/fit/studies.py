@@ -1,0 +1,259 @@
+"""Simulated studies of the fitted percept, and where the published numbers that were not fitted lie among them.
+
+The fit knows the mean forward rates alone. What the same people would give for F, for Tukey's pattern and for backward
+shots is the model's own, so those are what it can fail by.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from analysis.stats.anova import rm_anova
+from analysis.stats.binomial import binomial_test
+from analysis.paper.odds import WHOLE_PATTERN, Recurrence, wilson_interval
+from analysis.paper.paper import PublishedDirection
+from analysis.paper.published import rounds_to
+from device.methods import Method
+from device.words import DIRECTIONS
+from experiments.synthetic.diffusion import People
+from experiments.synthetic.percept import Percept, PerceptParameters, evidence, percepts_of
+from analysis.predict.fit.percept_model import FITTED, PerceptPeak, best_percept
+from analysis.predict.fit.request import ASSUMED_SPREAD, scaled
+from analysis.predict.power.felt import Counts, Felt, Floats, correct_shares
+from analysis.predict.power.grid import PEOPLE_A_CHUNK
+from analysis.predict.power.studies import published_directions
+from experiments.design.streams import generator
+
+PERCENTILES = (2.5, 25.0, 50.0, 75.0, 97.5)
+BINS = 40
+LARGEST_VARIANCE = 2.0
+"""Of a fitted number's logarithm: beyond, the normal approximation describes nothing that could be drawn (assumed)."""
+MAIN = "assumed spread"
+KINDS = {"people alike": People(), MAIN: ASSUMED_SPREAD, "twice the spread": scaled(ASSUMED_SPREAD, 2.0)}
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Case:
+    """Studies of one kind of people. `fit` meets the published means with them; with `drawn` its error is drawn too."""
+
+    name: str
+    people: People
+    fit: PerceptPeak
+    drawn: bool = False
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Place:
+    """Where a published number lies among the simulated ones.
+
+    `percentile`: share below it plus half of those that print alike, 0 to 1, with its 95 % Monte Carlo interval.
+    `outside`: twice the smaller tail. `fitted`: the fit has seen this number, so its place says nothing.
+    """
+
+    quantity: str
+    published: str
+    percentile: float
+    ci_low: float
+    ci_high: float
+    outside: float
+    quantiles: tuple[float, ...]  # at `PERCENTILES`
+    fitted: bool
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Recurs:
+    """The share of studies in which a published claim holds, with its 95 % Wilson interval."""
+
+    claim: str
+    share: float
+    ci_low: float
+    ci_high: float
+    fitted: bool
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Judged:
+    """What a case's studies say. `histograms`: of each quantity, edges and counts."""
+
+    case: Case
+    studies: int
+    places: tuple[Place, ...]
+    claims: tuple[Recurs, ...]
+    histograms: Mapping[str, tuple[Floats, NDArray[np.int64]]]
+
+
+def cases_of(
+    rates: Mapping[str, float], methods: Mapping[str, Method], trials: int, assumed: PerceptParameters
+) -> list[Case]:
+    """The kinds of people that are judged, the percept fitted anew for each; `assumed` has what is not fitted."""
+    cases = [
+        Case(name=name, people=people, fit=best_percept(rates, methods, trials=trials, people=people, base=assumed))
+        for name, people in KINDS.items()
+    ]
+    if (np.diag(cases[1].fit.covariance) < LARGEST_VARIANCE).all():  # not so if it is NaN
+        cases.append(replace(cases[1], name=f"{MAIN}, fit's error drawn", drawn=True))
+    return cases
+
+
+def judge(
+    case: Case,
+    methods: Mapping[str, Method],
+    published: PublishedDirection,
+    *,
+    studies: int,
+    seed: int,
+    tell: Callable[[str], None],
+) -> Judged:
+    """Draw the studies of a case at the paper's design, and find the published numbers' places.
+
+    They are drawn in pieces, each with a stream of its own; `tell` is told of each.
+    """
+    percepts = percepts_of({name: methods[name] for name in published.methods}, case.fit.parameters.leak_s)
+    pieces = []
+    for number, count in enumerate(_sizes(studies, published.n)):
+        draws = generator(seed, "fit", case.name, str(number))
+        pieces.append(_counts(case, percepts, published, count, draws))
+        tell(case.name)
+    correct = np.concatenate(pieces)
+    quantities = _quantities(correct, published)
+    return Judged(
+        case=case,
+        studies=studies,
+        places=tuple(place_of(*one) for one in quantities),
+        claims=tuple(_claims(correct, published)),
+        histograms={name: _histogram(values) for name, _, values, _ in quantities},
+    )
+
+
+def pieces_of(studies: int, published: PublishedDirection) -> int:
+    """How many pieces a case's studies are drawn in."""
+    return len(list(_sizes(studies, published.n)))
+
+
+def _sizes(studies: int, n: int) -> Iterator[int]:
+    each = max(1, PEOPLE_A_CHUNK // n)
+    yield from (min(each, studies - first) for first in range(0, studies, each))
+
+
+def _counts(
+    case: Case,
+    percepts: Mapping[str, Percept],
+    published: PublishedDirection,
+    studies: int,
+    draws: np.random.Generator,
+) -> Counts:
+    """Correct answers, (studies, n, methods, 2), methods in the published order."""
+    fitted = _drawn(case.fit, studies, draws) if case.drawn else [case.fit.parameters]
+    log_odds = np.array([[[evidence(percepts[name], one) for name in published.methods]] for one in fitted])
+    start = np.array([[one.start] for one in fitted])
+    felt = Felt(log_odds=(), start=0.5, people=case.people)
+    shares = correct_shares(log_odds, start, felt, (studies, published.n), draws)
+    return draws.binomial(_trials(published), shares[..., 0])
+
+
+def _drawn(fit: PerceptPeak, studies: int, draws: np.random.Generator) -> list[PerceptParameters]:
+    """Parameters from the fit's normal approximation: their logarithms with its covariance."""
+    p = fit.parameters
+    centre = np.log([p.sensitivity, p.confusion, p.start])
+    factor = np.linalg.cholesky(np.array(fit.covariance))
+    values = np.exp(centre + draws.standard_normal((studies, len(FITTED))) @ factor.T)
+    values[:, 2] = np.minimum(values[:, 2], 1.0 - 1e-9)
+    return [replace(p, **dict(zip(FITTED, row, strict=True))) for row in values.tolist()]
+
+
+def _trials(published: PublishedDirection) -> tuple[int, int]:
+    protocol = published.protocol
+    return protocol.forward_trials_per_session, protocol.backward_trials_per_session
+
+
+_Quantity = tuple[str, tuple[str, float, float], Floats, bool]
+"""Name; the published number as text with the bounds of what prints alike; simulated values; whether it was fitted."""
+
+
+def _quantities(correct: Counts, published: PublishedDirection) -> list[_Quantity]:
+    scores = correct[..., 0] / _trials(published)[0]
+    F, (df1, df2) = published.anova.F, published.anova.df
+    found: list[_Quantity] = [
+        (f"F({df1}, {df2}), correct rates on forward shots", _printed(F), np.asarray(rm_anova(scores).F), False)
+    ]
+    for claim in published.binomial:
+        method, way = published.methods.index(claim.method), DIRECTIONS.index(claim.direction)
+        trials, pooled = published.n * _trials(published)[way], correct[..., method, way].sum(axis=-1)
+        of_count = np.asarray(binomial_test(np.arange(trials + 1), trials).p)
+        name, fitted = f"{claim.method}, {claim.direction} shots", claim.direction == "forward"
+        found.append((f"{name}: binomial p", _printed(claim.p), of_count[pooled], fitted))
+        for count in (k for k in range(trials + 1) if not fitted and rounds_to(float(of_count[k]), claim.p)):
+            alike = (f"{count}, if p = {claim.p} is of it", float(count), float(count))
+            found.append((f"{name}: correct of {trials}", alike, pooled.astype(np.float64), fitted))
+    return found
+
+
+def _printed(text: str) -> tuple[str, float, float]:
+    half = 0.5 * 10.0 ** -len(text.partition(".")[2])
+    return text, float(text) - half, float(text) + half
+
+
+def place_of(quantity: str, published: tuple[str, float, float], values: Floats, fitted: bool) -> Place:
+    """The place of a published number among simulated values; it is text with the bounds of what prints alike.
+
+    A value that is undefined or infinite (nothing varies within people) counts as above.
+    """
+    text, low, high = published
+    known = np.where(np.isnan(values), np.inf, values)
+    below, above = float((known < low).mean()), float((known > high).mean())
+    percentile = (below + 1.0 - above) / 2.0
+    ci_low, ci_high = wilson_interval(round(percentile * values.size), values.size)
+    return Place(
+        quantity=quantity,
+        published=text,
+        percentile=percentile,
+        ci_low=ci_low,
+        ci_high=ci_high,
+        outside=2.0 * min(percentile, 1.0 - percentile),
+        quantiles=tuple(float(value) for value in np.percentile(known, PERCENTILES, method="inverted_cdf")),
+        fitted=fitted,
+    )
+
+
+def _claims(correct: Counts, published: PublishedDirection) -> Iterator[Recurs]:
+    held = published_directions(correct, _trials(published), published)
+    fitted = {name: name.startswith("binomial") and " forward" in name for name in held}
+    tukey = {name: flags for name, flags in held.items() if " above " in name}
+    yield from (_recurs(name, flags, fitted[name]) for name, flags in held.items())
+    yield _recurs("Tukey, all pairs as published", np.logical_and.reduce(list(tukey.values())), False)
+    stars = np.logical_and.reduce([*tukey.values(), *_not_further(correct, published)])
+    yield _recurs("Tukey, all pairs as published and no p below the next printed bound", stars, False)
+    yield _recurs(WHOLE_PATTERN, np.logical_and.reduce(list(held.values())), False)
+
+
+def _not_further(correct: Counts, published: PublishedDirection) -> Iterator[Recurrence]:
+    """Of each pair whose bound is not the smallest that the paper prints: is it not below the next smaller one?"""
+    bounds = sorted({claim.p_below for claim in published.tukey}, key=float)
+    for claim in published.tukey:
+        if smaller := bounds[: bounds.index(claim.p_below)]:
+            bold = published.model_copy(
+                update={"tukey": [claim.model_copy(update={"p_below": smaller[-1]})], "binomial": []}
+            )
+            held = published_directions(correct, _trials(published), bold)
+            yield from (~flags for name, flags in held.items() if " above " in name)
+
+
+def _recurs(claim: str, held: Recurrence, fitted: bool) -> Recurs:
+    low, high = wilson_interval(int(held.sum()), held.size)
+    return Recurs(claim=claim, share=float(held.mean()), ci_low=low, ci_high=high, fitted=fitted)
+
+
+def _histogram(values: Floats) -> tuple[Floats, NDArray[np.int64]]:
+    """Of whole numbers one bin each, of others so many between the 0.1 and 99.9 percent points."""
+    finite = values[np.isfinite(values)]
+    if (finite == np.rint(finite)).all():
+        edges = np.arange(finite.min() - 0.5, finite.max() + 1.0)
+    else:
+        low, high = np.percentile(finite, (0.1, 99.9))
+        edges = np.linspace(low, high, BINS + 1)
+    counts, edges = np.histogram(finite, edges)
+    return edges, counts

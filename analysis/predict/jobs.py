@@ -1,0 +1,170 @@
+"""Pieces of work done side by side: here, on processes of this machine, or on an existing Dask cluster.
+
+A piece is a function of one argument, both of which travel by pickle; what comes back does not depend on where or when
+it was worked out, so the caller puts it in order by its number. Each is handed over as soon as it is there.
+"""
+
+from __future__ import annotations
+
+import logging
+import os
+import re
+import signal
+import threading
+from collections.abc import Callable, Iterator, Sequence
+from concurrent.futures import ProcessPoolExecutor, as_completed
+from concurrent.futures.process import BrokenProcessPool
+from contextlib import contextmanager
+from multiprocessing import get_context, parent_process
+from typing import Any
+
+from experiments.load import ConfigError
+from experiments.record.provenance import recoil_version, versions
+
+Function = Callable[[Any], Any]
+Done = Callable[[int, Any], None]
+"""Told the number of a piece and what came of it, in the order in which they end."""
+Run = Callable[[Function, Sequence[Any], Done], None]
+"""Works out a function of each piece."""
+
+CONNECT_S = 10
+"""How long to wait for a cluster, and for its first worker; assumed."""
+_SIGNALS = (signal.SIGINT, signal.SIGTERM)
+_ADDRESS = r"(?:(?:tcp|tls|ws|wss)://)?(?:[^\s:/\[\]]+|\[[0-9a-fA-F:.]+\]):[0-9]{1,5}"
+_SAME = ("recoil", "numpy", "scipy")
+"""What workers must have in the versions of this machine, lest their numbers differ."""
+
+
+class JobError(ConfigError):
+    """Work that cannot be done where it was asked for."""
+
+
+def cores() -> int:
+    """How many cores this process may use."""
+    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
+
+
+@contextmanager
+def on_processes(workers: int) -> Iterator[Run]:
+    """On so many processes of their own, started anew ("spawn") so that it is the same on every system.
+
+    When interrupted, what has begun ends and nothing more begins. `JobError` if a process is killed.
+    """
+    yield lambda function, pieces, done: _on_processes(function, pieces, done, workers)
+
+
+@contextmanager
+def on_cluster(address: str) -> Iterator[Run]:
+    """On the workers of the Dask scheduler at `address`. `JobError` if there is none, or its workers lack Recoil."""
+    with _cluster(address) as client:
+        _check_workers(client, address)
+        yield lambda function, pieces, done: _on_cluster(function, pieces, done, client)
+
+
+def _on_processes(function: Function, pieces: Sequence[Any], done: Done, workers: int) -> None:
+    workers = min(workers, len(pieces))
+    if workers < 2:
+        for number, piece in enumerate(pieces):
+            done(number, function(piece))
+        return
+    pool = ProcessPoolExecutor(workers, mp_context=get_context("spawn"), initializer=_begin_worker)
+    try:
+        with _no_interrupt():
+            numbers = {pool.submit(function, piece): number for number, piece in enumerate(pieces)}
+        for future in as_completed(numbers):
+            done(numbers[future], future.result())
+    except BrokenProcessPool as error:
+        raise JobError("a worker process was killed (too little memory?); run again with fewer --workers") from error
+    finally:  # once: leaving a `with` would shut down again, and take back that the rest is cancelled
+        pool.shutdown(wait=True, cancel_futures=True)
+
+
+def _on_cluster(function: Function, pieces: Sequence[Any], done: Done, client: Any) -> None:
+    import distributed  # noqa: PLC0415 - the extra `dask`
+
+    gathered: Any = distributed.as_completed  # it has no types
+    futures = client.map(function, pieces, pure=False)
+    numbers = {future.key: number for number, future in enumerate(futures)}
+    try:
+        for future in gathered(futures, loop=client.loop):
+            done(numbers[future.key], _result(future))
+    finally:
+        client.cancel(futures)
+
+
+@contextmanager
+def _no_interrupt() -> Iterator[None]:
+    """Starting processes is not cut in half by a signal: it is told afterwards. They themselves never hear a Ctrl-C.
+
+    They inherit the mask of this thread; another thread may still take the signal, so the handlers wait as well.
+    """
+    if threading.current_thread() is not threading.main_thread() or not hasattr(signal, "pthread_sigmask"):
+        yield
+        return
+    heard: list[int] = []
+
+    def hear(number: int, _: object) -> None:
+        heard.append(number)
+
+    handlers = {number: signal.signal(number, hear) for number in _SIGNALS}
+    mask = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
+    try:
+        yield
+    finally:
+        signal.pthread_sigmask(signal.SIG_SETMASK, mask)
+        for number, handler in handlers.items():
+            signal.signal(number, handler)
+        if heard:
+            signal.raise_signal(heard[0])
+
+
+def _begin_worker() -> None:
+    """A worker does not outlive a parent that was killed; on Windows it ignores Ctrl-C only from here on."""
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    threading.Thread(target=_end_with_parent, daemon=True).start()
+
+
+def _end_with_parent() -> None:
+    parent = parent_process()
+    if parent is not None:
+        parent.join()
+        os._exit(1)
+
+
+def _cluster(address: str) -> Any:
+    try:
+        import distributed  # noqa: PLC0415 - the extra `dask`
+    except ModuleNotFoundError as error:
+        raise JobError('--scheduler needs Dask: install "recoil[dask]" here and on the workers') from error
+    if not re.fullmatch(_ADDRESS, address):  # some others would be tried in vain, and long
+        raise JobError(f"--scheduler {address}: must be host and port, such as tcp://127.0.0.1:8786")
+    logging.getLogger("distributed").setLevel(logging.CRITICAL)  # the message is ours
+    client: Any = distributed.Client  # it has no types
+    try:
+        return client(address, timeout=CONNECT_S, set_as_default=False)
+    except (OSError, ValueError, TypeError) as error:
+        reason = str(error).splitlines()[0] if str(error) else type(error).__name__
+        raise JobError(f"--scheduler {address}: no Dask scheduler answers there ({reason})") from error
+
+
+def _result(future: Any) -> Any:
+    try:
+        return future.result()
+    except Exception as error:  # a lost scheduler, a killed worker, whatever a worker raises: passed on in words
+        raise JobError(f"--scheduler: {type(error).__name__}: {error}") from error
+
+
+def _check_workers(client: Any, address: str) -> None:
+    """There must be workers, with this machine's versions of what the numbers depend on."""
+    try:
+        client.wait_for_workers(1, timeout=CONNECT_S)
+        theirs = client.run(versions)
+    except TimeoutError as error:
+        raise JobError(f"--scheduler {address}: has no workers; start some with `dask worker {address}`") from error
+    except Exception as error:  # whatever a worker raises
+        raise JobError(f"--scheduler {address}: a worker cannot run Recoil {recoil_version()}: {error}") from error
+    ours = versions()
+    for worker, there in theirs.items():
+        other = [f"{name} {there.get(name)}, not {ours[name]}" for name in _SAME if there.get(name) != ours[name]]
+        if other:
+            raise JobError(f"--scheduler {address}: the worker {worker} has {'; '.join(other)}; make them the same")

@@ -1,0 +1,191 @@
+"""What `recoil power` is asked for, spelled out as a grid of designs with their costs."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+from analysis.paper.paper import PublishedExperiment, load_paper
+from experiments.direction.config import DirectionConfig
+from experiments.synthetic.percept import Percept
+from experiments.load import find
+from experiments.preference.config import PreferenceConfig
+from analysis.predict.power.felt import Felt, felt_of, null_felt, percepts_of_setup
+from analysis.predict.power.request import (
+    FELT,
+    GridError,
+    Request,
+    check_scalars,
+    checked_setup,
+    factors,
+    method_sets_of,
+    numbers,
+    trials_of,
+)
+from analysis.predict.power.studies import Chunk, Config, Design, People, null_rates, null_ratings
+
+__all__ = ["Cell", "Grid", "Request", "make_grid"]
+
+DEFAULT_PARTICIPANTS = "6,8,10,12,14,16,18,20,24,28,32,40"
+NULL_PARTICIPANTS = "8,14,24"
+DEFAULT_EFFECTS = "0.5,0.75,1"
+PEOPLE_A_CHUNK = 70_000
+"""Participants drawn together: 5000 studies of 14. It is part of what a seed means, so it never depends on workers."""
+_MOST_PEOPLE = 999
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Cell:
+    """A design with the config that it makes, and its cost; `too_long` says why it may not be run, or nothing."""
+
+    design: Design
+    config: Config
+    duration_s: float
+    too_long: str
+
+    @property
+    def lab_hours(self) -> float:
+        """Hours of sessions, one participant after another."""
+        return self.design.participants * self.duration_s / 3600.0
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Grid:
+    """All cells in their order; `reference` is the paper's own design, with the published claims.
+
+    `percepts`: what the gun's shots give to feel, by method, if the participants feel it.
+    """
+
+    config: Config
+    cells: tuple[Cell, ...]
+    reference: Cell | None
+    published: PublishedExperiment | None
+    request: Request
+    percepts: Mapping[str, Percept] | None = None
+
+    @property
+    def all_cells(self) -> tuple[Cell, ...]:
+        """The cells, and the reference after them if it is none of them."""
+        apart = [self.reference] if self.reference and self.reference not in self.cells else []
+        return (*self.cells, *apart)
+
+    def chunks(self) -> list[Chunk]:
+        """The work, in its order: so many studies of every cell, in pieces."""
+        return [chunk for cell in self.all_cells for chunk in self.chunks_of(cell)]
+
+    def chunks_of(self, cell: Cell) -> list[Chunk]:
+        """The pieces of a cell."""
+        each = max(1, PEOPLE_A_CHUNK // cell.design.participants)
+        published = self.published if _is_of(self.published, cell) else None
+        return [
+            Chunk(
+                config=cell.config,
+                design=cell.design,
+                published=published,
+                seed=self.request.seed,
+                number=number,
+                studies=min(each, self.request.studies - first),
+                felt=self._felt(cell),
+            )
+            for number, first in enumerate(range(0, self.request.studies, each))
+        ]
+
+    def _felt(self, cell: Cell) -> Felt | None:
+        if self.percepts is None or not isinstance(cell.config, DirectionConfig):
+            return None
+        return felt_of(cell.config, self.percepts, cell.design.methods, cell.design.effect)
+
+
+def make_grid(request: Request) -> Grid:
+    """The grid of a request. `ConfigError` with a message for people for whatever is wrong with it."""
+    check_scalars(request)
+    setup = checked_setup(request.config)
+    config: Config = setup.config
+    people = request.participants or (NULL_PARTICIPANTS if request.null else DEFAULT_PARTICIPANTS)
+    participants = numbers(people, "--participants", 2, _MOST_PEOPLE)
+    effects = [0.0] if request.null else factors(request.effects or DEFAULT_EFFECTS)
+    designs = [
+        (_varied(config, methods, trials), Design(participants=n, trials=trials, methods=methods, effect=effect))
+        for methods in method_sets_of(request.methods, config)
+        for trials in trials_of(request.trials, config)
+        for effect in effects
+        for n in participants
+    ]
+    if request.null:
+        designs = [_null(*pair, who) for who in _null_people(config) for pair in designs]
+    published = None if request.null else _published(request.paper, config)
+    return Grid(
+        config=config,
+        cells=tuple(_cell(*pair) for pair in designs),
+        reference=_reference(config, published),
+        published=published,
+        request=request,
+        percepts=percepts_of_setup(setup) if config.synthetic.observer == FELT else None,
+    )
+
+
+def _varied(config: Config, methods: tuple[str, ...], trials: int) -> Config:
+    """The config with these methods and trials; not checked again, so that what it breaks can be told."""
+    changes: dict[str, Any] = {"methods": methods}
+    if isinstance(config, DirectionConfig):
+        design = config.design
+        forward = trials * design.forward_per_session // design.trials_per_session
+        changes |= {
+            "sets_per_session": trials // design.trials_per_set,
+            "forward_per_session": forward,
+            "backward_per_session": trials - forward,
+        }
+    return config.model_copy(update={"design": config.design.model_copy(update=changes)})
+
+
+def _null_people(config: Config) -> tuple[People, ...]:
+    if isinstance(config, PreferenceConfig):
+        return ("without preference",)
+    return ("guessing", "guessing, with the config's bias")
+
+
+def _null(config: Config, design: Design, people: People) -> tuple[Config, Design]:
+    """The design with null participants."""
+    config = config.model_copy(update={"synthetic": _null_synthetic(config, people)})
+    return config, replace(design, people=people)
+
+
+def _null_synthetic(config: Config, people: People) -> Any:
+    if isinstance(config, PreferenceConfig):
+        return config.synthetic.model_copy(update={"ratings": null_ratings(config.synthetic.ratings)})
+    if config.synthetic.observer == FELT:
+        return null_felt(config.synthetic, biased="bias" in people)
+    return config.synthetic.model_copy(update={"rates": null_rates(config.synthetic.rates, biased="bias" in people)})
+
+
+def _cell(config: Config, design: Design) -> Cell:
+    longest = config.fatigue.max_planned_s
+    longer = config.duration_s > longest
+    reason = f"{config.duration_s:g} s a participant exceed fatigue.max_planned_s = {longest:g} s" if longer else ""
+    return Cell(design=design, config=config, duration_s=config.duration_s, too_long=reason)
+
+
+def _published(name: str, config: Config) -> PublishedExperiment | None:
+    """The published claims about these methods; `None` if the paper is about others."""
+    path: Path = find(name)
+    try:
+        paper = load_paper(path)
+    except ValueError as error:
+        raise GridError(str(error)) from error
+    published: PublishedExperiment = getattr(paper, config.experiment)
+    one_way = isinstance(config, DirectionConfig) and not config.design.backward_per_session
+    return None if one_way or set(published.methods) != set(config.design.methods) else published
+
+
+def _is_of(published: PublishedExperiment | None, cell: Cell) -> bool:
+    return published is not None and set(published.methods) == set(cell.design.methods)
+
+
+def _reference(config: Config, published: PublishedExperiment | None) -> Cell | None:
+    """The paper's own number of people with the config's trials and effects."""
+    if published is None:
+        return None
+    trials = next(iter(trials_of(None, config)))
+    return _cell(config, Design(participants=published.n, trials=trials, methods=config.design.methods))

@@ -1,0 +1,133 @@
+"""The planned analysis on arrays of many simulated studies: what is significant in which, and how precise each is.
+
+The tests are those of `statistics.json`: repeated-measures ANOVA, Tukey's test on its error, the pooled exact binomial
+test, and d' with its mean over people; here also with the t-test of that mean against 0.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import lru_cache
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+from scipy import special
+
+from analysis.stats.anova import check_scores, rm_anova
+from analysis.stats.arrays import FloatArray
+from analysis.stats.binomial import binomial_test
+from analysis.stats.detection import yes_no
+from analysis.stats.studentized_range import studentized_range_isf
+from analysis.stats.tukey import pairs_of, pooled_pairs
+from analysis.paper.odds import SIGNIFICANT, Recurrence
+
+ANOVA = "ANOVA"
+ALL_PAIRS = "Tukey, all pairs"
+ANY_PAIR = "Tukey, any pair"
+_DIRECTIONS = ("forward", "backward")
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Findings:
+    """Of each study: which claims came out significant, and half the length of its 95 % intervals."""
+
+    claims: dict[str, Recurrence]
+    half_widths: dict[str, FloatArray]
+
+
+def analysed_ratings(scores: ArrayLike, methods: Sequence[str], expected: Sequence[float]) -> Findings:
+    """ANOVA and Tukey's test of `scores` (studies, n people, k methods), all at 5 %.
+
+    A pair that is expected to differ (`expected`: k values, only their order counts) must come out that way round; one
+    that is not counts if it differs either way. `all pairs` are all of the former, `any pair` is any pair either way.
+    Where nothing varies (0/0) a claim does not hold. `ValueError`: as in `rm_anova`.
+    """
+    checked = check_scores(scores)
+    pairs = pooled_pairs(checked)
+    critical = _critical(pairs.k, pairs.df)
+    differs = pairs.q > critical
+    claims = {ANOVA: np.asarray(np.asarray(rm_anova(checked).p) < SIGNIFICANT)}
+    ordered = []
+    for i, (a, b) in enumerate(pairs_of(pairs.k)):
+        name, sign = _pair(methods, expected, a, b)
+        right_way = sign * pairs.difference[..., i] > 0.0 if sign else True
+        claims[name] = np.asarray(differs[..., i] & right_way)
+        ordered += [claims[name]] if sign else []
+    claims[ANY_PAIR] = np.asarray(differs.any(axis=-1))
+    if ordered:
+        claims[ALL_PAIRS] = np.asarray(np.logical_and.reduce(ordered))
+    return Findings(
+        claims=claims,
+        half_widths={"difference of two methods": critical * pairs.error[..., 0]}
+        | {f"mean, {name}": half for name, half in zip(methods, _half_widths(checked), strict=True)},
+    )
+
+
+def analysed_directions(
+    correct: NDArray[np.int64],
+    trials: tuple[int, int],
+    methods: Sequence[str],
+    expected: Sequence[float],
+    expected_d: Sequence[float],
+) -> Findings:
+    """The whole planned analysis of `correct` answers (studies, n people, k methods, 2: forward, backward).
+
+    `trials`: of each direction a person and method, at least 1 forward; without backward ones there is no d'.
+    `expected` is the order of the correct rates (as in `analysed_ratings`), `expected_d` the sign of each d' (k); at 0
+    either sign counts. `ValueError`: as in `rm_anova`, `yes_no` and `binomial_test`.
+    """
+    found = analysed_ratings(correct[..., 0] / trials[0], methods, expected)
+    claims, half_widths = dict(found.claims), dict(found.half_widths)
+    claims |= _binomials(correct.sum(axis=-3), correct.shape[-3], trials, methods)
+    if trials[1]:
+        d = np.asarray(yes_no(correct[..., 0], trials[0], trials[1] - correct[..., 1], trials[1]).d_prime)
+        means, halves = d.mean(axis=-2), _half_widths(d)
+        for i, (method, sign) in enumerate(zip(methods, np.sign(expected_d), strict=True)):
+            reached = np.abs(means[..., i]) > halves[i]
+            claims[f"d′, {method}"] = reached & (sign * means[..., i] > 0.0) if sign else reached
+            half_widths[f"d′, {method}"] = halves[i]
+    return Findings(claims=claims, half_widths=half_widths)
+
+
+def _pair(methods: Sequence[str], expected: Sequence[float], a: int, b: int) -> tuple[str, int]:
+    """What is claimed of a pair, and the sign that the mean of `a` less that of `b` must have; 0 for either."""
+    sign = int(np.sign(expected[a] - expected[b]))
+    if not sign:
+        return f"Tukey, {methods[a]} other than {methods[b]}", 0
+    higher, lower = (a, b) if sign > 0 else (b, a)
+    return f"Tukey, {methods[higher]} above {methods[lower]}", sign
+
+
+@lru_cache(maxsize=64)
+def _critical(k: int, df: int) -> float:
+    """Tukey's critical q, to eleven digits: its last one depends on how many threads the linear algebra runs on."""
+    return float(f"{studentized_range_isf(SIGNIFICANT, k, df):.11g}")
+
+
+def _half_widths(values: FloatArray) -> FloatArray:
+    """Half the length of the 95 % interval of each column's mean (Student's t): (k, studies) of (studies, n, k)."""
+    n = values.shape[-2]
+    quantile = float(special.stdtrit(n - 1, 1.0 - SIGNIFICANT / 2.0))
+    halves: FloatArray = quantile * values.std(axis=-2, ddof=1) / math.sqrt(n)
+    return np.moveaxis(halves, -1, 0)
+
+
+def _binomials(
+    pooled: NDArray[np.int64], n: int, trials: tuple[int, int], methods: Sequence[str]
+) -> dict[str, Recurrence]:
+    """Is chance rejected? Of `pooled` (studies, k, 2), a test for each method and direction that was presented."""
+    return {
+        f"binomial, {method} {direction}": _rejected(n * trials[way])[pooled[..., i, way]]
+        for i, method in enumerate(methods)
+        for way, direction in enumerate(_DIRECTIONS)
+        if trials[way]
+    }
+
+
+@lru_cache(maxsize=64)
+def _rejected(trials: int) -> Recurrence:
+    """Of each count out of so many trials: does the exact test reject one half at 5 %?"""
+    p = np.asarray(binomial_test(np.arange(trials + 1), trials).p)
+    return p < SIGNIFICANT

@@ -1,0 +1,182 @@
+"""What `recoil power` says in words: what was simulated, and its findings on a terminal."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator
+from typing import Any
+
+from analysis.paper.odds import WHOLE_PATTERN
+from analysis.predict.power.planned import ALL_PAIRS, ANOVA, ANY_PAIR
+from analysis.report import apa
+from experiments.direction.config import DirectionConfig, Rates
+from experiments.preference.config import PreferenceConfig, Ratings
+from analysis.predict.power.grid import Grid
+from analysis.predict.power.request import FELT
+from analysis.predict.power.studies import PUBLISHED
+
+Facts = dict[str, Any]
+
+PATTERN = f"{PUBLISHED}, {WHOLE_PATTERN}"
+HEADLINES = (ANOVA, ALL_PAIRS, PATTERN)
+"""What is told first, where there is room for little."""
+
+
+def assumptions(grid: Grid) -> list[str]:
+    """What the numbers rest on."""
+    config, null = grid.config, grid.request.null
+    if isinstance(config, PreferenceConfig):
+        law = list(_null_ratings(config.synthetic.ratings) if null else _ratings(config.synthetic.ratings))
+    elif config.synthetic.observer == FELT:
+        law = list(_felt(config, null=null))
+    else:
+        law = list(_null_rates(config.synthetic.rates) if null else _rates(config.synthetic.rates))
+    return [
+        *law,
+        "All tests are at 5 %, two-sided; Tukey's test is on the pooled repeated-measures error. A comparison counts "
+        "only if it comes out the way round that the config's means have it; where they are equal, either way counts.",
+        "Every participant is complete: nobody drops out or misses an answer.",
+        "Hours in the lab are participants times the config's own duration (trials and breaks, as `recoil check` has "
+        "it), one participant after another, without practice, preparation and no-shows.",
+        "Intervals are Wilson's, of 95 %: the Monte Carlo error of so many studies, not the uncertainty of the "
+        "assumed participants.",
+    ]
+
+
+def as_text(found: Facts) -> str:
+    """The findings for a terminal."""
+    return "\n".join([f"{found['title']}: {found['studies']} studies of each design", *_body(found)])
+
+
+def claims_of(design: Facts) -> dict[str, Facts]:
+    """A design's shares by the name of the claim."""
+    return {share["claim"]: share for share in design["claims"]}
+
+
+def share_cell(share: Facts | None) -> str:
+    """A share with its interval, in percent."""
+    if share is None:
+        return apa.NONE
+    low, high = (100.0 * share[end] for end in ("ci_low", "ci_high"))
+    return f"{apa.number(100.0 * share['share'], 1)} {apa.interval(low, high, 1)}"
+
+
+def design_name(design: Facts, *, with_trials: bool) -> str:
+    """A smallest design in a cell; with its trials where the grid has several numbers of them."""
+    trials = f" × {design['trials']} trials a method" if with_trials else ""
+    return f"{design['participants']} people{trials}, {apa.number(design['lab_hours'], 1)} h"
+
+
+def varies(found: Facts, key: str) -> bool:
+    """Do the designs differ in this?"""
+    return len({repr(design[key]) for design in found["designs"]}) > 1
+
+
+def claim_name(claim: str) -> str:
+    """A claim as people read it."""
+    return "the paper's whole pattern" if claim == PATTERN else claim
+
+
+def wanted(claims: Iterable[str]) -> list[str]:
+    """The claims that a plan may aim at: without `any pair`, and of the published ones the whole pattern alone."""
+    return [c for c in claims if c != ANY_PAIR and (c == PATTERN or not c.startswith(PUBLISHED))]
+
+
+def pattern_sentence(found: Facts) -> str | None:
+    """The chance that the paper's whole pattern recurs."""
+    pattern = found["published_pattern"]
+    if pattern is None:
+        return None
+    return (
+        f"With n = {pattern['participants']} the paper's whole pattern of significance recurs in "
+        f"{apa.percent(pattern['share'])} of the studies (95 % CI {_bounds(pattern)} %)."
+    )
+
+
+def _bounds(share: Facts) -> str:
+    return apa.interval(100.0 * share["ci_low"], 100.0 * share["ci_high"], 1)
+
+
+def _body(found: Facts) -> Iterator[str]:
+    if found["null"]:
+        for design in found["designs"]:
+            yield f"  {design['participants']} people {design['people']}: false positives in % of the studies"
+            yield from (f"    {share['claim']:44} {share_cell(share)}" for share in design["claims"])
+        return
+    yield from (f"  {sentence}" for sentence in [pattern_sentence(found)] if sentence)
+    yield f"  The smallest design that reaches {apa.percent(found['target'], 0)}:"
+    yield from (f"    {_smallest(found, row)}" for row in found["smallest"] if row["claim"] in HEADLINES)
+    if too_long := sum(bool(design["too_long"]) for design in found["designs"]):
+        yield f"  {too_long} of {len(found['designs'])} designs keep a participant too long; none of them is proposed."
+
+
+def _smallest(found: Facts, row: Facts) -> str:
+    methods = f", {', '.join(row['methods'])}" if varies(found, "methods") else ""
+    if row["design"] is None:
+        reached = f"none; at most {apa.percent(row['most'])}"
+    else:
+        reached = design_name(row["design"], with_trials=varies(found, "trials"))
+    return f"{claim_name(row['claim']):26} effect × {row['effect']:g}{methods}: {reached}"
+
+
+def _rates(rates: Rates) -> Iterator[str]:
+    for direction, values in (("forward", rates.forward), ("backward", rates.backward)):
+        yield f"Mean correct rates, {direction}: {', '.join(f'{name} {value:g}' for name, value in values.items())}."
+    yield (
+        f"People differ by an ability of SD {rates.ability_sd:g} and a bias of SD {rates.bias_sd:g} around "
+        f"{rates.bias_mean:g}, in probit units; the same in all methods. Trials are independent given the person."
+    )
+    yield "The effect is a factor on the probit of each mean correct rate, so on d′: 1 is the config, 0 guessing."
+
+
+def _null_rates(rates: Rates) -> Iterator[str]:
+    yield "Null participants feel no direction: each answer is right with a chance of one half in the mean over people."
+    yield (
+        "Those with the config's bias differ in their readiness to say forward (SD "
+        f"{rates.bias_sd:g} around {rates.bias_mean:g}, probit units). The pooled binomial test takes trials as "
+        "independent and rejects them more often than 5 %: trials come in people. The exact test of plain guessers "
+        "stays at or below 5 %, as counts are whole numbers."
+    )
+
+
+def _felt(config: DirectionConfig, *, null: bool) -> Iterator[str]:
+    percept, people, lapses = config.synthetic.percept, config.synthetic.people, config.synthetic.diffusion.lapses
+    yield (
+        f"People answer from what the gun does: exponent {percept.exponent:g}, leak {percept.leak_s:g} s, sensitivity "
+        f"{percept.sensitivity:g}, confusion {percept.confusion:g}, start {percept.start:g} (`recoil fit`): a model's "
+        "guess, not a measurement."
+    )
+    yield (
+        f"They differ by SD {people.drift_factor_sd:g} of the factor on the drift, {people.log_boundary_sd:g} of the "
+        f"log boundary, {people.logit_start_sd:g} of the logit of the start; lapses {lapses.rate:g}."
+    )
+    if config.design.instructions:
+        yield (
+            f"Instructions {', '.join(config.design.instructions)}: each takes an equal part of a session's sets and "
+            "has its own boundary; the planned analysis counts all trials together."
+        )
+    if null:
+        yield (
+            "Null participants feel nothing: the evidence is 0, so each answers “forward” at the chance of their own "
+            "start: 0.5 for those who guess, the config's and its spread for those with the config's bias. The pooled "
+            "binomial test of the latter rejects as often as the bias is found, which is no false positive of a "
+            "direction felt; the exact test of plain guessers stays at or below 5 %, as counts are whole numbers."
+        )
+    else:
+        yield "The effect is a factor on the evidence (log odds of a right answer): 1 is the config, 0 nothing felt."
+
+
+def _ratings(law: Ratings) -> Iterator[str]:
+    yield f"Mean ratings: {', '.join(f'{name} {value:g}' for name, value in law.mean.items())}."
+    yield f"SD between people {law.person_sd:g}, within people {law.noise_sd:g}; kept to the scale and its grain."
+    if law.lowest:
+        yield f"{law.lowest} is rated below all others, by everybody at effect 1, by a smaller share below it."
+    if law.same:
+        yield f"A share of {law.same_share:g} rates {' and '.join(law.same)} alike."
+    yield "The effect is a factor on the distances of the methods' means from their common mean; 1 is the config."
+
+
+def _null_ratings(law: Ratings) -> Iterator[str]:
+    yield (
+        f"Null participants like all methods alike: one mean, SD between people {law.person_sd:g}, within people "
+        f"{law.noise_sd:g}, none of the habits that set methods apart."
+    )

@@ -1,0 +1,192 @@
+"""A model of answers that are right or wrong: log odds of each condition, with trials nested in people."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike
+from scipy import special
+
+from analysis.stats.paired import holm
+from analysis.stats.arrays import FloatArray, numbers, share
+from analysis.stats.tukey import Label, pairs_of
+
+NAME = "logistic GEE, independence working correlation, bias-reduced sandwich (Mancl & DeRouen 2001)"
+NOTE = (
+    "The model is a population-averaged logistic regression of the single forward answers on the method, with the "
+    "participants as clusters (generalised estimating equations). It is not a mixed-effects logistic regression, "
+    "because no frequentist one is at hand in Python (statsmodels has a variational Bayesian one only). With few "
+    "participants the plain sandwich is too small: Mancl & DeRouen's correction is used, t on n − 1 and Hotelling's F "
+    "on (k − 1, n − k + 1) degrees of freedom. With one factor the estimates are the logits of the pooled rates, so no "
+    "iteration can fail to converge."
+)
+NO_SPREAD = "Two conditions differ alike in every participant: without spread there is nothing to test against."
+FEW = 5
+"""Right or wrong answers in a condition below which Wald tests of log odds are known to fail (Hauck & Donner 1977)."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Odds:
+    """One condition: pooled `rate` with interval, and its log odds with standard error."""
+
+    label: Label
+    rate: float
+    ci_low: float
+    ci_high: float
+    log_odds: float
+    se: float
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Contrast:
+    """Log odds of `a` less those of `b`; the interval, for this pair alone, is of the odds ratio."""
+
+    a: Label
+    b: Label
+    log_odds_difference: float
+    se: float
+    t: float
+    df: int
+    p: float
+    p_holm: float
+    odds_ratio: float
+    ci_low: float
+    ci_high: float
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class EqualOdds:
+    """Are the odds of all conditions equal? Hotelling's F of the k - 1 contrasts."""
+
+    F: float
+    df: tuple[int, int]
+    p: float
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class LogitModel:
+    """The fitted model; empty where there is none, and `reason` says why. `few`: conditions near floor or ceiling."""
+
+    conditions: tuple[Odds, ...] = ()
+    contrasts: tuple[Contrast, ...] = ()
+    test: EqualOdds | None = None
+    few: tuple[Label, ...] = ()
+    reason: str | None = None
+
+
+def logit_model(
+    successes: ArrayLike, trials: ArrayLike, labels: Sequence[Label], confidence: float = 0.95
+) -> LogitModel:
+    """GEE of binary answers on one factor within people, by its closed form; linear in the number of people.
+
+    logit p_j = log(y_j / (N_j - y_j)) for the pooled y_j of N_j trials. Sandwich: sum over people of b_i b_i', with
+    b_ij = (y_ij - n_ij p_j) / (1 - n_ij / N_j) / (N_j p_j (1 - p_j)), where the middle factor is Mancl & DeRouen's
+    (I - H_ii)^-1. Equals statsmodels' `GEE(..., Independence()).fit(cov_type="bias_reduced")` on the single trials,
+    which takes 6 s for 10 000 people.
+
+    `successes, trials`: (n people, k conditions), every cell with a trial, k >= 2 labels; else `ValueError`.
+    No fit (`reason`): a condition all right or all wrong (separation), one person, no spread between people.
+    Sources: Liang & Zeger 1986, Biometrika 73, 13; Mancl & DeRouen 2001, Biometrics 57, 126.
+    """
+    y, n = numbers(successes, "successes"), numbers(trials, "trials")
+    if y.ndim != 2 or y.shape != n.shape or y.shape[1] != len(labels) or len(labels) < 2:
+        raise ValueError("successes and trials must be people by conditions, at least 2 labelled conditions")
+    if (n < 1.0).any() or ((y < 0.0) | (y > n)).any():
+        raise ValueError("every cell needs a trial, and successes must lie in 0..trials")
+    right, total = y.sum(axis=0), n.sum(axis=0)
+    reason = _unfit(right, total, len(y), labels)
+    if reason is not None:
+        return LogitModel(reason=reason)
+    rates = right / total
+    influence = (y - n * rates) / (1.0 - n / total) / (total * rates * (1.0 - rates))
+    covariance = influence.T @ influence
+    log_odds = special.logit(rates)
+    contrasts = _contrasts(log_odds, covariance, (len(y) - 1, confidence), labels)
+    if contrasts is None:
+        return LogitModel(reason=NO_SPREAD)
+    return LogitModel(
+        conditions=_conditions(log_odds, covariance, (len(y) - 1, confidence), labels),
+        contrasts=contrasts,
+        test=_equal_odds(log_odds, covariance, len(y)),
+        few=tuple(label for label, low in zip(labels, np.minimum(right, total - right) < FEW, strict=True) if low),
+    )
+
+
+def _unfit(right: FloatArray, total: FloatArray, people: int, labels: Sequence[Label]) -> str | None:
+    if people < 2:
+        return "There are fewer than two participants."
+    ends = [
+        f"{label} (every answer {'right' if right[j] else 'wrong'})"
+        for j, label in enumerate(labels)
+        if right[j] in (0.0, total[j])
+    ]
+    return f"The log odds are infinite: {', '.join(map(str, ends))}; no contrast is given." if ends else None
+
+
+def _conditions(
+    log_odds: FloatArray, covariance: FloatArray, df_and_confidence: tuple[int, float], labels: Sequence[Label]
+) -> tuple[Odds, ...]:
+    half = _critical(*df_and_confidence) * np.sqrt(np.diag(covariance))
+    low, rate, high = (special.expit(value) for value in (log_odds - half, log_odds, log_odds + half))
+    return tuple(
+        Odds(
+            label=label,
+            rate=float(rate[j]),
+            ci_low=float(low[j]),
+            ci_high=float(high[j]),
+            log_odds=float(log_odds[j]),
+            se=float(np.sqrt(covariance[j, j])),
+        )
+        for j, label in enumerate(labels)
+    )
+
+
+def _contrasts(
+    log_odds: FloatArray, covariance: FloatArray, df_and_confidence: tuple[int, float], labels: Sequence[Label]
+) -> tuple[Contrast, ...] | None:
+    """All pairs, or None if a pair has no variance to test against."""
+    a, b = np.array(pairs_of(len(labels)), dtype=np.intp).T
+    difference = log_odds[a] - log_odds[b]
+    variance = covariance[a, a] + covariance[b, b] - 2.0 * covariance[a, b]
+    if (variance <= 1e-12 * (covariance[a, a] + covariance[b, b])).any():
+        return None
+    se, df = np.sqrt(variance), df_and_confidence[0]
+    t = difference / se
+    p = 2.0 * special.stdtr(df, -np.abs(t))
+    adjusted, critical = holm(p), _critical(*df_and_confidence)
+    with np.errstate(over="ignore"):
+        ratio, low, high = (np.exp(difference + sign * critical * se) for sign in (0.0, -1.0, 1.0))
+    return tuple(
+        Contrast(
+            a=labels[a[i]],
+            b=labels[b[i]],
+            log_odds_difference=float(difference[i]),
+            se=float(se[i]),
+            t=float(t[i]),
+            df=df,
+            p=float(p[i]),
+            p_holm=float(adjusted[i]),
+            odds_ratio=float(ratio[i]),
+            ci_low=float(low[i]),
+            ci_high=float(high[i]),
+        )
+        for i in range(len(a))
+    )
+
+
+def _equal_odds(log_odds: FloatArray, covariance: FloatArray, people: int) -> EqualOdds | None:
+    """Hotelling's F = (n - k + 1) / ((n - 1)(k - 1)) d'V^-1 d of the contrasts d; None if V is singular."""
+    q = len(log_odds) - 1
+    against_first = np.column_stack([-np.ones(q), np.eye(q)])
+    difference, V = against_first @ log_odds, against_first @ covariance @ against_first.T
+    if people <= q or int(np.linalg.matrix_rank(V)) < q:
+        return None
+    df = (q, people - q)
+    F = float(difference @ np.linalg.solve(V, difference)) * df[1] / ((people - 1) * q)
+    return EqualOdds(F=F, df=df, p=float(special.fdtrc(*df, F)))
+
+
+def _critical(df: int, confidence: float) -> float:
+    return -float(special.stdtrit(df, (1.0 - share(confidence, "confidence")) / 2.0))

@@ -1,0 +1,154 @@
+"""`recoil analyze`: logs to statistics, tables, figures and report."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, TypeVar
+
+from analysis.summary import remarks_coding
+from analysis.paper.audit import audit
+from analysis.paper.audit.paper_file import PaperFile, load_paper_file
+from analysis.paper.audit.predictions import predictions
+from analysis.logs.by_study import by_study
+from analysis.logs.column_map import ColumnMap
+from analysis.logs.exclusions import Effect, Rules, apply_rules
+from analysis.logs.reading import Logs, Problem, Track, read_logs
+from analysis.logs.tables_out import result_tables
+from analysis.logs.toml_model import load_model
+from analysis.paper.paper import load_paper
+from analysis.paper.published import Prediction, compare
+from analysis.report.page import ReportData, write_report
+from analysis.summary.summary import summarize
+from experiments.record import storage
+from experiments.config.canonical import sha256
+from experiments.load import ConfigError
+from experiments.study.places import PlaceError
+from experiments.record.provenance import provenance
+
+Loaded = TypeVar("Loaded")
+_PER_STUDY = ("direction", "preference", "excluded", "warnings")
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Request:
+    """What is asked for: the logs, where to write, and the files that say how to read and what to leave out."""
+
+    paths: Sequence[Path]
+    out: Path
+    paper: Path | None = None
+    columns: Path | None = None
+    rules: Path | None = None
+    codebook: Path | None = None
+
+
+def analyze(request: Request, track: Track = iter) -> tuple[dict[str, Any], tuple[Problem, ...]]:
+    """Write statistics, tables and report of all usable logs; returns the statistics and what was left out.
+
+    `PlaceError` if there is no usable log at all, with every reason.
+    """
+    published = _loaded(load_paper, request.paper)
+    mapping = _loaded(lambda path: load_model(ColumnMap, path), request.columns)
+    rules = _loaded(lambda path: load_model(Rules, path), request.rules)
+    book = _loaded(remarks_coding.load_codebook, request.codebook)
+    logs = read_logs(request.paths, track, mapping)
+    if not logs.files:
+        reasons = "\n".join(str(problem) for problem in logs.problems)
+        raise PlaceError("\n".join(filter(None, ["no usable log in " + ", ".join(map(str, request.paths)), reasons])))
+    effect = apply_rules(logs, rules) if rules is not None else None
+    used = effect.logs if effect is not None else logs
+    statistics = summarize(used) | _by_study(used)
+    if effect is not None and rules is not None and request.rules is not None:
+        statistics = _with_rules(statistics, effect, rules, request.rules)
+    coded = None if book is None else _coded(used, statistics, book)
+    if coded is not None:
+        statistics = statistics | {"remarks": remarks_coding.as_json(coded)}
+    storage.make_folder(request.out)
+    report = ReportData(
+        title="Statistics of " + ", ".join(path.name or str(path) for path in request.paths),
+        statistics=statistics,
+        problems=logs.problems,
+        comparison=compare(statistics, published, _predicted(request.paper)) if published else None,
+        files=logs.files,
+        provenance=provenance() | _read_by(request.columns, mapping),
+        notes=tuple(_notes(effect)),
+        extra=() if coded is None else (remarks_coding.section(coded),),
+    )
+    write_report(request.out, report)
+    write_tables(request.out, used, statistics)
+    return statistics, logs.problems
+
+
+def write_tables(out: Path, logs: Logs, statistics: Mapping[str, Any]) -> None:
+    """Write each experiment's results by participant, long and wide, as CSV."""
+    for name, content in result_tables(logs, statistics).items():
+        storage.write_whole(out / name, content)
+
+
+def _predicted(paper: Path | None) -> dict[str, Prediction]:
+    """What the audit says of the published numbers."""
+    return {} if paper is None else predictions(audit(_loaded(load_paper_file, paper) or PaperFile()))
+
+
+def _coded(logs: Logs, statistics: dict[str, Any], book: remarks_coding.Codebook) -> remarks_coding.CodedRemarks:
+    """The descriptions of experiment 2, coded. `ConfigError` if the codebook does not fit them."""
+    ratings = logs.ratings
+    columns = ratings["participant_id"].astype(str), ratings["method"].astype(str), ratings["comment"].fillna("")
+    remarks = [
+        remarks_coding.Remark(participant=who, method=method, text=text)
+        for who, method, text in zip(*columns, strict=True)
+    ]
+    try:
+        return remarks_coding.code_remarks(remarks, list(statistics["preference"]["participants"]), book)
+    except (KeyError, ValueError) as error:
+        raise ConfigError(f"the codebook: {error if isinstance(error, ValueError) else 'no ratings here'}") from error
+
+
+def _by_study(logs: Logs) -> dict[str, Any]:
+    """Each study's own statistics, if there are several."""
+    found = {name: summarize(alone) for name, alone in by_study(logs).items()}
+    kept = {name: {key: one[key] for key in _PER_STUDY if key in one} for name, one in found.items()}
+    return {"studies": kept} if kept else {}
+
+
+def _with_rules(statistics: dict[str, Any], effect: Effect, rules: Rules, path: Path) -> dict[str, Any]:
+    return statistics | {
+        "excluded": [*effect.excluded, *statistics["excluded"]],
+        "warnings": [*statistics["warnings"], *effect.warnings],
+        "rules": {
+            "file": path.name,
+            "config": rules.model_dump(mode="json"),
+            "trials": effect.trials,
+            "dropped": effect.dropped,
+        },
+    }
+
+
+def _notes(effect: Effect | None) -> list[str]:
+    """How many trials the rules dropped, for the report."""
+    if effect is None:
+        return []
+    notes = []
+    for experiment, people in effect.dropped.items():
+        counts: dict[str, int] = {}
+        for by_rule in people.values():
+            for rule, count in by_rule.items():
+                counts[rule] = counts.get(rule, 0) + count
+        shown = ", ".join(f"{rule} {count}" for rule, count in sorted(counts.items())) or "none"
+        recorded = effect.trials[experiment]["recorded"]
+        notes.append(f"Trials dropped by rule in {experiment}, of {recorded}: {shown}.")
+    return notes
+
+
+def _read_by(path: Path | None, mapping: ColumnMap | None) -> dict[str, str]:
+    if path is None or mapping is None:
+        return {}
+    return {"other programs' logs read by": f"{path.name}, sha256 {sha256(mapping.model_dump(mode='json'))}"}
+
+
+def _loaded(load: Callable[[Path], Loaded], path: Path | None) -> Loaded | None:
+    try:
+        return load(path) if path else None
+    except ValueError as error:
+        raise ConfigError(str(error)) from error

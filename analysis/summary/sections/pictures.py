@@ -1,0 +1,160 @@
+"""The report's figures: when there is one, what its caption says, and what its text alternative tells."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+from analysis.report import apa
+from analysis.report.figures import (
+    ShotPanel,
+    figure_5,
+    figure_8,
+    figure_conditional_accuracy,
+    figure_directions,
+    figure_quantile_probability,
+    figure_response_times,
+    has_curve,
+    has_points,
+    named,
+    people,
+)
+from analysis.report.parts import EXPERIMENTS, Picture, ReportData, analysed
+from analysis.summary.sections.trade import CONDITIONAL_ACCURACY, QUANTILE_PROBABILITY
+
+FIGURE_5, FIGURE_8 = "figure-5", "figure-8"
+DIRECTIONS, RESPONSE_TIMES = "figure-directions", "figure-response-times"
+
+Statistics = Mapping[str, Any]
+
+_PANELS = " (a), sensitivity d′ (b) and criterion c (c)"
+_LINES = ", the absence of bias, and the d′ of somebody who is always right (log-linear correction)"
+_MARKS = "* p < .05, ** p < .01, *** p < .001, n.s. not significant"
+
+
+def write_figures(folder: Path, report: ReportData) -> None:
+    """Every figure that has data, under the stem that its picture names."""
+    statistics = report.statistics
+    if any(analysed(statistics, name) for name in EXPERIMENTS):
+        figure_8(statistics, folder / FIGURE_8)
+    if analysed(statistics, "direction"):
+        figure_directions(statistics["direction"], folder / DIRECTIONS)
+        if statistics["direction"]["response_times"]["n"]:
+            figure_response_times(statistics["direction"], folder / RESPONSE_TIMES)
+        _write_trade(folder, statistics["direction"])
+    if report.panels:
+        figure_5(report.panels, folder / FIGURE_5)
+
+
+def _write_trade(folder: Path, found: Statistics) -> None:
+    if has_curve(found):
+        figure_conditional_accuracy(found, folder / CONDITIONAL_ACCURACY)
+    if has_points(found):
+        figure_quantile_probability(found, folder / QUANTILE_PROBABILITY)
+
+
+def results_picture(statistics: Statistics) -> Picture:
+    """Figure 8 of the paper, of the experiments that have people."""
+    shown = [name for name in EXPERIMENTS if analysed(statistics, name)]
+    counts = "; ".join(f"{EXPERIMENTS[name]}, {people(statistics[name])}" for name in shown)
+    largest = max(analysed(statistics, name) for name in shown)
+    tested = any(statistics[name]["tukey"] for name in shown)
+    brackets = f" Brackets: Tukey's HSD with the repeated-measures error term ({_MARKS})." if tested else ""
+    caption = (
+        f"As the paper's Figure 8: {counts}. Bars and whiskers: mean and SD between participants; an SD may reach "
+        f"beyond the scale. {_crowd_words(largest)}{brackets}"
+    )
+    means = ". ".join(f"{EXPERIMENTS[name].capitalize()}: {_means_words(statistics[name], name)}" for name in shown)
+    tests = " ".join(_tests_words(statistics[name], name) for name in shown)
+    alt = f"Bar chart with one bar a rendering method and everybody's values. {means}. {tests}".strip()
+    return Picture(stem=FIGURE_8, caption=caption, alt=alt)
+
+
+def _crowd_words(largest: int) -> str:
+    if largest > 200:
+        return "Beyond 200 participants their distribution is shaded instead of drawn person by person."
+    return "Points: participants, each at the same place in every bar; thin lines join the values of one."
+
+
+def _means_words(found: Statistics, experiment: str) -> str:
+    shown = apa.percent if experiment == "direction" else apa.number
+    return ", ".join(f"{named(method)} {shown(mean)}" for method, mean in found["means"].items())
+
+
+def _tests_words(found: Statistics, experiment: str) -> str:
+    pairs = "; ".join(f"{named(c['a'])} against {named(c['b'])} {apa.p_value(c['p'])}" for c in found["tukey"] or [])
+    return f"Tukey's tests, {EXPERIMENTS[experiment]}: {pairs}." if pairs else ""
+
+
+def directions_picture(found: Statistics) -> Picture:
+    """Correct rates by direction beside d′ and criterion."""
+    sensitive = any(found["sensitivity"].values())
+    caption = (
+        f"Correct rate on forward and backward shots{_PANELS if sensitive else ''} of {people(found)}. Large marks and "
+        f"whiskers: mean and SD. {_direction_crowd(found['n'])} Dashed lines: guessing{_LINES if sensitive else ''}."
+    )
+    rates = "; ".join(_rates_words(found, method) for method in found["methods"])
+    alt = f"Dot plot of the mean correct rates with everybody's values and a line at chance, 50 %. {rates}."
+    return Picture(stem=DIRECTIONS, caption=caption, alt=alt)
+
+
+def _direction_crowd(n: int) -> str:
+    if n > 200:
+        return "Shaded: histograms over participants; in (a) forward to the left, backward to the right."
+    return "Small marks: participants; thin lines join the values of one."
+
+
+def _rates_words(found: Statistics, method: str) -> str:
+    forward, backward = found["means"][method], found["backward"]["means"].get(method)
+    rates = f"{named(method)} {apa.percent(forward)} forward, {apa.percent(backward)} backward"
+    return rates + _sensitivity_words(found["sensitivity"][method])
+
+
+def _sensitivity_words(one: Statistics | None) -> str:
+    if one is None:
+        return ""
+    return f", d′ {apa.number(one['d_prime']['mean'])}, criterion {apa.number(one['criterion']['mean'])}"
+
+
+def response_times_picture(found: Statistics) -> Picture | None:
+    """Response times, if there is a valid one."""
+    times = found["response_times"]
+    if not times["n"]:
+        return None
+    medians = " Points: medians of the participants." if len(times["participants"]) <= 200 else ""
+    caption = (
+        f"Response times from the onset of the pulse, {times['n']:,} valid times of {people(found)}. "
+        f"(a) Share of the trials answered by then. (b) By direction, n forward / backward; boxes: quartiles, "
+        f"whiskers: 5 and 95 %.{medians}"
+    )
+    spreads = "; ".join(_spread_words(method, spread) for method, spread in times["methods"].items() if spread)
+    alt = f"Cumulative distributions and box plots of the response times. {spreads}."
+    return Picture(stem=RESPONSE_TIMES, caption=caption, alt=alt)
+
+
+def _spread_words(method: str, spread: Statistics) -> str:
+    low, median, high = (apa.number(spread["percentiles"][at]) for at in (25, 50, 75))
+    return f"{named(method)} median {median} s, quartiles {low} and {high} s"
+
+
+def shot_picture(panels: tuple[ShotPanel, ...]) -> Picture:
+    """Figure 5 of the paper."""
+    caption = (
+        "As the paper's Figure 5: force on the hand F (positive in the direction of recoil), displacement x, velocity "
+        "dx/dt and drive u of one simulated shot. Dashed lines and circles: ends of the stages. Arrow: estimated force "
+        "of the collision with the rear stop, apart from F."
+    )
+    landings = "; ".join(
+        f"column {chr(ord('a') + i)}, {panel.title}: {_landing_words(panel)}" for i, panel in enumerate(panels)
+    )
+    alt = f"Line charts of F, x, dx/dt and u over time, one column a friction. {landings}."
+    return Picture(stem=FIGURE_5, caption=caption, alt=alt)
+
+
+def _landing_words(panel: ShotPanel) -> str:
+    peaks = f"F up to {apa.number(float(panel.force_N.max()), 1)} N, x up to "
+    peaks += f"{apa.number(float(panel.displacement_m.max()) * 1e3, 1)} mm"
+    if not panel.collision_force_N >= 0.0:
+        return f"{peaks}, no landing"
+    return f"{peaks}, collision with {apa.number(panel.collision_force_N, 1 if panel.collision_force_N >= 1 else 2)} N"

@@ -1,0 +1,212 @@
+"""A report's sections in their order. A section without data is left out."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Mapping
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+from analysis.paper.odds import Odds
+from analysis.paper.published import AUDITED, Row
+from analysis.report import apa
+from analysis.summary.sections.experiments import direction_section, preference_section
+from analysis.report.figures import ShotPanel, named
+from analysis.report.parts import EXPERIMENTS, LISTED, SHOWN, ReportData, Section, Table, analysed, shortened
+from analysis.summary.sections.pictures import results_picture, shot_picture
+from analysis.summary.sections.supplement import supplement_sections
+from analysis.summary.sections.trade import trade_section
+
+_HANDS = {
+    "participant": "the participant's own hand",
+    "experimenter": "the experimenter's hand",
+    "synthetic": "synthetic participants",
+}
+_LUCK = (
+    "One replication is luck. The table says how often each published claim recurred over many simulated replications "
+    "of the study, with a 95 % Wilson interval; a claim that recurs in two of three would fail in one of three honest "
+    "repetitions."
+)
+
+
+def sections(report: ReportData) -> tuple[Section, ...]:
+    """All sections that have something to say."""
+    statistics = report.statistics
+    found = [
+        _analysed(report),
+        _glance(statistics) if any(analysed(statistics, name) for name in EXPERIMENTS) else None,
+        _verdicts(report.comparison) if report.comparison else None,
+        direction_section(statistics["direction"]) if analysed(statistics, "direction") else None,
+        trade_section(statistics["direction"]) if analysed(statistics, "direction") else None,
+        preference_section(statistics["preference"]) if analysed(statistics, "preference") else None,
+        *supplement_sections(statistics),
+        *report.extra,
+        _odds(report.odds) if report.odds else None,
+        _shot(report.panels) if report.panels else None,
+        _left_out(report),
+        _provenance(report),
+    ]
+    return tuple(section for section in found if section is not None)
+
+
+def _analysed(report: ReportData) -> Section:
+    rows = tuple(
+        (name.capitalize(), f"{analysed(report.statistics, key):,}", f"{_excluded(report.statistics, key):,}")
+        for key, name in EXPERIMENTS.items()
+        if key in report.statistics
+    )
+    table = Table(caption="Participants", header=("Experiment", "Analysed", "Left out as incomplete"), rows=rows)
+    files = f"{len(report.files):,} log files were read. " if report.files else ""
+    bad = f"Left out, with the reasons listed below: {len(report.problems)}." if report.problems else ""
+    text = (files + bad).strip()
+    nothing = () if rows else ("There was nothing to analyse.",)
+    present = [key for key in EXPERIMENTS if analysed(report.statistics, key)]
+    origins = tuple(_origin(EXPERIMENTS[key], report.statistics[key]) for key in present)
+    return Section(
+        title="What was analysed",
+        paragraphs=(*((text,) if text else ()), *nothing, *origins),
+        tables=(table,) if rows else (),
+    )
+
+
+def _origin(name: str, found: Mapping[str, Any]) -> str:
+    """Who answered, and on which gun: nobody is to take synthetic participants for people."""
+    answers = ", ".join(f"{count} by {_HANDS[hand]}" for hand, count in found["origin"]["answers"].items())
+    guns = ", ".join(f"{count} on {_gun(gun)}" for gun, count in found["origin"]["guns"].items())
+    trials = f"; trials {guns}" if guns else ""
+    return f"{name.capitalize()}: answers {answers}{trials}."
+
+
+def _gun(name: str) -> str:
+    return "the simulated gun" if name == "simulated" else f"the gun {name}"
+
+
+def _excluded(statistics: Mapping[str, Any], experiment: str) -> int:
+    return sum(entry["experiment"] == experiment for entry in statistics.get("excluded", []))
+
+
+def _verdicts(comparison: tuple[Row, ...]) -> Section:
+    experiments = dict.fromkeys(row.experiment for row in comparison)
+    return Section(
+        title="Published and obtained",
+        paragraphs=(_agreement(comparison), *_audited(comparison)),
+        tables=tuple(_verdict_table(experiment, comparison) for experiment in experiments),
+    )
+
+
+def _agreement(comparison: tuple[Row, ...]) -> str:
+    words = ("agrees", "differs", "differs as predicted", "not obtained")
+    agrees, differs, predicted, missing = (sum(row.verdict == verdict for row in comparison) for verdict in words)
+    told = f"{agrees} published numbers and claims agree, {differs} differ"
+    told += f", {predicted} {'differs' if predicted == 1 else 'differ'} as the audit predicted" if predicted else ""
+    told += f", {missing} were not obtained." if missing else "."
+    return told + " A number agrees if it rounds to the printed digits, a bound or an order if it is true here."
+
+
+def _audited(comparison: tuple[Row, ...]) -> tuple[str, ...]:
+    """What the audit's column says, where there is one."""
+    if not any(row.audit for row in comparison):
+        return ()
+    return (
+        "The audit asks beforehand whether any data could give the published number beside the others. What differs as "
+        "predicted is the nearest value that data can have. Numbers that no log holds carry the audit's verdict alone.",
+    )
+
+
+def _verdict_table(experiment: str, comparison: tuple[Row, ...]) -> Table:
+    rows = [row for row in comparison if row.experiment == experiment]
+    if any(row.verdict in AUDITED for row in rows):
+        header: tuple[str, ...] = ("Quantity", "Published", "Verdict", "Note")
+        cells = [(row.quantity, row.published, row.verdict, row.note) for row in rows]
+        return Table(caption="Published numbers that no log holds, by the audit", header=header, rows=tuple(cells))
+    header, audited = ("Quantity", "Published", "Obtained", "Verdict"), any(row.audit for row in rows)
+    return Table(
+        caption=f"{EXPERIMENTS.get(experiment, experiment).capitalize()}, every published number beside the obtained",
+        header=(*header, *(("Audit",) if audited else ()), "Note"),
+        rows=tuple(
+            (
+                *(named(row.quantity), row.published or apa.NONE, obtained_text(row), row.verdict),
+                *((row.audit or apa.NONE,) if audited else ()),
+                row.note,
+            )
+            for row in rows
+        ),
+    )
+
+
+def obtained_text(row: Row) -> str:
+    """The obtained number with as many decimals as are printed; two where nothing is printed.
+
+    >>> obtained_text(Row(experiment="", quantity="", published="55.7 %", obtained=61.43, verdict="differs"))
+    '61.4 %'
+    """
+    if row.obtained is None:
+        return apa.NONE
+    if row.published.startswith("<"):
+        return apa.p_cell(row.obtained)
+    digits, _, unit = row.published.partition(" ")
+    decimals = len(digits.partition(".")[2]) if digits else 2
+    return f"{apa.number(row.obtained, decimals)} {unit}".strip()
+
+
+def _glance(statistics: Mapping[str, Any]) -> Section:
+    return Section(title="Results at a glance", pictures=(results_picture(statistics),))
+
+
+def _shot(panels: tuple[ShotPanel, ...]) -> Section:
+    return Section(title="The shot", pictures=(shot_picture(panels),))
+
+
+def _odds(odds: tuple[Odds, ...]) -> Section:
+    tables = tuple(
+        Table(
+            caption=f"{EXPERIMENTS.get(one.experiment, one.experiment).capitalize()}: {one.replications} replications",
+            header=("Published claim", "Recurs in", "95 % CI [%]"),
+            rows=tuple(
+                (named(row.claim), apa.percent(row.share), apa.interval(100.0 * row.ci_low, 100.0 * row.ci_high, 1))
+                for row in one.rows
+            ),
+        )
+        for one in odds
+    )
+    assumed = dict.fromkeys(one.assumptions for one in odds)
+    return Section(title="Odds of the published pattern", paragraphs=(_LUCK, *assumed), tables=tables)
+
+
+def _left_out(report: ReportData) -> Section | None:
+    excluded = tuple(
+        f"Participant {entry['participant']} in {EXPERIMENTS.get(entry['experiment'], entry['experiment'])}: "
+        f"{entry['reason']}."
+        for entry in report.statistics.get("excluded", [])
+    )
+    names = _short_names(report)
+    problems = tuple(str(replace(problem, file=names[problem.file])) for problem in report.problems)
+    warnings = tuple(f"Warning: {warning}." for warning in report.statistics.get("warnings", []))
+    items = (*shortened(excluded, "exclusions"), *shortened(problems, "problems"), *shortened(warnings, "warnings"))
+    return Section(title="Exclusions and problems", items=items) if items else None
+
+
+def _short_names(report: ReportData) -> dict[Path, Path]:
+    """Files by their path below the folder that holds them all: a report says nothing of the machine it was made on."""
+    files = [*report.files, *(problem.file for problem in report.problems)]
+    folders = {file.absolute().parent for file in files}
+    root = Path(os.path.commonpath(folders)) if folders else Path()
+    return {file: file.absolute().relative_to(root) for file in files}
+
+
+def _provenance(report: ReportData) -> Section | None:
+    pairs = [*report.provenance.items(), *report.statistics.get("versions", {}).items()]
+    rows = [*dict.fromkeys(pairs), *_file_rows(report)]
+    if not rows and not report.notes:
+        return None
+    table = Table(caption="Where the numbers come from", header=("What", "Value"), rows=tuple(rows))
+    return Section(title="Provenance and assumptions", items=report.notes, tables=(table,) if rows else ())
+
+
+def _file_rows(report: ReportData) -> list[tuple[str, str]]:
+    names = _short_names(report)
+    shown = report.files if len(report.files) <= LISTED else report.files[:SHOWN]
+    rows = [("log file", names[file].as_posix()) for file in shown]
+    rest = len(report.files) - len(shown)
+    return [*rows, ("log files", f"and {rest:,} more")] if rest else rows

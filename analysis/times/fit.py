@@ -1,0 +1,244 @@
+"""Maximum-likelihood fit of the diffusion model, with intervals and with what the data cannot tell."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from scipy import optimize, special
+
+from analysis.stats.arrays import FloatArray, share
+from analysis.times.ez import ez_from_summary
+from analysis.times.likelihood import (
+    Model,
+    Range,
+    Trials,
+    coordinates,
+    log_likelihood,
+    model_of,
+    natural,
+    trial_scores,
+)
+
+EDGE = 1e-4
+"""A share of lapses below this counts as none: its logit has no curvature left to take an interval from."""
+BLIND = 1e-6
+"""An eigenvalue of the information, scaled to a diagonal of ones, below this marks a direction the data do not see."""
+STEP = 1e-4
+
+_DRIFT_END, _LOG_BOUNDARY_END, _LOGIT_END = 100.0, 5.0, 12.0
+"""As far as a fit climbs: boundaries of 0.007 to 150 sqrt(s), shares to 6e-6 of their ends."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Estimate:
+    """A parameter in its own unit: drift 1/sqrt(s), boundary sqrt(s), start (z/a) and lapse 0..1, time s.
+
+    NaN limits where the data do not tell it. `se` is of the estimate itself, by the delta method.
+    """
+
+    name: str
+    value: float
+    se: float
+    ci_low: float
+    ci_high: float
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class DiffusionFit:
+    """A fitted model. `unidentified` names parameters on which the data have no grip.
+
+    With a `reason` the fit failed and has no intervals.
+    """
+
+    estimates: tuple[Estimate, ...]
+    log_likelihood: float
+    trials: int
+    clusters: int | None  # people behind a sandwich covariance; None for the model's own
+    unidentified: tuple[str, ...] = ()
+    reason: str | None = None
+
+    def __getitem__(self, name: str) -> Estimate:
+        """The estimate of a name. `KeyError`: there is none."""
+        for estimate in self.estimates:
+            if estimate.name == name:
+                return estimate
+        raise KeyError(name)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class _Peak:
+    at: FloatArray
+    value: float
+    converged: bool
+
+
+def fit(
+    trials: Trials,
+    *,
+    bias: bool = True,
+    lapses: bool | Range = False,
+    by_person: bool = False,
+    confidence: float = 0.95,
+    near: DiffusionFit | None = None,
+) -> DiffusionFit:
+    """Fit a drift a condition, a boundary an instruction, t0, and if asked the start and the lapses, to all trials.
+
+    `lapses`: True for lapses over the range of the data, or the range in s that they are known to have.
+    A truncated Newton method on the exact gradient (Nash 1984, SIAM J. Numer. Anal. 21, 770) from three starts, EZ's
+    and two multiples of it, the best of which is kept; L-BFGS-B climbs as high, but its threads wait for one another.
+    Intervals are Wald's in coordinates without bounds (log, logit), from the observed information, so they stay within
+    their range; with `by_person` from the sandwich of people's summed scores and t on people - 1 degrees of freedom.
+    `near`: a fit of like data to climb from, which saves two of three climbs; if that ends nowhere, the three are made.
+    When people differ the estimates are those of a compromise person all the same: t0 is pulled towards the fastest,
+    drifts towards 0, boundaries up, and no interval cures that (`people.fit_people` averages over people instead).
+    `profile.profile` gives likelihood intervals. Without participants' own times none of this can be: accuracy alone
+    fixes only the product of drift and boundary. `ValueError`: confidence outside 0..1.
+    Source: Ratcliff & Tuerlinckx 2002, Psychon. Bull. Rev. 9, 438.
+    """
+    alpha = 1.0 - share(confidence, "confidence")
+    model = model_of(trials, bias=bias, lapses=lapses)
+    peak = best(model, starts(model) if near is None else [_beside(model, near)])
+    if near is not None and not peak.converged:
+        peak = best(model, starts(model))
+    people = np.unique(trials.person).size if by_person else None
+    covariance, unidentified = _covariance(model, peak.at, by_person=by_person)
+    if not peak.converged:
+        covariance = np.full_like(covariance, math.nan)
+    critical = -float(special.stdtrit(people - 1, alpha / 2.0) if people else special.ndtri(alpha / 2.0))
+    return DiffusionFit(
+        estimates=_estimates(model, peak.at, np.sqrt(np.diag(covariance)), critical),
+        log_likelihood=peak.value,
+        trials=trials.time_s.size,
+        clusters=people,
+        unidentified=unidentified,
+        reason=None if peak.converged else "no start converged: the likelihood has no clear peak",
+    )
+
+
+def starts(model: Model) -> list[FloatArray]:
+    """Coordinates to climb from: EZ's of all trials together, and with the boundary halved and doubled."""
+    trials = model.trials
+    right = trials.upper == (trials.sign > 0)
+    times = trials.time_s[right] if right.sum() > 2 else trials.time_s
+    found = ez_from_summary(float(right.mean()), float(times.mean()), float(times.var() + 1e-6), times.size)
+    boundary = min(max(found.boundary, 0.3), 5.0)
+    t0 = min(max(found.non_decision_s, 0.3 * model.cap_s), 0.9 * model.cap_s)
+    places = []
+    for factor in (1.0, 0.5, 2.0):
+        values = [_first_drift(right[trials.condition == c], boundary) for c in range(model.drifts)]
+        values += [boundary * factor] * model.boundaries + [0.5] * model.bias + [t0] + [0.02] * model.lapses
+        places.append(coordinates(model, np.array(values)))
+    return places
+
+
+def _beside(model: Model, near: DiffusionFit) -> FloatArray:
+    """Coordinates at the estimates of another fit; `KeyError` if it lacks a parameter."""
+    values = np.array([near[name].value for name in model.names])
+    first = model.drifts + model.boundaries
+    values[model.drifts : first] = np.clip(values[model.drifts : first], 0.01, 100.0)
+    values[first:] = np.clip(values[first:], 0.01, 0.99)
+    values[first + model.bias] = min(near["non_decision_s"].value, 0.9 * model.cap_s)
+    return coordinates(model, values)
+
+
+def _first_drift(right: FloatArray, boundary: float) -> float:
+    n = right.size
+    rate = (right.sum() + 0.5) / (n + 1.0)
+    return float(special.logit(rate)) / boundary
+
+
+def best(model: Model, places: list[FloatArray], held: tuple[int, float] | None = None) -> _Peak:
+    """The highest peak climbed to from the given places, one coordinate held if asked."""
+    return max((_climb(model, place, held) for place in places), key=lambda peak: (peak.converged, peak.value))
+
+
+def _climb(model: Model, place: FloatArray, held: tuple[int, float] | None) -> _Peak:
+    n = model.trials.time_s.size
+    at = np.array(place)
+    free = np.ones(at.size, dtype=np.bool_)
+    if held is not None:
+        free[held[0]], at[held[0]] = False, held[1]
+
+    def loss(part: FloatArray) -> tuple[float, FloatArray]:
+        at[free] = part
+        value, slope = log_likelihood(model, at)
+        return -value / n, -slope[free] / n
+
+    ends = [_DRIFT_END] * model.drifts + [_LOG_BOUNDARY_END] * model.boundaries
+    ends += [_LOGIT_END] * (at.size - len(ends))
+    bounds = [(-end, end) for end, open_ in zip(ends, free, strict=True) if open_]
+    found = optimize.minimize(
+        loss,
+        at[free],
+        jac=True,
+        method="TNC",
+        bounds=bounds,
+        options={"maxfun": 2000, "ftol": 1e-13, "gtol": 1e-7},
+    )
+    at[free] = found.x
+    return _Peak(at=at, value=-float(found.fun) * n, converged=bool(np.abs(found.jac).max() < 1e-4))
+
+
+def information(model: Model, at: FloatArray) -> FloatArray:
+    """The observed information in the coordinates: central differences of the exact gradient."""
+    rows = []
+    for i in range(at.size):
+        step = np.zeros(at.size)
+        step[i] = STEP
+        ahead, behind = (log_likelihood(model, at + sign * step)[1] for sign in (1.0, -1.0))
+        rows.append((behind - ahead) / (2.0 * STEP))
+    matrix = np.array(rows)
+    return (matrix + matrix.T) / 2.0
+
+
+def _covariance(model: Model, at: FloatArray, *, by_person: bool) -> tuple[FloatArray, tuple[str, ...]]:
+    """Covariance of the coordinates (NaN where there is none) and the names that the data do not tell."""
+    matrix = information(model, at)
+    seen = np.ones(at.size, dtype=np.bool_)
+    if model.lapses and special.expit(at[-1]) < EDGE:
+        seen[-1] = False
+    seen &= np.diag(matrix) > 0.0
+    seen[np.flatnonzero(seen)[_blind(matrix[np.ix_(seen, seen)])]] = False
+    covariance = np.full_like(matrix, math.nan)
+    inverse = np.linalg.inv(matrix[np.ix_(seen, seen)])
+    if by_person:
+        inverse = inverse @ _spread(model, at)[np.ix_(seen, seen)] @ inverse
+    covariance[np.ix_(seen, seen)] = inverse
+    return covariance, tuple(name for name, known in zip(model.names, seen, strict=True) if not known)
+
+
+def _blind(matrix: FloatArray) -> FloatArray:
+    """Which coordinates take part in a direction without information."""
+    scale = np.sqrt(np.diag(matrix))
+    values, vectors = np.linalg.eigh(matrix / np.outer(scale, scale))
+    flat = vectors[:, values < BLIND]
+    return np.asarray((np.abs(flat) > 0.1).any(axis=1))
+
+
+def _spread(model: Model, at: FloatArray) -> FloatArray:
+    """Sum over people of the outer products of their scores, n / (n - 1) times."""
+    _, scores = trial_scores(model, at)
+    person = model.trials.person
+    summed = np.zeros((int(person.max()) + 1, at.size))
+    np.add.at(summed, person, scores)
+    n = len(summed)
+    return summed.T @ summed * (n / (n - 1.0)) if n > 1 else np.full((at.size, at.size), math.nan)
+
+
+def _estimates(model: Model, at: FloatArray, se: FloatArray, critical: float) -> tuple[Estimate, ...]:
+    known = np.where(np.isfinite(se), se, 0.0)
+    low, value, high = (natural(model, at + sign * critical * known) for sign in (-1.0, 0.0, 1.0))
+    slope = (natural(model, at + STEP) - natural(model, at - STEP)) / (2.0 * STEP)
+    blank = np.where(np.isfinite(se), 0.0, math.nan)
+    return tuple(
+        Estimate(
+            name=name,
+            value=float(value[i]),
+            se=float(slope[i] * se[i]),
+            ci_low=float(low[i] + blank[i]),
+            ci_high=float(high[i] + blank[i]),
+        )
+        for i, name in enumerate(model.names)
+    )

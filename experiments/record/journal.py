@@ -1,0 +1,281 @@
+"""The journal of a run: append-only, synced record by record. It is the truth; every table is made from it.
+
+One JSON object a line. The first record holds the whole plan, the resolved setup and where they came from. Every record
+has its number `n`, its `kind`, monotonic and UTC time, when the record before it was on the disk (`synced_s`), and the
+hash of that record's line (`link`): a record changed by hand breaks the chain.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import os
+from concurrent.futures import Future, ThreadPoolExecutor
+from contextlib import suppress
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, Literal, Self, get_args
+
+from experiments.record import storage
+from experiments.config.canonical import canonical_json, sha256
+from experiments.clock import Clock
+
+Kind = Literal["run", "step", "outcome", "shot", "remark", "resumed", "stopped", "finished"]
+_KINDS = get_args(Kind)
+_PATIENCE_S = 0.5
+"""How long a journal is tried that somebody may only be looking at."""
+
+
+class JournalError(Exception):
+    """A journal that cannot be written or read; the message says what is safe."""
+
+
+class JournalGone(JournalError):  # noqa: N818 - what is so, not what went wrong
+    """A journal that was deleted or moved while it was written; the message says where it is now, if anywhere."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Contents:
+    """What a journal holds: its whole records, their length in bytes, and what stands behind them cut off."""
+
+    path: Path
+    records: tuple[dict[str, Any], ...]
+    whole_bytes: int
+    cut_bytes: int
+    link: str
+
+    @property
+    def header(self) -> dict[str, Any]:
+        """The first record: plan, setup, provenance."""
+        return self.records[0]
+
+    @property
+    def finished(self) -> bool:
+        """Whether the run came to its end."""
+        return bool(self.records[-1]["kind"] == "finished")
+
+    @property
+    def cut_message(self) -> str | None:
+        """One clear sentence if the last record is cut off, else nothing."""
+        if not self.cut_bytes:
+            return None
+        return (
+            f"{self.path}: line {len(self.records) + 1} is cut off after {self.cut_bytes} bytes and was never "
+            f"acknowledged; everything up to record {self.records[-1]['n']} is read"
+        )
+
+
+class Journal:
+    """A journal open for writing. Each `append` returns when the record is on the disk, or raises `JournalError`.
+
+    A thread of its own writes, so that an interrupt, which reaches the main thread alone, never hits half a record.
+    """
+
+    def __init__(self, path: Path, descriptor: int, clock: Clock, before: Contents | None = None) -> None:
+        self.path = path
+        self._descriptor = descriptor
+        self._clock = clock
+        self._count = len(before.records) if before else 0
+        self._length = before.whole_bytes if before else 0
+        self._link = before.link if before else ""
+        self._synced_s: float | None = None
+        self._gone = ""
+        self._writer = ThreadPoolExecutor(max_workers=1, thread_name_prefix="journal")
+
+    @classmethod
+    def create(cls, path: Path, clock: Clock) -> Self:
+        """A new journal; its name is on the disk when this returns."""
+        try:
+            descriptor = storage.create(path)
+        except OSError as error:
+            raise JournalError(f"{path}: cannot be created ({error.strerror}); nothing was recorded") from error
+        return cls(path, _held(path, descriptor), clock)
+
+    @classmethod
+    def reopen(cls, contents: Contents, clock: Clock) -> Self:
+        """A journal to go on with: what was cut off, and so never acknowledged, is taken away first.
+
+        `JournalError` if another run holds it, or wrote to it since `contents` was read.
+        """
+        descriptor = hold(contents.path)
+        try:
+            if os.fstat(descriptor).st_size != contents.whole_bytes + contents.cut_bytes:
+                raise JournalError(f"{contents.path}: another run wrote to it just now; look again and start anew")
+            os.ftruncate(descriptor, contents.whole_bytes)
+        except BaseException:
+            os.close(descriptor)
+            raise
+        return cls(contents.path, descriptor, clock, contents)
+
+    def append(self, kind: Kind, **body: object) -> None:
+        """Write one record and return when it is on the disk."""
+        self.submit(kind, **body).result()
+
+    def submit(self, kind: Kind, **body: object) -> Future[None]:
+        """Have one record written after those submitted before; the result is there when it is on the disk."""
+        times = {"monotonic_s": self._clock.now(), "utc": self._clock.utc()}
+        return self._writer.submit(self._write, {"kind": kind, **times, **body})
+
+    def _write(self, record: dict[str, object]) -> None:
+        if self._gone:  # what stands written again is whole: nothing more goes where nobody finds it
+            raise JournalGone(self._gone)
+        try:
+            line = canonical_json({"n": self._count, "link": self._link, "synced_s": self._synced_s, **record}) + b"\n"
+            storage.write_all(self._descriptor, line)
+            storage.sync(self._descriptor)
+        except (OSError, ValueError) as error:
+            self._take_back()
+            reason = error.strerror if isinstance(error, OSError) else error
+            raise JournalError(
+                f"{self.path}: record {self._count} cannot be written ({reason}); "
+                f"everything up to record {self._count - 1} is safe on the disk"
+            ) from error
+        self._synced_s = self._clock.now()
+        self._count += 1
+        self._length += len(line)
+        self._link = link(line)
+        if not storage.is_at(self._descriptor, self.path):
+            self._gone = self._rescue()
+            raise JournalGone(self._gone)
+
+    def _rescue(self) -> str:
+        """Write a journal again that was deleted, from what is open; where it is now, and what to do."""
+        what, upto = f"{self.path}: the journal", f"Everything up to record {self._count - 1} is"
+        moved = storage.moved_to(self._descriptor)
+        if moved is not None:
+            return f"{what} was moved to {moved} during the run. {upto} there; resume it there"
+        data = storage.read_open(self._descriptor, self._length)
+        for path in (self.path, Path.cwd() / self.path.name, Path.home() / self.path.name):
+            if _written_again(path, data):
+                how = "go on with --resume" if path == self.path else f"put it back as {self.path}, then resume"
+                return f"{what} was deleted during the run. {upto} written again to {path}; {how}"
+        return f"{what} was deleted during the run, and cannot be written anywhere else: this run is lost"
+
+    def _take_back(self) -> None:
+        """Remove a record that was not acknowledged, so that the journal ends with a whole one."""
+        with suppress(OSError):  # readers leave out what is cut off, so a rest of it does no harm
+            os.ftruncate(self._descriptor, self._length)
+
+    def close(self) -> None:
+        """Let go of the file, after what was submitted."""
+        self._writer.shutdown()
+        os.close(self._descriptor)
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.close()
+
+
+def _written_again(path: Path, data: bytes) -> bool:
+    """Whether a file could be made of this, where none was."""
+    try:
+        storage.make_folder(path.parent)
+        descriptor = storage.create(path)
+    except OSError:
+        return False
+    try:
+        storage.write_all(descriptor, data)
+        storage.sync(descriptor)
+    except OSError:
+        return False
+    finally:
+        os.close(descriptor)
+    return True
+
+
+def hold(path: Path) -> int:
+    """An existing journal opened for this process alone. `JournalError` if it is gone or another run holds it."""
+    try:
+        descriptor = storage.reopen(path)
+    except OSError as error:
+        raise JournalError(f"{path}: cannot be opened ({error.strerror})") from error
+    return _held(path, descriptor)
+
+
+def _held(path: Path, descriptor: int) -> int:
+    if not storage.hold(descriptor, _PATIENCE_S):
+        os.close(descriptor)
+        raise JournalError(f"{path}: another run holds this journal; close that one first")
+    return descriptor
+
+
+def link(line: bytes) -> str:
+    """What the next record says of a line: the first 16 digits of its SHA-256."""
+    return hashlib.sha256(line.rstrip(b"\r\n")).hexdigest()[:16]
+
+
+def parsed(line: bytes) -> dict[str, Any]:
+    """The JSON object on a line; else `JournalError`."""
+    try:
+        value = json.loads(line)
+    except (ValueError, RecursionError) as error:
+        raise JournalError(f"not a JSON record ({error}); it was changed or damaged") from error
+    if not isinstance(value, dict):
+        raise JournalError("not a JSON object; it was changed or damaged")
+    return value
+
+
+def check_chain(value: dict[str, Any], number: int, before: str) -> None:
+    """`JournalError` unless the record's number `n` and its `link` follow from the line before."""
+    if value.get("n") != number:
+        raise JournalError(f"record number is {value.get('n')!r}, must be {number}; a line was lost or added")
+    if value.get("link") != before:
+        raise JournalError(f"does not follow from line {number}, which was changed after it was written")
+
+
+def read(path: Path) -> Contents:
+    """Every whole record of a journal. A record is whole if its line has its end; the rest is counted, not read.
+
+    `JournalError` names file, line and rule if there is no whole record, or if one was changed by hand.
+    """
+    data = _bytes(path)
+    whole_bytes = data.rfind(b"\n") + 1
+    lines = data[:whole_bytes].split(b"\n")[:-1]
+    _check_head(path, lines)
+    links = ["", *map(link, lines)]
+    records = tuple(_record(path, number, line, links[number]) for number, line in enumerate(lines))
+    cut_bytes = len(data) - whole_bytes
+    return Contents(path=path, records=records, whole_bytes=whole_bytes, cut_bytes=cut_bytes, link=links[-1])
+
+
+def head(path: Path) -> dict[str, Any] | None:
+    """The first record of a journal: plan, setup, provenance. `None` if the run was killed before it was whole."""
+    lines = _bytes(path).split(b"\n", 1)[:-1]
+    return _check_head(path, lines) if lines else None
+
+
+def is_empty(path: Path) -> bool:
+    """Whether a journal holds no whole record: the run was killed before anything was acknowledged."""
+    return b"\n" not in _bytes(path)
+
+
+def _bytes(path: Path) -> bytes:
+    try:
+        return path.read_bytes()
+    except OSError as error:
+        raise JournalError(f"{path}: cannot be read ({error.strerror})") from error
+
+
+def _check_head(path: Path, lines: list[bytes]) -> dict[str, Any]:
+    if not lines:
+        raise JournalError(f"{path}: line 1: no whole record, so nothing was acknowledged")
+    first = _record(path, 0, lines[0], "")
+    if first["kind"] != "run" or not {"plan", "setup"} <= first.keys():
+        raise JournalError(f"{path}: line 1: not the head of a journal (kind `run` with `plan` and `setup`)")
+    for part in ("plan", "setup"):
+        if sha256(first[part]) != first.get(f"{part}_sha256"):
+            raise JournalError(f"{path}: line 1: {part} does not have the hash {part}_sha256; it was changed")
+    return first
+
+
+def _record(path: Path, number: int, line: bytes, before: str) -> dict[str, Any]:
+    try:
+        value = parsed(line)
+        if value.get("kind") not in _KINDS:
+            raise JournalError(f"kind must be one of {', '.join(_KINDS)}; it was changed or damaged")
+        check_chain(value, number, before)
+    except JournalError as error:
+        raise JournalError(f"{path}: line {number + 1}: {error}") from error
+    return value

@@ -1,1 +1,0 @@
-"""The roof: the command line, and what needs the gun, the experiments and the analysis together."""

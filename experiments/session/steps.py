@@ -1,0 +1,285 @@
+"""The words between a session and the world: steps say what should happen, outcomes what did.
+
+Both are frozen facts. `kind` names them in the journal, from which they are read back and checked by pydantic.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Generator
+from dataclasses import asdict, dataclass
+from typing import Annotated, Any, Literal
+
+from pydantic import Field, TypeAdapter
+
+from device.words import Direction, ShotTiming
+from experiments.design.plan import Trial, where_given
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Prepare:
+    """Take the gun, turn it to the trial's direction, set the damper if one is named, hand it over.
+
+    `instruction` is the text of what the participant is told for this set, empty if nothing.
+    """
+
+    trial: Trial
+    attempt: int
+    damper: str
+    instruction: str = ""
+    kind: Literal["prepare"] = "prepare"
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Fire:
+    """Fire one shot of the trial's method."""
+
+    trial: Trial
+    attempt: int
+    kind: Literal["fire"] = "fire"
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Ask:
+    """Ask which way it shot, and take one of two answers."""
+
+    trial: Trial
+    attempt: int
+    question: str
+    forward: str
+    backward: str
+    kind: Literal["ask"] = "ask"
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Rest:
+    """A break that cannot be cut short without a recorded reason."""
+
+    between: Literal["sets", "sessions"]
+    duration_s: float
+    kind: Literal["rest"] = "rest"
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Present:
+    """Fire a shot every so often until the participant says next, which counts after the least exposure."""
+
+    trial: Trial
+    attempt: int
+    repeat_every_s: float
+    max_shots: int
+    least_exposure_s: float
+    kind: Literal["present"] = "present"
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Rate:
+    """Ask for a rating of the trial's stimulus, which is named by its order of presentation."""
+
+    trial: Trial
+    question: str
+    minimum: float
+    maximum: float
+    minimum_text: str
+    maximum_text: str
+    grain: float
+    kind: Literal["rate"] = "rate"
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Describe:
+    """Ask for a free description of the trial's stimulus."""
+
+    trial: Trial
+    question: str
+    kind: Literal["describe"] = "describe"
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Close:
+    """Everything is answered: correct, note and flag what is left, then end the run."""
+
+    kind: Literal["close"] = "close"
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Prepared:
+    """The gun is in the participant's hand, with the damper set as it was asked for: whoever fires confirms it.
+
+    `damper` is `None` where none is set by hand, and in journals from before it was kept.
+    """
+
+    damper: str | None = None
+    kind: Literal["prepared"] = "prepared"
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Fired:
+    """One shot was fired. Times are on the host's monotonic clock; home is predicted by the model.
+
+    `timing` tells how it came about, where a gun on a line was asked.
+    """
+
+    gun: str
+    onset_utc: str
+    requested_s: float
+    pulse_start_s: float
+    pulse_end_s: float
+    home_predicted_s: float
+    motion: str
+    timing: ShotTiming | None = None
+    kind: Literal["fired"] = "fired"
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Answered:
+    """The participant said which way. The time is valid if it came from the participant's own hand.
+
+    `key_time_s` is when the key for it went down, since the onset, where the response time is not that of the key: a
+    synthetic participant's is the observer's.
+    """
+
+    response: Direction
+    response_time_s: float
+    response_source: Literal["participant", "experimenter", "synthetic"]
+    response_time_valid: bool
+    key_time_s: float | None = None
+    kind: Literal["answered"] = "answered"
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Rested:
+    """The break is over; `cut_reason` says why it was shorter than planned, empty if it was not."""
+
+    rested_s: float
+    cut_reason: str = ""
+    kind: Literal["rested"] = "rested"
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Presented:
+    """The stimulus was felt until next was said, or until the most shots were fired.
+
+    `timings`: how each shot came about, in journals from before each had a record of its own (`TrainShot`).
+    """
+
+    gun: str
+    onset_utc: str
+    shots: int
+    exposure_s: float
+    ended_by: Literal["next", "limit"]
+    timings: tuple[ShotTiming, ...] = ()
+    kind: Literal["presented"] = "presented"
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class TrainShot:
+    """One shot of a train, recorded as soon as it was fired: of a train that breaks off it is known what was felt.
+
+    `shot` counts from 1; times and `timing` as in `Fired`.
+    """
+
+    shot: int
+    requested_s: float
+    pulse_start_s: float
+    pulse_end_s: float
+    home_predicted_s: float
+    motion: str
+    timing: ShotTiming | None = None
+    kind: Literal["train-shot"] = "train-shot"
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Rated:
+    """A rating, or `None` if the participant gave none. 0 is a rating."""
+
+    rating: float | None
+    rating_by: Literal["participant", "experimenter", "synthetic"]
+    kind: Literal["rated"] = "rated"
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Described:
+    """The participant's own words; may be empty."""
+
+    comment: str
+    kind: Literal["described"] = "described"
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Closed:
+    """There was nothing left to correct."""
+
+    kind: Literal["closed"] = "closed"
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Failed:
+    """The gun did not do it, or may not have: the trial is presented again.
+
+    `presented` tells whether its stimulus may have been felt: a shot that was refused was not.
+    """
+
+    cause: str
+    presented: bool = True
+    kind: Literal["failed"] = "failed"
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Interrupted:
+    """The run broke off, or was paused, before this step was done: the trial is presented again.
+
+    `presented` tells whether its stimulus was, or may have been, felt. Of a train that a pause ended it is known how
+    long and with how many shots.
+    """
+
+    presented: bool
+    cause: Literal["break-off", "pause"] = "break-off"
+    shots: int | None = None
+    exposure_s: float | None = None
+    kind: Literal["interrupted"] = "interrupted"
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Repeat:
+    """A trial was spoiled, this one or an earlier one of its set, and is to be presented again."""
+
+    trial: Trial
+    reason: str
+    kind: Literal["repeat"] = "repeat"
+
+
+Step = Prepare | Fire | Ask | Rest | Present | Rate | Describe | Close
+Outcome = Prepared | Fired | Answered | Rested | Presented | Rated | Described | Closed | Failed | Interrupted | Repeat
+TrialStep = Prepare | Fire | Ask | Present | Rate | Describe
+"""A step that is about one trial."""
+Session = Generator[Step, Outcome, None]
+"""Yields what should happen and is sent what did happen. It opens nothing, waits for nothing and knows no clock."""
+
+History = list[tuple[Step, Outcome]]
+"""What was done, in order."""
+
+
+def trial_of(step: Step | None) -> Trial | None:
+    """The trial that a step is about, if it is about one."""
+    return step.trial if isinstance(step, TrialStep) else None
+
+
+_WHERE_KNOWN = ("damper", "timing", "timings", "key_time_s", "shots", "exposure_s")
+_STEP: TypeAdapter[Step] = TypeAdapter(Annotated[Step, Field(discriminator="kind")])
+_OUTCOME: TypeAdapter[Outcome] = TypeAdapter(Annotated[Outcome, Field(discriminator="kind")])
+
+
+def record(word: Step | Outcome | TrainShot) -> dict[str, Any]:
+    """A step, outcome or shot as plain JSON values; an instruction, and what is not always known, only where it is."""
+    words = asdict(word, dict_factory=where_given)
+    return {key: value for key, value in words.items() if key not in _WHERE_KNOWN or value not in (None, ())}
+
+
+def step_from(body: object) -> Step:
+    """The step that a record holds; `pydantic.ValidationError` if it holds none."""
+    return _STEP.validate_python(body)
+
+
+def outcome_from(body: object) -> Outcome:
+    """The outcome that a record holds; `pydantic.ValidationError` if it holds none."""
+    return _OUTCOME.validate_python(body)

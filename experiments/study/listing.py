@@ -1,0 +1,191 @@
+"""`recoil study`: the participants of a study as a table, who comes next, and changes to the register."""
+
+from __future__ import annotations
+
+import io
+import shutil
+from collections.abc import Iterator, Mapping
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from typing import Any
+
+from pydantic import ValidationError
+from rich.console import Console
+from rich.table import Table
+from rich.text import Text
+
+from experiments.study import enrolment
+from experiments.clock import RealClock
+from experiments.dates import date_text
+from experiments.study.places import PlaceError
+from experiments.study.progress import Overview, StudyFolder, open_study, overview
+from experiments.study.study import Facts, Participant, RunStanding, eligible
+
+_OPTIONS = {"age_years": "--age", "sex": "--sex", "handedness": "--handedness"}
+_UNDER_WAY = ("in progress", "open elsewhere")
+_WIDTH = 160
+"""Columns of the table where it does not go to a terminal."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Change:
+    """What was asked for: someone joins with facts, or is excluded or readmitted for a reason."""
+
+    action: str
+    participant_id: str
+    facts: Facts
+    reason: str
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Found:
+    """A study and how it stands."""
+
+    study: StudyFolder
+    overview: Overview
+
+
+def change(asked: Mapping[str, str | None], facts: Mapping[str, object], reason: str | None) -> Change | None:
+    """What is to be changed; `None` for a look alone. `PlaceError` for options that do not go together."""
+    wanted = [(action, code) for action, code in asked.items() if code is not None]
+    if len(wanted) > 1:
+        raise PlaceError(f"{' and '.join(f'--{action}' for action, _ in wanted)}: give one of them at a time")
+    action, code = wanted[0] if wanted else ("", "")
+    _refuse_stray(action, facts, reason)
+    if not action:
+        return None
+    return Change(action=action, participant_id=code, facts=_facts(facts), reason=reason or "")
+
+
+def _refuse_stray(action: str, facts: Mapping[str, object], reason: str | None) -> None:
+    given = [_OPTIONS[fact] for fact, value in facts.items() if value is not None]
+    if given and action != "join":
+        raise PlaceError(f"{', '.join(given)}: facts go with --join CODE")
+    if reason is None and action in ("exclude", "readmit"):
+        raise PlaceError(f"--{action}: needs --reason TEXT, which is kept in the register; never a name")
+    if reason is not None and action not in ("exclude", "readmit"):
+        raise PlaceError("--reason: goes with --exclude CODE or --readmit CODE")
+
+
+def _facts(values: Mapping[str, object]) -> Facts:
+    try:
+        return Facts.model_validate(values)
+    except ValidationError as error:
+        first = error.errors()[0]
+        raise PlaceError(f"{_OPTIONS[str(first['loc'][0])]} {first['input']!r}: {first['msg']}") from error
+
+
+def study(folder: Path, wanted: Change | None) -> tuple[Found, tuple[str, ...]]:
+    """How a folder's study stands after a change, and what there is to say of the change. Errors name what to do."""
+    where = open_study(folder)
+    notes = _carry_out(where, wanted) if wanted else ()
+    return Found(study=where, overview=overview(where)), notes
+
+
+def _carry_out(where: StudyFolder, wanted: Change) -> tuple[str, ...]:
+    clock, code = RealClock(), wanted.participant_id
+    if wanted.action == "join":
+        reasons = enrolment.join(where, code, wanted.facts, clock)
+        return tuple(f"participant {code} is not eligible: {reason}; recorded, exclude?" for reason in reasons)
+    act = enrolment.exclude if wanted.action == "exclude" else enrolment.readmit
+    act(where.results, code, wanted.reason, clock)
+    return ()
+
+
+def as_json(found: Found) -> dict[str, Any]:
+    """The study as plain JSON values."""
+    coming = found.overview.next
+    return {
+        "study": found.study.config.title,
+        "planned_participants": found.study.config.participants,
+        "participants": [_participant(found, one) for one in found.overview.participants],
+        "next": coming
+        and {"participant_id": coming.participant_id, "new": coming.new, "orders": found.overview.orders},
+        "problems": list(found.overview.problems),
+    }
+
+
+def _participant(found: Found, one: Participant) -> dict[str, Any]:
+    return {
+        "participant_id": one.participant_id,
+        "facts": one.facts and one.facts.model_dump(mode="json"),
+        "joined_utc": one.joined_utc or None,
+        "excluded": one.excluded,
+        "not_eligible": list(_not_eligible(found, one)),
+        "experiments": {run.experiment: _run(run) for run in one.runs},
+    }
+
+
+def _run(run: RunStanding) -> dict[str, Any]:
+    return {key: value for key, value in asdict(run).items() if key != "experiment"}
+
+
+def _not_eligible(found: Found, one: Participant) -> tuple[str, ...]:
+    return eligible(one.facts, found.study.config.eligibility) if one.facts else ()
+
+
+def as_text(found: Found) -> str:
+    """The study for people: a table, then who comes next."""
+    text = io.StringIO()
+    console = Console(file=text, width=shutil.get_terminal_size((_WIDTH, 24)).columns, highlight=False, markup=False)
+    console.print(found.study.config.title, soft_wrap=True)
+    console.print(_table(found))
+    for line in (*_count_lines(found), *_next_lines(found)):
+        console.print(line, soft_wrap=True)
+    return text.getvalue().rstrip("\n")
+
+
+def _table(found: Found) -> Table:
+    table = Table()
+    for heading in ("code", "age", "sex", "hand", *found.study.experiments, "remark"):
+        table.add_column(heading, overflow="fold")
+    for one in found.overview.participants:
+        table.add_row(*map(Text, _cells(found, one)))  # as text: a reason in brackets is no mark-up
+    return table
+
+
+def _cells(found: Found, one: Participant) -> Iterator[str]:
+    facts = one.facts or Facts()
+    yield one.participant_id
+    for fact in (facts.age_years, facts.sex, facts.handedness):
+        yield "" if fact is None else str(fact)
+    for run in one.runs:
+        yield _state(run)
+    excluded = [] if one.excluded is None else [f"excluded: {one.excluded}"]
+    yield "\n".join([*excluded, *(f"not eligible: {reason}" for reason in _not_eligible(found, one))])
+
+
+def _state(run: RunStanding) -> str:
+    counts = f", {run.answered} of {run.planned} trials, last record {date_text(run.last_utc)}"
+    lines = [f"{run.state}{counts if run.state in _UNDER_WAY and run.planned else ''}", " > ".join(run.methods)]
+    return "\n".join(filter(None, [*lines, "practice done" if run.practised else ""]))
+
+
+def _count_lines(found: Found) -> Iterator[str]:
+    taking_part = [one for one in found.overview.participants if one.excluded is None]
+    done = sum(all(run.state == "done" for run in one.runs) for one in taking_part)
+    excluded = len(found.overview.participants) - len(taking_part)
+    yield f"{done} of {found.study.config.participants} participants done, {excluded} excluded"
+
+
+def _next_lines(found: Found) -> Iterator[str]:
+    coming = found.overview.next
+    if coming is None:
+        yield f"Next: {_nobody([one for one in found.overview.participants if one.excluded is None])}"
+        return
+    yield f"Next: {coming.participant_id}{' (new)' if coming.new else ''}"
+    for run in coming.runs:
+        methods = found.overview.orders[run.experiment]
+        go_on = " (go on with --resume)" if run.state == "in progress" else ""
+        yield f"  {run.experiment}: {' > '.join(methods) if methods else 'order drawn when the run begins'}{go_on}"
+
+
+def _nobody(taking_part: list[Participant]) -> str:
+    if any(map(_unreadable, taking_part)):
+        return "nobody who can be named, see what could not be read"
+    elsewhere = [one.participant_id for one in taking_part if one.is_elsewhere]
+    return f"nobody waits; at a console now: {', '.join(elsewhere)}" if elsewhere else "nobody, the study is done"
+
+
+def _unreadable(one: Participant) -> bool:
+    return any(run.state == "unreadable" for run in one.runs)

@@ -1,0 +1,112 @@
+"""Where a participant's files lie, and what is there already. Codes can never lead out of the results folder."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+
+from experiments.record import columns
+from experiments.record import journal
+from experiments.study import register
+from experiments.config.models import CODE
+
+_CODE = re.compile(CODE)
+
+
+class PlaceError(Exception):
+    """A participant or folder that cannot be used; the message names value and rule."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Place:
+    """The files of one participant in one experiment."""
+
+    results: Path
+    participant_id: str
+    experiment: str
+    practice: bool = False
+
+    @property
+    def folder(self) -> Path:
+        """The participant's folder."""
+        return self.results / f"sub-{self.participant_id}"
+
+    @property
+    def stem(self) -> str:
+        """How the names of the files begin."""
+        practice = "_practice" if self.practice else ""
+        return f"sub-{self.participant_id}_task-{self.experiment}{practice}"
+
+    @property
+    def journal(self) -> Path:
+        """The journal: the truth."""
+        return self.folder / f"{self.stem}_journal.jsonl"
+
+    @property
+    def table(self) -> Path:
+        """The table made from it."""
+        return self.folder / f"{self.stem}_{columns.FILE_SUFFIX[self.experiment]}.csv"
+
+
+def is_code(text: str) -> bool:
+    """Whether a text can be a participant's code."""
+    return _CODE.fullmatch(text) is not None
+
+
+def place(results: Path, participant_id: str, experiment: str) -> Place:
+    """The place of a run. `PlaceError` if the code breaks a rule or differs from a known one in case alone."""
+    if not is_code(participant_id):
+        shown = participant_id if len(participant_id) <= 40 else f"{participant_id[:40]}..."
+        raise PlaceError(
+            f"participant code {shown!r} ({len(participant_id)} characters): must be 1 to 32 letters and digits "
+            "(A-Z, a-z, 0-9), no blanks, dots or slashes; use a code, not a name"
+        )
+    for known in known_codes(results):
+        if known != participant_id and known.lower() == participant_id.lower():
+            raise PlaceError(
+                f"participant code {participant_id!r} differs from {known!r} in {results} in case alone; "
+                f"use {known!r} or another code"
+            )
+    return Place(results=results, participant_id=participant_id, experiment=experiment)
+
+
+def known_codes(results: Path) -> list[str]:
+    """The participants who have a folder or stand in the register."""
+    folders = {path.name.removeprefix("sub-") for path in results.glob("sub-*") if path.is_dir()}
+    return sorted(folders | register.codes(results))
+
+
+def journals(results: Path, experiment: str) -> Iterator[Path]:
+    """The journals of an experiment in a results folder."""
+    yield from sorted(results.glob(f"sub-*/sub-*_task-{experiment}_journal.jsonl"))
+
+
+def used_rows(results: Path, experiment: str) -> list[int]:
+    """The rows of the balancing square that runs in this folder have taken; who is excluded gives theirs back."""
+    left_out = register.excluded(results)
+    counted = (path for path in journals(results, experiment) if _code(path) not in left_out)
+    heads = filter(None, map(journal.head, counted))
+    return [head["plan"]["order_row"] for head in heads if head["plan"]["order_row"] is not None]
+
+
+def _code(journal_path: Path) -> str:
+    return journal_path.parent.name.removeprefix("sub-")
+
+
+def set_aside(run: Place) -> list[Path]:
+    """Rename a run's files so that a fresh one can begin; nothing is lost. Returns the new names."""
+    return [set_aside_file(path) for path in (run.journal, run.table) if path.exists()]
+
+
+def set_aside_file(path: Path) -> Path:
+    """Rename a file, or a folder, to the first free `NAME.aside-N`. Returns the new name."""
+    number = 1
+    while _aside(path, number).exists():
+        number += 1
+    return path.rename(_aside(path, number))
+
+
+def _aside(path: Path, number: int) -> Path:
+    return path.with_name(f"{path.stem}.aside-{number}{path.suffix}")

@@ -1,0 +1,263 @@
+"""The register of a results folder: who joined with which facts, who is excluded, whose run was set aside, and why.
+
+Codes only, never names. `participants.jsonl` is written and read like a journal: one JSON object a line, appended and
+synced record by record, each with its number, the date and time, and the hash of the line before it. A later `joined`
+record of a code corrects the facts of an earlier one; nothing is ever taken away.
+"""
+
+from __future__ import annotations
+
+import os
+import time
+from collections.abc import Iterable, Iterator
+from contextlib import contextmanager, suppress
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Annotated, Any, Literal
+
+from pydantic import AfterValidator, Field, StringConstraints, TypeAdapter, ValidationError
+
+from experiments.record import storage
+from experiments.config.canonical import canonical_json
+from experiments.clock import Clock
+from experiments.config.models import CODE, Model, Text
+from experiments.record.journal import JournalError, check_chain, link, parsed
+from experiments.study.study import Facts
+
+NAME = "participants.jsonl"
+MAX_REASON = 200
+_DAMAGED = "the register was changed or damaged: restore it from a copy, or rename it and enter the participants anew"
+_TRIES, _PAUSE_S = 100, 0.05
+"""How often, and how long apart, a register that another console holds is tried: it is held for one record only."""
+
+
+class RegisterError(JournalError):
+    """A register that cannot be written or trusted, or a record that breaks a rule."""
+
+
+def _plain(text: str) -> str:
+    if not text.strip() or not text.isprintable():
+        raise ValueError("must say why, in one line of printable characters")
+    return text
+
+
+Code = Annotated[str, StringConstraints(pattern=f"^{CODE}$")]
+Reason = Annotated[str, Field(max_length=MAX_REASON), AfterValidator(_plain)]
+
+
+class Joined(Model):
+    """Someone takes part, or their facts are corrected."""
+
+    kind: Literal["joined"] = "joined"
+    participant_id: Code
+    facts: Facts
+
+
+class Excluded(Model):
+    """Someone does not count: their row of the balancing square is free again, their logs are left out."""
+
+    kind: Literal["excluded"] = "excluded"
+    participant_id: Code
+    reason: Reason
+
+
+class Readmitted(Model):
+    """Someone who was excluded counts again."""
+
+    kind: Literal["readmitted"] = "readmitted"
+    participant_id: Code
+    reason: Reason
+
+
+class SetAside(Model):
+    """An unfinished run was set aside, to be started anew: of which experiment, and why."""
+
+    kind: Literal["set-aside"] = "set-aside"
+    participant_id: Code
+    experiment: Text
+    reason: Reason
+
+
+Entry = Joined | Excluded | Readmitted | SetAside
+_REASON: TypeAdapter[str] = TypeAdapter(Reason)
+_ENTRY: TypeAdapter[Entry] = TypeAdapter(Annotated[Entry, Field(discriminator="kind")])
+
+
+def entry(kind: str, participant_id: str, **body: object) -> Entry:
+    """A record to append. `RegisterError` names key, value and rule.
+
+    >>> entry("excluded", "P03", reason="left-handed").kind
+    'excluded'
+    """
+    return _checked({"kind": kind, "participant_id": participant_id, **body})
+
+
+def check_reason(text: str) -> None:
+    """`RegisterError` unless a text is fit as a reason."""
+    try:
+        _REASON.validate_python(text)
+    except ValidationError as error:
+        raise RegisterError(f"reason {text!r}: {error.errors()[0]['msg'].removeprefix('Value error, ')}") from error
+
+
+def _checked(values: dict[str, Any]) -> Entry:
+    try:
+        return _ENTRY.validate_python(values)
+    except ValidationError as error:
+        first = error.errors()[0]
+        key = ".".join(str(part) for part in first["loc"][1:]) or "kind"
+        shown = repr(first["input"])
+        shown = shown if len(shown) <= 60 else f"{shown[:60]}..."
+        raise RegisterError(f"{key} = {shown}: {first['msg'].removeprefix('Value error, ')}") from error
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Member:
+    """What the register says of one code: facts and when they joined, if they did; the reason if excluded."""
+
+    participant_id: str
+    facts: Facts | None = None
+    joined_utc: str = ""
+    excluded: str | None = None
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Register:
+    """What a register holds up to its end, or up to the first line that cannot be trusted, which `problem` names.
+
+    A last line without its end was never acknowledged and is not read. `members` are by code.
+    """
+
+    path: Path
+    entries: tuple[tuple[str, Entry], ...] = ()
+    whole_bytes: int = 0
+    link: str = ""
+    problem: str = ""
+
+    @property
+    def members(self) -> dict[str, Member]:
+        """The state of every code, as the records in their order leave it."""
+        return members(self.entries)
+
+
+def members(entries: Iterable[tuple[str, Entry]]) -> dict[str, Member]:
+    """The state of every code after records, each with its date and time."""
+    found: dict[str, Member] = {}
+    for utc, one in entries:
+        before = found.get(one.participant_id, Member(participant_id=one.participant_id))
+        found[one.participant_id] = _after(before, utc, one)
+    return found
+
+
+def _after(before: Member, utc: str, one: Entry) -> Member:
+    if isinstance(one, Joined):
+        return replace(before, facts=one.facts, joined_utc=before.joined_utc or utc)
+    if isinstance(one, SetAside):
+        return before
+    return replace(before, excluded=one.reason if isinstance(one, Excluded) else None)
+
+
+def read(results: Path) -> Register:
+    """The register of a results folder, as far as it can be trusted; an empty one if there is none."""
+    path = results / NAME
+    try:
+        data = path.read_bytes()
+    except (FileNotFoundError, NotADirectoryError):
+        return Register(path=path)
+    except OSError as error:
+        return Register(path=path, problem=f"{path}: cannot be read ({error.strerror})")
+    found = Register(path=path)
+    for number, line in enumerate(data[: data.rfind(b"\n") + 1].split(b"\n")[:-1]):
+        try:
+            found = _with_line(found, number, line)
+        except JournalError as error:
+            return replace(found, problem=f"{path}: line {number + 1}: {error}; {_DAMAGED}")
+    return found
+
+
+def _with_line(before: Register, number: int, line: bytes) -> Register:
+    values = parsed(line)
+    check_chain(values, number, before.link)
+    utc = values.get("utc")
+    if not isinstance(utc, str):
+        raise RegisterError(f"utc = {utc!r}: must be the date and time of the record")
+    body = {key: value for key, value in values.items() if key not in ("n", "link", "utc")}
+    entries = (*before.entries, (utc, _checked(body)))
+    return replace(before, entries=entries, whole_bytes=before.whole_bytes + len(line) + 1, link=link(line))
+
+
+def codes(results: Path) -> set[str]:
+    """The codes that stand in the register, as far as it can be trusted: so that no run depends on a sound one."""
+    return set(read(results).members)
+
+
+def excluded(results: Path) -> dict[str, str]:
+    """Who is excluded, with the reason. `RegisterError` if the register cannot be trusted: someone might be missing."""
+    found = read(results)
+    _refuse_problem(found)
+    return {code: member.excluded for code, member in found.members.items() if member.excluded is not None}
+
+
+def _refuse_problem(register: Register) -> None:
+    if register.problem:
+        raise RegisterError(register.problem)
+
+
+def append(results: Path, one: Entry, clock: Clock) -> None:
+    """Add a record and return when it is on the disk. `RegisterError` if it cannot be: then nothing was added."""
+    path = results / NAME
+    with _held(path) as descriptor:
+        before = read(results)
+        _refuse_problem(before)
+        _refuse_twin(before, one)
+        os.ftruncate(descriptor, before.whole_bytes)  # what was cut off was never acknowledged
+        head = {"n": len(before.entries), "link": before.link, "utc": clock.utc()}
+        _write(path, descriptor, canonical_json(head | one.model_dump(mode="json")) + b"\n", before.whole_bytes)
+
+
+def _refuse_twin(before: Register, one: Entry) -> None:
+    for known in before.members:
+        if known != one.participant_id and known.lower() == one.participant_id.lower():
+            raise RegisterError(
+                f"participant code {one.participant_id!r} differs from {known!r} in {before.path} in case alone; "
+                f"use {known!r} or another code"
+            )
+
+
+def _write(path: Path, descriptor: int, line: bytes, length: int) -> None:
+    try:
+        storage.write_all(descriptor, line)
+        storage.sync(descriptor)
+    except OSError as error:
+        with suppress(OSError):  # readers leave out what is cut off
+            os.ftruncate(descriptor, length)
+        raise RegisterError(f"{path}: cannot be written ({error.strerror}); nothing was added") from error
+
+
+@contextmanager
+def _held(path: Path) -> Iterator[int]:
+    """The register open for appending, for this process alone. Consoles hold it for one record, so waiting is short."""
+    try:
+        storage.make_folder(path.parent)
+        descriptor = _opened(path)
+    except OSError as error:
+        raise RegisterError(f"{path}: cannot be opened ({error.strerror}); nothing was added") from error
+    try:
+        _wait_for(path, descriptor)
+        yield descriptor
+    finally:
+        os.close(descriptor)
+
+
+def _opened(path: Path) -> int:
+    with suppress(FileExistsError):
+        return storage.create(path)
+    return storage.reopen(path)
+
+
+def _wait_for(path: Path, descriptor: int) -> None:
+    for _ in range(_TRIES):
+        if storage.hold(descriptor):
+            return
+        time.sleep(_PAUSE_S)
+    raise RegisterError(f"{path}: another program has held it for {_TRIES * _PAUSE_S:g} s; close that one first")

@@ -1,0 +1,93 @@
+"""A synthetic participant of experiment 1 who answers from what the gun does: percept, then diffusion."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
+from typing import TYPE_CHECKING
+
+from device.words import DIRECTIONS
+from experiments.synthetic.diffusion import Decision, Diffusion, Lapses, People, decide, person
+from experiments.synthetic.percept import Percept, PerceptParameters, diffusion_of, evidence, forward_rate
+from experiments.design.plan import Plan, Trial
+from experiments.design.streams import Stream
+
+if TYPE_CHECKING:
+    from experiments.direction.config import DirectionConfig
+
+NEUTRAL = "neutral"
+"""The instruction of a trial that has none."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Mind:
+    """What the participants are made of. All but the percept's fitted numbers is assumed: the paper has no times."""
+
+    percept: PerceptParameters = field(default_factory=PerceptParameters)
+    boundaries: Mapping[str, float] = field(default_factory=lambda: {"speed": 1.0, NEUTRAL: 1.5, "accuracy": 2.2})
+    non_decision_s: float = 0.35
+    lapses: Lapses = field(default_factory=Lapses)
+    people: People = field(default_factory=People)
+
+
+def mind_of(config: DirectionConfig) -> Mind:
+    """What a config's participants who feel the gun are made of."""
+    synthetic = config.synthetic
+    return Mind(
+        percept=synthetic.percept.own,
+        boundaries=synthetic.diffusion.boundaries,
+        non_decision_s=synthetic.diffusion.non_decision_s,
+        lapses=synthetic.diffusion.lapses.own,
+        people=synthetic.people.own,
+    )
+
+
+def forward_rates(mind: Mind, percept: Percept) -> dict[str, float]:
+    """The share of "forward" after a forward shot in the mean over people, by instruction."""
+    log_odds, neutral = evidence(percept, mind.percept), mind.boundaries[NEUTRAL]
+    return {
+        name: forward_rate(log_odds * boundary / neutral, mind.percept.start, mind.people, mind.lapses.rate)
+        for name, boundary in mind.boundaries.items()
+    }
+
+
+class FeltParticipant:
+    """A person drawn once, by the seed, who then decides each trial by its own stream.
+
+    The sensitivity is that at the neutral boundary, so a hurried person has the same drift and errs more.
+    `ValueError`: somebody whose drift, boundary or non-decision time is beyond what a `Diffusion` may be.
+    """
+
+    def __init__(self, mind: Mind, percepts: Mapping[str, Percept], plan: Plan) -> None:
+        self._seed, self._who = plan.seed, (plan.experiment, plan.participant_id)
+        someone = person(mind.people, Stream(plan.seed, "person", *self._who))
+        self._diffusions = {
+            (method, direction, instruction): someone.own(replace(_neutral(mind, log_odds), boundary=boundary))
+            for method, forward in percepts.items()
+            for direction, log_odds in zip(DIRECTIONS, _log_odds(forward, mind.percept), strict=True)
+            for instruction, boundary in mind.boundaries.items()
+        }
+
+    def decide(self, trial: Trial, instruction: str = NEUTRAL) -> Decision:
+        """The decision on a shot of this trial's method and direction; "upper" is "forward".
+
+        `KeyError`: a method without a percept or an instruction without a boundary.
+        """
+        draws = Stream(self._seed, "answer", *self._who, str(trial.session), str(trial.trial))
+        return decide(self._diffusions[trial.method, trial.direction, instruction], draws)
+
+
+def _log_odds(percept: Percept, parameters: PerceptParameters) -> tuple[float, float]:
+    """Of "forward" after a forward and after a backward shot, without bias."""
+    forward = evidence(percept, parameters)
+    return forward, -forward
+
+
+def _neutral(mind: Mind, log_odds: float) -> Diffusion:
+    return diffusion_of(
+        log_odds,
+        mind.percept,
+        boundary=mind.boundaries[NEUTRAL],
+        non_decision_s=mind.non_decision_s,
+        lapses=mind.lapses,
+    )

@@ -1,0 +1,86 @@
+"""The command line: which commands there are, and what becomes of whatever goes wrong in them."""
+
+from __future__ import annotations
+
+import os
+import signal
+import sys
+
+import typer
+
+from recoil.commands import design
+from recoil.commands import fit
+from recoil.commands import guns
+from recoil.commands import numbers
+from recoil.commands import power
+from recoil.commands import sessions
+from analysis.report.terminal import INTERRUPTED, UNUSABLE, say
+
+app = typer.Typer(
+    name="recoil",
+    help="Psychophysics experiments on haptic guns: plan, run, log, analyse, report.",
+    rich_markup_mode=None,
+    pretty_exceptions_enable=False,
+    no_args_is_help=True,
+    add_completion=False,
+)
+export = typer.Typer(help="Data sets for other programs.", rich_markup_mode=None, no_args_is_help=True)
+
+COMMANDS = (
+    numbers.reproduce,
+    sessions.check,
+    sessions.run,
+    sessions.study,
+    sessions.rebuild,
+    numbers.analyze,
+    numbers.audit,
+    power.power,
+    design.design,
+    guns.simulate,
+    sessions.configs,
+    sessions.new,
+    guns.twin,
+    guns.doctor,
+    guns.bench,
+)
+for command in COMMANDS:
+    app.command()(command)
+export.command()(numbers.bids)
+app.add_typer(export, name="export")
+app.add_typer(fit.app, name="fit")
+
+
+def main() -> None:
+    """Run a command. Whatever goes wrong is one message on stderr and an exit code, never a traceback."""
+    os.umask(0o077)  # what is written here is about people: for its owner alone
+    for name in ("SIGINT", "SIGTERM", "SIGHUP"):
+        if hasattr(signal, name):  # not every system knows all three
+            signal.signal(getattr(signal, name), _interrupt)
+    try:
+        app()
+    except KeyboardInterrupt:
+        sys.exit(INTERRUPTED)
+    except OSError as error:
+        say(f"recoil: {error.filename or 'system'}: {error.strerror or error}")
+        sys.exit(UNUSABLE)
+    except Exception as error:
+        if not isinstance(error, _expected()):
+            raise
+        say("\n".join(f"recoil: {line}" for line in str(error).splitlines()))
+        sys.exit(UNUSABLE)
+
+
+def _expected() -> tuple[type[Exception], ...]:
+    """The errors that have a message for people. Looked up only when something was raised."""
+    from device import DeviceError
+    from experiments.record.journal import JournalError
+    from experiments.load import ConfigError
+    from experiments.study.places import PlaceError
+
+    return ConfigError, PlaceError, JournalError, DeviceError
+
+
+def _interrupt(number: int, _: object) -> None:
+    """Say so here, since the command line's library catches the exception on its way, and ends with 130."""
+    say("\nrecoil: interrupted; what was acknowledged is on the disk")
+    raise KeyboardInterrupt(signal.Signals(number).name)

@@ -1,0 +1,86 @@
+"""`recoil fit`: models fitted to rates and to response times."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+from typer.core import TyperGroup
+
+from analysis.report.terminal import AsJson, FixedSeed, GunConfig, end, progress, say, show, tracked
+
+
+class _PerceptUnlessNamed(TyperGroup):
+    """`recoil fit` with options alone, or with nothing, fits the percept."""
+
+    def parse_args(self, ctx: typer.Context, args: list[str]) -> list[str]:  # type: ignore[override] # its own context
+        named = args and (not args[0].startswith("-") or args[0] in ctx.help_option_names)
+        return super().parse_args(ctx, args if named else ["percept", *args])
+
+
+app = typer.Typer(
+    cls=_PerceptUnlessNamed,
+    help=(
+        "Fit a model: `percept` (what of a shot says its direction, to a paper's rates; also what `recoil fit` alone "
+        "does) or `times` (how fast and how carefully people decide, to logs with their own response times)."
+    ),
+    rich_markup_mode=None,
+)
+
+Paper = Annotated[str, typer.Option(help="Published numbers: file, or the name of a shipped one.")]
+Rates = Annotated[
+    str | None, typer.Option(metavar="NAME=SHARE,...", help="Forward rates by method instead of a paper's.")
+]
+Trials = Annotated[int | None, typer.Option(min=1, max=10**9, help="Forward trials behind each of --rates (140).")]
+Spread = Annotated[
+    float, typer.Option(metavar="FACTOR", help="People differ by so many times the assumed spread; 0: all alike.")
+]
+Studies = Annotated[int, typer.Option(min=0, max=10_000_000, help="Simulated studies to judge the fit by; 0: none.")]
+
+
+@app.command()
+def percept(
+    *,
+    paper: Paper = "paper",
+    rates: Rates = None,
+    trials: Trials = None,
+    gun: GunConfig = "gun",
+    spread: Spread = 0.0,
+    studies: Studies = 10_000,
+    seed: FixedSeed = 1,
+    out: Annotated[Path, typer.Option(help="Folder for fit.json, percept.toml, figures and report.")] = Path(
+        "results/fit"
+    ),
+    as_json: AsJson = False,
+) -> None:
+    """The percept fitted to forward rates, what they cannot tell, and studies of it against what else is published."""
+    from analysis.predict.fit import percept as roof
+
+    asked = roof.Request(paper=paper, rates=rates, trials=trials, gun=gun, spread=spread, studies=studies, seed=seed)
+    found = roof.percept(asked, out, progress)
+    show(found, f"{roof.as_text(found)}\nReport: {out / 'report.html'}; for a config: {out / 'percept.toml'}", as_json)
+
+
+@app.command()
+def times(
+    logs: Annotated[list[Path], typer.Argument(metavar="LOGS...", help="Logs of experiment 1, or folders with logs.")],
+    *,
+    lapses: Annotated[
+        str, typer.Option(metavar="none|data|A-B", help="Lapses: none, over the times' range, or from A to B s.")
+    ] = "none",
+    bias: Annotated[bool, typer.Option("--bias/--no-bias", help="Fit the start, or hold it at one half.")] = True,
+    profile: Annotated[bool, typer.Option("--profile", help="Likelihood intervals as well; slower.")] = False,
+    out: Annotated[Path, typer.Option(help="Folder for fit.json, figure and report.")] = Path("results/fit-times"),
+    as_json: AsJson = False,
+) -> None:
+    """The diffusion model (drift, boundary, start, non-decision time) fitted to people's own response times."""
+    from analysis.predict.fit import times as roof
+
+    asked = roof.Request(paths=logs, lapses=lapses, bias=bias, profiled=profile)
+    found, problems = roof.times(asked, out, tracked, progress)
+    missing = [*map(str, problems), *roof.left_out(found)]
+    for one in missing:
+        say(f"recoil: left out: {one}")
+    show(found, f"{roof.as_text(found)}\nReport: {out / 'report.html'}", as_json)
+    raise end(exceptions=bool(missing))

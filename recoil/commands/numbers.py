@@ -1,0 +1,106 @@
+"""Commands around numbers: reproduce, analyse, audit, simulate studies, export."""
+
+from __future__ import annotations
+
+from enum import StrEnum
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from analysis.report.terminal import (
+    AsJson,
+    FixedSeed,
+    end,
+    progress,
+    say,
+    show,
+    tracked,
+)
+
+
+class ObserverName(StrEnum):
+    """Who answers in a reproduction."""
+
+    reconstructed = "reconstructed"
+    rates = "rates"
+
+
+def reproduce(
+    out: Annotated[Path, typer.Option(help="Folder for logs, statistics, figures and report.")] = Path(
+        "results/reproduction"
+    ),
+    seed: FixedSeed = 1,
+    study: Annotated[str, typer.Option(help="Config of a study, or the name of a shipped one.")] = "study",
+    observer: Annotated[
+        ObserverName | None,
+        typer.Option(help="Who answers: rebuilt from the published numbers where they fit, or drawn by the configs."),
+    ] = None,
+    as_json: AsJson = False,
+) -> None:
+    """Both experiments with synthetic participants on the simulated gun: logs, statistics, figures, report."""
+    from analysis.predict.reproduction import reproduce as roof
+
+    loaded = roof.load(study, seed, observer.value if observer else None)
+    with progress("reproduce", len(loaded.runs) + 3) as tell:
+        done = roof.reproduce(loaded, out, tell)
+    show(done.statistics, f"{roof.as_text(done.comparison)}\n\nReport: {out / 'report.html'}", as_json)
+
+
+def analyze(
+    paths: Annotated[list[Path], typer.Argument(metavar="PATH...", help="Logs, or folders with logs.")],
+    out: Annotated[Path, typer.Option(help="Folder for statistics, figures and report.")],
+    columns: Annotated[
+        Path | None, typer.Option(metavar="MAP.toml", help="Which columns mean what in logs that Recoil did not write.")
+    ] = None,
+    rules: Annotated[
+        Path | None, typer.Option(metavar="RULES.toml", help="Which trials and participants to leave out.")
+    ] = None,
+    paper: Annotated[Path | None, typer.Option(help="Published numbers to compare with.")] = None,
+    codebook: Annotated[Path | None, typer.Option(metavar="CODES.toml", help="Codes of free descriptions.")] = None,
+    as_json: AsJson = False,
+) -> None:
+    """Statistics, tables, figures and report of any number of logs."""
+    from analysis.summary import analyze as roof
+
+    asked = roof.Request(paths=paths, out=out, paper=paper, columns=columns, rules=rules, codebook=codebook)
+    statistics, problems = roof.analyze(asked, tracked)
+    for problem in problems:
+        say(f"recoil: left out: {problem}")
+    show(statistics, f"Report: {out / 'report.html'}", as_json)
+    raise end(exceptions=bool(problems or statistics["excluded"]))
+
+
+def bids(
+    folder: Annotated[Path, typer.Argument(metavar="DIR", help="The folder that holds the logs.")],
+    out: Annotated[
+        Path | None, typer.Option(metavar="BIDS", help="Folder for the data set; DIR/bids unless given.")
+    ] = None,
+    free_text: Annotated[
+        bool, typer.Option("--free-text", help="With comments and notes; they might say who someone is.")
+    ] = False,
+    as_json: AsJson = False,
+) -> None:
+    """The logs as a BIDS data set of behavioural runs; an earlier export is replaced."""
+    from analysis.archive.bids.export import export as roof
+
+    done = roof(folder, out or folder / "bids", free_text=free_text, track=tracked)
+    for problem in done.problems:
+        say(f"recoil: left out: {problem}")
+    show(done.as_json(), done.as_text(), as_json)
+    raise end(exceptions=bool(done.problems))
+
+
+def audit(
+    paper: Annotated[str, typer.Argument(metavar="PAPER", help="A paper's file, or a shipped one.")] = "paper",
+    out: Annotated[Path, typer.Option(help="Folder for audit.json and the report.")] = Path("results/audit"),
+    *,
+    as_json: AsJson = False,
+) -> None:
+    """Are the published numbers attainable and consistent? Each with its proof; exit code 1 if one is not."""
+    from analysis.paper.audit import command as roof
+
+    audited = roof.examine(paper)
+    roof.write(audited, out)
+    show(audited.as_json(), f"{audited.as_text()}\n\nReport: {out / 'report.html'}", as_json)
+    raise end(exceptions=audited.exceptions)

@@ -1,0 +1,57 @@
+"""The options of `recoil power`."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from analysis.report.terminal import AsJson, Config, FixedSeed, progress, show
+
+Participants = Annotated[str | None, typer.Option(metavar="N,N-N", help="How many people, such as 8,10,14-20.")]
+Trials = Annotated[str | None, typer.Option(metavar="N,N-N", help="Trials of a method; the config's own unless given.")]
+Methods = Annotated[list[str] | None, typer.Option(metavar="NAME,NAME", help="Compare these alone; may come again.")]
+Effect = Annotated[
+    str | None, typer.Option(metavar="FACTOR,FACTOR", help="Factors on what people feel; 1 is the config.")
+]
+Studies = Annotated[int, typer.Option(min=1, max=10_000_000, help="Simulated studies of each design.")]
+Null = Annotated[bool, typer.Option("--null", help="People who feel no difference: false positives.")]
+Workers = Annotated[int | None, typer.Option(min=1, help="Processes; as many as cores unless given.")]
+Scheduler = Annotated[str | None, typer.Option(metavar="ADDRESS", help="Work on this Dask cluster instead.")]
+
+
+def power(
+    config: Config,
+    *,
+    participants: Participants = None,
+    trials: Trials = None,
+    methods: Methods = None,
+    effect: Effect = None,
+    studies: Studies = 10_000,
+    target: Annotated[float, typer.Option(help="Power that a design is to reach.")] = 0.8,
+    null: Null = False,
+    seed: FixedSeed = 1,
+    paper: Annotated[str, typer.Option(help="Published numbers whose pattern may recur.")] = "paper",
+    workers: Workers = None,
+    scheduler: Scheduler = None,
+    out: Annotated[Path, typer.Option(help="Folder for power.json, figures and report.")] = Path("results/power"),
+    as_json: AsJson = False,
+) -> None:
+    """Simulated power and precision: how many people and trials does it take, and what does it cost?"""
+    from analysis.predict.power import run as roof
+
+    request = roof.Request(
+        config=config,
+        participants=participants,
+        trials=trials,
+        methods=tuple(methods or ()),
+        effects=effect,
+        studies=studies,
+        target=target,
+        null=null,
+        seed=seed,
+        paper=paper,
+    )
+    found = roof.power(request, roof.Where(workers=workers, scheduler=scheduler), out, progress)
+    show(found, f"{roof.as_text(found)}\nReport: {out / 'report.html'}", as_json)

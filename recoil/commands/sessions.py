@@ -1,0 +1,151 @@
+"""Commands around sessions: check a config, run, look after a study."""
+
+from __future__ import annotations
+
+import sys
+from enum import StrEnum
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from analysis.report.terminal import (
+    AsJson,
+    Seed,
+    end,
+    say,
+    show,
+)
+
+
+class ScreenName(StrEnum):
+    """Where a run takes place."""
+
+    terminal = "terminal"
+    synthetic = "synthetic"
+    console = "console"
+
+
+def check(
+    configs: Annotated[list[str], typer.Argument(metavar="CONFIG...", help="Files or names of shipped configs.")],
+    seed: Seed = None,
+    participants: Annotated[int, typer.Option(min=1, max=999, help="Show the orders of so many.")] = 14,
+    as_json: AsJson = False,
+) -> None:
+    """Validate configs; print design, orders, duration, drive and limits. Nothing is run."""
+    from analysis.predict import check as roof
+
+    found = [roof.check(name, seed, participants) for name in configs]
+    show(found if len(found) > 1 else found[0], "\n\n".join(map(roof.as_text, found)), as_json)
+
+
+def run(
+    config: Annotated[str, typer.Argument(help="File or name of a shipped config.")],
+    participant: Annotated[
+        str | None, typer.Option(help="Participant's code, 1 to 32 letters and digits; without: the start window.")
+    ] = None,
+    gun: Annotated[str, typer.Option(help="`simulated` or `serial:PORT`.")] = "simulated",
+    screen: Annotated[ScreenName, typer.Option(help="Where the run takes place.")] = ScreenName.terminal,
+    results: Annotated[Path, typer.Option(help="Folder for the logs.")] = Path("results"),
+    seed: Seed = None,
+    resume: Annotated[bool, typer.Option("--resume", help="Go on with an unfinished run.")] = False,
+    fresh: Annotated[bool, typer.Option("--fresh", help="Set an unfinished run aside and start anew.")] = False,
+    reason: Annotated[str, typer.Option(help="With --fresh: why, for the register; never a name.")] = "",
+    visual: Annotated[bool, typer.Option("--visual", help="A synthetic participant works the console.")] = False,
+    participant_screen: Annotated[
+        bool, typer.Option("--participant-screen", help="The participant rates on a screen of their own (PsychoPy).")
+    ] = False,
+    participant_keys: Annotated[
+        bool, typer.Option("--participant-keys", help="The participant answers with keys of their own (PsychoPy).")
+    ] = False,
+    noise: Annotated[
+        bool, typer.Option("--noise", help="Masking white noise through the participant's headphones (PsychoPy).")
+    ] = False,
+    participant_monitor: Annotated[
+        int | None, typer.Option(min=0, help="The participant's screen: 0 is the first; without: the last of several.")
+    ] = None,
+    as_json: AsJson = False,
+) -> None:
+    """One run: a participant doing one experiment."""
+    from recoil import session
+
+    asked = session.Asked(
+        config=config,
+        participant_id=participant or "",
+        gun=gun,
+        screen=screen.value,
+        results=results,
+        seed=seed,
+        resume=resume,
+        fresh=fresh,
+        reason=reason,
+        visual=visual,
+        participant_screen=participant_screen,
+        participant_keys=participant_keys,
+        noise=noise,
+        monitor=participant_monitor,
+    )
+    if participant is None:
+        session.run_lab_day(asked)
+        return
+    finished = session.run_session(asked)
+    show({"journal": str(finished.journal), "table": str(finished.table)}, f"Done: {finished.table}", as_json)
+
+
+def study(
+    folder: Annotated[Path, typer.Argument(metavar="DIR", help="A study's folder, or a results folder.")],
+    join: Annotated[str | None, typer.Option(metavar="CODE", help="Take someone in, or correct their facts.")] = None,
+    age: Annotated[int | None, typer.Option(min=1, max=120, help="With --join: age in years.")] = None,
+    sex: Annotated[str | None, typer.Option(help="With --join: female, male, other or undisclosed.")] = None,
+    handedness: Annotated[str | None, typer.Option(help="With --join: right, left or both.")] = None,
+    exclude: Annotated[str | None, typer.Option(metavar="CODE", help="Exclude a participant; needs --reason.")] = None,
+    readmit: Annotated[str | None, typer.Option(metavar="CODE", help="Take an exclusion back; needs --reason.")] = None,
+    reason: Annotated[str | None, typer.Option(help="Why; never a name.")] = None,
+    as_json: AsJson = False,
+) -> None:
+    """The participants of a study: done, in progress, excluded, and who comes next in which orders."""
+    from experiments.study import listing as roof
+
+    facts = {"age_years": age, "sex": sex, "handedness": handedness}
+    asked = {"join": join, "exclude": exclude, "readmit": readmit}
+    found, notes = roof.study(folder, roof.change(asked, facts, reason))
+    for message in (*notes, *found.overview.problems):
+        say(f"recoil: {message}")
+    show(roof.as_json(found), roof.as_text(found), as_json)
+    raise end(exceptions=bool(found.overview.problems))
+
+
+def rebuild(journals: Annotated[list[Path], typer.Argument(metavar="JOURNAL...")], as_json: AsJson = False) -> None:
+    """Make the CSV again from its journal, byte for byte."""
+    from recoil.session import rebuild_tables
+
+    built = rebuild_tables(journals)
+    for message in (message for one in built for message in one.messages):
+        say(f"recoil: {message}")
+    shown = [{"table": str(one.table), "rebuilt": one.rebuilt} for one in built]
+    text = "\n".join(f"{one.table}: {'rebuilt' if one.rebuilt else 'is as its journal says'}" for one in built)
+    show(shown, text, as_json)
+    raise end(exceptions=bool(any(one.messages for one in built)))
+
+
+def configs(
+    copy: Annotated[Path | None, typer.Option(help="Copy the configs into this folder.")] = None,
+    journal: Annotated[
+        Path | None, typer.Option("--from", metavar="JOURNAL", help="With --copy: the files that its run began with.")
+    ] = None,
+) -> None:
+    """List the shipped configs, copy them to edit, or give back those that a run began with."""
+    from recoil.began_with import copy_began_with
+    from experiments.study.folders import copy_configs, shipped
+
+    if journal is not None and copy is None:
+        raise typer.BadParameter("--from goes with --copy DIR, the folder that the files are written to")
+    paths = shipped() if copy is None else copy_began_with(journal, copy) if journal else copy_configs(copy)
+    sys.stdout.write("".join(f"{path}\n" for path in paths))
+
+
+def new(study: Annotated[Path, typer.Argument(metavar="STUDY", help="The folder to make.")]) -> None:
+    """Make a study's folder from a template."""
+    from experiments.study.folders import new_study
+
+    sys.stdout.write("".join(f"{path}\n" for path in new_study(study)))

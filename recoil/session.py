@@ -1,0 +1,200 @@
+"""`recoil run` and `recoil rebuild`: which screen and clock a run gets, and tables made again."""
+
+from __future__ import annotations
+
+import sys
+from contextlib import suppress
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from device.serial_gun.address import speed_of
+from experiments.record import storage
+from experiments.clock import Clock, RealClock, VirtualClock
+from experiments.live_run import RunStopped
+from experiments.load import load_setup
+from experiments.study.places import Place, PlaceError, place, set_aside_file
+from experiments.design.plan import Plan
+from experiments.run import Again, Finished, Request, rebuild, run
+from experiments.screen import Screen
+from experiments.screens.synthetic import synthetic_screen
+from experiments.screens.terminal import TerminalScreen
+from experiments.config.setup import Setup
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Asked:
+    """What was asked for on the command line."""
+
+    config: str
+    participant_id: str
+    gun: str
+    screen: str
+    results: Path
+    seed: int | None
+    resume: bool
+    fresh: bool
+    reason: str = ""
+    visual: bool = False
+    participant_screen: bool = False
+    participant_keys: bool = False
+    noise: bool = False
+    monitor: int | None = None
+
+
+def run_session(asked: Asked) -> Place:
+    """Carry out what was asked for. `PlaceError` for what cannot be done here; a stop raises `KeyboardInterrupt`."""
+    _check_screen(asked)
+    check_pace(asked.screen, asked.gun)
+    request = Request(
+        setup=load_setup(asked.config),
+        participant_id=asked.participant_id,
+        results=asked.results,
+        gun=asked.gun,
+        seed=asked.seed,
+        again=_again(asked),
+        anew_reason=asked.reason,
+    )
+    if asked.resume:
+        _check_resumable(request)
+    try:
+        return _SCREENS[asked.screen](request, asked).place
+    except RunStopped as stop:
+        with suppress(OSError):  # where the terminal is gone, nobody reads it
+            sys.stderr.write(f"recoil: stopped: {stop}. Go on with --resume.\n")
+        raise KeyboardInterrupt from stop
+
+
+def _check_resumable(request: Request) -> None:
+    """`PlaceError` if there is nothing to go on with: a mistyped code is not to begin a run."""
+    where = place(request.results, request.participant_id, request.setup.config.experiment)
+    if not where.journal.exists():
+        raise PlaceError(
+            f"{where.journal}: there is no run of {where.experiment} by {where.participant_id} to resume here; "
+            "look at --participant and --results, or leave out --resume to begin one"
+        )
+
+
+def _check_screen(asked: Asked) -> None:
+    if asked.screen == "terminal" and not (sys.stdin.isatty() and sys.stdout.isatty()):
+        raise PlaceError("--screen terminal: standard input and output are no terminal; use --screen synthetic")
+    sides = (asked.visual, asked.participant_screen, asked.participant_keys, asked.noise, asked.monitor is not None)
+    if asked.screen != "console" and any(sides):
+        raise PlaceError(
+            "--visual, --participant-screen, --participant-keys, --participant-monitor and --noise go with "
+            "--screen console"
+        )
+
+
+def check_pace(screen: str, gun: str) -> None:
+    """`PlaceError`, if people were to answer on a clock that goes faster than they live: a twin's in a hurry."""
+    if screen != "synthetic" and (_speed(gun) or 1.0) != 1.0:
+        raise PlaceError(
+            f"--gun {gun}: --screen {screen} is for people, who live no faster than the world; start `recoil twin` "
+            "without --speed and leave out ?speed, or use --screen synthetic"
+        )
+
+
+def _at_terminal(request: Request, asked: Asked) -> Finished:
+    del asked
+    return run(request, _terminal, RealClock())
+
+
+def _synthetic(request: Request, asked: Asked) -> Finished:
+    """On a virtual clock; with a gun on a line, whose shots take their time, on the real one."""
+    del asked
+    speed = _speed(request.gun)
+    return run(request, synthetic_screen, VirtualClock() if speed is None else RealClock(speed))
+
+
+def _speed(gun: str) -> float | None:
+    try:
+        return speed_of(gun)
+    except ValueError as error:
+        raise PlaceError(f"--gun {gun}: {error}") from error
+
+
+def _at_console(request: Request, asked: Asked) -> Finished:
+    live = _console()
+    finished: Finished = live.run_live(request, _sides(live, asked))
+    return finished
+
+
+def _sides(live: Any, asked: Asked) -> Any:
+    return live.Sides(
+        visual=asked.visual,
+        screen=asked.participant_screen,
+        own_keys=asked.participant_keys,
+        noise=asked.noise,
+        monitor=asked.monitor,
+    )
+
+
+def run_lab_day(asked: Asked) -> None:
+    """The start window at the console, and one run after the other from it."""
+    if asked.screen != "console":
+        raise PlaceError("give --participant CODE, or --screen console for its start window")
+    if asked.resume or asked.fresh or asked.visual:
+        raise PlaceError("--resume, --fresh and --visual go with --participant CODE; the start window asks by itself")
+    check_pace("console", asked.gun)
+    setup = load_setup(asked.config)
+    request = Request(setup=setup, participant_id="", results=asked.results, gun=asked.gun, seed=asked.seed)
+    live = _console()
+    try:
+        live.lab_day(request, _sides(live, asked))
+    except KeyboardInterrupt as signalled:
+        with suppress(OSError):  # where the terminal is gone, nobody reads it
+            sys.stderr.write(f"recoil: ended by {signalled}\n")
+        raise
+
+
+def _console() -> Any:
+    try:
+        from experiments.screens.console import live  # noqa: PLC0415 - Qt is an extra, and slow
+    except ModuleNotFoundError as error:
+        raise PlaceError(
+            f"--screen console needs the extra `gui` ({error.name} is missing): uv pip sync --python .venv "
+            "--require-hashes requirements/full.txt, or use --screen terminal"
+        ) from error
+    return live
+
+
+_SCREENS = {"terminal": _at_terminal, "synthetic": _synthetic, "console": _at_console}
+
+
+def _again(asked: Asked) -> Again:
+    if asked.resume and asked.fresh:
+        raise PlaceError("--resume and --fresh: give one of them; the first goes on with a run, the second starts anew")
+    if asked.reason and not asked.fresh:
+        raise PlaceError("--reason: goes with --fresh, and says why the unfinished run is set aside")
+    return "resume" if asked.resume else "fresh" if asked.fresh else "ask"
+
+
+def _terminal(setup: Setup[Any], plan: Plan, clock: Clock) -> Screen:
+    del setup
+    return TerminalScreen(plan, clock)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Rebuilt:
+    """A table made again: whether it had to be written, and what there is to say."""
+
+    table: Path
+    rebuilt: bool
+    messages: tuple[str, ...]
+
+
+def rebuild_tables(journals: list[Path]) -> list[Rebuilt]:
+    """The tables of journals. A table that differs from its journal is set aside, not overwritten."""
+    return [_rebuild(path) for path in journals]
+
+
+def _rebuild(path: Path) -> Rebuilt:
+    table, data, contents = rebuild(path)
+    messages = [contents.cut_message] if contents.cut_message else []
+    same = table.exists() and table.read_bytes() == data
+    if table.exists() and not same:
+        messages.append(f"{table}: differed from its journal and was set aside as {set_aside_file(table)}")
+    if not same:
+        storage.write_whole(table, data)
+    return Rebuilt(table=table, rebuilt=not same, messages=tuple(messages))
