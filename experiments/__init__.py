@@ -1,1 +1,1 @@
-"""Words and rules that experiments are made of; the roof of the house stands in `experiments.cli`."""
+"""Words and rules that experiments are made of; the feature of the house stands in `experiments.cli`."""

@@ -13,9 +13,9 @@ from device.methods import drive_of, rendering_of
 from device.parameters import GunParameters
 from device.words import Drive, Pulse
 from experiments.config.gun import GunConfig
+from experiments.config.setup import Setup
 from experiments.load import ConfigError
 from experiments.preference.config import PreferenceConfig
-from experiments.config.setup import Setup
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

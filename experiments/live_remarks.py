@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
+from experiments.design.plan import Trial
 from experiments.session import events
 from experiments.session.entries import Entry
 from experiments.session.events import Event
-from experiments.design.plan import Trial
 from experiments.session.remarks import (
     AnswerCorrected,
     Continued,

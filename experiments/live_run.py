@@ -14,18 +14,18 @@ from concurrent.futures import Future
 from dataclasses import dataclass, replace
 
 from device import DeviceError, Gun
-from experiments.session import events
 from experiments.clock import Clock
+from experiments.design.plan import Plan, Trial
+from experiments.live_remarks import remark_of
+from experiments.record.journal import Journal, JournalGone
+from experiments.screen import Screen
+from experiments.session import events
 from experiments.session.entries import Entry, entries, fits, repeatable, trial_at, value
 from experiments.session.events import ACTS, DISARMS, OWN, TYPED, Event, Press
-from experiments.record.journal import Journal, JournalGone
-from experiments.live_remarks import remark_of
-from experiments.design.plan import Plan, Trial
+from experiments.session.history import Told
 from experiments.session.remarks import Refused, Remark, record
-from experiments.screen import Screen
 from experiments.session.states import ARMED, No, Position, State, after, entered, why_after
 from experiments.session.steps import Outcome, Step
-from experiments.record.tables import Told
 
 REARM_HELD_S = 1.0
 """For so long a key is held to go on after an emergency stop."""

@@ -13,8 +13,8 @@ from typing import Any, TypeVar
 from pydantic import BaseModel, ValidationError
 
 from experiments.catalogue import CATALOGUE
-from experiments.config.models import ExperimentConfig, StudyConfig
 from experiments.config.gun import GunConfig
+from experiments.config.models import ExperimentConfig, StudyConfig
 from experiments.config.setup import Setup
 
 SomeModel = TypeVar("SomeModel", bound=BaseModel)

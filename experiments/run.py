@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import hashlib
 import os
 import shlex
 from collections.abc import Callable
@@ -11,32 +10,26 @@ from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import Any, Literal
 
-from pydantic import ValidationError
-
 from device import Gun, open_gun
 from experiments import catalogue, limits
-from experiments.design import orders
-from experiments.study import places
-from experiments.study import register
-from experiments.record import replay
-from experiments.record import storage
 from experiments.clock import Clock
-from experiments.record.columns import FILE_SUFFIX, LATER
+from experiments.config.setup import Setup
 from experiments.dates import date_text
+from experiments.design.plan import Plan
+from experiments.design.streams import draw_seed
+from experiments.live_run import LiveRun, RunStopped
+from experiments.rebuild import plan_of, sha256, table
+from experiments.record import replay, storage
 from experiments.record.journal import Contents, Journal, JournalError, hold, is_empty
 from experiments.record.journal import read as read_journal
-from experiments.live_run import LiveRun, RunStopped
-from experiments.study.places import Place, PlaceError
-from experiments.design.plan import Plan
 from experiments.record.provenance import provenance
 from experiments.record.replay import Standing
 from experiments.runner import carry_out, gun_name
 from experiments.screen import Screen
-from experiments.config.setup import Setup
 from experiments.session.steps import Answered, Rated, Session
 from experiments.stimulus import Desk
-from experiments.design.streams import draw_seed
-from experiments.record.tables import table_bytes
+from experiments.study import places, register
+from experiments.study.places import Place, PlaceError
 
 Again = Literal["ask", "resume", "fresh"]
 """What to do with an unfinished run: refuse and say what is there, go on with it, or set it aside."""
@@ -212,9 +205,7 @@ def _plan(job: _Job) -> Plan:
     if job.place.practice:
         return _practice(job)
     config = job.request.setup.config
-    order = config.design.order
-    used = [] if order == "random" else places.used_rows(job.place.results, config.experiment)
-    row = orders.next_row(order, len(config.design.methods), used)
+    row = places.next_row(job.request.setup, job.place.results)
     return job.experiment.make_plan(config, job.place.participant_id, resolve_seed(job.request), row)
 
 
@@ -296,7 +287,7 @@ def _to_the_end(session: Session, desk: Desk, standing: Standing, place: Place) 
         raise
     desk.live.end("")
     data = table(read_journal(place.journal))
-    desk.journal.append("finished", table_sha256=_sha256(data))
+    desk.journal.append("finished", table_sha256=sha256(data))
     return _write_table(place)
 
 
@@ -305,41 +296,3 @@ def _write_table(place: Place) -> int:
     contents = read_journal(place.journal)
     storage.write_whole(place.table, table(contents))
     return sum(isinstance(word, Answered | Rated) for _, word in replay.told(contents))
-
-
-def table(contents: Contents) -> bytes:
-    """The CSV that a journal makes. `JournalError` if this version does not know its plan.
-
-    A run that was finished before some columns came gets the table that it finished with.
-    """
-    plan = plan_of(contents)
-    if plan.experiment not in catalogue.CATALOGUE:
-        raise JournalError(
-            f"{contents.path}: line 1: experiment {plan.experiment!r} is not known to this version of Recoil"
-        )
-    rows = catalogue.CATALOGUE[plan.experiment].rows(plan, replay.told(contents))
-    data, finished = table_bytes(plan.experiment, rows), contents.records[-1].get("table_sha256")
-    if finished not in (None, _sha256(data)):
-        older = table_bytes(plan.experiment, rows, without=LATER)
-        return older if _sha256(older) == finished else data
-    return data
-
-
-def _sha256(data: bytes) -> str:
-    return hashlib.sha256(data).hexdigest()
-
-
-def plan_of(contents: Contents) -> Plan:
-    """The plan at the head of a journal."""
-    try:
-        return Plan.from_record(contents.header["plan"])
-    except ValidationError as error:
-        raise JournalError(f"{contents.path}: line 1: no plan of this version of Recoil") from error
-
-
-def rebuild(path: Path) -> tuple[Path, bytes, Contents]:
-    """The table of a journal: where it belongs, its bytes, and what the journal holds."""
-    contents = read_journal(path)
-    data = table(contents)
-    name = path.name.replace("_journal", f"_{FILE_SUFFIX[plan_of(contents).experiment]}")
-    return path.with_name(name).with_suffix(".csv"), data, contents

@@ -10,12 +10,12 @@ from __future__ import annotations
 import math
 
 from device.words import Identity
+from experiments.design.plan import Trial
+from experiments.live_run import RunStopped
+from experiments.record.replay import Standing
 from experiments.session import events
 from experiments.session.entries import trial_at
-from experiments.live_run import RunStopped
-from experiments.design.plan import Trial
-from experiments.synthetic.scale import on_scale
-from experiments.record.replay import Standing
+from experiments.session.scale import on_scale
 from experiments.session.states import State
 from experiments.session.steps import (
     Answered,
@@ -251,4 +251,4 @@ class _Runner:
 
 
 def _kept(rating: float, step: Rate) -> float:
-    return on_scale(rating, step.minimum, step.maximum, step.grain)
+    return on_scale(rating, step)

@@ -13,11 +13,11 @@ from typing import Any, Literal
 
 from device import DeviceError, Gun, LimitError, Shot, ShotReport
 from device.words import Drive
-from experiments.session import events
 from experiments.clock import Clock
-from experiments.record.journal import Journal
-from experiments.live_run import Held, LiveRun, RunStopped
 from experiments.design.plan import Trial
+from experiments.live_run import Held, LiveRun, RunStopped
+from experiments.record.journal import Journal
+from experiments.session import events
 from experiments.session.remarks import TestShot
 from experiments.session.states import State
 from experiments.session.steps import Failed, Fire, Fired, Interrupted, Present, Presented, TrainShot, record

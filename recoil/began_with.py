@@ -14,13 +14,12 @@ from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
-from experiments.record import journal
-from experiments.record import storage
 from experiments.catalogue import CATALOGUE
-from experiments.record.journal import JournalError
-from experiments.load import ConfigError, load_setup
-from experiments.study.places import PlaceError
 from experiments.config.toml_text import toml_text
+from experiments.load import ConfigError, load_setup
+from experiments.record import journal, storage
+from experiments.record.journal import JournalError
+from experiments.study.places import PlaceError
 
 
 def copy_began_with(path: Path, folder: Path) -> list[Path]:

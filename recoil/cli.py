@@ -8,13 +8,8 @@ import sys
 
 import typer
 
-from recoil.commands import design
-from recoil.commands import fit
-from recoil.commands import guns
-from recoil.commands import numbers
-from recoil.commands import power
-from recoil.commands import sessions
 from analysis.report.terminal import INTERRUPTED, UNUSABLE, say
+from recoil.commands import design, fit, guns, numbers, power, sessions
 
 app = typer.Typer(
     name="recoil",
@@ -73,8 +68,8 @@ def main() -> None:
 def _expected() -> tuple[type[Exception], ...]:
     """The errors that have a message for people. Looked up only when something was raised."""
     from device import DeviceError
-    from experiments.record.journal import JournalError
     from experiments.load import ConfigError
+    from experiments.record.journal import JournalError
     from experiments.study.places import PlaceError
 
     return ConfigError, PlaceError, JournalError, DeviceError

@@ -15,12 +15,12 @@ from rich.console import Console
 from rich.table import Table
 from rich.text import Text
 
-from experiments.record import storage
 from experiments.clock import RealClock
 from experiments.doctor.checks import carry_out, checks
 from experiments.doctor.finding import Finding
 from experiments.doctor.verdicts import overall
 from experiments.load import find, load_gun
+from experiments.record import storage
 
 _WIDTH = 160
 """Columns of the table where it does not go to a terminal."""

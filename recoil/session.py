@@ -9,17 +9,18 @@ from pathlib import Path
 from typing import Any
 
 from device.serial_gun.address import speed_of
-from experiments.record import storage
 from experiments.clock import Clock, RealClock, VirtualClock
+from experiments.config.setup import Setup
+from experiments.design.plan import Plan
 from experiments.live_run import RunStopped
 from experiments.load import load_setup
-from experiments.study.places import Place, PlaceError, place, set_aside_file
-from experiments.design.plan import Plan
-from experiments.run import Again, Finished, Request, rebuild, run
+from experiments.rebuild import rebuild
+from experiments.record import storage
+from experiments.run import Again, Finished, Request, run
 from experiments.screen import Screen
 from experiments.screens.synthetic import synthetic_screen
 from experiments.screens.terminal import TerminalScreen
-from experiments.config.setup import Setup
+from experiments.study.places import Place, PlaceError, place, set_aside_file
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

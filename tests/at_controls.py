@@ -18,18 +18,16 @@ from typing import Any, Literal
 
 from device import Gun, GunStatus, LimitError, LinkError, Shot, ShotReport
 from device.words import Direction
-from experiments.session import events
-from experiments.record import storage
 from experiments import run as runs
-from experiments.session.events import Press
-from experiments.record.journal import Contents, read
+from experiments.config.setup import Setup
+from experiments.design.plan import Plan, Trial
 from experiments.live_run import LiveRun
 from experiments.load import load_setup
-from experiments.study.places import Place, place
-from experiments.design.plan import Plan, Trial
-from experiments.session.remarks import AnswerCorrected, Remark
+from experiments.rebuild import table
+from experiments.record import storage
+from experiments.record.journal import Contents, read
 from experiments.record.replay import told
-from experiments.run import Finished, Request, run, table
+from experiments.run import Finished, Request, run
 from experiments.screen import Screen
 from experiments.screens.console import overview, theme, view
 from experiments.screens.console.controls import Controls
@@ -37,9 +35,12 @@ from experiments.screens.console.keys import Name, Presses
 from experiments.screens.console.messages import Ended, GunSeen
 from experiments.screens.console.needs import Field
 from experiments.screens.console.view import About, Seen
-from experiments.config.setup import Setup
+from experiments.session import events
+from experiments.session.events import Press
+from experiments.session.remarks import AnswerCorrected, Remark
 from experiments.session.states import Position, State
 from experiments.session.steps import Answered, Fire, Outcome, Step
+from experiments.study.places import Place, place
 from tests.waiting import PATIENCE_S, wait_for
 
 MOST_DEEDS = 2000

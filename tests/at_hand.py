@@ -9,9 +9,9 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from experiments.load import shipped_folder
 from experiments.session import events
 from experiments.session.events import ACTS, Event
-from experiments.load import shipped_folder
 from experiments.session.states import TABLE, No, State
 from tests.at_display import AtConsole, middle, records, remarks
 from tests.conftest import RECOIL

@@ -14,18 +14,18 @@ from typing import Any, Literal
 from hypothesis import strategies as st
 
 from device import LimitError, LinkError
-from experiments.session import events
-from experiments.session.events import ACTS
-from experiments.record.journal import Contents
-from experiments.live_run import RunStopped
+from experiments.config.setup import Setup
 from experiments.design.plan import Plan, Trial
-from experiments.session.remarks import AnswerCorrected, DescriptionCorrected, RatingCorrected, Refused
+from experiments.live_run import RunStopped
+from experiments.record.journal import Contents
 from experiments.record.replay import told
 from experiments.screens.console.keys import COMMANDS, Name
-from experiments.config.setup import Setup
+from experiments.session import events
+from experiments.session.events import ACTS
+from experiments.session.history import is_attempt
+from experiments.session.remarks import AnswerCorrected, DescriptionCorrected, RatingCorrected, Refused
 from experiments.session.states import ARMED, State
 from experiments.session.steps import Answered, Described, Rated
-from experiments.record.tables import is_attempt
 from tests.at_controls import GUARD_S, Offered, Sitting, WatchedGun, gated, kept, remarks, tells_correctness
 
 KEYS = (*"MFBPUERGNYLST7", "Space", "Enter", "Esc", "Tab", "F1", "F2")

@@ -16,14 +16,14 @@ from device.twin.body import Rendered
 from device.twin.twin import Twin
 from experiments import run as runs
 from experiments.clock import RealClock
-from experiments.record.journal import Contents, read
 from experiments.live_run import RunStopped
 from experiments.load import load_setup
-from experiments.study.places import Place, place
+from experiments.record.journal import Contents, read
 from experiments.record.replay import told
 from experiments.run import Request
 from experiments.screens.synthetic import synthetic_screen
 from experiments.session.steps import Answered, Failed, Fired
+from experiments.study.places import Place, place
 
 UNSURE = re.compile("fired and cut short|may have been fired|was fired, and its answer was lost|the gun rendered")
 """What a cause says of a shot that may have been felt."""

@@ -18,13 +18,13 @@ from pathlib import Path
 from typing import Any
 
 from device import LinkError
-from experiments.session import events
 from experiments import run as runs
 from experiments.clock import RealClock
 from experiments.live_run import RunStopped
 from experiments.run import Request
 from experiments.screens.console import app
 from experiments.screens.console.messages import Ended, ParticipantSeen
+from experiments.session import events
 from experiments.session.states import State
 from tests.at_controls import changed, short_direction
 

@@ -16,9 +16,20 @@ import mpmath
 import numpy as np
 import pytest
 
-from analysis.paper.audit import Comparison, Result, between_f, debit, degrees_of_freedom, grim, grimmer, p_against_statistic, percent_of_count, repeated_f
-from analysis.paper.audit import binomial_p
-from analysis.paper.audit import tukey_pattern
+from analysis.paper.audit import (
+    Comparison,
+    Result,
+    between_f,
+    binomial_p,
+    debit,
+    degrees_of_freedom,
+    grim,
+    grimmer,
+    p_against_statistic,
+    percent_of_count,
+    repeated_f,
+    tukey_pattern,
+)
 from tests.exact import exact_one_way_F, exact_rm_F
 
 MODES = (ROUND_HALF_UP, ROUND_HALF_EVEN, ROUND_HALF_DOWN, ROUND_DOWN)

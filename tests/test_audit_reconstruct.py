@@ -19,8 +19,8 @@ from analysis.paper.audit.means import scale_of
 from analysis.paper.audit.participants import attainable_f, backward_counts, forward_counts, rating_grains
 from analysis.paper.audit.printed import Interval, read
 from analysis.paper.audit.reconstruct import Column, Constraints, meets, printed_constraints, reconstruct
-from analysis.stats.binomial import binomial_test
 from analysis.paper.paper import Paper, load_paper
+from analysis.stats.binomial import binomial_test
 from tests.exact import exact_rm_F
 
 METHODS = ["vibration", "asymmetric-1", "asymmetric-2"]

@@ -9,8 +9,7 @@ from pathlib import Path
 
 import pytest
 
-from analysis.paper.audit import audit, debit, degrees_of_freedom, grim, grimmer, load_paper_file
-from analysis.paper.audit import binomial_p
+from analysis.paper.audit import audit, binomial_p, debit, degrees_of_freedom, grim, grimmer, load_paper_file
 from analysis.paper.audit.page import as_json, as_text, counts, page
 from analysis.paper.audit.predictions import ELSEWHERE, other_rows, predictions
 from analysis.paper.audit.run import Finding

@@ -10,8 +10,17 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from analysis.paper.audit import Rounding, Term, between_f, grimmer, p_against_statistic, read, repeated_f, total
-from analysis.paper.audit import binomial_p
+from analysis.paper.audit import (
+    Rounding,
+    Term,
+    between_f,
+    binomial_p,
+    grimmer,
+    p_against_statistic,
+    read,
+    repeated_f,
+    total,
+)
 from analysis.paper.audit.between_lattice import find_groups
 from analysis.paper.audit.power_sums import BudgetError, numbers_with_sums
 from analysis.paper.audit.printed import Interval, decimal

@@ -10,14 +10,14 @@ from typing import Any
 
 import pytest
 
-from experiments.config.canonical import canonical_json, sha256
 from experiments.clock import VirtualClock
-from experiments.record.journal import JournalError, read
+from experiments.config.canonical import canonical_json, sha256
 from experiments.load import ConfigError, load_setup, shipped_folder
-from experiments.study.places import PlaceError
-from recoil.began_with import copy_began_with
+from experiments.record.journal import JournalError, read
 from experiments.run import Request, run
 from experiments.screens.synthetic import synthetic_screen
+from experiments.study.places import PlaceError
+from recoil.began_with import copy_began_with
 from tests.conftest import Recoil
 
 ODD = 'A "quoted" \\ title,\n\tin two lines: 反冲 é \x7f'

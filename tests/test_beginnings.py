@@ -11,6 +11,11 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from experiments.clock import VirtualClock
+from experiments.config.models import EligibilityConfig
+from experiments.record.journal import JournalError, hold
+from experiments.run import Request, run
+from experiments.screens.synthetic import synthetic_screen
 from experiments.study import register
 from experiments.study.beginnings import (
     Entered,
@@ -23,13 +28,8 @@ from experiments.study.beginnings import (
     refusal,
     typed_facts,
 )
-from experiments.clock import VirtualClock
-from experiments.config.models import EligibilityConfig
 from experiments.study.enrolment import admit, exclude, join, readmit
-from experiments.record.journal import JournalError, hold
 from experiments.study.places import PlaceError
-from experiments.run import Request, run
-from experiments.screens.synthetic import synthetic_screen
 from experiments.study.progress import StudyFolder, open_study
 from experiments.study.study import Facts, Participant, RunStanding, State
 

@@ -9,14 +9,14 @@ from typing import Any
 
 import pytest
 
-from device.physics import simulate, simulate_batch
-from device.physics.tiers import OUTPUTS
 from analysis.predict.bench.flops import counting_floats, operations
 from analysis.predict.bench.ours import Contender, Ready, one_at_a_time
 from analysis.predict.bench.peers.problem import OFF_STATES, Outputs, PeerError, errors, guns, reference
 from analysis.predict.bench.peers.registry import peers
 from analysis.predict.bench.physics import leads
 from analysis.predict.bench.timing import Row, measure
+from device.physics import simulate, simulate_batch
+from device.physics.tiers import OUTPUTS
 from tests.conftest import Recoil
 
 TIGHT = {

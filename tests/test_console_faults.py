@@ -22,18 +22,18 @@ import pytest
 
 from device import Gun, LinkError, Shot, ShotReport
 from experiments import catalogue
-from experiments.record import storage
 from experiments import run as runs
 from experiments.clock import RealClock
-from experiments.record.journal import Contents, read
 from experiments.live_run import RunStopped
 from experiments.load import load_setup
-from experiments.study.places import place
+from experiments.record import storage
+from experiments.record.journal import Contents, read
 from experiments.record.replay import told
 from experiments.run import Request
 from experiments.screens.console import theme
 from experiments.session.states import State
 from experiments.session.steps import Answered, Ask, Failed, Fire, Fired
+from experiments.study.places import place
 from tests.at_controls import short_direction
 
 pytest.importorskip("PyQt6")

@@ -8,8 +8,6 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from experiments.session import events
-from experiments.session.entries import Entry, What
 from experiments.design.plan import Trial
 from experiments.screens.console.keys import (
     BOUNCE_S,
@@ -23,6 +21,8 @@ from experiments.screens.console.keys import (
     field_of,
     why_not,
 )
+from experiments.session import events
+from experiments.session.entries import Entry, What
 from experiments.session.states import TABLE, No, Position, State
 
 S = State

@@ -12,13 +12,13 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from experiments import catalogue
+from experiments.config.setup import Setup
 from experiments.design.plan import Plan, Trial
-from experiments.session.remarks import AnswerCorrected, Flagged, Noted
 from experiments.screens.console import overview, theme, view
 from experiments.screens.console.messages import Ended, GunSeen, ParticipantSeen
 from experiments.screens.console.pace import Pace, clock_text, end_text, remaining_s
 from experiments.screens.console.view import About, Seen
-from experiments.config.setup import Setup
+from experiments.session.remarks import AnswerCorrected, Flagged, Noted
 from experiments.session.states import Position, State
 from experiments.session.steps import Answered, Ask, Describe, Prepare, Present, Presented, Rate, Rated, Repeat, Rest
 from tests.at_controls import DIRECTION, PREFERENCE, sat_at, tells_correctness

@@ -12,15 +12,14 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy.integrate import quad
 
-from analysis.times import density
-from analysis.times import trade
+from analysis.times import density, trade
 from analysis.times.density import log_density, with_slopes
 from analysis.times.distribution import distribution
 from analysis.times.ez import ez, ez_from_summary
 from analysis.times.moments import moments
 from analysis.times.own_times import own_times
-from experiments.synthetic.diffusion_batch import decide_all
 from experiments.design.streams import generator
+from experiments.synthetic.diffusion_batch import decide_all
 
 CASES = [(1.0, 2.0, 0.5), (-3.0, 1.2, 0.2), (0.0, 1.0, 0.9), (8.0, 3.0, 0.1), (0.3, 0.6, 0.03)]
 TIMES = (1e-3, 0.05, 0.2999, 0.3001, 1.0, 4.0, 40.0)

@@ -14,16 +14,16 @@ from typing import Any
 
 import pytest
 
+from analysis.predict.design_search import run as feature
+from analysis.predict.design_search.critical import rate_at
+from analysis.predict.design_search.space import axis, make_space, span
+from analysis.predict.fit.percept_model import PAPER_RATES
 from device.limits import DriveHistory, load_of
 from device.parameters import GunParameters
 from device.physics.trains import highest_rate_Hz
 from device.words import Pulse
-from experiments.synthetic.percept import PerceptParameters
-from analysis.predict.fit.percept_model import PAPER_RATES
 from experiments.load import ConfigError
-from analysis.predict.design_search import run as roof
-from analysis.predict.design_search.critical import rate_at
-from analysis.predict.design_search.space import axis, make_space, span
+from experiments.synthetic.percept import PerceptParameters
 from tests.conftest import RECOIL, Recoil
 from tests.waiting import PATIENCE_S, wait_for
 
@@ -39,7 +39,7 @@ def silent(_what: str, _total: int) -> Iterator[Callable[[str], None]]:
 def done(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, Any]:
     """A small search, with the gun's own friction, voltage and pulse on its axes."""
     out = tmp_path_factory.mktemp("design")
-    return out, roof.design(roof.Request(grid=6), 1, out, silent)
+    return out, feature.design(feature.Request(grid=6), 1, out, silent)
 
 
 @pytest.fixture
@@ -126,7 +126,7 @@ def test_a_shot_that_does_not_break_away_is_named_and_never_counted_as_guessing(
     for plane in (found["map"], found["critical"]):
         for words, shares in zip(plane["status"], plane["predicted"], strict=True):
             assert [word == "home" for word in words] == [share is not None for share in shares]
-    assert "do not move the magnet (no percept)" in roof.as_text(found)
+    assert "do not move the magnet (no percept)" in feature.as_text(found)
     assert "do not move the magnet (no percept)" in (out / "report.md").read_text(encoding="utf-8")
 
 
@@ -143,13 +143,13 @@ def test_the_page_says_that_it_predicts_and_what_it_assumes(done: tuple[Path, An
 
 
 def test_beyond_the_devices_limits_nothing_is_proposed(tmp_path: Path) -> None:
-    request = roof.Request(grid=4, friction="0.2-1.2", voltage="15-33", pulse="0.01")
-    found = roof.design(request, 1, tmp_path, silent)
+    request = feature.Request(grid=4, friction="0.2-1.2", voltage="15-33", pulse="0.01")
+    found = feature.design(request, 1, tmp_path, silent)
     assert found["designs"]["beyond_limits"]["voltage above 24 V"] >= 4
     assert found["best"]["voltage_V"] < 24
     assert found["best"]["limit"] is None
     assert all(one["limit"] is None for one in found["front"])
-    assert "voltage above 24 V" in roof.as_text(found)
+    assert "voltage above 24 V" in feature.as_text(found)
 
 
 def test_without_a_design_to_propose_it_says_so_and_ends_with_1(recoil: Recoil, tmp_path: Path) -> None:
@@ -164,20 +164,20 @@ def test_without_a_design_to_propose_it_says_so_and_ends_with_1(recoil: Recoil, 
 @pytest.mark.parametrize(
     ("request_", "words"),
     [
-        (roof.Request(friction="1.2-0.2"), "--friction 1.2-0.2: FROM must be below TO"),
-        (roof.Request(friction="0.5"), "--friction 0.5: must be FROM-TO"),
-        (roof.Request(voltage="a-b"), "--voltage a-b: must be FROM-TO"),
-        (roof.Request(voltage="-3-4"), "--voltage -3-4: must be FROM-TO"),
-        (roof.Request(voltage="1-1e999"), "--voltage 1-1e999: must be at most 1000"),
-        (roof.Request(pulse="0.02-0.01"), "--pulse 0.02-0.01: FROM must be below TO"),
-        (roof.Request(rate_above_Hz=5.1), "--rate-above 5.1: must be above 0 and at most 5 Hz"),
-        (roof.Request(rate_above_Hz=float("nan")), "--rate-above nan"),
-        (roof.Request(grid=3), "--grid 3: must be 4 to 200"),
-        (roof.Request(config="direction", gun="gun"), "--gun gun: the config direction names its gun"),
-        (roof.Request(gun="nothing"), "nothing: no such file"),
+        (feature.Request(friction="1.2-0.2"), "--friction 1.2-0.2: FROM must be below TO"),
+        (feature.Request(friction="0.5"), "--friction 0.5: must be FROM-TO"),
+        (feature.Request(voltage="a-b"), "--voltage a-b: must be FROM-TO"),
+        (feature.Request(voltage="-3-4"), "--voltage -3-4: must be FROM-TO"),
+        (feature.Request(voltage="1-1e999"), "--voltage 1-1e999: must be at most 1000"),
+        (feature.Request(pulse="0.02-0.01"), "--pulse 0.02-0.01: FROM must be below TO"),
+        (feature.Request(rate_above_Hz=5.1), "--rate-above 5.1: must be above 0 and at most 5 Hz"),
+        (feature.Request(rate_above_Hz=float("nan")), "--rate-above nan"),
+        (feature.Request(grid=3), "--grid 3: must be 4 to 200"),
+        (feature.Request(config="direction", gun="gun"), "--gun gun: the config direction names its gun"),
+        (feature.Request(gun="nothing"), "nothing: no such file"),
     ],
 )
-def test_what_cannot_be_swept_is_refused_with_option_value_and_rule(request_: roof.Request, words: str) -> None:
+def test_what_cannot_be_swept_is_refused_with_option_value_and_rule(request_: feature.Request, words: str) -> None:
     with pytest.raises(ConfigError) as refused:
         make_space(request_)
     assert str(refused.value).startswith(words)
@@ -187,15 +187,15 @@ def test_a_gun_without_a_voice_coil_is_refused(tmp_path: Path) -> None:
     path = tmp_path / "buzz.toml"
     path.write_text('title = "Buzz"\n[methods.buzz]\nlabel = "Buzz"\nactuator = "vibration"\n', encoding="utf-8")
     with pytest.raises(ConfigError, match=r"buzz\.toml: methods: none has the actuator voice-coil"):
-        make_space(roof.Request(gun=str(path)))
+        make_space(feature.Request(gun=str(path)))
 
 
 def test_a_config_brings_its_gun() -> None:
-    assert make_space(roof.Request(config="direction")) == make_space(roof.Request())
+    assert make_space(feature.Request(config="direction")) == make_space(feature.Request())
 
 
 def test_an_axis_goes_through_the_guns_own_values() -> None:
-    space = make_space(roof.Request(grid=11))
+    space = make_space(feature.Request(grid=11))
     assert {0.21, 1.12} <= set(space.friction_N)
     assert 16.0 in space.voltage_V
     assert 0.01 in space.pulse_s

@@ -11,6 +11,12 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from analysis.predict.design_search import shots as design_shots
+from analysis.predict.design_search.assumed import both_ways
+from analysis.predict.design_search.limits import DUTY, HEAT, PULSE, VOLTAGE, broken_limit, steady_coil_C
+from analysis.predict.design_search.rates import evidences, logits, predict, rates
+from analysis.predict.design_search.shots import COIL_POINTS, FREE_POINTS, HOME, Row, felt_of, shots, summarised
+from analysis.predict.fit.percept_model import PAPER_RATES, fit_percept, predicted_rate
 from device.limits import DriveHistory, Load, load_of
 from device.methods import paper_methods
 from device.parameters import GunParameters
@@ -25,12 +31,6 @@ from experiments.synthetic.percept import (
     percept_of_summary,
     percept_of_trace,
 )
-from analysis.predict.fit.percept_model import PAPER_RATES, fit_percept, predicted_rate
-from analysis.predict.design_search import shots as design_shots
-from analysis.predict.design_search.assumed import both_ways
-from analysis.predict.design_search.limits import DUTY, HEAT, PULSE, VOLTAGE, broken_limit, steady_coil_C
-from analysis.predict.design_search.rates import evidences, logits, predict, rates
-from analysis.predict.design_search.shots import COIL_POINTS, FREE_POINTS, HOME, Row, felt_of, shots, summarised
 
 DEFAULT = PerceptParameters()
 GUN = GunParameters()

@@ -12,9 +12,9 @@ from scipy.stats import kstwo
 
 from analysis.times.distribution import distribution
 from analysis.times.moments import moments
+from experiments.design.streams import Stream, generator
 from experiments.synthetic.diffusion import Decision, Diffusion, Lapses, People, decide, person, upper_probability
 from experiments.synthetic.diffusion_batch import decide_all, upper_probabilities
-from experiments.design.streams import Stream, generator
 
 GRID = [(v, a, w) for v in (-2.0, 0.0, 0.5, 3.0) for a in (0.7, 2.0) for w in (0.2, 0.5, 0.9)]
 

@@ -9,11 +9,11 @@ import numpy as np
 import pytest
 
 from device.methods import paper_methods
+from experiments.direction.plan import make_plan
+from experiments.load import load_setup
 from experiments.synthetic.diffusion import Lapses, People
 from experiments.synthetic.felt import NEUTRAL, FeltParticipant, Mind
 from experiments.synthetic.percept import evidence, forward_rate, percepts_of
-from experiments.direction.plan import make_plan
-from experiments.load import load_setup
 
 CONFIG = load_setup("direction").config
 MIND = Mind()

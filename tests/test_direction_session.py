@@ -10,11 +10,11 @@ from hypothesis import strategies as st
 from pydantic import ValidationError
 
 from experiments.config.canonical import canonical_json
+from experiments.config.setup import Setup
+from experiments.design.plan import Plan, Trial
 from experiments.direction.plan import make_plan
 from experiments.direction.session import session
 from experiments.load import load_setup
-from experiments.design.plan import Plan, Trial
-from experiments.config.setup import Setup
 from experiments.session.steps import (
     Answered,
     Ask,

@@ -21,8 +21,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from device import LinkError
-from experiments.config.canonical import sha256
 from experiments.clock import VirtualClock
+from experiments.config.canonical import sha256
 from experiments.doctor import children, verdicts
 from experiments.doctor.checks import Check, carry_out, checks, no_display
 from experiments.doctor.deadline import within
@@ -32,8 +32,8 @@ from experiments.doctor.latencies import Latencies, latencies, together
 from experiments.doctor.link import adapters
 from experiments.doctor.measures import APPENDS, appends, ticks
 from experiments.doctor.spread import Spread, percentile, spread
-from experiments.record.journal import Journal
 from experiments.load import ConfigError, find, load_gun
+from experiments.record.journal import Journal
 from experiments.study.places import PlaceError
 from recoil.doctor import as_text
 from tests.conftest import RECOIL, Recoil

@@ -5,8 +5,8 @@ import math
 import numpy as np
 import pytest
 
-from analysis.stats.effect_sizes import NO_VARIANCE, TOO_LARGE, effect_size, partial_eta_squared_interval
 from analysis.stats.anova import rm_anova
+from analysis.stats.effect_sizes import NO_VARIANCE, TOO_LARGE, effect_size, partial_eta_squared_interval
 from tests.test_sphericity import RIGHT
 
 

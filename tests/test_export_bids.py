@@ -14,18 +14,18 @@ from typing import Any
 import pandas as pd
 import pytest
 
+from analysis.archive.bids import export as feature
 from analysis.archive.bids import files as data_set
 from analysis.archive.bids import vocabulary as words
 from analysis.logs.reading import read_logs
-from experiments.record import columns
 from experiments.clock import RealClock, VirtualClock
 from experiments.load import load_setup, shipped_folder
-from experiments.study.places import PlaceError
-from experiments.study.register import append, entry
-from analysis.archive.bids import export as roof
-from experiments.study.folders import new_study
+from experiments.record import columns
 from experiments.run import Request, run
 from experiments.screens.synthetic import synthetic_screen
+from experiments.study.folders import new_study
+from experiments.study.places import PlaceError
+from experiments.study.register import append, entry
 from tests.conftest import RECOIL, Recoil
 from tests.log_files import rating_rows, ratings_path, trial_rows, trials_path, write_rows, write_study
 from tests.test_cli import refused
@@ -114,7 +114,7 @@ def real(tmp_path_factory: pytest.TempPathFactory) -> Path:
 @pytest.fixture(scope="module")
 def exported(real: Path) -> Path:
     """The data set made of it, to look at."""
-    roof.export(real, real.parent / "bids")
+    feature.export(real, real.parent / "bids")
     return real.parent / "bids"
 
 
@@ -195,7 +195,7 @@ def test_participants_have_the_facts_of_the_register_in_the_words_of_bids(export
 
 def test_without_a_register_the_facts_are_missing(tmp_path: Path) -> None:
     write_rows(ratings_path(tmp_path / "logs", "P01"), rating_rows())
-    roof.export(tmp_path / "logs", tmp_path / "logs" / "bids")
+    feature.export(tmp_path / "logs", tmp_path / "logs" / "bids")
     only = table(tmp_path / "logs" / "bids", "participants.tsv")
     assert [(row["age"], row["sex"], row["handedness"]) for row in only] == [("n/a", "n/a", "n/a")]
     assert not (tmp_path / "logs" / "bids" / "task-direction_beh.json").exists()
@@ -203,7 +203,7 @@ def test_without_a_register_the_facts_are_missing(tmp_path: Path) -> None:
 
 def test_free_text_is_left_out_unless_asked_for(exported: Path, real: Path, tmp_path: Path) -> None:
     assert not [path for path, data in tree(exported).items() if "Müller".encode() in data]
-    roof.export(real, tmp_path / "bids", free_text=True)
+    feature.export(real, tmp_path / "bids", free_text=True)
     cell = "'=1+1 'open second line, Müller"
     assert table(tmp_path / "bids", "sub-Z9/beh/sub-Z9_task-preference_beh.tsv")[0]["comment"] == cell
     assert table(tmp_path / "bids", "sub-Z9/beh/sub-Z9_task-direction_beh.tsv")[1]["note"] == cell
@@ -221,7 +221,7 @@ def test_a_studys_title_is_the_data_sets_name(tmp_path: Path) -> None:
     new_study(tmp_path / "pilot")
     write_rows(ratings_path(tmp_path / "pilot" / "results", "P01"), rating_rows())
     for folder in ("pilot", "pilot/results"):
-        roof.export(tmp_path / folder, tmp_path / folder / "set")
+        feature.export(tmp_path / folder, tmp_path / folder / "set")
         description = json.loads((tmp_path / folder / "set" / "dataset_description.json").read_text())
         assert description["Name"] == "Recoil by asymmetric force: direction and preference"
 
@@ -307,7 +307,7 @@ def test_no_usable_log_is_2(recoil: Recoil, tmp_path: Path) -> None:
     refused(recoil("export", "bids", "bad"), "no usable log in bad", "sub-P01_task-direction_trials.csv, line 1")
     for folder, said in (("empty", "no usable log in .*empty"), ("nowhere", "nowhere: no such folder")):
         with pytest.raises(PlaceError, match=said):
-            roof.export(tmp_path / folder, tmp_path / folder / "bids")
+            feature.export(tmp_path / folder, tmp_path / folder / "bids")
     assert sorted(path.name for path in tmp_path.iterdir()) == ["bad", "empty", "home"]
     assert list((tmp_path / "empty").iterdir()) == []
 
@@ -316,8 +316,8 @@ def test_several_studies_are_not_mixed(tmp_path: Path) -> None:
     for site in ("kyoto", "oslo"):
         write_study(tmp_path / site / "results", 1)
     with pytest.raises(PlaceError, match=r"several studies \(.*kyoto/results, .*oslo/results\); export each by itself"):
-        roof.export(tmp_path, tmp_path / "bids")
-    roof.export(tmp_path / "oslo", tmp_path / "bids")
+        feature.export(tmp_path, tmp_path / "bids")
+    feature.export(tmp_path / "oslo", tmp_path / "bids")
     assert table(tmp_path / "bids", "participants.tsv")[0]["participant_id"] == "sub-P01"
 
 
@@ -325,7 +325,7 @@ def test_practice_is_not_exported(tmp_path: Path) -> None:
     logs = write_study(tmp_path / "logs", 1)
     log = trials_path(logs, "P01")
     log.with_name("sub-P01_task-direction_practice_trials.csv").write_bytes(log.read_bytes())
-    assert roof.export(logs, logs / "bids").problems == ()
+    assert feature.export(logs, logs / "bids").problems == ()
 
 
 # where it goes
@@ -334,17 +334,17 @@ def test_practice_is_not_exported(tmp_path: Path) -> None:
 def test_an_earlier_export_is_replaced_and_is_no_log(tmp_path: Path) -> None:
     logs = write_study(tmp_path / "logs", 2)
     for _ in range(2):
-        assert roof.export(logs, logs / "bids").problems == ()
+        assert feature.export(logs, logs / "bids").problems == ()
     trials_path(logs, "P02").unlink()
     ratings_path(logs, "P02").unlink()
-    assert roof.export(logs, logs / "bids").as_json()["participants"] == 1
+    assert feature.export(logs, logs / "bids").as_json()["participants"] == 1
     assert not (logs / "bids" / "sub-P02").exists()
     assert not [path for path in logs.iterdir() if path.name.startswith(".")]
     assert len(read_logs([logs]).files) == 2
 
 
 def test_what_people_filled_in_stays(real: Path, tmp_path: Path) -> None:
-    roof.export(real, tmp_path / "bids", free_text=True)
+    feature.export(real, tmp_path / "bids", free_text=True)
     given = {
         "dataset_description.json": {"Name": "Kicks", "Authors": ["A. Person", "B. Person"], "BIDSVersion": "0"},
         "task-direction_beh.json": {"Instructions": "Say where it kicked.", "note": {"Description": "old"}},
@@ -352,7 +352,7 @@ def test_what_people_filled_in_stays(real: Path, tmp_path: Path) -> None:
     for path, values in given.items():
         file = tmp_path / "bids" / path
         file.write_text(json.dumps(json.loads(file.read_text()) | values))
-    roof.export(real, tmp_path / "bids")
+    feature.export(real, tmp_path / "bids")
     description = json.loads((tmp_path / "bids" / "dataset_description.json").read_text())
     assert (description["Name"], description["Authors"]) == ("Kicks", ["A. Person", "B. Person"])
     assert description["BIDSVersion"] == "1.11.1"
@@ -364,13 +364,13 @@ def test_what_people_filled_in_stays(real: Path, tmp_path: Path) -> None:
 @pytest.mark.parametrize("path", ["derivatives/model.tsv", ".git/HEAD", "sub-P01/beh/notes.txt", "LICENSE"])
 def test_an_export_that_others_have_added_to_is_refused(tmp_path: Path, path: str) -> None:
     logs = write_study(tmp_path / "logs", 1)
-    roof.export(logs, logs / "bids")
+    feature.export(logs, logs / "bids")
     added = logs / "bids" / path
     added.parent.mkdir(parents=True, exist_ok=True)
     added.write_text("theirs")
     before = tree(logs / "bids")
     with pytest.raises(PlaceError, match=f"holds what no export wrote.*{path.split('/', maxsplit=1)[0]}"):
-        roof.export(logs, logs / "bids")
+        feature.export(logs, logs / "bids")
     assert tree(logs / "bids") == before
 
 
@@ -381,7 +381,7 @@ def test_a_folder_that_is_no_export_is_refused(tmp_path: Path, description: str)
     (tmp_path / "theirs" / "dataset_description.json").write_text(description)
     for out in (tmp_path / "theirs", logs, logs / "sub-P01", trials_path(logs, "P01")):
         with pytest.raises(PlaceError, match="exists and is no data set"):
-            roof.export(logs, out)
+            feature.export(logs, out)
     assert (tmp_path / "theirs" / "dataset_description.json").read_text() == description
     assert len(tree(logs)) == 2
 
@@ -396,7 +396,7 @@ def test_an_empty_folder_and_a_link_to_one_are_filled(tmp_path: Path) -> None:
     (tmp_path / "disk" / "bids").mkdir(parents=True)
     (tmp_path / "link").symlink_to(tmp_path / "disk" / "bids")
     for _ in range(2):
-        roof.export(logs, tmp_path / "link")
+        feature.export(logs, tmp_path / "link")
     assert (tmp_path / "link").is_symlink()
     assert (tmp_path / "disk" / "bids" / "participants.tsv").exists()
 
@@ -405,16 +405,16 @@ def test_where_two_names_cannot_be_exchanged_the_old_one_is_set_aside_first(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     logs = write_study(tmp_path / "logs", 1)
-    monkeypatch.setattr(roof, "_exchange", lambda *_: False)
+    monkeypatch.setattr(feature, "_exchange", lambda *_: False)
     for _ in range(2):
-        roof.export(logs, logs / "bids")
+        feature.export(logs, logs / "bids")
     assert sorted(path.name for path in logs.iterdir()) == ["bids", "sub-P01"]
     assert "sub-P01" in (logs / "bids" / "participants.tsv").read_text()
 
 
 def test_a_disk_that_fills_leaves_the_earlier_export(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     logs = write_study(tmp_path / "logs", 1)
-    roof.export(logs, logs / "bids")
+    feature.export(logs, logs / "bids")
     before = tree(logs)
     write_study(logs, 2)
     written = []
@@ -425,9 +425,9 @@ def test_a_disk_that_fills_leaves_the_earlier_export(tmp_path: Path, monkeypatch
             raise OSError(28, "No space left on device")
         path.write_bytes(data)
 
-    monkeypatch.setattr(roof.storage, "write_whole", full)
+    monkeypatch.setattr(feature.storage, "write_whole", full)
     with pytest.raises(OSError, match="No space left"):
-        roof.export(logs, logs / "bids")
+        feature.export(logs, logs / "bids")
     assert {path: data for path, data in tree(logs).items() if path.startswith(("bids", "."))} == {
         path: data for path, data in before.items() if path.startswith("bids")
     }
@@ -444,7 +444,7 @@ def test_a_kill_leaves_the_old_data_set_or_the_new_one(
     logs = write_study(tmp_path / "logs", 3)
     wholes = {}
     for name, free_text in (("new", True), ("old", False)):
-        roof.export(logs, logs / "bids", free_text=free_text)
+        feature.export(logs, logs / "bids", free_text=free_text)
         wholes[name] = tree(logs / "bids")
     assert wholes["old"] != wholes["new"]
     kill = ["strace", "-qq", "-f", "-e", f"trace={call}", "-e", f"inject={call}:signal=KILL:when={when}"]

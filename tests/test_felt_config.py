@@ -7,14 +7,15 @@ from pathlib import Path
 
 import pytest
 
+from analysis.predict.check import as_text, check
 from experiments.clock import VirtualClock
-from experiments.synthetic.felt import Mind, mind_of
+from experiments.direction.observer import mind_of
 from experiments.direction.plan import make_plan
 from experiments.load import ConfigError, load_setup
-from experiments.synthetic.percept_config import PerceptConfig
-from experiments.preference.config import Appeal
-from analysis.predict.check import as_text, check
 from experiments.screens.synthetic import synthetic_screen
+from experiments.synthetic.felt import Mind
+from experiments.synthetic.percept_config import PerceptConfig
+from experiments.synthetic.preference import Appeal
 from tests.felt_configs import BALANCE, changed, felt_text, shipped_text, written
 
 FELT = re.compile(r"\n\[synthetic\.(percept|diffusion|people|appeal)\].*", re.DOTALL)

@@ -13,19 +13,19 @@ import numpy as np
 import pytest
 
 from analysis.logs.reading import read_logs
-from experiments.synthetic.felt import forward_rates, mind_of
-from experiments.direction.observer import FeltObserver
+from experiments.config.setup import Setup
+from experiments.design.plan import Plan
+from experiments.design.streams import Stream
+from experiments.direction.observer import FeltObserver, mind_of
 from experiments.direction.observer import observer as direction_observer
-from experiments.synthetic.percept import evidence, percepts_of
 from experiments.direction.plan import make_plan
 from experiments.load import load_setup, shipped_folder
-from experiments.design.plan import Plan
-from experiments.synthetic.preference import feelings, felt_ratings
 from experiments.preference.observer import observer as preference_observer
 from experiments.preference.observer import strengths
 from experiments.preference.plan import make_plan as preference_plan
-from experiments.config.setup import Setup
-from experiments.design.streams import Stream
+from experiments.synthetic.felt import forward_rates
+from experiments.synthetic.percept import evidence, percepts_of
+from experiments.synthetic.preference import feelings, felt_ratings
 from tests.conftest import Recoil
 from tests.felt_configs import felt_text, written
 

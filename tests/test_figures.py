@@ -15,9 +15,12 @@ from matplotlib.figure import Figure
 from matplotlib.text import Text
 
 from analysis.logs.reading import read_logs
-from analysis.report.figures import ShotPanel, display_name, figure_5, figure_8, figure_directions, figure_response_times, stars
-from analysis.summary.figures import directions
-from analysis.summary.figures import results
+from analysis.report.figures.names import display_name, stars
+from analysis.report.figures.shot import ShotPanel, figure_5
+from analysis.summary.figures import directions, results
+from analysis.summary.figures.directions import figure_directions
+from analysis.summary.figures.results import figure_8
+from analysis.summary.figures.times import figure_response_times
 from analysis.summary.summary import summarize
 from tests.log_files import write_study
 

@@ -16,15 +16,15 @@ import pytest
 from scipy import stats
 
 from analysis.paper.paper import load_paper
-from device.methods import paper_methods
-from experiments.synthetic.diffusion import People
-from experiments.synthetic.percept import PerceptParameters
-from analysis.predict.fit.percept_model import PAPER_RATES, PAPER_TRIALS
-from experiments.load import ConfigError, find, load_setup, shipped_folder
 from analysis.predict.fit.percept import percept
+from analysis.predict.fit.percept_model import PAPER_RATES, PAPER_TRIALS
 from analysis.predict.fit.request import ASSUMED_SPREAD, Request, read
 from analysis.predict.fit.studies import Case, Judged, cases_of, judge, place_of
 from analysis.predict.fit.words import fragment, verdict_sentence
+from device.methods import paper_methods
+from experiments.load import ConfigError, find, load_setup, shipped_folder
+from experiments.synthetic.diffusion import People
+from experiments.synthetic.percept import PerceptParameters
 from tests.conftest import Recoil
 
 METHODS = paper_methods()

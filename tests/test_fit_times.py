@@ -9,13 +9,13 @@ from typing import Any
 import numpy as np
 import pytest
 
+from analysis.predict.fit.times import lapse_range
 from analysis.times.distribution import distribution
 from analysis.times.fit import fit
 from analysis.times.predicted import answered_by
-from experiments.synthetic.diffusion_batch import decide_all
-from experiments.load import ConfigError
-from analysis.predict.fit.times import lapse_range
 from experiments.design.streams import generator
+from experiments.load import ConfigError
+from experiments.synthetic.diffusion_batch import decide_all
 from tests.conftest import Recoil
 from tests.log_files import METHODS, TextRow, trial_rows, trials_path, write_rows
 from tests.test_decision_fit import made

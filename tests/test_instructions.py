@@ -15,23 +15,24 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from experiments.config.canonical import canonical_json
 from experiments.clock import VirtualClock
-from experiments.record.columns import LATER
+from experiments.config.canonical import canonical_json
+from experiments.config.setup import Setup
+from experiments.design.plan import Plan
 from experiments.direction.config import DirectionConfig
 from experiments.direction.plan import make_plan, make_practice
 from experiments.direction.session import session
-from experiments.record.journal import read
 from experiments.load import load_setup, shipped_folder
-from experiments.design.plan import Plan
+from experiments.rebuild import table
+from experiments.record.columns import LATER
+from experiments.record.journal import read
 from experiments.record.replay import told
-from experiments.run import Request, run, table
+from experiments.run import Request, run
 from experiments.screens.console.overview import coming
 from experiments.screens.console.view import About, Seen, instruction
 from experiments.screens.synthetic import synthetic_screen
 from experiments.screens.terminal import TerminalScreen
 from experiments.screens.texts import read_out_text
-from experiments.config.setup import Setup
 from experiments.session.states import Position, State
 from experiments.session.steps import Prepare, outcome_from, record, step_from
 

@@ -9,9 +9,9 @@ from typing import Any
 
 import pytest
 
-from experiments.record import storage
-from experiments.config.canonical import sha256
 from experiments.clock import VirtualClock
+from experiments.config.canonical import sha256
+from experiments.record import storage
 from experiments.record.journal import Contents, Journal, JournalError, head, read
 
 PARTS = {"plan": {"trials": [1, 2]}, "setup": {"title": "é – 20 °C"}}

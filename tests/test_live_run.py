@@ -11,14 +11,15 @@ from typing import Any
 import pytest
 
 from device import LimitError, LinkError
-from experiments.session import events
+from experiments.design.plan import Trial
+from experiments.live_run import RunStopped, Verdict
 from experiments.record import storage
+from experiments.record.replay import told
+from experiments.screens.texts import again_text
+from experiments.session import events
 from experiments.session import remarks as words
 from experiments.session.entries import Entry
 from experiments.session.events import Event, Press
-from experiments.live_run import RunStopped, Verdict
-from experiments.study.places import place
-from experiments.design.plan import Trial
 from experiments.session.remarks import (
     AnswerCorrected,
     Flagged,
@@ -29,10 +30,9 @@ from experiments.session.remarks import (
     RatingCorrected,
     Refused,
 )
-from experiments.record.replay import told
-from experiments.screens.texts import again_text
 from experiments.session.states import EMERGENCY, State
 from experiments.session.steps import Failed, Fire, Interrupted, Prepare, Presented, Rated, Repeat, trial_of
+from experiments.study.places import place
 from tests.at_controls import (
     DIRECTION,
     GUARD_S,

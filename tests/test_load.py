@@ -6,9 +6,9 @@ from typing import NamedTuple
 
 import pytest
 
+from analysis.predict.check import check
 from experiments.limits import check_limits
 from experiments.load import ConfigError, find, line_of, load_gun, load_setup, load_study, read_toml, shipped_folder
-from analysis.predict.check import check
 
 EXPERIMENTS = ("direction", "preference")
 DIRECTION, PREFERENCE, GUN = "direction.toml", "preference.toml", "gun.toml"

@@ -8,9 +8,9 @@ from pathlib import Path
 import pytest
 
 from analysis.logs.reading import read_logs
+from experiments.clock import RealClock
 from experiments.record import columns
 from experiments.study import register
-from experiments.clock import RealClock
 from tests.log_files import TextRow, rating_rows, ratings_path, trial_rows, trials_path, write_rows, write_study
 
 TRIALS_FILE = "sub-P01_task-direction_trials.csv"

@@ -8,6 +8,8 @@ import numpy as np
 import pytest
 
 from experiments.clock import VirtualClock
+from experiments.config.setup import Setup
+from experiments.design.streams import Stream
 from experiments.direction.observer import RatesObserver, TableObserver
 from experiments.direction.observer import observer as direction_observer
 from experiments.direction.plan import make_plan as direction_plan
@@ -15,10 +17,8 @@ from experiments.load import ConfigError, load_setup
 from experiments.preference.observer import RatingsObserver, draw_ratings
 from experiments.preference.observer import observer as preference_observer
 from experiments.preference.plan import make_plan as preference_plan
-from experiments.synthetic.scale import on_scale
 from experiments.screens.synthetic import synthetic_screen
-from experiments.config.setup import Setup
-from experiments.design.streams import Stream
+from experiments.session.scale import on_scale
 
 DIRECTION, PREFERENCE = load_setup("direction"), load_setup("preference")
 PLAN = direction_plan(DIRECTION.config, "P01", 1, None)
@@ -296,7 +296,7 @@ def test_a_single_method_can_be_the_lowest_of_all() -> None:
     ("value", "rating"), [(-3.0, 0.0), (0.0, 0.0), (0.04, 0.0), (0.06, 0.1), (0.3, 0.3), (9.96, 10.0), (99.0, 10.0)]
 )
 def test_the_nearest_value_of_the_scale_is_as_a_person_would_write_it(value: float, rating: float) -> None:
-    assert on_scale(value, 0.0, 10.0, 0.1) == rating
+    assert on_scale(value, PREFERENCE.config.rating) == rating
 
 
 def test_exposures_are_positive_last_as_long_as_planned_in_the_mean_and_depend_on_nothing_before() -> None:

@@ -5,8 +5,8 @@ import pingouin
 import pytest
 from scipy import stats
 
-from analysis.stats.paired import CONSTANT, EQUAL, holm, paired_t_tests
 from analysis.stats.anova import rm_anova
+from analysis.stats.paired import CONSTANT, EQUAL, holm, paired_t_tests
 from tests.test_sphericity import RIGHT
 
 

@@ -11,8 +11,8 @@ from typing import Any
 
 import pytest
 
-from experiments.load import load_setup
 from experiments.design.plan import Trial
+from experiments.load import load_setup
 from experiments.screens.console.beside import PAUSED, ParticipantSide
 from experiments.screens.participant.link import ParticipantLink
 from experiments.screens.participant.words import BETWEEN, Focused, line

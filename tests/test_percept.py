@@ -10,6 +10,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from analysis.predict.fit.percept_model import PAPER_RATES, PerceptFit, fit_percept, predicted_rate
 from device.methods import paper_methods
 from device.parameters import GunParameters, VibrationParameters
 from device.physics import simulate, trace
@@ -26,7 +27,6 @@ from experiments.synthetic.percept import (
     percept_of_summary,
     percepts_of,
 )
-from analysis.predict.fit.percept_model import PAPER_RATES, PerceptFit, fit_percept, predicted_rate
 
 DEFAULT = PerceptParameters()
 METHODS = paper_methods()

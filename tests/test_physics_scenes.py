@@ -11,12 +11,12 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from analysis.predict.bench.flops import operations
 from device.parameters import DriveOff, Emf
 from device.physics import FIDELITIES, SCENES, GunParameters, Scene, choose, simulate
 from device.physics.contact import compliant_collision, rigid_collision
 from device.physics.scenes import COSTS, NEEDED, choose_contact
 from device.physics.tiers import FRICTION_N, NEAR, stated_error
-from analysis.predict.bench.flops import operations
 from tests.conftest import Recoil
 
 PAPER = GunParameters()

@@ -6,7 +6,16 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from experiments.config.canonical import canonical_json, sha256
-from experiments.study.places import Place, PlaceError, journals, known_codes, place, set_aside, set_aside_file, used_rows
+from experiments.study.places import (
+    Place,
+    PlaceError,
+    journals,
+    known_codes,
+    place,
+    set_aside,
+    set_aside_file,
+    used_rows,
+)
 
 RESULTS = Path("/nowhere/results")
 EXPERIMENTS = ("direction", "preference")

@@ -18,9 +18,9 @@ import pytest
 from pydantic import ValidationError
 
 from experiments.config.canonical import canonical_json
+from experiments.design.plan import Plan
 from experiments.direction.plan import make_plan as direction_plan
 from experiments.load import load_setup
-from experiments.design.plan import Plan
 from experiments.preference.plan import make_plan as preference_plan
 
 SEEDS = 10_000

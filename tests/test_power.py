@@ -14,12 +14,12 @@ from typing import Any
 import psutil
 import pytest
 
+from analysis.predict.jobs import JobError, on_cluster, on_processes
+from analysis.predict.power import run as feature
+from analysis.predict.power.grid import Request, make_grid
 from analysis.predict.power.planned import ALL_PAIRS, ANOVA
 from experiments.config.models import leaves
 from experiments.load import ConfigError, load_setup, shipped_folder
-from analysis.predict.jobs import JobError, on_cluster, on_processes
-from analysis.predict.power import run as roof
-from analysis.predict.power.grid import Request, make_grid
 from tests.conftest import RECOIL, Recoil
 from tests.waiting import PATIENCE_S, wait_for
 
@@ -204,8 +204,8 @@ BAD = {
 def test_what_cannot_be_is_refused_in_one_message(
     words: str, tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    from recoil import cli
     from analysis.predict import jobs
+    from recoil import cli
 
     monkeypatch.setattr(jobs, "CONNECT_S", 1)
     monkeypatch.setattr("sys.argv", ["recoil", "power", "direction", *words.split(), "--out", str(tmp_path / "out")])
@@ -254,7 +254,7 @@ def test_trials_keep_the_sets_and_the_share_of_forward_trials() -> None:
 def test_a_design_that_keeps_people_too_long_is_shown_and_never_proposed(tmp_path: Path) -> None:
     request = Request(config="direction", participants="14", trials="20,40", effects="1", studies=200, target=0.75)
     with on_processes(1):
-        found = roof.power(request, roof.Where(workers=1), tmp_path, _silent)
+        found = feature.power(request, feature.Where(workers=1), tmp_path, _silent)
     short, long = found["designs"]
     assert short["too_long"] == ""
     assert long["too_long"] == "3060 s a participant exceed fatigue.max_planned_s = 2700 s"
@@ -270,7 +270,7 @@ def test_methods_can_be_compared_in_sets(tmp_path: Path) -> None:
         effects="1",
         studies=100,
     )
-    found = roof.power(request, roof.Where(workers=1), tmp_path, _silent)
+    found = feature.power(request, feature.Where(workers=1), tmp_path, _silent)
     assert [one["methods"] for one in found["designs"]] == [
         ["vibration", "asymmetric-2"],
         ["asymmetric-1", "asymmetric-2"],
@@ -282,8 +282,8 @@ def test_methods_can_be_compared_in_sets(tmp_path: Path) -> None:
 
 def test_a_worker_without_this_recoil_is_named() -> None:
     """The check itself, on what a worker might say."""
-    from experiments.record.provenance import versions
     from analysis.predict import jobs
+    from experiments.record.provenance import versions
 
     class Client:
         def wait_for_workers(self, number: int, timeout: float) -> None: ...

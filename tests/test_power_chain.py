@@ -10,17 +10,16 @@ import numpy as np
 import pytest
 
 from analysis.logs.reading import read_logs
-from analysis.power import Findings, analysed_directions, analysed_ratings
-from analysis.predict.power.planned import ANOVA, ANY_PAIR
+from analysis.predict.power.grid import Request as PowerRequest
+from analysis.predict.power.grid import make_grid
+from analysis.predict.power.planned import ANOVA, ANY_PAIR, Findings, analysed_directions, analysed_ratings
 from analysis.summary.summary import summarize
 from experiments.clock import VirtualClock
 from experiments.config.models import participant_codes
+from experiments.config.setup import Setup
 from experiments.load import load_setup
-from analysis.predict.power.grid import Request as PowerRequest
-from analysis.predict.power.grid import make_grid
 from experiments.run import Request, run
 from experiments.screens.synthetic import synthetic_screen
-from experiments.config.setup import Setup
 
 EQUAL = [0.0, 0.0, 0.0]
 

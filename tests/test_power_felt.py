@@ -11,19 +11,19 @@ import numpy as np
 import pytest
 from scipy import stats
 
-from analysis.power import merged
-from analysis.predict.power import shares
-from analysis.predict.power.planned import ANOVA, ANY_PAIR
-from experiments.direction.config import DirectionConfig
-from experiments.synthetic.diffusion import People
-from experiments.synthetic.felt import FeltParticipant, mind_of
-from experiments.synthetic.percept_batch import forward_rates
-from experiments.direction.plan import make_plan
-from experiments.load import load_setup
 from analysis.predict.power.felt import Felt, felt_counts, felt_of, percepts_of_setup
 from analysis.predict.power.grid import Request, make_grid
+from analysis.predict.power.planned import ANOVA, ANY_PAIR
+from analysis.predict.power.shares import merged, shares
 from analysis.predict.power.studies import run_chunk
 from experiments.design.streams import generator
+from experiments.direction.config import DirectionConfig
+from experiments.direction.observer import mind_of
+from experiments.direction.plan import make_plan
+from experiments.load import load_setup
+from experiments.synthetic.diffusion import People
+from experiments.synthetic.felt import FeltParticipant
+from experiments.synthetic.percept_batch import forward_rates
 from tests.conftest import Recoil
 from tests.felt_configs import felt_text, written
 from tests.test_power_studies import homogeneity_p

@@ -11,20 +11,11 @@ import numpy as np
 import pytest
 from scipy import stats
 
-from analysis.stats.tukey import rm_tukey_hsd
 from analysis.paper.odds import WHOLE_PATTERN
 from analysis.paper.paper import load_paper
-from analysis.power import Findings, Tally, analysed_directions, analysed_ratings, merged, precisions, tallied
-from analysis.predict.power import shares
-from analysis.predict.power.planned import ALL_PAIRS, ANOVA, ANY_PAIR
-from experiments.direction.observer import RatesObserver
-from experiments.direction.plan import make_plan
-from experiments.load import find, load_setup
-from experiments.preference.config import RatingScale
-from experiments.preference.observer import draw_ratings
-from experiments.synthetic.scale import on_scale as one_on_scale
-from analysis.predict.reproduction.odds import direction_odds, preference_odds
 from analysis.predict.power.grid import Request, make_grid
+from analysis.predict.power.planned import ALL_PAIRS, ANOVA, ANY_PAIR, Findings, analysed_directions, analysed_ratings
+from analysis.predict.power.shares import Tally, merged, precisions, shares, tallied
 from analysis.predict.power.studies import (
     Chunk,
     Design,
@@ -34,7 +25,15 @@ from analysis.predict.power.studies import (
     preference_scores,
     run_chunk,
 )
+from analysis.predict.reproduction.odds import direction_odds, preference_odds
+from analysis.stats.tukey import rm_tukey_hsd
 from experiments.design.streams import Stream, generator
+from experiments.direction.observer import RatesObserver
+from experiments.direction.plan import make_plan
+from experiments.load import find, load_setup
+from experiments.preference.config import RatingScale
+from experiments.preference.observer import draw_ratings
+from experiments.session.scale import on_scale as one_on_scale
 
 DIRECTION, PREFERENCE = load_setup("direction").config, load_setup("preference").config
 METHODS = DIRECTION.design.methods
@@ -121,7 +120,7 @@ def test_ratings_are_those_of_the_observer_for_the_same_draws() -> None:
 def test_a_scale_of_many_ratings_is_the_scale_of_one(grain: float) -> None:
     scale = RatingScale.model_validate({**PREFERENCE.rating.model_dump(), "grain": grain})
     values = draws().uniform(-2, 12, 2000)
-    assert on_scale(values, scale).tolist() == [one_on_scale(value, 0, 10, grain) for value in values]
+    assert on_scale(values, scale).tolist() == [one_on_scale(value, scale) for value in values]
 
 
 def test_half_the_effect_halves_the_distances_and_the_habit() -> None:

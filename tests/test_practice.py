@@ -9,9 +9,9 @@ from analysis.logs.reading import read_logs
 from experiments.clock import VirtualClock
 from experiments.direction.plan import make_practice
 from experiments.load import load_setup
-from experiments.study.places import PlaceError
 from experiments.run import Request, run
 from experiments.screens.synthetic import synthetic_screen
+from experiments.study.places import PlaceError
 
 DIRECTION, PREFERENCE = load_setup("direction"), load_setup("preference")
 

@@ -13,9 +13,9 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from experiments.study import register
-from experiments.record import storage
 from experiments.clock import VirtualClock
+from experiments.record import storage
+from experiments.study import register
 from experiments.study.places import PlaceError, known_codes, place
 from experiments.study.register import NAME, Entry, RegisterError, append, entry, excluded, members, read
 from tests.waiting import PATIENCE_S

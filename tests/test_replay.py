@@ -12,19 +12,20 @@ from typing import Any, NamedTuple
 import pytest
 
 from experiments import catalogue
-from experiments.study import register
-from experiments.config.canonical import canonical_json
 from experiments.clock import VirtualClock
-from experiments.record.journal import Journal, JournalError, link, read
-from experiments.load import load_setup
-from experiments.study.places import PlaceError, place
-from experiments.design.plan import Plan
-from experiments.study.register import RegisterError
-from experiments.record.replay import go_on, history, replay
-from experiments.run import Again, Request, plan_of, rebuild, run
-from experiments.screens.synthetic import synthetic_screen
+from experiments.config.canonical import canonical_json
 from experiments.config.setup import Setup
+from experiments.design.plan import Plan
+from experiments.load import load_setup
+from experiments.rebuild import plan_of, rebuild
+from experiments.record.journal import Journal, JournalError, link, read
+from experiments.record.replay import go_on, history, replay
+from experiments.run import Again, Request, run
+from experiments.screens.synthetic import synthetic_screen
 from experiments.session.states import EMERGENCY
+from experiments.study import register
+from experiments.study.places import PlaceError, place
+from experiments.study.register import RegisterError
 
 SETUPS = {name: load_setup(name) for name in ("direction", "preference")}
 EVERY = {"direction": 7, "preference": 1}

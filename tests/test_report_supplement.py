@@ -4,7 +4,7 @@ from pathlib import Path
 
 import pytest
 
-from analysis.report.parts import Section
+from analysis.report.section import Section
 from analysis.summary.sections.supplement import TITLES, supplement_sections
 from tests.test_sphericity import RIGHT
 from tests.test_supplement import CEILING, ONE_AT_CEILING, _ratings, _study

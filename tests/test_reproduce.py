@@ -13,9 +13,9 @@ from scipy.stats import studentized_range
 from statsmodels.stats.anova import AnovaRM
 
 from analysis.logs.reading import read_logs
-from experiments.load import load_setup
 from analysis.predict.reproduction import reproduce
 from analysis.predict.reproduction.odds import direction_counts, preference_scores
+from experiments.load import load_setup
 from tests.conftest import RECOIL
 
 EXPERIMENTS = ("direction", "preference")

@@ -10,23 +10,23 @@ import pytest
 from device import Identity, LimitError, LinkError, Shot, ShotReport, open_gun
 from device.words import GunStatus
 from experiments import catalogue, limits
-from experiments.record import replay
-from experiments.record import storage
 from experiments.clock import Clock, VirtualClock
-from experiments.record.journal import Journal, read
+from experiments.config.setup import Setup
+from experiments.design.plan import Plan
 from experiments.live_run import LiveRun, RunStopped
 from experiments.load import load_setup
-from experiments.study.places import Place, place
-from experiments.design.plan import Plan
-from experiments.session.remarks import Remark
+from experiments.rebuild import table
+from experiments.record import replay, storage
+from experiments.record.journal import Journal, read
 from experiments.record.replay import Standing
-from experiments.run import Request, run, table
+from experiments.run import Request, run
 from experiments.runner import MAX_FAILURES, carry_out
 from experiments.screens.synthetic import SyntheticScreen, synthetic_screen
-from experiments.config.setup import Setup
+from experiments.session.remarks import Remark
 from experiments.session.states import Position, State
 from experiments.session.steps import History, Outcome, Step, record
 from experiments.stimulus import Desk
+from experiments.study.places import Place, place
 
 SETUPS = {name: load_setup(name) for name in ("direction", "preference")}
 BOTH = pytest.mark.parametrize("name", SETUPS)

@@ -12,11 +12,11 @@ import pytest
 
 from device.wire import errors
 from experiments.record.journal import read
-from experiments.study.places import PlaceError
 from experiments.record.replay import told
+from experiments.session.steps import Failed
+from experiments.study.places import PlaceError
 from recoil.session import check_pace
 from recoil.twin import troubles_of
-from experiments.session.steps import Failed
 from tests.conftest import RECOIL
 from tests.serial_runs import check, hasty, of_trains, one_run, resumed, run_all, timings_of
 from tests.twins import Troubles, a_twin

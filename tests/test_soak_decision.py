@@ -17,9 +17,9 @@ from analysis.times.distribution import distribution
 from analysis.times.fit import DiffusionFit, fit
 from analysis.times.moments import moments
 from analysis.times.people import PeopleFit, fit_people
+from experiments.design.streams import generator
 from experiments.synthetic.diffusion import Diffusion, upper_probability
 from experiments.synthetic.diffusion_batch import decide_all
-from experiments.design.streams import generator
 from tests.conftest import Soak
 from tests.test_decision import reference
 from tests.test_decision_fit import RANGE_S, TRUTH, made

@@ -13,11 +13,11 @@ from typing import Any
 
 import pytest
 
+from analysis.predict.design_search.critical import LEVEL, rate_at
+from analysis.predict.jobs import cores
 from device.parameters import GunParameters
 from device.physics.trains import highest_rate_Hz
 from experiments.synthetic.percept import PerceptParameters
-from analysis.predict.design_search.critical import LEVEL, rate_at
-from analysis.predict.jobs import cores
 from tests.conftest import RECOIL, Soak
 from tests.test_power import files
 

@@ -15,14 +15,14 @@ import numpy as np
 import pytest
 
 from analysis.paper.odds import wilson_interval
+from analysis.predict.fit.percept_model import FITTED, Fitted, fit_percept
+from analysis.predict.jobs import cores, on_processes
 from analysis.predict.power.planned import ANOVA, ANY_PAIR
 from device.methods import paper_methods
+from experiments.design.streams import generator
+from experiments.load import load_setup
 from experiments.synthetic.diffusion import People
 from experiments.synthetic.percept import PerceptParameters, evidence, forward_rate, percepts_of
-from analysis.predict.fit.percept_model import FITTED, Fitted, fit_percept
-from experiments.load import load_setup
-from analysis.predict.jobs import cores, on_processes
-from experiments.design.streams import generator
 from tests.conftest import RECOIL, Soak
 from tests.test_power_chain import counted, said, through_the_chain
 from tests.test_power_felt import felt_config

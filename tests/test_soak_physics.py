@@ -13,10 +13,10 @@ from collections.abc import Callable, Iterator
 import numpy as np
 import pytest
 
+from analysis.predict.jobs import cores
 from device.physics import FIDELITIES, GunParameters, coil, simulate, simulate_batch, single, warm
 from device.physics.audit import audit
 from device.physics.trains import highest_rate_Hz, repeated
-from analysis.predict.jobs import cores
 from tests.conftest import Soak
 from tests.physics_claims import BARE, DAMPED, VARIANTS, motor_peak_N, share_after_turn, slide_mm
 from tests.test_physics import EXTREMES

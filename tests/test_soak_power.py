@@ -17,10 +17,10 @@ import pytest
 
 from analysis.paper.odds import WHOLE_PATTERN, wilson_interval
 from analysis.paper.paper import load_paper
-from analysis.predict.power.planned import ANOVA, ANY_PAIR
-from experiments.load import find, load_setup
 from analysis.predict.jobs import cores, on_processes
+from analysis.predict.power.planned import ANOVA, ANY_PAIR
 from analysis.predict.reproduction.odds import direction_odds, preference_odds
+from experiments.load import find, load_setup
 from tests.conftest import RECOIL, Soak
 from tests.test_power import files
 from tests.test_power_chain import counted, null_setup, said, through_the_chain

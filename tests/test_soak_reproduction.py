@@ -16,8 +16,8 @@ from scipy.stats import studentized_range
 from statsmodels.stats.anova import AnovaRM
 
 from experiments.direction.plan import make_plan
-from experiments.record.journal import JournalError, read
 from experiments.load import load_setup
+from experiments.record.journal import JournalError, read
 from tests import test_durability as durability
 from tests import test_reproduce as reproduction
 from tests.conftest import RECOIL, Soak

@@ -15,6 +15,17 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy import stats
 
+from analysis.logs.reading import read_logs
+from analysis.summary.figures.trade import (
+    figure_conditional_accuracy,
+    figure_quantile_probability,
+    has_curve,
+    has_points,
+)
+from analysis.summary.report import write_report
+from analysis.summary.sections.data import ReportData
+from analysis.summary.sections.trade import CONDITIONAL_ACCURACY, QUANTILE_PROBABILITY, trade_section
+from analysis.summary.summary import summarize
 from analysis.times import trade
 from analysis.times.by_person import ordered, quantiles
 from analysis.times.ez import ez, ez_people
@@ -24,14 +35,9 @@ from analysis.times.moments import moments
 from analysis.times.own_trials import own_trials
 from analysis.times.people import fit_people
 from analysis.times.sampled_fit import MOST_PEOPLE, as_trials, sampled_fit
-from analysis.logs.reading import read_logs
-from analysis.report.figures import figure_conditional_accuracy, figure_quantile_probability, has_curve, has_points
-from analysis.report.page import ReportData, write_report
-from analysis.summary.sections.trade import CONDITIONAL_ACCURACY, QUANTILE_PROBABILITY, trade_section
-from analysis.summary.summary import summarize
+from experiments.design.streams import generator
 from experiments.record import columns
 from experiments.synthetic.diffusion_batch import decide_all
-from experiments.design.streams import generator
 from tests.log_files import METHODS, TextRow, trial_rows, trials_path, write_many, write_rows
 
 DRIFTS = {"vibration": 0.0, "asymmetric-1": 1.2, "asymmetric-2": 2.0}

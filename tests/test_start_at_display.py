@@ -16,10 +16,10 @@ import pytest
 
 from experiments.clock import VirtualClock
 from experiments.load import load_setup
-from experiments.study.register import read
-from experiments.study.folders import new_study
 from experiments.run import Request, run
 from experiments.screens.synthetic import synthetic_screen
+from experiments.study.folders import new_study
+from experiments.study.register import read
 from tests import watched_start
 from tests.at_display import HAND_S, AtDisplay, last_record, needs_display
 from tests.conftest import RECOIL

@@ -21,14 +21,9 @@ from PyQt6.QtGui import QKeyEvent, QWheelEvent
 from PyQt6.QtTest import QTest
 from PyQt6.QtWidgets import QApplication, QPushButton, QWidget
 
-from experiments.study import enrolment
-from experiments.study import register
 from experiments.clock import RealClock, VirtualClock
-from experiments.record.journal import hold
 from experiments.load import load_setup
-from experiments.study.places import place
-from experiments.study.register import read
-from experiments.study.folders import new_study
+from experiments.record.journal import hold
 from experiments.run import Request, run
 from experiments.screens.console import theme
 from experiments.screens.console.app import application
@@ -37,7 +32,11 @@ from experiments.screens.console.live import _study
 from experiments.screens.console.opening import Opening
 from experiments.screens.console.start import StartWindow
 from experiments.screens.synthetic import synthetic_screen
+from experiments.study import enrolment, register
+from experiments.study.folders import new_study
+from experiments.study.places import place
 from experiments.study.progress import StudyFolder, open_study
+from experiments.study.register import read
 from experiments.study.study import Facts
 
 FACTS = Facts(age_years=25, sex="female", handedness="right")

@@ -11,9 +11,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from experiments.screens.console.keys import COMMANDS
 from experiments.session import events
 from experiments.session.events import ACTS, KINDS, Event
-from experiments.screens.console.keys import COMMANDS
 from experiments.session.states import (
     ARMED,
     BACK,

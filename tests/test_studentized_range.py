@@ -160,7 +160,6 @@ def test_a_probability_outside_its_range_is_refused() -> None:
 
 
 def test_importing_it_loads_neither_scipy_stats_nor_scipy_linalg() -> None:
-    code = (
-        "import sys, analysis.stats.studentized_tail; sys.exit(bool({'scipy.stats', 'scipy.linalg'} & set(sys.modules)))"
-    )
+    heavy = "{'scipy.stats', 'scipy.linalg'}"
+    code = f"import sys, analysis.stats.studentized_tail\nsys.exit(bool({heavy} & set(sys.modules)))"
     assert subprocess.run([sys.executable, "-c", code], check=False).returncode == 0

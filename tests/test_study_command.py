@@ -11,12 +11,12 @@ from typing import Any
 import pytest
 
 from experiments.clock import VirtualClock
-from experiments.record.journal import hold
 from experiments.load import load_setup
-from experiments.study.register import append, entry
-from experiments.study.folders import new_study
+from experiments.record.journal import hold
 from experiments.run import Request, run
 from experiments.screens.synthetic import synthetic_screen
+from experiments.study.folders import new_study
+from experiments.study.register import append, entry
 from tests.conftest import RECOIL, Recoil
 from tests.test_cli import refused
 from tests.waiting import PATIENCE_S

@@ -11,10 +11,10 @@ import pandas as pd
 import pytest
 
 from analysis import rm_tukey_hsd_paired
+from analysis.logs.reading import Logs, read_logs
 from analysis.stats.assumptions import assumptions
 from analysis.stats.bayes import SCALE, jzs_paired
 from analysis.stats.supplement import WITHIN, within_supplement
-from analysis.logs.reading import Logs, read_logs
 from analysis.summary.sections.supplement import supplement_sections
 from analysis.summary.summary import summarize
 from tests.log_files import METHODS, rating_rows, ratings_path, trial_rows, trials_path, write_rows, write_study
@@ -229,7 +229,7 @@ def test_the_paired_tukey_is_the_one_of_the_core(found: Json) -> None:
 
 
 def test_nothing_slow_is_imported_before_it_is_used() -> None:
-    program = "import sys, analysis.summary.summary; print([m for m in ('pingouin', 'statsmodels') if m in sys.modules])"
+    program = "import sys, analysis.summary.summary; print([m for m in {'pingouin', 'statsmodels'} & {*sys.modules}])"
     done = subprocess.run(
         [sys.executable, "-c", program], capture_output=True, text=True, check=True, timeout=PATIENCE_S
     )

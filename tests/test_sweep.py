@@ -11,10 +11,9 @@ import numpy as np
 import pyarrow.parquet as pq
 import pytest
 
+from analysis.predict.simulate import sweep, sweep_table
 from device.physics import GunParameters, simulate
 from experiments.load import ConfigError
-from analysis.predict.simulate import sweep
-from analysis.predict.simulate import sweep_table
 from tests.conftest import RECOIL
 from tests.waiting import PATIENCE_S, wait_for
 

@@ -5,14 +5,15 @@ import pytest
 from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
-from experiments.record import columns
-from experiments.record.columns import guard, unguard
+from experiments.design.plan import Plan
 from experiments.direction.plan import make_plan as direction_plan
 from experiments.direction.rows import rows as direction_rows
 from experiments.load import load_setup
-from experiments.design.plan import Plan
 from experiments.preference.plan import make_plan as preference_plan
 from experiments.preference.rows import rows as preference_rows
+from experiments.record import columns
+from experiments.record.columns import guard, unguard
+from experiments.record.tables import Row, table_bytes
 from experiments.session.remarks import AnswerCorrected
 from experiments.session.steps import (
     Answered,
@@ -34,7 +35,6 @@ from experiments.session.steps import (
     Rested,
     Step,
 )
-from experiments.record.tables import Row, table_bytes
 
 FORMULA_STARTS = tuple("=+-@\t\r")
 DIRECTION: Plan = direction_plan(load_setup("direction").config, "P01", 1, None)

@@ -10,8 +10,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from experiments.config.canonical import canonical_json
-from experiments.load import read_toml, shipped_folder
 from experiments.config.toml_text import toml_text
+from experiments.load import read_toml, shipped_folder
 
 texts = st.text(st.characters(exclude_categories=["Cs"]), max_size=20)
 numbers = st.integers() | st.floats(allow_nan=False, allow_infinity=False)

@@ -13,8 +13,8 @@ import pytest
 from device import LimitError, LinkError, Pulse, Shot, ShotReport, ShotTiming
 from device.words import GunStatus
 from experiments.clock import VirtualClock
+from experiments.rebuild import table
 from experiments.record.journal import Journal, read
-from experiments.run import table
 from experiments.stimulus import LEAD_S
 from tests.serial_runs import of_trains
 from tests.test_runner import Sitting, TroubledGun, resumed_rows, sitting

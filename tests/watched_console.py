@@ -276,8 +276,8 @@ def slow_disk(sync_s: float) -> None:
 
 
 if __name__ == "__main__":
-    from recoil.cli import main
     from experiments.screens.console.app import application
+    from recoil.cli import main
 
     watch = Watch(**json.loads(sys.argv.pop(1)))
     watch_guns(watch)

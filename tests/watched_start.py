@@ -125,8 +125,8 @@ def watch(file: Path) -> Any:
 
 
 if __name__ == "__main__":
-    from recoil.cli import main
     from experiments.screens.console.app import application
+    from recoil.cli import main
 
     application()
     eye = watch(Path(sys.argv.pop(1)))

@@ -1,1 +1,1 @@
-"""archive"""
+"""Data sets for others to keep and to read."""

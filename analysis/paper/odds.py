@@ -11,11 +11,11 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy import special
 
+from analysis.paper.paper import PublishedDirection, PublishedExperiment, TukeyClaim
 from analysis.stats.anova import check_scores, rm_anova
 from analysis.stats.binomial import binomial_test
 from analysis.stats.studentized_range import studentized_range_isf
 from analysis.stats.tukey import PairStatistics, pairs_of, pooled_pairs
-from analysis.paper.paper import PublishedDirection, PublishedExperiment, TukeyClaim
 
 WHOLE_PATTERN = "whole pattern"
 SIGNIFICANT = 0.05

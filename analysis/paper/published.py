@@ -7,8 +7,8 @@ from dataclasses import dataclass, replace
 from decimal import Decimal
 from typing import Any, Literal
 
-from analysis.paper.paper import Paper, PublishedDirection, PublishedExperiment, PublishedPreference, TukeyClaim
 from analysis.paper import quantities
+from analysis.paper.paper import Paper, PublishedDirection, PublishedExperiment, PublishedPreference, TukeyClaim
 
 Verdict = Literal[
     "agrees",

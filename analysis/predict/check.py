@@ -11,14 +11,15 @@ from device.physics import simulate
 from device.words import MAX_PULSE_S, MAX_VOLTAGE_V, Pulse
 from experiments import catalogue
 from experiments.config.models import participant_codes
+from experiments.config.setup import Setup
+from experiments.design.orders import next_row
 from experiments.direction.config import DirectionConfig
-from experiments.synthetic.felt import NEUTRAL, forward_rates, mind_of
-from experiments.synthetic.percept import percepts_of
+from experiments.direction.observer import mind_of
 from experiments.limits import MethodLimits, check_limits, check_methods
 from experiments.load import ConfigError, find, load_gun, load_setup, load_study, read_toml
-from experiments.design.orders import next_row
 from experiments.screens.synthetic import observer_of
-from experiments.config.setup import Setup
+from experiments.synthetic.felt import NEUTRAL, forward_rates
+from experiments.synthetic.percept import percepts_of
 
 EXAMPLE_SEED = 1
 """Orders are shown for this seed if the config gives none; a run without a seed draws its own."""

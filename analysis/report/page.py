@@ -1,19 +1,14 @@
-"""The report as files: HTML that needs nothing else, Markdown, the statistics as JSON, and the figures."""
+"""Sections as a page: HTML that needs nothing else, and Markdown."""
 
 from __future__ import annotations
 
 import base64
-import json
 import re
 from pathlib import Path
 
 from jinja2 import Environment, PackageLoader, StrictUndefined, select_autoescape
 
-from analysis.report.parts import Picture, ReportData, Section, Table
-from analysis.summary.sections.pictures import write_figures
-from analysis.summary.sections.sections import sections
-
-__all__ = ["Picture", "ReportData", "Section", "Table", "write_page", "write_report"]
+from analysis.report.section import Section
 
 VERDICTS = (
     *("agrees", "differs", "differs as predicted", "not published", "not obtained"),
@@ -27,21 +22,11 @@ _TIGHT = re.compile(r" (?=[=<>] [\d.−])|(?<= [=<>]) (?=[\d.−])|(?<=\d) (?=%)
 """Spaces that no line may break at: around `=` and `<` before a number, before a percent sign, in brackets."""
 
 
-def write_report(out: Path, report: ReportData) -> None:
-    """Write `report.html`, `report.md`, `statistics.json` and `figures/` into `out`, which is made if need be.
-
-    Files of an earlier report there are replaced. The same data give the same bytes.
-    """
-    out.mkdir(parents=True, exist_ok=True)
-    write_figures(out / "figures", report)
-    write_page(out, report.title, sections(report))
-    _write(out / "statistics.json", json.dumps(report.statistics, indent=1, ensure_ascii=False, allow_nan=False) + "\n")
-
-
 def write_page(out: Path, title: str, parts: tuple[Section, ...]) -> None:
     """Write `report.html` and `report.md` of finished sections; their pictures stand in `out / "figures"` already."""
     for name in ("report.html", "report.md"):
-        _write(out / name, _render(f"{name}.j2", title, parts, out / "figures"))
+        text = _render(f"{name}.j2", title, parts, out / "figures")
+        (out / name).write_text(text, encoding="utf-8", newline="\n")
 
 
 def markdown(text: str) -> str:
@@ -80,7 +65,3 @@ def _render(template: str, title: str, parts: tuple[Section, ...], figures: Path
 
 def _data_address(png: Path) -> str:
     return "data:image/png;base64," + base64.b64encode(png.read_bytes()).decode("ascii")
-
-
-def _write(path: Path, text: str) -> None:
-    path.write_text(text, encoding="utf-8", newline="\n")

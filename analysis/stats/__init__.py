@@ -1,1 +1,1 @@
-"""What stands around the core tests, mostly from libraries: corrections, sizes, other tests, what was assumed."""
+"""The statistics: arrays in, frozen results out. Our own core, and beside it what libraries add."""

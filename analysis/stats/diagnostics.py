@@ -9,8 +9,8 @@ import numpy as np
 from numpy.typing import ArrayLike
 from scipy import stats
 
-from analysis.stats.residuals import residuals
 from analysis.stats.arrays import numbers
+from analysis.stats.residuals import residuals
 
 SHAPIRO_UP_TO = 5000
 NO_RESIDUALS = "There is no error variance, so there are no residuals to look at."

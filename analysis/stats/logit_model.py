@@ -9,8 +9,8 @@ import numpy as np
 from numpy.typing import ArrayLike
 from scipy import special
 
-from analysis.stats.paired import holm
 from analysis.stats.arrays import FloatArray, numbers, share
+from analysis.stats.paired import holm
 from analysis.stats.tukey import Label, pairs_of
 
 NAME = "logistic GEE, independence working correlation, bias-reduced sandwich (Mancl & DeRouen 2001)"

@@ -10,9 +10,9 @@ import numpy as np
 from numpy.typing import ArrayLike
 from scipy import stats
 
-from analysis.stats.paired import holm
 from analysis.stats.anova import check_scores
 from analysis.stats.arrays import FloatArray, numbers
+from analysis.stats.paired import holm
 from analysis.stats.tukey import Label, pairs_of
 
 EXACT_UP_TO = 50

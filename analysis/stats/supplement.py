@@ -12,7 +12,10 @@ from typing import Any
 
 import pandas as pd
 
+from analysis.stats.anova import rm_anova
+from analysis.stats.arrays import FloatArray
 from analysis.stats.bayes import SCALE, jzs_paired
+from analysis.stats.cells import DIRECTIONS, TrialCells
 from analysis.stats.clustering import clustering
 from analysis.stats.diagnostics import NORMALITY_NOTE, OUTLIER_RULE, ends, normality, outliers
 from analysis.stats.effect_sizes import NOTE as EFFECT_SIZE_NOTE
@@ -24,9 +27,6 @@ from analysis.stats.paired import CONSTANT, EQUAL, PairedT, paired_t_tests
 from analysis.stats.rank_tests import friedman, signed_rank_tests
 from analysis.stats.residuals import unit_scaled
 from analysis.stats.sphericity import sphericity
-from analysis.stats.anova import rm_anova
-from analysis.stats.arrays import FloatArray
-from analysis.stats.cells import DIRECTIONS, TrialCells
 from analysis.stats.tukey import rm_tukey_hsd_paired
 
 Json = dict[str, Any]

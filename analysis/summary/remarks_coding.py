@@ -29,7 +29,7 @@ from pydantic import AfterValidator, Field, model_validator
 
 from analysis.logs.toml_model import Model, load_model
 from analysis.report import apa
-from analysis.report.parts import Section, Table
+from analysis.report.section import Section, Table
 
 
 def _compiles(text: str) -> str:

@@ -12,18 +12,18 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
-from analysis.stats.assumptions import assumptions
-from analysis.stats.clustering import METHOD as CLUSTERING_NOTE
-from analysis.stats.supplement import model, pooled_clustering, within_supplement
-from analysis.stats.within_subject import cousineau_morey
-from analysis.stats.anova import rm_anova
-from analysis.stats.binomial import binomial_test
-from analysis.stats.cells import DIRECTIONS, Finite, TrialCells, by_name, coded, trial_cells
-from analysis.stats.detection import yes_no
-from analysis.stats.tukey import rm_tukey_hsd
-from analysis.times.own_trials import INSTRUCTION
 from analysis.logs.completeness import complete_rows
 from analysis.logs.reading import Logs
+from analysis.stats.anova import rm_anova
+from analysis.stats.assumptions import assumptions
+from analysis.stats.binomial import binomial_test
+from analysis.stats.cells import DIRECTIONS, Finite, TrialCells, by_name, coded, trial_cells
+from analysis.stats.clustering import METHOD as CLUSTERING_NOTE
+from analysis.stats.detection import yes_no
+from analysis.stats.supplement import model, pooled_clustering, within_supplement
+from analysis.stats.tukey import rm_tukey_hsd
+from analysis.stats.within_subject import cousineau_morey
+from analysis.times.own_trials import INSTRUCTION
 from analysis.times.response_times import response_times, valid_times
 from analysis.times.speed_accuracy import speed_accuracy
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, fields
@@ -97,7 +96,7 @@ def simulate_batch(
     """
     rows, valid = _rows(gun or GunParameters(), fidelity, arrays)
     found = np.empty((len(rows), RESULT_SIZE))
-    cores, progress = cores or os.cpu_count() or 1, progress or (lambda _count: None)
+    progress = progress or (lambda _count: None)
     if valid.all():
         _run(rows, found, cores, progress)
     else:
@@ -146,7 +145,9 @@ def _reduce(rows: NDArray[np.float64], model: float) -> None:
         rows[:, BACK_EMF], rows[:, OPEN] = 0.0, 1.0
 
 
-def _run(rows: NDArray[np.float64], found: NDArray[np.float64], cores: int, progress: Callable[[int], object]) -> None:
+def _run(
+    rows: NDArray[np.float64], found: NDArray[np.float64], cores: int | None, progress: Callable[[int], object]
+) -> None:
     run = _compiled_chunk() if find_spec("numba") else _interpreted_chunk
 
     def one(start: int) -> int:

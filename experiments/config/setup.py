@@ -7,8 +7,8 @@ from pathlib import Path
 from typing import Any, Generic, TypeVar
 
 from experiments.config.canonical import sha256
-from experiments.config.models import ExperimentConfig
 from experiments.config.gun import GunConfig
+from experiments.config.models import ExperimentConfig
 
 Config_co = TypeVar("Config_co", bound=ExperimentConfig, covariant=True)
 

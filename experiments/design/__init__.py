@@ -1,1 +1,1 @@
-"""design"""
+"""From a config to a plan: orders, balance, random streams. Pure."""

@@ -15,12 +15,12 @@ from dataclasses import dataclass
 from statistics import NormalDist
 
 from device.words import DIRECTIONS, Direction
-from experiments.direction.config import DirectionConfig, Rates, ResponseTime
-from experiments.synthetic.felt import NEUTRAL, FeltParticipant, Mind, mind_of
-from experiments.synthetic.percept import Percept, percepts_of
-from experiments.design.plan import Plan, Trial
 from experiments.config.setup import Setup
+from experiments.design.plan import Plan, Trial
 from experiments.design.streams import Stream
+from experiments.direction.config import DirectionConfig, Rates, ResponseTime
+from experiments.synthetic.felt import NEUTRAL, FeltParticipant, Mind
+from experiments.synthetic.percept import Percept, percepts_of
 
 _NORMAL = NormalDist()
 
@@ -46,6 +46,18 @@ def observer(setup: Setup[DirectionConfig], plan: Plan) -> RatesObserver | Table
         methods = setup.gun.renderings(setup.config.design.methods)
         return FeltObserver(mind, percepts_of(methods, mind.percept.leak_s), plan)
     return RatesObserver(setup.config, plan)
+
+
+def mind_of(config: DirectionConfig) -> Mind:
+    """What a config's participants who feel the gun are made of."""
+    synthetic = config.synthetic
+    return Mind(
+        percept=synthetic.percept.own,
+        boundaries=synthetic.diffusion.boundaries,
+        non_decision_s=synthetic.diffusion.non_decision_s,
+        lapses=synthetic.diffusion.lapses.own,
+        people=synthetic.people.own,
+    )
 
 
 def probit_of_forward(rates: Rates, method: str, direction: Direction) -> float:

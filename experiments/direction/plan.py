@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 from device.words import Direction
-from experiments.direction.config import Design, DirectionConfig
 from experiments.design.orders import method_order
 from experiments.design.plan import Plan, Trial
 from experiments.design.streams import Stream
+from experiments.direction.config import Design, DirectionConfig
 
 
 def make_plan(config: DirectionConfig, participant_id: str, seed: int, order_row: int | None) -> Plan:

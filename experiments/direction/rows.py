@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 from experiments.design.plan import Plan, Trial
+from experiments.record.tables import Row, presentation
+from experiments.session.history import Story, Told, stories
 from experiments.session.remarks import AnswerCorrected
 from experiments.session.steps import Answered, Fired
-from experiments.record.tables import Row, Story, Told, presentation, stories
 
 ANTICIPATION_S = 0.1
 """A key that comes sooner was not pressed for what was felt: simple reactions to touch take longer (assumed)."""

@@ -5,10 +5,10 @@ from __future__ import annotations
 from functools import partial
 from itertools import pairwise
 
-from experiments.direction.config import Breaks, DirectionConfig
-from experiments.design.plan import Plan, Trial
-from experiments.session.presenting import Presenter
 from experiments.config.setup import Setup
+from experiments.design.plan import Plan, Trial
+from experiments.direction.config import Breaks, DirectionConfig
+from experiments.session.presenting import Presenter
 from experiments.session.steps import Ask, Fire, Prepare, Rest, Session, Step
 
 

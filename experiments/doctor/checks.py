@@ -11,13 +11,13 @@ from pathlib import Path
 from typing import Any
 
 from device import DeviceError
-from experiments.record import journal
 from experiments.doctor import children, link, measures, verdicts
 from experiments.doctor.children import Answer
 from experiments.doctor.deadline import within
 from experiments.doctor.figures import Display, Keys, Sound, Stage
 from experiments.doctor.finding import Finding
 from experiments.doctor.latencies import Latencies, latencies, together
+from experiments.record import journal
 from experiments.record.journal import JournalError
 from experiments.study.places import PlaceError
 

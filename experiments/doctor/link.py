@@ -12,8 +12,8 @@ from experiments.clock import RealClock
 from experiments.doctor.figures import Adapter, Link
 from experiments.doctor.measures import timed_ms
 from experiments.doctor.spread import spread
-from experiments.study.places import PlaceError
 from experiments.runner import gun_name
+from experiments.study.places import PlaceError
 
 ROUND_TRIPS = 200
 ADAPTERS = Path("/sys/bus/usb-serial/devices")

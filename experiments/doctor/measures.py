@@ -12,9 +12,9 @@ from importlib import metadata
 from itertools import pairwise
 from pathlib import Path
 
-from experiments.record import storage
 from experiments.doctor.figures import Appends, Machine, Ticks
 from experiments.doctor.spread import spread
+from experiments.record import storage
 from experiments.record.provenance import recoil_version
 
 PACKAGES = ("numpy", "scipy", "PyQt6", "psychopy")

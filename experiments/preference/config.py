@@ -22,9 +22,7 @@ from experiments.config.models import (
     check_duration,
 )
 from experiments.synthetic.percept_config import PerceptConfig
-
-Points = Annotated[float, Field(ge=-100, le=100)]
-"""Points of the rating scale, and beyond its ends."""
+from experiments.synthetic.preference import Appeal
 
 
 class Design(Model):
@@ -112,20 +110,6 @@ class Ratings(Model):
     def named(self) -> tuple[str, ...]:
         """The methods that the habits speak of."""
         return (*((self.lowest,) if self.lowest else ()), *(self.same or ()))
-
-
-class Appeal(Model):
-    """How a shot that is felt appeals: the numbers of `experiments.synthetic.preference`, all of them assumed.
-
-    `base` and `gain` meet the assumed means of `[synthetic.ratings]` to 0.2, `jnd` the published 2 of 14 who tied, and
-    `criterion_sd` the published F in half of all studies. Points of the scale but for `jnd`, a Weber fraction.
-    """
-
-    base: Points = 2.3
-    gain: Annotated[float, Field(ge=0, le=100)] = 4.9
-    jnd: Annotated[float, Field(ge=0, le=10)] = 0.33
-    person_sd: Spread = 0.6
-    criterion_sd: Spread = 1.9
 
 
 class Synthetic(SyntheticConfig):

@@ -5,14 +5,14 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 
-from experiments.synthetic.percept import evidence, percepts_of
+from experiments.config.setup import Setup
 from experiments.design.plan import Plan, Trial
-from experiments.synthetic.preference import felt_ratings
+from experiments.design.streams import Stream
 from experiments.preference.config import PreferenceConfig, RatingScale
 from experiments.preference.config import Ratings as RatingsLaw
-from experiments.synthetic.scale import on_scale
-from experiments.config.setup import Setup
-from experiments.design.streams import Stream
+from experiments.session.scale import on_scale
+from experiments.synthetic.percept import evidence, percepts_of
+from experiments.synthetic.preference import felt_ratings
 
 TABLE_COLUMNS = ("participant_id", "method", "rating")
 """The table of answers: each participant's rating of each method."""
@@ -59,7 +59,7 @@ def draw_ratings(law: RatingsLaw, scale: RatingScale, methods: Sequence[str], st
 
 
 def _kept(value: float, scale: RatingScale) -> float:
-    return on_scale(value, scale.minimum, scale.maximum, scale.grain)
+    return on_scale(value, scale)
 
 
 class RatingsObserver:

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from experiments.design.orders import method_order
 from experiments.design.plan import Plan, Trial
-from experiments.preference.config import PreferenceConfig
 from experiments.design.streams import Stream
+from experiments.preference.config import PreferenceConfig
 
 
 def make_plan(config: PreferenceConfig, participant_id: str, seed: int, order_row: int | None) -> Plan:

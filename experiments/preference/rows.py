@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 from experiments.design.plan import Plan
+from experiments.record.tables import Row, presentation
+from experiments.session.history import Story, Told, stories
 from experiments.session.remarks import DescriptionCorrected, RatingCorrected
 from experiments.session.steps import Described, Interrupted, Presented, Rated
-from experiments.record.tables import Row, Story, Told, presentation, stories
 
 
 def rows(plan: Plan, told: Told) -> list[Row]:

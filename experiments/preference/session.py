@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from functools import partial
 
+from experiments.config.setup import Setup
 from experiments.design.plan import Plan, Trial
 from experiments.preference.config import PreferenceConfig
 from experiments.session.presenting import Presenter
-from experiments.config.setup import Setup
 from experiments.session.steps import Describe, Prepare, Present, Rate, Session, Step
 
 

@@ -1,1 +1,1 @@
-"""record"""
+"""What a run leaves: the journal, what is derived from it, and where it came from."""

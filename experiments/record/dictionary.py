@@ -1,4 +1,4 @@
-"""The data dictionary, printed from the columns that everything else uses: `python -m experiments.record.dictionary`."""
+"""The data dictionary, printed from the columns: `python -m experiments.record.dictionary`."""
 
 from __future__ import annotations
 

@@ -16,9 +16,9 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Literal, Self, get_args
 
-from experiments.record import storage
-from experiments.config.canonical import canonical_json, sha256
 from experiments.clock import Clock
+from experiments.config.canonical import canonical_json, sha256
+from experiments.record import storage
 
 Kind = Literal["run", "step", "outcome", "shot", "remark", "resumed", "stopped", "finished"]
 _KINDS = get_args(Kind)

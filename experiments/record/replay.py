@@ -9,6 +9,7 @@ from typing import Any
 from pydantic import ValidationError
 
 from experiments.record.journal import Contents, JournalError
+from experiments.session.history import Told
 from experiments.session.remarks import Halted, Remark, TestShot, remark_from
 from experiments.session.states import EMERGENCY
 from experiments.session.steps import (
@@ -24,7 +25,6 @@ from experiments.session.steps import (
     record,
     step_from,
 )
-from experiments.record.tables import Told
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -7,15 +7,15 @@ from typing import Any
 
 from device import GunStatus
 from experiments import catalogue
-from experiments.session import events
 from experiments.clock import Clock
 from experiments.config.models import ExperimentConfig
-from experiments.session.events import Event
+from experiments.config.setup import Setup
+from experiments.design.plan import Plan
 from experiments.live_run import REARM_HELD_S, LiveRun
 from experiments.load import ConfigError
-from experiments.design.plan import Plan
+from experiments.session import events
+from experiments.session.events import Event
 from experiments.session.remarks import Remark
-from experiments.config.setup import Setup
 from experiments.session.states import EMERGENCY, Position, State
 from experiments.session.steps import Ask, Outcome, Present, Rate, Rest, Step
 

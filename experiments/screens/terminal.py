@@ -14,12 +14,8 @@ from contextlib import suppress
 from typing import TYPE_CHECKING, TextIO
 
 from device import GunStatus
-from experiments.session import events
 from experiments.clock import Clock
-from experiments.session.entries import Entry, value
-from experiments.session.events import Event, Press
 from experiments.live_run import LiveRun
-from experiments.session.remarks import Remark, flag_word
 from experiments.screens.texts import (
     FLAG_RULE,
     again_text,
@@ -31,6 +27,10 @@ from experiments.screens.texts import (
     typed_number,
     value_text,
 )
+from experiments.session import events
+from experiments.session.entries import Entry, value
+from experiments.session.events import Event, Press
+from experiments.session.remarks import Remark, flag_word
 from experiments.session.states import Position, State
 from experiments.session.steps import Ask, Describe, Outcome, Prepare, Rate, Rest, Step
 

@@ -7,8 +7,9 @@ from __future__ import annotations
 
 import unicodedata
 
-from experiments.session.entries import Entry, Value, together, value
 from experiments.design.plan import Plan, Trial
+from experiments.session.entries import Entry, Value, together, value
+from experiments.session.history import Told, is_attempt
 from experiments.session.remarks import (
     MAX_FLAG,
     AnswerCorrected,
@@ -34,7 +35,6 @@ from experiments.session.steps import (
     Step,
     trial_of,
 )
-from experiments.record.tables import Told, is_attempt
 
 FLAG_RULE = f"A flag is a word of at most {MAX_FLAG} letters, digits and hyphens."
 

@@ -1,1 +1,1 @@
-"""session"""
+"""What should happen and what did: steps, events, states, remarks. Pure."""

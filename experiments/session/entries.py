@@ -6,9 +6,9 @@ from dataclasses import dataclass
 from typing import Literal
 
 from experiments.design.plan import Plan, Trial
+from experiments.session.history import Told
 from experiments.session.remarks import AnswerCorrected, DescriptionCorrected, RatingCorrected, Remark
 from experiments.session.steps import Answered, Ask, Described, Outcome, Presented, Rate, Rated, Step, trial_of
-from experiments.record.tables import Told
 
 What = Literal["answer", "rating", "description"]
 Value = str | float | None

@@ -13,8 +13,8 @@ _HEAD = """# States of a live run
 
 Made by `python -m experiments.session.states_page > docs/states.md`; do not edit by hand.
 
-What each event does in each state, as `experiments/session/states.py` says it. `→` leaves the state for another; *over* lays
-one over it, *back* takes it away again; what is *kept* changes no state; *beneath* does as the state beneath says;
+What each event does in each state, as `experiments/session/states.py` says it. `→` leaves the state for another; *over*
+lays one over it, *back* takes it away again; what is *kept* changes no state; *beneath* does as the state beneath says;
 *else* is refused with the sentence in the last column. What is usual stands in the first row, and in the others only
 what is not. Answers, shots and whatever else carries the run on count, by the experimenter's hand, only from a press
 that began after the state was painted, by the guard time at least.

@@ -1,1 +1,1 @@
-"""study"""
+"""A study: who takes part, in which order, and how far everybody is."""

@@ -4,15 +4,13 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from experiments.study import beginnings
-from experiments.study import places
-from experiments.study import register
-from experiments.study.beginnings import Entered
 from experiments.clock import Clock
 from experiments.record.journal import JournalError
+from experiments.study import beginnings, places, register
+from experiments.study.beginnings import Entered
 from experiments.study.places import PlaceError
-from experiments.study.register import RegisterError
 from experiments.study.progress import StudyFolder, look_at
+from experiments.study.register import RegisterError
 from experiments.study.study import Facts, RunStanding, eligible, unanswered, unasked
 
 

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from experiments.record import storage
 from experiments.load import shipped_folder
+from experiments.record import storage
 from experiments.study.places import PlaceError
 
 _README = """# {title}

@@ -6,11 +6,13 @@ import re
 from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
-from experiments.record import columns
-from experiments.record import journal
-from experiments.study import register
 from experiments.config.models import CODE
+from experiments.config.setup import Setup
+from experiments.design import orders
+from experiments.record import columns, journal
+from experiments.study import register
 
 _CODE = re.compile(CODE)
 
@@ -83,8 +85,19 @@ def journals(results: Path, experiment: str) -> Iterator[Path]:
     yield from sorted(results.glob(f"sub-*/sub-*_task-{experiment}_journal.jsonl"))
 
 
+def next_row(setup: Setup[Any], results: Path) -> int | None:
+    """The row of the balancing square that the next run takes; `None` for a random order.
+
+    The least used row over the runs of participants who are not excluded, the first such row. So rows are used equally
+    often, to within one, whenever everyone who was excluded has been replaced.
+    """
+    design = setup.config.design
+    used = [] if design.order == "random" else used_rows(results, setup.config.experiment)
+    return orders.next_row(design.order, len(design.methods), used)
+
+
 def used_rows(results: Path, experiment: str) -> list[int]:
-    """The rows of the balancing square that runs in this folder have taken; who is excluded gives theirs back."""
+    """The rows that runs in this folder have taken; who is excluded gives theirs back."""
     left_out = register.excluded(results)
     counted = (path for path in journals(results, experiment) if _code(path) not in left_out)
     heads = filter(None, map(journal.head, counted))

@@ -16,18 +16,15 @@ from pathlib import Path
 from typing import Any
 
 from experiments import catalogue
-from experiments.record import journal
-from experiments.design import orders
-from experiments.study import places
-from experiments.study import register
-from experiments.record import storage
 from experiments.config.models import StudyConfig
-from experiments.record.journal import JournalError
+from experiments.config.setup import Setup
 from experiments.load import load_setup, load_study
+from experiments.rebuild import plan_of, rebuild
+from experiments.record import journal, storage
+from experiments.record.journal import JournalError
+from experiments.study import places, register
 from experiments.study.places import PlaceError
 from experiments.study.register import Member
-from experiments.run import plan_of, rebuild
-from experiments.config.setup import Setup
 from experiments.study.study import Next, Participant, RunStanding, by_code, who_is_next
 
 ANSWERED_BY = {"direction": "response_source", "preference": "rating_by"}
@@ -202,20 +199,9 @@ def _orders(study: StudyFolder, next_one: Next | None, problems: list[str]) -> d
     return found
 
 
-def next_row(setup: Setup[Any], results: Path) -> int | None:
-    """The row of the balancing square that the next run takes; `None` for a random order.
-
-    The least used row over the runs of participants who are not excluded, the first such row. So rows are used equally
-    often, to within one, whenever everyone who was excluded has been replaced.
-    """
-    design = setup.config.design
-    used = [] if design.order == "random" else places.used_rows(results, setup.config.experiment)
-    return orders.next_row(design.order, len(design.methods), used)
-
-
 def next_methods(setup: Setup[Any], results: Path, participant_id: str) -> tuple[str, ...] | None:
     """The methods of a participant's next run in their order; `None` if chance decides when the run begins."""
-    row, seed = next_row(setup, results), setup.config.seed
+    row, seed = places.next_row(setup, results), setup.config.seed
     if row is None and seed is None:
         return None
     made = catalogue.experiment(setup).make_plan(setup.config, participant_id, seed or 0, row)

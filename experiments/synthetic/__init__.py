@@ -1,1 +1,1 @@
-"""synthetic"""
+"""Models of participants: percept, decision, preference."""

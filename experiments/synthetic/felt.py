@@ -4,16 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
-from typing import TYPE_CHECKING
 
 from device.words import DIRECTIONS
-from experiments.synthetic.diffusion import Decision, Diffusion, Lapses, People, decide, person
-from experiments.synthetic.percept import Percept, PerceptParameters, diffusion_of, evidence, forward_rate
 from experiments.design.plan import Plan, Trial
 from experiments.design.streams import Stream
-
-if TYPE_CHECKING:
-    from experiments.direction.config import DirectionConfig
+from experiments.synthetic.diffusion import Decision, Diffusion, Lapses, People, decide, person
+from experiments.synthetic.percept import Percept, PerceptParameters, diffusion_of, evidence, forward_rate
 
 NEUTRAL = "neutral"
 """The instruction of a trial that has none."""
@@ -28,18 +24,6 @@ class Mind:
     non_decision_s: float = 0.35
     lapses: Lapses = field(default_factory=Lapses)
     people: People = field(default_factory=People)
-
-
-def mind_of(config: DirectionConfig) -> Mind:
-    """What a config's participants who feel the gun are made of."""
-    synthetic = config.synthetic
-    return Mind(
-        percept=synthetic.percept.own,
-        boundaries=synthetic.diffusion.boundaries,
-        non_decision_s=synthetic.diffusion.non_decision_s,
-        lapses=synthetic.diffusion.lapses.own,
-        people=synthetic.people.own,
-    )
 
 
 def forward_rates(mind: Mind, percept: Percept) -> dict[str, float]:

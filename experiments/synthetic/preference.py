@@ -15,12 +15,29 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 from statistics import NormalDist
-from typing import Protocol
+from typing import Annotated, Protocol
 
-from experiments.preference.config import Appeal, RatingScale
-from experiments.synthetic.scale import on_scale
+from pydantic import Field
 
-__all__ = ["feelings", "felt_ratings", "jnd_in_sds"]
+from experiments.config.models import Model, Spread
+from experiments.session.scale import Scale, on_scale
+
+Points = Annotated[float, Field(ge=-100, le=100)]
+"""Points of the rating scale, and beyond its ends."""
+
+
+class Appeal(Model):
+    """`[synthetic.appeal]`: how a shot that is felt appeals; all of its numbers are assumed.
+
+    `base` and `gain` meet the assumed means of `[synthetic.ratings]` to 0.2, `jnd` the published 2 of 14 who tied, and
+    `criterion_sd` the published F in half of all studies. Points of the scale but for `jnd`, a Weber fraction.
+    """
+
+    base: Points = 2.3
+    gain: Annotated[float, Field(ge=0, le=100)] = 4.9
+    jnd: Annotated[float, Field(ge=0, le=10)] = 0.33
+    person_sd: Spread = 0.6
+    criterion_sd: Spread = 1.9
 
 
 class Draws(Protocol):
@@ -39,7 +56,7 @@ def jnd_in_sds() -> float:
     return math.sqrt(2.0) * NormalDist().inv_cdf(0.75)
 
 
-def felt_ratings(law: Appeal, scale: RatingScale, strengths: Mapping[str, float], draws: Draws) -> dict[str, float]:
+def felt_ratings(law: Appeal, scale: Scale, strengths: Mapping[str, float], draws: Draws) -> dict[str, float]:
     """One person's ratings of methods of these strengths (at least 0), kept to the scale and its grain.
 
     Two draws a method are always made, in the order of their names, so a change of one number moves no other value.
@@ -52,7 +69,7 @@ def felt_ratings(law: Appeal, scale: RatingScale, strengths: Mapping[str, float]
     for alike in feelings(felt, law.jnd):
         mean = sum(felt[name] for name in alike) / len(alike)
         appeal = law.base + law.gain * math.log1p(mean) + person + criterion[alike[0]]
-        ratings |= dict.fromkeys(alike, on_scale(appeal, scale.minimum, scale.maximum, scale.grain))
+        ratings |= dict.fromkeys(alike, on_scale(appeal, scale))
     return ratings
 
 

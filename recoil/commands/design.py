@@ -35,9 +35,9 @@ def design(
     as_json: AsJson = False,
 ) -> None:
     """Which damper, voltage and pulse would be felt best, and where a direction begins to be felt. Predictions."""
-    from analysis.predict.design_search import run as roof
+    from analysis.predict.design_search import run as feature
 
-    request = roof.Request(
+    request = feature.Request(
         config=config,
         gun=gun,
         friction=friction,
@@ -47,6 +47,6 @@ def design(
         grid=grid,
         seed=seed,
     )
-    found = roof.design(request, workers, out, progress)
-    show(found, f"{roof.as_text(found)}\n\nReport: {out / 'report.html'}", as_json)
+    found = feature.design(request, workers, out, progress)
+    show(found, f"{feature.as_text(found)}\n\nReport: {out / 'report.html'}", as_json)
     raise end(exceptions=found["best"] is None)

@@ -55,11 +55,13 @@ def percept(
     as_json: AsJson = False,
 ) -> None:
     """The percept fitted to forward rates, what they cannot tell, and studies of it against what else is published."""
-    from analysis.predict.fit import percept as roof
+    from analysis.predict.fit import percept as feature
 
-    asked = roof.Request(paper=paper, rates=rates, trials=trials, gun=gun, spread=spread, studies=studies, seed=seed)
-    found = roof.percept(asked, out, progress)
-    show(found, f"{roof.as_text(found)}\nReport: {out / 'report.html'}; for a config: {out / 'percept.toml'}", as_json)
+    asked = feature.Request(paper=paper, rates=rates, trials=trials, gun=gun, spread=spread, studies=studies, seed=seed)
+    found = feature.percept(asked, out, progress)
+    show(
+        found, f"{feature.as_text(found)}\nReport: {out / 'report.html'}; for a config: {out / 'percept.toml'}", as_json
+    )
 
 
 @app.command()
@@ -75,12 +77,12 @@ def times(
     as_json: AsJson = False,
 ) -> None:
     """The diffusion model (drift, boundary, start, non-decision time) fitted to people's own response times."""
-    from analysis.predict.fit import times as roof
+    from analysis.predict.fit import times as feature
 
-    asked = roof.Request(paths=logs, lapses=lapses, bias=bias, profiled=profile)
-    found, problems = roof.times(asked, out, tracked, progress)
-    missing = [*map(str, problems), *roof.left_out(found)]
+    asked = feature.Request(paths=logs, lapses=lapses, bias=bias, profiled=profile)
+    found, problems = feature.times(asked, out, tracked, progress)
+    missing = [*map(str, problems), *feature.left_out(found)]
     for one in missing:
         say(f"recoil: left out: {one}")
-    show(found, f"{roof.as_text(found)}\nReport: {out / 'report.html'}", as_json)
+    show(found, f"{feature.as_text(found)}\nReport: {out / 'report.html'}", as_json)
     raise end(exceptions=bool(missing))

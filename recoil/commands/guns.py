@@ -46,10 +46,10 @@ def simulate(
     as_json: AsJson = False,
 ) -> None:
     """One shot by the model (summary, trace, figure), a table of shots over parameters that vary, or a vibration."""
-    from experiments.load import find
     from analysis.predict.simulate import more as shot_more
     from analysis.predict.simulate import scene as shot_scene
     from analysis.predict.simulate import shot
+    from experiments.load import find
 
     single: dict[str, object] = {"--audit": audit or None, "--hand": hand, "--contact-stiffness": contact_stiffness}
     models: dict[str, object] = {"--fidelity": fidelity, "--scene": scene, "--need": need, "--set": changes}
@@ -125,9 +125,9 @@ def twin(
     as_json: AsJson = False,
 ) -> None:
     """The gun's twin on a pseudo-terminal, until interrupted: prints its port, to be given to --gun."""
-    from recoil import twin as roof
+    from recoil import twin as feature
 
-    asked = roof.Asked(
+    asked = feature.Asked(
         gun=gun, link=link, tcp=tcp, speed=speed, drift_ppm=drift_ppm, wire=wire, troubles=trouble or [], seed=seed
     )
 
@@ -135,7 +135,7 @@ def twin(
         show(found, f"{found['address']}\nTry: recoil doctor --gun {found['gun']}", as_json)
         sys.stdout.flush()
 
-    roof.serve(asked, tell)
+    feature.serve(asked, tell)
 
 
 def doctor(
@@ -149,14 +149,14 @@ def doctor(
     as_json: AsJson = False,
 ) -> None:
     """The rig's self-test: what was measured, and what to do about what is not good."""
-    from recoil import doctor as roof
+    from recoil import doctor as feature
 
-    findings = roof.examine(results, gun, gun_config, progress)
-    found = roof.as_json(findings)
-    show(found, roof.as_text(findings), as_json)
+    findings = feature.examine(results, gun, gun_config, progress)
+    found = feature.as_json(findings)
+    show(found, feature.as_text(findings), as_json)
     if out:
-        roof.keep(found, out)
-    raise end(exceptions=bool(roof.fails(findings)))
+        feature.keep(found, out)
+    raise end(exceptions=bool(feature.fails(findings)))
 
 
 def bench(
@@ -168,12 +168,12 @@ def bench(
     as_json: AsJson = False,
 ) -> None:
     """Measure our own methods: error rates of the post-hoc tests, error against time of a simulated shot."""
-    from analysis.predict.bench import run as roof
+    from analysis.predict.bench import run as feature
     from analysis.predict.bench.part import Asked
 
-    unknown = set(parts or []) - set(roof.PARTS)
+    unknown = set(parts or []) - set(feature.PARTS)
     if unknown:
-        raise typer.BadParameter(f"no part {', '.join(sorted(unknown))}; there are {', '.join(roof.PARTS)}")
+        raise typer.BadParameter(f"no part {', '.join(sorted(unknown))}; there are {', '.join(feature.PARTS)}")
     asked = Asked(seed=seed, repeats=repeats, batch=batch, figures=out / "figures", progress=progress)
-    found, lines = roof.bench(out, parts or [], asked)
+    found, lines = feature.bench(out, parts or [], asked)
     show(found, "\n".join([*lines, f"Report: {out / 'report.html'}"]), as_json)

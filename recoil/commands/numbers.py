@@ -39,12 +39,12 @@ def reproduce(
     as_json: AsJson = False,
 ) -> None:
     """Both experiments with synthetic participants on the simulated gun: logs, statistics, figures, report."""
-    from analysis.predict.reproduction import reproduce as roof
+    from analysis.predict.reproduction import reproduce as feature
 
-    loaded = roof.load(study, seed, observer.value if observer else None)
+    loaded = feature.load(study, seed, observer.value if observer else None)
     with progress("reproduce", len(loaded.runs) + 3) as tell:
-        done = roof.reproduce(loaded, out, tell)
-    show(done.statistics, f"{roof.as_text(done.comparison)}\n\nReport: {out / 'report.html'}", as_json)
+        done = feature.reproduce(loaded, out, tell)
+    show(done.statistics, f"{feature.as_text(done.comparison)}\n\nReport: {out / 'report.html'}", as_json)
 
 
 def analyze(
@@ -61,10 +61,10 @@ def analyze(
     as_json: AsJson = False,
 ) -> None:
     """Statistics, tables, figures and report of any number of logs."""
-    from analysis.summary import analyze as roof
+    from analysis.summary import analyze as feature
 
-    asked = roof.Request(paths=paths, out=out, paper=paper, columns=columns, rules=rules, codebook=codebook)
-    statistics, problems = roof.analyze(asked, tracked)
+    asked = feature.Request(paths=paths, out=out, paper=paper, columns=columns, rules=rules, codebook=codebook)
+    statistics, problems = feature.analyze(asked, tracked)
     for problem in problems:
         say(f"recoil: left out: {problem}")
     show(statistics, f"Report: {out / 'report.html'}", as_json)
@@ -82,9 +82,9 @@ def bids(
     as_json: AsJson = False,
 ) -> None:
     """The logs as a BIDS data set of behavioural runs; an earlier export is replaced."""
-    from analysis.archive.bids.export import export as roof
+    from analysis.archive.bids.export import export as feature
 
-    done = roof(folder, out or folder / "bids", free_text=free_text, track=tracked)
+    done = feature(folder, out or folder / "bids", free_text=free_text, track=tracked)
     for problem in done.problems:
         say(f"recoil: left out: {problem}")
     show(done.as_json(), done.as_text(), as_json)
@@ -98,9 +98,9 @@ def audit(
     as_json: AsJson = False,
 ) -> None:
     """Are the published numbers attainable and consistent? Each with its proof; exit code 1 if one is not."""
-    from analysis.paper.audit import command as roof
+    from analysis.paper.audit import command as feature
 
-    audited = roof.examine(paper)
-    roof.write(audited, out)
+    audited = feature.examine(paper)
+    feature.write(audited, out)
     show(audited.as_json(), f"{audited.as_text()}\n\nReport: {out / 'report.html'}", as_json)
     raise end(exceptions=audited.exceptions)

@@ -39,9 +39,9 @@ def power(
     as_json: AsJson = False,
 ) -> None:
     """Simulated power and precision: how many people and trials does it take, and what does it cost?"""
-    from analysis.predict.power import run as roof
+    from analysis.predict.power import run as feature
 
-    request = roof.Request(
+    request = feature.Request(
         config=config,
         participants=participants,
         trials=trials,
@@ -53,5 +53,5 @@ def power(
         seed=seed,
         paper=paper,
     )
-    found = roof.power(request, roof.Where(workers=workers, scheduler=scheduler), out, progress)
-    show(found, f"{roof.as_text(found)}\nReport: {out / 'report.html'}", as_json)
+    found = feature.power(request, feature.Where(workers=workers, scheduler=scheduler), out, progress)
+    show(found, f"{feature.as_text(found)}\nReport: {out / 'report.html'}", as_json)

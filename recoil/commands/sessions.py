@@ -33,10 +33,10 @@ def check(
     as_json: AsJson = False,
 ) -> None:
     """Validate configs; print design, orders, duration, drive and limits. Nothing is run."""
-    from analysis.predict import check as roof
+    from analysis.predict import check as feature
 
-    found = [roof.check(name, seed, participants) for name in configs]
-    show(found if len(found) > 1 else found[0], "\n\n".join(map(roof.as_text, found)), as_json)
+    found = [feature.check(name, seed, participants) for name in configs]
+    show(found if len(found) > 1 else found[0], "\n\n".join(map(feature.as_text, found)), as_json)
 
 
 def run(
@@ -104,14 +104,14 @@ def study(
     as_json: AsJson = False,
 ) -> None:
     """The participants of a study: done, in progress, excluded, and who comes next in which orders."""
-    from experiments.study import listing as roof
+    from recoil import study as feature
 
     facts = {"age_years": age, "sex": sex, "handedness": handedness}
     asked = {"join": join, "exclude": exclude, "readmit": readmit}
-    found, notes = roof.study(folder, roof.change(asked, facts, reason))
+    found, notes = feature.study(folder, feature.change(asked, facts, reason))
     for message in (*notes, *found.overview.problems):
         say(f"recoil: {message}")
-    show(roof.as_json(found), roof.as_text(found), as_json)
+    show(feature.as_json(found), feature.as_text(found), as_json)
     raise end(exceptions=bool(found.overview.problems))
 
 
@@ -135,8 +135,8 @@ def configs(
     ] = None,
 ) -> None:
     """List the shipped configs, copy them to edit, or give back those that a run began with."""
-    from recoil.began_with import copy_began_with
     from experiments.study.folders import copy_configs, shipped
+    from recoil.began_with import copy_began_with
 
     if journal is not None and copy is None:
         raise typer.BadParameter("--from goes with --copy DIR, the folder that the files are written to")

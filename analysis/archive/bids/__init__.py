@@ -1,1 +1,1 @@
-"""bids"""
+"""Logs as a BIDS data set."""

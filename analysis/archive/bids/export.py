@@ -16,12 +16,11 @@ from typing import Any
 
 from analysis.archive.bids import files as bids
 from analysis.logs.reading import Logs, Track, read_logs
-from experiments.study import places
-from experiments.study import register
-from experiments.record import storage
 from experiments.load import load_study
-from experiments.study.places import PlaceError
+from experiments.record import storage
 from experiments.record.provenance import recoil_version
+from experiments.study import places, register
+from experiments.study.places import PlaceError
 from experiments.study.register import Member, RegisterError
 
 _AT_FDCWD, _RENAME_EXCHANGE = -100, 2

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
+from analysis.paper import quantities
 from analysis.paper.audit.claims import (
     BinomialClaim,
     Claim,
@@ -22,7 +23,6 @@ from analysis.paper.audit.means import scale_of
 from analysis.paper.audit.paper_file import PaperFile
 from analysis.paper.audit.printed import Rounding, read
 from analysis.paper.paper import Participants, PublishedDirection, PublishedExperiment, PublishedPreference
-from analysis.paper import quantities
 from analysis.paper.quantities import named_in
 
 RATE_GRAIN, RATING_GRAIN = "0.1", "0.1"

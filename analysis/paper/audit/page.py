@@ -9,7 +9,7 @@ from typing import Any, get_args
 from analysis.paper.audit.run import Finding
 from analysis.paper.audit.sentences import ATTENTION, FAIRNESS, nearest_text, sentences
 from analysis.paper.audit.words import Result, Verdict
-from analysis.report.parts import Section, Table
+from analysis.report.section import Section, Table
 
 Json = dict[str, Any]
 VERDICTS: tuple[Verdict, ...] = get_args(Verdict)

@@ -1,4 +1,4 @@
-"""A paper's numbers in TOML, for the audit: the sections of `analysis.paper.paper` where it has them, and a list of claims.
+"""A paper's numbers in TOML, for the audit: the sections of `analysis.paper.paper` and a list of claims.
 
 ```
 [paper]

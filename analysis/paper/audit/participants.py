@@ -20,8 +20,8 @@ from analysis.paper.audit.reconstruct import Column, Constraints, Reconstruction
 from analysis.paper.audit.repeated_lattice import Rows, effect
 from analysis.paper.audit.variance_ratios import repeated_f
 from analysis.paper.audit.words import Result
-from analysis.stats.studentized_range import studentized_range_isf
 from analysis.paper.paper import PublishedDirection, PublishedExperiment, PublishedPreference, TukeyClaim
+from analysis.stats.studentized_range import studentized_range_isf
 
 MEAN_SLACK = Fraction(3, 10)
 """How far an assumed mean rating may be off in a data set, in units of the scale; assumed."""

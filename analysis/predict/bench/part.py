@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from analysis.report.page import Section
+from analysis.report.section import Section
 
 Progress = Callable[[str, int], AbstractContextManager[Callable[[str], None]]]
 """Given what is done and in how many parts, takes the name of each part that is done."""

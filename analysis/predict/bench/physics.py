@@ -7,7 +7,6 @@ from dataclasses import asdict, dataclass
 from importlib.util import find_spec
 from typing import Any
 
-from device.physics.tiers import OUTPUTS
 from analysis.predict.bench import flops as bench_flops
 from analysis.predict.bench.ours import BATCH, SINGLE, contender_of, contenders
 from analysis.predict.bench.part import Asked, Measured
@@ -15,6 +14,7 @@ from analysis.predict.bench.peers.problem import OFF_STATES
 from analysis.predict.bench.peers.registry import peers
 from analysis.predict.bench.timing import Row, measure
 from analysis.predict.jobs import cores
+from device.physics.tiers import OUTPUTS
 
 EXACT = 1e-9
 """The error within which ways are set against each other."""

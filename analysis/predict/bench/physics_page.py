@@ -6,11 +6,11 @@ from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from analysis.report import apa
 from analysis.predict.bench.figures import Point, Trade, figure_trade
-from analysis.report.page import Picture, Section, Table
 from analysis.predict.bench.ours import BATCH, INTERPRETED, SINGLE
 from analysis.predict.bench.peers.problem import OFF_STATES
+from analysis.report import apa
+from analysis.report.section import Picture, Section, Table
 
 if TYPE_CHECKING:
     from analysis.predict.bench.physics import Lead

@@ -8,13 +8,14 @@ from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
-from analysis.stats import operating
-from analysis.report import apa
-from analysis.report.page import Section, Table, write_page
-from experiments.record import storage
-from experiments.record.provenance import provenance
 from analysis.predict.bench.part import Asked, Measured
 from analysis.predict.bench.physics import physics
+from analysis.report import apa
+from analysis.report.page import write_page
+from analysis.report.section import Section, Table
+from analysis.stats import operating
+from experiments.record import storage
+from experiments.record.provenance import provenance
 
 
 def bench(out: Path, chosen: list[str], asked: Asked) -> tuple[dict[str, Any], tuple[str, ...]]:

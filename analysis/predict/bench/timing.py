@@ -11,9 +11,9 @@ from importlib.util import find_spec
 from itertools import repeat
 from typing import Any
 
-from device.parameters import DriveOff
 from analysis.predict.bench.ours import Contender, Ready, one_at_a_time
 from analysis.predict.bench.peers.problem import errors, reference
+from device.parameters import DriveOff
 
 _LEAST_S = 0.02  # a measured stretch is at least as long; the clock's grain is far below
 _GIVES_UP = (ArithmeticError, AttributeError, ImportError, LookupError, RuntimeError, TypeError, ValueError)

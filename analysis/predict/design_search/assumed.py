@@ -9,15 +9,15 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy import special
 
+from analysis.predict.design_search.critical import crossings
+from analysis.predict.design_search.rates import Floats, evidences, logits, rates
+from analysis.predict.design_search.shots import Layer, shot_of
+from analysis.predict.fit.percept_model import PAPER_RATES, PerceptFit, fit_percept
 from device.methods import Method
 from device.parameters import GunParameters
 from device.physics import simulate
 from experiments.synthetic.diffusion import People
 from experiments.synthetic.percept import Percept, PerceptParameters, evidence, forward_rate
-from analysis.predict.fit.percept_model import PAPER_RATES, PerceptFit, fit_percept
-from analysis.predict.design_search.critical import crossings
-from analysis.predict.design_search.rates import Floats, evidences, logits, rates
-from analysis.predict.design_search.shots import Layer, shot_of
 
 DEFAULT = PerceptParameters()
 EXPONENTS = (1.1, 2.3)

@@ -8,12 +8,12 @@ from dataclasses import dataclass, fields
 import numpy as np
 from numpy.typing import NDArray
 
-from device.physics.trains import TICKS
-from analysis.predict.fit.percept_model import PerceptFit
 from analysis.predict.design_search.limits import LIMITS, broken_limit
 from analysis.predict.design_search.rates import Floats, predict, rates
 from analysis.predict.design_search.shots import HOME, Layer
 from analysis.predict.design_search.space import Space
+from analysis.predict.fit.percept_model import PerceptFit
+from device.physics.trains import TICKS
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)

@@ -13,14 +13,14 @@ import numpy as np
 from scipy import special
 from scipy.optimize import brentq
 
-from device.parameters import GunParameters
-from device.physics import simulate
-from experiments.synthetic.percept import PerceptParameters
-from analysis.predict.fit.percept_model import FITTED, PerceptFit
 from analysis.predict.design_search.rates import Floats, evidences, logits, rates
 from analysis.predict.design_search.shots import Layer, shot_of
 from analysis.predict.design_search.space import Space
+from analysis.predict.fit.percept_model import FITTED, PerceptFit
+from device.parameters import GunParameters
+from device.physics import simulate
 from experiments.design.streams import generator
+from experiments.synthetic.percept import PerceptParameters
 
 LEVEL = 0.75
 """Halfway between guessing and certainty: the usual threshold of a choice between two."""

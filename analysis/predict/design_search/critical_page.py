@@ -8,11 +8,11 @@ from typing import Any
 
 import numpy as np
 
-from analysis.report import apa
 from analysis.predict.design_search.maps import Lines, figure_critical
-from analysis.report.page import Picture, Section, Table
 from analysis.predict.design_search.marks import field_of, own_marks
 from analysis.predict.design_search.words import at_friction
+from analysis.report import apa
+from analysis.report.section import Picture, Section, Table
 
 Facts = dict[str, Any]
 

@@ -8,14 +8,6 @@ from typing import Any
 
 import numpy as np
 
-from device.limits import MAX_COIL_C, MAX_DUTY, MAX_SHOTS_PER_MINUTE, load_of
-from device.parameters import GunParameters
-from device.physics import simulate
-from device.physics.layout import STATUSES
-from device.physics.trains import highest_rate_Hz
-from device.words import MAX_PULSE_S, MAX_VOLTAGE_V, Pulse
-from experiments.synthetic.percept import percept_of
-from analysis.predict.fit.percept_model import PAPER_TRIALS, PerceptFit, predicted_rate
 from analysis.predict.design_search.assumed import Alternative, unbiased, under
 from analysis.predict.design_search.choice import Designs, shooting_rates
 from analysis.predict.design_search.critical import DRAWS, INSIDE, LEVEL, Contour
@@ -23,6 +15,14 @@ from analysis.predict.design_search.limits import LIMITS, broken_limit, steady_c
 from analysis.predict.design_search.rates import Floats, predict
 from analysis.predict.design_search.shots import Layer
 from analysis.predict.design_search.space import Space
+from analysis.predict.fit.percept_model import PAPER_TRIALS, PerceptFit, predicted_rate
+from device.limits import MAX_COIL_C, MAX_DUTY, MAX_SHOTS_PER_MINUTE, load_of
+from device.parameters import GunParameters
+from device.physics import simulate
+from device.physics.layout import STATUSES
+from device.physics.trains import highest_rate_Hz
+from device.words import MAX_PULSE_S, MAX_VOLTAGE_V, Pulse
+from experiments.synthetic.percept import percept_of
 
 Facts = dict[str, Any]
 

@@ -10,8 +10,8 @@ from typing import Any
 import matplotlib as mpl
 from matplotlib.axes import Axes
 
-from analysis.stats.arrays import FloatArray
 from analysis.report.figures.style import BLACK, BLUE, ORANGE, VERMILION, light_grid, new_figure, save, style
+from analysis.stats.arrays import FloatArray
 
 MARKERS = "os^Dv<>"
 FAINT, SOFT = "#d6d6d6", "#9db8cc"

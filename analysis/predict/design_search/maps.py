@@ -14,9 +14,9 @@ from matplotlib.colors import BoundaryNorm, ListedColormap
 from matplotlib.figure import Figure
 from matplotlib.patches import Patch
 
-from analysis.stats.arrays import FloatArray
 from analysis.predict.design_search.figures import MARKERS, Mark
 from analysis.report.figures.style import BLACK, BLUE, INK, METHOD_LINES, ORANGE, VERMILION, new_figure, save, style
+from analysis.stats.arrays import FloatArray
 
 AREAS = {"no-break-away": "#ececec", "stuck": "#8f8f8f", "not-home": "#c4b5a0"}
 """Where there is no prediction, by the status of the shot."""

@@ -7,14 +7,14 @@ from typing import Any
 
 import numpy as np
 
-from analysis.report import apa
-from analysis.predict.design_search.figures import Trade, figure_trade
-from analysis.predict.design_search.maps import figure_maps
-from analysis.report.page import Picture, Section, Table
 from analysis.predict.design_search.choice import Designs
 from analysis.predict.design_search.critical_page import critical_section
+from analysis.predict.design_search.figures import Trade, figure_trade
+from analysis.predict.design_search.maps import figure_maps
 from analysis.predict.design_search.marks import best_mark, felt_methods, field_of, mark_of, own_marks, with_pulse
 from analysis.predict.design_search.words import best_sentences, none_sentence, share_cell, swept
+from analysis.report import apa
+from analysis.report.section import Picture, Section, Table
 
 Facts = dict[str, Any]
 

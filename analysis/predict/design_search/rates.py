@@ -9,8 +9,8 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy import special
 
-from experiments.synthetic.percept import PerceptParameters
 from analysis.predict.fit.percept_model import FITTED, PerceptFit
+from experiments.synthetic.percept import PerceptParameters
 
 Floats = NDArray[np.float64]
 Bools = NDArray[np.bool_]

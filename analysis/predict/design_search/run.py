@@ -13,14 +13,6 @@ from typing import Any
 
 import numpy as np
 
-from analysis.report.page import write_page
-from device.methods import Method, paper_methods
-from device.parameters import GunParameters
-from device.physics.layout import STATUSES
-from experiments.record import storage
-from analysis.predict.fit.percept_model import PAPER_RATES, PerceptFit, fit_percept
-from experiments.record.provenance import provenance
-from analysis.report.terminal import Progress
 from analysis.predict.design_search.assumed import Alternative, alternatives
 from analysis.predict.design_search.choice import Designs, front, summary_error
 from analysis.predict.design_search.critical import Contour, contour_of
@@ -39,7 +31,15 @@ from analysis.predict.design_search.page import sections
 from analysis.predict.design_search.search import Search, search
 from analysis.predict.design_search.space import Request, Space, make_space
 from analysis.predict.design_search.words import as_text
+from analysis.predict.fit.percept_model import PAPER_RATES, PerceptFit, fit_percept
 from analysis.predict.jobs import cores, on_processes
+from analysis.report.page import write_page
+from analysis.report.terminal import Progress
+from device.methods import Method, paper_methods
+from device.parameters import GunParameters
+from device.physics.layout import STATUSES
+from experiments.record import storage
+from experiments.record.provenance import provenance
 
 __all__ = ["Request", "as_text", "design"]
 

@@ -7,13 +7,13 @@ from collections.abc import Callable
 from contextlib import AbstractContextManager
 from dataclasses import dataclass, replace
 
-from analysis.predict.fit.percept_model import PerceptFit
-from analysis.report.terminal import Progress
 from analysis.predict.design_search.assumed import LEAKS
 from analysis.predict.design_search.choice import Designs, best, designs_of, joined
 from analysis.predict.design_search.shots import Layer, layers, rows_of, simulate_rows
 from analysis.predict.design_search.space import Space
+from analysis.predict.fit.percept_model import PerceptFit
 from analysis.predict.jobs import Run, on_processes
+from analysis.report.terminal import Progress
 
 PASSES = 3
 """Closer looks, each around the best of the one before and at half its distances."""

@@ -6,11 +6,11 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
-from analysis.report import apa
 from analysis.predict.fit.figures import Spread, figure_places
-from analysis.report.page import Picture, Section, Table
 from analysis.predict.fit.studies import Judged
 from analysis.predict.fit.words import percents, place_sentence, spread_sentence, verdict_sentence
+from analysis.report import apa
+from analysis.report.section import Picture, Section, Table
 
 Facts = dict[str, Any]
 

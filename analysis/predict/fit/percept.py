@@ -10,19 +10,19 @@ from typing import Any
 
 import numpy as np
 
-from analysis.report.page import write_page
-from device.parameters import GunParameters
-from device.words import DIRECTIONS
-from experiments.record import storage
-from experiments.synthetic.percept import Percept, PerceptParameters, evidence, percept_of, percepts_of
-from experiments.synthetic.percept_batch import forward_rates
 from analysis.predict.fit.percept_model import PerceptFit, PerceptPeak, best_percept, fit_percept, predicted_rate
-from experiments.record.provenance import provenance
-from analysis.report.terminal import Progress
 from analysis.predict.fit.percept_page import sections
 from analysis.predict.fit.request import Request, Task, read
 from analysis.predict.fit.studies import MAIN, PERCENTILES, Judged, cases_of, judge, pieces_of
 from analysis.predict.fit.words import as_text, assumptions, fragment, plain
+from analysis.report.page import write_page
+from analysis.report.terminal import Progress
+from device.parameters import GunParameters
+from device.words import DIRECTIONS
+from experiments.record import storage
+from experiments.record.provenance import provenance
+from experiments.synthetic.percept import Percept, PerceptParameters, evidence, percept_of, percepts_of
+from experiments.synthetic.percept_batch import forward_rates
 
 __all__ = ["Request", "as_text", "percept"]
 

@@ -10,11 +10,6 @@ from functools import partial
 import numpy as np
 from scipy import optimize, special
 
-from device.methods import Method
-from device.words import Direction
-from experiments.synthetic.diffusion import People
-from experiments.synthetic.percept import Percept, PerceptParameters, evidence
-from experiments.synthetic.percept_batch import Floats, forward_rates
 from analysis.predict.fit.percept_likelihood import (
     ASSUMED,
     FITTED,
@@ -26,6 +21,11 @@ from analysis.predict.fit.percept_likelihood import (
     slope,
     task_of,
 )
+from device.methods import Method
+from device.words import Direction
+from experiments.synthetic.diffusion import People
+from experiments.synthetic.percept import Percept, PerceptParameters, evidence
+from experiments.synthetic.percept_batch import Floats, forward_rates
 
 __all__ = [
     "ASSUMED",

@@ -7,12 +7,12 @@ from pathlib import Path
 from typing import Any
 
 from analysis.paper.odds import wilson_interval
-from analysis.report import apa
 from analysis.predict.fit.figures import RateCurve, RatePoint, figure_percept
-from analysis.report.page import Picture, Section, Table
 from analysis.predict.fit.judgement_page import judgement
 from analysis.predict.fit.studies import Judged
 from analysis.predict.fit.words import NO_TIMES, UNITS, limits, percents
+from analysis.report import apa
+from analysis.report.section import Picture, Section, Table
 
 Facts = dict[str, Any]
 

@@ -7,10 +7,10 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 from analysis.paper.paper import PublishedDirection, load_paper
-from device.methods import Method
-from experiments.synthetic.diffusion import People
 from analysis.predict.fit.percept_model import FITTED, PAPER_TRIALS
+from device.methods import Method
 from experiments.load import ConfigError, find, load_gun
+from experiments.synthetic.diffusion import People
 
 ASSUMED_SPREAD = People(drift_factor_sd=0.2, log_boundary_sd=0.1, log_non_decision_sd=0.1, logit_start_sd=0.2)
 """How people are taken to differ; assumed: the paper prints no spread."""

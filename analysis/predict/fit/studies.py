@@ -12,21 +12,21 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from analysis.stats.anova import rm_anova
-from analysis.stats.binomial import binomial_test
 from analysis.paper.odds import WHOLE_PATTERN, Recurrence, wilson_interval
 from analysis.paper.paper import PublishedDirection
 from analysis.paper.published import rounds_to
-from device.methods import Method
-from device.words import DIRECTIONS
-from experiments.synthetic.diffusion import People
-from experiments.synthetic.percept import Percept, PerceptParameters, evidence, percepts_of
 from analysis.predict.fit.percept_model import FITTED, PerceptPeak, best_percept
 from analysis.predict.fit.request import ASSUMED_SPREAD, scaled
 from analysis.predict.power.felt import Counts, Felt, Floats, correct_shares
 from analysis.predict.power.grid import PEOPLE_A_CHUNK
 from analysis.predict.power.studies import published_directions
+from analysis.stats.anova import rm_anova
+from analysis.stats.binomial import binomial_test
+from device.methods import Method
+from device.words import DIRECTIONS
 from experiments.design.streams import generator
+from experiments.synthetic.diffusion import People
+from experiments.synthetic.percept import Percept, PerceptParameters, evidence, percepts_of
 
 PERCENTILES = (2.5, 25.0, 50.0, 75.0, 97.5)
 BINS = 40

@@ -12,23 +12,23 @@ from typing import Any
 
 import numpy as np
 
+from analysis.logs.reading import Logs, Problem, Track, read_logs
+from analysis.predict.fit.times_page import Fitted, sections
+from analysis.predict.fit.times_words import as_text, left_out
+from analysis.predict.fit.words import NO_TIMES, plain
+from analysis.report.page import write_page
+from analysis.report.terminal import Progress
 from analysis.times.ez import ez, ez_people
 from analysis.times.fit import DiffusionFit, fit
 from analysis.times.likelihood import Range, Trials
 from analysis.times.own_trials import REFUSALS, OwnTrials, own_trials
-from analysis.times.people import PeopleFit, fit_people, mean_estimate
+from analysis.times.people import fit_people, mean_estimate
 from analysis.times.profile import profile
 from analysis.times.sampled_fit import FEWEST_TRIALS, as_trials
-from analysis.logs.reading import Logs, Problem, Track, read_logs
-from analysis.report.page import write_page
-from experiments.record import storage
 from experiments.load import ConfigError
-from experiments.study.places import PlaceError
+from experiments.record import storage
 from experiments.record.provenance import provenance
-from analysis.report.terminal import Progress
-from analysis.predict.fit.times_page import sections
-from analysis.predict.fit.times_words import as_text, left_out
-from analysis.predict.fit.words import NO_TIMES, plain
+from experiments.study.places import PlaceError
 
 __all__ = ["Request", "as_text", "left_out", "times"]
 
@@ -46,17 +46,6 @@ class Request:
     lapses: str = "none"
     bias: bool = True
     profiled: bool = False
-
-
-@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class Fitted:
-    """The trials and their fits: of all together, and of each person where there are several."""
-
-    own: OwnTrials
-    trials: Trials
-    lapse_range_s: Range | None
-    together: DiffusionFit
-    each: PeopleFit | None
 
 
 def times(request: Request, out: Path, track: Track, progress: Progress) -> tuple[Facts, tuple[Problem, ...]]:

@@ -3,21 +3,22 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
+from analysis.predict.fit.figures import TimesPanel, figure_times
+from analysis.predict.fit.times_words import CAVEATS, interval, left_out, people_count
+from analysis.report import apa
+from analysis.report.section import Picture, Section, Table
 from analysis.stats.arrays import FloatArray
 from analysis.times.fit import DiffusionFit
+from analysis.times.likelihood import Range, Trials
+from analysis.times.own_trials import OwnTrials
+from analysis.times.people import PeopleFit
 from analysis.times.predicted import AnsweredBy, answered_by
-from analysis.report import apa
-from analysis.predict.fit.figures import TimesPanel, figure_times
-from analysis.report.page import Picture, Section, Table
-from analysis.predict.fit.times_words import CAVEATS, interval, left_out, people_count
-
-if TYPE_CHECKING:
-    from analysis.predict.fit.times import Fitted
 
 Facts = dict[str, Any]
 
@@ -25,6 +26,17 @@ SHOWN_PEOPLE = 60
 """A table of more people is read by nobody; `fit.json` has all."""
 _LIKELY = 0.995
 _POINTS = 200
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Fitted:
+    """The trials and their fits: of all together, and of each person where there are several."""
+
+    own: OwnTrials
+    trials: Trials
+    lapse_range_s: Range | None
+    together: DiffusionFit
+    each: PeopleFit | None
 
 
 def sections(found: Facts, fitted: Fitted, figures: Path) -> tuple[Section, ...]:

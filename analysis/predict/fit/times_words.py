@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Iterator
 from typing import Any
 
-from analysis.report import apa
 from analysis.predict.fit.words import NO_TIMES
+from analysis.report import apa
 
 Facts = dict[str, Any]
 

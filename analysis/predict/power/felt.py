@@ -12,13 +12,14 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from experiments.config.setup import Setup
 from experiments.direction.config import DirectionConfig, Synthetic
+from experiments.direction.observer import mind_of
 from experiments.synthetic.diffusion import People
 from experiments.synthetic.diffusion_batch import upper_probabilities
-from experiments.synthetic.felt import NEUTRAL, mind_of
+from experiments.synthetic.felt import NEUTRAL
 from experiments.synthetic.percept import Percept, evidence, percepts_of
 from experiments.synthetic.percept_batch import own_start
-from experiments.config.setup import Setup
 
 Floats = NDArray[np.float64]
 Counts = NDArray[np.int64]

@@ -8,10 +8,6 @@ from pathlib import Path
 from typing import Any
 
 from analysis.paper.paper import PublishedExperiment, load_paper
-from experiments.direction.config import DirectionConfig
-from experiments.synthetic.percept import Percept
-from experiments.load import find
-from experiments.preference.config import PreferenceConfig
 from analysis.predict.power.felt import Felt, felt_of, null_felt, percepts_of_setup
 from analysis.predict.power.request import (
     FELT,
@@ -25,6 +21,10 @@ from analysis.predict.power.request import (
     trials_of,
 )
 from analysis.predict.power.studies import Chunk, Config, Design, People, null_rates, null_ratings
+from experiments.direction.config import DirectionConfig
+from experiments.load import find
+from experiments.preference.config import PreferenceConfig
+from experiments.synthetic.percept import Percept
 
 __all__ = ["Cell", "Grid", "Request", "make_grid"]
 

@@ -6,10 +6,8 @@ from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
 from typing import Any
 
-from analysis.predict.power.planned import ANY_PAIR
-from analysis.report import apa
 from analysis.predict.power.figures import Curve, Panel, Rate, figure_false_positives, figure_power
-from analysis.report.page import Picture, Section, Table
+from analysis.predict.power.planned import ANY_PAIR
 from analysis.predict.power.studies import PUBLISHED
 from analysis.predict.power.words import (
     HEADLINES,
@@ -21,6 +19,8 @@ from analysis.predict.power.words import (
     varies,
     wanted,
 )
+from analysis.report import apa
+from analysis.report.section import Picture, Section, Table
 
 Facts = dict[str, Any]
 Pick = Callable[[Facts], Any]

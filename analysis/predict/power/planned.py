@@ -15,13 +15,13 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy import special
 
+from analysis.paper.odds import SIGNIFICANT, Recurrence
 from analysis.stats.anova import check_scores, rm_anova
 from analysis.stats.arrays import FloatArray
 from analysis.stats.binomial import binomial_test
 from analysis.stats.detection import yes_no
 from analysis.stats.studentized_range import studentized_range_isf
 from analysis.stats.tukey import pairs_of, pooled_pairs
-from analysis.paper.odds import SIGNIFICANT, Recurrence
 
 ANOVA = "ANOVA"
 ALL_PAIRS = "Tukey, all pairs"

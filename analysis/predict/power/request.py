@@ -7,11 +7,11 @@ import re
 from dataclasses import dataclass
 from typing import Any
 
+from analysis.predict.power.studies import Config
+from experiments.config.setup import Setup
 from experiments.direction.config import DirectionConfig
 from experiments.load import ConfigError, find, load_setup
 from experiments.preference.config import PreferenceConfig
-from analysis.predict.power.studies import Config
-from experiments.config.setup import Setup
 
 _LARGEST_EFFECT = 10.0
 FELT = "felt"

@@ -12,18 +12,17 @@ from pathlib import Path
 from typing import Any
 
 from analysis.paper.odds import SIGNIFICANT, WHOLE_PATTERN
-from analysis.power import Option, Tally, merged, precisions, smallest
-from analysis.predict.power import shares
-from analysis.report.page import write_page
-from experiments.record import storage
-from experiments.config.canonical import sha256
-from experiments.record.provenance import provenance
-from analysis.report.terminal import Progress
 from analysis.predict.jobs import Run, cores, on_cluster, on_processes
 from analysis.predict.power.grid import Cell, Grid, Request, make_grid
 from analysis.predict.power.page import sections
+from analysis.predict.power.shares import Option, Tally, merged, precisions, shares, smallest
 from analysis.predict.power.studies import PUBLISHED, Chunk, run_chunk
 from analysis.predict.power.words import as_text, assumptions
+from analysis.report.page import write_page
+from analysis.report.terminal import Progress
+from experiments.config.canonical import sha256
+from experiments.record import storage
+from experiments.record.provenance import provenance
 
 __all__ = ["Request", "Where", "as_text", "power"]
 

@@ -14,14 +14,15 @@ from scipy.special import ndtr
 
 from analysis.paper.odds import WHOLE_PATTERN, Recurrence, chance_recurs, recurs
 from analysis.paper.paper import PublishedDirection, PublishedExperiment
-from analysis.power import Findings, Tally, analysed_directions, analysed_ratings, tallied
+from analysis.predict.power.felt import Felt, felt_counts
+from analysis.predict.power.planned import Findings, analysed_directions, analysed_ratings
+from analysis.predict.power.shares import Tally, tallied
 from device.words import DIRECTIONS
 from experiments.config.canonical import canonical_json
+from experiments.design.streams import generator
 from experiments.direction.config import DirectionConfig, Rates
 from experiments.direction.observer import probit_of_forward
 from experiments.preference.config import PreferenceConfig, Ratings, RatingScale
-from analysis.predict.power.felt import Felt, felt_counts
-from experiments.design.streams import generator
 
 Scores = NDArray[np.float64]
 Counts = NDArray[np.int64]
@@ -132,7 +133,7 @@ def scaled_means(law: Ratings, methods: tuple[str, ...], effect: float) -> Score
 
 
 def on_scale(values: Scores, scale: RatingScale) -> Scores:
-    """`experiments.synthetic.scale.on_scale` of many values."""
+    """`experiments.session.scale.on_scale` of many values."""
     steps = np.rint((np.clip(values, scale.minimum, scale.maximum) - scale.minimum) / scale.grain)
     decimals = max(0, -int(np.floor(np.log10(scale.grain)))) + 2
     return np.round(scale.minimum + steps * scale.grain, decimals)

@@ -6,13 +6,13 @@ from collections.abc import Iterable, Iterator
 from typing import Any
 
 from analysis.paper.odds import WHOLE_PATTERN
+from analysis.predict.power.grid import Grid
 from analysis.predict.power.planned import ALL_PAIRS, ANOVA, ANY_PAIR
+from analysis.predict.power.request import FELT
+from analysis.predict.power.studies import PUBLISHED
 from analysis.report import apa
 from experiments.direction.config import DirectionConfig, Rates
 from experiments.preference.config import PreferenceConfig, Ratings
-from analysis.predict.power.grid import Grid
-from analysis.predict.power.request import FELT
-from analysis.predict.power.studies import PUBLISHED
 
 Facts = dict[str, Any]
 

@@ -10,11 +10,11 @@ from numpy.typing import NDArray
 
 from analysis.paper.odds import Odds, chance_recurs, odds_of, recurs
 from analysis.paper.paper import Paper
+from analysis.predict.power import studies as power_studies
+from experiments.design.streams import Stream, generator
 from experiments.direction.config import DirectionConfig
 from experiments.preference.config import PreferenceConfig
 from experiments.preference.observer import draw_ratings
-from analysis.predict.power import studies as power_studies
-from experiments.design.streams import Stream, generator
 
 Scores = NDArray[np.float64]
 Counts = NDArray[np.int64]

@@ -14,10 +14,10 @@ from analysis.paper.audit.repeated_lattice import Rows
 from analysis.paper.paper import Paper, PublishedDirection, PublishedExperiment, PublishedPreference
 from experiments.catalogue import CATALOGUE
 from experiments.config.models import StudyConfig
+from experiments.config.setup import Setup
 from experiments.direction.config import DirectionConfig
 from experiments.load import ConfigError
 from experiments.preference.config import PreferenceConfig
-from experiments.config.setup import Setup
 
 Answers = tuple[dict[str, str], ...]
 HONESTY = (

@@ -11,36 +11,38 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, Literal
 
+from analysis.logs.reading import Logs, read_logs
 from analysis.paper.audit import audit
 from analysis.paper.audit.paper_file import load_paper_file
 from analysis.paper.audit.predictions import ELSEWHERE, other_rows, predictions
 from analysis.paper.audit.run import Finding
 from analysis.paper.audit.sentences import ATTENTION
-from analysis.logs.reading import Logs, read_logs
 from analysis.paper.odds import Odds
 from analysis.paper.paper import Paper, load_paper
 from analysis.paper.published import Row, compare
-from analysis.report.page import ReportData, write_report
+from analysis.predict.reproduction.odds import direction_odds, preference_odds
+from analysis.predict.reproduction.reconstructed import misfit, seat, table_bytes, table_name
+from analysis.predict.simulate.panel import shot_panel
+from analysis.summary.report import write_report
+from analysis.summary.sections.data import ReportData
 from analysis.summary.sections.sections import obtained_text
 from analysis.summary.summary import summarize
 from device.parameters import GunParameters
-from experiments.study import places
-from experiments.record import storage
-from experiments.config.canonical import sha256
 from experiments.clock import VirtualClock
+from experiments.config.canonical import sha256
 from experiments.config.models import StudyConfig
+from experiments.config.setup import Setup
 from experiments.direction.config import DirectionConfig
-from experiments.record.journal import is_empty
-from experiments.record.journal import read as read_journal
 from experiments.load import ConfigError, load_setup, load_study
 from experiments.preference.config import PreferenceConfig
+from experiments.rebuild import rebuild
+from experiments.record import storage
+from experiments.record.journal import is_empty
+from experiments.record.journal import read as read_journal
 from experiments.record.provenance import git_commit, provenance, recoil_version
-from analysis.predict.reproduction.odds import direction_odds, preference_odds
-from analysis.predict.simulate.panel import shot_panel
-from analysis.predict.reproduction.reconstructed import misfit, seat, table_bytes, table_name
-from experiments.run import Request, rebuild, run
+from experiments.run import Request, run
 from experiments.screens.synthetic import synthetic_screen
-from experiments.config.setup import Setup
+from experiments.study import places
 
 MANIFEST = "reproduction.json"
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 
-from analysis.report.figures import ShotPanel
+from analysis.report.figures.shot import ShotPanel
 from device.parameters import GunParameters
 from device.physics import ShotSummary, trace
 

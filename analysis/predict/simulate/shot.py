@@ -10,13 +10,13 @@ from dataclasses import asdict, fields, replace
 from pathlib import Path
 from typing import Any
 
-from analysis.report.figures import figure_5
+from analysis.predict.simulate.more import as_lines, shown
+from analysis.predict.simulate.panel import shot_panel
+from analysis.report.figures.shot import figure_5
 from device.parameters import GunParameters
 from device.physics import simulate, trace
-from experiments.record import storage
 from experiments.load import ConfigError, load_gun
-from analysis.predict.simulate.panel import shot_panel
-from analysis.predict.simulate.more import as_lines, shown
+from experiments.record import storage
 
 KINDS: dict[str, type[float] | type[str]] = {
     field.name: str if isinstance(field.default, str) else float for field in fields(GunParameters)

@@ -15,14 +15,14 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from analysis.predict.simulate.shot import KINDS
+from analysis.predict.simulate.sweep_table import check_place, opened
+from analysis.report.terminal import Progress
 from device.parameters import GunParameters
 from device.physics import FIDELITIES, ShotBatch, simulate_batch
 from device.physics.layout import STATUSES
 from experiments.load import ConfigError
 from experiments.record.provenance import provenance
-from analysis.report.terminal import Progress
-from analysis.predict.simulate.shot import KINDS
-from analysis.predict.simulate.sweep_table import check_place, opened
 
 MOST_ROWS = 10_000_000
 """Of a table, unless --yes; and of values of one parameter."""

@@ -21,8 +21,8 @@ from numpy.typing import NDArray
 
 from device.physics import ShotBatch
 from device.physics.layout import STATUSES
-from experiments.record import storage
 from experiments.load import ConfigError
+from experiments.record import storage
 
 Write = Callable[[Mapping[str, NDArray[Any]], ShotBatch], None]
 """Takes the parameters that vary, and their shots."""

@@ -7,15 +7,17 @@ from collections.abc import Sequence
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.collections import LineCollection
+from numpy.typing import NDArray
 
-from analysis.stats.arrays import FloatArray
 from analysis.report.figures.style import BLACK, INK
+
+Floats = NDArray[np.float64]
 
 MANY = 200
 """More people than this are drawn as histograms: points and lines would be a grey wall."""
 
 
-def places(people: int, half_width: float, gap: float = 0.0) -> FloatArray:
+def places(people: int, half_width: float, gap: float = 0.0) -> Floats:
     """Where a column's people stand, left and right of its centre, which `gap` keeps free for a whisker.
 
     >>> places(4, 0.2, 0.1).tolist()
@@ -26,7 +28,11 @@ def places(people: int, half_width: float, gap: float = 0.0) -> FloatArray:
 
 
 def draw_points(
-    axes: Axes, centres: Sequence[float], values: FloatArray, where: FloatArray, markers: Sequence[str]
+    axes: Axes,
+    centres: Sequence[float],
+    values: Floats,
+    where: Floats,
+    markers: Sequence[str],
 ) -> None:
     """A point a person and column, joined from column to column; `values` (people, columns), NaN for none."""
     few = len(values) <= 30
@@ -55,7 +61,14 @@ def draw_points(
 
 
 def draw_histogram(
-    axes: Axes, centre: float, values: FloatArray, *, bin_width: float, half_width: float, colour: str, side: int = 0
+    axes: Axes,
+    centre: float,
+    values: Floats,
+    *,
+    bin_width: float,
+    half_width: float,
+    colour: str,
+    side: int = 0,
 ) -> None:
     """Bars around `centre`, as wide as their share of people; `side` -1 or 1 for a half to the left or right."""
     kept = values[np.isfinite(values)]

@@ -10,8 +10,8 @@ from pathlib import Path
 import matplotlib as mpl
 import numpy as np
 from matplotlib.axes import Axes
+from numpy.typing import NDArray
 
-from analysis.stats.arrays import FloatArray
 from analysis.report.figures.style import BLACK, BLUE, GREEN, PURPLE, VERMILION, light_grid, new_figure, save, style
 
 STAGES = ("recoil", "bullet firing", "resetting", "ready")
@@ -30,11 +30,11 @@ class ShotPanel:
     """
 
     title: str
-    time_s: FloatArray
-    force_N: FloatArray
-    displacement_m: FloatArray
-    velocity_m_s: FloatArray
-    drive_V: FloatArray
+    time_s: NDArray[np.float64]
+    force_N: NDArray[np.float64]
+    displacement_m: NDArray[np.float64]
+    velocity_m_s: NDArray[np.float64]
+    drive_V: NDArray[np.float64]
     stage_ends_s: tuple[float, float, float]
     collision_force_N: float
     contact_depth_m: float = 0.0005
@@ -44,7 +44,7 @@ class ShotPanel:
 @dataclass(frozen=True, slots=True, kw_only=True)
 class _Trace:
     label: str
-    values: FloatArray
+    values: NDArray[np.float64]
     colour: str
 
 

@@ -7,8 +7,8 @@ from pathlib import Path
 
 import matplotlib as mpl
 import numpy as np
+from numpy.typing import NDArray
 
-from analysis.stats.arrays import FloatArray
 from analysis.report.figures.style import BLACK, BLUE, INK, light_grid, new_figure, reference_line, save, style
 
 
@@ -17,9 +17,9 @@ class VibrationPanel:
     """One vibration to draw. Arrays (samples,) over time, beyond the duration's end."""
 
     title: str
-    time_s: FloatArray
-    acceleration_m_s2: FloatArray
-    envelope_m_s2: FloatArray
+    time_s: NDArray[np.float64]
+    acceleration_m_s2: NDArray[np.float64]
+    envelope_m_s2: NDArray[np.float64]
     peak_m_s2: float
     rms_m_s2: float  # over the duration
     duration_s: float

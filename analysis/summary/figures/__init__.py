@@ -1,1 +1,1 @@
-"""figures"""
+"""The figures of the two experiments, drawn from plain values."""

@@ -13,8 +13,6 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
-from analysis.stats.arrays import FloatArray
-from analysis.stats.detection import yes_no
 from analysis.report.figures.crowd import MANY, draw_histogram, draw_mean, draw_points, places
 from analysis.report.figures.names import people, wrapped
 from analysis.report.figures.style import (
@@ -28,6 +26,8 @@ from analysis.report.figures.style import (
     save,
     style,
 )
+from analysis.stats.arrays import FloatArray
+from analysis.stats.detection import yes_no
 
 Statistics = Mapping[str, Any]
 

@@ -1,1 +1,1 @@
-"""sections"""
+"""The report of a study, section by section."""

@@ -6,8 +6,8 @@ from collections.abc import Mapping
 from typing import Any
 
 from analysis.report import apa
-from analysis.report.figures import display_name, people
-from analysis.report.parts import Section
+from analysis.report.figures.names import display_name, people
+from analysis.report.section import Section
 from analysis.summary.sections.pictures import directions_picture, response_times_picture
 from analysis.summary.sections.tables import (
     binomial_table,

@@ -7,20 +7,19 @@ from pathlib import Path
 from typing import Any
 
 from analysis.report import apa
-from analysis.report.figures import (
-    ShotPanel,
-    figure_5,
-    figure_8,
+from analysis.report.figures.names import named, people
+from analysis.report.figures.shot import ShotPanel, figure_5
+from analysis.report.section import Picture
+from analysis.summary.figures.directions import figure_directions
+from analysis.summary.figures.results import figure_8
+from analysis.summary.figures.times import figure_response_times
+from analysis.summary.figures.trade import (
     figure_conditional_accuracy,
-    figure_directions,
     figure_quantile_probability,
-    figure_response_times,
     has_curve,
     has_points,
-    named,
-    people,
 )
-from analysis.report.parts import EXPERIMENTS, Picture, ReportData, analysed
+from analysis.summary.sections.data import EXPERIMENTS, ReportData, analysed
 from analysis.summary.sections.trade import CONDITIONAL_ACCURACY, QUANTILE_PROBABILITY
 
 FIGURE_5, FIGURE_8 = "figure-5", "figure-8"

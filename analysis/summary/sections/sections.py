@@ -11,9 +11,11 @@ from typing import Any
 from analysis.paper.odds import Odds
 from analysis.paper.published import AUDITED, Row
 from analysis.report import apa
+from analysis.report.figures.names import named
+from analysis.report.figures.shot import ShotPanel
+from analysis.report.section import LISTED, SHOWN, Section, Table, shortened
+from analysis.summary.sections.data import EXPERIMENTS, ReportData, analysed
 from analysis.summary.sections.experiments import direction_section, preference_section
-from analysis.report.figures import ShotPanel, named
-from analysis.report.parts import EXPERIMENTS, LISTED, SHOWN, ReportData, Section, Table, analysed, shortened
 from analysis.summary.sections.pictures import results_picture, shot_picture
 from analysis.summary.sections.supplement import supplement_sections
 from analysis.summary.sections.trade import trade_section

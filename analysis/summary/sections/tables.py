@@ -7,8 +7,8 @@ from itertools import islice
 from typing import Any
 
 from analysis.report import apa
-from analysis.report.figures import display_name
-from analysis.report.parts import LISTED, SHOWN, Table
+from analysis.report.figures.names import display_name
+from analysis.report.section import LISTED, SHOWN, Table
 
 Statistics = Mapping[str, Any]
 

@@ -6,8 +6,9 @@ from collections.abc import Iterator, Mapping
 from typing import Any
 
 from analysis.report import apa
-from analysis.report.figures import has_curve, has_points, people
-from analysis.report.parts import Picture, Section
+from analysis.report.figures.names import people
+from analysis.report.section import Picture, Section
+from analysis.summary.figures.trade import has_curve, has_points
 from analysis.summary.sections.trade_tables import cells_of, trade_tables
 
 Statistics = Mapping[str, Any]

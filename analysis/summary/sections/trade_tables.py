@@ -6,8 +6,8 @@ from collections.abc import Iterator, Mapping
 from typing import Any
 
 from analysis.report import apa
-from analysis.report.figures import display_name, named
-from analysis.report.parts import Table
+from analysis.report.figures.names import display_name, named
+from analysis.report.section import Table
 
 Statistics = Mapping[str, Any]
 

@@ -8,8 +8,8 @@ from PyQt6.QtCore import Qt
 from PyQt6.QtGui import QMouseEvent
 from PyQt6.QtWidgets import QGridLayout, QHBoxLayout, QPushButton, QSizePolicy, QWidget
 
-from experiments.session.events import Press
 from experiments.screens.console.keys import BY_NAME, Name, shown_key
+from experiments.session.events import Press
 
 Pressed = Callable[[], Press]
 Act = Callable[[Name, Press], None]

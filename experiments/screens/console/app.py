@@ -13,14 +13,12 @@ from typing import Any
 from PyQt6.QtCore import QEventLoop, QObject, QTimer, pyqtSignal
 from PyQt6.QtWidgets import QApplication
 
-from experiments.session import events
 from experiments.clock import Clock
-from experiments.session.events import Hand
-from experiments.record.journal import JournalError
+from experiments.config.setup import Setup
+from experiments.design.plan import Plan
 from experiments.live_run import LiveRun, RunStopped
 from experiments.load import ConfigError
-from experiments.study.places import PlaceError
-from experiments.design.plan import Plan
+from experiments.record.journal import JournalError
 from experiments.run import Finished, Request, run
 from experiments.screen import Screen
 from experiments.screens.console import display
@@ -32,7 +30,9 @@ from experiments.screens.console.view import About
 from experiments.screens.console.window import Bridge, ConsoleWindow
 from experiments.screens.console.windows import let_go, open_as_left
 from experiments.screens.synthetic import observer_of
-from experiments.config.setup import Setup
+from experiments.session import events
+from experiments.session.events import Hand
+from experiments.study.places import PlaceError
 
 WAKE_MS = 100
 SWITCH_S = 0.0005

@@ -11,8 +11,7 @@ from dataclasses import replace
 from typing import Any
 
 from device.words import Direction
-from experiments.session import events
-from experiments.session.events import OwnHand
+from experiments.config.setup import Setup
 from experiments.live_run import LiveRun
 from experiments.screens.console.messages import Message, ParticipantSeen, Trouble
 from experiments.screens.participant.link import ParticipantLink
@@ -27,7 +26,8 @@ from experiments.screens.participant.words import (
     KeyPressed,
     NoiseIs,
 )
-from experiments.config.setup import Setup
+from experiments.session import events
+from experiments.session.events import OwnHand
 from experiments.session.states import Position, State
 from experiments.session.steps import Ask, Describe, Rate
 

@@ -7,10 +7,10 @@ from typing import Protocol
 
 from PyQt6.QtWidgets import QHBoxLayout, QWidget
 
-from experiments.session.events import Press
 from experiments.screens.console import parts
 from experiments.screens.console.actions import CommandButton, HeldButton, Slots
 from experiments.screens.console.keys import Name, field_of
+from experiments.session.events import Press
 from experiments.session.states import Position, State
 
 _LEFT: tuple[Name, ...] = ("forward", "damper", "restart")

@@ -9,14 +9,10 @@ from collections.abc import Callable
 from typing import Any
 
 from device.words import Direction
-from experiments.session import events
 from experiments.clock import Clock
-from experiments.session.entries import trial_at, value
-from experiments.session.events import Event, Hand, Press
-from experiments.live_run import REARM_HELD_S, LiveRun
 from experiments.design.plan import Trial
+from experiments.live_run import REARM_HELD_S, LiveRun
 from experiments.preference.config import RatingScale
-from experiments.session.remarks import flag_word
 from experiments.screens.console.keys import (
     BY_NAME,
     COMMANDS,
@@ -29,6 +25,10 @@ from experiments.screens.console.keys import (
 )
 from experiments.screens.console.needs import Beside, View
 from experiments.screens.texts import FLAG_RULE, one_line, short_place, typed_number
+from experiments.session import events
+from experiments.session.entries import trial_at, value
+from experiments.session.events import Event, Hand, Press
+from experiments.session.remarks import flag_word
 from experiments.session.states import EMERGENCY, Position, State
 from experiments.session.steps import Ask
 

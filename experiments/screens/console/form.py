@@ -10,10 +10,10 @@ from PyQt6.QtCore import Qt, pyqtSignal
 from PyQt6.QtGui import QGuiApplication, QScreen
 from PyQt6.QtWidgets import QFormLayout, QFrame, QLabel, QScrollArea, QSizePolicy, QVBoxLayout, QWidget
 
-from experiments.study.beginnings import Entered, typed_facts
 from experiments.config.models import Fact, Handedness, Sex
 from experiments.screens.console import parts
 from experiments.screens.console.fields import LineEdit, Lines, ListBox, TickBox
+from experiments.study.beginnings import Entered, typed_facts
 from experiments.study.study import Participant
 
 _LEVELS: dict[str, tuple[str, ...]] = {"sex": get_args(Sex), "handedness": get_args(Handedness)}

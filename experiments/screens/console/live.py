@@ -12,11 +12,10 @@ from PyQt6.QtGui import QGuiApplication
 
 from device import DeviceError
 from experiments.clock import RealClock
-from experiments.session.events import Hand
-from experiments.record.journal import JournalError
+from experiments.config.setup import Setup
 from experiments.live_run import RunStopped
 from experiments.load import ConfigError, load_setup, load_study
-from experiments.study.places import PlaceError
+from experiments.record.journal import JournalError
 from experiments.run import Finished, Request, UnfinishedRun
 from experiments.screens.console.app import Console, application, run_console
 from experiments.screens.console.beside import WAIT, ParticipantSide
@@ -32,7 +31,8 @@ from experiments.screens.participant.link import ParticipantLink
 from experiments.screens.participant.look import Look
 from experiments.screens.participant.mailbox import ParticipantError
 from experiments.screens.participant.words import NoiseIs
-from experiments.config.setup import Setup
+from experiments.session.events import Hand
+from experiments.study.places import PlaceError
 from experiments.study.progress import StudyFolder
 
 

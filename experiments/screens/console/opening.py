@@ -5,9 +5,9 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 from typing import Any
 
+from experiments.config.setup import Setup
 from experiments.run import Again
 from experiments.screens.console.form import Beside
-from experiments.config.setup import Setup
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

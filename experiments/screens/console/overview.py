@@ -3,8 +3,11 @@
 from __future__ import annotations
 
 from device import GunStatus
-from experiments.session.entries import entries
 from experiments.design.plan import Trial
+from experiments.screens import texts
+from experiments.screens.console.messages import GunSeen
+from experiments.screens.console.view import About, Seen
+from experiments.session.entries import entries
 from experiments.session.remarks import (
     AnswerCorrected,
     DescriptionCorrected,
@@ -13,9 +16,6 @@ from experiments.session.remarks import (
     RatingCorrected,
     Remark,
 )
-from experiments.screens import texts
-from experiments.screens.console.messages import GunSeen
-from experiments.screens.console.view import About, Seen
 from experiments.session.steps import Answered, Ask, Close, Describe, Outcome, Rate, Repeat, Rest, Step
 
 STRIP = 40

@@ -7,12 +7,12 @@ from dataclasses import dataclass, field
 from datetime import datetime, timedelta
 
 from experiments.config.models import ExperimentConfig
-from experiments.session.entries import done, together
 from experiments.design.plan import Plan, Trial
+from experiments.session.entries import done, together
+from experiments.session.history import Told
 from experiments.session.remarks import Remark
 from experiments.session.states import Position, State
 from experiments.session.steps import Answered, Outcome, Presented, Rated, Rest, Rested, Step, trial_of
-from experiments.record.tables import Told
 
 PRIOR_TRIALS = 5
 """The plan counts as much as so many measured trials, so that the estimate does not jump with the first."""

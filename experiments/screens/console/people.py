@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 
-from experiments.study.beginnings import left_to_do, passed_over, run_of
 from experiments.dates import date_text
+from experiments.study.beginnings import left_to_do, passed_over, run_of
 from experiments.study.places import is_code
 from experiments.study.progress import Overview
 from experiments.study.study import Participant, RunStanding

@@ -7,9 +7,9 @@ from dataclasses import dataclass
 
 from PyQt6.QtWidgets import QFrame, QHBoxLayout, QVBoxLayout, QWidget
 
-from experiments.study.register import MAX_REASON, RegisterError, check_reason
 from experiments.screens.console import parts
 from experiments.screens.console.fields import LineEdit, Lines
+from experiments.study.register import MAX_REASON, RegisterError, check_reason
 
 WHY = "why? (never a name)"
 

@@ -5,9 +5,9 @@ from __future__ import annotations
 import time
 from typing import Protocol
 
-from experiments.synthetic.scale import on_scale
 from experiments.screens.participant.rating_page import spot_px
 from experiments.screens.participant.stage import TITLE
+from experiments.session.scale import on_scale
 from experiments.session.steps import Rate
 
 AGAIN_S = 0.2
@@ -61,5 +61,5 @@ class Rater:
 
 def _spot(step: Rate, rating: float, *, width_px: int, height_px: int) -> tuple[int, int]:
     """Where the rating's grain lies on the window."""
-    kept = on_scale(rating, step.minimum, step.maximum, step.grain)
+    kept = on_scale(rating, step)
     return spot_px((kept - step.minimum) / (step.maximum - step.minimum), width_px, height_px)

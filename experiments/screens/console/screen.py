@@ -7,9 +7,9 @@ from collections.abc import Callable
 
 from device import DeviceError, Gun, GunStatus
 from experiments.live_run import LiveRun
-from experiments.session.remarks import Noted, Remark
 from experiments.screens.console.beside import ParticipantSide
 from experiments.screens.console.messages import Began, GunSeen, Message, Saved, Shown, Trouble
+from experiments.session.remarks import Noted, Remark
 from experiments.session.states import Position
 from experiments.session.steps import Outcome, Step
 

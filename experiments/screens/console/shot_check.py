@@ -15,8 +15,8 @@ from typing import Any, Literal
 from device import DeviceError, Gun, GunStatus, Shot, ShotReport, open_gun
 from device.words import Drive, Effect
 from experiments.clock import Clock
-from experiments.limits import drives
 from experiments.config.setup import Setup
+from experiments.limits import drives
 
 COUNTDOWN_S = 3
 SWITCH_OFF = "SWITCH OFF ITS POWER."

@@ -9,10 +9,10 @@ from PyQt6.QtCore import Qt, pyqtSignal
 from PyQt6.QtWidgets import QVBoxLayout, QWidget
 
 from experiments.clock import Clock
+from experiments.config.setup import Setup
 from experiments.screens.console import parts
 from experiments.screens.console.fields import Lines
 from experiments.screens.console.shot_check import SWITCH_OFF, ShotCheck, Told
-from experiments.config.setup import Setup
 
 
 class ShotPage(QWidget):

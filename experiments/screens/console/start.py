@@ -16,11 +16,9 @@ from PyQt6.QtWidgets import (
     QWidget,
 )
 
-from experiments.study import beginnings
-from experiments.study import enrolment
 from experiments.clock import Clock
+from experiments.config.setup import Setup
 from experiments.record.journal import JournalError
-from experiments.study.places import PlaceError
 from experiments.run import Again
 from experiments.screens.console import parts, people, theme
 from experiments.screens.console.fields import Lines, sheet
@@ -32,7 +30,8 @@ from experiments.screens.console.question import WHY, Answer, Question, unfit
 from experiments.screens.console.shot_page import ShotPage
 from experiments.screens.console.signals import signals_to
 from experiments.screens.console.windows import let_go, open_as_left, remember, scaled, type_scale
-from experiments.config.setup import Setup
+from experiments.study import beginnings, enrolment
+from experiments.study.places import PlaceError
 from experiments.study.progress import Overview, StudyFolder, overview
 from experiments.study.study import Participant, RunStanding
 

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from PyQt6.QtWidgets import QLineEdit, QStackedWidget, QWidget
 
-from experiments.session.entries import Entry
 from experiments.screens.console import parts
 from experiments.screens.console.keys import field_of
 from experiments.screens.console.needs import Field
+from experiments.session.entries import Entry
 from experiments.session.states import Position
 from experiments.session.steps import Rate
 

@@ -8,7 +8,6 @@ from dataclasses import replace
 from PyQt6.QtWidgets import QDialog, QPushButton, QVBoxLayout
 
 from experiments.record.journal import JournalError
-from experiments.study.places import place
 from experiments.run import Again, Request
 from experiments.screens.console import people, theme
 from experiments.screens.console.fields import Lines, sheet
@@ -16,6 +15,7 @@ from experiments.screens.console.keyboard import FreshShortcuts
 from experiments.screens.console.question import WHY, Answer, Question, unfit
 from experiments.screens.console.signals import signals_to
 from experiments.screens.console.windows import let_go
+from experiments.study.places import place
 from experiments.study.progress import run_standing
 
 

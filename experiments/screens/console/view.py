@@ -9,15 +9,15 @@ from collections.abc import Callable
 from dataclasses import dataclass, field
 from typing import Any
 
-from experiments.session.entries import trial_at, value
+from experiments.config.setup import Setup
 from experiments.design.plan import Plan, Trial
 from experiments.screens import texts
 from experiments.screens.console.keys import Name, shown_key
 from experiments.screens.console.messages import Ended, GunSeen, ParticipantSeen
-from experiments.config.setup import Setup
+from experiments.session.entries import trial_at, value
+from experiments.session.history import Told
 from experiments.session.states import Position, State
 from experiments.session.steps import Ask, Describe, Prepare, Present, Rate, Rest
-from experiments.record.tables import Told
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -18,9 +18,7 @@ from PyQt6.QtWidgets import (
 )
 
 from experiments.clock import Clock
-from experiments.session.events import Hand, Press
 from experiments.live_run import LiveRun
-from experiments.session.remarks import Halted
 from experiments.screens.console import overview, parts, theme, tone, view
 from experiments.screens.console.beside import ParticipantSide
 from experiments.screens.console.buttons import Buttons
@@ -45,6 +43,8 @@ from experiments.screens.console.text_fields import TextFields
 from experiments.screens.console.view import About, Seen
 from experiments.screens.console.windows import remember, scaled
 from experiments.screens.texts import saved_text
+from experiments.session.events import Hand, Press
+from experiments.session.remarks import Halted
 from experiments.session.states import Position
 from experiments.session.steps import Failed, Rested
 

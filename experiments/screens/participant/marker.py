@@ -8,8 +8,8 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Literal
 
-from experiments.synthetic.scale import on_scale
 from experiments.screens.participant.words import AskRating
+from experiments.session.scale import on_scale
 
 Move = Literal["left", "right", "far left", "far right", "first", "last"]
 
@@ -27,7 +27,7 @@ _MOVES: dict[Move, Callable[[AskRating, float], float]] = {
 
 
 def _kept(scale: AskRating, rating: float) -> float:
-    return on_scale(rating, scale.minimum, scale.maximum, scale.grain)
+    return on_scale(rating, scale)
 
 
 def put(scale: AskRating, part: float) -> float:

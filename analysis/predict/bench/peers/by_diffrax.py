@@ -6,8 +6,8 @@ import math
 from collections.abc import Callable
 from typing import Any
 
-from device.parameters import DriveOff, GunParameters
 from analysis.predict.bench.peers.problem import Outputs, Peer, PeerError, Shoot, break_away
+from device.parameters import DriveOff, GunParameters
 
 _TOLERANCES = (1e-4, 1e-7, 1e-10, 1e-12)
 _METHODS = ("Tsit5", "Dopri8")

@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Any
 
-from device.parameters import DriveOff, GunParameters
 from analysis.predict.bench.peers.problem import Outputs, Peer, PeerError, Shoot
+from device.parameters import DriveOff, GunParameters
 
 _PLAIN = (1e-3, 1e-4, 1e-5)
 _COMPILED = (1e-3, 1e-4, 1e-5, 1e-6)

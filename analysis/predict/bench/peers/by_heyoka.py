@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Any
 
-from device.parameters import DriveOff, GunParameters
 from analysis.predict.bench.peers.problem import Outputs, Peer, PeerError, Shoot, break_away, force_on_hand
+from device.parameters import DriveOff, GunParameters
 
 _TOLERANCES = (1e-6, 1e-9, 1e-12, 2.2e-16)
 _PATIENCE_S = 1.0

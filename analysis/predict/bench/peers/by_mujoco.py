@@ -10,8 +10,8 @@ from __future__ import annotations
 import math
 from typing import Any
 
-from device.parameters import DriveOff, GunParameters
 from analysis.predict.bench.peers.problem import Outputs, Peer, PeerError, Shoot, break_away
+from device.parameters import DriveOff, GunParameters
 
 _SETTINGS = (("implicitfast", 1e-3), ("implicitfast", 1e-4), ("implicitfast", 1e-5), ("RK4", 1e-3), ("RK4", 1e-4))
 _HORIZON_S = 1.0

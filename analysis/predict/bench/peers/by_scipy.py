@@ -7,8 +7,8 @@ from typing import Any
 
 import numpy as np
 
-from device.parameters import DriveOff, GunParameters
 from analysis.predict.bench.peers.problem import Outputs, Peer, PeerError, Shoot, break_away, force_on_hand
+from device.parameters import DriveOff, GunParameters
 
 State = Sequence[float]
 Watch = Callable[[float, State], float]

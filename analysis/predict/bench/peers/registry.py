@@ -2,11 +2,7 @@
 
 from __future__ import annotations
 
-from analysis.predict.bench.peers import by_diffrax
-from analysis.predict.bench.peers import by_game_loop
-from analysis.predict.bench.peers import by_heyoka
-from analysis.predict.bench.peers import by_mujoco
-from analysis.predict.bench.peers import by_scipy
+from analysis.predict.bench.peers import by_diffrax, by_game_loop, by_heyoka, by_mujoco, by_scipy
 from analysis.predict.bench.peers.problem import Peer
 
 

@@ -1,0 +1,51 @@
+"""What a page is made of. The templates know this and nothing of the statistics."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+LISTED = 100
+"""A list longer than this is cut: a page of ten thousand rows is read by nobody, and opens slowly."""
+SHOWN = 50
+"""So many of it are left."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Table:
+    """A table of finished text."""
+
+    caption: str
+    header: tuple[str, ...]
+    rows: tuple[tuple[str, ...], ...]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Picture:
+    """A figure: `stem` is its file under `figures/` without the ending."""
+
+    stem: str
+    caption: str
+    alt: str
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Section:
+    """A heading with paragraphs, then pictures, tables and a list, each of which may be empty."""
+
+    title: str
+    paragraphs: tuple[str, ...] = ()
+    pictures: tuple[Picture, ...] = ()
+    tables: tuple[Table, ...] = ()
+    items: tuple[str, ...] = ()
+
+
+def shortened(items: Sequence[str], noun: str) -> tuple[str, ...]:
+    """All `items`, or the first 50 of more than 100 and how many more there are.
+
+    >>> shortened(["a", "b"], "files"), shortened(["a"] * 10_000, "files")[-1]
+    (('a', 'b'), 'and 9,950 more files')
+    """
+    if len(items) <= LISTED:
+        return tuple(items)
+    return (*items[:SHOWN], f"and {len(items) - SHOWN:,} more {noun}")
