@@ -12,23 +12,20 @@ from collections import deque
 from collections.abc import Sequence
 from concurrent.futures import Future
 from dataclasses import dataclass, replace
+from typing import Protocol
 
-from device import DeviceError, Gun
+from device import DeviceError, Gun, GunStatus
 from experiments.clock import Clock
 from experiments.design.plan import Plan, Trial
-from experiments.live_remarks import remark_of
 from experiments.record.journal import Journal, JournalGone
-from experiments.screen import Screen
-from experiments.session import events
-from experiments.session.entries import Entry, entries, fits, repeatable, trial_at, value
-from experiments.session.events import ACTS, DISARMS, OWN, TYPED, Event, Press
+from experiments.session import events, judging
+from experiments.session.events import DISARMS, TYPED, Event, Press
 from experiments.session.history import Told
-from experiments.session.remarks import Refused, Remark, record
-from experiments.session.states import ARMED, No, Position, State, after, entered, why_after
+from experiments.session.judging import Moment
+from experiments.session.kept import refused, remark_of
+from experiments.session.remarks import Remark, record
+from experiments.session.states import ARMED, Position, State, entered
 from experiments.session.steps import Outcome, Step
-
-REARM_HELD_S = 1.0
-"""For so long a key is held to go on after an emergency stop."""
 
 DISARMED_S = 10.0
 """The longest that a run waits for a disarming that began beside it: a gun on a line gives up before."""
@@ -56,6 +53,31 @@ class Verdict:
 
     def __bool__(self) -> bool:
         return self.taken
+
+
+class Screen(Protocol):
+    """Where a run is shown, and worked by a person, real or synthetic. All but `begin` and `act` come from any thread.
+
+    Whoever works it offers events to the live run; nothing is decided here.
+    """
+
+    def begin(self, live: LiveRun) -> None:
+        """Take the place before a run that stands where `live` says."""
+
+    def show(self, position: Position) -> None:
+        """Show a position; one of an earlier serial number than the last is out of date."""
+
+    def act(self, position: Position, until_s: float | None) -> None:
+        """The run waits now, at most until a time: who works in the run's own thread acts; others just go on."""
+
+    def acknowledge(self, step: Step | None, word: Outcome | Remark) -> None:
+        """Show that something is safe: its record is on the disk. A remark has no step."""
+
+    def trouble(self, text: str) -> None:
+        """Show what went wrong."""
+
+    def gun_seen(self, status: GunStatus | None, fault: str) -> None:
+        """Show what the gun itself says of its state, or why it says nothing."""
 
 
 class LiveRun:
@@ -91,20 +113,18 @@ class LiveRun:
     @property
     def trial(self) -> Trial:
         """The trial at hand: that of an open correction, else that of the step, else the last one."""
-        position = self._position
-        return position.correcting.trial if position.correcting else trial_at(self.plan, self._told, position.step)
+        with self._news:
+            return self._moment().trial
 
     def ready_at_s(self, now_s: float) -> bool:
         """Whether a press at a time would be late enough for what stands there."""
-        painted_s = self._painted_s
-        return painted_s is not None and now_s - painted_s >= self.guard_s
+        with self._news:
+            return self._moment().is_ready(now_s)
 
     def paused_between(self, from_s: float, to_s: float) -> bool:
         """Whether the run was paused at any time between two."""
         with self._news:
-            began_s = self._position.paused_s
-            pauses = self._pauses if began_s is None else [*self._pauses, (began_s, math.inf)]
-        return any(began_s <= to_s and ended_s >= from_s for began_s, ended_s in pauses)
+            return self._moment().paused_between(from_s, to_s)
 
     def painted(self, serial: int, at_s: float) -> None:
         """Take when a position was painted: from then on, and the guard time later, it can be worked."""
@@ -116,12 +136,13 @@ class LiveRun:
     def offer(self, event: Event, press: Press | None = None) -> Verdict:
         """Have an event judged, and taken if it may be. Never waits. `press`: by the experimenter's hand."""
         with self._news:
-            meant, text = self._meant(event)
-            refusal, before = self._refusal(meant, press), self._position
+            moment = self._moment()
+            meant, text = judging.meant(moment, event)
+            refusal = judging.refusal(moment, meant, press)
             if not refusal:
-                self._take(meant, before)
-            position = self._position
-            kept = self._refused(meant, refusal) if refusal else remark_of(meant, before, position, self.trial)
+                self._take(meant, moment)
+            before, position = moment.position, self._position
+            kept = refused(meant, before, refusal) if refusal else remark_of(meant, before, position, self.trial)
             written = None if kept is None else self._submit(kept)
         if kept is not None and written is not None:  # outside: who shows it may wait for this lock
             written.add_done_callback(lambda done: self._written(kept, done))
@@ -129,9 +150,10 @@ class LiveRun:
             self._screen.show(position)
         return Verdict(taken=not refusal, text=refusal or text)
 
-    def _take(self, event: Event, before: Position) -> None:
+    def _take(self, event: Event, moment: Moment) -> None:
         """Stand where an event leads; where it disarms, that begins when this is so, and before anything else."""
-        self._position = self._after(before, event)
+        before = moment.position
+        self._position = judging.moved(moment, event)
         if isinstance(event, DISARMS) and (before.base in ARMED or isinstance(event, events.EmergencyStop)):
             self._disarm_beside()
         if before.paused_s is not None and self._position.paused_s is None:
@@ -252,112 +274,31 @@ class LiveRun:
 
     # judging
 
-    def _meant(self, event: Event) -> tuple[Event, str]:
-        """A correction to what stands there already is none."""
-        entry = self._position.correcting
-        if isinstance(event, events.Correct) and entry is not None and event.value == value(self._told, entry):
-            return events.Leave(), "That is what stands there: nothing was corrected."
-        return event, ""
-
-    def _refusal(self, event: Event, press: Press | None) -> str:
-        """Why an event is not taken now; empty if it is."""
-        judged = after(self._position, type(event), self.clock.now())
-        if isinstance(judged, No):
-            return judged.because
-        return self._mistimed(event, press) or self._impossible(event)
-
-    def _mistimed(self, event: Event, press: Press | None) -> str:
-        if not isinstance(event, ACTS):
-            return ""
-        position, not_before_s = self._position, self._position.not_before_s
-        if isinstance(event, events.Next) and not_before_s is not None and self.clock.now() < not_before_s:
-            return "Too soon: it is to be felt for longer."
-        if press is None:
-            return ""
-        if press.serial != position.serial or self._painted_s is None:
-            return "That was pressed for what stood there before: press again."
-        if press.at_s - self._painted_s < self.guard_s:
-            return "Too soon after the change: press again."
-        return ""
-
-    def _impossible(self, event: Event) -> str:
-        """What the table cannot know: what a key was for, whether there is anything to undo or to repeat."""
-        match event:
-            case _ if isinstance(event, OWN):
-                return self._not_asked(event)
-            case events.Correct() if (entry := self._position.correcting) is not None and not fits(entry, event.value):
-                return f"That is no {entry.what}."
-            case events.Undo() if self._further_back() is None:
-                return "There is nothing to undo in this set."
-            case events.Repeat() if self._repeatable() is None:
-                return "There is no trial of this set to repeat now."
-            case events.Repeat(trial=Trial() as trial) if trial != self._repeatable():
-                return f"Trial {trial.trial} cannot be presented again any more."
-            case events.Rearm(held_s=float() as held_s) if held_s < REARM_HELD_S:
-                return f"Hold it for {REARM_HELD_S:g} s."
-            case _:
-                return ""
-
-    def _not_asked(self, event: events.ParticipantKey | events.ParticipantRated | events.ParticipantDescribed) -> str:
-        """Why what the participant did is no answer to what is asked."""
-        if event.step != self._position.number:
-            return "It was the answer to an earlier question."
-        if not isinstance(event, events.ParticipantKey):
-            return ""
-        if event.typed:
-            return "It went into what is open on the console: leave that (Esc), then have it pressed again."
-        return "" if self._counts(event.at_s) else "It went down before the stimulus, or in a pause."
-
-    def _counts(self, at_s: float) -> bool:
-        """Whether a key of the participant's that went down at a time was for the stimulus."""
-        onset_s = self._position.onset_s
-        return (onset_s is None or at_s >= onset_s) and not self.paused_between(at_s, at_s)
-
-    def _further_back(self) -> Entry | None:
-        found = entries(self._told, self.trial)
-        here = self._position.correcting
-        if here in found:
-            return found[max(0, found.index(here) - 1)]
-        return found[-1] if found else None
-
-    def _repeatable(self) -> Trial | None:
-        return repeatable(self._told, self._position.step, trial_at(self.plan, self._told, self._position.step))
+    def _moment(self) -> Moment:
+        """What is so now, to judge by."""
+        began_s = self._position.paused_s
+        return Moment(
+            plan=self.plan,
+            told=self._told,
+            position=self._position,
+            now_s=self.clock.now(),
+            painted_s=self._painted_s,
+            guard_s=self.guard_s,
+            pauses=self._pauses if began_s is None else [*self._pauses, (began_s, math.inf)],
+        )
 
     def repeated(self) -> Trial | None:
         """The trial that would be presented again now, if there is one."""
         with self._news:
-            return self._repeatable()
+            return self._moment().repeatable
 
     @property
     def undoable(self) -> bool:
         """Whether there is anything to undo in the set at hand."""
         with self._news:
-            return self._further_back() is not None
-
-    def _after(self, before: Position, event: Event) -> Position:
-        position = after(before, type(event), self.clock.now())
-        if isinstance(position, No):  # it was judged under the same lock
-            raise TypeError(position.because)
-        if isinstance(event, events.Undo):
-            entry = self._further_back()
-            moved = position.serial + (entry != before.correcting and position.serial == before.serial)
-            return replace(position, correcting=entry, serial=moved)
-        why = why_after(before, event)
-        return position if why is None else replace(position, why=why)
+            return self._moment().further_back is not None
 
     # keeping
-
-    def _refused(self, event: Event, because: str) -> Refused | None:
-        """What is kept of an event that would have carried the run on, and was refused."""
-        own = isinstance(event, OWN)
-        if not (own or isinstance(event, ACTS)) or self._position.base is State.STOPPED:
-            return None
-        return Refused(
-            event=events.word(type(event)),
-            state=str(self._position.state),
-            because=because,
-            by="participant" if own else "experimenter",
-        )
 
     def _written(self, remark: Remark, done: Future[None]) -> None:
         error = done.exception()

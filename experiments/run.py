@@ -17,7 +17,7 @@ from experiments.config.setup import Setup
 from experiments.dates import date_text
 from experiments.design.plan import Plan
 from experiments.design.streams import draw_seed
-from experiments.live_run import LiveRun, RunStopped
+from experiments.live_run import LiveRun, RunStopped, Screen
 from experiments.rebuild import plan_of, sha256, table
 from experiments.record import replay, storage
 from experiments.record.journal import Contents, Journal, JournalError, hold, is_empty
@@ -25,7 +25,6 @@ from experiments.record.journal import read as read_journal
 from experiments.record.provenance import provenance
 from experiments.record.replay import Standing
 from experiments.runner import carry_out, gun_name
-from experiments.screen import Screen
 from experiments.session.steps import Answered, Rated, Session
 from experiments.stimulus import Desk
 from experiments.study import places, register

@@ -12,12 +12,11 @@ from device.serial_gun.address import speed_of
 from experiments.clock import Clock, RealClock, VirtualClock
 from experiments.config.setup import Setup
 from experiments.design.plan import Plan
-from experiments.live_run import RunStopped
+from experiments.live_run import RunStopped, Screen
 from experiments.load import load_setup
 from experiments.rebuild import rebuild
 from experiments.record import storage
 from experiments.run import Again, Finished, Request, run
-from experiments.screen import Screen
 from experiments.screens.synthetic import synthetic_screen
 from experiments.screens.terminal import TerminalScreen
 from experiments.study.places import Place, PlaceError, place, set_aside_file

@@ -21,14 +21,13 @@ from device.words import Direction
 from experiments import run as runs
 from experiments.config.setup import Setup
 from experiments.design.plan import Plan, Trial
-from experiments.live_run import LiveRun
+from experiments.live_run import LiveRun, Screen
 from experiments.load import load_setup
 from experiments.rebuild import table
 from experiments.record import storage
 from experiments.record.journal import Contents, read
 from experiments.record.replay import told
 from experiments.run import Finished, Request, run
-from experiments.screen import Screen
 from experiments.screens.console import overview, theme, view
 from experiments.screens.console.controls import Controls
 from experiments.screens.console.keys import Name, Presses

@@ -11,10 +11,11 @@ from experiments.clock import Clock
 from experiments.config.models import ExperimentConfig
 from experiments.config.setup import Setup
 from experiments.design.plan import Plan
-from experiments.live_run import REARM_HELD_S, LiveRun
+from experiments.live_run import LiveRun
 from experiments.load import ConfigError
 from experiments.session import events
 from experiments.session.events import Event
+from experiments.session.judging import REARM_HELD_S
 from experiments.session.remarks import Remark
 from experiments.session.states import EMERGENCY, Position, State
 from experiments.session.steps import Ask, Outcome, Present, Rate, Rest, Step

@@ -16,11 +16,10 @@ from PyQt6.QtWidgets import QApplication
 from experiments.clock import Clock
 from experiments.config.setup import Setup
 from experiments.design.plan import Plan
-from experiments.live_run import LiveRun, RunStopped
+from experiments.live_run import LiveRun, RunStopped, Screen
 from experiments.load import ConfigError
 from experiments.record.journal import JournalError
 from experiments.run import Finished, Request, run
-from experiments.screen import Screen
 from experiments.screens.console import display
 from experiments.screens.console.beside import ParticipantSide
 from experiments.screens.console.messages import Began, Ended, Message

@@ -11,7 +11,7 @@ from typing import Any
 from device.words import Direction
 from experiments.clock import Clock
 from experiments.design.plan import Trial
-from experiments.live_run import REARM_HELD_S, LiveRun
+from experiments.live_run import LiveRun
 from experiments.preference.config import RatingScale
 from experiments.screens.console.keys import (
     BY_NAME,
@@ -28,6 +28,7 @@ from experiments.screens.texts import FLAG_RULE, one_line, short_place, typed_nu
 from experiments.session import events
 from experiments.session.entries import trial_at, value
 from experiments.session.events import Event, Hand, Press
+from experiments.session.judging import REARM_HELD_S
 from experiments.session.remarks import flag_word
 from experiments.session.states import EMERGENCY, Position, State
 from experiments.session.steps import Ask

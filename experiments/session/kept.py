@@ -5,7 +5,7 @@ from __future__ import annotations
 from experiments.design.plan import Trial
 from experiments.session import events
 from experiments.session.entries import Entry
-from experiments.session.events import Event
+from experiments.session.events import ACTS, OWN, Event
 from experiments.session.remarks import (
     AnswerCorrected,
     Continued,
@@ -16,6 +16,7 @@ from experiments.session.remarks import (
     Noted,
     Paused,
     RatingCorrected,
+    Refused,
     Remark,
 )
 from experiments.session.states import Position, State
@@ -46,6 +47,19 @@ def remark_of(  # noqa: C901, PLR0911 - one case an event
             return Continued(paused_s=round(then.since_s - (before.paused_s or before.since_s), 3))
         case _:
             return None
+
+
+def refused(event: Event, position: Position, because: str) -> Refused | None:
+    """What is kept of an event that would have carried the run on, and was refused."""
+    own = isinstance(event, OWN)
+    if not (own or isinstance(event, ACTS)) or position.base is State.STOPPED:
+        return None
+    return Refused(
+        event=events.word(type(event)),
+        state=str(position.state),
+        because=because,
+        by="participant" if own else "experimenter",
+    )
 
 
 def _corrected(entry: Entry, event: events.Correct) -> Remark:

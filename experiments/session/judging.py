@@ -1,0 +1,142 @@
+"""Whether an event is taken at a moment of a live run, or the sentence that says why not; and where it leads. Pure.
+
+The table of states decides what it can know. What a press was for, and whether there is anything to undo or to present
+again, is looked at here.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+from experiments.design.plan import Plan, Trial
+from experiments.session import events
+from experiments.session.entries import Entry, entries, fits, repeatable, trial_at, value
+from experiments.session.events import ACTS, OWN, Event, Press
+from experiments.session.history import Told
+from experiments.session.states import No, Position, after, why_after
+
+REARM_HELD_S = 1.0
+"""For so long a key is held to go on after an emergency stop."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Moment:
+    """All that an event is judged by.
+
+    `painted_s` is when the position was on the screen; `guard_s` is for so long after that no hand is taken; `pauses`
+    are begin and end of each.
+    """
+
+    plan: Plan
+    told: Told
+    position: Position
+    now_s: float
+    painted_s: float | None
+    guard_s: float
+    pauses: Sequence[tuple[float, float]] = ()
+
+    @property
+    def trial(self) -> Trial:
+        """The trial at hand: that of an open correction, else that of the step, else the last one."""
+        entry = self.position.correcting
+        return entry.trial if entry else trial_at(self.plan, self.told, self.position.step)
+
+    @property
+    def further_back(self) -> Entry | None:
+        """The entry that undo opens: the last of the set, or the one before that which is open."""
+        found, here = entries(self.told, self.trial), self.position.correcting
+        if here in found:
+            return found[max(0, found.index(here) - 1)]
+        return found[-1] if found else None
+
+    @property
+    def repeatable(self) -> Trial | None:
+        """The trial that would be presented again."""
+        step = self.position.step
+        return repeatable(self.told, step, trial_at(self.plan, self.told, step))
+
+    def is_ready(self, at_s: float) -> bool:
+        """Whether a press at a time would be late enough for what stands there."""
+        return self.painted_s is not None and at_s - self.painted_s >= self.guard_s
+
+    def paused_between(self, from_s: float, to_s: float) -> bool:
+        """Whether the run was paused at any time between two."""
+        return any(began_s <= to_s and ended_s >= from_s for began_s, ended_s in self.pauses)
+
+
+def meant(moment: Moment, event: Event) -> tuple[Event, str]:
+    """An event as it is meant, and what there is to say of it: a correction to what stands there already is none."""
+    entry = moment.position.correcting
+    if isinstance(event, events.Correct) and entry is not None and event.value == value(moment.told, entry):
+        return events.Leave(), "That is what stands there: nothing was corrected."
+    return event, ""
+
+
+def refusal(moment: Moment, event: Event, press: Press | None) -> str:
+    """Why an event is not taken; empty if it is. `press`: by the experimenter's hand."""
+    judged = after(moment.position, type(event), moment.now_s)
+    if isinstance(judged, No):
+        return judged.because
+    return _mistimed(moment, event, press) or _impossible(moment, event)
+
+
+def moved(moment: Moment, event: Event) -> Position:
+    """The position after an event that is taken. `TypeError`: it is refused."""
+    before = moment.position
+    position = after(before, type(event), moment.now_s)
+    if isinstance(position, No):
+        raise TypeError(position.because)
+    if isinstance(event, events.Undo):
+        entry = moment.further_back
+        serial = position.serial + (entry != before.correcting and position.serial == before.serial)
+        return replace(position, correcting=entry, serial=serial)
+    why = why_after(before, event)
+    return position if why is None else replace(position, why=why)
+
+
+def _mistimed(moment: Moment, event: Event, press: Press | None) -> str:
+    if not isinstance(event, ACTS):
+        return ""
+    not_before_s = moment.position.not_before_s
+    if isinstance(event, events.Next) and not_before_s is not None and moment.now_s < not_before_s:
+        return "Too soon: it is to be felt for longer."
+    if press is None:
+        return ""
+    if press.serial != moment.position.serial or moment.painted_s is None:
+        return "That was pressed for what stood there before: press again."
+    return "" if moment.is_ready(press.at_s) else "Too soon after the change: press again."
+
+
+def _impossible(moment: Moment, event: Event) -> str:
+    match event:
+        case _ if isinstance(event, OWN):
+            return _not_asked(moment, event)
+        case events.Correct() if (entry := moment.position.correcting) is not None and not fits(entry, event.value):
+            return f"That is no {entry.what}."
+        case events.Undo() if moment.further_back is None:
+            return "There is nothing to undo in this set."
+        case events.Repeat() if moment.repeatable is None:
+            return "There is no trial of this set to repeat now."
+        case events.Repeat(trial=Trial() as trial) if trial != moment.repeatable:
+            return f"Trial {trial.trial} cannot be presented again any more."
+        case events.Rearm(held_s=float() as held_s) if held_s < REARM_HELD_S:
+            return f"Hold it for {REARM_HELD_S:g} s."
+        case _:
+            return ""
+
+
+def _not_asked(
+    moment: Moment, event: events.ParticipantKey | events.ParticipantRated | events.ParticipantDescribed
+) -> str:
+    """Why what the participant did is no answer to what is asked."""
+    if event.step != moment.position.number:
+        return "It was the answer to an earlier question."
+    if not isinstance(event, events.ParticipantKey):
+        return ""
+    if event.typed:
+        return "It went into what is open on the console: leave that (Esc), then have it pressed again."
+    onset_s = moment.position.onset_s
+    if (onset_s is None or event.at_s >= onset_s) and not moment.paused_between(event.at_s, event.at_s):
+        return ""
+    return "It went down before the stimulus, or in a pause."
