@@ -3,6 +3,7 @@ from __future__ import annotations
 import json
 from pathlib import Path
 
+from device.physics import FIDELITIES
 from tests.conftest import Recoil
 
 
@@ -26,3 +27,17 @@ def test_an_unknown_part_is_named_with_those_there_are(recoil: Recoil) -> None:
     assert done.returncode == 2
     assert "horoscope" in done.stderr
     assert "post-hocs" in done.stderr
+
+
+def test_the_bench_tells_error_and_time_of_every_model(recoil: Recoil, tmp_path: Path) -> None:
+    out = tmp_path / "bench"
+    done = recoil("bench", "physics", "--repeats", 1, "--batch", 100, "--out", out)
+    assert done.returncode == 0, done.stderr
+    rows = json.loads((out / "bench.json").read_text(encoding="utf-8"))["physics"]
+    assert [(row["drive_off"], row["fidelity"]) for row in rows] == [
+        (drive_off, fidelity) for drive_off in ("open", "shorted") for fidelity in FIDELITIES
+    ]
+    assert all(row["error"] <= row["stated"] and row["single_us"] > 0 for row in rows)
+    assert {row["error"] for row in rows if row["fidelity"] == "full"} == {0.0}
+    page = (out / "report.md").read_text(encoding="utf-8")
+    assert all(fidelity in page and fidelity in done.stdout for fidelity in FIDELITIES)

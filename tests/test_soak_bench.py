@@ -1,10 +1,11 @@
-"""Speed of the gun's physics beside the peers', at equal error: `recoil bench physics`, kept as a table."""
+"""Speed of the gun's physics beside the peers', at equal error, kept as a table."""
 
 from __future__ import annotations
 
 import json
 import subprocess
 import sys
+from pathlib import Path
 from typing import Any
 
 import pytest
@@ -13,17 +14,16 @@ from tests.conftest import Soak
 
 pytestmark = pytest.mark.soak
 
-RUN = "from recoil.cli import main; main()"
+ROOT = Path(__file__).parent.parent
 OURS = ("Recoil, one at a time", "Recoil, batch")
 SLOWER = {"scipy DOP853": 500.0, "heyoka": 2.0}
 """So many times as long as ours they take with an open coil, at an error of at most 1e-9."""
 
 
 @pytest.fixture(scope="module")
-def found(tmp_path_factory: pytest.TempPathFactory) -> Any:
-    out = tmp_path_factory.mktemp("bench") / "out"
-    subprocess.run([sys.executable, "-c", RUN, "bench", "physics", "--out", out], check=True, capture_output=True)
-    return json.loads((out / "bench.json").read_text(encoding="utf-8"))["physics"]
+def found() -> Any:
+    done = subprocess.run([sys.executable, "-m", "tests.benchmarks"], check=True, capture_output=True, cwd=ROOT)
+    return json.loads(done.stdout)
 
 
 def test_the_leads(found: Any, soak: Soak) -> None:

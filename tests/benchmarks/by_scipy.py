@@ -7,8 +7,8 @@ from typing import Any
 
 import numpy as np
 
-from analysis.predict.bench.peers.problem import Outputs, Peer, PeerError, Shoot, break_away, force_on_hand
 from device.parameters import DriveOff, GunParameters
+from tests.benchmarks.problem import Outputs, Peer, PeerError, Shoot, break_away, force_on_hand
 
 State = Sequence[float]
 Watch = Callable[[float, State], float]
@@ -45,7 +45,7 @@ def _build(drive_off: DriveOff, method: str, rtol: float) -> Shoot:
 
 
 def _stage_solver(method: str, rtol: float) -> Callable[..., Any]:
-    from scipy.integrate import solve_ivp  # noqa: PLC0415 - heavy
+    from scipy.integrate import solve_ivp
 
     def solve(
         rates: Any, t: float, state: State, end: Watch | None, *watched: Watch, until: float | None = None

@@ -6,8 +6,8 @@ import math
 from collections.abc import Callable
 from typing import Any
 
-from analysis.predict.bench.peers.problem import Outputs, Peer, PeerError, Shoot, break_away
 from device.parameters import DriveOff, GunParameters
+from tests.benchmarks.problem import Outputs, Peer, PeerError, Shoot, break_away
 
 _TOLERANCES = (1e-4, 1e-7, 1e-10, 1e-12)
 _METHODS = ("Tsit5", "Dopri8")
@@ -56,7 +56,7 @@ _programs: dict[tuple[str, str], Any] = {}
 def _program(drive_off: DriveOff, method: str) -> Any:
     """The compiled shot of one method, for all tolerances."""
     if (drive_off, method) not in _programs:
-        import jax  # noqa: PLC0415 - a peer, not a dependency
+        import jax
 
         jax.config.update("jax_platforms", "cpu")
         jax.config.update("jax_enable_x64", True)
@@ -66,16 +66,16 @@ def _program(drive_off: DriveOff, method: str) -> Any:
 
 
 def _stage_solver(method: str) -> Callable[..., Any]:
-    import diffrax  # noqa: PLC0415 - a peer, not a dependency
-    import jax.numpy as jnp  # noqa: PLC0415
-    import optimistix  # noqa: PLC0415
+    import diffrax
+    import jax.numpy as jnp
+    import optimistix
 
     solver = getattr(diffrax, method)()
 
     def solve(rates: Any, t: Any, state: Any, end: Any, rtol: Any, *, until: Any = None) -> tuple[Any, Any]:
         """Time and state where `end` falls to 0 (or at `until`); not a number if it never does."""
 
-        def watched(t: Any, y: Any, args: Any, **_more: object) -> Any:  # noqa: ARG001 - it passes them by these names
+        def watched(t: Any, y: Any, args: Any, **_more: object) -> Any:
             return end(y)
 
         event = end and diffrax.Event(watched, optimistix.Newton(1e-15, 1e-15), direction=False)
@@ -99,7 +99,7 @@ def _stage_solver(method: str) -> Callable[..., Any]:
 
 
 def _shot(solve: Any, flight: Any) -> Callable[..., Any]:
-    import jax.numpy as jnp  # noqa: PLC0415 - a peer, not a dependency
+    import jax.numpy as jnp
 
     def shot(p: Any, t: Any, current: Any, rtol: Any) -> Any:
         m, _, _, _, km, xc, k, x0, Ff, V, _ = p

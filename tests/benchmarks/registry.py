@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from analysis.predict.bench.peers import by_diffrax, by_game_loop, by_heyoka, by_mujoco, by_scipy
-from analysis.predict.bench.peers.problem import Peer
+from tests.benchmarks import by_diffrax, by_game_loop, by_heyoka, by_mujoco, by_scipy
+from tests.benchmarks.problem import Peer
 
 
 def peers() -> list[Peer]:

@@ -8,7 +8,6 @@ from typing import Any
 
 import numpy as np
 
-from analysis.predict.bench.peers.problem import Outputs, Peer, guns
 from analysis.predict.jobs import cores
 from device.parameters import DriveOff, GunParameters
 from device.physics import FIDELITIES, ShotSummary, simulate, simulate_batch, warm
@@ -16,6 +15,7 @@ from device.physics.layout import pack
 from device.physics.results import summary_of
 from device.physics.single import interpret, model_of
 from device.physics.tiers import FRICTION_N, NEAR, OUTPUTS
+from tests.benchmarks.problem import Outputs, Peer, guns
 
 SINGLE, INTERPRETED, BATCH = "Recoil, one at a time", "Recoil, interpreted", "Recoil, batch"
 _FIXED = ("friction_N", "return_friction_N", "pulse_s", "contact_depth_m", "drive_off", "emf")

@@ -5,15 +5,15 @@ from __future__ import annotations
 import math
 import statistics
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from importlib.util import find_spec
 from itertools import repeat
 from typing import Any
 
-from analysis.predict.bench.ours import Contender, Ready, one_at_a_time
-from analysis.predict.bench.peers.problem import errors, reference
 from device.parameters import DriveOff
+from tests.benchmarks.ours import Contender, Ready, one_at_a_time
+from tests.benchmarks.problem import errors, reference
 
 _LEAST_S = 0.02  # a measured stretch is at least as long; the clock's grain is far below
 _GIVES_UP = (ArithmeticError, AttributeError, ImportError, LookupError, RuntimeError, TypeError, ValueError)
@@ -55,24 +55,20 @@ class _Runner:
     ratios: list[float] = field(default_factory=list)
 
 
-def measure(
-    contenders: Sequence[Contender], drive_off: DriveOff, repeats: int, tell: Callable[[str], None]
-) -> list[Row]:
-    """A row each, in their order. `tell` hears of each contender once before the rounds, and of each round."""
+def measure(contenders: Sequence[Contender], drive_off: DriveOff, repeats: int) -> list[Row]:
+    """A row each, in their order."""
     rows, runners = [], []
     for contender in contenders:
         row, runner = _prepared(contender, drive_off)
         rows.append(row)
         runners += [runner] if runner else []
-        tell(f"{row.family} {row.setting}")
     clock = one_at_a_time(drive_off)
     calls = _calls(clock)
-    for number in range(repeats):
+    for _ in range(repeats):
         for runner in runners:
             ours = _us(clock, calls)
             runner.us.append(_us(runner.ready, runner.calls))
             runner.ratios.append(runner.us[-1] / ours)
-        tell(f"round {number + 1} of {repeats}")
     for runner in runners:
         _conclude(runner)
     return rows

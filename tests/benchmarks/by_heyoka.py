@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Any
 
-from analysis.predict.bench.peers.problem import Outputs, Peer, PeerError, Shoot, break_away, force_on_hand
 from device.parameters import DriveOff, GunParameters
+from tests.benchmarks.problem import Outputs, Peer, PeerError, Shoot, break_away, force_on_hand
 
 _TOLERANCES = (1e-6, 1e-9, 1e-12, 2.2e-16)
 _PATIENCE_S = 1.0
@@ -72,7 +72,7 @@ class _Recoil:
     """The recoil stage: its end is a terminal event, the peak of the force a non-terminal one."""
 
     def __init__(self, tol: float) -> None:
-        import heyoka as hy  # noqa: PLC0415 - a peer, not a dependency
+        import heyoka as hy
 
         x, v, i = hy.make_vars("x", "v", "i")
         rates = _rates(hy, inside=True)
@@ -102,7 +102,7 @@ def _rates(hy: Any, *, inside: bool, alive: bool = True) -> list[tuple[Any, Any]
 
 def _stage(tol: float, *, ends_at: str, inside: bool, alive: bool) -> Any:
     """An integrator that stops where the speed, or the way to the target, falls to 0."""
-    import heyoka as hy  # noqa: PLC0415 - a peer, not a dependency
+    import heyoka as hy
 
     x, v, _ = hy.make_vars("x", "v", "i")
     watched = v if ends_at == "turn" else x - hy.par[_TARGET]

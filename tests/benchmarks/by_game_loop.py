@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Any
 
-from analysis.predict.bench.peers.problem import Outputs, Peer, PeerError, Shoot
 from device.parameters import DriveOff, GunParameters
+from tests.benchmarks.problem import Outputs, Peer, PeerError, Shoot
 
 _PLAIN = (1e-3, 1e-4, 1e-5)
 _COMPILED = (1e-3, 1e-4, 1e-5, 1e-6)
@@ -34,7 +34,7 @@ def _as_it_is(function: Callable[..., Any]) -> Callable[..., Any]:
 
 
 def _compiled(function: Callable[..., Any]) -> Callable[..., Any]:
-    import numba  # noqa: PLC0415 - the compiler is an extra
+    import numba
 
     compiled: Callable[..., Any] = numba.njit(function)
     return compiled

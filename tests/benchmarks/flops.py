@@ -13,10 +13,10 @@ from collections import Counter
 from collections.abc import Callable
 from typing import Any
 
-from analysis.predict.bench.peers.problem import guns
 from device.parameters import DriveOff
 from device.physics.layout import pack
 from device.physics.single import interpret, model_of
+from tests.benchmarks.problem import guns
 
 _KINDS = {"add": "additions", "sub": "additions", "mul": "multiplications", "truediv": "divisions"}
 

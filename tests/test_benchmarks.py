@@ -1,23 +1,20 @@
-"""`recoil bench physics`: end to end, its peers against the full model, and its count of operations."""
+"""The peers against the full model, the count of operations, and who leads."""
 
 from __future__ import annotations
 
-import json
 from importlib.util import find_spec
-from pathlib import Path
 from typing import Any
 
 import pytest
 
-from analysis.predict.bench.flops import counting_floats, operations
-from analysis.predict.bench.ours import Contender, Ready, one_at_a_time
-from analysis.predict.bench.peers.problem import OFF_STATES, Outputs, PeerError, errors, guns, reference
-from analysis.predict.bench.peers.registry import peers
-from analysis.predict.bench.physics import leads
-from analysis.predict.bench.timing import Row, measure
-from device.physics import simulate, simulate_batch
+from device.physics import simulate
 from device.physics.tiers import OUTPUTS
-from tests.conftest import Recoil
+from tests.benchmarks.flops import counting_floats, operations
+from tests.benchmarks.leads import leads
+from tests.benchmarks.ours import Contender, Ready, one_at_a_time
+from tests.benchmarks.problem import OFF_STATES, Outputs, PeerError, errors, guns, reference
+from tests.benchmarks.registry import peers
+from tests.benchmarks.timing import Row, measure
 
 TIGHT = {
     "scipy RK45": "rtol 1e-08",
@@ -96,14 +93,14 @@ def test_a_peer_that_is_missing_or_fails_is_a_row_and_stops_nobody() -> None:
     absent = contender("absent", "no_such_package_at_all", broken)
     failing = contender("failing", "recoil", broken)
     ours = contender("ours", "recoil", one_at_a_time, is_peer=False)
-    rows = measure([absent, failing, ours], "open", 1, lambda _word: None)
+    rows = measure([absent, failing, ours], "open", 1)
     assert [row.status for row in rows] == ["not installed", "failed", "measured"]
     assert "--group peers" in rows[0].note
     assert "an event was missed" in rows[1].note
     assert rows[2].error is not None
     assert rows[2].error < 1e-12
     with pytest.raises(PeerError):  # what is ours must not hide behind a row
-        measure([contender("ours", "recoil", broken, is_peer=False)], "open", 1, lambda _word: None)
+        measure([contender("ours", "recoil", broken, is_peer=False)], "open", 1)
 
 
 def test_a_lead_is_the_fastest_exact_setting_and_says_whether_it_is_what_was_wanted() -> None:
@@ -119,26 +116,3 @@ def test_a_lead_is_the_fastest_exact_setting_and_says_whether_it_is_what_was_wan
         ("heyoka", 1.5, "not met"),
         ("Recoil, batch", 4.0, "met"),
     ]
-
-
-def test_bench_physics_writes_values_page_and_figure(recoil: Recoil, tmp_path: Path) -> None:
-    simulate_batch(friction_N=[0.21])  # compiles, and keeps it for the command, which would have to wait
-    out = tmp_path / "bench"
-    done = recoil("bench", "physics", "--repeats", 1, "--batch", 500, "--out", out)
-    assert done.returncode == 0, done.stderr
-    found = json.loads((out / "bench.json").read_text(encoding="utf-8"))["physics"]
-    assert (found["repeats"], found["batch_shots"]) == (1, 500)
-    ours = [row for row in found["rows"] if row["family"] == "Recoil, interpreted" and row["setting"] == "full"]
-    assert [row["drive_off"] for row in ours] == ["open", "shorted"]
-    assert all(row["error"] < 1e-12 and row["us_per_shot"] > 0 for row in ours)
-    measured = {row["family"] for row in found["rows"] if row["status"] == "measured"}
-    assert {"scipy RK45", "scipy DOP853", "scipy Radau", "scipy BDF", "scipy LSODA"} <= measured
-    assert found["flops"]["open"]["bound_us"] > 0
-    page = (out / "report.md").read_text(encoding="utf-8")
-    for missing in {row["family"] for row in found["rows"] if row["status"] == "not installed"}:
-        assert missing in page
-        assert f"{missing}: not installed" in done.stdout
-    assert "scipy DOP853" in done.stdout
-    assert "wanted: at least 500 times" in done.stdout
-    assert (out / "figures" / "physics-trade.png").stat().st_size > 10_000
-    assert (out / "report.html").stat().st_mode & 0o077 == 0

@@ -10,8 +10,8 @@ from __future__ import annotations
 import math
 from typing import Any
 
-from analysis.predict.bench.peers.problem import Outputs, Peer, PeerError, Shoot, break_away
 from device.parameters import DriveOff, GunParameters
+from tests.benchmarks.problem import Outputs, Peer, PeerError, Shoot, break_away
 
 _SETTINGS = (("implicitfast", 1e-3), ("implicitfast", 1e-4), ("implicitfast", 1e-5), ("RK4", 1e-3), ("RK4", 1e-4))
 _HORIZON_S = 1.0
@@ -32,7 +32,7 @@ def peers() -> list[Peer]:
 
 
 def _build(drive_off: DriveOff, integrator: str, h: float) -> Shoot:
-    import mujoco  # noqa: PLC0415 - a peer, not a dependency
+    import mujoco
 
     prepared: dict[GunParameters, tuple[Any, Any]] = {}
 
