@@ -10,28 +10,21 @@ from pydantic import ValidationError
 from experiments import catalogue
 from experiments.design.plan import Plan
 from experiments.record import replay
-from experiments.record.columns import FILE_SUFFIX, LATER
+from experiments.record.columns import FILE_SUFFIX
 from experiments.record.journal import Contents, JournalError
 from experiments.record.journal import read as read_journal
 from experiments.record.tables import table_bytes
 
 
 def table(contents: Contents) -> bytes:
-    """The CSV that a journal makes. `JournalError` if this version does not know its plan.
-
-    A run that was finished before some columns came gets the table that it finished with.
-    """
+    """The CSV that a journal makes. `JournalError` if this version does not know its plan."""
     plan = plan_of(contents)
     if plan.experiment not in catalogue.CATALOGUE:
         raise JournalError(
             f"{contents.path}: line 1: experiment {plan.experiment!r} is not known to this version of Recoil"
         )
     rows = catalogue.CATALOGUE[plan.experiment].rows(plan, replay.told(contents))
-    data, finished = table_bytes(plan.experiment, rows), contents.records[-1].get("table_sha256")
-    if finished not in (None, sha256(data)):
-        older = table_bytes(plan.experiment, rows, without=LATER)
-        return older if sha256(older) == finished else data
-    return data
+    return table_bytes(plan.experiment, rows)
 
 
 def sha256(data: bytes) -> str:

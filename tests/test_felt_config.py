@@ -43,14 +43,6 @@ def test_the_shipped_sections_say_the_same_numbers() -> None:
     assert preference.synthetic.appeal == Appeal()
 
 
-@pytest.mark.parametrize("name", ["direction", "preference"])
-def test_a_setup_from_before_is_recorded_and_hashed_as_it_was(tmp_path: Path, name: str) -> None:
-    record = load_setup(str(written(tmp_path, without_sections(name), name))).record()["experiment"]
-    assert not {"percept", "diffusion", "people", "appeal"} & set(record["synthetic"])
-    assert "instructions" not in record
-    assert "instructions" not in record["design"]
-
-
 @pytest.mark.parametrize(("name", "observer"), [("direction", "rates"), ("preference", "ratings")])
 def test_who_feels_the_gun_is_recorded_with_all_their_numbers(tmp_path: Path, name: str, observer: str) -> None:
     text = changed(without_sections(name), (f'observer = "{observer}"', 'observer = "felt"'))

@@ -12,7 +12,6 @@ from device.physics.trains import highest_rate_Hz, train
 from device.simulated import SimulatedGun
 from device.words import Pulse, Shot
 from experiments.config.gun import GunConfig
-from experiments.load import find, load_gun
 
 BACK = GunParameters(return_friction_N=1.12)
 STRIPS = {"coefficient": 0.7, "stiffness_N_m": 1300.0, "deformation_m": 0.0005}  # 0.91 N, equation (5)
@@ -52,13 +51,6 @@ def test_a_friction_of_the_return_is_a_number_of_the_config():
 def test_a_damper_that_makes_no_sense_is_refused(method, said):
     with pytest.raises(ValueError, match=said):
         a_gun(**method)
-
-
-def test_a_config_without_strips_is_recorded_as_before_there_were_any():
-    record = load_gun(find("gun")).model_dump(mode="json")
-    for method in record["methods"].values():
-        assert set(method) == {"label", "actuator", "damper", "voice_coil", "vibration"}
-    assert "strips" in a_gun(strips=STRIPS).model_dump(mode="json")["methods"]["soft"]
 
 
 def test_a_recorded_gun_reads_back_as_itself():

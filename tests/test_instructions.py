@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import csv
-import hashlib
 import io
 import math
 from collections import Counter
@@ -23,8 +22,6 @@ from experiments.direction.config import DirectionConfig
 from experiments.direction.plan import make_plan, make_practice
 from experiments.direction.session import session
 from experiments.load import load_setup, shipped_folder
-from experiments.rebuild import table
-from experiments.record.columns import LATER
 from experiments.record.journal import read
 from experiments.record.replay import told
 from experiments.run import Request, run
@@ -193,21 +190,7 @@ def test_the_answers_of_the_hurried_are_quicker(done: tuple[Path, Path]) -> None
     assert {(row["response_source"], row["response_time_valid"]) for row in rows} == {("synthetic", "1")}
 
 
-def test_a_run_that_was_finished_before_the_column_came_keeps_the_table_it_finished_with(tmp_path: Path) -> None:
-    request = Request(setup=PLAIN, participant_id="P01", results=tmp_path, seed=1)
-    finished = run(request, synthetic_screen, VirtualClock())
-    contents, data = read(finished.place.journal), finished.place.table.read_bytes()
-    rows = list(csv.reader(io.StringIO(data.decode(), newline="")))
-    assert tuple(rows[0][-1:]) == LATER
-    assert {row[-1] for row in rows[1:]} == {""}
-    older = "".join(f"{','.join(row[:-1])}\r\n" for row in rows).encode()
-    *before, last = contents.records
-    then = replace(contents, records=[*before, dict(last) | {"table_sha256": hashlib.sha256(older).hexdigest()}])
-    assert table(contents) == data
-    assert table(then) == older
-
-
-def test_an_answer_from_before_key_times_were_kept_is_read_as_it_was() -> None:
+def test_the_time_of_a_key_is_in_the_record_only_where_there_is_one() -> None:
     body = {
         "kind": "answered", "response": "forward", "response_time_s": 0.5, "response_source": "synthetic",
         "response_time_valid": True,

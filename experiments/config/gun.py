@@ -6,7 +6,7 @@ from dataclasses import Field as DataclassField
 from dataclasses import fields, replace
 from typing import Any, Literal, Self, TypeVar
 
-from pydantic import Field, SerializerFunctionWrapHandler, model_serializer, model_validator
+from pydantic import Field, model_validator
 
 from device.methods import Method
 from device.parameters import GunParameters, VibrationParameters
@@ -37,12 +37,6 @@ class MethodConfig(Model):
     voice_coil: Numbers = Field(default_factory=dict)
     vibration: Numbers = Field(default_factory=dict)
     strips: StripsConfig | None = None
-
-    @model_serializer(mode="wrap")
-    def _as_it_is_hashed(self, handler: SerializerFunctionWrapHandler) -> dict[str, Any]:
-        """Strips only where there are some: a setup without keeps the hash that it had before there were any."""
-        table: dict[str, Any] = handler(self)
-        return {key: value for key, value in table.items() if key != "strips" or value is not None}
 
 
 class SerialConfig(Model):

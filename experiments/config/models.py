@@ -6,15 +6,13 @@ Unknown keys, wrong types, infinities and contradictions are refused here, at th
 from __future__ import annotations
 
 from collections.abc import Iterator
-from typing import Annotated, Any, ClassVar, Literal, Self, TypeVar
+from typing import Annotated, Any, Literal, Self, TypeVar
 
 from pydantic import (
     AfterValidator,
     BaseModel,
     ConfigDict,
     Field,
-    SerializerFunctionWrapHandler,
-    model_serializer,
     model_validator,
 )
 
@@ -51,22 +49,10 @@ Methods = Annotated[tuple[Text, ...], Field(min_length=1, max_length=26), AfterV
 
 
 class SyntheticConfig(Model):
-    """Who answers when nobody sits there: an observer, or the answers of a table.
-
-    `OF_FELT` names the sections of the observer "felt".
-    """
-
-    OF_FELT: ClassVar[tuple[str, ...]] = ()
+    """Who answers when nobody sits there: an observer, or the answers of a table."""
 
     observer: str
     table: Text | None = None
-
-    @model_serializer(mode="wrap")
-    def _as_it_is_hashed(self, handler: SerializerFunctionWrapHandler) -> dict[str, Any]:
-        """What is felt only where it is used or given: other setups keep the hash from before it could be."""
-        table: dict[str, Any] = handler(self)
-        unused = set() if self.observer == "felt" else set(self.OF_FELT) - self.model_fields_set
-        return {key: value for key, value in table.items() if key not in unused}
 
     @model_validator(mode="after")
     def _table_is_named(self) -> Self:
@@ -206,11 +192,6 @@ def _inner_leaves(value: Any, prefix: str) -> Iterator[str]:
         for key, inner in value.items():
             yield f"{prefix}{key}"
             yield from _inner_leaves(inner, f"{prefix}{key}.")
-
-
-def where_told(table: dict[str, Any]) -> dict[str, Any]:
-    """A table without `instructions` where there are none: such a setup keeps the hash from before there were any."""
-    return {key: value for key, value in table.items() if key != "instructions" or value}
 
 
 def check_covered(where: str, values: dict[str, float], methods: tuple[str, ...]) -> None:

@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from typing import Annotated, Any, ClassVar, Literal, Self
+from typing import Annotated, Literal, Self
 
-from pydantic import AfterValidator, Field, SerializerFunctionWrapHandler, model_serializer, model_validator
+from pydantic import AfterValidator, Field, model_validator
 
 from experiments.config.models import (
     Count,
@@ -20,7 +20,6 @@ from experiments.config.models import (
     check_covered,
     check_duration,
     once,
-    where_told,
 )
 from experiments.synthetic.felt_config import DiffusionConfig, PeopleConfig
 from experiments.synthetic.percept_config import PerceptConfig
@@ -57,10 +56,6 @@ class Design(Model):
     def trials(self) -> int:
         """Trials of the whole run."""
         return len(self.methods) * self.trials_per_session
-
-    @model_serializer(mode="wrap")
-    def _as_it_is_hashed(self, handler: SerializerFunctionWrapHandler) -> dict[str, Any]:
-        return where_told(handler(self))
 
     @model_validator(mode="after")
     def _counts_fit(self) -> Self:
@@ -159,8 +154,6 @@ class ResponseTime(Model):
 class Synthetic(SyntheticConfig):
     """Who answers when nobody sits there."""
 
-    OF_FELT: ClassVar[tuple[str, ...]] = ("percept", "diffusion", "people")
-
     observer: Literal["rates", "table", "felt"]
     rates: Rates
     response_time: ResponseTime
@@ -181,10 +174,6 @@ class DirectionConfig(ExperimentConfig):
     instructions: dict[str, InstructionConfig] = Field(default_factory=dict)
     timing: Timing
     synthetic: Synthetic
-
-    @model_serializer(mode="wrap")
-    def _as_it_is_hashed(self, handler: SerializerFunctionWrapHandler) -> dict[str, Any]:
-        return where_told(handler(self))
 
     @property
     def break_s(self) -> float:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Annotated, ClassVar, Literal, Self
+from typing import Annotated, Literal, Self
 
 from pydantic import Field, model_validator
 
@@ -114,8 +114,6 @@ class Ratings(Model):
 
 class Synthetic(SyntheticConfig):
     """Who rates when nobody sits there."""
-
-    OF_FELT: ClassVar[tuple[str, ...]] = ("percept", "appeal")
 
     observer: Literal["ratings", "table", "felt"]
     ratings: Ratings

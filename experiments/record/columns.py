@@ -118,9 +118,6 @@ RATINGS: tuple[Column, ...] = (
 TABLES: dict[str, tuple[Column, ...]] = {"direction": TRIALS, "preference": RATINGS}
 """The table of each experiment."""
 
-LATER = ("instruction",)
-"""Columns that tables from before they came do not have."""
-
 FILE_SUFFIX: dict[str, str] = {"direction": "trials", "preference": "ratings"}
 """How the table's file name ends: `sub-P01_task-direction_trials.csv`."""
 

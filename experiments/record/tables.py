@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import csv
 import io
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable
 
 from experiments.record import columns
 from experiments.session.history import Story, is_attempt
@@ -56,14 +56,11 @@ def _is_corrected(story: Story, given: type[Outcome]) -> bool:
     return bool(both) and not isinstance(both[-1], given)
 
 
-def table_bytes(experiment: str, rows: Iterable[Row], without: Sequence[str] = ()) -> bytes:
-    """The table as RFC 4180 CSV in UTF-8: CRLF, quotes doubled, text guarded, an empty cell for what is missing.
-
-    Columns `without` are left out.
-    """
+def table_bytes(experiment: str, rows: Iterable[Row]) -> bytes:
+    """The table as RFC 4180 CSV in UTF-8: CRLF, quotes doubled, text guarded, an empty cell for what is missing."""
     text = io.StringIO(newline="")
     writer = csv.writer(text, lineterminator="\r\n")
-    table = [column for column in columns.TABLES[experiment] if column.name not in without]
+    table = columns.TABLES[experiment]
     writer.writerow(column.name for column in table)
     writer.writerows([_cell(column, row.get(column.name)) for column in table] for row in rows)
     return text.getvalue().encode()

@@ -105,7 +105,7 @@ class Close:
 class Prepared:
     """The gun is in the participant's hand, with the damper set as it was asked for: whoever fires confirms it.
 
-    `damper` is `None` where none is set by hand, and in journals from before it was kept.
+    `damper` is `None` where none is set by hand.
     """
 
     damper: str | None = None
@@ -157,17 +157,13 @@ class Rested:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Presented:
-    """The stimulus was felt until next was said, or until the most shots were fired.
-
-    `timings`: how each shot came about, in journals from before each had a record of its own (`TrainShot`).
-    """
+    """The stimulus was felt until next was said, or until the most shots were fired."""
 
     gun: str
     onset_utc: str
     shots: int
     exposure_s: float
     ended_by: Literal["next", "limit"]
-    timings: tuple[ShotTiming, ...] = ()
     kind: Literal["presented"] = "presented"
 
 
@@ -264,7 +260,7 @@ def trial_of(step: Step | None) -> Trial | None:
     return step.trial if isinstance(step, TrialStep) else None
 
 
-_WHERE_KNOWN = ("damper", "timing", "timings", "key_time_s", "shots", "exposure_s")
+_WHERE_KNOWN = ("damper", "timing", "key_time_s", "shots", "exposure_s")
 _STEP: TypeAdapter[Step] = TypeAdapter(Annotated[Step, Field(discriminator="kind")])
 _OUTCOME: TypeAdapter[Outcome] = TypeAdapter(Annotated[Outcome, Field(discriminator="kind")])
 
@@ -272,7 +268,7 @@ _OUTCOME: TypeAdapter[Outcome] = TypeAdapter(Annotated[Outcome, Field(discrimina
 def record(word: Step | Outcome | TrainShot) -> dict[str, Any]:
     """A step, outcome or shot as plain JSON values; an instruction, and what is not always known, only where it is."""
     words = asdict(word, dict_factory=where_given)
-    return {key: value for key, value in words.items() if key not in _WHERE_KNOWN or value not in (None, ())}
+    return {key: value for key, value in words.items() if key not in _WHERE_KNOWN or value is not None}
 
 
 def step_from(body: object) -> Step:
