@@ -5,6 +5,7 @@ from __future__ import annotations
 import contextlib
 import os
 import pty
+import select
 import signal
 import subprocess
 import threading
@@ -22,6 +23,7 @@ class AtTerminal:
 
     def __init__(self, words: Sequence[object], folder: Path) -> None:
         self._ours, theirs = pty.openpty()
+        self._leave, self._leaves = os.pipe()
         self.process = subprocess.Popen(
             [str(word) for word in words],
             stdin=theirs,
@@ -40,8 +42,9 @@ class AtTerminal:
 
     def _read(self) -> None:
         while True:
+            ready, _, _ = select.select([self._ours, self._leave], [], [])  # a read under way would keep it open
             try:
-                data = os.read(self._ours, 65536)
+                data = b"" if self._leave in ready else os.read(self._ours, 65536)
             except OSError:
                 data = b""
             with self._news:
@@ -95,6 +98,8 @@ class AtTerminal:
 
     def hang_up(self) -> None:
         """Close the terminal."""
+        os.write(self._leaves, b"!")
+        self._reader.join()
         os.close(self._ours)
         self._ours = -1
 
@@ -111,7 +116,9 @@ class AtTerminal:
         if self.process.poll() is None:
             self.kill()
         if self._ours >= 0:
-            os.close(self._ours)
+            self.hang_up()
+        os.close(self._leave)
+        os.close(self._leaves)
 
 
 def answer_until_killed(screen: AtTerminal, seconds: float) -> None:

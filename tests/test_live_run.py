@@ -324,7 +324,7 @@ def test_a_pause_before_the_description_keeps_the_rating_and_takes_no_words_unti
         sitting.to(S.RATING)
         assert own_rating(sitting)
         assert by_hand(sitting, events.Pause())
-        assert own_words(sitting, "in the pause").text == "The run is paused: P goes on."
+        assert own_words(sitting, "in the pause").text == "The run is paused: go on first."
         assert by_hand(sitting, events.GoOn())
         assert sitting.state is S.DESCRIBING
         assert own_words(sitting)

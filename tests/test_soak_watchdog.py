@@ -28,7 +28,7 @@ pytestmark = pytest.mark.soak
 
 KILLS = 50
 BUSY = 8
-TRAIN_SHOTS, TRAINS = 100, 3
+TRAIN_SHOTS, TRAINS = 400, 3
 STOPS = 20
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import math
 from contextlib import suppress
 from itertools import pairwise
 from pathlib import Path
@@ -147,7 +148,7 @@ def test_a_shot_too_far_ahead_is_refused_by_the_gun_that_is_none(tmp_path: Path)
     gun.arm()
     shot = Shot(method="asymmetric-1", direction="forward", drive=Pulse(voltage_V=16.0, pulse_s=0.010))
     for at_s in (desk.clock.now() + 2.001, float("nan"), float("inf")):
-        with pytest.raises(LimitError, match="2 s ahead"):
+        with pytest.raises(LimitError, match="2 s ahead" if math.isfinite(at_s) else "a finite time"):
             gun.fire(shot, at_s)
     assert gun.reports == []
     assert gun.fire(shot, desk.clock.now() + 2.0).pulse_start_s == desk.clock.now() + 2.0
