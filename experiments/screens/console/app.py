@@ -23,7 +23,7 @@ from experiments.places import PlaceError
 from experiments.plan import Plan
 from experiments.run import Finished, Request, run
 from experiments.screen import Screen
-from experiments.screens.console import display
+from experiments.screens.console import display, tone
 from experiments.screens.console.beside import ParticipantSide
 from experiments.screens.console.messages import Began, Ended, Message
 from experiments.screens.console.screen import ConsoleScreen
@@ -204,6 +204,7 @@ def run_console(
         console.finish()
     keep()
     let_go(wake)
+    tone.finish()
     if console.error is not None:
         raise console.error
     if console.result is None:
