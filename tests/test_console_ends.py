@@ -194,6 +194,7 @@ def test_a_signal_ends_run_and_window_in_order(
         screen.process.send_signal(number)
         code, said = screen.end()
     assert code == 130, said
+    assert f"recoil: stopped: {number.name}. Go on with --resume." in said
     check_disarmed(Watch(str(tmp_path)))
     last = records(tmp_path / f"{PREFERENCE}_journal.jsonl")[-1]
     assert (last["kind"], last["reason"]) == ("stopped", number.name)

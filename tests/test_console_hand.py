@@ -6,6 +6,7 @@ Every state with every accident is a table of `make soak`; here are those that h
 from __future__ import annotations
 
 import importlib.util
+import time
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -13,7 +14,7 @@ import pytest
 
 from experiments.session.states import State
 from tests.at_display import AtConsole, needs_display, remarks, virtual_display
-from tests.at_hand import ACTIONS, Cell, check_cell, check_gun
+from tests.at_hand import ACTIONS, HELD_S, Cell, check_cell, check_gun
 
 pytest.importorskip("PyQt6")
 pytestmark = needs_display
@@ -72,6 +73,38 @@ def test_letters_beside_the_field_of_a_rating_are_text_and_no_commands(tmp_path:
         screen.until(lambda look: look.says("It was entered as 7.5."))
         screen.at("correcting")
     assert not remarks(cell.journal)
+
+
+def test_what_is_half_typed_outlives_a_pause_a_note_and_a_correction(tmp_path: Path, display: str) -> None:
+    cell = Cell(tmp_path, display, S.RATING)
+    with cell.reach() as screen:
+        screen.keys.type("6")
+        screen.keys.press("p", "Control_L")
+        screen.at("paused")
+        screen.keys.press("p")
+        screen.until(lambda look: look.state == "rating" and look.typed == "6")
+        screen.line("n", "a dog", "Control_L")
+        screen.until(lambda look: look.typed == "6" and look.ready)
+        screen.keys.type(".5\n")
+        screen.at("describing")
+        screen.keys.type("like a")
+        screen.keys.press("u", "Control_L")
+        screen.until(lambda look: look.state == "correcting" and look.typed == "6.5")
+        screen.keys.press("Escape")
+        screen.until(lambda look: look.state == "describing" and look.typed == "like a")
+        screen.keys.type(" toy")
+        screen.until(lambda look: look.typed == "like a toy")
+
+
+def test_a_key_that_is_held_is_not_typed_into_the_field_that_opens_under_it(tmp_path: Path, display: str) -> None:
+    cell = Cell(tmp_path, display, S.ASKING)
+    with cell.reach() as screen:
+        screen.keys.key_down("n")
+        screen.until(lambda look: look.line)
+        time.sleep(HELD_S)  # this is what the hand does
+        screen.keys.key_up("n")
+        assert screen.heard().typed == ""
+        screen.hold("n", until=lambda look: look.typed.startswith("nnn"))
 
 
 def check_participants_keys(screen: AtConsole, cell: Cell, *keys: str) -> None:

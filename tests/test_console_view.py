@@ -16,7 +16,7 @@ from experiments.config.setup import Setup
 from experiments.design.plan import Plan, Trial
 from experiments.screens.console import overview, theme, view
 from experiments.screens.console.messages import Ended, GunSeen, ParticipantSeen
-from experiments.screens.console.pace import Pace, clock_text, end_text, remaining_s
+from experiments.screens.console.pace import Pace, clock_text, end_text, progress, remaining_s
 from experiments.screens.console.view import About, Seen
 from experiments.session.remarks import AnswerCorrected, Flagged, Noted
 from experiments.session.states import Position, State
@@ -24,6 +24,7 @@ from experiments.session.steps import Answered, Ask, Describe, Prepare, Present,
 from tests.at_controls import DIRECTION, PREFERENCE, sat_at, tells_correctness
 
 SAID = Answered(response="forward", response_time_s=1.0, response_source="experimenter", response_time_valid=False)
+SHOWN = Presented(gun="simulated", onset_utc="", shots=3, exposure_s=2.0, ended_by="next")
 
 
 def plan_of(setup: Setup[Any]) -> Plan:
@@ -32,6 +33,14 @@ def plan_of(setup: Setup[Any]) -> Plan:
 
 def ask(trial: Trial) -> Ask:
     return Ask(trial=trial, attempt=1, question="Which way?", forward="forward", backward="backward")
+
+
+def present(trial: Trial) -> Present:
+    return Present(trial=trial, attempt=1, repeat_every_s=0.5, max_shots=9, least_exposure_s=1.0)
+
+
+def rate(trial: Trial) -> Rate:
+    return Rate(trial=trial, question="?", minimum=0, maximum=10, minimum_text="", maximum_text="", grain=0.1)
 
 
 def prepare(trial: Trial) -> Prepare:
@@ -106,9 +115,8 @@ def test_the_gun_is_shown_as_it_says_itself_and_never_as_safe_when_it_says_nothi
 
 def test_rating_and_description_are_awaited_from_the_participants_screen_where_there_is_one() -> None:
     trial = plan_of(PREFERENCE).trials[0]
-    rate = Rate(trial=trial, question="?", minimum=0, maximum=10, minimum_text="", maximum_text="", grain=0.1)
     for state, step, what in (
-        (State.RATING, rate, "rating"),
+        (State.RATING, rate(trial), "rating"),
         (State.DESCRIBING, Describe(trial=trial, question="?"), "description"),
     ):
         here = seen(PREFERENCE, Position(states=(state,), step=step))
@@ -277,19 +285,24 @@ def test_a_break_that_is_on_counts_as_what_is_left_of_it_and_stands_still_in_a_p
 
 def test_ratings_still_to_come_are_counted() -> None:
     day = Day(PREFERENCE)
-    felt = Presented(gun="simulated", onset_utc="", shots=3, exposure_s=2.0, ended_by="next")
-    day.told = [
-        (Present(trial=trial, attempt=1, repeat_every_s=0.5, max_shots=9, least_exposure_s=1.0), felt)
-        for trial in day.plan.trials
-    ]
+    day.told = [(present(trial), SHOWN) for trial in day.plan.trials]
     assert day.left_s == pytest.approx(len(day.plan.trials) * PREFERENCE.config.rating_s)
     assert day.left_s > 0
-    rated = Rated(rating=5.0, rating_by="experimenter")
-    rate = Rate(
-        trial=day.plan.trials[0], question="?", minimum=0, maximum=10, minimum_text="", maximum_text="", grain=0.1
-    )
-    day.told.append((rate, rated))
+    day.told.append((rate(day.plan.trials[0]), Rated(rating=5.0, rating_by="experimenter")))
     assert day.left_s == pytest.approx((len(day.plan.trials) - 1) * PREFERENCE.config.rating_s)
+
+
+def test_how_far_the_run_is_counts_what_was_felt_and_what_was_rated_where_all_is_rated_last() -> None:
+    plan = plan_of(PREFERENCE)
+    first, second, *_ = plan.trials
+    felt = [(present(trial), SHOWN) for trial in (first, second)]
+    told = (*felt, (rate(first), Rated(rating=None, rating_by="experimenter")))
+    counted = [(one.what, one.count, one.planned) for one in progress(plan, told, first, rated_last=True)]
+    assert counted == [("felt", 2, 3), ("rated", 1, 3)]
+    plan = plan_of(DIRECTION)
+    answers = tuple((ask(trial), SAID) for trial in plan.trials[:4])
+    counted = [(one.what, one.count, one.planned) for one in progress(plan, answers, plan.trials[4], rated_last=False)]
+    assert counted == [("set", 1, 3), ("session", 4, 6), ("experiment", 4, 12)]
 
 
 def test_the_end_is_a_time_of_day_also_over_midnight() -> None:

@@ -18,7 +18,7 @@ from experiments.screens.participant.link import ParticipantLink
 from experiments.screens.participant.words import BETWEEN, Focused, line
 from experiments.session.states import Position, State
 from experiments.session.steps import Describe, Rate
-from tests.at_display import wait_for
+from tests.waiting import PATIENCE_S, wait_for
 
 SETUP = load_setup("preference")
 PROGRAM = "import sys\nwith open(sys.argv[1], 'wb') as told:\n    for line in sys.stdin.buffer:\n        told.write(line)\n        told.flush()"  # noqa: E501 - a program
@@ -115,6 +115,31 @@ def test_whose_the_keys_are_is_told_also_if_it_was_said_before_anybody_listened(
     finally:
         link.close()
     assert heard == [Focused(on=True)]
+
+
+def test_the_program_is_started_again_once_however_often_it_is_asked_for(tmp_path: Path) -> None:
+    started: list[ParticipantLink] = []
+    go = threading.Event()
+
+    def open_link() -> ParticipantLink:
+        assert go.wait(PATIENCE_S)
+        started.append(ParticipantLink.start(command=(sys.executable, "-c", PROGRAM, str(tmp_path / "again"))))
+        return started[-1]
+
+    first = ParticipantLink.start(command=(sys.executable, "-c", "pass"))
+    side = ParticipantSide(first, open_link, SETUP, rates=True, own_keys=False)
+    try:
+        wait_for(lambda: first.failure is not None)
+        assert side.lost
+        side.restart()
+        assert not side.lost
+        side.restart()
+        go.set()
+        wait_for(lambda: not any(thread.name == "participant again" for thread in threading.enumerate()))
+        side.restart()
+        assert len(started) == 1
+    finally:
+        side.close()
 
 
 def test_a_question_whose_time_is_over_before_it_is_asked_is_never_shown(told: Told) -> None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import time
+from collections.abc import Iterator
 from typing import Any
 
 from Xlib import XK, X
@@ -93,7 +94,8 @@ class Hands:
     def focus_on(self, title: str, timeout_s: float = 0.0) -> tuple[int, int, int, int] | None:
         """Raise the newest window whose title holds a text, and give it the keys.
 
-        Gives back its place and size in pixels (x, y, width, height); `None` if there is none within the time.
+        Gives back its place and size in pixels (x, y, width, height) once its middle lies open, as a window manager
+        takes its time to raise it and a click meets whatever lies there; `None` if it does not within the time.
         """
         end_s = time.monotonic() + timeout_s
         while (found := self._focused(title)) is None and time.monotonic() < end_s:
@@ -103,26 +105,36 @@ class Hands:
     def _focused(self, title: str) -> tuple[int, int, int, int] | None:
         """A window may go while it is looked at: then there is none."""
         try:
-            window = self._find(self._root, title)
+            window = next(filter(None, (self._holding(top, title) for top in self._shown(self._root))), None)
             if window is None:
                 return None
             window.configure(stack_mode=X.Above)
             window.set_input_focus(X.RevertToParent, X.CurrentTime)
             self._display.sync()
             corner, size = self._root.translate_coords(window, 0, 0), window.get_geometry()
+            lies_open = self._holding(self._top_at(corner.x + size.width // 2, corner.y + size.height // 2), title)
         except XError:
             return None
-        return corner.x, corner.y, size.width, size.height
+        return (corner.x, corner.y, size.width, size.height) if lies_open == window else None
 
-    def _find(self, parent: Any, title: str) -> Any:
-        """The topmost window under a parent that fits. A window manager puts frames of its own around them."""
+    def _shown(self, parent: Any) -> Iterator[Any]:
+        """The windows under a parent that people work at, the topmost first."""
         for window in reversed(parent.query_tree().children):
-            if window.get_attributes().map_state != X.IsViewable or window.get_geometry().width <= _SMALLEST_PX:
-                continue
-            if title in self._title(window):
+            if window.get_attributes().map_state == X.IsViewable and window.get_geometry().width > _SMALLEST_PX:
+                yield window
+
+    def _holding(self, window: Any, title: str) -> Any:
+        """The window of a title, which is this one or within it: a window manager puts frames of its own around."""
+        if window is None or title in self._title(window):
+            return window
+        return next(filter(None, (self._holding(inner, title) for inner in self._shown(window))), None)
+
+    def _top_at(self, x_px: int, y_px: int) -> Any:
+        """The topmost window at a place of the display."""
+        for window in self._shown(self._root):
+            box = window.get_geometry()
+            if box.x <= x_px < box.x + box.width and box.y <= y_px < box.y + box.height:
                 return window
-            if (inner := self._find(window, title)) is not None:
-                return inner
         return None
 
     def _title(self, window: Any) -> str:

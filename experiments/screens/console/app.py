@@ -20,7 +20,7 @@ from experiments.live_run import LiveRun, RunStopped, Screen
 from experiments.load import ConfigError
 from experiments.record.journal import JournalError
 from experiments.run import Finished, Request, run
-from experiments.screens.console import display
+from experiments.screens.console import display, tone
 from experiments.screens.console.beside import ParticipantSide
 from experiments.screens.console.messages import Began, Ended, Message
 from experiments.screens.console.screen import ConsoleScreen
@@ -203,6 +203,7 @@ def run_console(
         console.finish()
     keep()
     let_go(wake)
+    tone.finish()
     if console.error is not None:
         raise console.error
     if console.result is None:

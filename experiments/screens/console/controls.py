@@ -117,7 +117,9 @@ class Controls:
 
     def hold(self, press: Press) -> None:
         """The key or button of the test shot went down: it has to be held."""
-        if not self.page and self.drawn.state is State.REARMING and self._held is None:
+        if self.page:
+            self._run_again()
+        elif self.drawn.state is State.REARMING and self._held is None:
             self._held = press
             self._view.say("Hold it …", "wait")
 
@@ -139,14 +141,18 @@ class Controls:
         if name == "emergency":
             self._offer(events.EmergencyStop())
         elif self.page and name not in PAGE_COMMANDS + HOLDS:
-            self.uncover()
-            self._view.say("Here is the run again: press again.", "wait")
+            self._run_again()
         elif name in _WINDOWS:
             _WINDOWS[name](self, press)
         elif self.ended:
             self._after_end(name)
         else:
             self._run(name, press)
+
+    def _run_again(self) -> None:
+        """A key that is not for a page takes it away, and does nothing else: what it does was not to be seen."""
+        self.uncover()
+        self._view.say("Here is the run again: press again.", "wait")
 
     def _after_end(self, name: Name) -> None:
         if name == "stop":

@@ -34,17 +34,18 @@ class Notice:
 
 
 class TextPage(QWidget):
-    """A page of text that is only looked at."""
+    """A page of text that is only looked at, and below it what was said last."""
 
     def __init__(self) -> None:
         super().__init__()
-        self._title, self._text = parts.label("place"), QPlainTextEdit()
+        self._title, self.said = parts.label("place"), parts.label("saved")
+        self._text = QPlainTextEdit()
         self._text.setReadOnly(True)
         self._text.setFocusPolicy(parts.NO_FOCUS)
         down = QVBoxLayout(self)
         down.setContentsMargins(10, 6, 10, 6)
-        down.addWidget(self._title)
-        down.addWidget(self._text)
+        for widget in (self._title, self._text, self.said):
+            down.addWidget(widget)
 
     def put(self, title: str, lines: list[str]) -> None:
         """Show lines of text."""

@@ -10,6 +10,9 @@ RATE_Hz = 44_100
 PITCH_Hz = 880.0
 LENGTH_S = 0.35
 LOUDNESS = 0.4
+MOST_S = 3.0
+"""How long a sound system that hangs is waited for."""
+_THREAD = "tone"
 
 
 def samples() -> array[float]:
@@ -27,7 +30,14 @@ def samples() -> array[float]:
 
 def play() -> None:
     """Play the tone beside everything else; silence is no error."""
-    threading.Thread(target=_play, daemon=True, name="tone").start()
+    threading.Thread(target=_play, daemon=True, name=_THREAD).start()
+
+
+def finish() -> None:
+    """Wait until no tone is played: as the sound system opens it swallows what the program says on the terminal."""
+    for thread in threading.enumerate():
+        if thread.name == _THREAD:
+            thread.join(MOST_S)
 
 
 def _play() -> None:

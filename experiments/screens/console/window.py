@@ -221,8 +221,9 @@ class ConsoleWindow(QMainWindow):
         self._show_line(text, mood)
 
     def _show_line(self, text: str, mood: str) -> None:
-        self.saved.setText(text)
-        parts.set_mood(self.saved, mood)
+        for label in (self.saved, self.page.said):
+            label.setText(text)
+            parts.set_mood(label, mood)
 
     # showing
 
