@@ -23,7 +23,7 @@ test: full
 soak: full
 	scripts/system-packages
 	rm -f results/soak/*.md
-	PATH="$(CURDIR)/.venv/bin:$$PATH" .venv/bin/pytest -m soak --durations 10
+	PATH="$(CURDIR)/.venv/bin:$$PATH" .venv/bin/pytest -m soak --timeout 0 --durations 10
 
 # The locks, from pyproject.toml
 lock:
