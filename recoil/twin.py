@@ -8,10 +8,9 @@ from dataclasses import dataclass, fields, replace
 from pathlib import Path
 from typing import Any
 
-from device.serial_gun.address import MAX_SPEED
+from device.serial_gun.opening import MAX_SPEED
 from device.twin.core import IDENTITY
-from device.twin.faults import Troubles
-from device.twin.ports import Pty, Socket, Tcp
+from device.twin.ports import Pty, Socket, Tcp, Troubles
 from device.twin.twin import Make, Twin
 from experiments.load import find, load_gun
 from experiments.study.places import PlaceError

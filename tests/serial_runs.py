@@ -10,10 +10,9 @@ from pathlib import Path
 from typing import Any
 
 from device import LinkError
-from device.serial_gun.address import speed_of
-from device.serial_gun.asked import WAYS
-from device.twin.body import Rendered
-from device.twin.twin import Twin
+from device.serial_gun.opening import speed_of
+from device.serial_gun.reports import WAYS
+from device.twin.twin import Rendered, Twin
 from experiments import run as runs
 from experiments.clock import RealClock
 from experiments.live_run import RunStopped

@@ -8,7 +8,7 @@ from typing import Any
 import pytest
 
 from device.physics import simulate
-from device.physics.tiers import OUTPUTS
+from device.physics.scenes import OUTPUTS
 from tests.benchmarks.flops import counting_floats, operations
 from tests.benchmarks.leads import leads
 from tests.benchmarks.ours import Contender, Ready, one_at_a_time

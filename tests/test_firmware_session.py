@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from device.serial_gun.asked import WAYS
+from device.serial_gun.reports import WAYS
 from experiments.record.journal import read
 from tests.conftest import Recoil
 from tests.serial_runs import hasty, timings_of

@@ -8,7 +8,7 @@ import sys
 import numpy as np
 import pytest
 
-from device.physics import GunParameters, ShotBatch, batch, simulate, simulate_batch, single, warm
+from device.physics import GunParameters, ShotBatch, batch, simulate, simulate_batch, summary, warm
 from device.physics.kernel import kernel
 
 NUMBERS = [field.name for field in dataclasses.fields(ShotBatch) if field.name != "status"]
@@ -69,7 +69,7 @@ def test_a_warm_process_gives_the_digits_of_a_cold_one(monkeypatch):
     pytest.importorskip("numba")
     guns = [GunParameters(friction_N=f, drive_off=off) for f in (0.21, 1.12, 1.7) for off in ("open", "shorted")]
     cold = [simulate(gun) for gun in guns]
-    monkeypatch.setattr(single, "_engine", dataclasses.replace(single._engine))
+    monkeypatch.setattr(summary, "_engine", dataclasses.replace(summary._engine))
     assert warm()
     for gun, expected in zip(guns, cold, strict=True):
         found = simulate(gun)
@@ -98,7 +98,7 @@ def test_what_one_process_compiled_is_found_by_the_next():
 
 def test_a_name_of_the_kernel_stands_for_one_function():
     with pytest.raises(ValueError, match="shoot already"):
-        kernel(single.shoot)
+        kernel(summary.shoot)
 
 
 def test_a_return_friction_of_its_own_is_the_guns_and_an_arrays():

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from device.physics import GunParameters, simulate
-from device.physics.layout import CONTINUES, pack
+from device.physics.kernel import CONTINUES, pack
 from device.physics.traces import segments
 
 SPREAD = {

@@ -7,7 +7,7 @@ import pytest
 
 from device.physics import FIDELITIES, GunParameters, simulate
 from device.physics.batch import simulate_batch
-from device.physics.tiers import FRICTION_N, NEAR, OUTPUTS, stated_error
+from device.physics.scenes import FRICTION_N, NEAR, OUTPUTS, stated_error
 
 OPTIONS = [(off, emf) for off in ("shorted", "open") for emf in ("printed", "reciprocal")]
 FIXED = ("friction_N", "return_friction_N", "pulse_s", "contact_depth_m", "drive_off", "emf")

@@ -10,12 +10,10 @@ import pytest
 from device import LinkError
 from device.limits import DriveHistory
 from device.methods import paper_methods
-from device.serial_gun.asked import Order, asked
 from device.serial_gun.checks import MAX_UNCERTAINTY_S, check_record, check_standing, check_times
 from device.serial_gun.clocks import HostTime
-from device.serial_gun.outcomes import Contradiction, CutShort
-from device.serial_gun.pending import Reply
-from device.serial_gun.reports import Told, ready_s
+from device.serial_gun.commands import Contradiction, CutShort, Reply
+from device.serial_gun.reports import Order, Told, asked, ready_s
 from device.wire.records import ShotRecord, Standing
 from experiments.record.journal import read
 from experiments.study.places import place

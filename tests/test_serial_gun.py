@@ -9,7 +9,7 @@ from device import Effect, LimitError, LinkError, Pulse, open_gun
 from device.limits import AMBIENT_C, DriveHistory
 from device.methods import paper_methods
 from device.parameters import GunParameters, VibrationParameters
-from device.serial_gun.asked import FLOORS_US, asked
+from device.serial_gun.reports import FLOORS_US, asked
 from device.simulated import SimulatedGun
 from device.twin import budget
 from tests.twins import PULSE, SLOW, Troubles, a_pair, a_shot, said

@@ -9,8 +9,7 @@ from dataclasses import replace
 import pytest
 
 from device import LinkError, open_gun
-from device.serial_gun.address import parse
-from device.serial_gun.find import find
+from device.serial_gun.opening import find, parse
 from device.twin.core import IDENTITY
 from tests.twins import a_twin
 
@@ -22,7 +21,7 @@ def test_a_gun_of_another_version_is_refused_by_name(tmp_path):
 
 
 def test_a_gun_is_found_by_what_answers_not_by_the_order_of_ports(tmp_path, monkeypatch):
-    monkeypatch.setattr("device.serial_gun.find.PROBE_S", 1.5)  # a busy machine is no silent gun
+    monkeypatch.setattr("device.serial_gun.opening.PROBE_S", 1.5)  # a busy machine is no silent gun
     for name in ("a", "b", "c"):
         (tmp_path / name).mkdir()
     silent, deaf = os.openpty()

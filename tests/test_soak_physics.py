@@ -14,7 +14,7 @@ import numpy as np
 import pytest
 
 from analysis.predict.jobs import cores
-from device.physics import FIDELITIES, GunParameters, coil, simulate, simulate_batch, single, warm
+from device.physics import FIDELITIES, GunParameters, coil, simulate, simulate_batch, summary, warm
 from device.physics.audit import audit
 from device.physics.trains import highest_rate_Hz, repeated
 from tests.conftest import Soak
@@ -33,7 +33,7 @@ PAIRS, RANDOM_GUNS, BATCH, REPEATS = 100_000, 500, 200_000, 3
 def compiled(monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
     """`simulate` in machine code for one test."""
     pytest.importorskip("numba")
-    monkeypatch.setattr(single, "_engine", dataclasses.replace(single._engine))
+    monkeypatch.setattr(summary, "_engine", dataclasses.replace(summary._engine))
     assert warm()
     return
 

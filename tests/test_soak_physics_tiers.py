@@ -10,7 +10,7 @@ import pytest
 
 from device.parameters import DriveOff, Emf
 from device.physics import FIDELITIES, GunParameters, simulate_batch
-from device.physics.tiers import FRICTION_N, NEAR, OUTPUTS, stated_error
+from device.physics.scenes import FRICTION_N, NEAR, OUTPUTS, stated_error
 from tests.conftest import Soak
 from tests.test_physics_scenes import NUMBERS, OPTIONS, PAPER
 

@@ -7,8 +7,8 @@ from contextlib import suppress
 import pytest
 
 from device import LinkError, ShotReport
-from device.twin.body import Rendered
 from device.twin.machine import LATE_PULSE_US
+from device.twin.twin import Rendered
 from tests.twins import PULSE, Pair, Troubles, a_pair, a_shot
 
 SHOTS = 40

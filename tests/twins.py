@@ -16,9 +16,8 @@ from device.methods import paper_methods
 from device.serial_gun import link
 from device.serial_gun.gun import SerialGun
 from device.serial_gun.opening import open_serial
-from device.twin.faults import Troubles
 from device.twin.machine import BOOT_REST_US
-from device.twin.ports import Pty, Socket, Tcp
+from device.twin.ports import Pty, Socket, Tcp, Troubles
 from device.twin.twin import Make, Twin
 
 PULSE = Pulse(voltage_V=16.0, pulse_s=0.010)

@@ -12,9 +12,8 @@ from __future__ import annotations
 
 from device.parameters import DriveOff, Emf, GunParameters
 from device.physics.batch import ShotBatch, simulate_batch, warm
-from device.physics.results import ShotSummary, ShotTrace, Status
 from device.physics.scenes import SCENES, Scene, choose
-from device.physics.single import FIDELITIES, simulate
+from device.physics.summary import FIDELITIES, ShotSummary, ShotTrace, Status, simulate
 from device.physics.traces import trace
 
 __all__ = [

@@ -8,8 +8,7 @@ from __future__ import annotations
 
 import math
 
-from device.physics.kernel import Floats, kernel
-from device.physics.layout import (
+from device.physics.kernel import (
     BACK_EMF,
     FRICTION_BACK,
     FRICTION_OUT,
@@ -21,6 +20,8 @@ from device.physics.layout import (
     RECIPROCAL,
     RESISTANCE,
     STIFFNESS,
+    Floats,
+    kernel,
 )
 
 _SLACK = 1e-12  # relative: the magnet breaks away this far beyond the threshold, so that it does accelerate

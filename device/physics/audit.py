@@ -17,7 +17,7 @@ import numpy as np
 
 from device.parameters import GunParameters
 from device.physics.arcs import grip
-from device.physics.layout import (
+from device.physics.kernel import (
     BACK_EMF,
     COIL,
     FRICTION_BACK,

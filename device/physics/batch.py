@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from device.parameters import ABOVE_ZERO, GunParameters
-from device.physics.layout import (
+from device.physics.kernel import (
     BACK_EMF,
     CLOSED_FORM,
     FRICTION_BACK,
@@ -28,7 +28,7 @@ from device.physics.layout import (
     WORK_SIZE,
     pack,
 )
-from device.physics.single import interpret, model_of, use
+from device.physics.summary import interpret, model_of, use
 
 _CHUNK = 4096  # shots between two words of progress
 _FIELDS = tuple(field.name for field in fields(GunParameters))

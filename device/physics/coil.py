@@ -4,8 +4,7 @@ from __future__ import annotations
 
 import math
 
-from device.physics.kernel import Floats, kernel
-from device.physics.layout import (
+from device.physics.kernel import (
     BACK_EMF,
     COIL_EDGE,
     CONTINUES,
@@ -33,9 +32,11 @@ from device.physics.layout import (
     USED,
     VS,
     XS,
+    Floats,
     I,
     V,
     X,
+    kernel,
 )
 from device.physics.polynomial import first_crossing, lowest, value, value_at_end
 from device.physics.series import expand, expand_slaved, fit, follow, rescale

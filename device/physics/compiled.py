@@ -16,8 +16,7 @@ import numba
 import numpy as np
 from numpy.typing import NDArray
 
-from device.physics.kernel import KERNEL
-from device.physics.layout import RESULT_SIZE, STATE_SIZE, WORK_SIZE
+from device.physics.kernel import KERNEL, RESULT_SIZE, STATE_SIZE, WORK_SIZE
 from device.physics.shot import shoot
 
 Rows = NDArray[np.float64]

@@ -9,8 +9,7 @@ from __future__ import annotations
 
 import math
 
-from device.physics.kernel import Floats, kernel
-from device.physics.layout import BS, ORDER
+from device.physics.kernel import BS, ORDER, Floats, kernel
 
 PER_BINOMIAL = tuple(1.0 / math.comb(ORDER, k) for k in range(ORDER + 1))
 _SMALLEST = 2.0**-46  # of the step: two roots closer than this are one touch, which ends nothing

@@ -24,8 +24,7 @@ from device.physics.arcs import (
     turn_time,
 )
 from device.physics.coil import begin_coil, coil_step
-from device.physics.kernel import Floats, clear, kernel
-from device.physics.layout import (
+from device.physics.kernel import (
     BEGAN,
     BREAK_AWAY,
     CLOSED_FORM,
@@ -63,9 +62,12 @@ from device.physics.layout import (
     VOLTAGE,
     WORK_SIZE,
     XS,
+    Floats,
     I,
     V,
     X,
+    clear,
+    kernel,
 )
 from device.physics.series import friction
 

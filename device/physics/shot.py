@@ -5,8 +5,7 @@ from __future__ import annotations
 import math
 
 from device.physics.arcs import grip, spring_force
-from device.physics.kernel import Floats, clear, kernel
-from device.physics.layout import (
+from device.physics.kernel import (
     BALLISTIC,
     BREAK_AWAY,
     COIL,
@@ -61,9 +60,12 @@ from device.physics.layout import (
     USED,
     VS,
     XS,
+    Floats,
     I,
     V,
     X,
+    clear,
+    kernel,
 )
 from device.physics.polynomial import bracketed_root, changes_between, lowest, value
 from device.physics.segments import advance, enter, pulse_off, pulse_on

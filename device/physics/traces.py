@@ -11,8 +11,7 @@ from numpy.typing import NDArray
 
 from device.parameters import GunParameters
 from device.physics.arcs import free_current, free_position, free_velocity, grip, resting_current, spring_force
-from device.physics.kernel import Floats
-from device.physics.layout import (
+from device.physics.kernel import (
     BREAK_AWAY,
     COIL,
     DRIVE,
@@ -37,16 +36,16 @@ from device.physics.layout import (
     VS,
     WORK_SIZE,
     XS,
+    Floats,
     I,
     V,
     X,
     pack,
 )
 from device.physics.polynomial import value
-from device.physics.results import ShotTrace, summary_of
 from device.physics.segments import advance, enter, pulse_off, pulse_on
 from device.physics.series import friction
-from device.physics.single import interpret
+from device.physics.summary import ShotTrace, interpret, summary_of
 
 _DENSE_S = 0.015  # where the current and the force change fast: pulse and recoil stage
 _REST_AFTER_S = 0.010  # shown after the last motion

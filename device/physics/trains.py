@@ -13,7 +13,7 @@ from itertools import pairwise
 from scipy.optimize import brentq
 
 from device.parameters import GunParameters
-from device.physics.layout import (
+from device.physics.kernel import (
     END,
     HORIZON_S,
     RESULT_SIZE,
@@ -24,9 +24,8 @@ from device.physics.layout import (
     X,
     pack,
 )
-from device.physics.results import ShotSummary, summary_of
 from device.physics.shot import shoot_on
-from device.physics.single import simulate
+from device.physics.summary import ShotSummary, simulate, summary_of
 
 TICKS = 1_000_000
 """A second in ticks."""

@@ -8,9 +8,8 @@ from __future__ import annotations
 
 from typing import Final
 
-from device.serial_gun.asked import Order
-from device.serial_gun.outcomes import Contradiction, CutShort
-from device.serial_gun.reports import Told
+from device.serial_gun.commands import Contradiction, CutShort
+from device.serial_gun.reports import Order, Told
 from device.wire.records import ShotRecord, Standing
 
 MAX_UNCERTAINTY_S: Final = 0.05

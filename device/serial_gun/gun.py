@@ -8,13 +8,11 @@ from collections.abc import Callable, Mapping
 
 from device.limits import DriveHistory, planned_start_s
 from device.methods import Method
-from device.serial_gun.arming import Arming
-from device.serial_gun.asked import Asked, Order, asked
-from device.serial_gun.asking import TRIES, ask, standing
+from device.serial_gun.arming import TRIES, Arming, ask, standing
 from device.serial_gun.checks import MAX_UNCERTAINTY_S
+from device.serial_gun.commands import Disconnected, Refused, TimedOut, Unsure
 from device.serial_gun.link import Link
-from device.serial_gun.outcomes import Disconnected, Refused, TimedOut, Unsure
-from device.serial_gun.reports import ready_s, report
+from device.serial_gun.reports import Asked, Order, asked, ready_s, report
 from device.serial_gun.triggering import Triggering
 from device.wire.records import Standing
 from device.words import GunState, GunStatus, Identity, LimitError, Shot, ShotReport

@@ -12,8 +12,17 @@ from collections.abc import Callable
 from contextlib import suppress
 
 from device.serial_gun.clocks import Clocks, Exchange, HostTime
-from device.serial_gun.outcomes import CalledOff, Command, Disconnected, Forgotten, TimedOut, WrongVersion
-from device.serial_gun.pending import Pending, Reply, Waiting
+from device.serial_gun.commands import (
+    CalledOff,
+    Command,
+    Disconnected,
+    Forgotten,
+    Pending,
+    Reply,
+    TimedOut,
+    Waiting,
+    WrongVersion,
+)
 from device.serial_gun.port import OpenPort, Port, SerialPort
 from device.wire import errors
 from device.wire.frame import Frame, Garbled, Splitter, decode, encode, following

@@ -6,7 +6,7 @@ import os
 from collections.abc import Callable
 from typing import Protocol, TypeVar
 
-from device.serial_gun.outcomes import Disconnected, TimedOut
+from device.serial_gun.commands import Disconnected, TimedOut
 from device.words import LinkError
 
 BAUD = 460_800

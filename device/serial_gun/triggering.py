@@ -5,14 +5,20 @@ from __future__ import annotations
 import time
 from collections.abc import Callable
 
-from device.serial_gun.arming import Arming
-from device.serial_gun.asked import Order
-from device.serial_gun.asking import TRIES, ask, last_shot, standing
+from device.serial_gun.arming import TRIES, Arming, ask, last_shot, standing
 from device.serial_gun.checks import check_not_fired, check_record, check_times
+from device.serial_gun.commands import (
+    CalledOff,
+    Contradiction,
+    CutShort,
+    Disconnected,
+    Refused,
+    Reply,
+    TimedOut,
+    Unsure,
+)
 from device.serial_gun.link import PATIENCE_S, Link
-from device.serial_gun.outcomes import CalledOff, Contradiction, CutShort, Disconnected, Refused, TimedOut, Unsure
-from device.serial_gun.pending import Reply
-from device.serial_gun.reports import Told
+from device.serial_gun.reports import Order, Told
 from device.wire import errors
 from device.wire.frame import Garbled
 from device.wire.records import ShotRecord

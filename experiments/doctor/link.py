@@ -7,7 +7,7 @@ from contextlib import closing, suppress
 from pathlib import Path
 
 from device import open_gun
-from device.serial_gun.address import speed_of
+from device.serial_gun.opening import speed_of
 from experiments.clock import RealClock
 from experiments.doctor.figures import Adapter, Link
 from experiments.doctor.measures import timed_ms

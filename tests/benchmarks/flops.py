@@ -14,8 +14,8 @@ from collections.abc import Callable
 from typing import Any
 
 from device.parameters import DriveOff
-from device.physics.layout import pack
-from device.physics.single import interpret, model_of
+from device.physics.kernel import pack
+from device.physics.summary import interpret, model_of
 from tests.benchmarks.problem import guns
 
 _KINDS = {"add": "additions", "sub": "additions", "mul": "multiplications", "truediv": "divisions"}

@@ -11,10 +11,9 @@ import numpy as np
 from analysis.predict.jobs import cores
 from device.parameters import DriveOff, GunParameters
 from device.physics import FIDELITIES, ShotSummary, simulate, simulate_batch, warm
-from device.physics.layout import pack
-from device.physics.results import summary_of
-from device.physics.single import interpret, model_of
-from device.physics.tiers import FRICTION_N, NEAR, OUTPUTS
+from device.physics.kernel import pack
+from device.physics.scenes import FRICTION_N, NEAR, OUTPUTS
+from device.physics.summary import interpret, model_of, summary_of
 from tests.benchmarks.problem import Outputs, Peer, guns
 
 SINGLE, INTERPRETED, BATCH = "Recoil, one at a time", "Recoil, interpreted", "Recoil, batch"

@@ -10,7 +10,7 @@ from pathlib import Path
 
 from device.methods import FRICTION_I_N, FRICTION_II_N
 from device.parameters import DriveOff, GunParameters
-from device.physics.tiers import OUTPUTS
+from device.physics.scenes import OUTPUTS
 
 Outputs = tuple[float, ...]
 """The numbers of `OUTPUTS`, in their order."""

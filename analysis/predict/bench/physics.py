@@ -14,7 +14,7 @@ from analysis.report.section import Section, Table
 from device.methods import FRICTION_I_N, FRICTION_II_N
 from device.parameters import DriveOff, GunParameters
 from device.physics import FIDELITIES, simulate, simulate_batch
-from device.physics.tiers import OUTPUTS, stated_error
+from device.physics.scenes import OUTPUTS, stated_error
 
 OFF_STATES: tuple[DriveOff, ...] = ("open", "shorted")
 SINGLE_SHOTS = 200

@@ -19,7 +19,7 @@ from analysis.predict.fit.percept_model import PAPER_TRIALS, PerceptFit, predict
 from device.limits import MAX_COIL_C, MAX_DUTY, MAX_SHOTS_PER_MINUTE, load_of
 from device.parameters import GunParameters
 from device.physics import simulate
-from device.physics.layout import STATUSES
+from device.physics.kernel import STATUSES
 from device.physics.trains import highest_rate_Hz
 from device.words import MAX_PULSE_S, MAX_VOLTAGE_V, Pulse
 from experiments.synthetic.percept import percept_of

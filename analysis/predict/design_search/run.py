@@ -37,7 +37,7 @@ from analysis.report.page import write_page
 from analysis.report.terminal import Progress
 from device.methods import Method, paper_methods
 from device.parameters import GunParameters
-from device.physics.layout import STATUSES
+from device.physics.kernel import STATUSES
 from experiments.record import storage
 from experiments.record.provenance import provenance
 

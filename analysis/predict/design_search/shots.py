@@ -14,8 +14,8 @@ from analysis.predict.design_search.space import Space
 from analysis.predict.jobs import Run
 from device.parameters import GunParameters
 from device.physics import ShotBatch, ShotSummary, simulate, simulate_batch
-from device.physics.layout import COIL, FREE, STATUSES, pack
-from device.physics.results import summary_of
+from device.physics.kernel import COIL, FREE, STATUSES, pack
+from device.physics.summary import summary_of
 from device.physics.traces import segments
 from experiments.synthetic.percept import Percept, percept_of_course, percept_of_summary
 

@@ -20,7 +20,7 @@ from analysis.predict.simulate.sweep_table import check_place, opened
 from analysis.report.terminal import Progress
 from device.parameters import GunParameters
 from device.physics import FIDELITIES, ShotBatch, simulate_batch
-from device.physics.layout import STATUSES
+from device.physics.kernel import STATUSES
 from experiments.load import ConfigError
 from experiments.record.provenance import provenance
 

@@ -20,7 +20,7 @@ import pyarrow.parquet
 from numpy.typing import NDArray
 
 from device.physics import ShotBatch
-from device.physics.layout import STATUSES
+from device.physics.kernel import STATUSES
 from experiments.load import ConfigError
 from experiments.record import storage
 
