@@ -1,4 +1,15 @@
-"""The cheapest model that a use can bear: what each reduced model costs in accuracy, and scenes that name outputs and errors."""
+"""What each reduced model costs in accuracy, stated and tested, and the cheapest that a use can bear.
+
+A scene names outputs and errors, `choose` picks a model and says what it stands for.
+
+The errors are relative to `full` and hold for guns near the paper's: every number within 10 % of it, but friction, the
+same on both ways, from 0.1 to 1.12 N, and any contact depth. They are the largest of 500,000 random guns and of all
+corners of that box, and a fifth more; `inf` is no promise. The peak on the hand needs the inductance; impulse, height
+and times need the back-EMF; the landing of a shorted coil needs everything.
+
+Operations of a shot of the paper's gun, counted (coil open, coil shorted): `closed-form` 0.2 thousand, `no-inductance`
+6 and 14, `ballistic` 16, `full` 16 and 42. Errors are stated near the paper's gun only; elsewhere the pick is `full`.
+"""
 
 from __future__ import annotations
 

@@ -1,4 +1,19 @@
-"""The motion inside the coil as Taylor series over one step, in s = (t - start) / step, by a recurrence written out term by term."""
+"""The motion inside the coil as Taylor series over one step, in s = (t - t_start)/span.
+
+    m v' = k_m g i - k (x + x_0) -/+ F_f,  L i' = u - R i - k_e v (printed) or k_e g v (reciprocal),  g = 1 - x/x_c
+
+Products of series are Cauchy products (Jorba & Zou, Experimental Mathematics 14 (2005) 99, section 2), and so is the
+choice of the step from the last two coefficients (section 3). Where the current's own time constant L/R is far below
+all others and its transient is over, the current follows the motion (the slow manifold), and the step no longer
+depends on the inductance.
+
+    (n + 1) x[n+1] = h v[n],  g[n+1] = -x[n+1]/x_c
+    (n + 1) v[n+1] = h/m (k_m (g i)[n] - k x[n]  + at n = 0: friction - k x_0)
+    (n + 1) i[n+1] = h/L (at n = 0: u  - R i[n] - k_e v[n])          or, reciprocal, k_e (g v)[n];  h: the step
+
+The product (g i)[n] is a sum of n + 1 terms. As a loop in a loop its bookkeeping costs more than its arithmetic:
+interpreted two thirds of the time, compiled a third. So the text of the function is made here, once, for `ORDER`.
+"""
 
 from __future__ import annotations
 

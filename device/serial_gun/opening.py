@@ -1,4 +1,4 @@
-"""From an address to the gun that answers there: a port that is named, or found by what answers, never by the order of ports."""
+"""From an address to the gun that answers there: a port that is named, or found by what answers."""
 
 from __future__ import annotations
 

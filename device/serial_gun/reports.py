@@ -1,4 +1,4 @@
-"""What is said on the wire of a gun and of a shot, and back: its order, its record, and the gun's own times on the host's clock."""
+"""From a shot to what is said of it on the wire, and back: times of the gun on the host's clock."""
 
 from __future__ import annotations
 
