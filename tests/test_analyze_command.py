@@ -14,8 +14,8 @@ from typing import Any
 
 import pytest
 
+from analysis.logs.files import study_names
 from analysis.logs.reading import read_logs
-from analysis.logs.studies import study_names
 from analysis.logs.tables_out import MAX_NAME, short_names
 from analysis.summary.summary import summarize
 from tests.conftest import RECOIL, Recoil

@@ -11,9 +11,8 @@ import pytest
 
 from analysis.paper.audit import audit, binomial_p, debit, degrees_of_freedom, grim, grimmer, load_paper_file
 from analysis.paper.audit.page import as_json, as_text, counts, page
-from analysis.paper.audit.predictions import ELSEWHERE, other_rows, predictions
 from analysis.paper.audit.run import Finding
-from analysis.paper.audit.sentences import nearest_text, sentences
+from analysis.paper.audit.sentences import ELSEWHERE, nearest_text, other_rows, predictions, sentences
 from analysis.paper.audit.words import Result
 from tests.conftest import Recoil
 

@@ -21,11 +21,10 @@ from analysis.paper.audit import (
     repeated_f,
     total,
 )
-from analysis.paper.audit.between_lattice import find_groups
+from analysis.paper.audit.lattices import Levels, effect, find, find_groups, ratio, search, within
+from analysis.paper.audit.p_values import p_bounds
 from analysis.paper.audit.power_sums import BudgetError, numbers_with_sums
 from analysis.paper.audit.printed import Interval, decimal
-from analysis.paper.audit.repeated_lattice import Levels, effect, find, ratio, search, within
-from analysis.paper.audit.tails import p_bounds
 from analysis.paper.audit.words import NONE_EXISTS, UNKNOWN, Found, decide
 from tests.exact import exact_rm_F
 

@@ -5,7 +5,7 @@ import math
 import pytest
 from scipy import integrate, stats
 
-from analysis.stats.bayes import SCALE, jzs_paired
+from analysis.stats.paired import SCALE, jzs_paired
 
 
 def _by_effect_size(t: float, n: int, r: float) -> float:

@@ -12,12 +12,10 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy.integrate import quad
 
-from analysis.times import density, trade
-from analysis.times.density import log_density, with_slopes
-from analysis.times.distribution import distribution
+from analysis.times import first_passage, trade
 from analysis.times.ez import ez, ez_from_summary
-from analysis.times.moments import moments
-from analysis.times.own_times import own_times
+from analysis.times.first_passage import distribution, log_density, moments, with_slopes
+from analysis.times.own_trials import own_times
 from experiments.design.streams import generator
 from experiments.synthetic.diffusion_batch import decide_all
 
@@ -54,9 +52,9 @@ def test_the_log_density_of_the_far_tails_does_not_underflow() -> None:
 
 def test_the_two_series_agree_where_they_meet() -> None:
     near = np.linspace(0.001, 0.999, 41)
-    tau = np.full(41, density.CUT)
-    images = density._log_images(tau, near, 1 - near)
-    waves = density._log_waves(tau, near, 1 - near)
+    tau = np.full(41, first_passage.CUT)
+    images = first_passage._log_images(tau, near, 1 - near)
+    waves = first_passage._log_waves(tau, near, 1 - near)
     assert np.abs(images - waves).max() < 1e-12
 
 

@@ -7,11 +7,10 @@ import math
 import numpy as np
 import pytest
 
-from analysis.times.density import log_density
-from analysis.times.fit import fit, starts
+from analysis.times.first_passage import log_density
+from analysis.times.fit import fit, profile, starts
 from analysis.times.likelihood import Trials, coordinates, log_likelihood, model_of, natural, trials_of
 from analysis.times.people import fit_people
-from analysis.times.profile import profile
 from experiments.design.streams import generator
 from experiments.synthetic.diffusion_batch import decide_all
 

@@ -12,8 +12,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from analysis.predict.design_search import shots as design_shots
-from analysis.predict.design_search.assumed import both_ways
-from analysis.predict.design_search.limits import DUTY, HEAT, PULSE, VOLTAGE, broken_limit, steady_coil_C
+from analysis.predict.design_search.choice import DUTY, HEAT, PULSE, VOLTAGE, broken_limit, steady_coil_C
+from analysis.predict.design_search.critical import both_ways
 from analysis.predict.design_search.rates import evidences, logits, predict, rates
 from analysis.predict.design_search.shots import COIL_POINTS, FREE_POINTS, HOME, Row, felt_of, shots, summarised
 from analysis.predict.fit.percept_model import PAPER_RATES, fit_percept, predicted_rate

@@ -10,8 +10,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.stats import kstwo
 
-from analysis.times.distribution import distribution
-from analysis.times.moments import moments
+from analysis.times.first_passage import distribution, moments
 from experiments.design.streams import Stream, generator
 from experiments.synthetic.diffusion import Decision, Diffusion, Lapses, People, decide, person, upper_probability
 from experiments.synthetic.diffusion_batch import decide_all, upper_probabilities

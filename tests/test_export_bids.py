@@ -16,7 +16,7 @@ import pytest
 
 from analysis.archive.bids import export as feature
 from analysis.archive.bids import files as data_set
-from analysis.archive.bids import vocabulary as words
+from analysis.archive.bids import files as words
 from analysis.logs.reading import read_logs
 from experiments.clock import RealClock, VirtualClock
 from experiments.load import load_setup, shipped_folder

@@ -15,8 +15,8 @@ from matplotlib.figure import Figure
 from matplotlib.text import Text
 
 from analysis.logs.reading import read_logs
-from analysis.report.figures.names import display_name, stars
 from analysis.report.figures.shot import ShotPanel, figure_5
+from analysis.report.figures.style import display_name, stars
 from analysis.summary.figures import directions, results
 from analysis.summary.figures.directions import figure_directions
 from analysis.summary.figures.results import figure_8

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from analysis.predict.fit.times import lapse_range
-from analysis.times.distribution import distribution
+from analysis.times.first_passage import distribution
 from analysis.times.fit import fit
 from analysis.times.predicted import answered_by
 from experiments.design.streams import generator

@@ -13,8 +13,7 @@ from scipy import stats
 
 from analysis.predict.power.felt import Felt, felt_counts, felt_of, percepts_of_setup
 from analysis.predict.power.grid import Request, make_grid
-from analysis.predict.power.planned import ANOVA, ANY_PAIR
-from analysis.predict.power.shares import merged, shares
+from analysis.predict.power.planned import ANOVA, ANY_PAIR, merged, shares
 from analysis.predict.power.studies import run_chunk
 from experiments.design.streams import generator
 from experiments.direction.config import DirectionConfig

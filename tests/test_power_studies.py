@@ -14,8 +14,19 @@ from scipy import stats
 from analysis.paper.odds import WHOLE_PATTERN
 from analysis.paper.paper import load_paper
 from analysis.predict.power.grid import Request, make_grid
-from analysis.predict.power.planned import ALL_PAIRS, ANOVA, ANY_PAIR, Findings, analysed_directions, analysed_ratings
-from analysis.predict.power.shares import Tally, merged, precisions, shares, tallied
+from analysis.predict.power.planned import (
+    ALL_PAIRS,
+    ANOVA,
+    ANY_PAIR,
+    Findings,
+    Tally,
+    analysed_directions,
+    analysed_ratings,
+    merged,
+    precisions,
+    shares,
+    tallied,
+)
 from analysis.predict.power.studies import (
     Chunk,
     Design,
@@ -25,7 +36,7 @@ from analysis.predict.power.studies import (
     preference_scores,
     run_chunk,
 )
-from analysis.predict.reproduction.odds import direction_odds, preference_odds
+from analysis.predict.reproduction.reproduce import direction_odds, preference_odds
 from analysis.stats.tukey import rm_tukey_hsd
 from experiments.design.streams import Stream, generator
 from experiments.direction.observer import RatesObserver

@@ -12,8 +12,8 @@ from analysis.logs.reading import Logs, Problem, read_logs
 from analysis.paper.odds import odds_of
 from analysis.paper.paper import Paper, load_paper
 from analysis.paper.published import compare
-from analysis.summary.report import write_report
 from analysis.summary.sections.data import ReportData
+from analysis.summary.sections.sections import write_report
 from analysis.summary.summary import summarize
 from tests.log_files import trial_rows, trials_path, write_rows, write_study
 from tests.test_figures import shot_panel

@@ -14,7 +14,7 @@ from statsmodels.stats.anova import AnovaRM
 
 from analysis.logs.reading import read_logs
 from analysis.predict.reproduction import reproduce
-from analysis.predict.reproduction.odds import direction_counts, preference_scores
+from analysis.predict.reproduction.reproduce import direction_counts, preference_scores
 from experiments.load import load_setup
 from tests.conftest import RECOIL
 

@@ -12,10 +12,8 @@ import numpy as np
 import pytest
 from scipy.stats import kstwo
 
-from analysis.times.density import log_density
-from analysis.times.distribution import distribution
+from analysis.times.first_passage import distribution, log_density, moments
 from analysis.times.fit import DiffusionFit, fit
-from analysis.times.moments import moments
 from analysis.times.people import PeopleFit, fit_people
 from experiments.design.streams import generator
 from experiments.synthetic.diffusion import Diffusion, upper_probability

@@ -19,7 +19,7 @@ from analysis.paper.odds import WHOLE_PATTERN, wilson_interval
 from analysis.paper.paper import load_paper
 from analysis.predict.jobs import cores, on_processes
 from analysis.predict.power.planned import ANOVA, ANY_PAIR
-from analysis.predict.reproduction.odds import direction_odds, preference_odds
+from analysis.predict.reproduction.reproduce import direction_odds, preference_odds
 from experiments.load import find, load_setup
 from tests.conftest import RECOIL, Soak
 from tests.test_power import files

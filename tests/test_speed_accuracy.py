@@ -22,17 +22,16 @@ from analysis.summary.figures.trade import (
     has_curve,
     has_points,
 )
-from analysis.summary.report import write_report
 from analysis.summary.sections.data import ReportData
+from analysis.summary.sections.sections import write_report
 from analysis.summary.sections.trade import CONDITIONAL_ACCURACY, QUANTILE_PROBABILITY, trade_section
 from analysis.summary.summary import summarize
 from analysis.times import trade
-from analysis.times.by_person import ordered, quantiles
 from analysis.times.ez import ez, ez_people
+from analysis.times.first_passage import moments
 from analysis.times.fit import fit
 from analysis.times.likelihood import trials_of
-from analysis.times.moments import moments
-from analysis.times.own_trials import own_trials
+from analysis.times.own_trials import ordered, own_trials, quantiles
 from analysis.times.people import fit_people
 from analysis.times.sampled_fit import MOST_PEOPLE, as_trials, sampled_fit
 from experiments.design.streams import generator

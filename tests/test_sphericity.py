@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from analysis.stats.anova import rm_anova
-from analysis.stats.residuals import residuals
+from analysis.stats.diagnostics import residuals
 from analysis.stats.sphericity import NO_VARIANCE, SINGULAR, TOO_FEW, TRIVIAL, Corrected, sphericity
 
 _ROWS = "6 9 10, 2 9 10, 5 7 8, 6 6 10, 5 9 9, 8 8 10, 5 8 10, 8 10 10, 2 8 10, 7 8 9, 6 9 10, 5 8 10, 7 7 9, 7 9 10"

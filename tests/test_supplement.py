@@ -13,7 +13,7 @@ import pytest
 from analysis import rm_tukey_hsd_paired
 from analysis.logs.reading import Logs, read_logs
 from analysis.stats.assumptions import assumptions
-from analysis.stats.bayes import SCALE, jzs_paired
+from analysis.stats.paired import SCALE, jzs_paired
 from analysis.stats.supplement import WITHIN, within_supplement
 from analysis.summary.sections.supplement import supplement_sections
 from analysis.summary.summary import summarize

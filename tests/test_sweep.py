@@ -11,7 +11,7 @@ import numpy as np
 import pyarrow.parquet as pq
 import pytest
 
-from analysis.predict.simulate import sweep, sweep_table
+from analysis.predict.simulate import sweep
 from device.physics import GunParameters, simulate
 from experiments.load import ConfigError
 from tests.conftest import RECOIL
@@ -89,7 +89,7 @@ def test_blocks_make_the_table_of_one_piece(tmp_path, monkeypatch):
     words = ("friction_N=0.1:1.2:7", "voltage_V=12:24:5")
     sweep.sweep(asked(tmp_path / "whole.csv", *words), silent)
     monkeypatch.setattr(sweep, "_BLOCK", 4)
-    monkeypatch.setattr(sweep_table, "_GROUP", 10)
+    monkeypatch.setattr(sweep, "_GROUP", 10)
     sweep.sweep(asked(tmp_path / "pieces.csv", *words), silent)
     assert (tmp_path / "pieces.csv").read_bytes() == (tmp_path / "whole.csv").read_bytes()
     sweep.sweep(asked(tmp_path / "pieces.parquet", *words), silent)

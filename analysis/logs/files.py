@@ -1,4 +1,4 @@
-"""The log files in folders, the study each belongs to, and their content, unedited since the run."""
+"""The log files in folders, the study each belongs to under a short name, and their unedited content."""
 
 from __future__ import annotations
 
@@ -7,9 +7,9 @@ import io
 import json
 import os
 import re
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
-from pathlib import Path
+from pathlib import Path, PurePath
 
 from analysis.logs.rules import BadLogError
 from experiments.record import columns
@@ -156,3 +156,27 @@ def _last_lines(stream: io.FileIO) -> Iterator[bytes]:
         stream.seek(max(0, size - tail))
         lines = stream.read(tail).splitlines()
         yield lines[-1] if len(lines) > 1 or (lines and size <= tail) else b""
+
+def study_names(folders: Iterable[str]) -> dict[str, str]:
+    """Short names for studies' folders: what tells them apart, from the first differing part on; else the last part.
+
+    >>> study_names(["/data/kyoto/results", "/data/oslo/results"])
+    {'/data/kyoto/results': 'kyoto', '/data/oslo/results': 'oslo'}
+    >>> study_names(["/data/kyoto"])
+    {'/data/kyoto': 'kyoto'}
+    """
+    ways = {folder: PurePath(folder).parts for folder in sorted(folders)}
+    shared = _shared(list(ways.values()))
+    tails = [way[shared:][::-1] for way in ways.values()]
+    behind = _shared(tails)
+    ends = {folder: way[shared : len(way) - behind] for folder, way in ways.items()}
+    if len(ways) > 1 and all(ends.values()):
+        return {folder: "/".join(end) for folder, end in ends.items()}
+    return {folder: "/".join(way[shared - 1 :]) for folder, way in ways.items()} if ways else {}
+
+
+def _shared(ways: list[tuple[str, ...]]) -> int:
+    """How many parts all begin with."""
+    return next(
+        (n for n, parts in enumerate(zip(*ways, strict=False)) if len(set(parts)) > 1), min(map(len, ways), default=0)
+    )

@@ -1,4 +1,4 @@
-"""The published numbers beside the obtained ones, row by row. A difference is a row like any other."""
+"""The published numbers beside the obtained ones, row by row, under one name each."""
 
 from __future__ import annotations
 
@@ -7,8 +7,58 @@ from dataclasses import dataclass, replace
 from decimal import Decimal
 from typing import Any, Literal
 
-from analysis.paper import quantities
-from analysis.paper.paper import Paper, PublishedDirection, PublishedExperiment, PublishedPreference, TukeyClaim
+from analysis.paper.paper import (
+    BinomialClaim,
+    Lowest,
+    Paper,
+    PublishedDirection,
+    PublishedExperiment,
+    PublishedPreference,
+    SameScore,
+    TukeyClaim,
+)
+
+ANOVA_F, ANOVA_P, PARTICIPANTS = "ANOVA F", "ANOVA p", "participants"
+
+
+def anova_df(kind: str) -> str:
+    """Degrees of freedom of the effect or of the error."""
+    return f"ANOVA df of the {kind}"
+
+
+def tukey_p(claim: TukeyClaim) -> str:
+    """The p of a post-hoc comparison."""
+    return f"Tukey p, {claim.higher} above {claim.lower}"
+
+
+def mean_rate(method: str) -> str:
+    """A mean correct rate on forward shots."""
+    return f"mean correct rate forward, {method}"
+
+
+def binomial_p(claim: BinomialClaim) -> str:
+    """The p of a test against one half."""
+    return f"binomial p, {claim.method} {claim.direction}"
+
+
+def rated_lowest(claim: Lowest) -> str:
+    """How many rated a method lowest."""
+    return f"participants who rated {claim.method} lowest"
+
+
+def one_score(claim: SameScore) -> str:
+    """How many gave two methods one score."""
+    return f"participants with one score for {' and '.join(claim.methods)}"
+
+
+def named_in(experiment: str, quantity: str) -> str:
+    """A quantity of an experiment.
+
+    >>> named_in("direction", ANOVA_F)
+    'direction: ANOVA F'
+    """
+    return f"{experiment}: {quantity}"
+
 
 Verdict = Literal[
     "agrees",
@@ -55,14 +105,14 @@ def compare(statistics: Statistics, paper: Paper, predicted: Mapping[str, Predic
     """Every published number against `statistics` (the content of `statistics.json`).
 
     A number agrees if it rounds to the printed digits; a bound or an order, if it is true of the obtained numbers. What
-    the paper draws but does not print is listed as not published. `predicted`: by `quantities.named_in`, what the audit
+    the paper draws but does not print is listed as not published. `predicted`: by `named_in`, what the audit
     says; a difference to one of the nearest attainable values is the one that it predicts.
     """
     direction, preference = statistics.get("direction"), statistics.get("preference")
     rows = [*_common("direction", paper.direction, direction), *_direction(paper.direction, direction)]
     rows += [*_common("preference", paper.preference, preference), *_preference(paper.preference, preference)]
     known = predicted or {}
-    return tuple(_beside(row, known.get(quantities.named_in(row.experiment, row.quantity))) for row in rows)
+    return tuple(_beside(row, known.get(named_in(row.experiment, row.quantity))) for row in rows)
 
 
 def _beside(row: Row, prediction: Prediction | None) -> Row:
@@ -144,19 +194,19 @@ def _float(value: float | None) -> float | None:
 
 
 def _common(name: str, published: PublishedExperiment, statistics: Statistics | None) -> Iterator[Row]:
-    yield _number(name, quantities.PARTICIPANTS, str(published.n), _found(statistics, "n"))
+    yield _number(name, PARTICIPANTS, str(published.n), _found(statistics, "n"))
     for i, (df, kind) in enumerate(zip(published.anova.df, ("effect", "error"), strict=True)):
-        yield _number(name, quantities.anova_df(kind), str(df), _found(statistics, "anova", "df", i))
-    yield _number(name, quantities.ANOVA_F, published.anova.F, _found(statistics, "anova", "F"))
+        yield _number(name, anova_df(kind), str(df), _found(statistics, "anova", "df", i))
+    yield _number(name, ANOVA_F, published.anova.F, _found(statistics, "anova", "F"))
     p = _found(statistics, "anova", "p")
     bound = published.anova.p_below
-    yield _claim(name, quantities.ANOVA_P, f"< {bound}", p, truth=p is not None and p < float(bound))
+    yield _claim(name, ANOVA_P, f"< {bound}", p, truth=p is not None and p < float(bound))
     for claim in published.tukey:
         yield _tukey(name, claim, statistics)
 
 
 def _tukey(name: str, claim: TukeyClaim, statistics: Statistics | None) -> Row:
-    quantity = quantities.tukey_p(claim)
+    quantity = tukey_p(claim)
     pair = {claim.higher, claim.lower}
     comparisons = _found(statistics, "tukey") or []
     found = next((c for c in comparisons if {c["a"], c["b"]} == pair), None)
@@ -173,10 +223,10 @@ def _direction(published: PublishedDirection, statistics: Statistics | None) -> 
     for method, printed in published.means.items():
         mean = _found(statistics, "means", method)
         percent = None if mean is None else 100.0 * mean
-        yield _number(name, quantities.mean_rate(method), printed, percent, "%")
+        yield _number(name, mean_rate(method), printed, percent, "%")
     for claim in published.binomial:
         p = _found(statistics, "binomial", claim.method, claim.direction, "p")
-        yield _number(name, quantities.binomial_p(claim), claim.p, p)
+        yield _number(name, binomial_p(claim), claim.p, p)
     for method in published.methods:
         sd = _found(statistics, "sds", method)
         yield _unpublished(name, f"SD of the correct rate, {method} (%)", _percent(sd), "drawn in Fig. 8 (a) only")
@@ -196,13 +246,13 @@ def _preference(published: PublishedPreference, statistics: Statistics | None) -
     lowest, same = published.lowest, published.same_score
     yield _number(
         name,
-        quantities.rated_lowest(lowest),
+        rated_lowest(lowest),
         str(lowest.participants),
         None if ratings is None else sum(_is_lowest(row, lowest.method) for row in ratings.values()),
     )
     yield _number(
         name,
-        quantities.one_score(same),
+        one_score(same),
         str(same.participants),
         None if ratings is None else sum(_is_same(row, same.methods) for row in ratings.values()),
     )

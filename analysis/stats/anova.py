@@ -10,8 +10,7 @@ from numpy.typing import ArrayLike, NDArray
 from scipy import special
 
 from analysis.stats.arrays import FloatArray, Values, numbers, plain
-from analysis.stats.slices import unscaled
-from analysis.stats.sums_of_squares import Sums, between_sums, repeated_sums
+from analysis.stats.sums_of_squares import Sums, between_sums, repeated_sums, unscaled
 
 NO_ERROR = "no error variance: the effect is the same in everyone, F is infinite"
 NO_VARIANCE = "neither effect nor error beyond the rounding of the data: F is 0/0, undefined"

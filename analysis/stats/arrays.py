@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+import warnings
+from collections.abc import Callable, Sequence
 from numbers import Real
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -61,3 +63,12 @@ def share(value: float, name: str) -> float:
     if not 0.0 < value < 1.0:
         raise ValueError(f"{name} must lie between 0 and 1, not {value}")
     return value
+
+
+def pingouin(name: str) -> Callable[..., Any]:
+    """A function of pingouin by its name, its import silent: the deprecations in there are for its authors."""
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")
+        import pingouin as library  # type: ignore[import-untyped, unused-ignore]  # noqa: PLC0415 - takes seconds
+    function: Callable[..., Any] = getattr(library, name)
+    return function

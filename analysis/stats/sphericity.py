@@ -10,9 +10,8 @@ from numpy.typing import ArrayLike
 from scipy import special
 
 from analysis.stats.anova import check_scores, rm_anova
-from analysis.stats.arrays import FloatArray
-from analysis.stats.libraries import pingouin
-from analysis.stats.residuals import residuals
+from analysis.stats.arrays import FloatArray, pingouin
+from analysis.stats.diagnostics import residuals
 
 TRIVIAL = "With two conditions there is one difference only: sphericity holds trivially and nothing is corrected."
 NO_VARIANCE = "There is no error variance, so there are no covariances to compare."

@@ -15,9 +15,8 @@ from numpy.typing import ArrayLike
 
 from analysis.stats.anova import check_groups, check_scores
 from analysis.stats.arrays import FloatArray, Values, plain, share
-from analysis.stats.slices import unscaled
 from analysis.stats.studentized_range import studentized_range_isf, studentized_range_sf
-from analysis.stats.sums_of_squares import Sums, between_sums, repeated_sums
+from analysis.stats.sums_of_squares import Sums, between_sums, repeated_sums, unscaled
 
 Label = str | int
 

@@ -7,20 +7,20 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, TypeVar
 
-from analysis.logs.by_study import by_study
 from analysis.logs.column_map import ColumnMap
+from analysis.logs.completeness import by_study
 from analysis.logs.exclusions import Effect, Rules, apply_rules
 from analysis.logs.reading import Logs, Problem, Track, read_logs
 from analysis.logs.tables_out import result_tables
 from analysis.logs.toml_model import load_model
 from analysis.paper.audit import audit
 from analysis.paper.audit.paper_file import PaperFile, load_paper_file
-from analysis.paper.audit.predictions import predictions
+from analysis.paper.audit.sentences import predictions
 from analysis.paper.paper import load_paper
 from analysis.paper.published import Prediction, compare
 from analysis.summary import remarks_coding
-from analysis.summary.report import write_report
 from analysis.summary.sections.data import ReportData
+from analysis.summary.sections.sections import write_report
 from analysis.summary.summary import summarize
 from experiments.config.canonical import sha256
 from experiments.load import ConfigError

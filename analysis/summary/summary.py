@@ -20,9 +20,9 @@ from analysis.stats.binomial import binomial_test
 from analysis.stats.cells import DIRECTIONS, Finite, TrialCells, by_name, coded, trial_cells
 from analysis.stats.clustering import METHOD as CLUSTERING_NOTE
 from analysis.stats.detection import yes_no
+from analysis.stats.effect_sizes import cousineau_morey
 from analysis.stats.supplement import model, pooled_clustering, within_supplement
 from analysis.stats.tukey import rm_tukey_hsd
-from analysis.stats.within_subject import cousineau_morey
 from analysis.times.own_trials import INSTRUCTION
 from analysis.times.response_times import response_times, valid_times
 from analysis.times.speed_accuracy import speed_accuracy

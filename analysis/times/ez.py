@@ -11,9 +11,8 @@ from numpy.typing import ArrayLike, NDArray
 from scipy import special
 
 from analysis.stats.arrays import FloatArray
-from analysis.times.by_person import ordered
-from analysis.times.moments import mean_form, variance_form
-from analysis.times.own_times import answers, own_times
+from analysis.times.first_passage import mean_form, variance_form
+from analysis.times.own_trials import answers, ordered, own_times
 
 FEWEST = 10
 """Fewer correct answers than this give no variance worth the name (assumed)."""

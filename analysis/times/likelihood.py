@@ -18,8 +18,8 @@ from numpy.typing import ArrayLike, NDArray
 from scipy import special
 
 from analysis.stats.arrays import FloatArray
-from analysis.times.density import with_slopes
-from analysis.times.own_times import answers, own_times
+from analysis.times.first_passage import with_slopes
+from analysis.times.own_trials import answers, own_times
 
 Places = NDArray[np.intp]
 Label = str

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from analysis.stats.arrays import FloatArray
-from analysis.times.distribution import distribution
+from analysis.times.first_passage import distribution
 from analysis.times.fit import DiffusionFit
 from analysis.times.likelihood import Range
 

@@ -14,8 +14,15 @@ from analysis.stats.arrays import FloatArray
 from analysis.times.ez import ez_people
 from analysis.times.fit import DiffusionFit, Estimate
 from analysis.times.own_trials import REFUSALS, OwnTrials, own_trials
-from analysis.times.people import MeanEstimate, PeopleFit, mean_estimate
-from analysis.times.person_cells import PersonCells, instruction_effects, over_people, person_cells
+from analysis.times.people import (
+    MeanEstimate,
+    PeopleFit,
+    PersonCells,
+    instruction_effects,
+    mean_estimate,
+    over_people,
+    person_cells,
+)
 from analysis.times.sampled_fit import SampledFit, sampled_fit
 from analysis.times.trade import (
     QUANTILES,

@@ -12,9 +12,8 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from analysis.stats.arrays import FloatArray, numbers
-from analysis.times.by_person import Ordered, ordered
-from analysis.times.by_person import quantiles as own_quantiles
-from analysis.times.own_times import answers, own_times
+from analysis.times.own_trials import Ordered, answers, ordered, own_times
+from analysis.times.own_trials import quantiles as own_quantiles
 
 QUANTILES = (0.1, 0.3, 0.5, 0.7, 0.9)
 """The five of Ratcliff & Tuerlinckx 2002."""

@@ -169,7 +169,7 @@ def bench(
 ) -> None:
     """Measure our own methods: error rates of the post-hoc tests, error against time of a simulated shot."""
     from analysis.predict.bench import run as feature
-    from analysis.predict.bench.part import Asked
+    from analysis.predict.bench.physics import Asked
 
     unknown = set(parts or []) - set(feature.PARTS)
     if unknown:

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 from math import exp
 from random import Random
 
-from analysis.paper.audit.repeated_lattice import Rows, distance, within
+from analysis.paper.audit.lattices import Rows, distance, within
 
 _HOT, _COLD = 1.0, 0.002
 """Temperatures at the start and at the end, in rows out of order; found by trial on data that existed."""

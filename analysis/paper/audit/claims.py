@@ -1,21 +1,43 @@
-"""The claims of a paper's file: where it says what, and the arguments of the check, one model a kind.
+"""The claims of a paper's file: where it says what, and which check it calls with what arguments.
 
 A number that is rounded is text, as printed; a whole number of TOML is exact, such as a count. `run` calls the check.
 """
 
 from __future__ import annotations
 
+from collections.abc import Callable, Mapping
+from types import MappingProxyType
 from typing import Annotated, Any, ClassVar, Literal
 
 from pydantic import AfterValidator, BaseModel, ConfigDict, Field
 
-from analysis.paper.audit.freedom import Design
+from analysis.paper.audit.binomial_p import binomial_p
+from analysis.paper.audit.freedom import Design, degrees_of_freedom
+from analysis.paper.audit.means import grim, percent_of_count
+from analysis.paper.audit.p_values import Sides, Statistic, p_against_statistic
 from analysis.paper.audit.printed import read
-from analysis.paper.audit.registry import CHECKS
-from analysis.paper.audit.tails import Sides, Statistic
-from analysis.paper.audit.totals import Bound, Term
-from analysis.paper.audit.tukey_pattern import Comparison
+from analysis.paper.audit.spreads import debit, grimmer
+from analysis.paper.audit.totals import Bound, Term, total
+from analysis.paper.audit.tukey_pattern import Comparison, tukey_pattern
+from analysis.paper.audit.variance_ratios import between_f, repeated_f
 from analysis.paper.audit.words import Result
+
+CHECKS: Mapping[str, Callable[..., Result]] = MappingProxyType(
+    {
+        "grim": grim,
+        "percent": percent_of_count,
+        "grimmer": grimmer,
+        "debit": debit,
+        "df": degrees_of_freedom,
+        "p": p_against_statistic,
+        "binomial": binomial_p,
+        "repeated-f": repeated_f,
+        "between-f": between_f,
+        "tukey": tukey_pattern,
+        "total": total,
+    }
+)
+"""Name in a paper's file -> check; a claim's other keys are the check's arguments (`paper_file` types them)."""
 
 
 def _is_printed(text: str) -> str:

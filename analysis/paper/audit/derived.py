@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
-from analysis.paper import quantities
+from analysis.paper import published
 from analysis.paper.audit.claims import (
     BinomialClaim,
     Claim,
@@ -23,7 +23,7 @@ from analysis.paper.audit.means import scale_of
 from analysis.paper.audit.paper_file import PaperFile
 from analysis.paper.audit.printed import Rounding, read
 from analysis.paper.paper import Participants, PublishedDirection, PublishedExperiment, PublishedPreference
-from analysis.paper.quantities import named_in
+from analysis.paper.published import named_in
 
 RATE_GRAIN, RATING_GRAIN = "0.1", "0.1"
 """Of the correct rate, cor / 10; of the continuous rating scale, assumed: it has no printed grain."""
@@ -47,7 +47,7 @@ def _participants(people: Participants) -> Iterator[Claim]:
     place = "III, Participants"
     sexes = [TermModel(times=[people.male]), TermModel(times=[people.female])]
     quote = f"{people.n} participants ({people.male} males and {people.female} females)"
-    about = [named_in(name, quantities.PARTICIPANTS) for name in ("direction", "preference")]
+    about = [named_in(name, published.PARTICIPANTS) for name in ("direction", "preference")]
     yield TotalClaim(place=place, quote=quote, about=about, kind="total", printed=str(people.n), terms=sexes)
     low = [TermModel(times=[people.age_min])]
     quote = f"ages ranged from {people.age_min} to {people.age_max} years"
@@ -63,7 +63,7 @@ def _direction(paper: PublishedDirection) -> Iterator[Claim]:
         yield GrimClaim(
             place=place, quote=f"{method}: {mean}%", kind="grim", mean=f"{mean}%", n=paper.n, grain=RATE_GRAIN,
             low="0", high="1", note=f"rates in steps of 1/{trials}",
-            about=[named_in("direction", quantities.mean_rate(method))],
+            about=[named_in("direction", published.mean_rate(method))],
         )  # fmt: skip
     means = [f"{paper.means[method]}%" for method in paper.methods]
     yield from _anova(paper, place, means)
@@ -74,7 +74,7 @@ def _direction(paper: PublishedDirection) -> Iterator[Claim]:
         counts = _counts(paper.means[claim.method], n) if forward else None
         yield BinomialClaim(
             place=place, quote=f"{claim.method}, {claim.direction}: p = {claim.p}", kind="binomial", p=claim.p, n=n,
-            counts=counts, note="pooled over participants", about=[named_in("direction", quantities.binomial_p(claim))],
+            counts=counts, note="pooled over participants", about=[named_in("direction", published.binomial_p(claim))],
         )  # fmt: skip
     for method in paper.methods:
         yield UnpublishedClaim(place="Fig. 8(a)", quote=method, kind="unpublished", quantity=f"SD, {method}")
@@ -113,7 +113,7 @@ def _anova(paper: PublishedExperiment, place: str, means: list[str] | None) -> I
     df = [str(value) for value in anova.df]
     quote = f"F({df[0]},{df[1]})={anova.F}, p<{anova.p_below}"
     name = _name(paper)
-    about = [named_in(name, quantities.anova_df(part)) for part in ("effect", "error")]
+    about = [named_in(name, published.anova_df(part)) for part in ("effect", "error")]
     yield DfClaim(place=place, quote=quote, about=about, kind="df", df=df, design="repeated", counts=[paper.n, k])
     rates = means is not None
     yield RepeatedFClaim(
@@ -121,9 +121,9 @@ def _anova(paper: PublishedExperiment, place: str, means: list[str] | None) -> I
         grain=RATE_GRAIN if rates else RATING_GRAIN, low="0", high="1" if rates else _scale_top(paper),
         transforms=["arcsine"] if rates else [], other_grains=["0.05"] if rates else [],
         note="0.05: both directions pooled, 20 trials" if rates else "grain of the continuous scale assumed",
-        about=[named_in(name, quantities.ANOVA_F)],
+        about=[named_in(name, published.ANOVA_F)],
     )  # fmt: skip
-    p, about = f"< {anova.p_below}", [named_in(name, quantities.ANOVA_P)]
+    p, about = f"< {anova.p_below}", [named_in(name, published.ANOVA_P)]
     yield PClaim(place=place, quote=quote, about=about, kind="p", statistic="F", value=anova.F, df=df, p=p)
 
 
@@ -150,7 +150,7 @@ def _tukey(paper: PublishedExperiment, place: str, means: list[str] | None) -> I
         place=place, quote=quote, kind="tukey", F=paper.anova.F, sizes=[paper.n] * len(paper.methods),
         comparisons=pairs, means=means, grain=RATE_GRAIN if rates else None, low="0" if rates else None,
         high="1" if rates else None, note="stars of Fig. 8: p < .05 also says not below .01",
-        about=[named_in(_name(paper), quantities.tukey_p(claim)) for claim in paper.tukey],
+        about=[named_in(_name(paper), published.tukey_p(claim)) for claim in paper.tukey],
     )  # fmt: skip
 
 
@@ -165,7 +165,7 @@ def _preference(paper: PublishedPreference) -> Iterator[Claim]:
     yield PercentClaim(
         place=place, quote=f"{lowest} of the participants gave lower scores for {paper.lowest.method}", kind="percent",
         percent=lowest, count=paper.lowest.participants, n=n,
-        about=[named_in("preference", quantities.rated_lowest(paper.lowest))],
+        about=[named_in("preference", published.rated_lowest(paper.lowest))],
     )  # fmt: skip
     for method in paper.methods:
         yield UnpublishedClaim(place="Fig. 8(b)", quote=method, kind="unpublished", quantity=f"mean and SD, {method}")

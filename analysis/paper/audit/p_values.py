@@ -1,13 +1,112 @@
-"""Printed p-values against the printed statistic and its degrees of freedom."""
+"""Printed p-values against the printed statistic and its degrees of freedom, by tails between safe bounds."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from fractions import Fraction
+from typing import Literal
+
+import numpy as np
+from scipy import special
 
 from analysis.paper.audit.printed import Interval, PrintedNumber, Rounding, read
-from analysis.paper.audit.tails import SIDED, Sides, Statistic, check_df, p_range
 from analysis.paper.audit.words import NONE_EXISTS, UNKNOWN, Attempt, Found, Result, decide
+from analysis.stats.studentized_range import studentized_range_sf
+
+Statistic = Literal["t", "F", "chi2", "r", "z", "Q", "q"]
+Sides = Literal["two-sided", "one-sided"]
+RELATIVE, ABSOLUTE = 1e-9, 1e-300
+"""Margin of t, F, chi2, r and z: scipy states 1e-13 or better."""
+RANGE_RELATIVE, RANGE_FAR, RANGE_ABSOLUTE = 1e-5, 1e-2, 1e-11
+"""Margins of the studentized range: 2e-7 relative was measured up to 1000 df, 1e-3 beyond; no digit below 1e-12."""
+_DF = {"t": 1, "F": 2, "chi2": 1, "r": 1, "z": 0, "Q": 1, "q": 2}
+SIDED = ("t", "r", "z")
+"""Statistics with a sign: the others' p-values have one tail."""
+
+
+def check_df(statistic: Statistic, df: Sequence[Fraction]) -> None:
+    """`ValueError` if the statistic has not so many degrees of freedom, or one is not above 0 (q: k below 2)."""
+    if len(df) != _DF[statistic] or any(value <= 0 for value in df) or (statistic == "q" and df[0] < 2):
+        raise ValueError(f"{statistic} needs {_DF[statistic]} degrees of freedom above 0, not {list(map(str, df))}")
+
+
+def p_bounds(statistic: Statistic, value: Fraction, df: Sequence[Fraction], sides: Sides) -> tuple[Fraction, Fraction]:
+    """Bounds that certainly hold the p-value of |value|: t, F, chi2, r, z, meta-analytic Q, or Tukey's q (df: k, df).
+
+    The sign is dropped: a one-sided p is that of the tail on the statistic's own side. |r| above 1 counts as 1.
+    """
+    x = abs(value)
+    if x == 0 and statistic != "q":
+        return (Fraction(1, 2),) * 2 if statistic in SIDED and sides == "one-sided" else (Fraction(1),) * 2
+    p = _TAILS[statistic](x, [float(number) for number in df])
+    p *= 2 if statistic in SIDED and sides == "two-sided" else 1
+    relative, absolute = RELATIVE, ABSOLUTE
+    if statistic == "q":
+        relative, absolute = RANGE_RELATIVE if df[1] <= 1000 else RANGE_FAR, RANGE_ABSOLUTE
+    low, high = p * (1 - relative) - absolute, p * (1 + relative) + absolute
+    return Fraction(max(low, 0.0)), Fraction(min(high, 1.0))
+
+
+def p_range(
+    statistic: Statistic, values: Interval, df: Sequence[Fraction], sides: Sides
+) -> tuple[Interval, Interval | None]:
+    """All p-values that |values| can have: an interval certainly holding them, and one certainly within (or None).
+
+    p falls as |value| rises and is continuous, so the ends of the statistic give the ends of p.
+    """
+    least, most = _magnitudes(values)
+    low = (Fraction(0), Fraction(0)) if most is None else p_bounds(statistic, most, df, sides)
+    high = p_bounds(statistic, least, df, sides)
+    outer = Interval(low[0], high[1])
+    return outer, Interval(low[1], high[0], False, False) if low[1] < high[0] else None
+
+
+def _magnitudes(values: Interval) -> tuple[Fraction, Fraction | None]:
+    """Least and greatest magnitude in an interval."""
+    if values.low is None or values.high is None:
+        nearest = values.low if values.high is None else values.high
+        outwards = nearest is not None and (nearest > 0) == (values.high is None)
+        return (abs(nearest) if outwards and nearest is not None else Fraction(0)), None
+    ends = sorted((abs(values.low), abs(values.high)))
+    return (Fraction(0) if values.low <= 0 <= values.high else ends[0]), ends[1]
+
+
+def _beta_tail(a: float, b: float, small: Fraction) -> float:
+    """I(1 - small; a, b): by its complement where `small` is the argument that keeps its digits."""
+    if small >= 1:
+        return 0.0
+    return float(special.betaincc(b, a, float(small)) if 2 * small < 1 else special.betainc(a, b, float(1 - small)))
+
+
+def _t_tail(x: Fraction, df: list[float]) -> float:
+    """P(T > x) = I(df / (df + x^2); df / 2, 1 / 2) / 2."""
+    return _beta_tail(df[0] / 2, 0.5, x**2 / (Fraction(df[0]) + x**2)) / 2
+
+
+def _r_tail(x: Fraction, df: list[float]) -> float:
+    """P(R > x) by t = r sqrt(df / (1 - r^2)): I(1 - r^2; df / 2, 1 / 2) / 2."""
+    return _beta_tail(df[0] / 2, 0.5, x**2) / 2
+
+
+def _f_tail(x: Fraction, df: list[float]) -> float:
+    """P(F > x) = I(df2 / (df2 + df1 x); df2 / 2, df1 / 2)."""
+    explained = Fraction(df[0]) * x
+    return _beta_tail(df[1] / 2, df[0] / 2, explained / (Fraction(df[1]) + explained))
+
+
+def _range_tail(x: Fraction, df: list[float]) -> float:
+    return float(np.asarray(studentized_range_sf(float(x), df[0], df[1])))
+
+
+_TAILS: dict[Statistic, Callable[[Fraction, list[float]], float]] = {
+    "t": _t_tail,
+    "r": _r_tail,
+    "z": lambda x, _: float(special.ndtr(-float(x))),
+    "F": _f_tail,
+    "chi2": lambda x, df: float(special.chdtrc(df[0], float(x))),
+    "Q": lambda x, df: float(special.chdtrc(df[0], float(x))),
+    "q": _range_tail,
+}
 
 PFromRange = Callable[[Rounding], tuple[Interval, Interval | None]]
 _SOURCE = "Nuijten et al. 2016, Behavior Research Methods 48, 1205"

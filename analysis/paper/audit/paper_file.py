@@ -8,7 +8,7 @@ source = "doi or address"
 [[claims]]
 place = "Results, first paragraph"
 quote = "M = 5.21, SD = 1.60"
-kind = "grimmer"          # a key of analysis.paper.audit.registry.CHECKS, or "stated", "unpublished"
+kind = "grimmer"          # a key of analysis.paper.audit.claims.CHECKS, or "stated", "unpublished"
 mean = "5.21"             # text: the printed digits; whole numbers are exact
 sd = "1.60"
 n = 28

@@ -2,14 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from fractions import Fraction
 from math import sqrt
 from types import MappingProxyType
+from typing import cast
 
 from analysis.paper.audit.printed import PrintedNumber, decimal, read
 from analysis.paper.audit.run import Finding
 from analysis.paper.audit.words import ROUNDINGS, Result
+from analysis.paper.published import Prediction, Row, Verdict
 
 ATTENTION = ("not attainable", "only under a reading")
 """The verdicts that ask something of a paper."""
@@ -194,3 +196,45 @@ _UNITS: Mapping[str, Callable[[Result, Fraction], str]] = MappingProxyType(
 def _capital(text: str) -> str:
     """A capital at the start, but not of a symbol such as p."""
     return text[:1].upper() + text[1:] if text[1:2].isalpha() else text
+
+
+ELSEWHERE = "elsewhere in the paper"
+"""Where the numbers stand that no log holds."""
+
+
+def predictions(findings: Sequence[Finding]) -> dict[str, Prediction]:
+    """By the name of the number (`quantities.named_in`): verdict, nearest attainable values, and a note on them."""
+    return {name: _prediction(finding) for finding in findings for name in finding.about}
+
+
+def _prediction(finding: Finding) -> Prediction:
+    result = finding.result
+    if result.verdict not in ATTENTION:
+        return Prediction(verdict=result.verdict)
+    return Prediction(verdict=result.verdict, nearest=_nearest(result), note=_note(result))
+
+
+def _nearest(result: Result) -> tuple[float, ...]:
+    unit = 100 if "%" in result.printed else 1
+    return tuple(float(value) * unit for value in (result.below, result.above) if value is not None)
+
+
+def _note(result: Result) -> str:
+    near = nearest_text(result)
+    rescued = f"; attainable by {', or '.join(result.readings)}" if result.readings else ""
+    return f"not attainable beside the other numbers{f', nearest {near}' if near else ''}{rescued}"
+
+
+def other_rows(findings: Sequence[Finding]) -> Iterator[Row]:
+    """The published numbers that no log holds, each with the audit's verdict."""
+    for finding in findings:
+        if finding.about or finding.result.verdict == "not published":
+            continue
+        yield Row(
+            experiment=ELSEWHERE,
+            quantity=f"{finding.place}: {finding.quote}",
+            published=finding.result.printed,
+            obtained=None,
+            verdict=cast("Verdict", finding.result.verdict),
+            note=sentences(finding)[0] if finding.result.verdict in ATTENTION else finding.note,
+        )

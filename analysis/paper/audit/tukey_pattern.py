@@ -14,10 +14,10 @@ from math import isqrt
 
 import numpy as np
 
+from analysis.paper.audit.lattices import column_choices
 from analysis.paper.audit.means import Scale, check_count, scale_of
+from analysis.paper.audit.p_values import p_range
 from analysis.paper.audit.printed import Interval, PrintedNumber, Rounding, read
-from analysis.paper.audit.repeated_lattice import column_choices
-from analysis.paper.audit.tails import p_range
 from analysis.paper.audit.words import NONE_EXISTS, UNKNOWN, Attempt, Found, Result, decide
 from analysis.stats.studentized_range import studentized_range_isf
 

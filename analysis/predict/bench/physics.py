@@ -1,20 +1,46 @@
-"""Error and time of a simulated shot by each of our models, on this machine: what is gained by modelling less."""
+"""Error and time of a simulated shot by each of our models, on this machine: what is gained and what is given up."""
 
 from __future__ import annotations
 
 import statistics
 import time
 from collections.abc import Callable, Iterator
+from contextlib import AbstractContextManager
 from dataclasses import asdict, dataclass
 from importlib.util import find_spec
+from pathlib import Path
+from typing import Any
 
-from analysis.predict.bench.part import Asked, Measured
 from analysis.report import apa
 from analysis.report.section import Section, Table
 from device.methods import FRICTION_I_N, FRICTION_II_N
 from device.parameters import DriveOff, GunParameters
 from device.physics import FIDELITIES, simulate, simulate_batch
 from device.physics.scenes import OUTPUTS, stated_error
+
+Progress = Callable[[str, int], AbstractContextManager[Callable[[str], None]]]
+"""Given what is done and in how many parts, takes the name of each part that is done."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Asked:
+    """What to measure with. `figures` is the folder of the page's pictures; a batch holds `batch` shots."""
+
+    seed: int
+    repeats: int
+    batch: int
+    figures: Path
+    progress: Progress
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Measured:
+    """What a part found: plain JSON values, the section that tells it, and lines for the terminal."""
+
+    values: Any
+    section: Section
+    lines: tuple[str, ...] = ()
+
 
 OFF_STATES: tuple[DriveOff, ...] = ("open", "shorted")
 SINGLE_SHOTS = 200

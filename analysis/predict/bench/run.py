@@ -8,8 +8,7 @@ from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
-from analysis.predict.bench.part import Asked, Measured
-from analysis.predict.bench.physics import physics
+from analysis.predict.bench.physics import Asked, Measured, physics
 from analysis.report import apa
 from analysis.report.page import write_page
 from analysis.report.section import Section, Table

@@ -8,10 +8,8 @@ from typing import Any
 
 import numpy as np
 
-from analysis.predict.design_search.assumed import Alternative, unbiased, under
-from analysis.predict.design_search.choice import Designs, shooting_rates
-from analysis.predict.design_search.critical import DRAWS, INSIDE, LEVEL, Contour
-from analysis.predict.design_search.limits import LIMITS, broken_limit, steady_coil_C
+from analysis.predict.design_search.choice import LIMITS, Designs, broken_limit, shooting_rates, steady_coil_C
+from analysis.predict.design_search.critical import DRAWS, INSIDE, LEVEL, Alternative, Contour, unbiased, under
 from analysis.predict.design_search.rates import Floats, predict
 from analysis.predict.design_search.shots import Layer
 from analysis.predict.design_search.space import Space

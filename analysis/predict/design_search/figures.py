@@ -2,15 +2,30 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 import matplotlib as mpl
+import numpy as np
 from matplotlib.axes import Axes
+from matplotlib.colors import BoundaryNorm, ListedColormap
+from matplotlib.figure import Figure
+from matplotlib.patches import Patch
 
-from analysis.report.figures.style import BLACK, BLUE, ORANGE, VERMILION, light_grid, new_figure, save, style
+from analysis.report.figures.style import (
+    BLACK,
+    BLUE,
+    INK,
+    METHOD_LINES,
+    ORANGE,
+    VERMILION,
+    light_grid,
+    new_figure,
+    save,
+    style,
+)
 from analysis.stats.arrays import FloatArray
 
 MARKERS = "os^Dv<>"
@@ -110,4 +125,235 @@ def _scales(axes: Axes, bound_Hz: float, trade: Trade) -> None:
         textcoords="offset points",
         fontsize=7.5,
         color="#444444",
+    )
+
+
+AREAS = {"no-break-away": "#ececec", "stuck": "#8f8f8f", "not-home": "#c4b5a0"}
+"""Where there is no prediction, by the status of the shot."""
+AREA_NAMES = {
+    "no-break-away": "no break-away: nothing is felt",
+    "stuck": "stuck: friction holds the magnet off its stop",
+    "not-home": "not home within the model's horizon",
+}
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Field:
+    """A plane of designs of one pulse: axes, then arrays (frictions, voltages); NaN where there is no prediction."""
+
+    pulse_s: float
+    friction_N: FloatArray
+    voltage_V: FloatArray
+    status: Any  # words
+    predicted: FloatArray
+    shooting_rate_Hz: FloatArray
+    beyond: Any  # booleans over the voltages: a limit of the device would be broken
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Lines:
+    """The contour over the frictions with its band; other contours by name. What is not reached is not finite."""
+
+    voltage_V: FloatArray
+    low_V: FloatArray
+    high_V: FloatArray
+    others: Mapping[str, FloatArray]
+
+
+def figure_maps(
+    field: Field, lines: tuple[float, float], own: Sequence[Mark], best: Mark | None, path_stem: Path
+) -> None:
+    """Two maps over friction and voltage: the predicted share and the shooting rate, each with its line of `lines`."""
+    level, bound_Hz = lines
+    with mpl.rc_context(style()):  # type: ignore[arg-type]
+        figure = new_figure(8.6, 4.7)
+        left, right = figure.subplots(1, 2, sharex=True, sharey=True)
+        shares = _mesh(left, field, 100.0 * field.predicted, "viridis", (50.0, 100.0))
+        _level(left, field, 100.0 * field.predicted, 100.0 * level, "%")
+        _level(left, field, field.shooting_rate_Hz, bound_Hz, "Hz")
+        figure.colorbar(shares, ax=left, label="right about a forward shot, predicted [%]")
+        rates = _mesh(right, field, field.shooting_rate_Hz, "cividis", (0.0, 4.0 * bound_Hz))
+        _level(right, field, field.shooting_rate_Hz, bound_Hz, "Hz")
+        figure.colorbar(rates, ax=right, extend="max", label="highest shooting rate [Hz]")
+        for axes, title in ((left, "felt"), (right, "fast")):
+            axes.set_title(f"{title}, pulse {1e3 * field.pulse_s:.3g} ms", loc="left")
+            _beyond(axes, field)
+            _marks(axes, field, [*own, *([best] if best else [])], best)
+            axes.set_xlabel("damper friction [N]")
+        left.set_ylabel("voltage [V]")
+        _legend(figure, left, field)
+        save(figure, path_stem)
+
+
+def figure_critical(field: Field, lines: Lines, level: float, own: Sequence[Mark], path_stem: Path) -> None:
+    """The contour of `level` over friction and voltage with its band, and the contours under other assumptions."""
+    with mpl.rc_context(style()):  # type: ignore[arg-type]
+        figure = new_figure(6.6, 5.2)
+        axes = figure.subplots()
+        _areas(axes, field)
+        x, top = field.friction_N, float(field.voltage_V[-1])
+        low, high = (np.clip(part, 0.0, top) for part in (lines.low_V, lines.high_V))
+        axes.fill_between(x, low, high, color=BLUE, alpha=0.18, linewidth=0.0, label="95 % of the contours drawn")
+        for n, (name, voltage_V) in enumerate(lines.others.items()):
+            dashes = METHOD_LINES[(n + 1) % len(METHOD_LINES)]
+            colour = (INK, INK, VERMILION, VERMILION, ORANGE)[n % 5]
+            axes.plot(x, _finite(voltage_V), color=colour, linewidth=1.1, linestyle=dashes, label=name)
+        axes.plot(x, _finite(lines.voltage_V), color=BLUE, linewidth=2.0, label=f"{100.0 * level:g} % right")
+        _marks(axes, field, own, None)
+        axes.set_xlim(float(x[0]), float(x[-1]))
+        axes.set_ylim(float(field.voltage_V[0]), top)
+        axes.set_xlabel("damper friction [N]")
+        axes.set_ylabel("voltage [V]")
+        axes.set_title(f"Pulse {1e3 * field.pulse_s:.3g} ms", loc="left")
+        _legend(figure, axes, field)
+        save(figure, path_stem)
+
+
+def _finite(values: FloatArray) -> FloatArray:
+    return np.where(np.isfinite(values), values, np.nan)
+
+
+def _mesh(axes: Axes, field: Field, values: FloatArray, map_name: str, ends: tuple[float, float]) -> Any:
+    """The values as coloured cells between the ends of the scale; gives back what a colour bar needs."""
+    _areas(axes, field)
+    return axes.pcolormesh(
+        field.friction_N,
+        field.voltage_V,
+        np.ma.masked_invalid(values).T,
+        cmap=map_name,
+        vmin=ends[0],
+        vmax=ends[1],
+        shading="nearest",
+        rasterized=True,
+    )
+
+
+def _areas(axes: Axes, field: Field) -> None:
+    number = np.full(field.status.shape, np.nan)
+    for n, status in enumerate(AREAS):
+        number[field.status == status] = n
+    axes.pcolormesh(
+        field.friction_N,
+        field.voltage_V,
+        np.ma.masked_invalid(number).T,
+        cmap=ListedColormap(list(AREAS.values())),
+        norm=BoundaryNorm(np.arange(-0.5, len(AREAS)), len(AREAS)),
+        shading="nearest",
+        rasterized=True,
+    )
+
+
+def _level(axes: Axes, field: Field, values: FloatArray, height: float, unit: str) -> None:
+    """A line at a height of the values, if they reach it."""
+    known = values[np.isfinite(values)]
+    if not known.size or not known.min() < height < known.max():
+        return
+    numbers = np.ma.masked_invalid(values).T
+    dashes = "--" if unit == "Hz" else "-"
+    line = axes.contour(field.friction_N, field.voltage_V, numbers, levels=[height], colors="white", linestyles=dashes)
+    axes.clabel(line, fmt={height: f"{height:g} {unit}"}, fontsize=8.0)
+
+
+def _beyond(axes: Axes, field: Field) -> None:
+    """Hatches over the voltages at which a limit of the device would be broken."""
+    volts, half = field.voltage_V, 0.5 * np.diff(field.voltage_V)
+    lows, highs = volts - np.append(half[:1], half), volts + np.append(half, half[-1:])
+    for low, high in zip(lows[field.beyond], highs[field.beyond], strict=True):
+        axes.axhspan(low, high, facecolor="none", edgecolor=INK, hatch="////", linewidth=0.0)
+
+
+def _marks(axes: Axes, field: Field, marks: Sequence[Mark], best: Mark | None) -> None:
+    """The designs with a name that lie on the plane."""
+    for n, mark in enumerate(marks):
+        if not _holds(field, mark):
+            continue
+        is_best = mark is best
+        axes.plot(
+            [mark.friction_N],
+            [mark.voltage_V],
+            "*" if is_best else MARKERS[n % len(MARKERS)],
+            color=ORANGE if is_best else VERMILION,
+            markersize=13.0 if is_best else 6.5,
+            markeredgecolor=BLACK if is_best else "white",
+            markeredgewidth=0.8,
+            linestyle="none",
+            label=mark.name,
+            zorder=6,
+            clip_on=False,
+        )
+
+
+def _holds(field: Field, mark: Mark) -> bool:
+    x, y = field.friction_N, field.voltage_V
+    return bool(x[0] <= mark.friction_N <= x[-1] and y[0] <= mark.voltage_V <= y[-1])
+
+
+def _legend(figure: Figure, axes: Axes, field: Field) -> None:
+    handles, names = axes.get_legend_handles_labels()
+    patches = [
+        Patch(facecolor=colour, label=AREA_NAMES[status])
+        for status, colour in AREAS.items()
+        if (field.status == status).any()
+    ]
+    if field.beyond.any():
+        patches.append(Patch(facecolor="white", edgecolor=INK, hatch="////", label="beyond the device's limits"))
+    where: Any = "outside lower center"
+    figure.legend(
+        [*handles, *patches],
+        [*names, *(str(patch.get_label()) for patch in patches)],
+        loc=where,
+        ncols=2,
+        frameon=False,
+        fontsize=8.0,
+        handlelength=3.0,
+    )
+
+
+Facts = dict[str, Any]
+
+
+def field_of(found: Facts, plane: Facts) -> Field:
+    """A plane of designs, for a map."""
+    return Field(
+        pulse_s=plane["pulse_s"],
+        friction_N=np.array(found["axes"]["friction_N"]),
+        voltage_V=np.array(found["axes"]["voltage_V"]),
+        status=np.array(plane["status"]),
+        predicted=np.array(plane["predicted"], dtype=np.float64),
+        shooting_rate_Hz=np.array(plane["shooting_rate_Hz"], dtype=np.float64),
+        beyond=np.array([words is not None for words in plane["limit_of_voltage"]]),
+    )
+
+
+def with_pulse(one: Facts, pulse_s: float) -> str:
+    """A method's name; with its pulse, if that is another than the map's."""
+    return str(one["name"] if one["pulse_s"] == pulse_s else f"{one['name']} (pulse {1e3 * one['pulse_s']:.3g} ms)")
+
+
+def felt_methods(found: Facts, *, swept: bool = False) -> list[Facts]:
+    """The gun's own methods that have a prediction; those alone that the sweep could come upon, if asked."""
+    return [one for one in found["own"] if one["predicted"] is not None and (one["swept"] or not swept)]
+
+
+def own_marks(found: Facts, *, swept: bool = False) -> list[Mark]:
+    """The same by their names."""
+    return [mark_of(one["name"], one) for one in felt_methods(found, swept=swept)]
+
+
+def best_mark(found: Facts) -> Mark | None:
+    """The best design, if one may be proposed."""
+    best = found["best"]
+    return None if best is None else mark_of(f"best at {found['rate_above_Hz']:g} Hz or faster", best)
+
+
+def mark_of(name: str, one: Facts) -> Mark:
+    """A design under a name; without known limits its prediction stands for them."""
+    return Mark(
+        name=name,
+        friction_N=one["friction_N"],
+        voltage_V=one["voltage_V"],
+        shooting_rate_Hz=one["shooting_rate_Hz"],
+        predicted=one["predicted"],
+        ci_low=one["predicted"] if one["ci_low"] is None else one["ci_low"],
+        ci_high=one["predicted"] if one["ci_high"] is None else one["ci_high"],
     )

@@ -10,16 +10,17 @@ from typing import Any
 import matplotlib as mpl
 from matplotlib.axes import Axes
 
-from analysis.report.figures.names import display_name, wrapped
 from analysis.report.figures.style import (
     BLACK,
     METHOD_LINES,
+    display_name,
     light_grid,
     method_colour,
     new_figure,
     reference_line,
     save,
     style,
+    wrapped,
 )
 
 Numbers = Sequence[float]

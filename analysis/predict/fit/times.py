@@ -13,17 +13,15 @@ from typing import Any
 import numpy as np
 
 from analysis.logs.reading import Logs, Problem, Track, read_logs
-from analysis.predict.fit.times_page import Fitted, sections
-from analysis.predict.fit.times_words import as_text, left_out
+from analysis.predict.fit.times_page import Fitted, as_text, left_out, sections
 from analysis.predict.fit.words import NO_TIMES, plain
 from analysis.report.page import write_page
 from analysis.report.terminal import Progress
 from analysis.times.ez import ez, ez_people
-from analysis.times.fit import DiffusionFit, fit
+from analysis.times.fit import DiffusionFit, fit, profile
 from analysis.times.likelihood import Range, Trials
 from analysis.times.own_trials import REFUSALS, OwnTrials, own_trials
 from analysis.times.people import fit_people, mean_estimate
-from analysis.times.profile import profile
 from analysis.times.sampled_fit import FEWEST_TRIALS, as_trials
 from experiments.load import ConfigError
 from experiments.record import storage

@@ -15,7 +15,7 @@ from analysis.paper.odds import SIGNIFICANT, WHOLE_PATTERN
 from analysis.predict.jobs import Run, cores, on_cluster, on_processes
 from analysis.predict.power.grid import Cell, Grid, Request, make_grid
 from analysis.predict.power.page import sections
-from analysis.predict.power.shares import Option, Tally, merged, precisions, shares, smallest
+from analysis.predict.power.planned import Option, Tally, merged, precisions, shares, smallest
 from analysis.predict.power.studies import PUBLISHED, Chunk, run_chunk
 from analysis.predict.power.words import as_text, assumptions
 from analysis.report.page import write_page

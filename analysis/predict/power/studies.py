@@ -15,8 +15,7 @@ from scipy.special import ndtr
 from analysis.paper.odds import WHOLE_PATTERN, Recurrence, chance_recurs, recurs
 from analysis.paper.paper import PublishedDirection, PublishedExperiment
 from analysis.predict.power.felt import Felt, felt_counts
-from analysis.predict.power.planned import Findings, analysed_directions, analysed_ratings
-from analysis.predict.power.shares import Tally, tallied
+from analysis.predict.power.planned import Findings, Tally, analysed_directions, analysed_ratings, tallied
 from device.words import DIRECTIONS
 from experiments.config.canonical import canonical_json
 from experiments.design.streams import generator

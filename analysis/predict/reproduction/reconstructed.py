@@ -9,8 +9,8 @@ from dataclasses import dataclass, replace
 from fractions import Fraction
 from typing import Any
 
+from analysis.paper.audit.lattices import Rows
 from analysis.paper.audit.participants import MEAN_SLACK, Rebuilt, backward_counts, forward_counts, rating_grains
-from analysis.paper.audit.repeated_lattice import Rows
 from analysis.paper.paper import Paper, PublishedDirection, PublishedExperiment, PublishedPreference
 from experiments.catalogue import CATALOGUE
 from experiments.config.models import StudyConfig

@@ -1,6 +1,7 @@
-"""`recoil reproduce`: a whole study with synthetic participants on the simulated gun, from plans to the report.
+"""`recoil reproduce`: a whole study with synthetic participants on the simulated gun, and the odds of its pattern.
 
-Every part is the one that live sessions use; only the clock is virtual, so that breaks take no time.
+Every part is the one that live sessions use; only the clock is virtual, so that breaks take no time. The odds are over
+participants of the same config, whose logs are not written.
 """
 
 from __future__ import annotations
@@ -11,30 +12,33 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, Literal
 
+import numpy as np
+from numpy.typing import NDArray
+
 from analysis.logs.reading import Logs, read_logs
 from analysis.paper.audit import audit
 from analysis.paper.audit.paper_file import load_paper_file
-from analysis.paper.audit.predictions import ELSEWHERE, other_rows, predictions
 from analysis.paper.audit.run import Finding
-from analysis.paper.audit.sentences import ATTENTION
-from analysis.paper.odds import Odds
+from analysis.paper.audit.sentences import ATTENTION, ELSEWHERE, other_rows, predictions
+from analysis.paper.odds import Odds, chance_recurs, odds_of, recurs
 from analysis.paper.paper import Paper, load_paper
 from analysis.paper.published import Row, compare
-from analysis.predict.reproduction.odds import direction_odds, preference_odds
+from analysis.predict.power import studies as power_studies
 from analysis.predict.reproduction.reconstructed import misfit, seat, table_bytes, table_name
-from analysis.predict.simulate.panel import shot_panel
-from analysis.summary.report import write_report
+from analysis.predict.simulate.shot import shot_panel
 from analysis.summary.sections.data import ReportData
-from analysis.summary.sections.sections import obtained_text
+from analysis.summary.sections.sections import obtained_text, write_report
 from analysis.summary.summary import summarize
 from device.parameters import GunParameters
 from experiments.clock import VirtualClock
 from experiments.config.canonical import sha256
 from experiments.config.models import StudyConfig
 from experiments.config.setup import Setup
+from experiments.design.streams import Stream, generator
 from experiments.direction.config import DirectionConfig
 from experiments.load import ConfigError, load_setup, load_study
 from experiments.preference.config import PreferenceConfig
+from experiments.preference.observer import draw_ratings
 from experiments.rebuild import rebuild
 from experiments.record import storage
 from experiments.record.journal import is_empty
@@ -43,6 +47,53 @@ from experiments.record.provenance import git_commit, provenance, recoil_version
 from experiments.run import Request, run
 from experiments.screens.synthetic import synthetic_screen
 from experiments.study import places
+
+Scores = NDArray[np.float64]
+Counts = NDArray[np.int64]
+
+
+def direction_counts(config: DirectionConfig, methods: list[str], n: int, replications: int, seed: int) -> Counts:
+    """Correct answers, (replications, n, methods, 2 directions), of people drawn as `RatesObserver` draws them."""
+    counts = power_studies.direction_counts(config, n, replications, generator(seed, "odds", config.experiment))
+    return counts[:, :, [config.design.methods.index(method) for method in methods]]
+
+
+def preference_scores(config: PreferenceConfig, methods: list[str], n: int, replications: int, seed: int) -> Scores:
+    """Ratings, (replications, n, methods), of people drawn as `RatingsObserver` draws them."""
+    stream = Stream(seed, "odds", config.experiment)
+    law, scale = config.synthetic.ratings, config.rating
+    people = (draw_ratings(law, scale, methods, stream) for _ in range(replications * n))
+    ratings = [person[method] for person in people for method in methods]
+    return np.array(ratings).reshape(replications, n, len(methods))
+
+
+def direction_odds(config: DirectionConfig, paper: Paper, replications: int, seed: int) -> Odds:
+    """The odds of experiment 1's claims at the published rates."""
+    published, rates, forward = paper.direction, config.synthetic.rates, config.design.forward_per_session
+    counts = direction_counts(config, published.methods, published.n, replications, seed)
+    claims = recurs(counts[..., 0] / forward, published)
+    return odds_of(
+        config.experiment,
+        claims | chance_recurs(counts.sum(axis=1), published.n * forward, published),
+        f"{published.n} people whose correct rates are, in the mean, the published ones; people differ by an ability "
+        f"of SD {rates.ability_sd:g} and a bias of SD {rates.bias_sd:g} in probit units (assumed); "
+        f"{forward} forward and as many backward trials a method; seed {seed}.",
+    )
+
+
+def preference_odds(config: PreferenceConfig, paper: Paper, replications: int, seed: int) -> Odds:
+    """The odds of experiment 2's claims at the assumed ratings."""
+    published, law = paper.preference, config.synthetic.ratings
+    scores = preference_scores(config, published.methods, published.n, replications, seed)
+    means = ", ".join(f"{method} {law.mean[method]:g}" for method in published.methods)
+    return odds_of(
+        config.experiment,
+        recurs(scores, published),
+        f"{published.n} people; the means and SDs are not published, so these are assumed: {means}; SD between people "
+        f"{law.person_sd:g}, within {law.noise_sd:g}; a share of {law.same_share:g} give "
+        f"{' and '.join(law.same or ())} the same score; seed {seed}.",
+    )
+
 
 MANIFEST = "reproduction.json"
 

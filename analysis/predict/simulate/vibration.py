@@ -10,7 +10,7 @@ import numpy as np
 
 from analysis.predict.simulate.more import shown
 from analysis.predict.simulate.shot import write_columns
-from analysis.report.figures.vibration import VibrationPanel, figure_vibration
+from analysis.report.figures.shot import VibrationPanel, figure_vibration
 from device.vibration import Vibration, VibrationParameters, solved, waveform
 from experiments.load import ConfigError, load_gun
 

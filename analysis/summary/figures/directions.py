@@ -14,7 +14,6 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
 from analysis.report.figures.crowd import MANY, draw_histogram, draw_mean, draw_points, places
-from analysis.report.figures.names import people, wrapped
 from analysis.report.figures.style import (
     BLACK,
     DIRECTION_MARKERS,
@@ -22,9 +21,11 @@ from analysis.report.figures.style import (
     light_grid,
     method_colour,
     new_figure,
+    people,
     reference_line,
     save,
     style,
+    wrapped,
 )
 from analysis.stats.arrays import FloatArray
 from analysis.stats.detection import yes_no

@@ -13,16 +13,18 @@ from matplotlib.axes import Axes
 from matplotlib.colors import to_rgba
 
 from analysis.report.figures.crowd import MANY, draw_histogram, draw_mean, draw_points, places
-from analysis.report.figures.names import people, stars, wrapped
 from analysis.report.figures.style import (
     BLACK,
     bounded,
     light_grid,
     method_colour,
     new_figure,
+    people,
     reference_line,
     save,
+    stars,
     style,
+    wrapped,
 )
 
 Statistics = Mapping[str, Any]

@@ -13,17 +13,18 @@ from matplotlib.colors import to_rgba
 from matplotlib.patches import Patch
 
 from analysis.report.figures.crowd import MANY, places
-from analysis.report.figures.names import display_name, wrapped
 from analysis.report.figures.style import (
     BLACK,
     DIRECTION_MARKERS,
     INK,
     METHOD_LINES,
+    display_name,
     light_grid,
     method_colour,
     new_figure,
     save,
     style,
+    wrapped,
 )
 
 Statistics = Mapping[str, Any]

@@ -13,11 +13,11 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.lines import Line2D
 
-from analysis.report.figures.names import display_name
 from analysis.report.figures.style import (
     BLACK,
     INK,
     METHOD_LINES,
+    display_name,
     light_grid,
     method_colour,
     new_figure,

@@ -7,8 +7,8 @@ from pathlib import Path
 from typing import Any
 
 from analysis.report import apa
-from analysis.report.figures.names import named, people
 from analysis.report.figures.shot import ShotPanel, figure_5
+from analysis.report.figures.style import named, people
 from analysis.report.section import Picture
 from analysis.summary.figures.directions import figure_directions
 from analysis.summary.figures.results import figure_8

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import os
 from collections.abc import Mapping
 from dataclasses import replace
@@ -11,12 +12,13 @@ from typing import Any
 from analysis.paper.odds import Odds
 from analysis.paper.published import AUDITED, Row
 from analysis.report import apa
-from analysis.report.figures.names import named
 from analysis.report.figures.shot import ShotPanel
+from analysis.report.figures.style import named
+from analysis.report.page import write_page
 from analysis.report.section import LISTED, SHOWN, Section, Table, shortened
 from analysis.summary.sections.data import EXPERIMENTS, ReportData, analysed
 from analysis.summary.sections.experiments import direction_section, preference_section
-from analysis.summary.sections.pictures import results_picture, shot_picture
+from analysis.summary.sections.pictures import results_picture, shot_picture, write_figures
 from analysis.summary.sections.supplement import supplement_sections
 from analysis.summary.sections.trade import trade_section
 
@@ -212,3 +214,15 @@ def _file_rows(report: ReportData) -> list[tuple[str, str]]:
     rows = [("log file", names[file].as_posix()) for file in shown]
     rest = len(report.files) - len(shown)
     return [*rows, ("log files", f"and {rest:,} more")] if rest else rows
+
+
+def write_report(out: Path, report: ReportData) -> None:
+    """Write `report.html`, `report.md`, `statistics.json` and `figures/` into `out`, which is made if need be.
+
+    Files of an earlier report there are replaced. The same data give the same bytes.
+    """
+    out.mkdir(parents=True, exist_ok=True)
+    write_figures(out / "figures", report)
+    write_page(out, report.title, sections(report))
+    text = json.dumps(report.statistics, indent=1, ensure_ascii=False, allow_nan=False) + "\n"
+    (out / "statistics.json").write_text(text, encoding="utf-8", newline="\n")

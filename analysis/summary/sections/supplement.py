@@ -6,7 +6,7 @@ from collections.abc import Iterable, Mapping
 from typing import Any
 
 from analysis.report import apa
-from analysis.report.figures.names import display_name, named
+from analysis.report.figures.style import display_name, named
 from analysis.report.section import Section, Table
 
 Statistics = Mapping[str, Any]
