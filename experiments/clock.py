@@ -1,10 +1,10 @@
-"""The clock of a run: the machine's own, or a virtual one on which breaks take no time."""
+"""The clock of a run: the machine's own, or a virtual one on which breaks take no time; and dates for people."""
 
 from __future__ import annotations
 
 import threading
 import time
-from datetime import UTC, datetime, timedelta
+from datetime import UTC, datetime, timedelta, tzinfo
 from typing import Protocol
 
 
@@ -82,3 +82,28 @@ class VirtualClock:
 
 def _iso(moment: datetime) -> str:
     return moment.isoformat(timespec="microseconds").replace("+00:00", "Z")
+
+
+_DAYS = ("Mon", "Tue", "Wed", "Thu", "Fri", "Sat", "Sun")
+_MONTHS = ("Jan", "Feb", "Mar", "Apr", "May", "Jun", "Jul", "Aug", "Sep", "Oct", "Nov", "Dec")
+"""In the language of the screens, whatever language the system speaks."""
+
+
+def date_text(utc: str, zone: tzinfo | None = None) -> str:
+    """Date and time of a record (ISO 8601) in local time; what is no date is given back as it is.
+
+    >>> from datetime import timedelta, timezone
+    >>> date_text("2026-11-22T01:09:58.895306Z", timezone(timedelta(hours=2)))
+    'Sun 22 Nov 2026, 03:09'
+    """
+    try:
+        moment = datetime.fromisoformat(utc).astimezone(zone)
+    except (ValueError, OverflowError):
+        return utc
+    day = f"{_DAYS[moment.weekday()]} {moment.day} {_MONTHS[moment.month - 1]} {moment.year}"
+    return f"{day}, {time_text(moment)}"
+
+
+def time_text(moment: datetime) -> str:
+    """The time of day: `14:05`."""
+    return f"{moment:%H:%M}"

@@ -21,8 +21,7 @@ from experiments.record.journal import Journal, JournalGone
 from experiments.session import events, judging
 from experiments.session.events import DISARMS, TYPED, Event, Press
 from experiments.session.history import Told
-from experiments.session.judging import Moment
-from experiments.session.kept import refused, remark_of
+from experiments.session.judging import Moment, refused, remark_of
 from experiments.session.remarks import Remark, record
 from experiments.session.states import ARMED, Position, State, entered
 from experiments.session.steps import Outcome, Step

@@ -12,9 +12,8 @@ from typing import Any, Literal
 
 from device import Gun, open_gun
 from experiments import catalogue, limits
-from experiments.clock import Clock
+from experiments.clock import Clock, date_text
 from experiments.config.setup import Setup
-from experiments.dates import date_text
 from experiments.design.plan import Plan
 from experiments.design.streams import draw_seed
 from experiments.live_run import LiveRun, RunStopped, Screen

@@ -14,8 +14,7 @@ from experiments.design.plan import Trial
 from experiments.live_run import RunStopped
 from experiments.record.replay import Standing
 from experiments.session import events
-from experiments.session.entries import trial_at
-from experiments.session.scale import on_scale
+from experiments.session.history import trial_at
 from experiments.session.states import State
 from experiments.session.steps import (
     Answered,
@@ -39,6 +38,7 @@ from experiments.session.steps import (
     Rested,
     Session,
     Step,
+    on_scale,
     record,
 )
 from experiments.stimulus import Desk, Stimulus, disarm

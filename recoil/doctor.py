@@ -17,7 +17,7 @@ from rich.text import Text
 
 from experiments.clock import RealClock
 from experiments.doctor.checks import carry_out, checks
-from experiments.doctor.finding import Finding
+from experiments.doctor.figures import Finding
 from experiments.doctor.verdicts import overall
 from experiments.load import find, load_gun
 from experiments.record import storage

@@ -14,8 +14,7 @@ from rich.console import Console
 from rich.table import Table
 from rich.text import Text
 
-from experiments.clock import RealClock
-from experiments.dates import date_text
+from experiments.clock import RealClock, date_text
 from experiments.study import enrolment
 from experiments.study.places import PlaceError
 from experiments.study.progress import Overview, StudyFolder, open_study, overview

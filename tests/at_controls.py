@@ -31,8 +31,7 @@ from experiments.run import Finished, Request, run
 from experiments.screens.console import overview, theme, view
 from experiments.screens.console.controls import Controls
 from experiments.screens.console.keys import Name, Presses
-from experiments.screens.console.messages import Ended, GunSeen
-from experiments.screens.console.needs import Field
+from experiments.screens.console.messages import Ended, Field, GunSeen
 from experiments.screens.console.view import About, Seen
 from experiments.session import events
 from experiments.session.events import Press

@@ -11,7 +11,7 @@ from typing import Any
 import pytest
 
 from experiments.clock import VirtualClock
-from experiments.config.canonical import canonical_json, sha256
+from experiments.config.setup import canonical_json, sha256
 from experiments.load import ConfigError, load_setup, shipped_folder
 from experiments.record.journal import JournalError, read
 from experiments.run import Request, run

@@ -17,18 +17,21 @@ from experiments.record.journal import JournalError, hold
 from experiments.run import Request, run
 from experiments.screens.synthetic import synthetic_screen
 from experiments.study import register
-from experiments.study.beginnings import (
+from experiments.study.enrolment import (
     Entered,
+    admit,
+    exclude,
     facts_of,
     is_news,
+    join,
     left_to_do,
     next_experiment,
     passed_over,
     read_back_refusal,
+    readmit,
     refusal,
     typed_facts,
 )
-from experiments.study.enrolment import admit, exclude, join, readmit
 from experiments.study.places import PlaceError
 from experiments.study.progress import StudyFolder, open_study
 from experiments.study.study import Facts, Participant, RunStanding, State

@@ -22,7 +22,7 @@ from experiments.screens.console.keys import (
     why_not,
 )
 from experiments.session import events
-from experiments.session.entries import Entry, What
+from experiments.session.history import Entry, What
 from experiments.session.states import TABLE, No, Position, State
 
 S = State

@@ -9,8 +9,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from pydantic import ValidationError
 
-from experiments.config.canonical import canonical_json
-from experiments.config.setup import Setup
+from experiments.config.setup import Setup, canonical_json
 from experiments.design.plan import Plan, Trial
 from experiments.direction.plan import make_plan
 from experiments.direction.session import session

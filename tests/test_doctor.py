@@ -22,16 +22,28 @@ from hypothesis import strategies as st
 
 from device import LinkError
 from experiments.clock import VirtualClock
-from experiments.config.canonical import sha256
+from experiments.config.setup import sha256
 from experiments.doctor import children, verdicts
 from experiments.doctor.checks import Check, carry_out, checks, no_display
-from experiments.doctor.deadline import within
-from experiments.doctor.figures import Adapter, Appends, Display, Keys, Link, Machine, Sound, Stage, Ticks
-from experiments.doctor.finding import VERDICTS, Finding
+from experiments.doctor.children import within
+from experiments.doctor.figures import (
+    VERDICTS,
+    Adapter,
+    Appends,
+    Display,
+    Finding,
+    Keys,
+    Link,
+    Machine,
+    Sound,
+    Spread,
+    Stage,
+    Ticks,
+    percentile,
+    spread,
+)
 from experiments.doctor.latencies import Latencies, latencies, together
-from experiments.doctor.link import adapters
-from experiments.doctor.measures import APPENDS, appends, ticks
-from experiments.doctor.spread import Spread, percentile, spread
+from experiments.doctor.measures import APPENDS, adapters, appends, ticks
 from experiments.load import ConfigError, find, load_gun
 from experiments.record.journal import Journal
 from experiments.study.places import PlaceError

@@ -15,8 +15,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from experiments.clock import VirtualClock
-from experiments.config.canonical import canonical_json
-from experiments.config.setup import Setup
+from experiments.config.setup import Setup, canonical_json
 from experiments.design.plan import Plan
 from experiments.direction.config import DirectionConfig
 from experiments.direction.plan import make_plan, make_practice

@@ -10,7 +10,7 @@ from typing import Any
 import pytest
 
 from experiments.clock import VirtualClock
-from experiments.config.canonical import sha256
+from experiments.config.setup import sha256
 from experiments.record import storage
 from experiments.record.journal import Contents, Journal, JournalError, head, read
 

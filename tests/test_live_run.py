@@ -18,8 +18,8 @@ from experiments.record.replay import told
 from experiments.screens.texts import again_text
 from experiments.session import events
 from experiments.session import remarks as words
-from experiments.session.entries import Entry
 from experiments.session.events import Event, Press
+from experiments.session.history import Entry
 from experiments.session.remarks import (
     AnswerCorrected,
     Flagged,

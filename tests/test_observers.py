@@ -18,7 +18,7 @@ from experiments.preference.observer import RatingsObserver, draw_ratings
 from experiments.preference.observer import observer as preference_observer
 from experiments.preference.plan import make_plan as preference_plan
 from experiments.screens.synthetic import synthetic_screen
-from experiments.session.scale import on_scale
+from experiments.session.steps import on_scale
 
 DIRECTION, PREFERENCE = load_setup("direction"), load_setup("preference")
 PLAN = direction_plan(DIRECTION.config, "P01", 1, None)

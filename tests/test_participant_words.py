@@ -5,9 +5,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 from pydantic import ValidationError
 
-from experiments.screens.participant.clocks import ClockMap, RoundTrip, clock_map
+from experiments.screens.participant.link import ClockMap, RoundTrip, clock_map
 from experiments.screens.participant.look import Look, arguments, look_from
-from experiments.screens.participant.marker import move, put
+from experiments.screens.participant.rating_page import move, put
 from experiments.screens.participant.words import (
     AskDescription,
     AskDirection,

@@ -8,7 +8,7 @@ from zoneinfo import ZoneInfo
 
 import pytest
 
-from experiments.dates import date_text, time_text
+from experiments.clock import date_text, time_text
 from experiments.screens.console.people import cell_text, coming_text, note_text, remark, stopped_text
 from experiments.study.progress import Overview
 from experiments.study.study import Next, Participant, RunStanding, State

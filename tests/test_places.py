@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from experiments.config.canonical import canonical_json, sha256
+from experiments.config.setup import canonical_json, sha256
 from experiments.study.places import (
     Place,
     PlaceError,

@@ -17,7 +17,7 @@ from typing import NamedTuple
 import pytest
 from pydantic import ValidationError
 
-from experiments.config.canonical import canonical_json
+from experiments.config.setup import canonical_json
 from experiments.design.plan import Plan
 from experiments.direction.plan import make_plan as direction_plan
 from experiments.load import load_setup

@@ -44,7 +44,7 @@ from experiments.direction.plan import make_plan
 from experiments.load import find, load_setup
 from experiments.preference.config import RatingScale
 from experiments.preference.observer import draw_ratings
-from experiments.session.scale import on_scale as one_on_scale
+from experiments.session.steps import on_scale as one_on_scale
 
 DIRECTION, PREFERENCE = load_setup("direction").config, load_setup("preference").config
 METHODS = DIRECTION.design.methods

@@ -13,8 +13,7 @@ import pytest
 
 from experiments import catalogue
 from experiments.clock import VirtualClock
-from experiments.config.canonical import canonical_json
-from experiments.config.setup import Setup
+from experiments.config.setup import Setup, canonical_json
 from experiments.design.plan import Plan
 from experiments.load import load_setup
 from experiments.rebuild import plan_of, rebuild

@@ -5,7 +5,7 @@ from pathlib import Path
 
 import pytest
 
-from experiments.config.canonical import canonical_json, sha256
+from experiments.config.setup import canonical_json, sha256
 from experiments.load import load_setup, shipped_folder
 
 

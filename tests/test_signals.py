@@ -13,7 +13,7 @@ os.environ.setdefault("QT_QPA_PLATFORM", "offscreen")
 from PyQt6.QtCore import QCoreApplication
 
 from experiments.screens.console.app import application
-from experiments.screens.console.signals import signals_to
+from experiments.screens.console.windows import signals_to
 
 
 @pytest.fixture(autouse=True)

@@ -27,9 +27,8 @@ from experiments.record.journal import hold
 from experiments.run import Request, run
 from experiments.screens.console import theme
 from experiments.screens.console.app import application
-from experiments.screens.console.form import Beside
+from experiments.screens.console.form import Beside, Opening
 from experiments.screens.console.live import _study
-from experiments.screens.console.opening import Opening
 from experiments.screens.console.start import StartWindow
 from experiments.screens.synthetic import synthetic_screen
 from experiments.study import enrolment, register

@@ -14,9 +14,8 @@ from hypothesis import strategies as st
 
 from experiments import catalogue
 from experiments.clock import VirtualClock
-from experiments.config.canonical import canonical_json, sha256
 from experiments.config.models import EligibilityConfig, Handedness, Sex, StudyConfig
-from experiments.config.setup import Setup
+from experiments.config.setup import Setup, canonical_json, sha256
 from experiments.load import ConfigError, load_setup, load_study, shipped_folder
 from experiments.study.places import place, used_rows
 from experiments.study.progress import ANSWERED_BY, next_row

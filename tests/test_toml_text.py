@@ -9,7 +9,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from experiments.config.canonical import canonical_json
+from experiments.config.setup import canonical_json
 from experiments.config.toml_text import toml_text
 from experiments.load import read_toml, shipped_folder
 

@@ -152,7 +152,7 @@ def _run(window: Any) -> dict[str, Any]:
 
 
 def _places(window: Any) -> dict[str, list[int]]:
-    from experiments.screens.console.actions import CommandButton
+    from experiments.screens.console.buttons import CommandButton
 
     found = {}
     for button in window.findChildren(CommandButton):

@@ -60,6 +60,7 @@ def _reasons(table: pd.DataFrame, experiment: str, methods: Sequence[str]) -> di
     }
     return absent | lacking
 
+
 def by_study(logs: Logs) -> dict[str, Logs]:
     """The logs of each study with plain codes, by the study's name; nothing if there is one study only."""
     names = sorted({str(name) for table in (logs.trials, logs.ratings) for name in table[STUDY].unique()})

@@ -157,6 +157,7 @@ def _last_lines(stream: io.FileIO) -> Iterator[bytes]:
         lines = stream.read(tail).splitlines()
         yield lines[-1] if len(lines) > 1 or (lines and size <= tail) else b""
 
+
 def study_names(folders: Iterable[str]) -> dict[str, str]:
     """Short names for studies' folders: what tells them apart, from the first differing part on; else the last part.
 

@@ -22,7 +22,7 @@ from analysis.summary import remarks_coding
 from analysis.summary.sections.data import ReportData
 from analysis.summary.sections.sections import write_report
 from analysis.summary.summary import summarize
-from experiments.config.canonical import sha256
+from experiments.config.setup import sha256
 from experiments.load import ConfigError
 from experiments.record import storage
 from experiments.record.provenance import provenance

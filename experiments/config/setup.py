@@ -1,14 +1,30 @@
-"""A setup: an experiment's config with the gun it runs on, resolved and hashed. What a run needs to know beforehand."""
+"""A setup: an experiment's config with the gun it runs on, resolved and hashed by one spelling of every value."""
 
 from __future__ import annotations
 
+import hashlib
+import json
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, Generic, TypeVar
 
-from experiments.config.canonical import sha256
 from experiments.config.gun import GunConfig
 from experiments.config.models import ExperimentConfig
+
+
+def canonical_json(value: object) -> bytes:
+    """UTF-8 JSON with sorted keys, no blanks and no NaN; floats in Python's shortest round-trip form.
+
+    >>> canonical_json({"b": 1, "a": [0.1, "é"]}).decode()
+    '{"a":[0.1,"é"],"b":1}'
+    """
+    return json.dumps(value, sort_keys=True, separators=(",", ":"), ensure_ascii=False, allow_nan=False).encode()
+
+
+def sha256(value: object) -> str:
+    """The SHA-256 of a value's canonical JSON, in hexadecimal."""
+    return hashlib.sha256(canonical_json(value)).hexdigest()
+
 
 Config_co = TypeVar("Config_co", bound=ExperimentConfig, covariant=True)
 

@@ -8,7 +8,7 @@ from typing import Any
 from pydantic import TypeAdapter
 
 from device.words import Direction
-from experiments.config.canonical import sha256
+from experiments.config.setup import sha256
 
 PLAN_FORMAT = 1
 

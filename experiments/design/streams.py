@@ -14,7 +14,7 @@ from typing import TypeVar
 
 import numpy as np
 
-from experiments.config.canonical import canonical_json
+from experiments.config.setup import canonical_json
 
 Item = TypeVar("Item")
 

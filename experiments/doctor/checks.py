@@ -11,11 +11,9 @@ from pathlib import Path
 from typing import Any
 
 from device import DeviceError
-from experiments.doctor import children, link, measures, verdicts
-from experiments.doctor.children import Answer
-from experiments.doctor.deadline import within
-from experiments.doctor.figures import Display, Keys, Sound, Stage
-from experiments.doctor.finding import Finding
+from experiments.doctor import children, measures, verdicts
+from experiments.doctor.children import Answer, within
+from experiments.doctor.figures import Display, Finding, Keys, Sound, Stage
 from experiments.doctor.latencies import Latencies, latencies, together
 from experiments.record import journal
 from experiments.record.journal import JournalError
@@ -41,7 +39,7 @@ def checks(results: Path, gun: str, limit_s: float) -> tuple[Check, ...]:
         "clock": lambda: (verdicts.of_clock(measures.ticks()),),
         "disk": partial(_disk, results),
         "gun": partial(_gun, gun, limit_s),
-        "USB adapter": lambda: (verdicts.of_adapters(link.adapters()),),
+        "USB adapter": lambda: (verdicts.of_adapters(measures.adapters()),),
         "display": partial(_on_display, "display", "display", _display),
         "PsychoPy": partial(_on_display, "PsychoPy", "stage", _stage, PSYCHOPY_DEADLINE_S),
         "sound": _sound,
@@ -81,7 +79,7 @@ def _disk(results: Path) -> tuple[Finding, ...]:
 
 def _gun(address: str, limit_s: float) -> tuple[Finding, ...]:
     try:
-        return (verdicts.of_link(within(DEADLINE_S, partial(link.link, address)), limit_s),)
+        return (verdicts.of_link(within(DEADLINE_S, partial(measures.link, address)), limit_s),)
     except (DeviceError, OSError) as error:
         return (verdicts.of_link_failure(str(error)),)
 

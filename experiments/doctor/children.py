@@ -1,4 +1,4 @@
-"""Child programs asked for figures: their crash or silence is an answer as well."""
+"""Work that may hang, and child programs asked for figures: their crash or silence is an answer."""
 
 from __future__ import annotations
 
@@ -8,10 +8,44 @@ import re
 import subprocess
 import sys
 import tempfile
+import threading
+from collections.abc import Callable
 from contextlib import suppress
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import IO, Any
+from typing import IO, Any, TypeVar
+
+Result = TypeVar("Result")
+
+_PUT_AWAY_S = 2.0
+
+
+def within(seconds: float, work: Callable[[], Result]) -> Result:
+    """The result of some work, or what it raises. `TimeoutError` if it takes longer; it is then left to itself."""
+    results: list[Result] = []
+    errors: list[Exception] = []
+    done = threading.Event()  # not `join`: once interrupted, it takes the thread for ended
+
+    def carry_out() -> None:
+        try:
+            results.append(work())
+        except Exception as error:  # noqa: BLE001 - raised again where it is waited for
+            errors.append(error)
+        finally:
+            done.set()
+
+    try:
+        threading.Thread(target=carry_out, daemon=True, name="check").start()
+        done.wait(seconds)
+    except KeyboardInterrupt:
+        done.wait(_PUT_AWAY_S)  # so that it can close and remove what it opened
+        raise
+    if errors:
+        raise errors[0]
+    if not results:
+        raise TimeoutError(f"did not end within {seconds:g} s")
+    return results[0]
+
 
 _ROOT = Path(__file__).parents[2]
 """Where `experiments` lies: started there, the child runs the same code, whatever the caller's folder holds."""

@@ -1,4 +1,4 @@
-"""Machine, clock and disk, measured in this process."""
+"""Machine, clock, disk and the gun's link, measured in this process."""
 
 from __future__ import annotations
 
@@ -7,15 +7,19 @@ import platform
 import shutil
 import time
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager, suppress
+from contextlib import closing, contextmanager, suppress
 from importlib import metadata
 from itertools import pairwise
 from pathlib import Path
 
-from experiments.doctor.figures import Appends, Machine, Ticks
-from experiments.doctor.spread import spread
+from device import open_gun
+from device.serial_gun.opening import speed_of
+from experiments.clock import RealClock
+from experiments.doctor.figures import Adapter, Appends, Link, Machine, Ticks, spread
 from experiments.record import storage
 from experiments.record.provenance import recoil_version
+from experiments.runner import gun_name
+from experiments.study.places import PlaceError
 
 PACKAGES = ("numpy", "scipy", "PyQt6", "psychopy")
 READINGS = 20_000
@@ -100,3 +104,37 @@ def _file(path: Path) -> Iterator[int]:
     finally:
         os.close(descriptor)
         path.unlink(missing_ok=True)
+
+
+ROUND_TRIPS = 200
+ADAPTERS = Path("/sys/bus/usb-serial/devices")
+"""Where Linux shows them; nowhere else."""
+
+
+def link(address: str) -> Link:
+    """Ask the gun who it is and how it stands, many times.
+
+    `DeviceError` if it does not answer; `PlaceError` if there is no such form of address.
+    """
+    try:
+        gun = open_gun(address, clock=RealClock(speed_of(address) or 1.0).now)
+    except ValueError as error:
+        raise PlaceError(f"--gun {address}: {error}") from error
+    with closing(gun):
+        name = gun_name(gun.identify())
+        gun.disarm()
+        times = timed_ms(ROUND_TRIPS, gun.status)
+        status = gun.status()
+    return Link(gun=name, state=status.state, fault=status.fault, round_trip_ms=spread(times))
+
+
+def adapters(folder: Path = ADAPTERS) -> list[Adapter]:
+    """The USB serial adapters that have a latency timer."""
+    return list(_adapters(folder))
+
+
+def _adapters(folder: Path) -> Iterator[Adapter]:
+    for setting in sorted(folder.glob("*/latency_timer")):
+        with suppress(OSError, ValueError):  # pulled out just now
+            latency_ms = int(setting.read_text(encoding="ascii"))
+            yield Adapter(name=setting.parent.name, setting=str(setting), latency_ms=latency_ms)

@@ -6,10 +6,22 @@ from collections.abc import Sequence
 from dataclasses import asdict
 from typing import Literal
 
-from experiments.doctor.figures import Adapter, Appends, Display, Keys, Link, Machine, Sound, Stage, Ticks
-from experiments.doctor.finding import Finding, Verdict
+from experiments.doctor.figures import (
+    Adapter,
+    Appends,
+    Display,
+    Finding,
+    Keys,
+    Link,
+    Machine,
+    Sound,
+    Spread,
+    Stage,
+    Ticks,
+    Verdict,
+    spread,
+)
 from experiments.doctor.latencies import Latencies
-from experiments.doctor.spread import Spread, spread
 
 MAX_STEP_TO_SCREEN_MS = 50.0
 MAX_KEY_TO_DISK_MS = 10.0

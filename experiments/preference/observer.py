@@ -10,7 +10,7 @@ from experiments.design.plan import Plan, Trial
 from experiments.design.streams import Stream
 from experiments.preference.config import PreferenceConfig, RatingScale
 from experiments.preference.config import Ratings as RatingsLaw
-from experiments.session.scale import on_scale
+from experiments.session.steps import on_scale
 from experiments.synthetic.percept import evidence, percepts_of
 from experiments.synthetic.preference import felt_ratings
 

@@ -17,7 +17,7 @@ from pathlib import Path
 from typing import Any, Literal, Self, get_args
 
 from experiments.clock import Clock
-from experiments.config.canonical import canonical_json, sha256
+from experiments.config.setup import canonical_json, sha256
 from experiments.record import storage
 
 Kind = Literal["run", "step", "outcome", "shot", "remark", "resumed", "stopped", "finished"]

@@ -28,8 +28,8 @@ from experiments.screens.texts import (
     value_text,
 )
 from experiments.session import events
-from experiments.session.entries import Entry, value
 from experiments.session.events import Event, Press
+from experiments.session.history import Entry, value
 from experiments.session.remarks import Remark, flag_word
 from experiments.session.states import Position, State
 from experiments.session.steps import Ask, Describe, Outcome, Prepare, Rate, Rest, Step

@@ -8,8 +8,7 @@ from __future__ import annotations
 import unicodedata
 
 from experiments.design.plan import Plan, Trial
-from experiments.session.entries import Entry, Value, together, value
-from experiments.session.history import Told, is_attempt
+from experiments.session.history import Entry, Told, Value, is_attempt, together, value
 from experiments.session.remarks import (
     MAX_FLAG,
     AnswerCorrected,

@@ -1,8 +1,4 @@
-"""Whether an event is taken at a moment of a live run, or the sentence that says why not; and where it leads. Pure.
-
-The table of states decides what it can know. What a press was for, and whether there is anything to undo or to present
-again, is looked at here.
-"""
+"""Whether an event is taken at a moment of a live run, or why not, and what of it is kept as a remark. Pure."""
 
 from __future__ import annotations
 
@@ -11,10 +7,22 @@ from dataclasses import dataclass, replace
 
 from experiments.design.plan import Plan, Trial
 from experiments.session import events
-from experiments.session.entries import Entry, entries, fits, repeatable, trial_at, value
 from experiments.session.events import ACTS, OWN, Event, Press
-from experiments.session.history import Told
-from experiments.session.states import No, Position, after, why_after
+from experiments.session.history import Entry, Told, entries, fits, repeatable, trial_at, value
+from experiments.session.remarks import (
+    AnswerCorrected,
+    Continued,
+    DescriptionCorrected,
+    Flagged,
+    Halted,
+    HaltReason,
+    Noted,
+    Paused,
+    RatingCorrected,
+    Refused,
+    Remark,
+)
+from experiments.session.states import No, Position, State, after, why_after
 
 REARM_HELD_S = 1.0
 """For so long a key is held to go on after an emergency stop."""
@@ -140,3 +148,55 @@ def _not_asked(
     if (onset_s is None or event.at_s >= onset_s) and not moment.paused_between(event.at_s, event.at_s):
         return ""
     return "It went down before the stimulus, or in a pause."
+
+
+def remark_of(  # noqa: C901, PLR0911 - one case an event
+    event: Event, before: Position, then: Position, trial: Trial
+) -> Remark | None:
+    """What is written of an event that was taken between two positions; `trial` is the one at hand."""
+    match event:
+        case events.Flag():
+            return Flagged(trial=event.trial or trial, flag=event.flag)
+        case events.Note():
+            return Noted(trial=event.trial or trial, text=event.text)
+        case events.Correct() if before.correcting is not None:
+            return _corrected(before.correcting, event)
+        case events.Reason():
+            return HaltReason(text=event.text)
+        case events.EmergencyStop() if before.base is not State.HALTED:
+            return Halted(by=event.by)
+        case events.Pause():
+            return Paused()
+        case events.ParticipantBack():
+            return Noted(trial=None, text="The participant's screen was started again.")
+        case events.ParticipantLost() if before.paused_s is None and then.paused_s is not None:
+            return Paused(cause=event.cause)
+        case events.GoOn():
+            return Continued(paused_s=round(then.since_s - (before.paused_s or before.since_s), 3))
+        case _:
+            return None
+
+
+def refused(event: Event, position: Position, because: str) -> Refused | None:
+    """What is kept of an event that would have carried the run on, and was refused."""
+    own = isinstance(event, OWN)
+    if not (own or isinstance(event, ACTS)) or position.base is State.STOPPED:
+        return None
+    return Refused(
+        event=events.word(type(event)),
+        state=str(position.state),
+        because=because,
+        by="participant" if own else "experimenter",
+    )
+
+
+def _corrected(entry: Entry, event: events.Correct) -> Remark:
+    match entry.what, event.value:
+        case "answer", "forward" | "backward" as response:
+            return AnswerCorrected(trial=entry.trial, response=response)
+        case "rating", float() | None as rating:
+            return RatingCorrected(trial=entry.trial, rating=rating)
+        case "description", str() as comment:
+            return DescriptionCorrected(trial=entry.trial, comment=comment)
+        case _:
+            raise TypeError(f"{event.value!r} is no {entry.what}")

@@ -10,8 +10,8 @@ from dataclasses import dataclass, replace
 from enum import StrEnum
 
 from experiments.session import events
-from experiments.session.entries import Entry
 from experiments.session.events import Event
+from experiments.session.history import Entry
 from experiments.session.steps import Step
 
 

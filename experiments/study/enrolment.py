@@ -1,17 +1,128 @@
-"""Who is taken into a study, excluded and readmitted: the rules between a request and its record in the register."""
+"""Who is taken into a study, excluded and readmitted, and which experiment somebody comes to."""
 
 from __future__ import annotations
 
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 from pathlib import Path
+from typing import get_args
+
+from pydantic import ValidationError
 
 from experiments.clock import Clock
+from experiments.config.models import EligibilityConfig, Fact
 from experiments.record.journal import JournalError
-from experiments.study import beginnings, places, register
-from experiments.study.beginnings import Entered
+from experiments.study import places, register
 from experiments.study.places import PlaceError
 from experiments.study.progress import StudyFolder, look_at
 from experiments.study.register import RegisterError
-from experiments.study.study import Facts, RunStanding, eligible, unanswered, unasked
+from experiments.study.study import Facts, Participant, RunStanding, eligible, unanswered, unasked
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Entered:
+    """What was entered before a run: the code and its read-back, the experiment, the facts as they were typed."""
+
+    participant_id: str
+    read_back: str
+    experiment: str
+    facts: Mapping[str, str]
+
+
+def run_of(person: Participant, experiment: str) -> RunStanding:
+    """How somebody stands in an experiment."""
+    return next(run for run in person.runs if run.experiment == experiment)
+
+
+def next_experiment(person: Participant | None, experiments: Sequence[str]) -> str:
+    """The first experiment in the order of the study that somebody has not done; the first of all if nothing is left.
+
+    >>> runs = [RunStanding(experiment=name, state=state) for name, state in [("a", "done"), ("b", "not begun")]]
+    >>> next_experiment(Participant(participant_id="P01", runs=tuple(runs)), ["a", "b"])
+    'b'
+    """
+    ahead = left_to_do(person, experiments)
+    return ahead[0] if ahead else experiments[0]
+
+
+def left_to_do(person: Participant | None, experiments: Sequence[str]) -> list[str]:
+    """The experiments that somebody has not done, in the order of the study."""
+    return [one for one in experiments if person is None or run_of(person, one).state != "done"]
+
+
+def passed_over(person: Participant | None, experiment: str, experiments: Sequence[str]) -> list[str]:
+    """The experiments that come before one in the study and that somebody has not done: doing it breaks the order."""
+    return left_to_do(person, experiments[: experiments.index(experiment)])
+
+
+def facts_of(typed: Mapping[str, str]) -> Facts:
+    """Facts from what was typed; what is empty was not given. `ValueError` names fact, value and rule.
+
+    >>> facts_of({"age_years": " 25", "sex": ""})
+    Facts(age_years=25, sex=None, handedness=None)
+    """
+    given: dict[str, str | int] = {fact: text.strip() for fact, text in typed.items() if text.strip()}
+    age = given.get("age_years")
+    if isinstance(age, str) and age.isdecimal() and len(age) <= _AGE_DIGITS:
+        given["age_years"] = int(age)
+    try:
+        return Facts.model_validate(given)
+    except ValidationError as error:
+        fact = str(error.errors()[0]["loc"][0])
+        rule = "whole years from 1 to 120" if fact == "age_years" else "one of the levels that are offered"
+        raise ValueError(f"{fact} = {given.get(fact)!r}: must be {rule}") from error
+
+
+_AGE_DIGITS = 3
+
+
+def typed_facts(facts: Facts | None) -> dict[str, str]:
+    """Facts on record as they would be typed."""
+    values = facts.model_dump() if facts is not None else {}
+    return {fact: "" if values.get(fact) is None else str(values[fact]) for fact in get_args(Fact)}
+
+
+def is_news(person: Participant, facts: Facts, asked: Sequence[Fact]) -> bool:
+    """Whether facts say something that is not on record; so does anyone who is not on record at all."""
+    known = person.facts
+    return known is None or any(getattr(facts, fact) != getattr(known, fact) for fact in asked)
+
+
+def refusal(person: Participant, entered: Entered, facts: Facts, rules: EligibilityConfig, *, practice: bool) -> str:
+    """Why no run begins, in one sentence; empty if one may. A practice may be done before and after every run."""
+    code = person.participant_id
+    elsewhere = [run.experiment for run in person.runs if run.state == "open elsewhere"]
+    missing, reasons = unanswered(facts, rules), eligible(facts, rules)
+    if person.excluded is not None:
+        return f"{code} is excluded ({person.excluded}): readmit them first, or use another code."
+    if elsewhere:
+        return f"{code} sits at another console, where {elsewhere[0]} is open: close it there first."
+    if not practice and run_of(person, entered.experiment).state == "done":
+        return (
+            f"{code} has finished {entered.experiment}; one finished run a participant and experiment, so choose "
+            "another experiment or another code."
+        )
+    if missing:
+        return f"The study asks for what was not given: {', '.join(map(fact_text, missing))}."
+    if reasons:
+        return f"{code} is not eligible: {'; '.join(reasons)}. Correct what was entered, or let somebody else come."
+    return ""
+
+
+def fact_text(name: str) -> str:
+    """A fact of a person as people call it: `age_years` is an age."""
+    return name.removesuffix("_years")
+
+
+def read_back_refusal(entered: Entered) -> str:
+    """Why the code is not sure yet; empty if it is."""
+    if not entered.participant_id:
+        return "Type the participant's code, and read it back."
+    if not entered.read_back:
+        return "Read the code back: type it a second time, just as it stands above."
+    if entered.participant_id != entered.read_back:
+        return f"The two codes differ: {entered.participant_id} and {entered.read_back}. Type the second one again."
+    return ""
 
 
 def admit(study: StudyFolder, entered: Entered, clock: Clock, *, practice: bool = False) -> RunStanding:
@@ -19,18 +130,18 @@ def admit(study: StudyFolder, entered: Entered, clock: Clock, *, practice: bool 
 
     `PlaceError` and `JournalError` say why they may not; then nothing is recorded.
     """
-    _refuse(beginnings.read_back_refusal(entered))
+    _refuse(read_back_refusal(entered))
     person, problems = look_at(study, entered.participant_id)
-    run = beginnings.run_of(person, entered.experiment)
+    run = run_of(person, entered.experiment)
     if run.state == "unreadable":
         raise JournalError("\n".join(problems))
     try:
-        facts = beginnings.facts_of(entered.facts)
+        facts = facts_of(entered.facts)
     except ValueError as error:
         raise PlaceError(str(error)) from error
     rules = study.config.eligibility
-    _refuse(beginnings.refusal(person, entered, facts, rules, practice=practice))
-    if beginnings.is_news(person, facts, rules.ask):
+    _refuse(refusal(person, entered, facts, rules, practice=practice))
+    if is_news(person, facts, rules.ask):
         join(study, entered.participant_id, facts, clock)
     return run
 

@@ -20,7 +20,7 @@ from typing import Annotated, Protocol
 from pydantic import Field
 
 from experiments.config.models import Model, Spread
-from experiments.session.scale import Scale, on_scale
+from experiments.session.steps import Scale, on_scale
 
 Points = Annotated[float, Field(ge=-100, le=100)]
 """Points of the rating scale, and beyond its ends."""

@@ -12,7 +12,7 @@ from analysis.paper.audit.page import as_json, as_text, counts, page
 from analysis.paper.audit.paper_file import PaperFile, load_paper_file
 from analysis.paper.audit.run import Finding
 from analysis.report.page import write_page
-from experiments.config.canonical import sha256
+from experiments.config.setup import sha256
 from experiments.load import ConfigError, find
 from experiments.record import storage
 from experiments.record.provenance import provenance

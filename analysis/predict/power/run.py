@@ -20,7 +20,7 @@ from analysis.predict.power.studies import PUBLISHED, Chunk, run_chunk
 from analysis.predict.power.words import as_text, assumptions
 from analysis.report.page import write_page
 from analysis.report.terminal import Progress
-from experiments.config.canonical import sha256
+from experiments.config.setup import sha256
 from experiments.record import storage
 from experiments.record.provenance import provenance
 

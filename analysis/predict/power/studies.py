@@ -17,7 +17,7 @@ from analysis.paper.paper import PublishedDirection, PublishedExperiment
 from analysis.predict.power.felt import Felt, felt_counts
 from analysis.predict.power.planned import Findings, Tally, analysed_directions, analysed_ratings, tallied
 from device.words import DIRECTIONS
-from experiments.config.canonical import canonical_json
+from experiments.config.setup import canonical_json
 from experiments.design.streams import generator
 from experiments.direction.config import DirectionConfig, Rates
 from experiments.direction.observer import probit_of_forward
@@ -132,7 +132,7 @@ def scaled_means(law: Ratings, methods: tuple[str, ...], effect: float) -> Score
 
 
 def on_scale(values: Scores, scale: RatingScale) -> Scores:
-    """`experiments.session.scale.on_scale` of many values."""
+    """`experiments.session.steps.on_scale` of many values."""
     steps = np.rint((np.clip(values, scale.minimum, scale.maximum) - scale.minimum) / scale.grain)
     decimals = max(0, -int(np.floor(np.log10(scale.grain)))) + 2
     return np.round(scale.minimum + steps * scale.grain, decimals)

@@ -31,9 +31,8 @@ from analysis.summary.sections.sections import obtained_text, write_report
 from analysis.summary.summary import summarize
 from device.parameters import GunParameters
 from experiments.clock import VirtualClock
-from experiments.config.canonical import sha256
 from experiments.config.models import StudyConfig
-from experiments.config.setup import Setup
+from experiments.config.setup import Setup, sha256
 from experiments.design.streams import Stream, generator
 from experiments.direction.config import DirectionConfig
 from experiments.load import ConfigError, load_setup, load_study

@@ -5,8 +5,7 @@ from __future__ import annotations
 import time
 from typing import Any
 
-from experiments.doctor.figures import Stage
-from experiments.doctor.spread import percentile
+from experiments.doctor.figures import Stage, percentile
 from experiments.screens.participant.toolkit import load, writable_home
 
 FRAMES = 60

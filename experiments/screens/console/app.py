@@ -1,4 +1,4 @@
-"""The console as a program: the run in a thread of its own, the window in the main one."""
+"""The console as a program: the run in a thread of its own, its screen, and the window in Qt's."""
 
 from __future__ import annotations
 
@@ -13,6 +13,7 @@ from typing import Any
 from PyQt6.QtCore import QEventLoop, QObject, QTimer, pyqtSignal
 from PyQt6.QtWidgets import QApplication
 
+from device import DeviceError, Gun, GunStatus
 from experiments.clock import Clock
 from experiments.config.setup import Setup
 from experiments.design.plan import Plan
@@ -20,18 +21,79 @@ from experiments.live_run import LiveRun, RunStopped, Screen
 from experiments.load import ConfigError
 from experiments.record.journal import JournalError
 from experiments.run import Finished, Request, run
-from experiments.screens.console import display, tone
+from experiments.screens.console import tone, windows
 from experiments.screens.console.beside import ParticipantSide
-from experiments.screens.console.messages import Began, Ended, Message
-from experiments.screens.console.screen import ConsoleScreen
-from experiments.screens.console.signals import signals_to
+from experiments.screens.console.messages import Began, Ended, GunSeen, Message, Saved, Shown, Trouble
 from experiments.screens.console.view import About
 from experiments.screens.console.window import Bridge, ConsoleWindow
-from experiments.screens.console.windows import let_go, open_as_left
+from experiments.screens.console.windows import let_go, open_as_left, signals_to
 from experiments.screens.synthetic import observer_of
 from experiments.session import events
 from experiments.session.events import Hand
+from experiments.session.remarks import Noted, Remark
+from experiments.session.states import Position
+from experiments.session.steps import Outcome, Step
 from experiments.study.places import PlaceError
+
+GUN_LOOK_S = 0.2
+"""How often the gun's state is looked at."""
+
+
+class ConsoleScreen:
+    """Shows a run in a window, which offers what its keys and buttons mean. `tell` takes messages to it.
+
+    `beside` is the participant's own screen, where there is one.
+    """
+
+    def __init__(self, tell: Callable[[Message], None], beside: ParticipantSide | None = None) -> None:
+        self._tell, self._beside = tell, beside
+        self._stop_looking = threading.Event()
+
+    def begin(self, live: LiveRun) -> None:
+        """Show where the run stands, and look after the gun from now on."""
+        self._tell(Began(live=live))
+        if self._beside is not None:
+            noise = self._beside.begin(live, self._tell)
+            if noise:
+                live.remark(Noted(trial=None, text=noise))
+        threading.Thread(target=self._look, args=(live.gun,), daemon=True, name="gun-look").start()
+
+    def end(self) -> None:
+        """Look no more, and let the participant's screen go."""
+        self._stop_looking.set()
+        if self._beside is not None:
+            threading.Thread(target=self._beside.close, daemon=True).start()
+
+    def show(self, position: Position) -> None:
+        """Have a position shown, on the participant's screen as well."""
+        self._tell(Shown(position=position))
+        if self._beside is not None:
+            self._beside.follow(position)
+
+    def act(self, position: Position, until_s: float | None) -> None:
+        """The window acts whenever a key does."""
+
+    def acknowledge(self, step: Step | None, word: Outcome | Remark) -> None:
+        """Show that it is safe."""
+        self._tell(Saved(step=step, word=word))
+
+    def trouble(self, text: str) -> None:
+        """Show what went wrong."""
+        self._tell(Trouble(text=text))
+
+    def gun_seen(self, status: GunStatus | None, fault: str) -> None:
+        """Show what the gun itself says."""
+        self._tell(GunSeen(status=status, fault=fault))
+
+    def _look(self, gun: Gun) -> None:
+        """Look at the gun until the run ends."""
+        while not self._stop_looking.is_set():
+            try:
+                self.gun_seen(gun.status(), "")
+            except DeviceError as error:
+                self.gun_seen(None, str(error))
+            self._stop_looking.wait(GUN_LOOK_S)
+
 
 WAKE_MS = 100
 SWITCH_S = 0.0005
@@ -52,7 +114,7 @@ def _only_application() -> QApplication:
     """Made once and kept: Qt's windows live only as long as it."""
     made = QApplication(["recoil"])
     made.setQuitOnLastWindowClosed(False)  # one window may follow the other
-    display.listen()
+    windows.listen()
     return made
 
 
@@ -195,7 +257,7 @@ def run_console(
     wake = QTimer()  # lets Python look at signals such as Ctrl-C while Qt waits
     wake.timeout.connect(lambda: _leave_without_window(loop, console))
     wake.start(WAKE_MS)
-    keep = display.on_loss(console.lose_display)
+    keep = windows.on_loss(console.lose_display)
     with signals_to(console.leave), _quick_threads():
         console.start()
         watch(console)

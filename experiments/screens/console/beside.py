@@ -15,7 +15,7 @@ from experiments.config.setup import Setup
 from experiments.live_run import LiveRun
 from experiments.screens.console.messages import Message, ParticipantSeen, Trouble
 from experiments.screens.participant.link import ParticipantLink
-from experiments.screens.participant.mailbox import ParticipantError
+from experiments.screens.participant.process import ParticipantError
 from experiments.screens.participant.words import (
     BETWEEN,
     AskDescription,

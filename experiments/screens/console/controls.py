@@ -23,11 +23,11 @@ from experiments.screens.console.keys import (
     shown_key,
     why_not,
 )
-from experiments.screens.console.needs import Beside, View
+from experiments.screens.console.messages import Beside, View
 from experiments.screens.texts import FLAG_RULE, one_line, short_place, typed_number
 from experiments.session import events
-from experiments.session.entries import trial_at, value
 from experiments.session.events import Event, Hand, Press
+from experiments.session.history import trial_at, value
 from experiments.session.judging import REARM_HELD_S
 from experiments.session.remarks import flag_word
 from experiments.session.states import EMERGENCY, Position, State

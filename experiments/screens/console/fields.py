@@ -1,8 +1,9 @@
-"""Widgets that Qt has almost: text that always has room, a box with a tick, a list that the wheel does not turn."""
+"""Widgets that Qt has almost: text that always has room, boxes with a tick, lists, a question with its answers."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
 from math import ceil
 
 from PyQt6.QtCore import QEvent, QPointF, QRectF, QSize, Qt
@@ -17,9 +18,22 @@ from PyQt6.QtGui import (
     QTextOption,
     QWheelEvent,
 )
-from PyQt6.QtWidgets import QCheckBox, QComboBox, QFrame, QLineEdit, QSizePolicy, QStyle, QStyleOptionButton, QTextEdit
+from PyQt6.QtWidgets import (
+    QCheckBox,
+    QComboBox,
+    QFrame,
+    QHBoxLayout,
+    QLineEdit,
+    QSizePolicy,
+    QStyle,
+    QStyleOptionButton,
+    QTextEdit,
+    QVBoxLayout,
+    QWidget,
+)
 
 from experiments.screens.console import parts, theme
+from experiments.study.register import MAX_REASON, RegisterError, check_reason
 
 
 class Lines(QTextEdit):
@@ -147,3 +161,51 @@ def sheet() -> str:
     QScrollBar::add-line, QScrollBar::sub-line {{ width: 0px; height: 0px; }}
     {moods}
     """
+
+
+WHY = "why? (never a name)"
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Answer:
+    """An answer: what its button says, its key, and what it does with the reason that was typed."""
+
+    text: str
+    key: str
+    do: Callable[[str], None]
+
+
+class Question(QFrame):
+    """Asks one thing, until it is answered or taken back."""
+
+    def __init__(self, text: str, answers: tuple[Answer, ...], *, reason: str = "") -> None:
+        super().__init__()
+        self.setObjectName("panel")
+        down = QVBoxLayout(self)
+        self.text = Lines("question")
+        self.text.say(text, "ask")
+        down.addWidget(self.text)
+        self.reason = LineEdit()
+        self.reason.setMaxLength(MAX_REASON)
+        self.reason.setPlaceholderText(reason)
+        self.reason.setAccessibleName(reason)
+        self.reason.setVisible(bool(reason))
+        down.addWidget(self.reason)
+        across = QHBoxLayout()
+        for answer in answers:
+            across.addWidget(self._button(answer))
+        down.addLayout(across)
+
+    def _button(self, answer: Answer) -> QWidget:
+        return parts.button(self, answer.text, answer.key, lambda: answer.do(self.reason.text().strip()))
+
+
+def unfit(reason: str) -> str:
+    """Why a reason cannot be kept, in one sentence; empty if it can."""
+    if not reason:
+        return "Type why, first."
+    try:
+        check_reason(reason)
+    except RegisterError as error:
+        return f"{error}."
+    return ""

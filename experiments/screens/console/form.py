@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any, get_args
 
 from PyQt6.QtCore import Qt, pyqtSignal
@@ -11,9 +11,11 @@ from PyQt6.QtGui import QGuiApplication, QScreen
 from PyQt6.QtWidgets import QFormLayout, QFrame, QLabel, QScrollArea, QSizePolicy, QVBoxLayout, QWidget
 
 from experiments.config.models import Fact, Handedness, Sex
+from experiments.config.setup import Setup
+from experiments.run import Again
 from experiments.screens.console import parts
 from experiments.screens.console.fields import LineEdit, Lines, ListBox, TickBox
-from experiments.study.beginnings import Entered, typed_facts
+from experiments.study.enrolment import Entered, typed_facts
 from experiments.study.study import Participant
 
 _LEVELS: dict[str, tuple[str, ...]] = {"sex": get_args(Sex), "handedness": get_args(Handedness)}
@@ -57,9 +59,9 @@ class Form(QFrame):
         fields.setObjectName("form")
         form.setRowWrapPolicy(QFormLayout.RowWrapPolicy.WrapLongRows)
         form.setFieldGrowthPolicy(QFormLayout.FieldGrowthPolicy.ExpandingFieldsGrow)
-        for name, field in self._rows():
-            field.setAccessibleName(name)
-            form.addRow(_beside_its_field(name), field)
+        for name, widget in self._rows():
+            widget.setAccessibleName(name)
+            form.addRow(_beside_its_field(name), widget)
         scroll = QScrollArea()
         scroll.setWidget(fields)
         scroll.setWidgetResizable(True)
@@ -74,7 +76,7 @@ class Form(QFrame):
     def _rows(self) -> list[tuple[str, QWidget]]:
         rows: list[tuple[str, QWidget]] = [("Experiment", self.experiment), ("Code", self.code)]
         rows += [("Code, read back", self.code_again)]
-        rows += [(_FACT_TEXT[fact], field) for fact, field in self.facts.items()]
+        rows += [(_FACT_TEXT[fact], widget) for fact, widget in self.facts.items()]
         rows += [("Participant", self.own_screen), ("", self.own_keys), ("", self.noise)]
         return rows + ([("Their monitor", self.monitor)] if self.monitor.count() > 1 else [])
 
@@ -108,7 +110,7 @@ class Form(QFrame):
             participant_id=self.participant_id,
             read_back=self.code_again.text().strip(),
             experiment=self.experiment.currentText(),
-            facts={fact: _text(field) for fact, field in self.facts.items()},
+            facts={fact: _text(field) for fact, widget in self.facts.items()},
         )
 
     def beside(self) -> Beside:
@@ -131,11 +133,11 @@ class Form(QFrame):
             self._typed = None
 
     def _fill(self, values: dict[str, str]) -> None:
-        for fact, field in self.facts.items():
-            if isinstance(field, LineEdit):
-                field.setText(values[fact])
+        for fact, widget in self.facts.items():
+            if isinstance(widget, LineEdit):
+                widget.setText(values[fact])
             else:
-                field.setCurrentText(values[fact])
+                widget.setCurrentText(values[fact])
 
 
 def _beside_its_field(name: str) -> QLabel:
@@ -166,3 +168,33 @@ def monitors() -> list[str]:
 def _monitor(number: int, screen: QScreen) -> str:
     size = screen.size() * screen.devicePixelRatio()
     return f"{number}: {screen.name()}, {size.width()} × {size.height()}"
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Choice:
+    """What was chosen: who does which experiment, and how. `anew_reason`: why an unfinished run is set aside."""
+
+    setup: Setup[Any]
+    participant_id: str
+    again: Again = "ask"
+    anew_reason: str = ""
+    practice: bool = False
+    training: bool = False
+    participant_screen: bool = False
+    participant_keys: bool = False
+    noise: bool = False
+    monitor: int | None = None
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Opening:
+    """How a start window opens: on which gun, with what ticked, with whom (empty: who comes next), and what it says.
+
+    `named` is the experiment whose config was named when the program was started; later windows have none.
+    """
+
+    gun: str
+    named: str = ""
+    beside: Beside = field(default_factory=Beside)
+    participant_id: str = ""
+    said: str = ""

@@ -10,8 +10,8 @@ from dataclasses import dataclass
 from typing import Literal
 
 from experiments.session import events
-from experiments.session.entries import What
 from experiments.session.events import Event
+from experiments.session.history import What
 from experiments.session.states import No, Position, State, change_of
 
 BOUNCE_S = 0.02

@@ -19,17 +19,14 @@ from experiments.record.journal import JournalError
 from experiments.run import Finished, Request, UnfinishedRun
 from experiments.screens.console.app import Console, application, run_console
 from experiments.screens.console.beside import WAIT, ParticipantSide
-from experiments.screens.console.form import Beside, monitors
-from experiments.screens.console.opening import Choice, Opening
-from experiments.screens.console.rater import Rater
-from experiments.screens.console.signals import signals_to
+from experiments.screens.console.form import Beside, Choice, Opening, monitors
 from experiments.screens.console.start import choose
-from experiments.screens.console.unfinished import ask
-from experiments.screens.console.visual import VisualParticipant
-from experiments.screens.console.waiting import while_shown
+from experiments.screens.console.unfinished import ask, while_shown
+from experiments.screens.console.visual import Rater, VisualParticipant
+from experiments.screens.console.windows import signals_to
 from experiments.screens.participant.link import ParticipantLink
 from experiments.screens.participant.look import Look
-from experiments.screens.participant.mailbox import ParticipantError
+from experiments.screens.participant.process import ParticipantError
 from experiments.screens.participant.words import NoiseIs
 from experiments.session.events import Hand
 from experiments.study.places import PlaceError

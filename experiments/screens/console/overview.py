@@ -7,7 +7,7 @@ from experiments.design.plan import Trial
 from experiments.screens import texts
 from experiments.screens.console.messages import GunSeen
 from experiments.screens.console.view import About, Seen
-from experiments.session.entries import entries
+from experiments.session.history import entries
 from experiments.session.remarks import (
     AnswerCorrected,
     DescriptionCorrected,

@@ -8,8 +8,7 @@ from datetime import datetime, timedelta
 
 from experiments.config.models import ExperimentConfig
 from experiments.design.plan import Plan, Trial
-from experiments.session.entries import done, together
-from experiments.session.history import Told
+from experiments.session.history import Told, done, together
 from experiments.session.remarks import Remark
 from experiments.session.states import Position, State
 from experiments.session.steps import Answered, Outcome, Presented, Rated, Rest, Rested, Step, trial_of

@@ -21,16 +21,13 @@ from experiments.config.setup import Setup
 from experiments.record.journal import JournalError
 from experiments.run import Again
 from experiments.screens.console import parts, people, theme
-from experiments.screens.console.fields import Lines, sheet
-from experiments.screens.console.form import Form
+from experiments.screens.console.fields import WHY, Answer, Lines, Question, sheet, unfit
+from experiments.screens.console.form import Choice, Form, Opening
 from experiments.screens.console.keyboard import FreshShortcuts
-from experiments.screens.console.opening import Choice, Opening
-from experiments.screens.console.people_table import PeopleTable
-from experiments.screens.console.question import WHY, Answer, Question, unfit
+from experiments.screens.console.people import PeopleTable
 from experiments.screens.console.shot_page import ShotPage
-from experiments.screens.console.signals import signals_to
-from experiments.screens.console.windows import let_go, open_as_left, remember, scaled, type_scale
-from experiments.study import beginnings, enrolment
+from experiments.screens.console.windows import let_go, open_as_left, remember, scaled, signals_to, type_scale
+from experiments.study import enrolment
 from experiments.study.places import PlaceError
 from experiments.study.progress import Overview, StudyFolder, overview
 from experiments.study.study import Participant, RunStanding
@@ -150,7 +147,7 @@ class StartWindow(QWidget):
         """Show what is on record of the code, and the experiment that comes next for them in the order of the study."""
         person = self._person(self.form.participant_id)
         self.form.show_facts(person)
-        self.form.experiment.setCurrentText(beginnings.next_experiment(person, self._study.experiments))
+        self.form.experiment.setCurrentText(enrolment.next_experiment(person, self._study.experiments))
         self._show_choice()
 
     def _show_choice(self) -> None:

@@ -1,20 +1,22 @@
-"""An unfinished run is there: the console shows when it stopped, and asks."""
+"""An unfinished run is there: the console shows when it stopped, and asks; and what is waited for is said."""
 
 from __future__ import annotations
 
+import threading
 import time
+from collections.abc import Callable
 from dataclasses import replace
+from typing import TypeVar
 
-from PyQt6.QtWidgets import QDialog, QPushButton, QVBoxLayout
+from PyQt6.QtCore import QEventLoop, Qt, QTimer
+from PyQt6.QtWidgets import QDialog, QLabel, QPushButton, QVBoxLayout
 
 from experiments.record.journal import JournalError
 from experiments.run import Again, Request
 from experiments.screens.console import people, theme
-from experiments.screens.console.fields import Lines, sheet
+from experiments.screens.console.fields import WHY, Answer, Lines, Question, sheet, unfit
 from experiments.screens.console.keyboard import FreshShortcuts
-from experiments.screens.console.question import WHY, Answer, Question, unfit
-from experiments.screens.console.signals import signals_to
-from experiments.screens.console.windows import let_go
+from experiments.screens.console.windows import let_go, signals_to
 from experiments.study.places import place
 from experiments.study.progress import run_standing
 
@@ -80,3 +82,34 @@ def ask(request: Request) -> Request | None:
     if signalled:
         raise KeyboardInterrupt(signalled[0])
     return decided
+
+
+LOOK_MS = 30
+Made = TypeVar("Made")
+
+
+def while_shown(text: str, make: Callable[[], Made]) -> Made:
+    """What `make` gives back, done in a thread of its own while a window shows the text. Raises what it raises."""
+    shown = QLabel(text)
+    shown.setWindowTitle("Recoil – please wait")
+    shown.setStyleSheet(f"{theme.sheet('dark')} QLabel {{ font-size: 26px; padding: 40px; }}")
+    shown.setAlignment(Qt.AlignmentFlag.AlignCenter)
+    made: list[Made] = []
+    errors: list[BaseException] = []
+
+    def work() -> None:
+        try:
+            made.append(make())
+        except BaseException as error:  # noqa: BLE001 - raised again where it is waited for
+            errors.append(error)
+
+    loop, look, thread = QEventLoop(), QTimer(), threading.Thread(target=work, daemon=True, name="waiting")
+    look.timeout.connect(lambda: None if thread.is_alive() else loop.quit())
+    shown.show()
+    thread.start()
+    look.start(LOOK_MS)
+    loop.exec()
+    shown.close()
+    if errors:
+        raise errors[0]
+    return made[0]

@@ -14,8 +14,7 @@ from experiments.design.plan import Plan, Trial
 from experiments.screens import texts
 from experiments.screens.console.keys import Name, shown_key
 from experiments.screens.console.messages import Ended, GunSeen, ParticipantSeen
-from experiments.session.entries import trial_at, value
-from experiments.session.history import Told
+from experiments.session.history import Told, trial_at, value
 from experiments.session.states import Position, State
 from experiments.session.steps import Ask, Describe, Prepare, Present, Rate, Rest
 

@@ -23,11 +23,13 @@ from experiments.screens.console import overview, parts, theme, tone, view
 from experiments.screens.console.beside import ParticipantSide
 from experiments.screens.console.buttons import Buttons
 from experiments.screens.console.controls import Controls
+from experiments.screens.console.instruction import FITS, Notice, TextFields, TextPage
 from experiments.screens.console.keyboard import Keyboard
 from experiments.screens.console.keys import Name, Typing
 from experiments.screens.console.messages import (
     Began,
     Ended,
+    Field,
     GunSeen,
     Message,
     ParticipantSeen,
@@ -35,11 +37,8 @@ from experiments.screens.console.messages import (
     Shown,
     Trouble,
 )
-from experiments.screens.console.needs import Field
-from experiments.screens.console.notice import FITS, Notice, TextPage
 from experiments.screens.console.pace import Pace
 from experiments.screens.console.side import Bars, Side
-from experiments.screens.console.text_fields import TextFields
 from experiments.screens.console.view import About, Seen
 from experiments.screens.console.windows import remember, scaled
 from experiments.screens.texts import saved_text

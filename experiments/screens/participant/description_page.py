@@ -5,8 +5,7 @@ from __future__ import annotations
 import math
 from typing import Any
 
-from experiments.screens.participant.confirming import ENTER, Button, heading, hint
-from experiments.screens.participant.pages import QuietPage
+from experiments.screens.participant.pages import ENTER, Button, QuietPage, heading, hint
 from experiments.screens.participant.stage import Box, Stage
 from experiments.screens.participant.words import AskDescription, DescriptionGiven
 

@@ -1,15 +1,69 @@
-"""What is typed in the console's window: a rating, words, or a line that was asked for."""
+"""The instruction in large type, the fields and the line that are typed in, and the page of text over them."""
 
 from __future__ import annotations
 
-from PyQt6.QtWidgets import QLineEdit, QStackedWidget, QWidget
+from PyQt6.QtWidgets import QLabel, QLineEdit, QPlainTextEdit, QStackedWidget, QVBoxLayout, QWidget
 
 from experiments.screens.console import parts
 from experiments.screens.console.keys import field_of
-from experiments.screens.console.needs import Field
-from experiments.session.entries import Entry
+from experiments.screens.console.messages import Field
+from experiments.screens.console.view import Instruction
+from experiments.session.history import Entry
 from experiments.session.states import Position
 from experiments.session.steps import Rate
+
+SIZES_PX = {"title": 46, "damper": 34, "detail": 23}
+FITS = (1.0, 0.88, 0.76, 0.66, 0.56)
+"""How far the type shrinks."""
+
+
+class Notice:
+    """What to do now, the damper, and what belongs to it: three labels."""
+
+    def __init__(self) -> None:
+        self.title, self.damper, self.detail = self.labels = [parts.label(name) for name in SIZES_PX]
+
+    def put(self, shown: Instruction) -> None:
+        """Show an instruction."""
+        for label, text in zip(self.labels, (shown.title, shown.damper, shown.detail), strict=True):
+            if label.text() != text:
+                label.setText(text)
+            label.setVisible(bool(text))
+        parts.set_mood(self.title, shown.mood)
+        parts.set_mood(self.damper, shown.mood)
+
+    def size(self, factor: float) -> None:
+        """Give the type so many times its own size."""
+        for label, size_px in zip(self.labels, SIZES_PX.values(), strict=True):
+            _size(label, round(size_px * factor), bold=label is not self.detail)
+
+
+class TextPage(QWidget):
+    """A page of text that is only looked at, and below it what was said last."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self._title, self.said = parts.label("place"), parts.label("saved")
+        self._text = QPlainTextEdit()
+        self._text.setReadOnly(True)
+        self._text.setFocusPolicy(parts.NO_FOCUS)
+        down = QVBoxLayout(self)
+        down.setContentsMargins(10, 6, 10, 6)
+        for widget in (self._title, self._text, self.said):
+            down.addWidget(widget)
+
+    def put(self, title: str, lines: list[str]) -> None:
+        """Show lines of text."""
+        self._title.setText(title)
+        self._text.setPlainText("\n".join(lines))
+
+
+def _size(label: QLabel, size_px: int, *, bold: bool) -> None:
+    """Give a label's type a size in pixels; the window's style sheet would win over a font."""
+    style = f"font-size: {max(8, size_px)}px; font-weight: {'bold' if bold else 'normal'};"
+    if label.styleSheet() != style:
+        label.setStyleSheet(style)
+
 
 _Belongs = tuple[str | None, int, Entry | None]
 """What a field is for: its kind, the number of the step, and the entry that is corrected."""
