@@ -22,7 +22,11 @@ MAX_EFFECT = 123
 """Waveforms in the library of the vibration driver (DRV2605)."""
 
 
-class DeviceError(Exception):
+class RecoilError(Exception):
+    """Anything that goes wrong and has a message for people: the root of all errors of this product."""
+
+
+class DeviceError(RecoilError):
     """Anything that goes wrong with a gun."""
 
 

@@ -12,9 +12,9 @@ from device.limits import MAX_SHOTS_PER_MINUTE, DriveHistory, Load, load_of
 from device.methods import drive_of, rendering_of
 from device.parameters import GunParameters
 from device.words import Drive, Pulse
+from experiments.config.door import ConfigError
 from experiments.config.gun import GunConfig
 from experiments.config.setup import Setup
-from experiments.load import ConfigError
 from experiments.preference.config import PreferenceConfig
 
 

@@ -15,6 +15,7 @@ from dataclasses import dataclass, replace
 from typing import Protocol
 
 from device import DeviceError, Gun, GunStatus
+from device.words import RecoilError
 from experiments.clock import Clock
 from experiments.design.plan import Plan, Trial
 from experiments.record.journal import Journal, JournalGone
@@ -30,7 +31,7 @@ DISARMED_S = 10.0
 """The longest that a run waits for a disarming that began beside it: a gun on a line gives up before."""
 
 
-class RunStopped(Exception):  # noqa: N818 - a stop is not an error
+class RunStopped(RecoilError):  # noqa: N818 - a stop is not an error
     """The run stops here on purpose or for want of a gun; it can be resumed.
 
     `saved`: the answers that were read back from the disk afterwards; `None` if they were not.

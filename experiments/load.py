@@ -1,27 +1,17 @@
-"""Configs from disk: found, read and checked at the door. Every refusal names file, line, key, value and rule."""
+"""Configs from disk: found, and checked with what belongs to them."""
 
 from __future__ import annotations
 
 import csv
-import json
-import re
-import tomllib
 from collections.abc import Iterator
 from pathlib import Path
-from typing import Any, TypeVar
-
-from pydantic import BaseModel, ValidationError
+from typing import Any
 
 from experiments.catalogue import CATALOGUE
+from experiments.config.door import ConfigError, checked, load, read_toml
 from experiments.config.gun import GunConfig
 from experiments.config.models import ExperimentConfig, StudyConfig
 from experiments.config.setup import Setup
-
-SomeModel = TypeVar("SomeModel", bound=BaseModel)
-
-
-class ConfigError(Exception):
-    """A config that cannot be used; the message names file, place, value and rule, a line for each finding."""
 
 
 def shipped_folder() -> Path:
@@ -51,7 +41,7 @@ def load_setup(name: str) -> Setup[Any]:
     if not isinstance(kind, str) or kind not in CATALOGUE:
         known = ", ".join(CATALOGUE)
         raise ConfigError(f"{path}: experiment = {kind!r}; must be one of {known} (is it the config of a run?)")
-    config = _checked(CATALOGUE[kind].config, path, table)
+    config = checked(CATALOGUE[kind].config, table, path)
     gun = load_gun(path.parent / config.gun)
     setup = Setup(config=config, gun=gun, source=path, answers=_answers(path, config))
     _check_methods(path, setup)
@@ -63,66 +53,13 @@ def load_gun(path: Path) -> GunConfig:
     if not path.is_file():
         what = "a folder, not a file" if path.is_dir() else "no such file"
         raise ConfigError(f"{path}: {what}; the config's key `gun` names it")
-    return _checked(GunConfig, path, read_toml(path))
+    return load(GunConfig, path)
 
 
 def load_study(name: str) -> tuple[StudyConfig, Path]:
     """A study's config and the folder it lies in."""
     path = find(name)
-    return _checked(StudyConfig, path, read_toml(path)), path.parent
-
-
-def read_toml(path: Path) -> dict[str, Any]:
-    """The tables of a TOML file, unchecked."""
-    try:
-        return tomllib.loads(path.read_text(encoding="utf-8"))
-    except UnicodeDecodeError as error:
-        raise ConfigError(f"{path}: byte {error.start}: not UTF-8; save the file as UTF-8") from error
-    except (ValueError, RecursionError) as error:  # also numbers and nestings beyond all reason
-        raise ConfigError(f"{path}: not TOML: {error}") from error
-    except OSError as error:
-        raise ConfigError(f"{path}: cannot be read ({error.strerror})") from error
-
-
-def _checked(model: type[SomeModel], path: Path, table: dict[str, Any]) -> SomeModel:
-    try:
-        # JSON on the way: strict types, while TOML's arrays may become tuples
-        return model.model_validate_json(json.dumps(table, default=_no_json))
-    except ValidationError as error:
-        text = path.read_text(encoding="utf-8")
-        raise ConfigError("\n".join(_finding(path, text, finding) for finding in error.errors())) from error
-
-
-def _no_json(value: object) -> dict[str, str]:
-    """Dates and times, which no config has: as something that is neither text nor number."""
-    return {"date": str(value)}
-
-
-def _finding(path: Path, text: str, finding: Any) -> str:
-    keys = [str(part) for part in finding["loc"]]
-    line = line_of(text, keys)
-    value = finding["input"]
-    shown = f" = {value!r}" if keys and isinstance(value, str | int | float | bool) else ""
-    rule = finding["msg"].removeprefix("Value error, ")
-    rule = "unknown key; remove it or correct its spelling" if finding["type"] == "extra_forbidden" else rule
-    return f"{path}{f':{line}' if line else ''}: {'.'.join(keys)}{shown}{': ' if keys else ''}{rule}"
-
-
-def line_of(text: str, keys: list[str]) -> int | None:
-    r"""The line of a dotted key in a TOML text, or of the nearest table around it; `None` for the whole file.
-
-    >>> line_of("a = 1\n[b]\nc = 2", ["b", "c"]), line_of("[b]", ["b", "missing"]), line_of("a = 1", [])
-    (3, 1, None)
-    """
-    places: dict[tuple[str, ...], int] = {}
-    table: tuple[str, ...] = ()
-    for number, line in enumerate(text.split("\n"), start=1):
-        if header := re.match(r"\s*\[([^\[\]]+)\]", line):
-            table = tuple(part.strip(' "') for part in header[1].split("."))
-            places.setdefault(table, number)
-        elif entry := re.match(r"\s*([\w.\-\"]+)\s*=", line):
-            places.setdefault((*table, *entry[1].replace('"', "").split(".")), number)
-    return next((places[tuple(keys[:n])] for n in range(len(keys), 0, -1) if tuple(keys[:n]) in places), None)
+    return load(StudyConfig, path), path.parent
 
 
 def _check_methods(path: Path, setup: Setup[Any]) -> None:

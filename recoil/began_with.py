@@ -15,8 +15,9 @@ from pathlib import Path
 from typing import Any
 
 from experiments.catalogue import CATALOGUE
+from experiments.config.door import ConfigError
 from experiments.config.toml_text import toml_text
-from experiments.load import ConfigError, load_setup
+from experiments.load import load_setup
 from experiments.record import journal, storage
 from experiments.record.journal import JournalError
 from experiments.study.places import PlaceError

@@ -9,6 +9,7 @@ import sys
 import typer
 
 from analysis.report.terminal import INTERRUPTED, UNUSABLE, say
+from device.words import RecoilError
 from recoil.commands import design, fit, guns, numbers, power, sessions
 
 app = typer.Typer(
@@ -58,21 +59,9 @@ def main() -> None:
     except OSError as error:
         say(f"recoil: {error.filename or 'system'}: {error.strerror or error}")
         sys.exit(UNUSABLE)
-    except Exception as error:
-        if not isinstance(error, _expected()):
-            raise
+    except RecoilError as error:
         say("\n".join(f"recoil: {line}" for line in str(error).splitlines()))
         sys.exit(UNUSABLE)
-
-
-def _expected() -> tuple[type[Exception], ...]:
-    """The errors that have a message for people. Looked up only when something was raised."""
-    from device import DeviceError
-    from experiments.load import ConfigError
-    from experiments.record.journal import JournalError
-    from experiments.study.places import PlaceError
-
-    return ConfigError, PlaceError, JournalError, DeviceError
 
 
 def _interrupt(number: int, _: object) -> None:

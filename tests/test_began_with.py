@@ -11,8 +11,9 @@ from typing import Any
 import pytest
 
 from experiments.clock import VirtualClock
+from experiments.config.door import ConfigError
 from experiments.config.setup import canonical_json, sha256
-from experiments.load import ConfigError, load_setup, shipped_folder
+from experiments.load import load_setup, shipped_folder
 from experiments.record.journal import JournalError, read
 from experiments.run import Request, run
 from experiments.screens.synthetic import synthetic_screen

@@ -9,8 +9,8 @@ import pytest
 
 from analysis.logs.column_map import ColumnMap
 from analysis.logs.reading import Logs, read_logs
-from analysis.logs.toml_model import load_model
 from analysis.summary.summary import summarize
+from experiments.config.door import load
 from tests.log_files import TextRow, trial_rows, write_study
 
 EXAMPLE = Path(__file__).parent.parent / "configs" / "examples" / "columns.toml"
@@ -38,7 +38,7 @@ def _write(path: Path, rows: list[list[str]], header: tuple[str, ...] = HEADER, 
 def _read(path: Path, text: str | None = None) -> Logs:
     toml = path.parent / "map.toml"
     toml.write_text(EXAMPLE.read_text(encoding="utf-8") if text is None else text, encoding="utf-8")
-    return read_logs([path], mapping=load_model(ColumnMap, toml))
+    return read_logs([path], mapping=load(ColumnMap, toml))
 
 
 def test_psychopys_files_give_the_statistics_of_the_same_answers_in_recoils_own(tmp_path: Path) -> None:
@@ -144,7 +144,7 @@ def test_recoils_own_logs_may_lie_beside_them(tmp_path: Path) -> None:
 
 
 FAULTS: dict[str, tuple[Callable[[str], str], str]] = {
-    "unknown key": (lambda t: t.replace("delimiter =", "separator ="), "key text.separator = ',' is unknown"),
+    "unknown key": (lambda t: t.replace("delimiter =", "separator ="), "text.separator = ',': unknown key"),
     "no experiment": (lambda t: t.replace('experiment = "direction"', ""), "key experiment is missing"),
     "no response": (lambda t: t.replace('response = "key', '# "'), "columns.response is missing"),
     "level": (lambda t: t.replace('up = "forward"', 'up = "left"'), "key values.response.up = 'left'"),
@@ -154,7 +154,7 @@ FAULTS: dict[str, tuple[Callable[[str], str], str]] = {
     "both": (lambda t: t.replace("# file_name", "file_name"), "either `column` or `file_name`"),
     "pattern": (lambda t: t.replace('column = "participant"', 'file_name = "P.."'), "has 0 groups"),
     "skip": (lambda t: t.replace("empty = true", ""), "give `values`, or `empty = true`"),
-    "not TOML": (lambda t: t + "[", "not a TOML file"),
+    "not TOML": (lambda t: t + "[", "not TOML"),
 }  # fmt: skip
 
 
@@ -164,7 +164,7 @@ def test_a_bad_map_is_refused_with_file_key_value_and_rule(case: str, tmp_path: 
     path = tmp_path / "map.toml"
     path.write_text(spoil(EXAMPLE.read_text(encoding="utf-8")), encoding="utf-8")
     with pytest.raises(ValueError, match=r"map[.]toml: ") as refused:
-        load_model(ColumnMap, path)
+        load(ColumnMap, path)
     assert words in str(refused.value)
 
 

@@ -22,7 +22,7 @@ from device.limits import DriveHistory, load_of
 from device.parameters import GunParameters
 from device.physics.trains import highest_rate_Hz
 from device.words import Pulse
-from experiments.load import ConfigError
+from experiments.config.door import ConfigError
 from experiments.synthetic.percept import PerceptParameters
 from tests.conftest import RECOIL, Recoil
 from tests.waiting import PATIENCE_S, wait_for

@@ -22,6 +22,7 @@ from hypothesis import strategies as st
 
 from device import LinkError
 from experiments.clock import VirtualClock
+from experiments.config.door import ConfigError
 from experiments.config.setup import sha256
 from experiments.doctor import children, verdicts
 from experiments.doctor.checks import Check, carry_out, checks, no_display
@@ -44,7 +45,7 @@ from experiments.doctor.figures import (
 )
 from experiments.doctor.latencies import Latencies, latencies, together
 from experiments.doctor.measures import APPENDS, adapters, appends, ticks
-from experiments.load import ConfigError, find, load_gun
+from experiments.load import find, load_gun
 from experiments.record.journal import Journal
 from experiments.study.places import PlaceError
 from recoil.doctor import as_text

@@ -8,8 +8,8 @@ import pytest
 
 from analysis.logs.exclusions import Effect, Rules, apply_rules
 from analysis.logs.reading import Logs, read_logs
-from analysis.logs.toml_model import load_model
 from analysis.summary.summary import summarize
+from experiments.config.door import load
 from tests.log_files import TextRow, rating_rows, ratings_path, trial_rows, trials_path, write_rows, write_study
 
 EXAMPLE = Path(__file__).parent.parent / "configs" / "examples" / "rules.toml"
@@ -18,7 +18,7 @@ EXAMPLE = Path(__file__).parent.parent / "configs" / "examples" / "rules.toml"
 def _rules(folder: Path, text: str) -> Rules:
     path = folder / "rules.toml"
     path.write_text(text, encoding="utf-8")
-    return load_model(Rules, path)
+    return load(Rules, path)
 
 
 def _spoilt(folder: Path) -> Logs:
@@ -40,7 +40,7 @@ def _forward(row: TextRow) -> TextRow:
 
 @pytest.fixture
 def effect(tmp_path: Path) -> Effect:
-    return apply_rules(_spoilt(tmp_path), load_model(Rules, EXAMPLE))
+    return apply_rules(_spoilt(tmp_path), load(Rules, EXAMPLE))
 
 
 def test_dropped_trials_are_counted_by_participant_and_the_first_rule_that_drops_them(effect: Effect) -> None:

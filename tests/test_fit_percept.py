@@ -22,7 +22,8 @@ from analysis.predict.fit.request import ASSUMED_SPREAD, Request, read
 from analysis.predict.fit.studies import Case, Judged, cases_of, judge, place_of
 from analysis.predict.fit.words import fragment, verdict_sentence
 from device.methods import paper_methods
-from experiments.load import ConfigError, find, load_setup, shipped_folder
+from experiments.config.door import ConfigError
+from experiments.load import find, load_setup, shipped_folder
 from experiments.synthetic.diffusion import People
 from experiments.synthetic.percept import PerceptParameters
 from tests.conftest import Recoil

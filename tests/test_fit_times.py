@@ -13,8 +13,8 @@ from analysis.predict.fit.times import lapse_range
 from analysis.times.first_passage import distribution
 from analysis.times.fit import fit
 from analysis.times.predicted import answered_by
+from experiments.config.door import ConfigError
 from experiments.design.streams import generator
-from experiments.load import ConfigError
 from experiments.synthetic.diffusion_batch import decide_all
 from tests.conftest import Recoil
 from tests.log_files import METHODS, TextRow, trial_rows, trials_path, write_rows

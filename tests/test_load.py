@@ -7,8 +7,9 @@ from typing import NamedTuple
 import pytest
 
 from analysis.predict.check import check
+from experiments.config.door import ConfigError, line_of, read_toml
 from experiments.limits import check_limits
-from experiments.load import ConfigError, find, line_of, load_gun, load_setup, load_study, read_toml, shipped_folder
+from experiments.load import find, load_gun, load_setup, load_study, shipped_folder
 
 EXPERIMENTS = ("direction", "preference")
 DIRECTION, PREFERENCE, GUN = "direction.toml", "preference.toml", "gun.toml"
@@ -99,11 +100,11 @@ BROKEN = {
         "between_set_s",
     ),
     "missing key": Broken(
-        DIRECTION, DIRECTION, "trial_s = 17.0 ", "# ", ("timing.trial_s: Field required",), "[timing]"
+        DIRECTION, DIRECTION, "trial_s = 17.0 ", "# ", ("timing.trial_s: is missing",), "[timing]"
     ),
     "unknown table": Broken(DIRECTION, DIRECTION, "[breaks]", "[brakes]", ("brakes: unknown key",), "[brakes]"),
     "missing table": Broken(
-        PREFERENCE, PREFERENCE, "[description]\ntext", "[rating.description]\ntext", ("description: Field required",)
+        PREFERENCE, PREFERENCE, "[description]\ntext", "[rating.description]\ntext", ("description: is missing",)
     ),
     "text for a number": Broken(
         DIRECTION, DIRECTION, "= 20.0", '= "20"', ("breaks.between_sets_s = '20'", "valid number"), 'sets_s = "20"'

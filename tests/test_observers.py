@@ -8,12 +8,13 @@ import numpy as np
 import pytest
 
 from experiments.clock import VirtualClock
+from experiments.config.door import ConfigError
 from experiments.config.setup import Setup
 from experiments.design.streams import Stream
 from experiments.direction.observer import RatesObserver, TableObserver
 from experiments.direction.observer import observer as direction_observer
 from experiments.direction.plan import make_plan as direction_plan
-from experiments.load import ConfigError, load_setup
+from experiments.load import load_setup
 from experiments.preference.observer import RatingsObserver, draw_ratings
 from experiments.preference.observer import observer as preference_observer
 from experiments.preference.plan import make_plan as preference_plan

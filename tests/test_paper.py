@@ -47,13 +47,13 @@ def test_a_paper_without_claims_and_head_is_read_as_before(tmp_path: Path) -> No
     [
         ('F = "28.45"', "F = 28.45", ["direction.anova.F", "28.45", "string"]),
         ('F = "28.45"', 'F = "28,45"', ["direction.anova.F", "'28,45'", "pattern"]),
-        ('F = "28.45"', 'F = "28.45"\nG = 1', ["direction.anova.G", "1", "no other keys"]),
+        ('F = "28.45"', 'F = "28.45"\nG = 1', ["direction.anova.G", "1", "unknown key"]),
         ('F = "28.45"\n', "", ["direction.anova.F", "missing", "required"]),
         ('p = "0.205"', 'p = "20.5"', ["direction.binomial.0.p", "'20.5'", "above 1"]),
         ('direction = "forward"', 'direction = "left"', ["direction.binomial.0.direction", "'left'", "forward"]),
         ('higher = "asymmetric-1"', 'higher = "ramp"', ["direction", "ramp above vibration", "two of"]),
         ("[participants]\nn = 14", "[participants]\nn = 0", ["participants.n", "0", "greater than or equal to 1"]),
-        ("[participants]", "[participants", ["not a TOML file", "line"]),
+        ("[participants]", "[participants", ["not TOML", "line"]),
     ],
 )
 def test_bad_input_is_one_message_with_file_key_value_and_rule(

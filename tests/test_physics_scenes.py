@@ -8,7 +8,6 @@ from typing import Any
 
 import numpy as np
 import pytest
-from analysis.predict.bench.flops import operations
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
@@ -16,6 +15,7 @@ from device.parameters import DriveOff, Emf
 from device.physics import FIDELITIES, SCENES, GunParameters, Scene, choose, simulate
 from device.physics.contact import compliant_collision, rigid_collision
 from device.physics.scenes import COSTS, FRICTION_N, NEAR, NEEDED, choose_contact, stated_error
+from tests.benchmarks.flops import operations
 from tests.conftest import Recoil
 
 PAPER = GunParameters()

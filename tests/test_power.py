@@ -18,8 +18,9 @@ from analysis.predict.jobs import JobError, on_cluster, on_processes
 from analysis.predict.power import run as feature
 from analysis.predict.power.grid import Request, make_grid
 from analysis.predict.power.planned import ALL_PAIRS, ANOVA
+from experiments.config.door import ConfigError
 from experiments.config.models import leaves
-from experiments.load import ConfigError, load_setup, shipped_folder
+from experiments.load import load_setup, shipped_folder
 from tests.conftest import RECOIL, Recoil
 from tests.waiting import PATIENCE_S, wait_for
 

@@ -14,11 +14,12 @@ from hypothesis import strategies as st
 
 from experiments import catalogue
 from experiments.clock import VirtualClock
+from experiments.config.door import ConfigError
 from experiments.config.models import EligibilityConfig, Handedness, Sex, StudyConfig
 from experiments.config.setup import Setup, canonical_json, sha256
-from experiments.load import ConfigError, load_setup, load_study, shipped_folder
-from experiments.study.places import place, used_rows
-from experiments.study.progress import ANSWERED_BY, next_row
+from experiments.load import load_setup, load_study, shipped_folder
+from experiments.study.places import next_row, place, used_rows
+from experiments.study.progress import ANSWERED_BY
 from experiments.study.register import append, entry
 from experiments.study.study import (
     Facts,

@@ -13,7 +13,7 @@ import pytest
 
 from analysis.predict.simulate import sweep
 from device.physics import GunParameters, simulate
-from experiments.load import ConfigError
+from experiments.config.door import ConfigError
 from tests.conftest import RECOIL
 from tests.waiting import PATIENCE_S, wait_for
 

@@ -21,7 +21,7 @@ from typing import Annotated, Literal, Self
 
 from pydantic import AfterValidator, Field, model_validator
 
-from analysis.logs.toml_model import Model
+from experiments.config.door import Model
 
 Text = Annotated[str, Field(min_length=1, max_length=500)]
 MEASURES = {"direction": ("method", "direction", "response"), "preference": ("method", "rating")}

@@ -36,7 +36,7 @@ from pydantic import Field, model_validator
 from analysis.logs.completeness import rows_without, tidied
 from analysis.logs.frames import STUDY
 from analysis.logs.reading import Logs
-from analysis.logs.toml_model import Model
+from experiments.config.door import Model
 
 Share = Annotated[float, Field(ge=0, le=1)]
 Seconds = Annotated[float, Field(ge=0, le=86_400)]

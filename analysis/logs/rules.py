@@ -7,6 +7,7 @@ import re
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 
+from device.words import RecoilError
 from experiments.record import columns
 from experiments.record.columns import Column
 
@@ -20,7 +21,7 @@ _INTEGER = re.compile(r"[+-]?[0-9]{1,15}")
 _NUMBER = re.compile(r"[+-]?([0-9]+\.?[0-9]*|\.[0-9]+)([eE][+-]?[0-9]{1,4})?")
 
 
-class BadLogError(Exception):
+class BadLogError(RecoilError):
     """A table that breaks a rule: what, and where. It never leaves the room."""
 
     def __init__(self, message: str, line: int | None = None, column: str | None = None) -> None:

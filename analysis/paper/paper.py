@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-import tomllib
 from decimal import Decimal
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
-from pydantic import AfterValidator, BaseModel, ConfigDict, Field, StringConstraints, ValidationError, model_validator
+from pydantic import AfterValidator, Field, StringConstraints, model_validator
+
+from experiments.config.door import Model, load
 
 Printed = Annotated[str, StringConstraints(pattern=r"^[0-9]+(\.[0-9]+)?$")]
 """A number as the paper prints it, such as "28.45": decimal digits in quotes."""
@@ -24,11 +25,7 @@ PrintedP = Annotated[Printed, AfterValidator(_is_share)]
 Count = Annotated[int, Field(ge=1)]
 
 
-class _Section(BaseModel):
-    model_config = ConfigDict(extra="forbid", frozen=True, strict=True)
-
-
-class PaperHead(_Section):
+class PaperHead(Model):
     """Which paper it is."""
 
     title: str = ""
@@ -36,7 +33,7 @@ class PaperHead(_Section):
     field: str = ""
 
 
-class Participants(_Section):
+class Participants(Model):
     """Who took part."""
 
     n: Count
@@ -47,7 +44,7 @@ class Participants(_Section):
     handedness: str
 
 
-class PublishedAnova(_Section):
+class PublishedAnova(Model):
     """F with its degrees of freedom, and the bound that p is said to be below."""
 
     F: Printed
@@ -55,7 +52,7 @@ class PublishedAnova(_Section):
     p_below: PrintedP
 
 
-class TukeyClaim(_Section):
+class TukeyClaim(Model):
     """`higher` is said to be significantly above `lower`, with p below the bound."""
 
     higher: str
@@ -63,7 +60,7 @@ class TukeyClaim(_Section):
     p_below: PrintedP
 
 
-class BinomialClaim(_Section):
+class BinomialClaim(Model):
     """The p of the binomial test of a method and direction against one half."""
 
     method: str
@@ -71,7 +68,7 @@ class BinomialClaim(_Section):
     p: PrintedP
 
 
-class DirectionProtocol(_Section):
+class DirectionProtocol(Model):
     """How the trials of experiment 1 were laid out."""
 
     sessions: Count
@@ -84,28 +81,28 @@ class DirectionProtocol(_Section):
     duration_min: Printed
 
 
-class PreferenceProtocol(_Section):
+class PreferenceProtocol(Model):
     """How the trials of experiment 2 were laid out."""
 
     trials: Count
     duration_min: Printed
 
 
-class Lowest(_Section):
+class Lowest(Model):
     """So many participants rated `method` lowest."""
 
     method: str
     participants: int
 
 
-class SameScore(_Section):
+class SameScore(Model):
     """So many participants gave two methods the same score."""
 
     methods: Annotated[list[str], Field(min_length=2, max_length=2)]
     participants: int
 
 
-class PublishedExperiment(_Section):
+class PublishedExperiment(Model):
     """What both experiments print: n, the methods in order, F, and the pattern of the post-hoc tests."""
 
     n: Count
@@ -139,40 +136,16 @@ class PublishedPreference(PublishedExperiment):
     same_score: SameScore
 
 
-class Paper(_Section):
+class Paper(Model):
     """All published numbers. `claims` are for the audit, which checks them (`analysis.paper.audit.paper_file`)."""
 
     paper: PaperHead = PaperHead()
     participants: Participants
     direction: PublishedDirection
     preference: PublishedPreference
-    claims: list[dict[str, Any]] = []
+    claims: list[dict[str, Any]] = Field(default_factory=list)
 
 
 def load_paper(path: str | Path) -> Paper:
-    """The paper's numbers from a TOML file.
-
-    `ValueError` with the file and, of the first fault, the key, the value and the rule.
-    """
-    try:
-        content = tomllib.loads(Path(path).read_text(encoding="utf-8"))
-    except OSError as error:
-        raise ValueError(f"{path}: cannot be read: {error.strerror or error}") from error
-    except ValueError as error:  # not UTF-8, or not TOML
-        raise ValueError(f"{path}: not a TOML file: {error}") from error
-    try:
-        return Paper.model_validate(content)
-    except ValidationError as error:
-        raise ValueError(f"{path}: {_first_fault(error)}") from error
-
-
-def _first_fault(error: ValidationError) -> str:
-    fault = error.errors()[0]
-    key = ".".join(str(part) for part in fault["loc"])
-    if fault["type"] == "missing":
-        return f"key {key} is missing (rule: it is required)"
-    if fault["type"] == "extra_forbidden":
-        return f"key {key} = {fault['input']!r} is unknown (rule: no other keys)"
-    if isinstance(fault["input"], dict):
-        return f"key {key}: {fault['msg']}"
-    return f"key {key} = {fault['input']!r}: {fault['msg']}"
+    """The paper's numbers from a TOML file. `ConfigError` with file, key, value and rule."""
+    return load(Paper, Path(path))

@@ -10,13 +10,14 @@ from device.parameters import GunParameters
 from device.physics import simulate
 from device.words import MAX_PULSE_S, MAX_VOLTAGE_V, Pulse
 from experiments import catalogue
+from experiments.config.door import read_toml
 from experiments.config.models import participant_codes
 from experiments.config.setup import Setup
 from experiments.design.orders import next_row
 from experiments.direction.config import DirectionConfig
 from experiments.direction.observer import mind_of
 from experiments.limits import MethodLimits, check_limits, check_methods
-from experiments.load import ConfigError, find, load_gun, load_setup, load_study, read_toml
+from experiments.load import find, load_gun, load_setup, load_study
 from experiments.screens.synthetic import observer_of
 from experiments.synthetic.felt import NEUTRAL, forward_rates
 from experiments.synthetic.percept import percepts_of
@@ -39,10 +40,7 @@ def check(name: str, seed: int | None, participants: int) -> Facts:
         gun = load_gun(path)
         check_methods(gun, tuple(gun.methods), path)
         return {"gun": gun.title, "methods": list(gun.methods), "assumed": list(gun.assumed)}
-    try:
-        paper = load_paper(path)
-    except ValueError as error:
-        raise ConfigError(str(error)) from error
+    paper = load_paper(path)
     return {"paper": path.name, "experiments": {"direction": paper.direction.n, "preference": paper.preference.n}}
 
 

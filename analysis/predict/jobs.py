@@ -18,7 +18,7 @@ from contextlib import contextmanager
 from multiprocessing import get_context, parent_process
 from typing import Any
 
-from experiments.load import ConfigError
+from experiments.config.door import ConfigError
 from experiments.record.provenance import recoil_version, versions
 
 Function = Callable[[Any], Any]

@@ -2,19 +2,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import Any
 
 from analysis.logs.column_map import ColumnMap
 from analysis.logs.completeness import by_study
 from analysis.logs.exclusions import Effect, Rules, apply_rules
 from analysis.logs.reading import Logs, Problem, Track, read_logs
 from analysis.logs.tables_out import result_tables
-from analysis.logs.toml_model import load_model
 from analysis.paper.audit import audit
-from analysis.paper.audit.paper_file import PaperFile, load_paper_file
+from analysis.paper.audit.paper_file import load_paper_file
 from analysis.paper.audit.sentences import predictions
 from analysis.paper.paper import load_paper
 from analysis.paper.published import Prediction, compare
@@ -22,13 +21,12 @@ from analysis.summary import remarks_coding
 from analysis.summary.sections.data import ReportData
 from analysis.summary.sections.sections import write_report
 from analysis.summary.summary import summarize
+from experiments.config.door import ConfigError, load
 from experiments.config.setup import sha256
-from experiments.load import ConfigError
 from experiments.record import storage
 from experiments.record.provenance import provenance
 from experiments.study.places import PlaceError
 
-Loaded = TypeVar("Loaded")
 _PER_STUDY = ("direction", "preference", "excluded", "warnings")
 
 
@@ -49,10 +47,10 @@ def analyze(request: Request, track: Track = iter) -> tuple[dict[str, Any], tupl
 
     `PlaceError` if there is no usable log at all, with every reason.
     """
-    published = _loaded(load_paper, request.paper)
-    mapping = _loaded(lambda path: load_model(ColumnMap, path), request.columns)
-    rules = _loaded(lambda path: load_model(Rules, path), request.rules)
-    book = _loaded(remarks_coding.load_codebook, request.codebook)
+    published = load_paper(request.paper) if request.paper else None
+    mapping = load(ColumnMap, request.columns) if request.columns else None
+    rules = load(Rules, request.rules) if request.rules else None
+    book = remarks_coding.load_codebook(request.codebook) if request.codebook else None
     logs = read_logs(request.paths, track, mapping)
     if not logs.files:
         reasons = "\n".join(str(problem) for problem in logs.problems)
@@ -89,7 +87,7 @@ def write_tables(out: Path, logs: Logs, statistics: Mapping[str, Any]) -> None:
 
 def _predicted(paper: Path | None) -> dict[str, Prediction]:
     """What the audit says of the published numbers."""
-    return {} if paper is None else predictions(audit(_loaded(load_paper_file, paper) or PaperFile()))
+    return {} if paper is None else predictions(audit(load_paper_file(paper)))
 
 
 def _coded(logs: Logs, statistics: dict[str, Any], book: remarks_coding.Codebook) -> remarks_coding.CodedRemarks:
@@ -146,10 +144,3 @@ def _read_by(path: Path | None, mapping: ColumnMap | None) -> dict[str, str]:
     if path is None or mapping is None:
         return {}
     return {"other programs' logs read by": f"{path.name}, sha256 {sha256(mapping.model_dump(mode='json'))}"}
-
-
-def _loaded(load: Callable[[Path], Loaded], path: Path | None) -> Loaded | None:
-    try:
-        return load(path) if path else None
-    except ValueError as error:
-        raise ConfigError(str(error)) from error

@@ -27,9 +27,9 @@ from typing import Annotated, Any, Self
 
 from pydantic import AfterValidator, Field, model_validator
 
-from analysis.logs.toml_model import Model, load_model
 from analysis.report import apa
 from analysis.report.section import Section, Table
+from experiments.config.door import Model, load
 
 
 def _compiles(text: str) -> str:
@@ -108,7 +108,7 @@ class CodedRemarks:
 
 def load_codebook(path: Path) -> Codebook:
     """A codebook, its table of hand-given codes read in; `ValueError` with file, place and rule."""
-    book = load_model(Codebook, path)
+    book = load(Codebook, path)
     if book.hand_coded is None:
         return book
     given = list(_hand_coded(path.parent / book.hand_coded, {code.code for code in book.codes}))

@@ -10,7 +10,8 @@ from pydantic import Field, model_validator
 
 from device.methods import Method
 from device.parameters import GunParameters, VibrationParameters
-from experiments.config.models import Model, Text
+from experiments.config.door import Model
+from experiments.config.models import Text
 
 Numbers = dict[str, Any]
 """A table for one of the device's parameter types, which say what may stand in it."""

@@ -11,10 +11,11 @@ from typing import Annotated, Any, Literal, Self, TypeVar
 from pydantic import (
     AfterValidator,
     BaseModel,
-    ConfigDict,
     Field,
     model_validator,
 )
+
+from experiments.config.door import Model
 
 Order = Literal["random", "williams", "latin-square"]
 Fact = Literal["age_years", "sex", "handedness"]
@@ -24,12 +25,6 @@ Handedness = Literal["right", "left", "both"]
 
 CODE = r"[A-Za-z0-9]{1,32}"
 """A participant's code, as a pattern."""
-
-
-class Model(BaseModel):
-    """A table of a config: unknown keys refused, types as written, no infinities, never changed."""
-
-    model_config = ConfigDict(extra="forbid", frozen=True, strict=True, allow_inf_nan=False)
 
 
 def _distinct(methods: tuple[str, ...]) -> tuple[str, ...]:

@@ -16,6 +16,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Literal, Self, get_args
 
+from device.words import RecoilError
 from experiments.clock import Clock
 from experiments.config.setup import canonical_json, sha256
 from experiments.record import storage
@@ -26,7 +27,7 @@ _PATIENCE_S = 0.5
 """How long a journal is tried that somebody may only be looking at."""
 
 
-class JournalError(Exception):
+class JournalError(RecoilError):
     """A journal that cannot be written or read; the message says what is safe."""
 
 

@@ -8,11 +8,11 @@ from typing import Any
 from device import GunStatus
 from experiments import catalogue
 from experiments.clock import Clock
+from experiments.config.door import ConfigError
 from experiments.config.models import ExperimentConfig
 from experiments.config.setup import Setup
 from experiments.design.plan import Plan
 from experiments.live_run import LiveRun
-from experiments.load import ConfigError
 from experiments.session import events
 from experiments.session.events import Event
 from experiments.session.judging import REARM_HELD_S

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from device.words import RecoilError
 from experiments.config.models import CODE
 from experiments.config.setup import Setup
 from experiments.design import orders
@@ -17,7 +18,7 @@ from experiments.study import register
 _CODE = re.compile(CODE)
 
 
-class PlaceError(Exception):
+class PlaceError(RecoilError):
     """A participant or folder that cannot be used; the message names value and rule."""
 
 

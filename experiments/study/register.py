@@ -18,7 +18,8 @@ from typing import Annotated, Any, Literal
 from pydantic import AfterValidator, Field, StringConstraints, TypeAdapter, ValidationError
 
 from experiments.clock import Clock
-from experiments.config.models import CODE, Model, Text
+from experiments.config.door import Model
+from experiments.config.models import CODE, Text
 from experiments.config.setup import canonical_json
 from experiments.record import storage
 from experiments.record.journal import JournalError, check_chain, link, parsed

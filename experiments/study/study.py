@@ -8,7 +8,8 @@ from dataclasses import dataclass
 from itertools import count
 from typing import Literal, get_args
 
-from experiments.config.models import AgeYears, EligibilityConfig, Fact, Handedness, Model, Sex, StudyConfig
+from experiments.config.door import Model
+from experiments.config.models import AgeYears, EligibilityConfig, Fact, Handedness, Sex, StudyConfig
 
 State = Literal["done", "in progress", "open elsewhere", "not begun", "unreadable"]
 """How a run stands; `open elsewhere`: another process is carrying it out at this moment."""

@@ -6,7 +6,8 @@ from typing import Annotated
 
 from pydantic import Field
 
-from experiments.config.models import InnerShare, Model
+from experiments.config.door import Model
+from experiments.config.models import InnerShare
 from experiments.synthetic.percept import PerceptParameters
 
 _DEFAULT = PerceptParameters()

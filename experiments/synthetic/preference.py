@@ -19,7 +19,8 @@ from typing import Annotated, Protocol
 
 from pydantic import Field
 
-from experiments.config.models import Model, Spread
+from experiments.config.door import Model
+from experiments.config.models import Spread
 from experiments.session.steps import Scale, on_scale
 
 Points = Annotated[float, Field(ge=-100, le=100)]

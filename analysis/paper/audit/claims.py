@@ -9,7 +9,7 @@ from collections.abc import Callable, Mapping
 from types import MappingProxyType
 from typing import Annotated, Any, ClassVar, Literal
 
-from pydantic import AfterValidator, BaseModel, ConfigDict, Field
+from pydantic import AfterValidator, Field
 
 from analysis.paper.audit.binomial_p import binomial_p
 from analysis.paper.audit.freedom import Design, degrees_of_freedom
@@ -21,6 +21,7 @@ from analysis.paper.audit.totals import Bound, Term, total
 from analysis.paper.audit.tukey_pattern import Comparison, tukey_pattern
 from analysis.paper.audit.variance_ratios import between_f, repeated_f
 from analysis.paper.audit.words import Result
+from experiments.config.door import Model
 
 CHECKS: Mapping[str, Callable[..., Result]] = MappingProxyType(
     {
@@ -50,13 +51,7 @@ PrintedText = Annotated[str, AfterValidator(_is_printed)]
 Count = Annotated[int, Field(ge=1)]
 
 
-class Strict(BaseModel):
-    """No unknown keys, no changes, no conversions."""
-
-    model_config = ConfigDict(extra="forbid", frozen=True, strict=True)
-
-
-class Claim(Strict):
+class Claim(Model):
     """One printed number: `place` in the paper, a short `quote`, and a `note` on how the file reads it.
 
     `about`: the numbers of Recoil's own comparison that it is about, such as "direction: ANOVA F".
@@ -65,7 +60,7 @@ class Claim(Strict):
     place: str
     quote: str
     note: str = ""
-    about: list[str] = []
+    about: list[str] = Field(default_factory=list)
     not_arguments: ClassVar[frozenset[str]] = frozenset({"place", "quote", "note", "about", "kind"})
 
     def run(self) -> Result:
@@ -129,7 +124,7 @@ class PClaim(Claim):
     kind: Literal["p"]
     statistic: Statistic
     value: PrintedText
-    df: list[PrintedText] = []
+    df: list[PrintedText] = Field(default_factory=list)
     p: PrintedText
     sides: Sides = "two-sided"
 
@@ -155,8 +150,8 @@ class RepeatedFClaim(Claim):
     grain: PrintedText = "1"
     low: PrintedText | None = None
     high: PrintedText | None = None
-    transforms: list[str] = []
-    other_grains: list[PrintedText] = []
+    transforms: list[str] = Field(default_factory=list)
+    other_grains: list[PrintedText] = Field(default_factory=list)
 
 
 class BetweenFClaim(Claim):
@@ -171,7 +166,7 @@ class BetweenFClaim(Claim):
     high: PrintedText | None = None
 
 
-class TukeyPair(Strict):
+class TukeyPair(Model):
     """Mean `higher` above mean `lower`, by their places from 0; see `Comparison`."""
 
     higher: int
@@ -199,11 +194,11 @@ class TukeyClaim(Claim):
         return super().arguments() | {"comparisons": pairs}
 
 
-class TermModel(Strict):
+class TermModel(Model):
     """A product of factors over divisors; see `Term`."""
 
     times: Annotated[list[int | PrintedText], Field(min_length=1)]
-    over: list[int | PrintedText] = []
+    over: list[int | PrintedText] = Field(default_factory=list)
 
 
 class TotalClaim(Claim):

@@ -12,8 +12,9 @@ from analysis.paper.audit.page import as_json, as_text, counts, page
 from analysis.paper.audit.paper_file import PaperFile, load_paper_file
 from analysis.paper.audit.run import Finding
 from analysis.report.page import write_page
+from experiments.config.door import ConfigError
 from experiments.config.setup import sha256
-from experiments.load import ConfigError, find
+from experiments.load import find
 from experiments.record import storage
 from experiments.record.provenance import provenance
 
@@ -60,12 +61,11 @@ class Audited:
 def examine(name: str) -> Audited:
     """The audit of a paper's file, or of a shipped one. `ConfigError` if it cannot be used."""
     source = find(name)
+    paper = load_paper_file(source)
     try:
-        paper = load_paper_file(source)
         findings = audit(paper)
     except ValueError as error:
-        text = str(error)
-        raise ConfigError(text if text.startswith(str(source)) else f"{source}: {text}") from error
+        raise ConfigError(f"{source}: {error}") from error
     if not findings:
         raise ConfigError(f"{source}: makes no claims; give [[claims]], or the sections of a paper")
     return Audited(paper=paper, findings=findings, source=source)

@@ -39,16 +39,16 @@ own comparison that it is about. `[participants]`, `[direction]` and `[preferenc
 
 from __future__ import annotations
 
-import tomllib
 from pathlib import Path
 
-from pydantic import Field, ValidationError
+from pydantic import Field
 
-from analysis.paper.audit.claims import AnyClaim, Strict
+from analysis.paper.audit.claims import AnyClaim
 from analysis.paper.paper import PaperHead, Participants, PublishedDirection, PublishedPreference
+from experiments.config.door import Model, load, parsed
 
 
-class PaperFile(Strict):
+class PaperFile(Model):
     """Everything that a paper reports, as claims; the three sections are those of Recoil's own paper."""
 
     paper: PaperHead = PaperHead()
@@ -59,22 +59,10 @@ class PaperFile(Strict):
 
 
 def parse_paper(text: str, name: str = "the paper") -> PaperFile:
-    """A paper's file from its TOML text; `ValueError` with the name, and of the first fault the key and the rule."""
-    try:
-        return PaperFile.model_validate(tomllib.loads(text))
-    except tomllib.TOMLDecodeError as error:
-        raise ValueError(f"{name}: not a TOML file: {error}") from error
-    except ValidationError as error:
-        fault = error.errors()[0]
-        key = ".".join(str(part) for part in fault["loc"])
-        shown = "" if isinstance(fault["input"], dict) else f" = {fault['input']!r}"
-        raise ValueError(f"{name}: key {key}{shown}: {fault['msg']}") from error
+    """A paper's file from its TOML text. `ConfigError` with its name, key, value and rule."""
+    return parsed(PaperFile, text, name)
 
 
 def load_paper_file(path: str | Path) -> PaperFile:
-    """A paper's file; `ValueError` with the file and its first fault."""
-    try:
-        text = Path(path).read_text(encoding="utf-8")
-    except (OSError, UnicodeDecodeError) as error:
-        raise ValueError(f"{path}: cannot be read: {error}") from error
-    return parse_paper(text, str(path))
+    """A paper's file. `ConfigError` with file, key, value and rule."""
+    return load(PaperFile, Path(path))

@@ -9,7 +9,8 @@ from dataclasses import dataclass
 from analysis.paper.paper import PublishedDirection, load_paper
 from analysis.predict.fit.percept_model import FITTED, PAPER_TRIALS
 from device.methods import Method
-from experiments.load import ConfigError, find, load_gun
+from experiments.config.door import ConfigError
+from experiments.load import find, load_gun
 from experiments.synthetic.diffusion import People
 
 ASSUMED_SPREAD = People(drift_factor_sd=0.2, log_boundary_sd=0.1, log_non_decision_sd=0.1, logit_start_sd=0.2)
@@ -112,10 +113,7 @@ def _published(request: Request) -> PublishedDirection:
     if request.trials is not None:
         raise ConfigError(f"--trials {request.trials}: the paper has its own; give the option with --rates alone")
     path = find(request.paper)
-    try:
-        published = load_paper(path).direction
-    except ValueError as error:
-        raise ConfigError(str(error)) from error
+    published = load_paper(path).direction
     missing = [name for name in published.methods if name not in published.means]
     if missing:
         raise ConfigError(f"{path}: direction.means has no rate of {', '.join(missing)}; give one for each method")

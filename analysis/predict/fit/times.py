@@ -23,7 +23,7 @@ from analysis.times.likelihood import Range, Trials
 from analysis.times.own_trials import REFUSALS, OwnTrials, own_trials
 from analysis.times.people import fit_people, mean_estimate
 from analysis.times.sampled_fit import FEWEST_TRIALS, as_trials
-from experiments.load import ConfigError
+from experiments.config.door import ConfigError
 from experiments.record import storage
 from experiments.record.provenance import provenance
 from experiments.study.places import PlaceError

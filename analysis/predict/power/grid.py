@@ -4,14 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
-from pathlib import Path
 from typing import Any
 
 from analysis.paper.paper import PublishedExperiment, load_paper
 from analysis.predict.power.felt import Felt, felt_of, null_felt, percepts_of_setup
 from analysis.predict.power.request import (
     FELT,
-    GridError,
     Request,
     check_scalars,
     checked_setup,
@@ -169,11 +167,7 @@ def _cell(config: Config, design: Design) -> Cell:
 
 def _published(name: str, config: Config) -> PublishedExperiment | None:
     """The published claims about these methods; `None` if the paper is about others."""
-    path: Path = find(name)
-    try:
-        paper = load_paper(path)
-    except ValueError as error:
-        raise GridError(str(error)) from error
+    paper = load_paper(find(name))
     published: PublishedExperiment = getattr(paper, config.experiment)
     one_way = isinstance(config, DirectionConfig) and not config.design.backward_per_session
     return None if one_way or set(published.methods) != set(config.design.methods) else published

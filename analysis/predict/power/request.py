@@ -8,9 +8,10 @@ from dataclasses import dataclass
 from typing import Any
 
 from analysis.predict.power.studies import Config
+from experiments.config.door import ConfigError
 from experiments.config.setup import Setup
 from experiments.direction.config import DirectionConfig
-from experiments.load import ConfigError, find, load_setup
+from experiments.load import find, load_setup
 from experiments.preference.config import PreferenceConfig
 
 _LARGEST_EFFECT = 10.0

@@ -13,10 +13,10 @@ from analysis.paper.audit.lattices import Rows
 from analysis.paper.audit.participants import MEAN_SLACK, Rebuilt, backward_counts, forward_counts, rating_grains
 from analysis.paper.paper import Paper, PublishedDirection, PublishedExperiment, PublishedPreference
 from experiments.catalogue import CATALOGUE
+from experiments.config.door import ConfigError
 from experiments.config.models import StudyConfig
 from experiments.config.setup import Setup
 from experiments.direction.config import DirectionConfig
-from experiments.load import ConfigError
 from experiments.preference.config import PreferenceConfig
 
 Answers = tuple[dict[str, str], ...]

@@ -31,11 +31,12 @@ from analysis.summary.sections.sections import obtained_text, write_report
 from analysis.summary.summary import summarize
 from device.parameters import GunParameters
 from experiments.clock import VirtualClock
+from experiments.config.door import ConfigError
 from experiments.config.models import StudyConfig
 from experiments.config.setup import Setup, sha256
 from experiments.design.streams import Stream, generator
 from experiments.direction.config import DirectionConfig
-from experiments.load import ConfigError, load_setup, load_study
+from experiments.load import load_setup, load_study
 from experiments.preference.config import PreferenceConfig
 from experiments.preference.observer import draw_ratings
 from experiments.rebuild import rebuild
@@ -155,11 +156,8 @@ def load(name: str, seed: int, observer: Observer | None = None) -> Study:
     """
     config, folder = load_study(name)
     setups = tuple(load_setup(str(folder / experiment)) for experiment in config.experiments)
-    try:
-        paper = load_paper(folder / config.paper) if config.paper else None
-        findings = audit(load_paper_file(folder / config.paper)) if config.paper else ()
-    except ValueError as error:
-        raise ConfigError(str(error)) from error
+    paper = load_paper(folder / config.paper) if config.paper else None
+    findings = audit(load_paper_file(folder / config.paper)) if config.paper else ()
     study = Study(config=config, setups=setups, seated=setups, seed=seed, paper=paper, findings=findings)
     reason = "other participants were asked for" if observer == "rates" else misfit(config, setups, paper)
     if observer == "reconstructed" and reason:

@@ -10,7 +10,7 @@ from device.parameters import GunParameters
 from device.physics import audit as energy
 from device.physics.contact import compliant_collision, rigid_collision
 from device.physics.hand import Hand, simulate_held
-from experiments.load import ConfigError
+from experiments.config.door import ConfigError
 
 ASSUMED = "assumed"
 """The word for the hand of assumed numbers."""

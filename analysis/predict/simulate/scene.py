@@ -10,7 +10,7 @@ from typing import Any
 from analysis.predict.simulate.sweep import axis_of
 from device.parameters import GunParameters
 from device.physics.scenes import COLLISION, NEEDED, SCENES, Scene, choose, choose_contact
-from experiments.load import ConfigError
+from experiments.config.door import ConfigError
 
 _OWN = "needs of your own"
 

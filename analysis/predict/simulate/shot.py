@@ -15,7 +15,8 @@ from analysis.predict.simulate.more import as_lines, shown
 from analysis.report.figures.shot import ShotPanel, figure_5
 from device.parameters import GunParameters
 from device.physics import ShotSummary, simulate, trace
-from experiments.load import ConfigError, load_gun
+from experiments.config.door import ConfigError
+from experiments.load import load_gun
 from experiments.record import storage
 
 _COARSE_S = 0.0005  # steps above which a curve is drawn with corners

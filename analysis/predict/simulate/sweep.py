@@ -29,7 +29,7 @@ from analysis.report.terminal import Progress
 from device.parameters import GunParameters
 from device.physics import FIDELITIES, ShotBatch, simulate_batch
 from device.physics.kernel import STATUSES
-from experiments.load import ConfigError
+from experiments.config.door import ConfigError
 from experiments.record import storage
 from experiments.record.provenance import provenance
 

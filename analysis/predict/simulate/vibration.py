@@ -12,7 +12,8 @@ from analysis.predict.simulate.more import shown
 from analysis.predict.simulate.shot import write_columns
 from analysis.report.figures.shot import VibrationPanel, figure_vibration
 from device.vibration import Vibration, VibrationParameters, solved, waveform
-from experiments.load import ConfigError, load_gun
+from experiments.config.door import ConfigError
+from experiments.load import load_gun
 
 _POINTS = 2401
 _FINE = 200_001  # samples, of which the largest is the peak to nine digits

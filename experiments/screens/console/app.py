@@ -15,10 +15,10 @@ from PyQt6.QtWidgets import QApplication
 
 from device import DeviceError, Gun, GunStatus
 from experiments.clock import Clock
+from experiments.config.door import ConfigError
 from experiments.config.setup import Setup
 from experiments.design.plan import Plan
 from experiments.live_run import LiveRun, RunStopped, Screen
-from experiments.load import ConfigError
 from experiments.record.journal import JournalError
 from experiments.run import Finished, Request, run
 from experiments.screens.console import tone, windows

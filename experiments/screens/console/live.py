@@ -12,9 +12,10 @@ from PyQt6.QtGui import QGuiApplication
 
 from device import DeviceError
 from experiments.clock import RealClock
+from experiments.config.door import ConfigError
 from experiments.config.setup import Setup
 from experiments.live_run import RunStopped
-from experiments.load import ConfigError, load_setup, load_study
+from experiments.load import load_setup, load_study
 from experiments.record.journal import JournalError
 from experiments.run import Finished, Request, UnfinishedRun
 from experiments.screens.console.app import Console, application, run_console

@@ -12,6 +12,7 @@ from contextlib import suppress
 from pathlib import Path
 from typing import IO, TypeVar
 
+from device.words import RecoilError
 from experiments.screens.participant.words import FromParticipant
 
 _ROOT = Path(__file__).parents[3]
@@ -103,7 +104,7 @@ def _ending(code: int | None) -> str:
 Word = TypeVar("Word", bound=FromParticipant)
 
 
-class ParticipantError(Exception):
+class ParticipantError(RecoilError):
     """The participant's screen did not do it; the message says what and why."""
 
 

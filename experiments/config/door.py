@@ -1,0 +1,113 @@
+"""The door for TOML: file and model come to a frozen value, or to a message with file, line, key, value and rule."""
+
+from __future__ import annotations
+
+import json
+import re
+import tomllib
+from pathlib import Path
+from typing import Any, TypeVar
+
+from pydantic import BaseModel, ConfigDict, ValidationError
+
+from device.words import RecoilError
+
+SomeModel = TypeVar("SomeModel", bound=BaseModel)
+
+_MISSING = "is missing; it is required"
+_UNKNOWN = "unknown key; remove it or correct its spelling"
+
+
+class ConfigError(RecoilError, ValueError):
+    """What was given cannot be used; the message names file or option, place, value and rule, a line a finding."""
+
+
+class Model(BaseModel):
+    """A table of a file: unknown keys refused, types as written, no infinities, never changed."""
+
+    model_config = ConfigDict(extra="forbid", frozen=True, strict=True, allow_inf_nan=False)
+
+
+def load(model: type[SomeModel], path: Path) -> SomeModel:
+    """A file's content. `ConfigError` with a line for every finding."""
+    return checked(model, read_toml(path), path)
+
+
+def read_toml(path: Path) -> dict[str, Any]:
+    """The tables of a TOML file, unchecked."""
+    return tables(read_text(path), path)
+
+
+def read_text(path: Path) -> str:
+    """A file's text."""
+    try:
+        return path.read_text(encoding="utf-8")
+    except UnicodeDecodeError as error:
+        raise ConfigError(f"{path}: byte {error.start}: not UTF-8; save the file as UTF-8") from error
+    except OSError as error:
+        raise ConfigError(f"{path}: cannot be read ({error.strerror or error})") from error
+
+
+def tables(text: str, source: Path | str) -> dict[str, Any]:
+    """The tables of a TOML text, unchecked; `source` is what messages call it."""
+    try:
+        return tomllib.loads(text)
+    except (ValueError, RecursionError) as error:  # also numbers and nestings beyond all reason
+        raise ConfigError(f"{source}: not TOML: {error}") from error
+
+
+def checked(model: type[SomeModel], table: dict[str, Any], path: Path) -> SomeModel:
+    """The tables of a file as what they mean."""
+    try:
+        return _validated(model, table)
+    except ValidationError as error:
+        raise ConfigError(_findings(error, path, read_text(path))) from error
+
+
+def parsed(model: type[SomeModel], text: str, source: str) -> SomeModel:
+    """A TOML text as what it means; `source` is what messages call it."""
+    try:
+        return _validated(model, tables(text, source))
+    except ValidationError as error:
+        raise ConfigError(_findings(error, source, text)) from error
+
+
+def _validated(model: type[SomeModel], table: dict[str, Any]) -> SomeModel:
+    """By way of JSON: types stay strict, while TOML's arrays may become tuples."""
+    return model.model_validate_json(json.dumps(table, default=_no_json))
+
+
+def _no_json(value: object) -> dict[str, str]:
+    """Dates and times, which no file has: as something that is neither text nor number."""
+    return {"date": str(value)}
+
+
+def _findings(error: ValidationError, source: Path | str, text: str) -> str:
+    return "\n".join(_finding(finding, source, text) for finding in error.errors())
+
+
+def _finding(finding: Any, source: Path | str, text: str) -> str:
+    keys = [str(part) for part in finding["loc"]]
+    line = line_of(text, keys)
+    value = finding["input"]
+    shown = f" = {value!r}" if keys and isinstance(value, str | int | float | bool) else ""
+    rules = {"extra_forbidden": _UNKNOWN, "missing": _MISSING}
+    rule = rules.get(finding["type"], finding["msg"].removeprefix("Value error, "))
+    return f"{source}{f':{line}' if line else ''}: {'.'.join(keys)}{shown}{': ' if keys else ''}{rule}"
+
+
+def line_of(text: str, keys: list[str]) -> int | None:
+    r"""The line of a dotted key in a TOML text, or of the nearest table around it; `None` for the whole file.
+
+    >>> line_of("a = 1\n[b]\nc = 2", ["b", "c"]), line_of("[b]", ["b", "missing"]), line_of("a = 1", [])
+    (3, 1, None)
+    """
+    places: dict[tuple[str, ...], int] = {}
+    table: tuple[str, ...] = ()
+    for number, line in enumerate(text.split("\n"), start=1):
+        if header := re.match(r"\s*\[([^\[\]]+)\]", line):
+            table = tuple(part.strip(' "') for part in header[1].split("."))
+            places.setdefault(table, number)
+        elif entry := re.match(r"\s*([\w.\-\"]+)\s*=", line):
+            places.setdefault((*table, *entry[1].replace('"', "").split(".")), number)
+    return next((places[tuple(keys[:n])] for n in range(len(keys), 0, -1) if tuple(keys[:n]) in places), None)
