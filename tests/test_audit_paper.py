@@ -11,6 +11,7 @@ import pytest
 
 from analysis.paper.audit import CHECKS, Finding, audit, load_paper_file, parse_paper, repeated_f
 from analysis.paper.audit.claims import AnyClaim
+from experiments.config.door import ConfigError
 from tests.exact import exact_rm_F
 
 ROOT = Path(__file__).parent
@@ -125,9 +126,9 @@ def test_every_check_names_its_source() -> None:
     ],
 )
 def test_a_fault_is_named_with_its_key(claim: str, message: str) -> None:
-    with pytest.raises(ValueError, match=message) as error:
+    with pytest.raises(ConfigError, match=message) as error:
         parse_paper(f'[[claims]]\nplace = "I"\nquote = "x"\n{claim}', "some.toml")
-    assert str(error.value).startswith("some.toml: key claims.0")
+    assert str(error.value).startswith("some.toml:1: claims.0")
 
 
 def test_a_claim_that_makes_no_sense_is_named_by_its_place() -> None:
@@ -137,7 +138,7 @@ def test_a_claim_that_makes_no_sense_is_named_by_its_place() -> None:
 
 
 def test_what_is_no_toml_or_no_file_is_said() -> None:
-    with pytest.raises(ValueError, match="not TOML"):
+    with pytest.raises(ConfigError, match="not TOML"):
         parse_paper("a = ")
-    with pytest.raises(ValueError, match="cannot be read"):
+    with pytest.raises(ConfigError, match="cannot be read"):
         load_paper_file("nowhere.toml")

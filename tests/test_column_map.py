@@ -10,7 +10,7 @@ import pytest
 from analysis.logs.column_map import ColumnMap
 from analysis.logs.reading import Logs, read_logs
 from analysis.summary.summary import summarize
-from experiments.config.door import load
+from experiments.config.door import ConfigError, load
 from tests.log_files import TextRow, trial_rows, write_study
 
 EXAMPLE = Path(__file__).parent.parent / "configs" / "examples" / "columns.toml"
@@ -145,10 +145,10 @@ def test_recoils_own_logs_may_lie_beside_them(tmp_path: Path) -> None:
 
 FAULTS: dict[str, tuple[Callable[[str], str], str]] = {
     "unknown key": (lambda t: t.replace("delimiter =", "separator ="), "text.separator = ',': unknown key"),
-    "no experiment": (lambda t: t.replace('experiment = "direction"', ""), "key experiment is missing"),
+    "no experiment": (lambda t: t.replace('experiment = "direction"', ""), "experiment: is missing"),
     "no response": (lambda t: t.replace('response = "key', '# "'), "columns.response is missing"),
-    "level": (lambda t: t.replace('up = "forward"', 'up = "left"'), "key values.response.up = 'left'"),
-    "unit": (lambda t: t.replace('unit = "s"', 'unit = "min"'), "key response_time.unit = 'min'"),
+    "level": (lambda t: t.replace('up = "forward"', 'up = "left"'), "values.response.up = 'left'"),
+    "unit": (lambda t: t.replace('unit = "s"', 'unit = "min"'), "response_time.unit = 'min'"),
     "no unit": (lambda t: t.replace('[response_time]\nunit = "s"', ""), "response_time.unit is missing"),
     "decimal": (lambda t: t.replace('decimal = "."', 'decimal = ","'), "is also text.delimiter"),
     "both": (lambda t: t.replace("# file_name", "file_name"), "either `column` or `file_name`"),
@@ -163,7 +163,7 @@ def test_a_bad_map_is_refused_with_file_key_value_and_rule(case: str, tmp_path: 
     spoil, words = FAULTS[case]
     path = tmp_path / "map.toml"
     path.write_text(spoil(EXAMPLE.read_text(encoding="utf-8")), encoding="utf-8")
-    with pytest.raises(ValueError, match=r"map[.]toml: ") as refused:
+    with pytest.raises(ConfigError, match=r"map[.]toml:(\d+:)? ") as refused:
         load(ColumnMap, path)
     assert words in str(refused.value)
 

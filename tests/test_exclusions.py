@@ -9,7 +9,7 @@ import pytest
 from analysis.logs.exclusions import Effect, Rules, apply_rules
 from analysis.logs.reading import Logs, read_logs
 from analysis.summary.summary import summarize
-from experiments.config.door import load
+from experiments.config.door import ConfigError, load
 from tests.log_files import TextRow, rating_rows, ratings_path, trial_rows, trials_path, write_rows, write_study
 
 EXAMPLE = Path(__file__).parent.parent / "configs" / "examples" / "rules.toml"
@@ -125,13 +125,13 @@ def test_no_rules_change_nothing(tmp_path: Path) -> None:
     ("text", "words"),
     [
         ("trials.response_time_min_s = 2.0\ntrials.response_time_max_s = 1.0", "must be below response_time_max_s = 1"),
-        ("participants.min_kept_share = 80", "key participants.min_kept_share = 80"),
-        ('excluded = [{code = "P 1", reason = "x"}]', "key excluded.0.code = 'P 1'"),
-        ('excluded = [{code = "P1"}]', "key excluded.0.reason is missing"),
-        ("trials.drop = 1", "key trials.drop = 1 is unknown"),
+        ("participants.min_kept_share = 80", "participants.min_kept_share = 80"),
+        ('excluded = [{code = "P 1", reason = "x"}]', "excluded.0.code = 'P 1'"),
+        ('excluded = [{code = "P1"}]', "excluded.0.reason: is missing"),
+        ("trials.drop = 1", "trials.drop = 1: unknown key"),
     ],
 )
 def test_bad_rules_are_refused_with_file_key_value_and_rule(text: str, words: str, tmp_path: Path) -> None:
-    with pytest.raises(ValueError, match=r"rules[.]toml: ") as refused:
+    with pytest.raises(ConfigError, match=r"rules[.]toml:(\d+:)? ") as refused:
         _rules(tmp_path, text)
     assert words in str(refused.value)

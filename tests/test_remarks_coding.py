@@ -9,6 +9,7 @@ import pytest
 
 from analysis.logs.reading import read_logs
 from analysis.summary.remarks_coding import Codebook, Remark, code_remarks, load_codebook, section
+from experiments.config.door import ConfigError
 from tests.conftest import Recoil
 from tests.log_files import write_study
 
@@ -96,7 +97,7 @@ def test_codes_given_by_hand_come_from_a_table(tmp_path: Path) -> None:
 def test_a_faulty_codebook_is_refused_with_file_and_rule(tmp_path: Path, old: str, new: str, words: str) -> None:
     path = tmp_path / "codes.toml"
     path.write_text(BOOK.replace(old, new, 1), encoding="utf-8")
-    with pytest.raises(ValueError, match=words):
+    with pytest.raises(ConfigError, match=words):
         load_codebook(path)
 
 
@@ -107,7 +108,7 @@ def test_a_faulty_codebook_is_refused_with_file_and_rule(tmp_path: Path, old: st
 def test_a_faulty_table_of_codes_is_refused_with_its_line(tmp_path: Path, table: str, words: str) -> None:
     (tmp_path / "codes.toml").write_text('hand_coded = "by_hand.csv"\n' + BOOK, encoding="utf-8")
     (tmp_path / "by_hand.csv").write_text(table, encoding="utf-8")
-    with pytest.raises(ValueError, match=words):
+    with pytest.raises(ConfigError, match=words):
         load_codebook(tmp_path / "codes.toml")
 
 

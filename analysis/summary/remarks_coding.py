@@ -29,7 +29,7 @@ from pydantic import AfterValidator, Field, model_validator
 
 from analysis.report import apa
 from analysis.report.section import Section, Table
-from experiments.config.door import Model, load
+from experiments.config.door import ConfigError, Model, load
 
 
 def _compiles(text: str) -> str:
@@ -107,7 +107,7 @@ class CodedRemarks:
 
 
 def load_codebook(path: Path) -> Codebook:
-    """A codebook, its table of hand-given codes read in; `ValueError` with file, place and rule."""
+    """A codebook, its table of hand-given codes read in. `ConfigError` with file, place and rule."""
     book = load(Codebook, path)
     if book.hand_coded is None:
         return book
@@ -127,12 +127,12 @@ def _hand_coded(path: Path, known: set[str]) -> Iterable[tuple[str, str]]:
             reader = csv.DictReader(file, strict=True)
             rows = list(reader)
     except (OSError, ValueError, csv.Error) as error:
-        raise ValueError(f"{path}: cannot be read ({error}); the codebook's key hand_coded names it") from error
+        raise ConfigError(f"{path}: cannot be read ({error}); the codebook's key hand_coded names it") from error
     if list(reader.fieldnames or ()) != ["participant_id", "code"]:
-        raise ValueError(f"{path}: line 1: columns are {reader.fieldnames}; they must be participant_id, code")
+        raise ConfigError(f"{path}: line 1: columns are {reader.fieldnames}; they must be participant_id, code")
     for number, row in enumerate(rows, start=2):
         if row["code"] not in known:
-            raise ValueError(f"{path}: line {number}: code {row['code']!r} is not in the codebook")
+            raise ConfigError(f"{path}: line {number}: code {row['code']!r} is not in the codebook")
         yield row["participant_id"], row["code"]
 
 

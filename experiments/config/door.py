@@ -18,7 +18,7 @@ _MISSING = "is missing; it is required"
 _UNKNOWN = "unknown key; remove it or correct its spelling"
 
 
-class ConfigError(RecoilError, ValueError):
+class ConfigError(RecoilError):
     """What was given cannot be used; the message names file or option, place, value and rule, a line a finding."""
 
 
@@ -101,12 +101,16 @@ def line_of(text: str, keys: list[str]) -> int | None:
 
     >>> line_of("a = 1\n[b]\nc = 2", ["b", "c"]), line_of("[b]", ["b", "missing"]), line_of("a = 1", [])
     (3, 1, None)
+    >>> line_of("[[b]]\nc = 1\n[[b]]\nc = 2", ["b", "1", "c"])
+    4
     """
     places: dict[tuple[str, ...], int] = {}
     table: tuple[str, ...] = ()
     for number, line in enumerate(text.split("\n"), start=1):
-        if header := re.match(r"\s*\[([^\[\]]+)\]", line):
-            table = tuple(part.strip(' "') for part in header[1].split("."))
+        if header := re.match(r"\s*(\[\[?)([^\[\]]+)\]", line):
+            table = tuple(part.strip(' "') for part in header[2].split("."))
+            if header[1] == "[[":
+                table = (*table, str(sum(place[:-1] == table and place[-1].isdigit() for place in places)))
             places.setdefault(table, number)
         elif entry := re.match(r"\s*([\w.\-\"]+)\s*=", line):
             places.setdefault((*table, *entry[1].replace('"', "").split(".")), number)
