@@ -12,7 +12,7 @@ from analysis.times.fit import fit, profile, starts
 from analysis.times.likelihood import Trials, coordinates, log_likelihood, model_of, natural, trials_of
 from analysis.times.people import fit_people
 from experiments.design.streams import generator
-from experiments.synthetic.diffusion_batch import decide_all
+from experiments.synthetic.diffusion import decide_all
 
 METHODS = ("asymmetric-1", "asymmetric-2", "vibration")
 DRIFTS = (1.0, 1.8, 0.0)

@@ -27,7 +27,7 @@ from experiments.synthetic.percept import (
     Percept,
     PerceptParameters,
     evidence,
-    forward_rate,
+    forward_rates,
     percept_of_summary,
     percept_of_trace,
 )
@@ -50,7 +50,7 @@ def fired(load: Load, rate_Hz: float, shots: int) -> DriveHistory:
 
 
 def rate_of(percept: Percept) -> float:
-    return forward_rate(evidence(percept, DEFAULT), DEFAULT.start, People())
+    return float(forward_rates(evidence(percept, DEFAULT), DEFAULT.start, People()))
 
 
 @pytest.mark.parametrize("gun", GUNS)

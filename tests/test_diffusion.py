@@ -12,8 +12,16 @@ from scipy.stats import kstwo
 
 from analysis.times.first_passage import distribution, moments
 from experiments.design.streams import Stream, generator
-from experiments.synthetic.diffusion import Decision, Diffusion, Lapses, People, decide, person, upper_probability
-from experiments.synthetic.diffusion_batch import decide_all, upper_probabilities
+from experiments.synthetic.diffusion import (
+    Decision,
+    Diffusion,
+    Lapses,
+    People,
+    decide,
+    decide_all,
+    person,
+    upper_probabilities,
+)
 
 GRID = [(v, a, w) for v in (-2.0, 0.0, 0.5, 3.0) for a in (0.7, 2.0) for w in (0.2, 0.5, 0.9)]
 
@@ -56,7 +64,7 @@ def test_times_given_the_answer_follow_the_distribution(v: float, a: float, w: f
 
 def ks_p(t: np.ndarray, answer: bool, v: float, a: float, w: float) -> float:
     """The exact p of Kolmogorov and Smirnov's largest distance."""
-    whole = upper_probability(v, a, w)
+    whole = float(upper_probabilities(v, a, w))
     share = np.asarray(distribution(t, answer, v, a, w)) / (whole if answer else 1.0 - whole)
     steps = np.arange(t.size + 1) / t.size
     distance = max((steps[1:] - share).max(), (share - steps[:-1]).max())
@@ -148,13 +156,14 @@ def test_more_drift_never_turns_an_upper_answer_lower(seed: int, drift: float, m
 
 @given(st.floats(-30, 30), st.floats(0.1, 5), st.floats(0, 1))
 def test_the_two_answers_mirror_each_other(v: float, a: float, w: float) -> None:
-    assert upper_probability(v, a, w) == pytest.approx(1.0 - upper_probability(-v, a, 1.0 - w), abs=1e-12)
-    assert float(upper_probabilities(v, a, w)) == pytest.approx(upper_probability(v, a, w), abs=1e-15)
+    assert float(upper_probabilities(v, a, w)) == pytest.approx(
+        1.0 - float(upper_probabilities(-v, a, 1.0 - w)), abs=1e-12
+    )
 
 
 def test_the_probability_is_theory_s() -> None:
     for v, a, w in GRID:
-        assert upper_probability(v, a, w) == pytest.approx(float(moments(v, a, w).upper), abs=1e-14)
+        assert float(upper_probabilities(v, a, w)) == pytest.approx(float(moments(v, a, w).upper), abs=1e-14)
 
 
 def test_lapses_are_coins_at_uniform_times() -> None:

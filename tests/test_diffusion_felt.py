@@ -13,7 +13,7 @@ from experiments.direction.plan import make_plan
 from experiments.load import load_setup
 from experiments.synthetic.diffusion import Lapses, People
 from experiments.synthetic.felt import NEUTRAL, FeltParticipant, Mind
-from experiments.synthetic.percept import evidence, forward_rate, percepts_of
+from experiments.synthetic.percept import evidence, forward_rates, percepts_of
 
 CONFIG = load_setup("direction").config
 MIND = Mind()
@@ -42,7 +42,7 @@ def test_participants_who_differ_answer_at_the_mean_rate_of_theory() -> None:
     people = People(drift_factor_sd=0.3, log_boundary_sd=0.2, logit_start_sd=0.3)
     mind = replace(MIND, people=people, lapses=Lapses(rate=0.05))
     for name, rate in rates(mind).items():
-        expected = forward_rate(evidence(FELT[name], mind.percept), mind.percept.start, people, lapse_rate=0.05)
+        expected = float(forward_rates(evidence(FELT[name], mind.percept), mind.percept.start, people, lapse_rate=0.05))
         assert rate == pytest.approx(expected, abs=0.045)
 
 

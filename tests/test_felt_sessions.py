@@ -23,7 +23,7 @@ from experiments.load import load_setup, shipped_folder
 from experiments.preference.observer import observer as preference_observer
 from experiments.preference.observer import strengths
 from experiments.preference.plan import make_plan as preference_plan
-from experiments.synthetic.felt import forward_rates
+from experiments.synthetic.felt import rates_by_instruction
 from experiments.synthetic.percept import evidence, percepts_of
 from experiments.synthetic.preference import feelings, felt_ratings
 from tests.conftest import Recoil
@@ -94,7 +94,7 @@ def test_who_is_hurried_errs_as_much_more_as_the_law_says(hurried: Any) -> None:
     mind = mind_of(setup.config)
     methods = setup.gun.renderings(setup.config.design.methods)
     for method, percept in percepts_of(methods, mind.percept.leak_s).items():
-        for name, rate in forward_rates(mind, percept).items():
+        for name, rate in rates_by_instruction(mind, percept).items():
             marks = [right for right, _ in found[method, name]]
             assert np.mean(marks) == pytest.approx(rate, abs=4.5 * math.sqrt(rate * (1 - rate) / len(marks)))
     speed, accuracy = (np.mean(found["asymmetric-1", name], axis=0)[0] for name in ("speed", "accuracy"))
@@ -109,7 +109,7 @@ def test_who_is_hurried_is_as_much_faster_as_the_law_says(hurried: Any) -> None:
     start, neutral = mind.percept.start, mind.boundaries["neutral"]
     for method, percept in percepts_of(methods, mind.percept.leak_s).items():
         drift = evidence(percept, mind.percept) / neutral
-        for name, rate in forward_rates(mind, percept).items():
+        for name, rate in rates_by_instruction(mind, percept).items():
             a, times = mind.boundaries[name], np.array([time for _, time in found[method, name]])
             decision_s = (a * rate - start * a) / drift if drift else start * (1 - start) * a * a
             error = times.std(ddof=1) / math.sqrt(len(times))

@@ -15,7 +15,7 @@ from analysis.times.fit import fit
 from analysis.times.predicted import answered_by
 from experiments.config.door import ConfigError
 from experiments.design.streams import generator
-from experiments.synthetic.diffusion_batch import decide_all
+from experiments.synthetic.diffusion import decide_all
 from tests.conftest import Recoil
 from tests.log_files import METHODS, TextRow, trial_rows, trials_path, write_rows
 from tests.test_decision_fit import made

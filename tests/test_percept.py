@@ -14,7 +14,7 @@ from analysis.predict.fit.percept_model import PAPER_RATES, PerceptFit, fit_perc
 from device.methods import paper_methods
 from device.parameters import GunParameters, VibrationParameters
 from device.physics import simulate, trace
-from experiments.synthetic.diffusion import Diffusion, Lapses, People, upper_probability
+from experiments.synthetic.diffusion import Diffusion, Lapses, People, upper_probabilities
 from experiments.synthetic.percept import (
     SILENT,
     Percept,
@@ -22,7 +22,7 @@ from experiments.synthetic.percept import (
     diffusion_of,
     evidence,
     felt_course,
-    forward_rate,
+    forward_rates,
     percept_of,
     percept_of_summary,
     percepts_of,
@@ -128,7 +128,7 @@ def test_the_diffusion_of_an_evidence_has_its_log_odds() -> None:
     unbiased = replace(DEFAULT, start=0.5)
     diffusion = diffusion_of(1.3, unbiased, boundary=1.7, non_decision_s=0.3, lapses=Lapses())
     assert isinstance(diffusion, Diffusion)
-    p = upper_probability(diffusion.drift, diffusion.boundary, diffusion.start)
+    p = float(upper_probabilities(diffusion.drift, diffusion.boundary, diffusion.start))
     assert math.log(p / (1 - p)) == pytest.approx(1.3)
 
 
@@ -136,11 +136,12 @@ def test_the_mean_rate_over_people_is_that_of_many() -> None:
     people = People(drift_factor_sd=0.4, log_boundary_sd=0.3, logit_start_sd=0.5)
     draws = np.random.Generator(np.random.PCG64(1)).normal(size=(20_000, 3))
     rates = [
-        upper_probability(1.5 * (1 + 0.4 * x) * math.exp(0.3 * y), 1.0, 0.56 / (0.56 + 0.44 * math.exp(-0.5 * z)))
+        upper_probabilities(1.5 * (1 + 0.4 * x) * math.exp(0.3 * y), 1.0, 0.56 / (0.56 + 0.44 * math.exp(-0.5 * z)))
         for x, y, z in draws
     ]
-    assert forward_rate(1.5, 0.56, people) == pytest.approx(np.mean(rates), abs=4.5 * np.std(rates) / math.sqrt(20_000))
-    assert forward_rate(1.5, 0.56, People(), lapse_rate=1.0) == 0.5
+    error = 4.5 * np.std(rates) / math.sqrt(20_000)
+    assert forward_rates(1.5, 0.56, people) == pytest.approx(np.mean(rates), abs=error)
+    assert forward_rates(1.5, 0.56, People(), lapse_rate=1.0) == 0.5
 
 
 def test_the_shipped_numbers_are_the_fit_to_the_paper_s_rates(paper: PerceptFit) -> None:

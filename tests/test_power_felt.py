@@ -22,7 +22,7 @@ from experiments.direction.plan import make_plan
 from experiments.load import load_setup
 from experiments.synthetic.diffusion import People
 from experiments.synthetic.felt import FeltParticipant
-from experiments.synthetic.percept_batch import forward_rates
+from experiments.synthetic.percept import forward_rates
 from tests.conftest import Recoil
 from tests.felt_configs import felt_text, written
 from tests.test_power_studies import homogeneity_p

@@ -16,8 +16,7 @@ from analysis.times.first_passage import distribution, log_density, moments
 from analysis.times.fit import DiffusionFit, fit
 from analysis.times.people import PeopleFit, fit_people
 from experiments.design.streams import generator
-from experiments.synthetic.diffusion import Diffusion, upper_probability
-from experiments.synthetic.diffusion_batch import decide_all
+from experiments.synthetic.diffusion import Diffusion, decide_all, upper_probabilities
 from tests.conftest import Soak
 from tests.test_decision import reference
 from tests.test_decision_fit import RANGE_S, TRUTH, made
@@ -75,7 +74,7 @@ def test_the_distribution_of_times(soak: Soak) -> None:
     for place in GRID:
         v, a, w = place
         drawn = decide_all(v, a, w, 0.0, generator=generator(2, "ks", str(place)), shape=(n,))
-        whole = upper_probability(v, a, w)
+        whole = float(upper_probabilities(v, a, w))
         for answer in (True, False):
             t = np.sort(drawn.time_s[drawn.upper == answer])
             if t.size < 100:

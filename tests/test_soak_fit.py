@@ -22,7 +22,7 @@ from device.methods import paper_methods
 from experiments.design.streams import generator
 from experiments.load import load_setup
 from experiments.synthetic.diffusion import People
-from experiments.synthetic.percept import PerceptParameters, evidence, forward_rate, percepts_of
+from experiments.synthetic.percept import PerceptParameters, evidence, forward_rates, percepts_of
 from tests.conftest import RECOIL, Soak
 from tests.test_power_chain import counted, said, through_the_chain
 from tests.test_power_felt import felt_config
@@ -71,7 +71,7 @@ def refitted(times: int, number: int) -> dict[str, Fitted]:
     trials, felt = 140 * times, percepts_of(paper_methods(), TRUTH.leak_s)
     draws = generator(number, "percept recovery", str(times))
     rates = {
-        name: float(draws.binomial(trials, forward_rate(evidence(one, TRUTH), TRUTH.start, People()))) / trials
+        name: float(draws.binomial(trials, forward_rates(evidence(one, TRUTH), TRUTH.start, People()))) / trials
         for name, one in felt.items()
     }
     return fit_percept(rates, paper_methods(), trials=trials).fitted

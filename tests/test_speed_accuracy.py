@@ -36,7 +36,7 @@ from analysis.times.people import fit_people
 from analysis.times.sampled_fit import MOST_PEOPLE, as_trials, sampled_fit
 from experiments.design.streams import generator
 from experiments.record import columns
-from experiments.synthetic.diffusion_batch import decide_all
+from experiments.synthetic.diffusion import decide_all
 from tests.log_files import METHODS, TextRow, trial_rows, trials_path, write_many, write_rows
 
 DRIFTS = {"vibration": 0.0, "asymmetric-1": 1.2, "asymmetric-2": 2.0}

@@ -19,7 +19,7 @@ from experiments.direction.observer import mind_of
 from experiments.limits import MethodLimits, check_limits, check_methods
 from experiments.load import find, load_gun, load_setup, load_study
 from experiments.screens.synthetic import observer_of
-from experiments.synthetic.felt import NEUTRAL, forward_rates
+from experiments.synthetic.felt import NEUTRAL, rates_by_instruction
 from experiments.synthetic.percept import percepts_of
 
 EXAMPLE_SEED = 1
@@ -112,7 +112,7 @@ def _felt(setup: Setup[Any]) -> dict[str, dict[str, float]]:
     percepts = percepts_of(setup.gun.renderings(config.design.methods), mind.percept.leak_s)
     told = config.design.instructions or (NEUTRAL,)
     return {
-        method: {name: rate for name, rate in forward_rates(mind, percept).items() if name in told}
+        method: {name: rate for name, rate in rates_by_instruction(mind, percept).items() if name in told}
         for method, percept in percepts.items()
     }
 

@@ -9,16 +9,26 @@ into exits from symmetric intervals, whose time does not depend on the side and 
 alternating series of Devroye 2009; at least 0.9991 of the proposals are accepted, whatever c.
 Sources: Ratcliff 1978, Psychol. Rev. 85, 59; Devroye 2009, Stat. Probab. Lett. 79, 2251; Polson, Scott & Windle 2013,
 J. Am. Stat. Assoc. 108, 1339 (J is four times their Polya-Gamma variable); cf. Drugowitsch 2016, Sci. Rep. 6, 20490.
+
+Of many at once the draws are made of the bit generator's raw output, which numpy promises never to change, in the order
+in which the draws still wanting stand in the array; so a seed gives the same answers and times everywhere.
 """
 
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from dataclasses import dataclass
-from statistics import NormalDist
 from typing import Protocol
 
-__all__ = ["Decision", "Diffusion", "Draws", "Lapses", "People", "Person", "decide", "person", "upper_probability"]
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+from scipy import special
+
+Floats = NDArray[np.float64]
+Bools = NDArray[np.bool_]
+Draw = Callable[[int], Floats]
+"""So many numbers strictly between 0 and 1."""
 
 CUT = 0.64
 """Where the two forms of the series meet (Devroye 2009)."""
@@ -27,7 +37,8 @@ SURE = 30.0
 LARGEST = 1e6
 """Drift and boundary above this are refused: nobody is that cautious, and squares stay far from overflow."""
 
-_NORMAL = NormalDist()
+LEVY_TAIL = float(special.ndtr(-1.0 / math.sqrt(CUT)))
+"""P(N < -1/sqrt(CUT)): 1/N^2 is then below `CUT`."""
 
 
 class Draws(Protocol):
@@ -137,16 +148,12 @@ def person(people: People, draws: Draws) -> Person:
     )
 
 
-def upper_probability(drift: float, boundary: float, start: float) -> float:
-    """P(upper) = (1 - exp(-2 v w a)) / (1 - exp(-2 v a)), w for no drift; to 1e-16 and without overflow.
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Decisions:
+    """Answers and times, arrays of one shape."""
 
-    >>> upper_probability(0.0, 1.0, 0.25), round(upper_probability(1.0, 2.0, 0.5), 6)
-    (0.25, 0.880797)
-    """
-    if drift < 0:
-        return 1.0 - upper_probability(-drift, boundary, 1.0 - start)
-    whole = -math.expm1(-2.0 * drift * boundary)
-    return -math.expm1(-2.0 * drift * boundary * start) / whole if whole > 1e-300 else start
+    upper: Bools
+    time_s: Floats
 
 
 def decide(diffusion: Diffusion, draws: Draws) -> Decision:
@@ -160,109 +167,183 @@ def decide(diffusion: Diffusion, draws: Draws) -> Decision:
         time_s = lapses.earliest_s + (lapses.latest_s - lapses.earliest_s) * draws.uniform()
         return Decision(upper=side < 0.5, time_s=time_s, lapse=True)
     a, w = diffusion.boundary, diffusion.start
-    upper = side < upper_probability(diffusion.drift, a, w)
+    upper = side < float(upper_probabilities(diffusion.drift, a, w))
     gap, back = ((1.0 - w) * a, w * a) if upper else (w * a, (1.0 - w) * a)
-    return Decision(upper=upper, time_s=diffusion.non_decision_s + _way(abs(diffusion.drift), gap, back, draws))
+    way = _ways(np.array([abs(diffusion.drift)]), np.array([gap]), np.array([back]), lambda count: _drawn(draws, count))
+    return Decision(upper=upper, time_s=diffusion.non_decision_s + float(way[0]))
 
 
-def _way(drift: float, gap: float, back: float, draws: Draws) -> float:
-    """The time in s until a point `gap` away is met, given that the one `back` behind is not.
+def _drawn(draws: Draws, count: int) -> Floats:
+    return np.array([draws.uniform() for _ in range(count)])
+
+
+def upper_probabilities(drift: ArrayLike, boundary: ArrayLike, start: ArrayLike) -> Floats:
+    """P(upper) = (1 - exp(-2 v w a)) / (1 - exp(-2 v a)), w for no drift; to 1e-16. The arguments broadcast.
+
+    >>> upper_probabilities([0.0, 1.0], [1.0, 2.0], [0.25, 0.5]).round(6).tolist()
+    [0.25, 0.880797]
+    """
+    v, a, w = (np.asarray(values, dtype=np.float64) for values in (drift, boundary, start))
+    w = np.where(v < 0.0, 1.0 - w, w)
+    whole = -np.expm1(-2.0 * np.abs(v) * a)
+    some = whole > 1e-300
+    share = np.where(some, -np.expm1(-2.0 * np.abs(v) * a * w) / np.where(some, whole, 1.0), w)
+    return np.where(v < 0.0, 1.0 - share, share)
+
+
+def decide_all(
+    drift: ArrayLike,
+    boundary: ArrayLike,
+    start: ArrayLike,
+    non_decision_s: ArrayLike,
+    *,
+    generator: np.random.Generator,
+    shape: tuple[int, ...] | None = None,
+) -> Decisions:
+    """One decision each of the broadcast parameters (or of `shape`), without lapses; about 1 us each.
+
+    `ValueError`: a drift or boundary beyond `LARGEST`, a boundary not above 0, a start outside 0..1, a time below 0.
+    """
+    values = (np.asarray(value, dtype=np.float64) for value in (drift, boundary, start, non_decision_s))
+    v, a, w, t0 = (np.array(x) for x in np.broadcast_arrays(*values))
+    _check(v, a, w, t0)
+    shape = v.shape if shape is None else shape
+    v, a, w, t0 = (np.broadcast_to(x, shape).ravel() for x in (v, a, w, t0))
+    upper = uniforms(generator, v.size) < upper_probabilities(v, a, w)
+    gap, back = np.where(upper, 1.0 - w, w) * a, np.where(upper, w, 1.0 - w) * a
+    time_s = t0 + _ways(np.abs(v), gap, back, lambda count: uniforms(generator, count))
+    return Decisions(upper=upper.reshape(shape), time_s=time_s.reshape(shape))
+
+
+def uniforms(generator: np.random.Generator, count: int) -> Floats:
+    """Numbers strictly between 0 and 1, as `Stream.uniform` makes them."""
+    raw = np.asarray(generator.bit_generator.random_raw(count), dtype=np.uint64)
+    return ((raw >> np.uint64(12)).astype(np.float64) + 0.5) * 2.0**-52
+
+
+def _check(v: Floats, a: Floats, w: Floats, t0: Floats) -> None:
+    rules = (
+        (np.abs(v) <= LARGEST, f"drift must be within {LARGEST:g}"),
+        ((a > 0.0) & (a <= LARGEST), f"boundary must be above 0 and at most {LARGEST:g}"),
+        ((w >= 0.0) & (w <= 1.0), "start must be 0 to 1"),
+        ((t0 >= 0.0) & (t0 <= 3_600.0), "non_decision_s must be 0 to 3600"),
+    )
+    for holds, rule in rules:
+        if not holds.all():
+            raise ValueError(f"{rule}, but element {int(np.argmin(holds.ravel()))} is not")
+
+
+def _ways(v: Floats, gap: Floats, back: Floats, draw: Draw) -> Floats:
+    """The times in s until points `gap` away are met, given that those `back` behind are not; a round is an exit each.
 
     Nearer to the point behind, the way is doubled for sure; nearer to the one ahead, it ends with at least 1/2. Given
     the answer the sign of the drift no longer matters.
     """
-    time_s = 0.0
-    while gap > 0.0:
-        if back <= gap:
-            time_s += exit_time(drift, back, draws)
-            gap, back = gap - back, 2.0 * back
-            if back <= 0.0:
-                break
-        else:
-            time_s += exit_time(drift, gap, draws)
-            if draws.uniform() < ending_probability(drift, gap, back):
-                break
-            gap, back = 2.0 * gap, back - gap
+    time_s = np.zeros_like(v)
+    open_ = np.flatnonzero((gap > 0.0) & (back > 0.0))
+    while open_.size:
+        c, g, b = v[open_], gap[open_], back[open_]
+        behind = b <= g
+        time_s[open_] += exit_times(c, np.where(behind, b, g), draw)
+        there = draw(open_.size) < ending_probabilities(c, g, b)
+        gap[open_], back[open_] = np.where(behind, g - b, 2.0 * g), np.where(behind, 2.0 * b, b - g)
+        open_ = open_[np.where(behind, g > b, ~there)]
     return time_s
 
 
-def ending_probability(drift: float, gap: float, back: float) -> float:
-    """The chance that an exit from (-gap, gap) is through the point ahead, given that it is met in the end.
+def ending_probabilities(v: Floats, gap: Floats, back: Floats) -> Floats:
+    """The chances that exits from (-gap, gap) are through the point ahead, given that it is met in the end.
 
     (1 - exp(-2 v (gap + back))) / (1 - exp(-2 v back)) / (1 + exp(-2 v gap)); without drift (gap + back) / (2 back).
     """
-    whole, behind = math.expm1(-2.0 * drift * (gap + back)), math.expm1(-2.0 * drift * back)
-    if behind > -1e-300:
-        return (gap + back) / (2.0 * back)
-    return whole / behind / (1.0 + math.exp(-2.0 * drift * gap))
+    behind = np.expm1(-2.0 * v * back)
+    some = behind < -1e-300
+    ratio = np.expm1(-2.0 * v * (gap + back)) / np.where(some, behind, 1.0) / (1.0 + np.exp(-2.0 * v * gap))
+    return np.where(some, ratio, (gap + back) / (2.0 * back))
 
 
-def exit_time(drift: float, half_width: float, draws: Draws) -> float:
-    """The time in s at which a diffusion from 0 leaves (-half_width, half_width); exact, whatever the drift."""
-    c = abs(drift) * half_width
-    rate = math.pi**2 / 8.0 + c * c / 2.0
-    late = late_share(c)
-    while True:
-        if draws.uniform() < late:
-            x = CUT - math.log(draws.uniform()) / rate
-        else:
-            x = _early_slow(c, draws) if c * CUT < 1.0 else _early_fast(c, draws)
-        if _accepted(x, draws.uniform()):
-            return half_width * half_width * x
+def exit_times(drift: Floats, half_width: Floats, draw: Draw) -> Floats:
+    """The times at which diffusions from 0 leave (-half_width, half_width)."""
+    c = np.abs(drift) * half_width
+    x, wanting = np.empty_like(c), np.arange(c.size)
+    late_share = late_shares(c)
+    while wanting.size:
+        proposed = _proposed(c[wanting], late_share[wanting], draw)
+        taken = _accepted(proposed, draw(wanting.size))
+        x[wanting[taken]] = proposed[taken]
+        wanting = wanting[~taken]
+    return np.asarray(half_width * half_width * x)
 
 
-def late_share(c: float) -> float:
+def late_shares(c: Floats) -> Floats:
     """The share of proposals that lie beyond `CUT`: p / (p + q) of Polson, Scott & Windle, both times exp(c)."""
-    if c > SURE:
-        return 0.0
-    rate, root = math.pi**2 / 8.0 + c * c / 2.0, math.sqrt(CUT)
-    p = math.pi / (2.0 * rate) * math.exp(c - rate * CUT)
-    below = math.erfc((1.0 - CUT * c) / root / math.sqrt(2.0)) / 2.0
-    above = math.exp(2.0 * c) * math.erfc((1.0 + CUT * c) / root / math.sqrt(2.0)) / 2.0
-    return p / (p + 2.0 * (below + above))
+    near = np.minimum(c, SURE)
+    rate, root = math.pi**2 / 8.0 + near * near / 2.0, math.sqrt(2.0 * CUT)
+    p = math.pi / (2.0 * rate) * np.exp(near - rate * CUT)
+    above = np.exp(2.0 * near) * special.erfc((1.0 + CUT * near) / root)
+    share = p / (p + special.erfc((1.0 - CUT * near) / root) + above)
+    return np.where(c > SURE, 0.0, share)
 
 
-LEVY_TAIL = _NORMAL.cdf(-1.0 / math.sqrt(CUT))
-"""P(N < -1/sqrt(CUT)): 1/N^2 is then below `CUT`."""
+def _proposed(c: Floats, late_share: Floats, draw: Draw) -> Floats:
+    late = draw(c.size) < late_share
+    slow, fast = ~late & (c * CUT < 1.0), ~late & (c * CUT >= 1.0)
+    x = np.empty_like(c)
+    rate = math.pi**2 / 8.0 + c[late] ** 2 / 2.0
+    x[late] = CUT - np.log(draw(rate.size)) / rate
+    x[slow] = _early_slow(c[slow], draw)
+    x[fast] = _early_fast(c[fast], draw)
+    return x
 
 
-def _early_slow(c: float, draws: Draws) -> float:
-    """An inverse Gaussian number of mean 1/c and shape 1 given that it is below `CUT`, for a mean above `CUT`.
+def _early_slow(c: Floats, draw: Draw) -> Floats:
+    """Inverse Gaussian numbers of mean 1/c and shape 1 given that they are below `CUT`, for means above `CUT`.
 
     1/N^2 below `CUT`, tilted by exp(-c^2 x / 2): at least 0.45 of the proposals are taken.
     """
-    while True:
-        x = _NORMAL.inv_cdf(LEVY_TAIL * draws.uniform()) ** -2
-        if draws.uniform() < math.exp(-c * c * x / 2.0):
-            return x
+    x, wanting = np.empty_like(c), np.arange(c.size)
+    while wanting.size:
+        proposed = special.ndtri(LEVY_TAIL * draw(wanting.size)) ** -2.0
+        taken = draw(wanting.size) < np.exp(-(c[wanting] ** 2) * proposed / 2.0)
+        x[wanting[taken]] = proposed[taken]
+        wanting = wanting[~taken]
+    return x
 
 
-def _early_fast(c: float, draws: Draws) -> float:
-    """The same for a mean below `CUT`: at least 0.6 of the proposals are."""
-    while True:
-        x = _inverse_gaussian(1.0 / c, draws)
-        if x <= CUT:
-            return x
+def _early_fast(c: Floats, draw: Draw) -> Floats:
+    """The same for means below `CUT`, where at least 0.6 of the proposals are.
+
+    Michael, Schucany & Haas 1976, Am. Stat. 30, 88; the smaller root without cancellation.
+    """
+    x, wanting = np.empty_like(c), np.arange(c.size)
+    while wanting.size:
+        mean = 1.0 / c[wanting]
+        h = mean * special.ndtri(draw(wanting.size)) ** 2 / 2.0
+        root = mean / (1.0 + h + np.sqrt(h * (2.0 + h)))
+        smaller = draw(wanting.size) * (mean + root) <= mean
+        proposed = np.where(smaller, root, mean * mean / root)
+        taken = proposed <= CUT
+        x[wanting[taken]] = proposed[taken]
+        wanting = wanting[~taken]
+    return x
 
 
-def _inverse_gaussian(mean: float, draws: Draws) -> float:
-    """Michael, Schucany & Haas 1976, Am. Stat. 30, 88; the smaller root without cancellation."""
-    h = mean * draws.normal() ** 2 / 2.0
-    x = mean / (1.0 + h + math.sqrt(h * (2.0 + h)))
-    return x if draws.uniform() * (mean + x) <= mean else mean * mean / x
-
-
-def _accepted(x: float, u: float) -> bool:
+def _accepted(x: Floats, u: Floats) -> Bools:
     """Whether u a_0 lies below the alternating sum, told by as many terms as it takes: odd sums are below, even above.
 
-    The terms fall faster than exp(-n^2), so they have vanished after a few tens at the latest.
+    Nearly all are told by the first term; the terms fall faster than exp(-n^2), so they have vanished soon.
     """
-    total, n = 1.0, 0
-    while True:
+    total = np.ones_like(x)
+    result, wanting = np.zeros(x.size, dtype=np.bool_), np.arange(x.size)
+    n = 0
+    while wanting.size:
         n += 1
-        term = (2 * n + 1) * math.exp(-2.0 * n * (n + 1) / x if x <= CUT else -n * (n + 1) * math.pi**2 * x / 2.0)
-        total += -term if n % 2 else term
-        if n % 2 and u < total:
-            return True
-        if (not n % 2 and u > total) or term == 0.0:
-            return u < total
+        here = x[wanting]
+        size = n * (n + 1)
+        term = (2 * n + 1) * np.exp(np.where(here <= CUT, -2.0 * size / here, -size * math.pi**2 * here / 2.0))
+        total[wanting] += -term if n % 2 else term
+        below = u[wanting] < total[wanting]
+        told = (term == 0.0) | (below if n % 2 else ~below)
+        result[wanting[told]] = below[told]
+        wanting = wanting[~told]
+    return result

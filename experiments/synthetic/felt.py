@@ -14,7 +14,7 @@ from experiments.config.models import Share
 from experiments.design.plan import Plan, Trial
 from experiments.design.streams import Stream
 from experiments.synthetic.diffusion import Decision, Diffusion, Lapses, People, decide, person
-from experiments.synthetic.percept import Percept, PerceptParameters, diffusion_of, evidence, forward_rate
+from experiments.synthetic.percept import Percept, PerceptParameters, diffusion_of, evidence, forward_rates
 
 NEUTRAL = "neutral"
 """The instruction of a trial that has none."""
@@ -31,11 +31,11 @@ class Mind:
     people: People = field(default_factory=People)
 
 
-def forward_rates(mind: Mind, percept: Percept) -> dict[str, float]:
+def rates_by_instruction(mind: Mind, percept: Percept) -> dict[str, float]:
     """The share of "forward" after a forward shot in the mean over people, by instruction."""
     log_odds, neutral = evidence(percept, mind.percept), mind.boundaries[NEUTRAL]
     return {
-        name: forward_rate(log_odds * boundary / neutral, mind.percept.start, mind.people, mind.lapses.rate)
+        name: float(forward_rates(log_odds * boundary / neutral, mind.percept.start, mind.people, mind.lapses.rate))
         for name, boundary in mind.boundaries.items()
     }
 

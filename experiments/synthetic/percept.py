@@ -22,26 +22,18 @@ from dataclasses import dataclass
 from functools import lru_cache
 from typing import TYPE_CHECKING
 
+import numpy as np
+from numpy.polynomial.hermite_e import hermegauss
+from numpy.typing import ArrayLike
+
 from device.methods import Method
 from device.parameters import GunParameters
-from experiments.synthetic.diffusion import Diffusion, Lapses, People, upper_probability
+from experiments.synthetic.diffusion import Diffusion, Floats, Lapses, People, upper_probabilities
 
 if TYPE_CHECKING:
     from device.physics import ShotSummary, ShotTrace
 
-__all__ = [
-    "Percept",
-    "PerceptParameters",
-    "diffusion_of",
-    "evidence",
-    "felt_course",
-    "forward_rate",
-    "percept_of",
-    "percept_of_course",
-    "percept_of_summary",
-    "percept_of_trace",
-    "percepts_of",
-]
+_POINTS = 15
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -169,29 +161,40 @@ def diffusion_of(
     )
 
 
-def forward_rate(log_odds: float, start: float, people: People, lapse_rate: float = 0.0) -> float:
-    """The share of "forward" in the mean over people: over their factors of drift and boundary and their bias.
+def own_start(start: ArrayLike, logit_start: ArrayLike) -> Floats:
+    """The starting point of people whose logit differs by so much, as `diffusion.Person.own` has it; they broadcast.
 
-    Gauss-Hermite quadrature of 15 points for each spread above 0; 1e-8 of the mean for spreads up to 0.5. With no
-    spread and no lapses `upper_probability`.
+    >>> own_start(0.5, [0.0, 1.0]).round(6).tolist()
+    [0.5, 0.731059]
     """
-    mean = 0.0
-    for drift, p in _nodes(people.drift_factor_sd):
-        for boundary, q in _nodes(people.log_boundary_sd):
-            for logit, r in _nodes(people.logit_start_sd):
-                w = start / (start + (1.0 - start) * math.exp(-logit))
-                mean += p * q * r * upper_probability(log_odds * (1.0 + drift) * math.exp(boundary), 1.0, w)
-    return (1.0 - lapse_rate) * mean + lapse_rate / 2.0
+    w = np.asarray(start, dtype=np.float64)
+    return np.asarray(w / (w + (1.0 - w) * np.exp(-np.asarray(logit_start, dtype=np.float64))))
+
+
+def forward_rates(log_odds: ArrayLike, start: float, people: People, lapse_rate: float = 0.0) -> Floats:
+    """The share of "forward" in the mean over people, of each evidence (any shape).
+
+    Over their factors of drift and boundary and their bias: Gauss-Hermite quadrature of 15 points for each spread above
+    0; 1e-8 of the mean for spreads up to 0.5. With no spread and no lapses `upper_probabilities`.
+
+    >>> forward_rates([0.0, 1.0, -1.0], 0.5, People()).round(6).tolist()
+    [0.5, 0.731059, 0.268941]
+    """
+    drift, boundary, logit = map(_nodes, (people.drift_factor_sd, people.log_boundary_sd, people.logit_start_sd))
+    strength = (1.0 + drift[0])[:, None] * np.exp(boundary[0])
+    product = np.asarray(log_odds, dtype=np.float64)[..., None, None, None] * strength[..., None]
+    upper = upper_probabilities(product, 1.0, own_start(start, logit[0]))
+    mean = np.einsum("...ijk,i,j,k->...", upper, drift[1], boundary[1], logit[1])
+    return np.asarray((1.0 - lapse_rate) * mean + lapse_rate / 2.0)
 
 
 @lru_cache(maxsize=64)
-def _nodes(sd: float) -> tuple[tuple[float, float], ...]:
+def _nodes(sd: float) -> tuple[Floats, Floats]:
+    """Places and weights of the quadrature."""
     if sd == 0.0:
-        return ((0.0, 1.0),)
-    from numpy.polynomial.hermite_e import hermegauss  # noqa: PLC0415 - only where people differ
-
-    places, weights = hermegauss(15)
-    return tuple((sd * float(x), float(w) / math.sqrt(2.0 * math.pi)) for x, w in zip(places, weights, strict=True))
+        return np.zeros(1), np.ones(1)
+    places, weights = hermegauss(_POINTS)
+    return sd * places, weights / math.sqrt(2.0 * math.pi)
 
 
 def percepts_of(methods: Mapping[str, Method], leak_s: float) -> dict[str, Percept]:

@@ -23,7 +23,7 @@ from device.parameters import GunParameters
 from device.physics import simulate
 from experiments.design.streams import generator
 from experiments.synthetic.diffusion import People
-from experiments.synthetic.percept import Percept, PerceptParameters, evidence, forward_rate
+from experiments.synthetic.percept import Percept, PerceptParameters, evidence, forward_rates
 
 LEVEL = 0.75
 """Halfway between guessing and certainty: the usual threshold of a choice between two."""
@@ -221,7 +221,7 @@ def under(gun: GunParameters, others: Sequence[Alternative]) -> dict[str, float]
 def _rate(percept: Percept | None, parameters: PerceptParameters) -> float:
     if percept is None:
         return math.nan
-    return forward_rate(evidence(percept, parameters), parameters.start, People())
+    return float(forward_rates(evidence(percept, parameters), parameters.start, People()))
 
 
 def both_ways(felt: Floats, parameters: PerceptParameters) -> Floats:

@@ -21,8 +21,7 @@ from device.parameters import GunParameters
 from device.words import DIRECTIONS
 from experiments.record import storage
 from experiments.record.provenance import provenance
-from experiments.synthetic.percept import Percept, PerceptParameters, evidence, percept_of, percepts_of
-from experiments.synthetic.percept_batch import forward_rates
+from experiments.synthetic.percept import Percept, PerceptParameters, evidence, forward_rates, percept_of, percepts_of
 
 __all__ = ["Request", "as_text", "percept"]
 

@@ -12,9 +12,8 @@ from numpy.typing import NDArray
 from scipy import optimize, special
 
 from device.methods import Method
-from experiments.synthetic.diffusion import People
-from experiments.synthetic.percept import Percept, PerceptParameters, evidence, percepts_of
-from experiments.synthetic.percept_batch import Floats, forward_rates
+from experiments.synthetic.diffusion import Floats, People
+from experiments.synthetic.percept import Percept, PerceptParameters, evidence, forward_rates, percepts_of
 
 FITTED = ("sensitivity", "confusion", "start")
 ASSUMED = ("exponent", "leak_s", "boundary")

@@ -23,9 +23,8 @@ from analysis.predict.fit.percept_likelihood import (
 )
 from device.methods import Method
 from device.words import Direction
-from experiments.synthetic.diffusion import People
-from experiments.synthetic.percept import Percept, PerceptParameters, evidence
-from experiments.synthetic.percept_batch import Floats, forward_rates
+from experiments.synthetic.diffusion import Floats, People
+from experiments.synthetic.percept import Percept, PerceptParameters, evidence, forward_rates
 
 __all__ = [
     "ASSUMED",

@@ -15,11 +15,9 @@ from numpy.typing import ArrayLike, NDArray
 from experiments.config.setup import Setup
 from experiments.direction.config import DirectionConfig, Synthetic
 from experiments.direction.observer import mind_of
-from experiments.synthetic.diffusion import People
-from experiments.synthetic.diffusion_batch import upper_probabilities
+from experiments.synthetic.diffusion import People, upper_probabilities
 from experiments.synthetic.felt import NEUTRAL
-from experiments.synthetic.percept import Percept, evidence, percepts_of
-from experiments.synthetic.percept_batch import own_start
+from experiments.synthetic.percept import Percept, evidence, own_start, percepts_of
 
 Floats = NDArray[np.float64]
 Counts = NDArray[np.int64]
