@@ -11,14 +11,14 @@ from experiments.config.setup import Setup
 from experiments.design.plan import Plan
 from experiments.direction import observer as direction_observer
 from experiments.direction.config import DirectionConfig
-from experiments.direction.plan import make_plan as direction_plan
-from experiments.direction.plan import make_practice as direction_practice
-from experiments.direction.rows import rows as direction_rows
+from experiments.direction.session import make_plan as direction_plan
+from experiments.direction.session import make_practice as direction_practice
+from experiments.direction.session import rows as direction_rows
 from experiments.direction.session import session as direction_session
 from experiments.preference import observer as preference_observer
 from experiments.preference.config import PreferenceConfig
-from experiments.preference.plan import make_plan as preference_plan
-from experiments.preference.rows import rows as preference_rows
+from experiments.preference.session import make_plan as preference_plan
+from experiments.preference.session import rows as preference_rows
 from experiments.preference.session import session as preference_session
 from experiments.record.tables import Row
 from experiments.session.history import Told

@@ -28,7 +28,7 @@ from experiments.record import storage
 from experiments.record.journal import Contents, read
 from experiments.record.replay import told
 from experiments.run import Finished, Request, run
-from experiments.screens.console import overview, theme, view
+from experiments.screens.console import overview, parts, view
 from experiments.screens.console.controls import Controls
 from experiments.screens.console.keys import Name, Presses
 from experiments.screens.console.messages import Ended, Field, GunSeen
@@ -407,7 +407,7 @@ class PaperWindow:
     # View
 
     def say(self, text: str, mood: str) -> None:
-        assert mood in theme.MOODS
+        assert mood in parts.MOODS
         self.heard.append(text)
 
     def open_line(self, question: str) -> None:

@@ -18,7 +18,7 @@ from experiments.record.journal import JournalError, read
 from experiments.run import Request, run
 from experiments.screens.synthetic import synthetic_screen
 from experiments.study.places import PlaceError
-from recoil.began_with import copy_began_with
+from recoil.config_files import copy_began_with
 from tests.conftest import Recoil
 
 ODD = 'A "quoted" \\ title,\n\tin two lines: 反冲 é \x7f'

@@ -176,7 +176,7 @@ def test_only_a_change_of_what_is_asked_is_news() -> None:
 
 @pytest.fixture
 def study(tmp_path: Path) -> StudyFolder:
-    from experiments.study.folders import new_study
+    from recoil.config_files import new_study
 
     new_study(tmp_path / "pilot")
     return open_study(tmp_path / "pilot")

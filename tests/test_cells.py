@@ -6,7 +6,7 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from analysis.logs.completeness import complete_rows
+from analysis.logs.exclusions import complete_rows
 from analysis.logs.reading import read_logs
 from analysis.stats.cells import coded, trial_cells
 from tests.log_files import METHODS, trial_rows, trials_path, write_rows, write_study

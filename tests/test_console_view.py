@@ -14,9 +14,9 @@ from hypothesis import strategies as st
 from experiments import catalogue
 from experiments.config.setup import Setup
 from experiments.design.plan import Plan, Trial
-from experiments.screens.console import overview, theme, view
+from experiments.screens.console import overview, parts, view
 from experiments.screens.console.messages import Ended, GunSeen, ParticipantSeen
-from experiments.screens.console.pace import Pace, clock_text, end_text, progress, remaining_s
+from experiments.screens.console.overview import Pace, clock_text, end_text, progress, remaining_s
 from experiments.screens.console.view import About, Seen
 from experiments.session.remarks import AnswerCorrected, Flagged, Noted
 from experiments.session.states import Position, State
@@ -194,24 +194,24 @@ def test_the_strip_shows_the_own_hands_times_of_the_session_alone() -> None:
 
 
 @pytest.mark.parametrize("name", ["dark", "light"])
-def test_text_of_every_mood_stands_out_on_ground_and_panel_seven_to_one(name: theme.Theme) -> None:
+def test_text_of_every_mood_stands_out_on_ground_and_panel_seven_to_one(name: parts.Theme) -> None:
     for ground in ("ground", "panel"):
-        for colour in (*theme.MOODS, "text", "quiet"):
-            assert theme.contrast(name, colour, ground) >= 7, (colour, ground)
+        for colour in (*parts.MOODS, "text", "quiet"):
+            assert parts.contrast(name, colour, ground) >= 7, (colour, ground)
 
 
 @pytest.mark.parametrize("name", ["dark", "light"])
-@pytest.mark.parametrize("ground", ["stop", *theme.BANDS])
-def test_the_text_of_stop_button_and_bands_stands_out(name: theme.Theme, ground: str) -> None:
-    assert theme.contrast(name, f"{ground}_text", ground) >= 4.5  # WCAG 2 AA; it is large and bold
+@pytest.mark.parametrize("ground", ["stop", *parts.BANDS])
+def test_the_text_of_stop_button_and_bands_stands_out(name: parts.Theme, ground: str) -> None:
+    assert parts.contrast(name, f"{ground}_text", ground) >= 4.5  # WCAG 2 AA; it is large and bold
 
 
 def test_contrast_is_that_of_the_published_definition(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setitem(theme._COLOURS["light"], "grey", "#767676")
-    assert theme.contrast("light", "grey") == pytest.approx(4.54, abs=0.005)
+    monkeypatch.setitem(parts._COLOURS["light"], "grey", "#767676")
+    assert parts.contrast("light", "grey") == pytest.approx(4.54, abs=0.005)
     # WCAG 2: a colour on itself is 1 to 1; #767676 is the lightest grey with 4.5 to 1 on white
-    assert theme.contrast("light", "ground", "ground") == 1
-    assert theme.contrast("light", "stop_text", "ground") == 1
+    assert parts.contrast("light", "ground", "ground") == 1
+    assert parts.contrast("light", "stop_text", "ground") == 1
 
 
 # the time to go

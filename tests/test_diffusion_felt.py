@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from device.methods import paper_methods
-from experiments.direction.plan import make_plan
+from experiments.direction.session import make_plan
 from experiments.load import load_setup
 from experiments.synthetic.diffusion import Lapses, People
 from experiments.synthetic.felt import NEUTRAL, FeltParticipant, Mind

@@ -11,8 +11,7 @@ from pydantic import ValidationError
 
 from experiments.config.setup import Setup, canonical_json
 from experiments.design.plan import Plan, Trial
-from experiments.direction.plan import make_plan
-from experiments.direction.session import session
+from experiments.direction.session import make_plan, session
 from experiments.load import load_setup
 from experiments.session.steps import (
     Answered,

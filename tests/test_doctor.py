@@ -43,8 +43,8 @@ from experiments.doctor.figures import (
     percentile,
     spread,
 )
-from experiments.doctor.latencies import Latencies, latencies, together
 from experiments.doctor.measures import APPENDS, adapters, appends, ticks
+from experiments.doctor.verdicts import Latencies, latencies, together
 from experiments.load import find, load_gun
 from experiments.record.journal import Journal
 from experiments.study.places import PlaceError

@@ -23,9 +23,9 @@ from experiments.load import load_setup, shipped_folder
 from experiments.record import columns
 from experiments.run import Request, run
 from experiments.screens.synthetic import synthetic_screen
-from experiments.study.folders import new_study
 from experiments.study.places import PlaceError
 from experiments.study.register import append, entry
+from recoil.config_files import new_study
 from tests.conftest import RECOIL, Recoil
 from tests.log_files import rating_rows, ratings_path, trial_rows, trials_path, write_rows, write_study
 from tests.test_cli import refused

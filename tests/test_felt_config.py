@@ -11,11 +11,11 @@ from analysis.predict.check import as_text, check
 from experiments.clock import VirtualClock
 from experiments.config.door import ConfigError
 from experiments.direction.observer import mind_of
-from experiments.direction.plan import make_plan
+from experiments.direction.session import make_plan
 from experiments.load import load_setup
 from experiments.screens.synthetic import synthetic_screen
 from experiments.synthetic.felt import Mind
-from experiments.synthetic.percept_config import PerceptConfig
+from experiments.synthetic.percept import PerceptConfig
 from experiments.synthetic.preference import Appeal
 from tests.felt_configs import BALANCE, changed, felt_text, shipped_text, written
 

@@ -18,11 +18,11 @@ from experiments.design.plan import Plan
 from experiments.design.streams import Stream
 from experiments.direction.observer import FeltObserver, mind_of
 from experiments.direction.observer import observer as direction_observer
-from experiments.direction.plan import make_plan
+from experiments.direction.session import make_plan
 from experiments.load import load_setup, shipped_folder
 from experiments.preference.observer import observer as preference_observer
 from experiments.preference.observer import strengths
-from experiments.preference.plan import make_plan as preference_plan
+from experiments.preference.session import make_plan as preference_plan
 from experiments.synthetic.felt import rates_by_instruction
 from experiments.synthetic.percept import evidence, percepts_of
 from experiments.synthetic.preference import feelings, felt_ratings

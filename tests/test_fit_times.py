@@ -11,8 +11,7 @@ import pytest
 
 from analysis.predict.fit.times import lapse_range
 from analysis.times.first_passage import distribution
-from analysis.times.fit import fit
-from analysis.times.predicted import answered_by
+from analysis.times.fit import answered_by, fit
 from experiments.config.door import ConfigError
 from experiments.design.streams import generator
 from experiments.synthetic.diffusion import decide_all

@@ -6,8 +6,7 @@ from device.methods import rendering_of, settle_s
 from device.parameters import GunParameters
 from device.physics import simulate, trace
 from device.physics.audit import audit
-from device.physics.contact import compliant_collision, rigid_collision
-from device.physics.hand import Hand, simulate_held
+from device.physics.hand import Hand, compliant_collision, rigid_collision, simulate_held
 from device.physics.trains import highest_rate_Hz, train
 from device.simulated import SimulatedGun
 from device.words import Pulse, Shot

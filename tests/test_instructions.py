@@ -18,8 +18,7 @@ from experiments.clock import VirtualClock
 from experiments.config.setup import Setup, canonical_json
 from experiments.design.plan import Plan
 from experiments.direction.config import DirectionConfig
-from experiments.direction.plan import make_plan, make_practice
-from experiments.direction.session import session
+from experiments.direction.session import make_plan, make_practice, session
 from experiments.load import load_setup, shipped_folder
 from experiments.record.journal import read
 from experiments.record.replay import told

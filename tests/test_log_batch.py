@@ -13,14 +13,13 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from analysis.logs import cells as log_cells
+from analysis.logs import frames as log_cells
 from analysis.logs import reading as logs
 from analysis.logs.batch import read_batch
 from analysis.logs.files import find_logs
 from analysis.logs.frames import Block, joined
 from analysis.logs.reading import read_logs
-from analysis.logs.records import records
-from analysis.logs.rules import BadLogError
+from analysis.logs.rules import BadLogError, records
 from experiments.record import columns
 from tests.log_files import TextRow, rating_rows, trial_rows, trials_path, write_rows, write_study
 

@@ -13,11 +13,11 @@ from experiments.config.setup import Setup
 from experiments.design.streams import Stream
 from experiments.direction.observer import RatesObserver, TableObserver
 from experiments.direction.observer import observer as direction_observer
-from experiments.direction.plan import make_plan as direction_plan
+from experiments.direction.session import make_plan as direction_plan
 from experiments.load import load_setup
 from experiments.preference.observer import RatingsObserver, draw_ratings
 from experiments.preference.observer import observer as preference_observer
-from experiments.preference.plan import make_plan as preference_plan
+from experiments.preference.session import make_plan as preference_plan
 from experiments.screens.synthetic import synthetic_screen
 from experiments.session.steps import on_scale
 

@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from experiments.design.orders import method_order, next_row, rows
+from experiments.design.plan import method_order, next_row, rows
 from experiments.design.streams import Stream
 
 COUNTS = range(2, 9)

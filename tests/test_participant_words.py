@@ -6,7 +6,6 @@ from hypothesis import strategies as st
 from pydantic import ValidationError
 
 from experiments.screens.participant.link import ClockMap, RoundTrip, clock_map
-from experiments.screens.participant.look import Look, arguments, look_from
 from experiments.screens.participant.rating_page import move, put
 from experiments.screens.participant.words import (
     AskDescription,
@@ -16,6 +15,7 @@ from experiments.screens.participant.words import (
     DescriptionGiven,
     DirectionGiven,
     Failed,
+    Look,
     Noise,
     NoiseIs,
     Ping,
@@ -23,8 +23,10 @@ from experiments.screens.participant.words import (
     RatingGiven,
     Ready,
     Show,
+    arguments,
     from_participant_from,
     line,
+    look_from,
     to_participant_from,
 )
 

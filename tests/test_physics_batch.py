@@ -91,7 +91,7 @@ def test_a_session_never_loads_the_compiler():
 
 def test_what_one_process_compiled_is_found_by_the_next():
     pytest.importorskip("numba")
-    code = "import sys; from device.physics.compiled import _digest; sys.stdout.write(_digest())"
+    code = "import sys; from device.physics.batch import _digest; sys.stdout.write(_digest())"
     names = {subprocess.run([sys.executable, "-c", code], check=True, capture_output=True).stdout for _ in range(2)}
     assert len(names) == 1
 

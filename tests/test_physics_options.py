@@ -9,9 +9,8 @@ from hypothesis import strategies as st
 
 from device.physics import GunParameters, hand, simulate
 from device.physics.audit import audit
-from device.physics.contact import compliant_collision, rigid_collision
 from device.physics.damper import damper_friction, strip_stiffness
-from device.physics.hand import Hand, simulate_held
+from device.physics.hand import Hand, compliant_collision, rigid_collision, simulate_held
 
 VARIANTS = [(f, off, emf) for f in (0.21, 1.12) for off in ("shorted", "open") for emf in ("printed", "reciprocal")]
 

@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 
 from device.parameters import DriveOff, Emf
 from device.physics import FIDELITIES, SCENES, GunParameters, Scene, choose, simulate
-from device.physics.contact import compliant_collision, rigid_collision
+from device.physics.hand import compliant_collision, rigid_collision
 from device.physics.scenes import COSTS, FRICTION_N, NEAR, NEEDED, choose_contact, stated_error
 from tests.benchmarks.flops import operations
 from tests.conftest import Recoil

@@ -19,9 +19,9 @@ from pydantic import ValidationError
 
 from experiments.config.setup import canonical_json
 from experiments.design.plan import Plan
-from experiments.direction.plan import make_plan as direction_plan
+from experiments.direction.session import make_plan as direction_plan
 from experiments.load import load_setup
-from experiments.preference.plan import make_plan as preference_plan
+from experiments.preference.session import make_plan as preference_plan
 
 SEEDS = 10_000
 METHODS = ("vibration", "asymmetric-1", "asymmetric-2")

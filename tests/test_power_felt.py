@@ -18,7 +18,7 @@ from analysis.predict.power.studies import run_chunk
 from experiments.design.streams import generator
 from experiments.direction.config import DirectionConfig
 from experiments.direction.observer import mind_of
-from experiments.direction.plan import make_plan
+from experiments.direction.session import make_plan
 from experiments.load import load_setup
 from experiments.synthetic.diffusion import People
 from experiments.synthetic.felt import FeltParticipant

@@ -40,7 +40,7 @@ from analysis.predict.reproduction.reproduce import direction_odds, preference_o
 from analysis.stats.tukey import rm_tukey_hsd
 from experiments.design.streams import Stream, generator
 from experiments.direction.observer import RatesObserver
-from experiments.direction.plan import make_plan
+from experiments.direction.session import make_plan
 from experiments.load import find, load_setup
 from experiments.preference.config import RatingScale
 from experiments.preference.observer import draw_ratings

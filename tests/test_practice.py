@@ -7,7 +7,7 @@ import pytest
 
 from analysis.logs.reading import read_logs
 from experiments.clock import VirtualClock
-from experiments.direction.plan import make_practice
+from experiments.direction.session import make_practice
 from experiments.load import load_setup
 from experiments.run import Request, run
 from experiments.screens.synthetic import synthetic_screen

@@ -5,8 +5,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from experiments.load import load_setup
-from experiments.preference.plan import make_plan
-from experiments.preference.session import session
+from experiments.preference.session import make_plan, session
 from experiments.session.steps import (
     Close,
     Closed,

@@ -11,7 +11,7 @@ from device.methods import paper_methods
 from device.parameters import GunParameters, VibrationParameters
 from device.serial_gun.reports import FLOORS_US, asked
 from device.simulated import SimulatedGun
-from device.twin import budget
+from device.twin import machine
 from tests.twins import PULSE, SLOW, Troubles, a_pair, a_shot, said
 from tests.waiting import wait_for
 
@@ -162,7 +162,7 @@ def test_a_method_whose_name_cannot_be_said_is_refused(tmp_path):
         asked(a_shot("Vibration", drive=Effect(effect=1)), {"Vibration": VibrationParameters()})
     weak = asked(a_shot("weak", drive=Pulse(voltage_V=0.00012, pulse_s=0.001)), {"weak": GunParameters()})
     assert (weak.setting.amount, weak.setting.rest_us) == (0, 50_000)
-    assert FLOORS_US == budget.FLOOR_US
+    assert FLOORS_US == machine.FLOOR_US
 
 
 def test_disarming_from_another_thread_cuts_a_shot_that_waits(slow_pair):

@@ -6,8 +6,7 @@ import pytest
 
 from device.physics import GunParameters, simulate
 from device.physics.audit import audit
-from device.physics.contact import compliant_collision
-from device.physics.hand import Hand, simulate_held
+from device.physics.hand import Hand, compliant_collision, simulate_held
 
 
 def test_audit_hand_and_stop_are_those_of_the_physics(recoil):

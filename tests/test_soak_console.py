@@ -16,7 +16,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from experiments.doctor.latencies import Latencies, latencies, together
+from experiments.doctor.verdicts import Latencies, latencies, together
 from experiments.record.journal import read
 from tests import test_console as console
 from tests import test_console_faults as faults

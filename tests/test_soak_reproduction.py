@@ -15,7 +15,7 @@ import pytest
 from scipy.stats import studentized_range
 from statsmodels.stats.anova import AnovaRM
 
-from experiments.direction.plan import make_plan
+from experiments.direction.session import make_plan
 from experiments.load import load_setup
 from experiments.record.journal import JournalError, read
 from tests import test_durability as durability

@@ -32,8 +32,7 @@ from analysis.times.first_passage import moments
 from analysis.times.fit import fit
 from analysis.times.likelihood import trials_of
 from analysis.times.own_trials import ordered, own_trials, quantiles
-from analysis.times.people import fit_people
-from analysis.times.sampled_fit import MOST_PEOPLE, as_trials, sampled_fit
+from analysis.times.people import MOST_PEOPLE, as_trials, fit_people, sampled_fit
 from experiments.design.streams import generator
 from experiments.record import columns
 from experiments.synthetic.diffusion import decide_all

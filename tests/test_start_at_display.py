@@ -18,8 +18,8 @@ from experiments.clock import VirtualClock
 from experiments.load import load_setup
 from experiments.run import Request, run
 from experiments.screens.synthetic import synthetic_screen
-from experiments.study.folders import new_study
 from experiments.study.register import read
+from recoil.config_files import new_study
 from tests import watched_start
 from tests.at_display import HAND_S, AtDisplay, last_record, needs_display
 from tests.conftest import RECOIL

@@ -25,18 +25,18 @@ from experiments.clock import RealClock, VirtualClock
 from experiments.load import load_setup
 from experiments.record.journal import hold
 from experiments.run import Request, run
-from experiments.screens.console import theme
+from experiments.screens.console import parts
 from experiments.screens.console.app import application
 from experiments.screens.console.form import Beside, Opening
 from experiments.screens.console.live import _study
 from experiments.screens.console.start import StartWindow
 from experiments.screens.synthetic import synthetic_screen
 from experiments.study import enrolment, register
-from experiments.study.folders import new_study
 from experiments.study.places import place
 from experiments.study.progress import StudyFolder, open_study
 from experiments.study.register import read
 from experiments.study.study import Facts
+from recoil.config_files import new_study
 
 FACTS = Facts(age_years=25, sex="female", handedness="right")
 PATIENCE_S = 60
@@ -678,10 +678,10 @@ def test_where_there_are_several_monitors_the_participants_is_chosen_by_its_numb
 
 def test_a_ticked_box_shows_a_tick(opened: Open) -> None:
     box = opened().form.noise
-    tick = theme.colour("dark", "ground")  # of a box that is ticked, on a ground of another colour
+    tick = parts.colour("dark", "ground")  # of a box that is ticked, on a ground of another colour
     assert tick not in colours_of_box(box)
     box.setChecked(True)
-    assert {tick, theme.colour("dark", "act")} <= colours_of_box(box)
+    assert {tick, parts.colour("dark", "act")} <= colours_of_box(box)
 
 
 # test shots

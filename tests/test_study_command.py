@@ -16,8 +16,8 @@ from experiments.load import load_setup
 from experiments.record.journal import hold
 from experiments.run import Request, run
 from experiments.screens.synthetic import synthetic_screen
-from experiments.study.folders import new_study
 from experiments.study.register import append, entry
+from recoil.config_files import new_study
 from tests.conftest import RECOIL, Recoil
 from tests.test_cli import refused
 from tests.waiting import PATIENCE_S

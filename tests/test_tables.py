@@ -6,11 +6,11 @@ from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
 from experiments.design.plan import Plan
-from experiments.direction.plan import make_plan as direction_plan
-from experiments.direction.rows import rows as direction_rows
+from experiments.direction.session import make_plan as direction_plan
+from experiments.direction.session import rows as direction_rows
 from experiments.load import load_setup
-from experiments.preference.plan import make_plan as preference_plan
-from experiments.preference.rows import rows as preference_rows
+from experiments.preference.session import make_plan as preference_plan
+from experiments.preference.session import rows as preference_rows
 from experiments.record import columns
 from experiments.record.columns import guard, unguard
 from experiments.record.tables import Row, table_bytes

@@ -5,8 +5,8 @@ from __future__ import annotations
 import pytest
 
 from device import limits, words
-from device.twin import budget, machine
-from device.twin.budget import DUTY_US, Budget
+from device.twin import machine
+from device.twin.machine import DUTY_US, Budget
 from device.wire import errors
 from device.wire.records import Setting
 from tests.twin_hosts import PULSE, READY, Hand
@@ -83,12 +83,12 @@ def test_the_coil_stays_below_80_degrees_and_cools_as_the_host_thinks_or_slower(
 
 
 def test_the_firmwares_limits_are_the_hosts():
-    assert budget.MAX_MILLIVOLTS == 1000 * words.MAX_VOLTAGE_V
-    assert budget.MAX_PULSE_US == 1e6 * words.MAX_PULSE_S
-    assert budget.DUTY_US / budget.SECOND_US == limits.MAX_DUTY
-    assert budget.MAX_SHOTS == limits.MAX_SHOTS_PER_MINUTE
+    assert machine.MAX_MILLIVOLTS == 1000 * words.MAX_VOLTAGE_V
+    assert machine.MAX_PULSE_US == 1e6 * words.MAX_PULSE_S
+    assert machine.DUTY_US / machine.SECOND_US == limits.MAX_DUTY
+    assert machine.MAX_SHOTS == limits.MAX_SHOTS_PER_MINUTE
     assert machine.MAX_AHEAD_US == 1e6 * limits.MAX_AHEAD_S
-    assert budget.MAX_WARMTH_NJ / 1e9 == (limits.MAX_COIL_C - limits.AMBIENT_C) * limits.HEAT_CAPACITY_J_K
+    assert machine.MAX_WARMTH_NJ / 1e9 == (limits.MAX_COIL_C - limits.AMBIENT_C) * limits.HEAT_CAPACITY_J_K
 
 
 def test_after_a_boot_nothing_is_fired_for_a_second():

@@ -251,7 +251,7 @@ def watch_guns(watch: Watch) -> None:
 def watch_participants(watch: Watch) -> None:
     """From now on every participant's screen that is started is watched."""
     from experiments.screens.participant.link import ParticipantLink
-    from experiments.screens.participant.look import Look, arguments
+    from experiments.screens.participant.words import Look, arguments
 
     start, left = ParticipantLink.start, watch.participants
 

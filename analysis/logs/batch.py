@@ -15,7 +15,7 @@ import numpy as np
 import pyarrow as pa
 from numpy.typing import NDArray
 
-from analysis.logs import cells as log_cells
+from analysis.logs import frames as log_cells
 from analysis.logs.frames import Block, Cells, Coded, Texts, chosen, is_category
 from analysis.logs.rules import BadLogError, Cell, experiment_of, is_code, parse_cell
 from experiments.record import columns

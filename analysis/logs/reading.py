@@ -17,8 +17,7 @@ from analysis.logs.column_map import ColumnMap
 from analysis.logs.files import ENDINGS, Problem, code_in_name, find_logs, read_content, study_names
 from analysis.logs.frames import Block, block_of_rows, joined
 from analysis.logs.mapped import MappedLog, is_recoils, read_mapped
-from analysis.logs.records import records
-from analysis.logs.rules import BadLogError, check_table
+from analysis.logs.rules import BadLogError, check_table, records
 from experiments.study import register
 
 __all__ = ["Logs", "Problem", "Track", "read_logs"]

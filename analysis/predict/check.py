@@ -13,7 +13,7 @@ from experiments import catalogue
 from experiments.config.door import read_toml
 from experiments.config.models import participant_codes
 from experiments.config.setup import Setup
-from experiments.design.orders import next_row
+from experiments.design.plan import next_row
 from experiments.direction.config import DirectionConfig
 from experiments.direction.observer import mind_of
 from experiments.limits import MethodLimits, check_limits, check_methods

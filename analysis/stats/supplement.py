@@ -15,13 +15,12 @@ import pandas as pd
 from analysis.stats.anova import rm_anova
 from analysis.stats.arrays import FloatArray
 from analysis.stats.cells import DIRECTIONS, TrialCells
-from analysis.stats.clustering import clustering
 from analysis.stats.diagnostics import NORMALITY_NOTE, OUTLIER_RULE, ends, normality, outliers, unit_scaled
 from analysis.stats.effect_sizes import NOTE as EFFECT_SIZE_NOTE
 from analysis.stats.effect_sizes import effect_size
 from analysis.stats.logit_model import NAME as MODEL_NAME
 from analysis.stats.logit_model import NOTE as MODEL_NOTE
-from analysis.stats.logit_model import LogitModel, logit_model
+from analysis.stats.logit_model import LogitModel, clustering, logit_model
 from analysis.stats.paired import CONSTANT, EQUAL, SCALE, PairedT, jzs_paired, paired_t_tests
 from analysis.stats.rank_tests import friedman, signed_rank_tests
 from analysis.stats.sphericity import sphericity

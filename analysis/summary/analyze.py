@@ -8,8 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from analysis.logs.column_map import ColumnMap
-from analysis.logs.completeness import by_study
-from analysis.logs.exclusions import Effect, Rules, apply_rules
+from analysis.logs.exclusions import Effect, Rules, apply_rules, by_study
 from analysis.logs.reading import Logs, Problem, Track, read_logs
 from analysis.logs.tables_out import result_tables
 from analysis.paper.audit import audit

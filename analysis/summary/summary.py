@@ -12,15 +12,15 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
-from analysis.logs.completeness import complete_rows
+from analysis.logs.exclusions import complete_rows
 from analysis.logs.reading import Logs
 from analysis.stats.anova import rm_anova
 from analysis.stats.assumptions import assumptions
 from analysis.stats.binomial import binomial_test
 from analysis.stats.cells import DIRECTIONS, Finite, TrialCells, by_name, coded, trial_cells
-from analysis.stats.clustering import METHOD as CLUSTERING_NOTE
 from analysis.stats.detection import yes_no
 from analysis.stats.effect_sizes import cousineau_morey
+from analysis.stats.logit_model import METHOD as CLUSTERING_NOTE
 from analysis.stats.supplement import model, pooled_clustering, within_supplement
 from analysis.stats.tukey import rm_tukey_hsd
 from analysis.times.own_trials import INSTRUCTION

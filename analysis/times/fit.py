@@ -6,10 +6,12 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import ArrayLike
 from scipy import optimize, special
 
 from analysis.stats.arrays import FloatArray, share
 from analysis.times.ez import ez_from_summary
+from analysis.times.first_passage import distribution
 from analysis.times.likelihood import Model, Range, Trials, coordinates, log_likelihood, model_of, natural, trial_scores
 
 EDGE = 1e-4
@@ -284,3 +286,42 @@ def _edge(model: Model, index: int, sign: float) -> float:
     at = np.full(len(model.names), 0.0)
     at[index] = sign * 700.0
     return float(natural(model, at)[index])
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class AnsweredBy:
+    """Shares of all trials answered right and wrong by each time: cumulative, so that the ends add up to 1."""
+
+    right: FloatArray
+    wrong: FloatArray
+
+
+def answered_by(
+    fit: DiffusionFit,
+    time_s: ArrayLike,
+    *,
+    condition: str,
+    instruction: str,
+    towards_upper: float = 0.5,
+    lapse_range_s: Range | None = None,
+) -> AnsweredBy:
+    """The fit's prediction for a condition and instruction, at times of one axis.
+
+    `towards_upper` is the share of shots that drive to the upper answer; `lapse_range_s` that of the fit, if it has
+    lapses. `KeyError`: the fit knows no such condition or instruction.
+    """
+    t = np.asarray(time_s, dtype=np.float64)
+    v, a = fit[f"drift {condition}".strip()].value, fit[f"boundary {instruction}".strip()].value
+    values = {estimate.name: estimate.value for estimate in fit.estimates}
+    w, lapse = values.get("start", 0.5), values.get("lapse", 0.0)
+    decided = t - values["non_decision_s"]
+    right, wrong = (
+        towards_upper * np.asarray(distribution(decided, answer, v, a, w))
+        + (1.0 - towards_upper) * np.asarray(distribution(decided, not answer, -v, a, w))
+        for answer in (True, False)
+    )
+    lapsed = np.zeros_like(t)
+    if lapse_range_s is not None:
+        earliest, latest = lapse_range_s
+        lapsed = 0.5 * lapse * np.clip((t - earliest) / (latest - earliest), 0.0, 1.0)
+    return AnsweredBy(right=(1.0 - lapse) * right + lapsed, wrong=(1.0 - lapse) * wrong + lapsed)

@@ -18,12 +18,13 @@ from analysis.times.people import (
     MeanEstimate,
     PeopleFit,
     PersonCells,
+    SampledFit,
     instruction_effects,
     mean_estimate,
     over_people,
     person_cells,
+    sampled_fit,
 )
-from analysis.times.sampled_fit import SampledFit, sampled_fit
 from analysis.times.trade import (
     QUANTILES,
     balanced_integration,

@@ -16,7 +16,6 @@ from itertools import pairwise
 import numpy as np
 
 from device.parameters import GunParameters
-from device.physics.arcs import grip
 from device.physics.kernel import (
     BACK_EMF,
     COIL,
@@ -29,6 +28,7 @@ from device.physics.kernel import (
     STOP,
     pack,
 )
+from device.physics.segments import grip
 from device.physics.traces import Segment, segments
 
 _NODES, _WEIGHTS = (row.tolist() for row in np.polynomial.legendre.leggauss(32))

@@ -1,13 +1,21 @@
-"""Shots by the hundred thousand: arrays of parameters in, arrays of results out, compiled, on all cores."""
+"""The kernel in machine code. The one module that knows the compiler (extra `fast`).
+
+The first use compiles for half a minute and keeps the result beside this file, or in the user's cache; later
+processes load it in about a second. No session calls this.
+"""
 
 from __future__ import annotations
 
+import hashlib
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, fields
+from functools import lru_cache
 from importlib.util import find_spec
-from typing import Any
+from types import CodeType, FunctionType
+from typing import Any, cast
 
+import numba
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
@@ -19,6 +27,7 @@ from device.physics.kernel import (
     FRICTION_OUT,
     INDUCTANCE,
     INVALID,
+    KERNEL,
     MODEL,
     NO_INDUCTANCE,
     OPEN,
@@ -28,7 +37,58 @@ from device.physics.kernel import (
     WORK_SIZE,
     pack,
 )
+from device.physics.shot import shoot
 from device.physics.summary import interpret, model_of, use
+
+Rows = NDArray[np.float64]
+
+
+def _many(rows: Rows, state: Rows, work: Rows, found: Rows) -> None:
+    """The results of each row of parameters."""
+    for n in range(len(rows)):
+        shoot(rows[n], state, work, found[n])
+
+
+@lru_cache(maxsize=1)
+def compiled() -> tuple[Callable[..., None], Callable[..., None]]:
+    """`shoot` for one shot, and for rows of them."""
+    digest = _digest()
+    twins: dict[str, Any] = {}
+    spaces: list[dict[str, Any]] = []
+    for name, function in (*KERNEL.items(), ("_many", _many)):
+        twin, space = _twin(function, f"{name}_{digest}")
+        entry = name in ("shoot", "_many")
+        # all that is called is copied in: half the time, since a call counts the references to each row;
+        # a single shot keeps Python's lock, as all of them share one desk
+        twins[name] = numba.njit(error_model="numpy", cache=entry, nogil=name == "_many", forceinline=not entry)(twin)
+        spaces.append(space)
+    for space in spaces:
+        space.update({name: twin for name, twin in twins.items() if name in space})
+    return twins["shoot"], twins["_many"]
+
+
+def _twin(function: Callable[..., object], name: str) -> tuple[FunctionType, dict[str, Any]]:
+    """A copy of the function with a name and globals of its own."""
+    plain = cast("FunctionType", function)
+    space = dict(plain.__globals__)
+    twin = FunctionType(plain.__code__, space)
+    twin.__qualname__ = name  # the compiler's cache goes by it
+    return twin, space
+
+
+def _digest() -> str:
+    """Of the kernel's code and of how it is compiled: the compiler's own cache looks at one file only."""
+    codes = (cast("FunctionType", function).__code__ for function in (*KERNEL.values(), compiled.__wrapped__))
+    text = "".join(map(_told, codes))
+    sizes = f"{RESULT_SIZE} {STATE_SIZE} {WORK_SIZE}"
+    return hashlib.sha256((text + sizes).encode()).hexdigest()[:16]
+
+
+def _told(code: CodeType) -> str:
+    """What a piece of code does, as text. Code within it by the same text: as a constant it is told by its address."""
+    constants = [_told(one) if isinstance(one, CodeType) else repr(one) for one in code.co_consts]
+    return f"{code.co_code.hex()}{constants}{code.co_names}"
+
 
 _CHUNK = 4096  # shots between two words of progress
 _FIELDS = tuple(field.name for field in fields(GunParameters))
@@ -65,7 +125,7 @@ def warm() -> bool:
     """Compiles the kernel or loads it, half a minute or one second, for `simulate` too. False without the compiler."""
     if find_spec("numba") is None:
         return False
-    from device.physics.compiled import compiled  # noqa: PLC0415 - only here is the compiler wanted
+    from device.physics.batch import compiled  # noqa: PLC0415 - only here is the compiler wanted
 
     one, _ = compiled()
     state, work, found = np.empty(STATE_SIZE), np.empty(WORK_SIZE), np.empty(RESULT_SIZE)
@@ -161,7 +221,7 @@ def _run(
 
 
 def _compiled_chunk() -> Callable[[NDArray[np.float64], NDArray[np.float64]], None]:
-    from device.physics.compiled import compiled  # noqa: PLC0415 - the compiler waits until a batch is asked for
+    from device.physics.batch import compiled  # noqa: PLC0415 - the compiler waits until a batch is asked for
 
     _, many = compiled()
     return lambda rows, found: many(rows, np.empty(STATE_SIZE), np.empty(WORK_SIZE), found)

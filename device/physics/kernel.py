@@ -1,6 +1,6 @@
 """What the kernel is written in: the mark of its functions, and where each number stands in its rows of floats.
 
-A session runs these functions interpreted, a batch compiled (`device.physics.compiled`); both give the same digits.
+A session runs these functions interpreted, a batch compiled (`device.physics.batch`); both give the same digits.
 """
 
 from __future__ import annotations

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 
-from device.physics.arcs import grip, spring_force
 from device.physics.kernel import (
     BALLISTIC,
     BREAK_AWAY,
@@ -68,7 +67,7 @@ from device.physics.kernel import (
     kernel,
 )
 from device.physics.polynomial import bracketed_root, changes_between, lowest, value
-from device.physics.segments import advance, enter, pulse_off, pulse_on
+from device.physics.segments import advance, enter, grip, pulse_off, pulse_on, spring_force
 from device.physics.series import friction
 
 _EQUAL = 1e-14  # relative: forces closer than this are one

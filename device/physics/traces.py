@@ -10,7 +10,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from device.parameters import GunParameters
-from device.physics.arcs import free_current, free_position, free_velocity, grip, resting_current, spring_force
 from device.physics.kernel import (
     BREAK_AWAY,
     COIL,
@@ -43,7 +42,18 @@ from device.physics.kernel import (
     pack,
 )
 from device.physics.polynomial import value
-from device.physics.segments import advance, enter, pulse_off, pulse_on
+from device.physics.segments import (
+    advance,
+    enter,
+    free_current,
+    free_position,
+    free_velocity,
+    grip,
+    pulse_off,
+    pulse_on,
+    resting_current,
+    spring_force,
+)
 from device.physics.series import friction
 from device.physics.summary import ShotTrace, interpret, summary_of
 

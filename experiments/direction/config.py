@@ -22,7 +22,7 @@ from experiments.config.models import (
     once,
 )
 from experiments.synthetic.felt import DiffusionConfig, PeopleConfig
-from experiments.synthetic.percept_config import PerceptConfig
+from experiments.synthetic.percept import PerceptConfig
 
 Balance = Literal["session", "set", "set-exact"]
 InstructionName = Annotated[str, Field(pattern=r"^[A-Za-z0-9][A-Za-z0-9_-]{0,31}$")]

@@ -1,15 +1,107 @@
-"""The session of experiment 1: turn, fire, ask, sixty times, with a break after each set and session."""
+"""Experiment 1: its plan, sessions of one method each; turn, fire, ask, with breaks; and the table of its trials."""
 
 from __future__ import annotations
 
 from functools import partial
 from itertools import pairwise
 
+from device.words import Direction
 from experiments.config.setup import Setup
-from experiments.design.plan import Plan, Trial
-from experiments.direction.config import Breaks, DirectionConfig
-from experiments.session.presenting import Presenter
-from experiments.session.steps import Ask, Fire, Prepare, Rest, Session, Step
+from experiments.design.plan import Plan, Trial, method_order
+from experiments.design.streams import Stream
+from experiments.direction.config import Breaks, Design, DirectionConfig
+from experiments.record.tables import Row, presentation
+from experiments.session.history import Story, Told, stories
+from experiments.session.remarks import AnswerCorrected
+from experiments.session.steps import Answered, Ask, Fire, Fired, Prepare, Presenter, Rest, Session, Step
+
+
+def make_plan(config: DirectionConfig, participant_id: str, seed: int, order_row: int | None) -> Plan:
+    """The plan that a config, a participant, a seed and a row of the square make; the same for the same."""
+    design, who = config.design, (config.experiment, participant_id)
+    methods = method_order(design.order, design.methods, order_row, Stream(seed, "session-order", *who))
+    trials = [
+        trial
+        for session, method in enumerate(methods, start=1)
+        for trial in _session(
+            design,
+            session,
+            method,
+            ways=_directions(design, Stream(seed, "directions", *who, str(session))),
+            told=_instructions(design, seed, (*who, str(session))),
+        )
+    ]
+    return Plan(
+        experiment=config.experiment,
+        participant_id=participant_id,
+        seed=seed,
+        order_row=order_row,
+        trials=tuple(trials),
+    )
+
+
+def make_practice(config: DirectionConfig, participant_id: str, seed: int) -> Plan | None:
+    """The plan of a practice: some trials of each method, mixed, in one set. `None` if the config has none.
+
+    A practice is of the gun: it has no instruction.
+    """
+    who, each = (config.experiment, participant_id), config.practice.trials_per_method
+    methods = Stream(seed, "practice-methods", *who).shuffled([*config.design.methods] * each)
+    forward = len(methods) // 2
+    ways = Stream(seed, "practice-directions", *who).shuffled(_ways(forward, len(methods) - forward))
+    trials = [
+        Trial(session=1, method=method, set=1, trial=place, direction=way)
+        for place, (method, way) in enumerate(zip(methods, ways, strict=True), start=1)
+    ]
+    if not trials:
+        return None
+    return Plan(
+        experiment=config.experiment, participant_id=participant_id, seed=seed, order_row=None, trials=tuple(trials)
+    )
+
+
+def _session(design: Design, session: int, method: str, *, ways: list[Direction], told: list[str]) -> list[Trial]:
+    """The trials of a session; `ways` has one direction a trial, `told` one instruction a set."""
+    return [
+        Trial(
+            session=session,
+            method=method,
+            set=1 + place // design.trials_per_set,
+            trial=1 + place,
+            direction=way,
+            instruction=told[place // design.trials_per_set],
+        )
+        for place, way in enumerate(ways)
+    ]
+
+
+def _instructions(design: Design, seed: int, session: tuple[str, ...]) -> list[str]:
+    """The instruction of each set: each equally often, in random order; empty where the design has none."""
+    if not design.instructions:
+        return [""] * design.sets_per_session
+    each = design.sets_per_session // len(design.instructions)
+    return Stream(seed, "instructions", *session).shuffled([*design.instructions] * each)
+
+
+def _directions(design: Design, stream: Stream) -> list[Direction]:
+    if design.balance == "session":
+        return stream.shuffled(_ways(design.forward_per_session, design.backward_per_session))
+    return [
+        way
+        for forward in _forward_by_set(design, stream)
+        for way in stream.shuffled(_ways(forward, design.trials_per_set - forward))
+    ]
+
+
+def _forward_by_set(design: Design, stream: Stream) -> list[int]:
+    """Forward trials of each set, as even as it gets; which sets have one more is random."""
+    each, left = divmod(design.forward_per_session, design.sets_per_session)
+    return stream.shuffled([each + 1] * left + [each] * (design.sets_per_session - left))
+
+
+def _ways(forward: int, backward: int) -> list[Direction]:
+    ways: list[Direction] = ["forward"] * forward
+    return ways + ["backward"] * backward
 
 
 def session(plan: Plan, setup: Setup[DirectionConfig]) -> Session:
@@ -47,3 +139,50 @@ def _steps(setup: Setup[DirectionConfig], trial: Trial, attempt: int) -> tuple[S
             backward=question.backward,
         ),
     )
+
+
+ANTICIPATION_S = 0.1
+"""A key that comes sooner was not pressed for what was felt: simple reactions to touch take longer (assumed)."""
+
+
+def rows(plan: Plan, told: Told) -> list[Row]:
+    """One row a planned trial, in order; what was not reached is empty."""
+    return [
+        {
+            "participant_id": plan.participant_id,
+            "experiment": plan.experiment,
+            "session": trial.session,
+            "method": trial.method,
+            "set": trial.set,
+            "trial": trial.trial,
+            "direction": trial.direction,
+            **_answer(trial, story),
+            **_marked(presentation(story, Fired), story),
+            "instruction": trial.instruction,
+        }
+        for trial, story in stories(plan.trials, told).items()
+    ]
+
+
+def _answer(trial: Trial, story: Story) -> Row:
+    """The answer that counts: the last one given, or what it was corrected to, whose time is not the participant's."""
+    given = story.last(Answered)
+    if given is None:
+        return {}
+    counts = [word for word in story.words if isinstance(word, Answered | AnswerCorrected)][-1]
+    as_given = counts is given
+    return {
+        "response": counts.response,
+        "correct": int(counts.response == trial.direction),
+        "response_time_s": given.response_time_s,
+        "response_source": given.response_source if as_given else "experimenter",
+        "response_time_valid": int(given.response_time_valid and as_given),
+    }
+
+
+def _marked(row: Row, story: Story) -> Row:
+    """A presentation whose answer came sooner than anybody reacts is marked: it was kept, and it was guessed."""
+    given = story.last(Answered)
+    if given is None or given.response_source != "participant" or given.response_time_s >= ANTICIPATION_S:
+        return row
+    return row | {"flags": " ".join(filter(None, (str(row["flags"]), "anticipation")))}

@@ -14,7 +14,7 @@ from device import DeviceError
 from experiments.doctor import children, measures, verdicts
 from experiments.doctor.children import Answer, within
 from experiments.doctor.figures import Display, Finding, Keys, Sound, Stage
-from experiments.doctor.latencies import Latencies, latencies, together
+from experiments.doctor.verdicts import Latencies, latencies, together
 from experiments.record import journal
 from experiments.record.journal import JournalError
 from experiments.study.places import PlaceError

@@ -21,7 +21,7 @@ from experiments.config.models import (
     check_covered,
     check_duration,
 )
-from experiments.synthetic.percept_config import PerceptConfig
+from experiments.synthetic.percept import PerceptConfig
 from experiments.synthetic.preference import Appeal
 
 

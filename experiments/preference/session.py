@@ -1,14 +1,46 @@
-"""The session of experiment 2: each method felt until next, then each rated and described."""
+"""Experiment 2: its plan, one trial a method; each felt until next, then each rated; and the table of its ratings."""
 
 from __future__ import annotations
 
 from functools import partial
 
 from experiments.config.setup import Setup
-from experiments.design.plan import Plan, Trial
+from experiments.design.plan import Plan, Trial, method_order
+from experiments.design.streams import Stream
 from experiments.preference.config import PreferenceConfig
-from experiments.session.presenting import Presenter
-from experiments.session.steps import Describe, Prepare, Present, Rate, Session, Step
+from experiments.record.tables import Row, presentation
+from experiments.session.history import Story, Told, stories
+from experiments.session.remarks import DescriptionCorrected, RatingCorrected
+from experiments.session.steps import (
+    Describe,
+    Described,
+    Interrupted,
+    Prepare,
+    Present,
+    Presented,
+    Presenter,
+    Rate,
+    Rated,
+    Session,
+    Step,
+)
+
+
+def make_plan(config: PreferenceConfig, participant_id: str, seed: int, order_row: int | None) -> Plan:
+    """The plan that a config, a participant, a seed and a row of the square make; the same for the same."""
+    design = config.design
+    stream = Stream(seed, "trial-order", config.experiment, participant_id)
+    trials = [
+        Trial(session=1, method=method, set=1, trial=place, direction=design.direction)
+        for place, method in enumerate(method_order(design.order, design.methods, order_row, stream), start=1)
+    ]
+    return Plan(
+        experiment=config.experiment,
+        participant_id=participant_id,
+        seed=seed,
+        order_row=order_row,
+        trials=tuple(trials),
+    )
 
 
 def session(plan: Plan, setup: Setup[PreferenceConfig]) -> Session:
@@ -46,3 +78,41 @@ def _rate(trial: Trial, config: PreferenceConfig) -> Rate:
         maximum_text=scale.maximum_text,
         grain=scale.grain,
     )
+
+
+def rows(plan: Plan, told: Told) -> list[Row]:
+    """One row a planned trial, in order of presentation; what was not reached is empty."""
+    return [
+        {
+            "participant_id": plan.participant_id,
+            "experiment": plan.experiment,
+            "trial": trial.trial,
+            "method": trial.method,
+            **_exposure(story),
+            **_rating(story),
+            **presentation(story, Presented),
+        }
+        for trial, story in stories(plan.trials, told).items()
+    ]
+
+
+def _exposure(story: Story) -> Row:
+    """The last exposure, and how long earlier ones of the same trial were felt before it."""
+    felt = [word.exposure_s for word in story.words if isinstance(word, Presented | Interrupted) and word.exposure_s]
+    shown = story.last(Presented)
+    if shown is None:
+        return {"earlier_exposure_s": sum(felt)} if felt else {}
+    row: Row = {"shots": shown.shots, "exposure_s": shown.exposure_s}
+    return row | ({"earlier_exposure_s": sum(felt[:-1])} if felt[:-1] else {})
+
+
+def _rating(story: Story) -> Row:
+    """The rating that counts, the participant's words, and whose hand entered them."""
+    entered = [word for word in story.words if isinstance(word, Rated | RatingCorrected)]
+    described = [word for word in story.words if isinstance(word, Described | DescriptionCorrected)]
+    row: Row = {"comment": described[-1].comment} if described else {}
+    if not entered:
+        return row
+    counts = entered[-1]
+    by = counts.rating_by if isinstance(counts, Rated) else "experimenter"
+    return row | {"rating": counts.rating, "rating_by": by}

@@ -11,7 +11,7 @@ from typing import Any
 from device.words import RecoilError
 from experiments.config.models import CODE
 from experiments.config.setup import Setup
-from experiments.design import orders
+from experiments.design import plan
 from experiments.record import columns, journal
 from experiments.study import register
 
@@ -94,7 +94,7 @@ def next_row(setup: Setup[Any], results: Path) -> int | None:
     """
     design = setup.config.design
     used = [] if design.order == "random" else used_rows(results, setup.config.experiment)
-    return orders.next_row(design.order, len(design.methods), used)
+    return plan.next_row(design.order, len(design.methods), used)
 
 
 def used_rows(results: Path, experiment: str) -> list[int]:

@@ -20,14 +20,17 @@ import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import lru_cache
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Annotated
 
 import numpy as np
 from numpy.polynomial.hermite_e import hermegauss
 from numpy.typing import ArrayLike
+from pydantic import Field
 
 from device.methods import Method
 from device.parameters import GunParameters
+from experiments.config.door import Model
+from experiments.config.models import InnerShare
 from experiments.synthetic.diffusion import Diffusion, Floats, Lapses, People, upper_probabilities
 
 if TYPE_CHECKING:
@@ -200,3 +203,21 @@ def _nodes(sd: float) -> tuple[Floats, Floats]:
 def percepts_of(methods: Mapping[str, Method], leak_s: float) -> dict[str, Percept]:
     """The percept of each method."""
     return {name: percept_of(method, leak_s) for name, method in methods.items()}
+
+
+_DEFAULT = PerceptParameters()
+
+
+class PerceptConfig(Model):
+    """The numbers of `experiments.synthetic.percept`, where each has its source; those defaults."""
+
+    exponent: Annotated[float, Field(gt=0, le=10)] = _DEFAULT.exponent
+    leak_s: Annotated[float, Field(gt=0, le=10)] = _DEFAULT.leak_s
+    sensitivity: Annotated[float, Field(ge=0, le=1e6)] = _DEFAULT.sensitivity
+    confusion: Annotated[float, Field(ge=0, le=1e6)] = _DEFAULT.confusion
+    start: InnerShare = _DEFAULT.start
+
+    @property
+    def own(self) -> PerceptParameters:
+        """The percept's own type."""
+        return PerceptParameters(**self.model_dump())

@@ -10,12 +10,14 @@ import typer
 from analysis.report.terminal import AsJson, Config, FixedSeed, progress, show
 
 Participants = Annotated[str | None, typer.Option(metavar="N,N-N", help="How many people, such as 8,10,14-20.")]
-Trials = Annotated[str | None, typer.Option(metavar="N,N-N", help="Trials of a method; the config's own unless given.")]
+TrialsList = Annotated[
+    str | None, typer.Option(metavar="N,N-N", help="Trials of a method; the config's own unless given.")
+]
 Methods = Annotated[list[str] | None, typer.Option(metavar="NAME,NAME", help="Compare these alone; may come again.")]
 Effect = Annotated[
     str | None, typer.Option(metavar="FACTOR,FACTOR", help="Factors on what people feel; 1 is the config.")
 ]
-Studies = Annotated[int, typer.Option(min=1, max=10_000_000, help="Simulated studies of each design.")]
+Simulated = Annotated[int, typer.Option(min=1, max=10_000_000, help="Simulated studies of each design.")]
 Null = Annotated[bool, typer.Option("--null", help="People who feel no difference: false positives.")]
 Workers = Annotated[int | None, typer.Option(min=1, help="Processes; as many as cores unless given.")]
 Scheduler = Annotated[str | None, typer.Option(metavar="ADDRESS", help="Work on this Dask cluster instead.")]
@@ -25,10 +27,10 @@ def power(
     config: Config,
     *,
     participants: Participants = None,
-    trials: Trials = None,
+    trials: TrialsList = None,
     methods: Methods = None,
     effect: Effect = None,
-    studies: Studies = 10_000,
+    studies: Simulated = 10_000,
     target: Annotated[float, typer.Option(help="Power that a design is to reach.")] = 0.8,
     null: Null = False,
     seed: FixedSeed = 1,

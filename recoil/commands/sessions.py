@@ -135,8 +135,7 @@ def configs(
     ] = None,
 ) -> None:
     """List the shipped configs, copy them to edit, or give back those that a run began with."""
-    from experiments.study.folders import copy_configs, shipped
-    from recoil.began_with import copy_began_with
+    from recoil.config_files import copy_began_with, copy_configs, shipped
 
     if journal is not None and copy is None:
         raise typer.BadParameter("--from goes with --copy DIR, the folder that the files are written to")
@@ -146,6 +145,6 @@ def configs(
 
 def new(study: Annotated[Path, typer.Argument(metavar="STUDY", help="The folder to make.")]) -> None:
     """Make a study's folder from a template."""
-    from experiments.study.folders import new_study
+    from recoil.config_files import new_study
 
     sys.stdout.write("".join(f"{path}\n" for path in new_study(study)))

@@ -5,11 +5,10 @@
 """
 
 from analysis.paper.audit.annealing import Order
-from analysis.paper.audit.binomial_p import binomial_p
 from analysis.paper.audit.claims import CHECKS
 from analysis.paper.audit.freedom import degrees_of_freedom
 from analysis.paper.audit.means import grim, percent_of_count, scale_of
-from analysis.paper.audit.p_values import p_against_statistic
+from analysis.paper.audit.p_values import binomial_p, p_against_statistic
 from analysis.paper.audit.paper_file import PaperFile, load_paper_file, parse_paper
 from analysis.paper.audit.printed import Interval, PrintedNumber, Rounding, read
 from analysis.paper.audit.reconstruct import Constraints, Reconstruction, printed_constraints, reconstruct

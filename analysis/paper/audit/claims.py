@@ -11,10 +11,9 @@ from typing import Annotated, Any, ClassVar, Literal
 
 from pydantic import AfterValidator, Field
 
-from analysis.paper.audit.binomial_p import binomial_p
 from analysis.paper.audit.freedom import Design, degrees_of_freedom
 from analysis.paper.audit.means import grim, percent_of_count
-from analysis.paper.audit.p_values import Sides, Statistic, p_against_statistic
+from analysis.paper.audit.p_values import Sides, Statistic, binomial_p, p_against_statistic
 from analysis.paper.audit.printed import read
 from analysis.paper.audit.spreads import debit, grimmer
 from analysis.paper.audit.totals import Bound, Term, total

@@ -12,10 +12,10 @@ from fractions import Fraction
 from typing import Any
 
 from analysis.paper.audit.annealing import Order
-from analysis.paper.audit.binomial_p import binomial_p
 from analysis.paper.audit.derived import STARS
 from analysis.paper.audit.lattices import Rows, effect
 from analysis.paper.audit.means import Scale, scale_of
+from analysis.paper.audit.p_values import binomial_p
 from analysis.paper.audit.printed import Interval, Rounding, read
 from analysis.paper.audit.reconstruct import Column, Constraints, Reconstruction, Sums, reconstruct
 from analysis.paper.audit.variance_ratios import repeated_f

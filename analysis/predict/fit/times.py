@@ -21,8 +21,7 @@ from analysis.times.ez import ez, ez_people
 from analysis.times.fit import DiffusionFit, fit, profile
 from analysis.times.likelihood import Range, Trials
 from analysis.times.own_trials import REFUSALS, OwnTrials, own_trials
-from analysis.times.people import fit_people, mean_estimate
-from analysis.times.sampled_fit import FEWEST_TRIALS, as_trials
+from analysis.times.people import FEWEST_TRIALS, as_trials, fit_people, mean_estimate
 from experiments.config.door import ConfigError
 from experiments.record import storage
 from experiments.record.provenance import provenance

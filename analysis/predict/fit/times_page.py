@@ -14,11 +14,10 @@ from analysis.predict.fit.words import NO_TIMES
 from analysis.report import apa
 from analysis.report.section import Picture, Section, Table
 from analysis.stats.arrays import FloatArray
-from analysis.times.fit import DiffusionFit
+from analysis.times.fit import AnsweredBy, DiffusionFit, answered_by
 from analysis.times.likelihood import Range, Trials
 from analysis.times.own_trials import OwnTrials
 from analysis.times.people import PeopleFit
-from analysis.times.predicted import AnsweredBy, answered_by
 
 Facts = dict[str, Any]
 

@@ -8,8 +8,7 @@ from typing import Any
 
 from device.parameters import GunParameters
 from device.physics import audit as energy
-from device.physics.contact import compliant_collision, rigid_collision
-from device.physics.hand import Hand, simulate_held
+from device.physics.hand import Hand, compliant_collision, rigid_collision, simulate_held
 from experiments.config.door import ConfigError
 
 ASSUMED = "assumed"

@@ -32,7 +32,7 @@ from PyQt6.QtWidgets import (
     QWidget,
 )
 
-from experiments.screens.console import parts, theme
+from experiments.screens.console import parts
 from experiments.study.register import MAX_REASON, RegisterError, check_reason
 
 
@@ -95,7 +95,7 @@ class TickBox(QCheckBox):
         box = QRectF(style.subElementRect(QStyle.SubElement.SE_CheckBoxIndicator, option, self))
         painter = QPainter(self)
         painter.setRenderHint(QPainter.RenderHint.Antialiasing)
-        painter.setPen(QPen(QColor(theme.colour("dark", "ground")), box.width() / 7))
+        painter.setPen(QPen(QColor(parts.colour("dark", "ground")), box.width() / 7))
         painter.drawPolyline(QPolygonF([_at(box, 0.22, 0.52), _at(box, 0.43, 0.74), _at(box, 0.79, 0.28)]))
         painter.end()
 
@@ -142,22 +142,22 @@ def sheet() -> str:
     """What these widgets, and the windows made of them, add to the style of all."""
     moods = "\n".join(
         f'QTextEdit[mood="{mood}"], QLabel#gun[mood="{mood}"], QLabel#count[mood="{mood}"] '
-        f"{{ color: {theme.colour('dark', mood)}; }}"
-        for mood in theme.MOODS
+        f"{{ color: {parts.colour('dark', mood)}; }}"
+        for mood in parts.MOODS
     )
     return f"""
     QTextEdit {{ background: transparent; border: none; font-size: 19px; }}
-    QTextEdit#place {{ font-size: 22px; color: {theme.colour("dark", "quiet")}; }}
+    QTextEdit#place {{ font-size: 22px; color: {parts.colour("dark", "quiet")}; }}
     QLabel#title {{ font-size: 56px; font-weight: bold; }}
     QTextEdit#detail {{ font-size: 26px; }}
     QTextEdit#saved, QTextEdit#question {{ font-size: 22px; }}
     QLabel#gun {{ font-size: 22px; font-weight: bold; }}
-    QLabel#count {{ font-size: 160px; font-weight: bold; color: {theme.colour("dark", "ask")}; }}
+    QLabel#count {{ font-size: 160px; font-weight: bold; color: {parts.colour("dark", "ask")}; }}
     QPushButton#stop {{ font-size: 34px; padding: 26px; }}
     QScrollArea {{ background: transparent; }}
     QTableWidget::item {{ padding: 3px 8px; }}
     QScrollBar {{ background: transparent; border: none; width: 14px; height: 14px; }}
-    QScrollBar::handle {{ background: {theme.colour("dark", "line")}; border-radius: 5px; min-height: 30px; }}
+    QScrollBar::handle {{ background: {parts.colour("dark", "line")}; border-radius: 5px; min-height: 30px; }}
     QScrollBar::add-line, QScrollBar::sub-line {{ width: 0px; height: 0px; }}
     {moods}
     """

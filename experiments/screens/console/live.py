@@ -26,9 +26,8 @@ from experiments.screens.console.unfinished import ask, while_shown
 from experiments.screens.console.visual import Rater, VisualParticipant
 from experiments.screens.console.windows import signals_to
 from experiments.screens.participant.link import ParticipantLink
-from experiments.screens.participant.look import Look
 from experiments.screens.participant.process import ParticipantError
-from experiments.screens.participant.words import NoiseIs
+from experiments.screens.participant.words import Look, NoiseIs
 from experiments.session.events import Hand
 from experiments.study.places import PlaceError
 from experiments.study.progress import StudyFolder

@@ -1,22 +1,150 @@
-"""What an experimenter looks for beside the instruction: what comes next, what was answered, the gun. Pure: no Qt."""
+"""How far a run is, and when it will end: from the plan, and ever more from the trials that were measured."""
 
 from __future__ import annotations
 
+from collections.abc import Collection, Sequence
+from dataclasses import dataclass, field
+from datetime import datetime, timedelta
+
 from device import GunStatus
-from experiments.design.plan import Trial
+from experiments.config.models import ExperimentConfig
+from experiments.design.plan import Plan, Trial
 from experiments.screens import texts
 from experiments.screens.console.messages import GunSeen
 from experiments.screens.console.view import About, Seen
-from experiments.session.history import entries
-from experiments.session.remarks import (
-    AnswerCorrected,
-    DescriptionCorrected,
-    Flagged,
-    Noted,
-    RatingCorrected,
-    Remark,
+from experiments.session.history import Told, done, entries, together
+from experiments.session.remarks import AnswerCorrected, DescriptionCorrected, Flagged, Noted, RatingCorrected, Remark
+from experiments.session.states import Position, State
+from experiments.session.steps import (
+    Answered,
+    Ask,
+    Close,
+    Describe,
+    Outcome,
+    Presented,
+    Rate,
+    Rated,
+    Repeat,
+    Rest,
+    Rested,
+    Step,
+    trial_of,
 )
-from experiments.session.steps import Answered, Ask, Close, Describe, Outcome, Rate, Repeat, Rest, Step
+
+PRIOR_TRIALS = 5
+"""The plan counts as much as so many measured trials, so that the estimate does not jump with the first."""
+
+ROUGH_S = 1200.0
+"""With more than this still to go, the end is told to five minutes."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Progress:
+    """How many trials are done of those planned, and of what."""
+
+    what: str
+    count: int
+    planned: int
+
+
+def progress(plan: Plan, told: Told, current: Trial, *, rated_last: bool) -> list[Progress]:
+    """How far the run is, seen from the current trial.
+
+    Trials of the set, of the session and of the experiment; where all are rated after all were felt, felt and rated.
+    """
+    felt, rated = done(told), {trial_of(step) for step, word in told if isinstance(word, Rated)}
+    if rated_last:
+        return [_progress("felt", plan.trials, felt), _progress("rated", plan.trials, rated)]
+    session = [trial for trial in plan.trials if trial.session == current.session]
+    here = [trial for trial in session if together(trial, current)]
+    parts = {"set": here, "session": session, "experiment": plan.trials}
+    return [_progress(what, trials, felt) for what, trials in parts.items()]
+
+
+def _progress(what: str, trials: Sequence[Trial], finished: Collection[Trial | None]) -> Progress:
+    return Progress(what=what, count=sum(trial in finished for trial in trials), planned=len(trials))
+
+
+@dataclass(slots=True)
+class Pace:
+    """Measures how long trials take, without the time of pauses."""
+
+    began_s: float | None = None
+    measured_s: list[float] = field(default_factory=list)
+    _trial_s: float | None = None
+    _paused_s: float = 0.0
+    _pause_began_s: float | None = None
+
+    def at(self, position: Position, now_s: float) -> None:
+        """Take a new position."""
+        if self.began_s is None and position.step is not None:
+            self.began_s = now_s
+        if position.state in (State.SETTING, State.PREPARING) and self._trial_s is None:
+            self._trial_s, self._paused_s = now_s, 0.0
+        if position.paused_s is not None:
+            self._pause_began_s = position.paused_s
+        elif self._pause_began_s is not None:
+            self._paused_s += now_s - self._pause_began_s
+            self._pause_began_s = None
+
+    def saved(self, word: Outcome | Remark, now_s: float) -> None:
+        """Take what was saved: a trial is over with its answer, or with its stimulus where answers come at the end."""
+        if isinstance(word, Answered | Presented) and self._trial_s is not None:
+            self.measured_s.append(now_s - self._trial_s - self._paused_s)
+        if isinstance(word, Answered | Presented | Rested):
+            self._trial_s = None
+
+    def elapsed_s(self, now_s: float) -> float:
+        """How long the run has been under way; 0 before it begins."""
+        return 0.0 if self.began_s is None else now_s - self.began_s
+
+    def trial_s(self, planned_s: float) -> float:
+        """How long a trial takes: the mean of those measured and of `PRIOR_TRIALS` as planned."""
+        return (PRIOR_TRIALS * planned_s + sum(self.measured_s)) / (PRIOR_TRIALS + len(self.measured_s))
+
+
+def remaining_s(  # noqa: PLR0917 - each is looked at
+    config: ExperimentConfig, plan: Plan, told: Told, pace: Pace, position: Position, now_s: float
+) -> float:
+    """Seconds still to go: trials left, breaks left, what is left of this one, and the ratings still to come."""
+    left = len(plan.trials) - len(done(told))
+    rated = sum(isinstance(word, Rated) for _, word in told)
+    ratings_s = max(0, len(plan.trials) - rated) * config.rating_s
+    return left * pace.trial_s(config.trial_s) + _breaks_left_s(config, told, position, now_s) + ratings_s
+
+
+def _breaks_left_s(config: ExperimentConfig, told: Told, position: Position, now_s: float) -> float:
+    taken: list[Step | None] = [step for step, word in told if isinstance(step, Rest) and isinstance(word, Rested)]
+    left_s = config.break_s - sum(step.duration_s for step in taken if isinstance(step, Rest))
+    if position.base is State.RESTING and position.until_s is not None and isinstance(position.step, Rest):
+        since_s = now_s if position.paused_s is None else position.paused_s
+        left_s -= position.step.duration_s - max(0.0, position.until_s - since_s)
+    return max(0.0, left_s)
+
+
+def end_text(left_s: float, now: datetime) -> str:
+    """When a run ends, as a time of day: to five minutes if it is far.
+
+    >>> end_text(3000.0, datetime(2026, 11, 22, 13, 43, 20)), end_text(300.0, datetime(2026, 11, 22, 13, 43, 20))
+    ('about 14:35', 'about 13:48')
+    """
+    end, grain_s = now + timedelta(seconds=left_s), 300 if left_s > ROUGH_S else 60
+    midnight = end.replace(hour=0, minute=0, second=0, microsecond=0)
+    grains = round((end - midnight).total_seconds() / grain_s)
+    return f"about {midnight + timedelta(seconds=grains * grain_s):%H:%M}"
+
+
+def clock_text(seconds: float) -> str:
+    """Minutes and seconds, hours where there are some.
+
+    >>> clock_text(75), clock_text(3725)
+    ('1:15', '1:02:05')
+    """
+    whole = max(0, round(seconds))
+    minutes, rest = divmod(whole, 60)
+    hours, minutes = divmod(minutes, 60)
+    return f"{hours}:{minutes:02d}:{rest:02d}" if hours else f"{minutes}:{rest:02d}"
+
 
 STRIP = 40
 """So many response times are shown at most."""

@@ -9,7 +9,7 @@ from PyQt6.QtGui import QPainter, QPaintEvent
 from PyQt6.QtWidgets import QHBoxLayout, QListWidget, QProgressBar, QVBoxLayout, QWidget
 
 from experiments.screens.console import overview, parts
-from experiments.screens.console.pace import Pace, clock_text, end_text, progress, remaining_s
+from experiments.screens.console.overview import Pace, clock_text, end_text, progress, remaining_s
 from experiments.screens.console.view import About, Seen
 
 LONGEST_S = 3.0

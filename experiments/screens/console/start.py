@@ -20,7 +20,7 @@ from experiments.clock import Clock
 from experiments.config.setup import Setup
 from experiments.record.journal import JournalError
 from experiments.run import Again
-from experiments.screens.console import parts, people, theme
+from experiments.screens.console import parts, people
 from experiments.screens.console.fields import WHY, Answer, Lines, Question, sheet, unfit
 from experiments.screens.console.form import Choice, Form, Opening
 from experiments.screens.console.keyboard import FreshShortcuts
@@ -165,7 +165,7 @@ class StartWindow(QWidget):
         scale = type_scale(self.width(), self.height())
         if scale != self._scale:
             self._scale = scale
-            self.setStyleSheet(scaled(theme.sheet("dark") + sheet(), scale))
+            self.setStyleSheet(scaled(parts.sheet("dark") + sheet(), scale))
 
     def closeEvent(self, event: QCloseEvent | None) -> None:  # noqa: N802 - Qt's name
         """Let whoever waits for a choice go on, once no test shot is under way."""

@@ -13,7 +13,7 @@ from PyQt6.QtWidgets import QDialog, QLabel, QPushButton, QVBoxLayout
 
 from experiments.record.journal import JournalError
 from experiments.run import Again, Request
-from experiments.screens.console import people, theme
+from experiments.screens.console import parts, people
 from experiments.screens.console.fields import WHY, Answer, Lines, Question, sheet, unfit
 from experiments.screens.console.keyboard import FreshShortcuts
 from experiments.screens.console.windows import let_go, signals_to
@@ -32,7 +32,7 @@ class Unfinished(QDialog):
         self._request = request
         self.decided: Request | None = None
         self.setWindowTitle("Recoil – unfinished run")
-        self.setStyleSheet(theme.sheet("dark") + sheet())
+        self.setStyleSheet(parts.sheet("dark") + sheet())
         answers = (
             Answer(text="Go on with it", key="Ctrl+G", do=lambda _: self._decide("resume", "")),
             Answer(text="Set it aside, start anew", key="Ctrl+N", do=self._fresh),
@@ -92,7 +92,7 @@ def while_shown(text: str, make: Callable[[], Made]) -> Made:
     """What `make` gives back, done in a thread of its own while a window shows the text. Raises what it raises."""
     shown = QLabel(text)
     shown.setWindowTitle("Recoil – please wait")
-    shown.setStyleSheet(f"{theme.sheet('dark')} QLabel {{ font-size: 26px; padding: 40px; }}")
+    shown.setStyleSheet(f"{parts.sheet('dark')} QLabel {{ font-size: 26px; padding: 40px; }}")
     shown.setAlignment(Qt.AlignmentFlag.AlignCenter)
     made: list[Made] = []
     errors: list[BaseException] = []

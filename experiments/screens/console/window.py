@@ -19,7 +19,7 @@ from PyQt6.QtWidgets import (
 
 from experiments.clock import Clock
 from experiments.live_run import LiveRun
-from experiments.screens.console import overview, parts, theme, tone, view
+from experiments.screens.console import overview, parts, tone, view
 from experiments.screens.console.beside import ParticipantSide
 from experiments.screens.console.buttons import Buttons
 from experiments.screens.console.controls import Controls
@@ -37,7 +37,7 @@ from experiments.screens.console.messages import (
     Shown,
     Trouble,
 )
-from experiments.screens.console.pace import Pace
+from experiments.screens.console.overview import Pace
 from experiments.screens.console.side import Bars, Side
 from experiments.screens.console.view import About, Seen
 from experiments.screens.console.windows import remember, scaled
@@ -90,7 +90,7 @@ class ConsoleWindow(QMainWindow):
         self._brief_until_s: float | None = None
         self._brief_for = -1
         self._lasting = ("", "good")
-        self.theme: theme.Theme = "dark"
+        self.theme: parts.Theme = "dark"
         self._scale = 0.0
         self._build()
         self._keyboard = Keyboard(self, clock.now)
@@ -288,7 +288,7 @@ class ConsoleWindow(QMainWindow):
             self._restyle()
 
     def _restyle(self) -> None:
-        self.setStyleSheet(scaled(theme.sheet(self.theme), self._scale))
+        self.setStyleSheet(scaled(parts.sheet(self.theme), self._scale))
 
     def showEvent(self, event: QShowEvent | None) -> None:  # noqa: N802 - Qt's name
         """Hear the keys before any widget does."""

@@ -13,13 +13,10 @@ from typing import BinaryIO
 
 from pydantic import ValidationError
 
-from experiments.screens.participant.description_page import DescriptionPage
-from experiments.screens.participant.look import Look
-from experiments.screens.participant.noise import MaskingNoise
 from experiments.screens.participant.pages import DirectionPage, MessagePage
-from experiments.screens.participant.rating_page import RatingPage
+from experiments.screens.participant.rating_page import DescriptionPage, RatingPage
 from experiments.screens.participant.stage import Stage
-from experiments.screens.participant.toolkit import Keys, load
+from experiments.screens.participant.toolkit import Keys, MaskingNoise, load
 from experiments.screens.participant.words import (
     BETWEEN,
     AskDescription,
@@ -29,6 +26,7 @@ from experiments.screens.participant.words import (
     Failed,
     FromParticipant,
     KeyPressed,
+    Look,
     Noise,
     Ping,
     Pong,

@@ -16,7 +16,6 @@ from typing import Self, TypeVar
 from pydantic import ValidationError
 
 from experiments.clock import Clock, RealClock
-from experiments.screens.participant.look import Look, arguments
 from experiments.screens.participant.process import Mailbox, ParticipantError, ParticipantProcess
 from experiments.screens.participant.words import (
     AskDescription,
@@ -27,6 +26,7 @@ from experiments.screens.participant.words import (
     DirectionGiven,
     Failed,
     Focused,
+    Look,
     Noise,
     NoiseIs,
     Ping,
@@ -35,6 +35,7 @@ from experiments.screens.participant.words import (
     Ready,
     Show,
     Unasked,
+    arguments,
     from_participant_from,
     line,
 )

@@ -12,9 +12,8 @@ from ctypes import byref, c_int, c_ulong
 from dataclasses import dataclass
 from typing import Any, Protocol
 
-from experiments.screens.participant.look import PALETTES, Look
 from experiments.screens.participant.toolkit import Toolkit
-from experiments.screens.participant.words import EmergencyPressed, Focused, FromParticipant, Unasked
+from experiments.screens.participant.words import PALETTES, EmergencyPressed, Focused, FromParticipant, Look, Unasked
 
 _NO_WINDOW = 1
 """Up to this X means nobody, or whoever is under the pointer."""

@@ -1,4 +1,4 @@
-"""`recoil configs --from JOURNAL --copy DIR`: the files that a run began with, from the head of its journal.
+"""`recoil configs` and `recoil new`: the shipped configs to edit, those a run began with, and a study's folder.
 
 The head holds the whole resolved setup: the experiment's config, its gun, the answers of its table. The copies load
 back to the very same setup, by its hash, so that the run can go on with them; this is checked before it is said.
@@ -17,7 +17,7 @@ from typing import Any
 from experiments.catalogue import CATALOGUE
 from experiments.config.door import ConfigError
 from experiments.config.toml_text import toml_text
-from experiments.load import load_setup
+from experiments.load import load_setup, shipped_folder
 from experiments.record import journal, storage
 from experiments.record.journal import JournalError
 from experiments.study.places import PlaceError
@@ -123,3 +123,47 @@ def _check(path: Path, config: Path, sha256: str) -> None:
             f"{path}: line 1: the run began with setup {sha256[:12]}, but this version of Recoil makes {found[:12]} "
             "of the same values; go on with the version that the head names (provenance)"
         )
+
+
+_README = """# {title}
+
+Edit the configs here; every number of the protocol is in them.
+
+    recoil check study.toml                                   the design, the orders, the duration, the limits
+    recoil reproduce --study study.toml --out simulated       the whole study with synthetic participants
+    recoil doctor                                             the rig's self-test
+    recoil run direction.toml --screen console                sessions at the console, from its start window
+    recoil run direction.toml --participant P01               a session on a terminal
+    recoil study .                                            who is done, in progress, excluded, next
+    recoil analyze results --out analysis                     statistics, figures and report of all logs
+
+Logs go to `results/`; it is readable by its owner only. Use codes for participants, never names.
+"""
+
+
+def shipped() -> list[Path]:
+    """The shipped configs, and the examples of what else can be given as a file."""
+    return sorted(shipped_folder().glob("*.toml")) + sorted(shipped_folder().glob("examples/*.toml"))
+
+
+def copy_configs(folder: Path) -> list[Path]:
+    """Copy the shipped configs and examples. `PlaceError` if one is there already; then nothing is copied."""
+    copies = [(source, folder / source.relative_to(shipped_folder())) for source in shipped()]
+    there = [str(target) for _, target in copies if target.exists()]
+    if there:
+        raise PlaceError(f"{', '.join(there)}: already there; nothing is overwritten, so copy to another folder")
+    for source, target in copies:
+        target.parent.mkdir(parents=True, exist_ok=True)
+        target.write_bytes(source.read_bytes())
+    return [target for _, target in copies]
+
+
+def new_study(folder: Path) -> list[Path]:
+    """A study's folder: configs, a page that says how to go on, and a private folder for results."""
+    if folder.exists() and (not folder.is_dir() or any(folder.iterdir())):
+        raise PlaceError(f"{folder}: exists and is not empty; name a new folder")
+    made = copy_configs(folder)
+    page = folder / "README.md"
+    page.write_text(_README.format(title=folder.name), encoding="utf-8")
+    storage.make_folder(folder / "results")
+    return [*made, page, folder / "results"]
