@@ -16,6 +16,7 @@ from experiments.remarks import (
 from experiments.screens import texts
 from experiments.screens.console.messages import GunSeen
 from experiments.screens.console.view import About, Seen
+from experiments.states import State
 from experiments.steps import Answered, Ask, Close, Describe, Outcome, Rate, Repeat, Rest, Step
 
 STRIP = 40
@@ -23,8 +24,10 @@ STRIP = 40
 
 
 def coming(seen: Seen, count: int = 3) -> list[str]:
-    """The next few things to do after the trial at hand."""
+    """The next few things to do after the trial at hand; after an emergency stop, or at the end, nothing is."""
     step = seen.position.step
+    if seen.ended is not None or seen.position.base is State.HALTED:
+        return []
     if isinstance(step, Rate | Describe):
         return _still_to_rate(seen, step)[:count]
     if isinstance(step, Close):

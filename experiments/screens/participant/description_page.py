@@ -6,7 +6,7 @@ import math
 from typing import Any
 
 from experiments.screens.participant.confirming import ENTER, Button, heading, hint
-from experiments.screens.participant.pages import QuietPage
+from experiments.screens.participant.pages import Drafts, QuietPage
 from experiments.screens.participant.stage import Box, Stage
 from experiments.screens.participant.words import AskDescription, DescriptionGiven
 
@@ -26,14 +26,14 @@ _FULL = "There is no more room. When you are done: the button, or Ctrl and Enter
 class DescriptionPage(QuietPage):
     """A box to type in. Letters get smaller as it fills; a key that finds no room is not taken, and that is said.
 
-    `drafts` holds what was written so far, by the stimulus's number: it stands there at first, and is kept at last.
+    `drafts` holds what was written so far: it stands there at first, and is kept at last.
     """
 
     redraw_s = 1 / 30
     pointer = True
     typed = True
 
-    def __init__(self, stage: Stage, asked: AskDescription, drafts: dict[int, str]) -> None:
+    def __init__(self, stage: Stage, asked: AskDescription, drafts: Drafts) -> None:
         self._asked, self._drafts = asked, drafts
         self._now, self._drawn_s = stage.toolkit.now, math.inf
         self._done = self._full = False
@@ -41,7 +41,7 @@ class DescriptionPage(QuietPage):
         self._size = 0
         self._height_px = stage.height_px
         self._room_px = (place.height - 2 * _PADDING) * stage.height_px
-        self._box = _text_box(stage, place, drafts.get(asked.number, ""))
+        self._box = _text_box(stage, place, str(drafts.get(asked.draft, "")))
         self._button = Button(stage, "Done")
         self._drawn = [*heading(stage, asked), self._box]
         self._hints = {False: hint(stage, _HINT), True: hint(stage, _FULL)}
@@ -71,7 +71,7 @@ class DescriptionPage(QuietPage):
     def leave(self) -> None:
         """No more typing; what was written is kept."""
         self._box.editable = False
-        self._drafts[self._asked.number] = self._box.text
+        self._drafts[self._asked.draft] = self._box.text
 
     def _fit(self) -> None:
         """Smaller letters if the text is too high; where there are none, the last letter goes again."""

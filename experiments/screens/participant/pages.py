@@ -2,12 +2,17 @@
 
 from __future__ import annotations
 
+import math
+
 from experiments.screens.participant.keys import Keys
 from experiments.screens.participant.stage import Box, Stage
 from experiments.screens.participant.words import AskDirection, DirectionGiven, FromParticipant
 
 STILL_S = 0.1
 """How often a page is drawn on which nothing moves."""
+
+Drafts = dict[int, float | str]
+"""What was set or written on a page that was taken off before it was given, by the question's `draft`."""
 
 
 class QuietPage:
@@ -55,10 +60,14 @@ class MessagePage(QuietPage):
 
 
 class DirectionPage(QuietPage):
-    """Two answers, each with its key. Keys count from the onset on, even those that went down before the page stood."""
+    """Two answers, each with its key. Keys count from the onset on, even those that went down before the page stood.
+
+    After a pause, or where a key was refused, only those that go down once it stands there again.
+    """
 
     def __init__(self, stage: Stage, asked: AskDirection, keys: Keys) -> None:
-        self._asked, self._keys = asked, keys
+        self._asked, self._keys, self._now = asked, keys, stage.toolkit.now
+        self._since_s = math.inf if asked.once_seen else asked.onset_s
         width, ink = stage.half_width, stage.palette.ink
         question = Box(y=0.4, width=2 * width, height=0.25)
         self._drawn = [stage.text(asked.question, question, 0.06, ink)]
@@ -76,10 +85,12 @@ class DirectionPage(QuietPage):
         """The question and both answers."""
         for stimulus in self._drawn:
             stimulus.draw()
+        if math.isinf(self._since_s):
+            self._since_s = max(self._now(), self._asked.onset_s)
 
     def outcome(self) -> DirectionGiven | None:
         """The first of the two keys since the onset."""
-        for press in self._keys.since(self._asked.onset_s):
+        for press in self._keys.since(self._since_s):
             if press.name == self._asked.forward_key:
                 return DirectionGiven(response="forward", pressed_s=press.pressed_s, ask=self._asked.ask)
             if press.name == self._asked.backward_key:

@@ -6,7 +6,7 @@ from typing import Any
 
 from experiments.screens.participant.confirming import ENTER, Button, heading, hint
 from experiments.screens.participant.marker import Move, move, put
-from experiments.screens.participant.pages import QuietPage
+from experiments.screens.participant.pages import Drafts, QuietPage
 from experiments.screens.participant.stage import Box, Stage, half_width
 from experiments.screens.participant.words import AskRating, RatingGiven
 
@@ -40,15 +40,18 @@ def spot_px(part: float, width_px: int, height_px: int) -> tuple[int, int]:
 
 
 class RatingPage(QuietPage):
-    """The scale. No marker stands on it until the participant puts one there, and nothing is confirmed before."""
+    """The scale. No marker stands on it until the participant puts one there, and nothing is confirmed before.
+
+    `drafts` holds where it stood when the page was taken off: it stands there again.
+    """
 
     redraw_s = 1 / 60
     pointer = True
     typed = True
 
-    def __init__(self, stage: Stage, asked: AskRating) -> None:
-        self._stage, self._asked = stage, asked
-        self._rating: float | None = None
+    def __init__(self, stage: Stage, asked: AskRating, drafts: Drafts) -> None:
+        self._stage, self._asked, self._drafts = stage, asked, drafts
+        self._rating = None if asked.draft not in drafts else float(drafts[asked.draft])
         self._dragging = self._done = False
         self._half = _LENGTH * stage.half_width
         self._slider = self._scale()
@@ -96,6 +99,11 @@ class RatingPage(QuietPage):
         if not self._done or self._rating is None:
             return None
         return RatingGiven(rating=self._rating, ask=self._asked.ask)
+
+    def leave(self) -> None:
+        """Where the marker stands is kept."""
+        if self._rating is not None:
+            self._drafts[self._asked.draft] = self._rating
 
     def _confirm(self) -> None:
         self._done = self._rating is not None
