@@ -19,7 +19,7 @@ from experiments.record import storage
 from experiments.run import Again, Finished, Request, run
 from experiments.screens.synthetic import synthetic_screen
 from experiments.screens.terminal import TerminalScreen
-from experiments.study.places import Place, PlaceError, place, set_aside_file
+from experiments.study.places import Place, PlaceError, check_code, place, set_aside_file
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -44,6 +44,7 @@ class Asked:
 
 def run_session(asked: Asked) -> Place:
     """Carry out what was asked for. `PlaceError` for what cannot be done here; a stop raises `KeyboardInterrupt`."""
+    check_code(asked.participant_id)
     _check_screen(asked)
     check_pace(asked.screen, asked.gun)
     request = Request(
@@ -96,8 +97,11 @@ def check_pace(screen: str, gun: str) -> None:
 
 
 def _at_terminal(request: Request, asked: Asked) -> Finished:
-    del asked
-    return run(request, _terminal, RealClock())
+    def screen(setup: Setup[Any], plan: Plan, clock: Clock) -> Screen:
+        del setup
+        return TerminalScreen(plan, clock, simulated=asked.gun == "simulated")
+
+    return run(request, screen, RealClock())
 
 
 def _synthetic(request: Request, asked: Asked) -> Finished:
@@ -168,11 +172,6 @@ def _again(asked: Asked) -> Again:
     if asked.reason and not asked.fresh:
         raise PlaceError("--reason: goes with --fresh, and says why the unfinished run is set aside")
     return "resume" if asked.resume else "fresh" if asked.fresh else "ask"
-
-
-def _terminal(setup: Setup[Any], plan: Plan, clock: Clock) -> Screen:
-    del setup
-    return TerminalScreen(plan, clock)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -14,7 +14,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
-from tests.at_display import OTHER, PATIENCE_S, AtConsole, another_window, records, remarks, wait_for
+from tests.at_display import HAND_S, OTHER, PATIENCE_S, AtConsole, another_window, records, remarks, wait_for
 from tests.at_hand import STEM, check_gun, short_configs, words
 from tests.watched_console import Look, Watch
 
@@ -93,6 +93,7 @@ class RandomHands:
         for key in sorted(self.down):
             screen.keys.key_up(key)
         self.down.clear()
+        time.sleep(HAND_S)  # the next press of a key that was down is no bounce of it
         return left
 
     def _move(self, screen: AtConsole) -> None:

@@ -73,13 +73,14 @@ def test_the_emergency_stop_and_the_keys_of_the_window_are_the_same_everywhere(
 
 
 @pytest.mark.parametrize("position", NO_FIELD, ids=lambda position: position.state)
-def test_where_nothing_is_typed_a_letter_is_a_command_and_with_ctrl_it_is_none(position: Position) -> None:
+def test_where_nothing_is_typed_a_letter_is_a_command_and_with_ctrl_as_well_but_no_answer(position: Position) -> None:
     pause = "go on" if position.state is S.PAUSED else "pause"
     assert [command(key, position) for key in "FBMEUGNRQLYTSP"] == [
         *("forward", "backward", "damper", "end break", "undo", "flag", "note", "repeat", "stop", "list"),
         *("reason", "rearm", "restart", pause),
     ]
-    assert [command(key, position, ctrl=True) for key in LETTERS] == [None] * len(LETTERS)
+    for key in LETTERS:
+        assert command(key, position, ctrl=True) == (None if key in "FB" else command(key, position))
 
 
 @pytest.mark.parametrize("line", [False, True])

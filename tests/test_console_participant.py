@@ -217,7 +217,7 @@ def test_a_participants_key_that_went_into_a_note_is_no_answer_and_the_next_one_
         screen.stands(RUN)
         asking = screen.to("asking", trial=1)
         screen.participant_shows("DirectionPage")
-        for opened, why in (("n", lambda look: look.line), ("F1", lambda look: look.page)):
+        for count, (opened, why) in enumerate((("n", lambda look: look.line), ("F1", lambda look: look.page)), 2):
             screen.keys.press(opened)
             screen.until(why)
             before = len(remarks(journal, "refused"))
@@ -226,6 +226,7 @@ def test_a_participants_key_that_went_into_a_note_is_no_answer_and_the_next_one_
             wait_for(lambda before=before: len(remarks(journal, "refused")) > before)
             screen.keys.press("Escape")
             screen.until(lambda look: not look.line and not look.page)
+            screen.participant_shows("DirectionPage", count)
         assert screen.look().serial == asking.serial
         screen.keys.press("Down")
         screen.until(lambda look: look.serial != asking.serial)

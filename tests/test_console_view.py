@@ -126,6 +126,24 @@ def test_rating_and_description_are_awaited_from_the_participants_screen_where_t
         assert view.instruction(there, 0.0).detail == f"?\n{awaited}"
 
 
+def test_a_participants_screen_that_is_gone_is_awaited_no_more() -> None:
+    gone = ParticipantSeen(failure="killed by signal 9")
+    for setup, step, state, does in (
+        (PREFERENCE, rate, State.RATING, {"participant_rates": True}),
+        (DIRECTION, ask, State.ASKING, {"participant_keys": True}),
+    ):
+        here = seen(setup, Position(states=(state,), step=step(plan_of(setup).trials[0])), participant=gone)
+        detail = view.instruction(replace(here, about=replace(here.about, **does)), 0.0).detail
+        assert "Awaited" not in detail
+        assert "Their screen is gone." in detail
+
+
+def test_after_an_emergency_stop_nothing_comes_next_and_no_end_is_told() -> None:
+    trial = plan_of(DIRECTION).trials[0]
+    assert overview.coming(seen(DIRECTION, Position(states=(State.ASKING,), step=ask(trial))))
+    assert not overview.coming(seen(DIRECTION, Position(states=(State.HALTED,), step=ask(trial))))
+
+
 def test_the_participants_screen_has_the_keys_from_one_rating_or_description_to_the_next_and_no_longer() -> None:
     here = seen(PREFERENCE, Position()).about
     step = Describe(trial=plan_of(PREFERENCE).trials[0], question="?")

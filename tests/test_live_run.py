@@ -484,7 +484,8 @@ def test_a_repeat_that_was_asked_for_one_trial_is_not_taken_for_the_next(tmp_pat
         rate_and_describe(sitting)
         assert sitting.state is S.RATING
         sitting.press("Enter")
-        assert sitting.window.heard.count("Trial 1 cannot be presented again any more.") == 1
+        said = "Trial 1 cannot be presented again any more. What you typed is kept as a note."
+        assert sitting.window.heard.count(said) == 1
         contents = of_journal(sitting)
     assert not [word for _, word in told(contents) if isinstance(word, Repeat)]
 
@@ -967,6 +968,30 @@ def test_a_key_that_went_into_what_is_open_on_the_console_is_nobodys_answer(tmp_
         assert sitting.state is S.ASKING
         assert sitting.live.offer(own_key(sitting))
         assert len(raw_answers(of_journal(sitting))) == 1
+
+
+def test_words_for_what_is_not_done_any_more_are_kept_as_a_note(tmp_path: Path) -> None:
+    with sat_at(S.ASKING, tmp_path) as sitting:
+        sitting.press("R")
+        sitting.window.fields["line"] = "she sneezed"
+        sitting.press("F12")
+        sitting.paint()
+        assert sitting.state is S.HALTED
+        sitting.press("Enter")
+        assert sitting.window.heard[-1].endswith("What you typed is kept as a note.")
+        assert not sitting.controls.typing.line
+        assert [remark.text for remark in remarks(of_journal(sitting), Noted)] == ["repeat: she sneezed"]
+
+
+def test_what_is_no_flag_stays_to_be_typed_over(tmp_path: Path) -> None:
+    with sat_at(S.ASKING, tmp_path) as sitting:
+        sitting.press("G")
+        sitting.type("!?")
+        assert sitting.controls.typing.line
+        sitting.window.fields["line"] = "noise"
+        sitting.press("Enter")
+        assert not sitting.controls.typing.line
+        assert [remark.flag for remark in remarks(of_journal(sitting), Flagged)] == ["noise"]
 
 
 def test_a_damper_that_may_have_been_set_is_confirmed_before_anything_fires(tmp_path: Path) -> None:

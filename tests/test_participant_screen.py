@@ -154,7 +154,7 @@ def link(display, tmp_path_factory):
 def ask(link, hands, console):
     """Ask, and come back when the question stands on the display. Nothing is left of what was written before."""
     with pytest.raises(ParticipantError, match="no answer"):
-        link.ask_rating(SCALE, 0.0)
+        link.ask_rating(replace(SCALE, draft=-1), 0.0)
 
     def ask(question):
         show(link, "Please wait")
@@ -289,7 +289,29 @@ def test_what_was_written_of_one_stimulus_never_stands_in_the_description_of_ano
     answer = ask(WORDS)
     type_on(hands, "a")
     call_off(link, answer)
-    assert describe(hands, ask(replace(WORDS, number=3)), "b") == "b"
+    assert describe(hands, ask(replace(WORDS, number=3, draft=1)), "b") == "b"
+
+
+def test_a_rating_that_was_called_off_has_its_marker_where_it_was(ask, hands, link):
+    answer = ask(SCALE)
+    hands.click(RIGHT_END, LINE_Y)
+    hands.key("Left")
+    call_off(link, answer)
+    again = ask(SCALE)
+    hands.click(0.5, BUTTON_Y)
+    assert again.result(PATIENCE_S).rating == 9.9
+
+
+def test_the_marker_of_one_stimulus_never_stands_on_the_scale_of_another(ask, hands, link):
+    answer = ask(SCALE)
+    hands.click(RIGHT_END, LINE_Y)
+    call_off(link, answer)
+    other = ask(replace(SCALE, number=3, draft=1))
+    hands.click(0.5, BUTTON_Y)
+    hands.key("Return")
+    hands.click(LEFT_END, LINE_Y)
+    hands.key("Return")
+    assert other.result(PATIENCE_S).rating == 0.0
 
 
 @pytest.fixture
@@ -322,6 +344,15 @@ def test_a_key_before_the_onset_is_no_answer_but_one_before_the_question_stands_
     given = link.ask_direction(replace(question, onset_s=before.pressed_s + FAR_S), PATIENCE_S)
     assert (before.response, given.response) == ("backward", "forward")
     assert given.pressed_s > before.pressed_s + FAR_S
+
+
+def test_after_a_pause_a_key_counts_once_the_question_stands_there_again(link, hands, console):
+    show(link, "Paused")
+    question = replace(WHICH, onset_s=time.monotonic(), once_seen=True)
+    hands.key("b")
+    answer = hands.changing(lambda: console.submit(link.ask_direction, question, PATIENCE_S))
+    hands.key("f")
+    assert answer.result(PATIENCE_S).response == "forward"
 
 
 def test_without_a_sound_device_the_noise_stays_off_with_one_clear_message(link):

@@ -603,8 +603,10 @@ def test_a_person_is_run_on_a_simulated_gun_only_after_a_question(study: StudyFo
     fill(window, "P01")
     key(window, "Return", CTRL)
     assert question(window).startswith("The gun is SIMULATED: P01 will feel nothing.")
+    assert not read(study.results).members
     key(window, "Return", CTRL)
     assert window.choice is None
+    assert not read(study.results).members
     key(window, "S", CTRL)
     assert window.choice is not None
 
@@ -758,6 +760,15 @@ def test_the_emergency_stop_of_a_test_shot_says_what_the_gun_reports(opened: Ope
     key(window, "T", CTRL)
     assert not window.shots.is_running
     assert not window.shots.next_button.isVisible()
+    key(window, "Escape")
+    assert said(window) == "The last test shot ended by an emergency stop."
+    key(window, "T", CTRL)
+    assert not window.shots.is_running
+    assert "Is the gun where it hurts nobody?" in question(window)
+    key(window, "S", CTRL)
+    assert window.shots.is_running
+    key(window, "Escape")
+    until(lambda: not window.shots.is_running)
     key(window, "Escape")
     key(window, "T", CTRL)
     assert window.shots.is_running

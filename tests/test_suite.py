@@ -19,6 +19,7 @@ PLAIN = {"abs", "float", "int", "len", "max", "min", "round", "sorted", "sum"}
 """Calls out of which a clock's reading comes as what it was."""
 ORDERS = {
     "test_clock.test_the_real_clock_is_the_machines",
+    "test_console_participant.test_a_participants_key_is_a_response_time_from_the_onset_of_the_shot",
     "test_firmware_emulated.test_its_clock_goes_as_the_worlds",
     "test_serial_troubles.test_disarming_a_gun_that_is_gone_waits_for_its_watchdog",
     "test_participant_screen.test_a_key_tells_the_direction_and_when_it_went_down",

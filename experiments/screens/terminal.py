@@ -46,10 +46,10 @@ _REARMING = (
 )
 _CLOSING = "\nEverything is answered. `undo` opens the last answer, `note` and `flag` mark.\n  Enter ends the run: "
 _HALTED = (
-    "\n  EMERGENCY STOP. Nothing fires in this run any more. If the gun does not say at once that it is disarmed, "
-    "SWITCH OFF ITS POWER.\n"
+    "\n  EMERGENCY STOP. Nothing fires in this run any more.{unsure}\n"
     "  Type why, and Enter; Enter alone closes the run, which can be resumed: "
 )
+_UNSURE = " Unless the gun says that it is disarmed, SWITCH OFF ITS POWER."
 _COMMANDS = ("stop", "pause", "undo", "repeat", "flag", "note", "skip", "help")
 _TICK_S = 1.0
 
@@ -57,8 +57,17 @@ _TICK_S = 1.0
 class TerminalScreen:
     """Says on a terminal what to do, and offers what is typed."""
 
-    def __init__(self, plan: Plan, clock: Clock, lines: TextIO | None = None, out: TextIO | None = None) -> None:
-        self._plan, self._clock = plan, clock
+    def __init__(
+        self,
+        plan: Plan,
+        clock: Clock,
+        lines: TextIO | None = None,
+        out: TextIO | None = None,
+        *,
+        simulated: bool = False,
+    ) -> None:
+        self._plan, self._clock, self._simulated = plan, clock, simulated
+        self._disarmed = False
         self._out = out or sys.stdout
         if isinstance(sys.stdin, io.TextIOWrapper):
             sys.stdin.reconfigure(errors="replace")  # a byte that is no UTF-8 is not to end the run
@@ -71,7 +80,8 @@ class TerminalScreen:
     def begin(self, live: LiveRun) -> None:
         """Say who it is, and begin to read."""
         self._live = live
-        self._say(f"Participant {self._plan.participant_id}, experiment {self._plan.experiment}.\n{_HELP}")
+        band = "SIMULATED GUN – nothing is felt.\n" if self._simulated else ""
+        self._say(f"{band}Participant {self._plan.participant_id}, experiment {self._plan.experiment}.\n{_HELP}")
         for target in (self._read, self._count_down):
             threading.Thread(target=target, daemon=True, name="terminal").start()
 
@@ -101,10 +111,9 @@ class TerminalScreen:
 
     def gun_seen(self, status: GunStatus | None, fault: str) -> None:
         """Say what the gun itself says after it was told to disarm."""
-        if status is None:
-            self._say(f"\n  The gun says nothing ({fault}).")
-        else:
-            self._say(f"\n  The gun says that it is {status.state}.")
+        self._disarmed = status is not None and status.state == "disarmed"
+        told = f"The gun says nothing ({fault})" if status is None else f"The gun says that it is {status.state}"
+        self._say(f"\n  {told}{'.' if self._disarmed else ': SWITCH OFF ITS POWER.'}")
 
     # what is asked for
 
@@ -139,7 +148,7 @@ class TerminalScreen:
             case State.CORRECTING if position.correcting is not None:
                 return self._correction(position.correcting)
             case State.HALTED:
-                return _HALTED
+                return _HALTED.format(unsure="" if self._disarmed else _UNSURE)
             case _:
                 return ""
 

@@ -126,9 +126,20 @@ def read_back_refusal(entered: Entered) -> str:
 
 
 def admit(study: StudyFolder, entered: Entered, clock: Clock, *, practice: bool = False) -> RunStanding:
-    """Check all that must hold before somebody runs, have what they said on record, and give back how their run stands.
+    """Have what somebody said on record, and give back how their run stands.
 
-    `PlaceError` and `JournalError` say why they may not; then nothing is recorded.
+    `PlaceError` and `JournalError` say why they may not run; then nothing is recorded.
+    """
+    run, facts = may_run(study, entered, practice=practice)
+    if facts is not None:
+        join(study, entered.participant_id, facts, clock)
+    return run
+
+
+def may_run(study: StudyFolder, entered: Entered, *, practice: bool = False) -> tuple[RunStanding, Facts | None]:
+    """Check all that must hold before somebody runs: how their run stands, and what is new of what they said.
+
+    `PlaceError` and `JournalError` say why they may not.
     """
     _refuse(read_back_refusal(entered))
     person, problems = look_at(study, entered.participant_id)
@@ -141,9 +152,7 @@ def admit(study: StudyFolder, entered: Entered, clock: Clock, *, practice: bool 
         raise PlaceError(str(error)) from error
     rules = study.config.eligibility
     _refuse(refusal(person, entered, facts, rules, practice=practice))
-    if is_news(person, facts, rules.ask):
-        join(study, entered.participant_id, facts, clock)
-    return run
+    return run, facts if is_news(person, facts, rules.ask) else None
 
 
 def _refuse(reason: str) -> None:

@@ -58,14 +58,19 @@ def is_code(text: str) -> bool:
     return _CODE.fullmatch(text) is not None
 
 
-def place(results: Path, participant_id: str, experiment: str) -> Place:
-    """The place of a run. `PlaceError` if the code breaks a rule or differs from a known one in case alone."""
+def check_code(participant_id: str) -> None:
+    """`PlaceError`, if it is no participant's code."""
     if not is_code(participant_id):
         shown = participant_id if len(participant_id) <= 40 else f"{participant_id[:40]}..."
         raise PlaceError(
             f"participant code {shown!r} ({len(participant_id)} characters): must be 1 to 32 letters and digits "
             "(A-Z, a-z, 0-9), no blanks, dots or slashes; use a code, not a name"
         )
+
+
+def place(results: Path, participant_id: str, experiment: str) -> Place:
+    """The place of a run. `PlaceError` if the code breaks a rule or differs from a known one in case alone."""
+    check_code(participant_id)
     for known in known_codes(results):
         if known != participant_id and known.lower() == participant_id.lower():
             raise PlaceError(

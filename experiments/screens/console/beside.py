@@ -146,9 +146,10 @@ class ParticipantSide:
             forward_key="up",
             backward_key="down",
             onset_s=position.since_s if paused else onset_s,  # a key in a pause is no answer
+            once_seen=paused,  # nor one while their screen still says so
         )
         while wanted() and not self._keyed(question, position, wanted):
-            question = replace(question, onset_s=self._now_s())  # it was refused: the next key counts
+            question = replace(question, once_seen=True)  # it was refused: the next key counts
 
     def _keyed(self, question: AskDirection, position: Position, wanted: Wanted) -> bool:
         """Have the participant press a key; whether it was taken for the answer."""
@@ -161,9 +162,6 @@ class ParticipantSide:
             self._tell(Trouble(text=f"The participant’s key was not taken. {verdict.text}"))
         return bool(verdict)
 
-    def _now_s(self) -> float:
-        return 0.0 if self._live is None else self._live.clock.now()
-
     def _rated(self, step: Rate, position: Position, wanted: Wanted) -> None:
         given = self._link.ask_rating(
             AskRating(
@@ -175,6 +173,7 @@ class ParticipantSide:
                 minimum_text=step.minimum_text,
                 maximum_text=step.maximum_text,
                 grain=step.grain,
+                draft=position.number,
             ),
             wanted=wanted,
         )
@@ -183,7 +182,7 @@ class ParticipantSide:
     def _described(self, step: Describe, position: Position, wanted: Wanted) -> None:
         of = self._setup.config.design.trials
         given = self._link.ask_description(
-            AskDescription(number=step.trial.trial, of=of, question=step.question), wanted=wanted
+            AskDescription(number=step.trial.trial, of=of, question=step.question, draft=position.number), wanted=wanted
         )
         self._offer(events.ParticipantDescribed(text=given.comment, step=position.number, by=self._hand))
 

@@ -143,6 +143,7 @@ class Buttons:
 
         `over`: the run has ended; `letters`: letters are text, commands take Ctrl as well.
         """
+        closes = over or position.base is State.HALTED
         shown = set[str]() if over else set(_shown(position, screen_lost=not idle("restart")))
         self.slots.show_only({button for name, button in self._large.items() if name in shown})
         for name, button in self._large.items():
@@ -150,7 +151,7 @@ class Buttons:
         for name, button in self._row.items():
             held = name == "pause" and position.state is State.PAUSED
             button.name = "go on" if held else name
-            button.label("Close" if name == "stop" and over else "", letters=letters)
+            button.label("Close" if name == "stop" and closes else "", letters=letters)
             dim = "yes" if idle(button.name) else "no"
             if button.property("dim") != dim:
                 button.setProperty("dim", dim)

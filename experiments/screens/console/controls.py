@@ -11,8 +11,9 @@ from typing import Any
 from device.words import Direction
 from experiments.clock import Clock
 from experiments.design.plan import Trial
-from experiments.live_run import LiveRun
+from experiments.live_run import LiveRun, Verdict
 from experiments.preference.config import RatingScale
+from experiments.screens.console import lines
 from experiments.screens.console.keys import (
     BY_NAME,
     COMMANDS,
@@ -24,12 +25,11 @@ from experiments.screens.console.keys import (
     why_not,
 )
 from experiments.screens.console.messages import Beside, View
-from experiments.screens.texts import FLAG_RULE, one_line, short_place, typed_number
+from experiments.screens.texts import FLAG_RULE, one_line, typed_number
 from experiments.session import events
 from experiments.session.events import Event, Hand, Press
-from experiments.session.history import trial_at, value
+from experiments.session.history import value
 from experiments.session.judging import REARM_HELD_S
-from experiments.session.remarks import flag_word
 from experiments.session.states import EMERGENCY, Position, State
 from experiments.session.steps import Ask
 
@@ -38,7 +38,6 @@ PAGE_COMMANDS: tuple[Name, ...] = ("help", "list", "leave", "emergency", "theme"
 HOLDS: tuple[Name, ...] = ("pause", "next")
 """What makes the gun silent: done from a page as well, which goes. The rest would be done unseen."""
 
-_LINES: tuple[Name, ...] = ("end break", "repeat", "flag", "note", "reason", "stop")
 _EVENTS: dict[Name, Event] = {
     "fire": events.Fire(),
     "next": events.Next(),
@@ -70,7 +69,7 @@ class Controls:
         self._live, self._clock, self._view = live, clock, view
         self._scale, self._hand, self._beside = scale, hand, beside
         self._observer = observer
-        self._enter: Callable[[str, Press], None] | None = None
+        self._enter: Callable[[str, Press], bool] | None = None
         self._held: Press | None = None
         self.drawn = live.position
         self.page: Name | None = None
@@ -162,7 +161,7 @@ class Controls:
 
     def _run(self, name: Name, press: Press) -> None:
         self.uncover()
-        if name in _LINES:
+        if name in lines.NAMES:
             self._ask_for(name)
         elif name in ("forward", "backward"):
             self._answer(name, press)
@@ -175,7 +174,9 @@ class Controls:
 
     def _offer(self, event: Event, press: Press | None = None) -> None:
         """Have an event judged, and say what there is to say of it."""
-        verdict = self._live.offer(event, press)
+        self._say(self._live.offer(event, press))
+
+    def _say(self, verdict: Verdict) -> None:
         if verdict.text:
             self._view.say(verdict.text, "wait" if verdict.taken else "bad")
 
@@ -282,66 +283,36 @@ class Controls:
         else:
             trial = (self._live.repeated() if name == "repeat" else None) or self._live.trial
             self._enter = lambda line, press: self._line(name, trial, line, press)
-            self._view.open_line(f"{self._question(name, trial)}  (Enter saves, Esc leaves it)")
+            self._view.open_line(f"{lines.question(name, trial, self._live)}  (Enter saves, Esc leaves it)")
 
     def ask_why_it_stops(self) -> None:
         """Somebody wants to close the window of a live run."""
         self._ask_for("stop")
 
-    def _question(self, name: Name, trial: Trial) -> str:
-        live = self._live
-        place = short_place(trial, trial_at(live.plan, live.told, live.position.step))
-        match name:
-            case "end break":
-                return "Why does the break end early?"
-            case "repeat":
-                return f"Why is trial {trial.trial} to be presented again?"
-            case "flag":
-                return f"Flag {place} as (a word such as noise or late)"
-            case "note":
-                return f"Note on {place}"
-            case "reason":
-                return "Why was there an emergency stop?"
-            case _:
-                return "Why does the run stop here? It can be resumed."
-
     def _enter_line(self, press: Press) -> None:
         text, enter = one_line(self._view.typed("line")), self._enter
         if not text:
             self._view.say("Type a word or two, or leave it with Esc.", "bad")
-            return
-        self._close_line()
-        if enter is not None:
-            enter(text, press)
+        elif enter is not None and enter(text, press):
+            self._close_line()
 
     def _close_line(self) -> None:
         self._enter = None
         self._view.close_line()
 
-    def _line(self, name: Name, trial: Trial, line: str, press: Press) -> None:
-        match name:
-            case "end break" if self._live.position.base is not State.RESTING:
-                self._offer(events.Note(text=f"break: {line}", trial=trial))
-                self._view.say("The break is over: what you typed is kept as a note.", "wait")
-            case "end break":
-                self._offer(events.EndBreak(reason=line), press)
-            case "repeat":
-                self._offer(events.Repeat(reason=line, trial=trial), press)
-            case "flag":
-                self._flag(line, trial)
-            case "note":
-                self._offer(events.Note(text=line, trial=trial))
-            case "reason":
-                self._offer(events.Reason(text=line))
-            case _:
-                self._offer(events.Stop(reason=line))
-
-    def _flag(self, typed: str, trial: Trial) -> None:
-        flag = flag_word(typed)
-        if flag is None:
+    def _line(self, name: Name, trial: Trial, text: str, press: Press) -> bool:
+        """Do what a line was typed for; what comes too late is kept as a note. Whether the line is done with."""
+        event = lines.event_of(name, trial, text)
+        if event is None:
             self._view.say(FLAG_RULE, "bad")
-        else:
-            self._offer(events.Flag(flag=flag, trial=trial))
+            return False
+        verdict = self._live.offer(event, press if isinstance(event, events.EndBreak | events.Repeat) else None)
+        if verdict.taken:
+            self._say(verdict)
+            return True
+        kept = self._live.offer(lines.as_note(name, trial, text))
+        self._view.say(f"{verdict.text} What you typed is kept as a note." if kept else verdict.text, "wait")
+        return bool(kept)
 
     # what belongs to the window
 

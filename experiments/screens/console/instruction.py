@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from PyQt6.QtGui import QResizeEvent, QShowEvent
 from PyQt6.QtWidgets import QLabel, QLineEdit, QPlainTextEdit, QStackedWidget, QVBoxLayout, QWidget
 
 from experiments.screens.console import parts
@@ -15,6 +16,7 @@ from experiments.session.steps import Rate
 SIZES_PX = {"title": 46, "damper": 34, "detail": 23}
 FITS = (1.0, 0.88, 0.76, 0.66, 0.56)
 """How far the type shrinks."""
+_PAGE_PX, _LEAST_PX = 20, 9
 
 
 class Notice:
@@ -39,7 +41,7 @@ class Notice:
 
 
 class TextPage(QWidget):
-    """A page of text that is only looked at, and below it what was said last."""
+    """A page of text that is only looked at, in type that has room for all of it, and below it what was said last."""
 
     def __init__(self) -> None:
         super().__init__()
@@ -56,6 +58,29 @@ class TextPage(QWidget):
         """Show lines of text."""
         self._title.setText(title)
         self._text.setPlainText("\n".join(lines))
+        self._fit()
+
+    def resizeEvent(self, event: QResizeEvent | None) -> None:  # noqa: N802 - Qt's name
+        """Type shrinks with the page."""
+        super().resizeEvent(event)
+        self._fit()
+
+    def showEvent(self, event: QShowEvent | None) -> None:  # noqa: N802 - Qt's name
+        """Its room is known now."""
+        super().showEvent(event)
+        self._fit()
+
+    def _fit(self) -> None:
+        if not self.isVisible():
+            return
+        for size_px in range(_PAGE_PX, _LEAST_PX - 1, -1):
+            self._text.setStyleSheet(f"font-size: {size_px}px;")
+            text, view = self._text.document(), self._text.viewport()
+            if text is None or view is None:
+                return
+            rows = text.size().height()  # of such a widget's document, which counts in lines
+            if rows * self._text.fontMetrics().lineSpacing() + 2 * text.documentMargin() < view.height():
+                return
 
 
 def _size(label: QLabel, size_px: int, *, bold: bool) -> None:

@@ -114,7 +114,7 @@ class Typing:
 def command_for(key: str, *, ctrl: bool, typing: Typing, position: Position) -> Name | None:
     """The command that a key is now; `None` if it is none, and so may be text.
 
-    Where letters are text, a letter is a command with Ctrl held.
+    Where letters are text, a letter is a command with Ctrl held; elsewhere Ctrl changes nothing, but answers take none.
     """
     if key in ("F12", "F1", "F2", "Esc"):
         return {"F12": "emergency", "F1": "help", "F2": "theme", "Esc": "leave"}[key]  # type: ignore[return-value]
@@ -124,9 +124,13 @@ def command_for(key: str, *, ctrl: bool, typing: Typing, position: Position) -> 
         return None  # it changes the input method: nobody fires by that
     if ctrl and key == "X":
         return "no answer" if field_of(position) == "number" and not typing.line else None
-    if ctrl != typing.letters:
+    if typing.letters and not ctrl:
         return None
-    return _letter(key, position)
+    name = _letter(key, position)
+    return None if ctrl and not typing.letters and name in _ANSWERS else name
+
+
+_ANSWERS: tuple[Name, ...] = ("forward", "backward")
 
 
 def _letter(key: str, position: Position) -> Name | None:

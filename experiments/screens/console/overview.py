@@ -151,8 +151,10 @@ STRIP = 40
 
 
 def coming(seen: Seen, count: int = 3) -> list[str]:
-    """The next few things to do after the trial at hand."""
+    """The next few things to do after the trial at hand; after an emergency stop, or at the end, nothing is."""
     step = seen.position.step
+    if seen.ended is not None or seen.position.base is State.HALTED:
+        return []
     if isinstance(step, Rate | Describe):
         return _still_to_rate(seen, step)[:count]
     if isinstance(step, Close):

@@ -167,7 +167,7 @@ def restyle(widget: QWidget) -> None:
 
 def button(parent: QWidget, text: str, key: str, slot: Slot, *, name: str = "") -> QPushButton:
     """A button that shows its key, and the key. Both do the same, and only while the button is there to be seen."""
-    made = _button(f"{text}  [{key}]", text, slot, name)
+    made = _button(f"{text}  [{key.replace('Return', 'Enter')}]", text, slot, name)
 
     def pressed() -> None:
         if made.isVisible():

@@ -26,8 +26,8 @@ class ShotPage(QWidget):
         self._gun, self._clock = gun, clock
         self._check: ShotCheck | None = None
         self._setup: Setup[Any] | None = None
-        self._stopped = False
-        """The emergency stop: nothing is fired from this page until it was left."""
+        self.stopped = False
+        """The emergency stop: nothing is fired from this page until it was left, and entered on purpose."""
         self._method_at = 0
         self.over: Callable[[], None] = lambda: None
         self.told.connect(self._take)
@@ -58,7 +58,7 @@ class ShotPage(QWidget):
 
     def enter(self) -> None:
         """The page was entered anew."""
-        self._stopped = False
+        self.stopped = False
 
     def choose(self, setup: Setup[Any]) -> None:
         """Test the methods of an experiment, from the first on."""
@@ -79,7 +79,7 @@ class ShotPage(QWidget):
 
     def begin(self) -> None:
         """Test the next method."""
-        if self._check is not None or self._setup is None or self._stopped:
+        if self._check is not None or self._setup is None or self.stopped:
             return
         method = self._next_method(self._setup)
         self._shown = self.next_text().removeprefix("Test shot: ")
@@ -93,7 +93,7 @@ class ShotPage(QWidget):
         if self._check is None:
             return
         self._check.emergency_stop()
-        self._stopped = True
+        self.stopped = True
         self._show("EMERGENCY STOP", f"Disarming. If the gun does not fall silent: {SWITCH_OFF}", "bad")
 
     def call_off(self) -> None:
@@ -111,7 +111,7 @@ class ShotPage(QWidget):
         """Show how far the test shot is."""
         if told.phase == "over":
             self._end(told)
-        elif self._stopped:
+        elif self.stopped:
             return
         elif told.phase == "counting":
             self._show("STAND CLEAR", f"{self._shown} will be fired. Nobody may hold the gun. Esc calls it off.", "ask")
@@ -123,7 +123,7 @@ class ShotPage(QWidget):
         self._check = None
         if told.fired:
             self._method_at += 1
-        title = "EMERGENCY STOP" if self._stopped else "Fired" if told.fired else "Not fired"
+        title = "EMERGENCY STOP" if self.stopped else "Fired" if told.fired else "Not fired"
         self._show(title, told.text, told.mood)
         self._running(False)
         self.over()
@@ -136,6 +136,6 @@ class ShotPage(QWidget):
 
     def _running(self, running: bool) -> None:
         self.stop_button.setVisible(running)
-        self.next_button.setVisible(not (running or self._stopped))
+        self.next_button.setVisible(not (running or self.stopped))
         self.next_button.setText(f"{self.next_text()}  [Ctrl+T]")
         self.call_off_button.setText("Call it off  [Esc]" if running else "Back  [Esc]")

@@ -11,6 +11,7 @@ from PyQt6.QtWidgets import QHBoxLayout, QListWidget, QProgressBar, QVBoxLayout,
 from experiments.screens.console import overview, parts
 from experiments.screens.console.overview import Pace, clock_text, end_text, progress, remaining_s
 from experiments.screens.console.view import About, Seen
+from experiments.session.states import State
 
 LONGEST_S = 3.0
 """The height of the strip; longer times stand at its upper edge."""
@@ -120,7 +121,7 @@ class Bars(QWidget):
 
 def _times(seen: Seen, pace: Pace, now_s: float) -> str:
     elapsed = f"Elapsed {clock_text(pace.elapsed_s(now_s))}"
-    if seen.ended is not None:
+    if seen.ended is not None or seen.position.base is State.HALTED:
         return elapsed
     left_s = remaining_s(seen.about.setup.config, seen.about.plan, seen.told, pace, seen.position, now_s)
     return f"{elapsed}\nEnds {end_text(left_s, datetime.now())}"

@@ -34,6 +34,7 @@ from experiments.study.study import Participant, RunStanding
 
 NAME = "start"
 SIMULATED = "simulated"
+STOPPED = "The last test shot ended by an emergency stop."
 
 
 class StartWindow(QWidget):
@@ -209,12 +210,14 @@ class StartWindow(QWidget):
     # choosing
 
     def _start(self) -> None:
+        if self._opening.gun == SIMULATED and not self._simulation_is_known:
+            if self._checked(lambda: enrolment.may_run(self._study, self.form.entered())[0]) is not None:
+                self._ask_simulation()  # before anything is on record: they may leave it
+            return
         run = self._admit(practice=False)
         if run is None:
             return
-        if self._opening.gun == SIMULATED and not self._simulation_is_known:
-            self._ask_simulation()
-        elif run.state == "in progress":
+        if run.state == "in progress":
             self._ask_resume(run)
         else:
             self._leave(self.form.participant_id)
@@ -228,9 +231,13 @@ class StartWindow(QWidget):
 
     def _admit(self, *, practice: bool) -> RunStanding | None:
         """How the run stands that may begin now; `None`, with the reason shown, if it may not."""
+        entered = self.form.entered()
+        return self._checked(lambda: enrolment.admit(self._study, entered, self._clock, practice=practice))
+
+    def _checked(self, check: Callable[[], RunStanding]) -> RunStanding | None:
         self._take_back()
         try:
-            return enrolment.admit(self._study, self.form.entered(), self._clock, practice=practice)
+            return check()
         except (PlaceError, JournalError) as error:
             self._refused(str(error))
             return None
@@ -340,6 +347,14 @@ class StartWindow(QWidget):
 
     def _test_shot(self) -> None:
         self._take_back()
+        if self.shots.stopped:
+            sure = Answer(text="It is: test shot", key="Ctrl+S", do=lambda _: self._enter_shots())
+            self._ask(Question(f"{STOPPED} Is the gun where it hurts nobody?", (sure, self._leave_it())))
+        else:
+            self._enter_shots()
+
+    def _enter_shots(self) -> None:
+        self._take_back()
         self.pages.setCurrentWidget(self.shots)
         self.shots.enter()
         self.shots.begin()
@@ -351,6 +366,7 @@ class StartWindow(QWidget):
     def _leave_shots(self) -> None:
         self.pages.setCurrentIndex(0)
         self._show_choice()
+        self.say(STOPPED if self.shots.stopped else "", "bad")
         self.form.code_again.setFocus()
 
 

@@ -54,6 +54,11 @@ class Seen:
         return shown_key(name, letters=self.letters)
 
     @property
+    def participant_gone(self) -> bool:
+        """Whether there was a participant's screen, and is none now."""
+        return self.participant is not None and bool(self.participant.failure)
+
+    @property
     def here(self) -> Trial:
         """The trial at hand, whatever is corrected."""
         return trial_at(self.about.plan, self.told, self.position.step)
@@ -90,7 +95,9 @@ def method_text(about: About, trial: Trial) -> str:
 
 
 def place_text(seen: Seen) -> str:
-    """Where the run stands: trial, set, session."""
+    """Where the run stands: trial, set, session; nowhere, if it ended before it began."""
+    if seen.ended is not None and seen.position.step is None:
+        return ""
     place = texts.place_text(seen.about.plan, seen.here)
     return f"{place} ({method_text(seen.about, seen.here)})" if seen.about.plan.trials[-1].session > 1 else place
 
@@ -196,8 +203,14 @@ def _asking(seen: Seen, now_s: float) -> Instruction:
     step = seen.position.step
     question = step.question if isinstance(step, Ask) else ""
     own = "Awaited: the participant's own key, UP for forward or DOWN for backward.\nF or B enters it for them."
-    detail = own if seen.about.participant_keys else "Enter what the participant says: F or B."
+    told = "Enter what the participant says: F or B."
+    detail = _asked_there(seen, own, told) if seen.about.participant_keys else told
     return Instruction(title=question, detail=detail, mood="ask")
+
+
+def _asked_there(seen: Seen, awaited: str, here: str) -> str:
+    """What is awaited from the participant's screen, or that there is none any more."""
+    return f"Their screen is gone. {here} To start it again, pause first." if seen.participant_gone else awaited
 
 
 def _rating(seen: Seen, now_s: float) -> Instruction:
@@ -206,8 +219,9 @@ def _rating(seen: Seen, now_s: float) -> Instruction:
     if not isinstance(step, Rate | Describe):
         return _moment(seen, 0.0)
     what = "rating" if isinstance(step, Rate) else "description"
-    own = f"\nAwaited: the participant's {what} on their own screen, or type it here."
-    detail = f"{step.question}{own if seen.about.participant_rates else ''}"
+    own = f"Awaited: the participant's {what} on their own screen, or type it here."
+    there = _asked_there(seen, own, "Type here what they say.") if seen.about.participant_rates else ""
+    detail = "\n".join(filter(None, (step.question, there)))
     return Instruction(title=texts.ordinal(seen.about.plan, step.trial), detail=detail, mood="ask")
 
 

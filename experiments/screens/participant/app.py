@@ -13,7 +13,7 @@ from typing import BinaryIO
 
 from pydantic import ValidationError
 
-from experiments.screens.participant.pages import DirectionPage, MessagePage
+from experiments.screens.participant.pages import DirectionPage, Drafts, MessagePage
 from experiments.screens.participant.rating_page import DescriptionPage, RatingPage
 from experiments.screens.participant.stage import Stage
 from experiments.screens.participant.toolkit import Keys, MaskingNoise, load
@@ -112,8 +112,9 @@ class App:
         self._noise = MaskingNoise()
         self._told: tuple[str, ...] = ()
         self._told_s = 0.0
-        self._drafts: dict[int, str] = {}
-        """What was written on the stimuli by their numbers, until the next rating is asked for."""
+        self._drafts: Drafts = {}
+        """What was set or written and not taken, until something else is asked for."""
+        self._asked_for = ("", 0)
 
     def begin(self) -> None:
         """Show an empty window and say that it is ready."""
@@ -155,14 +156,19 @@ class App:
             case Show():
                 self._stage.put(MessagePage(self._stage, word.text), keep_keys=word.keep_keys)
             case AskRating():
-                self._stage.put(RatingPage(self._stage, word))
-                self._drafts.clear()  # only now: what is given as a pause begins is not taken, and asked for again
+                self._stage.put(RatingPage(self._stage, word, self._drafts_of(word)))
             case AskDescription():
-                self._stage.put(DescriptionPage(self._stage, word, self._drafts))
+                self._stage.put(DescriptionPage(self._stage, word, self._drafts_of(word)))
             case AskDirection():
                 self._stage.put(DirectionPage(self._stage, word, self._keys))
             case Noise():
                 self._wire.say(self._noise.turn(word))
+
+    def _drafts_of(self, word: AskRating | AskDescription) -> Drafts:
+        """What is given as a pause begins is not taken, and asked for again: it is there still."""
+        if (word.kind, word.draft) != self._asked_for:
+            self._drafts, self._asked_for = {}, (word.kind, word.draft)
+        return self._drafts
 
     def _answer(self) -> None:
         """Say what the page came to, if it did, and thank for it. After a page to type on another is likely to come."""

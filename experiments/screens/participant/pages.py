@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from typing import Any
 
 from experiments.screens.participant.stage import Box, Stage
@@ -16,6 +17,9 @@ from experiments.screens.participant.words import (
 
 STILL_S = 0.1
 """How often a page is drawn on which nothing moves."""
+
+Drafts = dict[int, float | str]
+"""What was set or written on a page that was taken off before it was given, by the question's `draft`."""
 
 
 class QuietPage:
@@ -63,10 +67,14 @@ class MessagePage(QuietPage):
 
 
 class DirectionPage(QuietPage):
-    """Two answers, each with its key. Keys count from the onset on, even those that went down before the page stood."""
+    """Two answers, each with its key. Keys count from the onset on, even those that went down before the page stood.
+
+    After a pause, or where a key was refused, only those that go down once it stands there again.
+    """
 
     def __init__(self, stage: Stage, asked: AskDirection, keys: Keys) -> None:
-        self._asked, self._keys = asked, keys
+        self._asked, self._keys, self._now = asked, keys, stage.toolkit.now
+        self._since_s = math.inf if asked.once_seen else asked.onset_s
         width, ink = stage.half_width, stage.palette.ink
         question = Box(y=0.4, width=2 * width, height=0.25)
         self._drawn = [stage.text(asked.question, question, 0.06, ink)]
@@ -84,10 +92,12 @@ class DirectionPage(QuietPage):
         """The question and both answers."""
         for stimulus in self._drawn:
             stimulus.draw()
+        if math.isinf(self._since_s):
+            self._since_s = max(self._now(), self._asked.onset_s)
 
     def outcome(self) -> DirectionGiven | None:
         """The first of the two keys since the onset."""
-        for press in self._keys.since(self._asked.onset_s):
+        for press in self._keys.since(self._since_s):
             if press.name == self._asked.forward_key:
                 return DirectionGiven(response="forward", pressed_s=press.pressed_s, ask=self._asked.ask)
             if press.name == self._asked.backward_key:

@@ -9,7 +9,7 @@ import math
 from collections.abc import Callable
 from typing import Any, Literal
 
-from experiments.screens.participant.pages import ENTER, Button, QuietPage, heading, hint
+from experiments.screens.participant.pages import ENTER, Button, Drafts, QuietPage, heading, hint
 from experiments.screens.participant.stage import Box, Stage, half_width
 from experiments.screens.participant.words import AskDescription, AskRating, DescriptionGiven, RatingGiven
 from experiments.session.steps import on_scale
@@ -76,15 +76,18 @@ def spot_px(part: float, width_px: int, height_px: int) -> tuple[int, int]:
 
 
 class RatingPage(QuietPage):
-    """The scale. No marker stands on it until the participant puts one there, and nothing is confirmed before."""
+    """The scale. No marker stands on it until the participant puts one there, and nothing is confirmed before.
+
+    `drafts` holds where it stood when the page was taken off: it stands there again.
+    """
 
     redraw_s = 1 / 60
     pointer = True
     typed = True
 
-    def __init__(self, stage: Stage, asked: AskRating) -> None:
-        self._stage, self._asked = stage, asked
-        self._rating: float | None = None
+    def __init__(self, stage: Stage, asked: AskRating, drafts: Drafts) -> None:
+        self._stage, self._asked, self._drafts = stage, asked, drafts
+        self._rating = None if asked.draft not in drafts else float(drafts[asked.draft])
         self._dragging = self._done = False
         self._half = _LENGTH * stage.half_width
         self._slider = self._scale()
@@ -132,6 +135,11 @@ class RatingPage(QuietPage):
         if not self._done or self._rating is None:
             return None
         return RatingGiven(rating=self._rating, ask=self._asked.ask)
+
+    def leave(self) -> None:
+        """Where the marker stands is kept."""
+        if self._rating is not None:
+            self._drafts[self._asked.draft] = self._rating
 
     def _confirm(self) -> None:
         self._done = self._rating is not None
@@ -190,14 +198,14 @@ _FULL = "There is no more room. When you are done: the button, or Ctrl and Enter
 class DescriptionPage(QuietPage):
     """A box to type in. Letters get smaller as it fills; a key that finds no room is not taken, and that is said.
 
-    `drafts` holds what was written so far, by the stimulus's number: it stands there at first, and is kept at last.
+    `drafts` holds what was written so far: it stands there at first, and is kept at last.
     """
 
     redraw_s = 1 / 30
     pointer = True
     typed = True
 
-    def __init__(self, stage: Stage, asked: AskDescription, drafts: dict[int, str]) -> None:
+    def __init__(self, stage: Stage, asked: AskDescription, drafts: Drafts) -> None:
         self._asked, self._drafts = asked, drafts
         self._now, self._drawn_s = stage.toolkit.now, math.inf
         self._done = self._full = False
@@ -205,7 +213,7 @@ class DescriptionPage(QuietPage):
         self._size = 0
         self._height_px = stage.height_px
         self._room_px = (place.height - 2 * _PADDING) * stage.height_px
-        self._box = _text_box(stage, place, drafts.get(asked.number, ""))
+        self._box = _text_box(stage, place, str(drafts.get(asked.draft, "")))
         self._button = Button(stage, "Done")
         self._drawn = [*heading(stage, asked), self._box]
         self._hints = {False: hint(stage, _HOW), True: hint(stage, _FULL)}
@@ -235,7 +243,7 @@ class DescriptionPage(QuietPage):
     def leave(self) -> None:
         """No more typing; what was written is kept."""
         self._box.editable = False
-        self._drafts[self._asked.number] = self._box.text
+        self._drafts[self._asked.draft] = self._box.text
 
     def _fit(self) -> None:
         """Smaller letters if the text is too high; where there are none, the last letter goes again."""

@@ -40,7 +40,10 @@ class Show:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class AskRating:
-    """Ask for a rating of one of several stimuli, named by its order of presentation."""
+    """Ask for a rating of one of several stimuli, named by its order of presentation.
+
+    Asked again with the same `draft`, it begins with the marker where it stood; so does a description with its words.
+    """
 
     number: int
     of: int
@@ -50,27 +53,29 @@ class AskRating:
     minimum_text: str
     maximum_text: str
     grain: Positive
+    draft: int = 0
     ask: int = 0
     kind: Literal["ask-rating"] = "ask-rating"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class AskDescription:
-    """Ask for a description of one of several stimuli, named by its order of presentation.
-
-    Asked again for the same one, it begins with what was written before.
-    """
+    """Ask for a description of one of several stimuli, named by its order of presentation."""
 
     number: int
     of: int
     question: str
+    draft: int = 0
     ask: int = 0
     kind: Literal["ask-description"] = "ask-description"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class AskDirection:
-    """Ask which way it shot; a key pressed before `onset_s` is no answer. Keys have PsychoPy's names."""
+    """Ask which way it shot; a key pressed before `onset_s` is no answer. Keys have PsychoPy's names.
+
+    `once_seen`: nor is one that was pressed before the question stood there.
+    """
 
     question: str
     forward: str
@@ -78,6 +83,7 @@ class AskDirection:
     forward_key: str
     backward_key: str
     onset_s: Finite
+    once_seen: bool = False
     ask: int = 0
     kind: Literal["ask-direction"] = "ask-direction"
 

@@ -1,0 +1,55 @@
+"""The lines that are typed for a command: what is asked, and which event comes of it. Pure."""
+
+from __future__ import annotations
+
+from experiments.design.plan import Trial
+from experiments.live_run import LiveRun
+from experiments.screens.console.keys import Name
+from experiments.screens.texts import short_place
+from experiments.session import events
+from experiments.session.events import Event
+from experiments.session.history import trial_at
+from experiments.session.remarks import flag_word
+
+NAMES: tuple[Name, ...] = ("end break", "repeat", "flag", "note", "reason", "stop")
+
+
+def question(name: Name, trial: Trial, live: LiveRun) -> str:
+    """What is asked for."""
+    place = short_place(trial, trial_at(live.plan, live.told, live.position.step))
+    match name:
+        case "end break":
+            return "Why does the break end early?"
+        case "repeat":
+            return f"Why is trial {trial.trial} to be presented again?"
+        case "flag":
+            return f"Flag {place} as (a word such as noise or late)"
+        case "note":
+            return f"Note on {place}"
+        case "reason":
+            return "Why was there an emergency stop?"
+        case _:
+            return "Why does the run stop here? It can be resumed."
+
+
+def event_of(name: Name, trial: Trial, text: str) -> Event | None:
+    """What a typed text comes to; `None` if it is to be a flag and is none."""
+    match name:
+        case "end break":
+            return events.EndBreak(reason=text)
+        case "repeat":
+            return events.Repeat(reason=text, trial=trial)
+        case "flag":
+            flag = flag_word(text)
+            return None if flag is None else events.Flag(flag=flag, trial=trial)
+        case "note":
+            return events.Note(text=text, trial=trial)
+        case "reason":
+            return events.Reason(text=text)
+        case _:
+            return events.Stop(reason=text)
+
+
+def as_note(name: Name, trial: Trial, text: str) -> events.Note:
+    """What was typed for something that is not done any more."""
+    return events.Note(text=f"{'break' if name == 'end break' else name}: {text}", trial=trial)
