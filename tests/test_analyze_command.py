@@ -131,7 +131,7 @@ def test_a_bad_map_or_bad_rules_end_with_one_message_and_2(recoil: Recoil, tmp_p
     bad.write_text("speed = 9\n")
     done = recoil("analyze", tmp_path, "--out", tmp_path / "out", option, bad)
     assert done.returncode == 2
-    assert "bad.toml: key speed = 9 is unknown" in done.stderr
+    assert "bad.toml:1: speed = 9: unknown key" in done.stderr
     assert "Traceback" not in done.stderr
 
 

@@ -299,8 +299,8 @@ def _name(column: Column) -> str:
 
 
 def _sidecar(experiment: str, free_text: bool) -> Row:
-    described = {_name(column): described(column, _name(column)) for column in _exported(experiment, free_text)}
-    return {"TaskName": experiment, "TaskDescription": TASKS[experiment], **described}
+    found = {_name(column): described(column, _name(column)) for column in _exported(experiment, free_text)}
+    return {"TaskName": experiment, "TaskDescription": TASKS[experiment], **found}
 
 
 def _beh(run: Run, free_text: bool) -> bytes:
