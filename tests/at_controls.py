@@ -718,3 +718,6 @@ def _bring(sitting: Sitting, state: State, gate: SyncGate) -> None:
         case _:
             sitting.to(state)
     assert sitting.state is state, sitting.position
+
+
+SETUPS = {"direction": DIRECTION, "preference": PREFERENCE}

@@ -17,6 +17,7 @@ import pytest
 
 from experiments.screens.console.keys import BOUNCE_S, BY_NAME
 from tests import watched_participant
+from tests.at_runs import RUN, words
 from tests.waiting import PATIENCE_S, wait_for
 from tests.watched_console import Look, Watch
 
@@ -301,3 +302,34 @@ def last_record(journal: Path) -> dict[str, Any]:
         return {}
     records = map(json.loads, reversed(lines))
     return next((record for record in records if record["kind"] != "shot"), {})
+
+
+def run_words(configs: Path, experiment: str = "direction", *more: object) -> list[object]:
+    return words(configs, experiment, "--participant", "P01", *more)
+
+
+def check_disarmed(watch: Watch) -> None:
+    """The last that the gun was told is to disarm."""
+    calls = [call["call"] for call in watch.calls()]
+    assert "disarm" in calls
+    assert "armed" not in calls[len(calls) - 1 - calls[::-1].index("disarm") :]
+
+
+def lose_the_display(configs: Path, folder: Path, experiment: str, state: str) -> float:
+    """Kill the X server under a run at a state; how long the program then lives, in seconds."""
+    with ExitStack() as stack:
+        name, server = stack.enter_context(x_server())
+        stack.enter_context(window_manager(name))
+        screen = stack.enter_context(AtConsole(run_words(configs, experiment), folder, name))
+        screen.stands(RUN)
+        screen.to(state, trial=2)
+        return killed_s(server, screen)
+
+
+def killed_s(server: subprocess.Popen[bytes], screen: AtConsole) -> float:
+    at_s = time.monotonic()
+    server.kill()
+    code, said = screen.end()
+    assert code == 1, said
+    assert "the display was lost" in said
+    return time.monotonic() - at_s

@@ -322,3 +322,25 @@ def check_cell(cell: Cell, action: Action) -> Happened:
     check(cell, action, happened)
     check_gun(cell.watch, cell.journal)
     return happened
+
+
+PARTICIPANT = "Recoil: participant"
+
+
+def check_participants_keys(screen: AtConsole, cell: Cell, *keys: str) -> None:
+    """Keys on the participant's window do nothing to the run; F12 there halts it."""
+    before = len(remarks(cell.journal))
+    screen.focus_on(PARTICIPANT)
+    screen.until(lambda look: not look.active and look.says("Keys: the participant's screen (F12 works there)"))
+    for key in keys:
+        screen.keys.press(key)
+    screen.focus_on("Recoil – P01")
+    screen.until(lambda look: look.active)
+    look = screen.heard()
+    assert look.state == str(cell.state)
+    assert len(remarks(cell.journal)) == before
+    screen.focus_on(PARTICIPANT)
+    screen.until(lambda look: not look.active)
+    screen.keys.press("F12")
+    screen.until(lambda look: look.state == "halted" and look.says("The gun itself says that it is disarmed."))
+    assert remarks(cell.journal)[before:] == [{"by": "participant", "kind": "halted"}]

@@ -98,3 +98,12 @@ def soak(request: pytest.FixtureRequest) -> Iterator[Soak]:
     lines += [f"| {' | '.join(row)} |" for row in rows]
     SOAK_FOLDER.mkdir(parents=True, exist_ok=True)
     table.write_text("\n".join(lines) + "\n", encoding="utf-8")
+
+
+def refused(done: subprocess.CompletedProcess[str], *said: str) -> None:
+    """Exit code 2 and one message that says it all; no traceback, nothing on standard output."""
+    assert done.returncode == 2, done
+    assert "Traceback" not in done.stderr
+    assert done.stdout == ""
+    for words in said:
+        assert words in done.stderr

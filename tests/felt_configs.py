@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import shutil
+from collections.abc import Mapping
 from pathlib import Path
 
 from experiments.load import shipped_folder
@@ -39,3 +40,8 @@ def written(folder: Path, text: str, name: str = "direction") -> Path:
     path = folder / f"{name}.toml"
     path.write_text(text, encoding="utf-8")
     return path
+
+
+def felt_config(folder: Path, instructions: tuple[str, ...] = (), spreads: Mapping[str, float] | None = None) -> Path:
+    """The shipped config with people who feel the gun and differ so much, told so."""
+    return written(folder, felt_text(instructions, **(spreads or {})))

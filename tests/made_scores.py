@@ -2,7 +2,14 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+from typing import Any
+
 import numpy as np
+
+from analysis.logs.reading import read_logs
+from analysis.summary.summary import summarize
+from tests.log_files import METHODS, rating_rows, ratings_path, trial_rows, trials_path, write_rows
 
 KINDS = ("ordinary", "weak", "huge", "far apart")
 
@@ -24,3 +31,45 @@ def made_scores(seed: int, n: int, k: int, kind: str, offset: float) -> np.ndarr
             return people + noise + 0.6 * effect + offset ** rng.uniform(0, 1, size=(n, 1))
         case _:
             return offset + people + noise + 0.6 * effect
+
+
+_ROWS = "6 9 10, 2 9 10, 5 7 8, 6 6 10, 5 9 9, 8 8 10, 5 8 10, 8 10 10, 2 8 10, 7 8 9, 6 9 10, 5 8 10, 7 7 9, 7 9 10"
+RIGHT = np.array([row.split() for row in _ROWS.split(",")], dtype=np.int64)
+"""Right forward answers of ten, 14 participants by 3 methods: the data of every "R 4.2.2" number in these tests."""
+
+
+Json = dict[str, Any]
+
+
+def _study(folder: Path, right: Any, methods: tuple[str, ...] = METHODS) -> Json:
+    """Statistics of participants with so many right forward answers of ten; every second backward answer is right."""
+    for i, counts in enumerate(right):
+        code = f"P{i + 1:02d}"
+        rows = trial_rows(code, methods=methods)
+        for method, count in zip(methods, counts, strict=True):
+            for direction, share in (("forward", int(count)), ("backward", 5)):
+                chosen = [r for r in rows if r["method"] == method and r["direction"] == direction]
+                for place, row in enumerate(chosen):
+                    other = "backward" if direction == "forward" else "forward"
+                    correct = place < share
+                    row.update(response=direction if correct else other, correct=str(int(correct)))
+        write_rows(trials_path(folder, code), rows)
+    return summarize(read_logs([folder]))
+
+
+def _ratings(folder: Path, table: Any, methods: tuple[str, ...] = METHODS) -> Json:
+    for i, ratings in enumerate(table):
+        rows = rating_rows(f"P{i + 1:02d}", methods=methods)
+        for row, rating in zip(rows, ratings, strict=True):
+            row["rating"] = str(rating)
+        write_rows(ratings_path(folder, f"P{i + 1:02d}"), rows)
+    return summarize(read_logs([folder]))
+
+
+CEILING = np.full((6, 3), 10)
+ONE_AT_CEILING = np.column_stack([RIGHT[:, :2], np.full(14, 10)])
+
+
+PEOPLE, COLUMNS = np.arange(14)[:, None] * 0.1, np.array([0.0, 0.1, 0.3])
+ADDITIVE = PEOPLE + COLUMNS
+"""0, 0.1, ... 1.3 plus 0, 0.1, 0.3: F is infinite in decimals, 3e32 in doubles; pingouin 0.7: -9.6e15, p = 1."""

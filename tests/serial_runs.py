@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import csv
 import re
 from collections import Counter
 from collections.abc import Callable, Iterator
@@ -23,6 +24,7 @@ from experiments.run import Request
 from experiments.screens.synthetic import synthetic_screen
 from experiments.session.steps import Answered, Failed, Fired
 from experiments.study.places import Place, place
+from tests.twins import Troubles
 
 UNSURE = re.compile("fired and cut short|may have been fired|was fired, and its answer was lost|the gun rendered")
 """What a cause says of a shot that may have been felt."""
@@ -155,3 +157,28 @@ def timings_of(contents: Contents) -> list[dict[str, Any]]:
     """How every shot in a journal came about that was done, in order."""
     bodies = [entry["body"] for entry in contents.records if entry["kind"] in ("outcome", "shot")]
     return sorted((body["timing"] for body in bodies if "timing" in body), key=lambda one: one["requested_s"])
+
+
+SPEED = 40.0
+TROUBLES = Troubles(
+    jitter_s=0.002,
+    lose=0.004,
+    double=0.004,
+    corrupt=0.004,
+    partial=0.004,
+    reset=0.01,
+    busy=0.01,
+    hang=0.01,
+    unplug=0.01,
+    unplug_reply=0.002,
+    unplug_idle=0.002,
+    hang_s=0.3,
+    replug_s=0.1,
+)
+DIFFERENT = ("onset_utc", "response_time_s", "gun", "exposure_s", "attempts")
+"""Columns that differ from run to run: times, and how often a busy machine, away for long, had to present a trial."""
+
+
+def rows(path: Path) -> list[dict[str, str]]:
+    with path.open(encoding="utf-8", newline="") as file:
+        return [{key: cell for key, cell in row.items() if key not in DIFFERENT} for row in csv.DictReader(file)]

@@ -34,17 +34,12 @@ from experiments.study.enrolment import (
 )
 from experiments.study.places import PlaceError
 from experiments.study.progress import StudyFolder, open_study
-from experiments.study.study import Facts, Participant, RunStanding, State
+from experiments.study.study import Facts, Participant, State
+from tests.people import ORDER, someone
 
-ORDER = ("direction", "preference")
 RULES = EligibilityConfig(ask=("age_years", "handedness"), handedness=("right",), age_years_max=29)
 RIGHT = {"age_years": "25", "sex": "female", "handedness": "right"}
 FACTS = Facts(age_years=25, sex="female", handedness="right")
-
-
-def someone(*states: State, **more: Any) -> Participant:
-    runs = tuple(RunStanding(experiment=name, state=state) for name, state in zip(ORDER, states, strict=True))
-    return Participant(participant_id="P01", runs=runs, **more)
 
 
 def entered(code: str = "P01", experiment: str = "direction", facts: dict[str, str] | None = None) -> Entered:

@@ -1,9 +1,7 @@
 from __future__ import annotations
 
-import json
 import math
 from fractions import Fraction
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -14,9 +12,7 @@ from mpmath import mp, mpf
 from scipy import special, stats
 
 from analysis import binomial_test
-
-GOLDEN = json.loads((Path(__file__).parent / "golden" / "binomial.json").read_text())
-"""References of mpmath, remade by `python -m tests.golden.make_binomial`."""
+from tests.golden_binomial import GOLDEN, digits_of
 
 
 def _exact_p(k: int, n: int, p0: Fraction) -> Fraction:
@@ -52,15 +48,6 @@ def test_p_and_interval_agree_with_scipy(k: int, n: int, p0: float) -> None:
 def test_certain_chances_give_certain_answers() -> None:
     found = binomial_test([0, 1, 10, 9], 10, [0.0, 0.0, 1.0, 1.0])
     assert found.p.tolist() == [1.0, 0.0, 1.0, 0.0]
-
-
-def digits_of(found: float, reference: str) -> float:
-    """Correct digits, at most 17; an infinite or vanished reference must be met exactly."""
-    with mp.workdps(40):
-        exact = mpf(reference)
-        if found == exact:
-            return 17.0
-        return min(17.0, float(-mp.log10(abs(mpf(found) / exact - 1)))) if exact and mp.isfinite(exact) else 0.0
 
 
 @pytest.mark.parametrize("case", GOLDEN["tests"], ids=lambda case: f"{case['k']} of {case['n']} at {case['p0']:.3g}")

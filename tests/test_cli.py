@@ -10,20 +10,11 @@ from pathlib import Path
 import pytest
 
 from experiments.load import shipped_folder
-from tests.conftest import RECOIL, Recoil
+from tests.conftest import RECOIL, Recoil, refused
 from tests.waiting import PATIENCE_S, wait_for
 
 TABLE = "results/sub-P01/sub-P01_task-direction_trials.csv"
 JOURNAL = "results/sub-P01/sub-P01_task-direction_journal.jsonl"
-
-
-def refused(done: subprocess.CompletedProcess[str], *said: str) -> None:
-    """Exit code 2 and one message that says it all; no traceback, nothing on standard output."""
-    assert done.returncode == 2, done
-    assert "Traceback" not in done.stderr
-    assert done.stdout == ""
-    for words in said:
-        assert words in done.stderr
 
 
 def synthetic(

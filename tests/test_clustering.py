@@ -5,7 +5,7 @@ import pytest
 from scipy import stats
 
 from analysis.stats.logit_model import ALL_EQUAL, ONE_PERSON, ONE_TRIAL, clustering
-from tests.test_sphericity import RIGHT
+from tests.made_scores import RIGHT
 
 
 def test_equal_numbers_of_trials_equal_r() -> None:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import csv
 import os
 import random
 import re
@@ -13,18 +12,13 @@ from pathlib import Path
 
 import pytest
 
-from experiments.record.journal import read
-from experiments.record.replay import history
-from experiments.session.steps import Answered
 from tests.at_display import AtConsole, AtDisplay, needs_display, records, remarks, virtual_display
+from tests.at_runs import DIRECTION, PREFERENCE, RUN, answers, rows, words
 from tests.conftest import RECOIL
 
 pytest.importorskip("PyQt6")
 pytestmark = needs_display
 
-DIRECTION = "results/sub-P01/sub-P01_task-direction"
-PREFERENCE = "results/sub-P01/sub-P01_task-preference"
-RUN = "Recoil – P01"
 START = "Recoil – start"
 
 
@@ -32,20 +26,6 @@ START = "Recoil – start"
 def display() -> Iterator[str]:
     with virtual_display() as name:
         yield name
-
-
-def words(configs: Path, experiment: str, *more: object) -> list[object]:
-    config = configs / f"{experiment}.toml"
-    return [RECOIL, "run", config, "--screen", "console", "--results", "results", "--seed", 1, *more]
-
-
-def rows(folder: Path, stem: str, kind: str) -> list[dict[str, str]]:
-    with (folder / f"{stem}_{kind}.csv").open(newline="", encoding="utf-8") as table:
-        return list(csv.DictReader(table))
-
-
-def answers(journal: Path) -> list[str]:
-    return [outcome.response for _, outcome in history(read(journal)) if isinstance(outcome, Answered)]
 
 
 def start(screen: AtConsole, code: str = "P01", later: int = 0) -> None:

@@ -7,9 +7,7 @@ import os
 import shutil
 import signal
 import subprocess
-import time
 from collections.abc import Callable, Iterator
-from contextlib import ExitStack
 from pathlib import Path
 
 import pytest
@@ -18,15 +16,16 @@ from tests.at_display import (
     OTHER,
     AtConsole,
     another_window,
+    check_disarmed,
+    lose_the_display,
     needs_display,
     records,
     remarks,
+    run_words,
     virtual_display,
-    window_manager,
-    x_server,
 )
 from tests.at_hand import check_gun
-from tests.test_console import DIRECTION, PREFERENCE, RUN, answers, rows, words
+from tests.at_runs import DIRECTION, PREFERENCE, RUN, answers, rows
 from tests.watched_console import Watch
 
 pytest.importorskip("PyQt6")
@@ -42,17 +41,6 @@ def display() -> Iterator[str]:
         yield name
 
 
-def run_words(configs: Path, experiment: str = "direction", *more: object) -> list[object]:
-    return words(configs, experiment, "--participant", "P01", *more)
-
-
-def check_disarmed(watch: Watch) -> None:
-    """The last that the gun was told is to disarm."""
-    calls = [call["call"] for call in watch.calls()]
-    assert "disarm" in calls
-    assert "armed" not in calls[len(calls) - 1 - calls[::-1].index("disarm") :]
-
-
 def check_resumes(command: list[object], folder: Path, display: str, trial: int) -> None:
     """The run goes on at a trial."""
     with AtConsole([*command, "--resume"], folder, display) as screen:
@@ -62,26 +50,6 @@ def check_resumes(command: list[object], folder: Path, display: str, trial: int)
 
 
 # the display
-
-
-def lose_the_display(configs: Path, folder: Path, experiment: str, state: str) -> float:
-    """Kill the X server under a run at a state; how long the program then lives, in seconds."""
-    with ExitStack() as stack:
-        name, server = stack.enter_context(x_server())
-        stack.enter_context(window_manager(name))
-        screen = stack.enter_context(AtConsole(run_words(configs, experiment), folder, name))
-        screen.stands(RUN)
-        screen.to(state, trial=2)
-        return killed_s(server, screen)
-
-
-def killed_s(server: subprocess.Popen[bytes], screen: AtConsole) -> float:
-    at_s = time.monotonic()
-    server.kill()
-    code, said = screen.end()
-    assert code == 1, said
-    assert "the display was lost" in said
-    return time.monotonic() - at_s
 
 
 @pytest.mark.parametrize(("experiment", "state"), [("direction", "asking"), ("preference", "train")])

@@ -11,7 +11,7 @@ from pathlib import Path
 import pytest
 
 from tests.at_display import AtConsole, needs_display, virtual_display
-from tests.test_console import RUN, words
+from tests.at_runs import RUN, words
 
 pytest.importorskip("PyQt6")
 

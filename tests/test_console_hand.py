@@ -13,15 +13,14 @@ from pathlib import Path
 import pytest
 
 from experiments.session.states import State
-from tests.at_display import AtConsole, needs_display, remarks, virtual_display
-from tests.at_hand import ACTIONS, HELD_S, Cell, check_cell, check_gun
+from tests.at_display import needs_display, remarks, virtual_display
+from tests.at_hand import ACTIONS, HELD_S, Cell, check_cell, check_gun, check_participants_keys
 
 pytest.importorskip("PyQt6")
 pytestmark = needs_display
 needs_psychopy = pytest.mark.skipif(
     importlib.util.find_spec("psychopy") is None, reason="PsychoPy is not installed: extra `gui`"
 )
-PARTICIPANT = "Recoil: participant"
 S = State
 
 
@@ -105,25 +104,6 @@ def test_a_key_that_is_held_is_not_typed_into_the_field_that_opens_under_it(tmp_
         screen.keys.key_up("n")
         assert screen.heard().typed == ""
         screen.hold("n", until=lambda look: look.typed.startswith("nnn"))
-
-
-def check_participants_keys(screen: AtConsole, cell: Cell, *keys: str) -> None:
-    """Keys on the participant's window do nothing to the run; F12 there halts it."""
-    before = len(remarks(cell.journal))
-    screen.focus_on(PARTICIPANT)
-    screen.until(lambda look: not look.active and look.says("Keys: the participant's screen (F12 works there)"))
-    for key in keys:
-        screen.keys.press(key)
-    screen.focus_on("Recoil – P01")
-    screen.until(lambda look: look.active)
-    look = screen.heard()
-    assert look.state == str(cell.state)
-    assert len(remarks(cell.journal)) == before
-    screen.focus_on(PARTICIPANT)
-    screen.until(lambda look: not look.active)
-    screen.keys.press("F12")
-    screen.until(lambda look: look.state == "halted" and look.says("The gun itself says that it is disarmed."))
-    assert remarks(cell.journal)[before:] == [{"by": "participant", "kind": "halted"}]
 
 
 @needs_psychopy

@@ -15,8 +15,8 @@ from pathlib import Path
 import pytest
 
 from tests.at_display import AtConsole, AtDisplay, needs_display, records, remarks, virtual_display, wait_for
+from tests.at_runs import DIRECTION, PREFERENCE, RUN, rows, words
 from tests.conftest import RECOIL
-from tests.test_console import DIRECTION, PREFERENCE, RUN, rows, words
 
 pytestmark = [
     needs_display,

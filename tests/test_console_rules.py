@@ -9,10 +9,9 @@ from typing import Any
 import pytest
 from hypothesis import given, settings
 
-from tests.at_controls import DIRECTION, PREFERENCE
+from tests.at_controls import SETUPS
 from tests.experimenters import MOVES, Experimenter, check
 
-SETUPS = {"direction": DIRECTION, "preference": PREFERENCE}
 RUNS = 50
 """Of each experiment; `make soak` makes 1,000 of each."""
 

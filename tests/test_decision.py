@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 from itertools import pairwise
 
-import mpmath
 import numpy as np
 import pytest
 from hypothesis import given
@@ -18,20 +17,10 @@ from analysis.times.first_passage import distribution, log_density, moments, wit
 from analysis.times.own_trials import own_times
 from experiments.design.streams import generator
 from experiments.synthetic.diffusion import decide_all
+from tests.decisions import reference
 
 CASES = [(1.0, 2.0, 0.5), (-3.0, 1.2, 0.2), (0.0, 1.0, 0.9), (8.0, 3.0, 0.1), (0.3, 0.6, 0.03)]
 TIMES = (1e-3, 0.05, 0.2999, 0.3001, 1.0, 4.0, 40.0)
-
-
-def reference(t: float, upper: bool, v: float, a: float, w: float) -> mpmath.mpf:
-    """The logarithm of the density by Feller's series of images, with 200 digits and 400 terms."""
-    with mpmath.workdps(200):
-        t_, v_, a_, w_ = map(mpmath.mpf, (t, v, a, w))
-        if upper:
-            v_, w_ = -v_, 1 - w_
-        tau = t_ / a_**2
-        total = mpmath.fsum((w_ + 2 * k) * mpmath.exp(-((w_ + 2 * k) ** 2) / (2 * tau)) for k in range(-200, 200))
-        return mpmath.log(total / mpmath.sqrt(2 * mpmath.pi * tau**3) / a_**2) - v_ * a_ * w_ - v_**2 * t_ / 2
 
 
 @pytest.mark.parametrize(("v", "a", "w"), CASES)

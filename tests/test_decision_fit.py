@@ -9,55 +9,11 @@ import pytest
 
 from analysis.times.first_passage import log_density
 from analysis.times.fit import fit, profile, starts
-from analysis.times.likelihood import Trials, coordinates, log_likelihood, model_of, natural, trials_of
+from analysis.times.likelihood import coordinates, log_likelihood, model_of, natural, trials_of
 from analysis.times.people import fit_people
 from experiments.design.streams import generator
 from experiments.synthetic.diffusion import decide_all
-
-METHODS = ("asymmetric-1", "asymmetric-2", "vibration")
-DRIFTS = (1.0, 1.8, 0.0)
-BOUNDARIES = (1.8, 1.2)
-INSTRUCTIONS = ("accuracy", "speed")
-START, T0_S = 0.53, 0.35
-RANGE_S = (0.3, 3.0)
-TRUTH = dict(
-    zip(
-        (*(f"drift {m}" for m in METHODS), *(f"boundary {i}" for i in INSTRUCTIONS), "start", "non_decision_s"),
-        (*DRIFTS, *BOUNDARIES, START, T0_S),
-        strict=True,
-    )
-)
-
-
-def made(seed: int, *, times: int = 1, people: int = 14, lapse: float = 0.0, spread: float = 0.0) -> Trials:
-    """A study of experiment 1's size, or `times` as many trials a person, half of them under each instruction.
-
-    `spread`: SD of each person's factor on the drifts, and of their log boundary, log t0 (half) and logit start.
-    """
-    draws, n = generator(seed, "recovery", str(times)), people * 60 * times
-    order = np.arange(n)
-    condition, sign, instruction = order % 3, 1.0 - 2.0 * (order // 3 % 2), order // 6 % 2
-    person = order // (60 * times)
-    own = spread * draws.standard_normal((4, people))[:, person]
-    w = 1.0 / (1.0 + (1.0 - START) / START * np.exp(-own[2]))
-    drawn = decide_all(
-        np.array(DRIFTS)[condition] * sign * (1.0 + own[0]),
-        np.array(BOUNDARIES)[instruction] * np.exp(own[1] / 2.0),
-        w,
-        T0_S * np.exp(own[3] / 2.0),
-        generator=draws,
-    )
-    lapsed = draws.random(n) < lapse
-    return trials_of(
-        upper=np.where(lapsed, draws.random(n) < 0.5, drawn.upper),
-        time_s=np.where(lapsed, draws.uniform(*RANGE_S, n), drawn.time_s),
-        sources=np.full(n, "synthetic"),
-        towards_upper=sign > 0,
-        condition=np.array(METHODS)[condition],
-        instruction=np.array(INSTRUCTIONS)[instruction],
-        person=person.astype(np.str_),
-    )
-
+from tests.decisions import BOUNDARIES, DRIFTS, INSTRUCTIONS, METHODS, RANGE_S, START, T0_S, TRUTH, made
 
 STUDY = made(1)
 

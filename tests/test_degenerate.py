@@ -12,10 +12,7 @@ import pytest
 from analysis import one_way_anova, rm_anova, rm_tukey_hsd, rm_tukey_hsd_paired, tukey_hsd
 from analysis.stats.anova import NO_ERROR, NO_VARIANCE
 from tests.exact import exact_rm_F
-
-PEOPLE, COLUMNS = np.arange(14)[:, None] * 0.1, np.array([0.0, 0.1, 0.3])
-ADDITIVE = PEOPLE + COLUMNS
-"""0, 0.1, ... 1.3 plus 0, 0.1, 0.3: F is infinite in decimals, 3e32 in doubles; pingouin 0.7: -9.6e15, p = 1."""
+from tests.made_scores import ADDITIVE, COLUMNS, PEOPLE
 
 
 @pytest.mark.parametrize(

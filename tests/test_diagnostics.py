@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from analysis.stats.diagnostics import NO_RESIDUALS, TOO_MANY, ends, normality, outliers
-from tests.test_sphericity import RIGHT
+from tests.made_scores import RIGHT
 
 
 def test_shapiro_wilk_of_the_residuals_equals_r() -> None:

@@ -13,7 +13,6 @@ from scipy.stats import kstwo
 from analysis.times.first_passage import distribution, moments
 from experiments.design.streams import Stream, generator
 from experiments.synthetic.diffusion import (
-    Decision,
     Diffusion,
     Lapses,
     People,
@@ -22,16 +21,9 @@ from experiments.synthetic.diffusion import (
     person,
     upper_probabilities,
 )
+from tests.decisions import EXTREMES, law, scalar
 
 GRID = [(v, a, w) for v in (-2.0, 0.0, 0.5, 3.0) for a in (0.7, 2.0) for w in (0.2, 0.5, 0.9)]
-
-
-def law(drift: float, boundary: float, start: float, t0: float = 0.0) -> Diffusion:
-    return Diffusion(drift=drift, boundary=boundary, start=start, non_decision_s=t0)
-
-
-def scalar(diffusion: Diffusion, count: int, seed: int = 1) -> list[Decision]:
-    return [decide(diffusion, Stream(seed, "trial", str(i))) for i in range(count)]
 
 
 @pytest.mark.parametrize(("v", "a", "w"), GRID)
@@ -78,21 +70,6 @@ def test_the_scalar_sampler_has_the_accuracy_and_mean_of_theory() -> None:
         t, p = np.array([d.time_s for d in decisions]), float(expected.upper)
         assert abs(np.mean([d.upper for d in decisions]) - p) < 4.5 * math.sqrt(p * (1 - p) / 4_000)
         assert abs(t.mean() - expected.mean_s) < 4.5 * t.std() / math.sqrt(4_000)
-
-
-EXTREMES = [
-    law(0.0, 1.0, 0.5, 0.0),  # no drift, no non-decision time
-    law(0.0, 1e6, 0.5),  # huge caution
-    law(1e6, 1e6, 0.5),
-    law(1e6, 1e-6, 0.5, 1e-9),
-    law(-1e6, 1e6, 1e-12),
-    law(1e-320, 1.0, 0.5),  # a drift beyond the smallest normal number
-    law(1.0, 1e-300, 0.5),
-    law(1.0, 1.0, 1e-300),
-    law(2.0, 1.0, 1.0 - 1e-16),
-    law(1.0, 1.0, 0.0),  # starts at a boundary
-    law(1.0, 1.0, 1.0),
-]
 
 
 @pytest.mark.parametrize("extreme", EXTREMES)

@@ -50,7 +50,7 @@ from experiments.record.journal import Journal
 from experiments.study.places import PlaceError
 from recoil.doctor import as_text
 from tests.conftest import RECOIL, Recoil
-from tests.test_durability import can_mount, in_small_disk
+from tests.kills import can_mount, in_small_disk
 from tests.waiting import PATIENCE_S
 
 milliseconds = st.floats(min_value=0, max_value=1e4)

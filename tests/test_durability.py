@@ -2,41 +2,18 @@
 
 from __future__ import annotations
 
-import os
 import random
 import re
 import shutil
-import subprocess
 from pathlib import Path
 
 import pytest
 
-from experiments.record.journal import Contents, read
-from experiments.record.replay import history
-from experiments.session.steps import Answered
+from experiments.record.journal import read
 from tests.at_terminal import ANSWERS, FIRES, AtTerminal, answer_until_killed
-from tests.conftest import RECOIL
+from tests.kills import answers, can_mount, in_small_disk, words
 
 STEM = "sub-P01/sub-P01_task-direction"
-
-
-def words(configs: Path, *more: object) -> list[object]:
-    return [
-        RECOIL,
-        "run",
-        configs / "direction.toml",
-        "--participant",
-        "P01",
-        "--seed",
-        1,
-        "--results",
-        "results",
-        *more,
-    ]
-
-
-def answers(contents: Contents) -> str:
-    return "".join(outcome.response[0] for _, outcome in history(contents) if isinstance(outcome, Answered))
 
 
 def killed_run(configs: Path, folder: Path, seconds: float, *, begun: bool) -> tuple[str, Path]:
@@ -113,18 +90,6 @@ def test_the_system_calls_show_a_sync_before_each_acknowledgement(quick_configs:
             assert synced
             acknowledged += 1
     assert acknowledged == 3
-
-
-def in_small_disk(script: str, folder: Path) -> subprocess.CompletedProcess[str]:
-    """A script in a private mount namespace, where it can mount a disk as small as it likes."""
-    flags = ["-m"] if os.getuid() == 0 else ["-rm"]
-    return subprocess.run(
-        ["unshare", *flags, "sh", "-c", script], cwd=folder, capture_output=True, text=True, timeout=120, check=False
-    )
-
-
-def can_mount(folder: Path) -> bool:
-    return in_small_disk("mkdir -p m && mount -t tmpfs none m", folder).returncode == 0
 
 
 def test_a_full_disk_stops_the_run_at_the_last_safe_answer(quick_configs: Path, tmp_path: Path) -> None:

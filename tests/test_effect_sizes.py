@@ -7,7 +7,7 @@ import pytest
 
 from analysis.stats.anova import rm_anova
 from analysis.stats.effect_sizes import NO_VARIANCE, TOO_LARGE, effect_size, partial_eta_squared_interval
-from tests.test_sphericity import RIGHT
+from tests.made_scores import RIGHT
 
 
 def test_both_eta_squared_equal_r() -> None:

@@ -26,9 +26,8 @@ from experiments.screens.synthetic import synthetic_screen
 from experiments.study.places import PlaceError
 from experiments.study.register import append, entry
 from recoil.config_files import new_study
-from tests.conftest import RECOIL, Recoil
+from tests.conftest import RECOIL, Recoil, refused
 from tests.log_files import rating_rows, ratings_path, trial_rows, trials_path, write_rows, write_study
-from tests.test_cli import refused
 from tests.waiting import PATIENCE_S
 
 VALIDATOR = RECOIL.with_name("bids-validator-deno")

@@ -8,65 +8,24 @@ from __future__ import annotations
 
 import re
 import subprocess
-from random import Random
 
 import pytest
 
-from device.twin.machine import LATE_PULSE_US
 from device.wire.errors import message
-from device.wire.records import ShotRecord, Standing
-from tests.test_firmware_core import built
-
-PULSE, EFFECT = "CONF a,FORW,PULS,16000,10000,211000", "CONF v,FORW,EFF,47,24000,50000"
-LEAST_WATCHDOG_US, MOST_WATCHDOG_US = 36_000, 101_000
-"""425 ticks of LSI / 4, whose frequency the data sheet (DS10693) gives as 17 to 47 kHz."""
-BUSES = ("absent", "error", "low", "sb", "addr", "txe", "btf", "stop")
-"""No driver, a bus error, the clock held low; where a transfer hangs (RM0390, "Transfer sequence diagram for master
-transmitter")."""
-
-
-class Run:
-    """What was seen from outside of a run of the chip, in microseconds since power came on."""
-
-    def __init__(self, *script: str) -> None:
-        ordered = sorted(script, key=lambda line: int(line.split()[0]))
-        text = "".join(f"{line}\n" for line in [*ordered, "9000000 end"])
-        program = built("host") / "fake-f446"
-        done = subprocess.run([program], input=text, capture_output=True, text=True, check=True, timeout=600)
-        self.lines = [(int(time), words) for time, words in (line.split(" ", 1) for line in done.stdout.splitlines())]
-
-    def times(self, begin: str) -> list[int]:
-        return [time for time, words in self.lines if words.startswith(begin)]
-
-    def said(self, begin: str = "") -> list[str]:
-        return [words[5:] for _, words in self.lines if words.startswith(f"says {begin}")]
-
-    @property
-    def shots(self) -> list[ShotRecord]:
-        return [ShotRecord.parse(text) for text in self.said("SHOT ")]
-
-    @property
-    def standing(self) -> Standing:
-        return Standing.parse(self.said("STAT ")[-1])
-
-    @property
-    def seen(self) -> list[str]:
-        """All but what it said and how it went."""
-        return [words for _, words in self.lines[:-2] if not words.startswith("says ")]
-
-    @property
-    def longest_unfed_us(self) -> int:
-        return int(re.fullmatch(r"longest between two feeds of the watchdog: (\d+) us", self.lines[-1][1])[1])
-
-
-def say(time_us: int, *lines: str) -> list[str]:
-    """Lines of a hand at a terminal, 1 ms apart."""
-    return [f"{time_us + 1_000 * number} say {line}" for number, line in enumerate(lines)]
-
-
-def well(run: Run) -> bool:
-    """The chip ran to the end of the script, and no rule of the manual was broken."""
-    return run.lines[-2][1] == "end" and not run.times("broken rule")
+from tests.firmware import (
+    BUSES,
+    EFFECT,
+    LEAST_WATCHDOG_US,
+    MOST_WATCHDOG_US,
+    PULSE,
+    Run,
+    built,
+    chances,
+    check_records,
+    dead_bus,
+    say,
+    well,
+)
 
 
 def test_a_pulse_lasts_as_long_as_it_should_and_the_record_says_when_it_was():
@@ -128,18 +87,6 @@ def test_while_the_clock_runs_the_watchdog_is_fed_at_rest_and_at_work():
     assert well(run)
     assert len(run.times("coil on")) == 20
     assert run.longest_unfed_us < LEAST_WATCHDOG_US / 10
-
-
-def dead_bus(bus: str) -> list[str]:
-    """An effect on a bus that is dead, and another when it is well again."""
-    return [
-        f"1000000 bus {bus}",
-        *say(1_100_000, EFFECT, "ARM", "TRIG 5"),
-        *say(1_200_000, "SHOT?", "STAT?", "SYST:ERR?", "SYST:ERR?"),
-        "1300000 bus good",
-        *say(1_400_000, "*RST", EFFECT.replace("47", "48"), "ARM", "TRIG 5"),
-        *say(1_500_000, "SHOT?"),
-    ]
 
 
 @pytest.mark.parametrize("access_ns", [100, 1_000])
@@ -242,54 +189,6 @@ def test_a_pulse_that_would_begin_after_its_end_drives_nothing_and_is_told_as_ne
     assert well(run)
     assert run.times("coil") == []
     assert (run.shots[0].ending, run.shots[0].count, run.said()[-1]) == ("NONE", 0, message(107))
-
-
-EVERY_US = 400_000
-
-
-def mishaps(draw: Random, time_us: int) -> list[str]:
-    """What befalls the chip around a shot, and is over before the next."""
-    around_us = time_us + draw.randrange(-5_000, 30_000)
-    return draw.choice(
-        (
-            [],
-            [f"{around_us} stall {draw.randrange(30_000)}"],
-            [f"{around_us} bus {draw.choice(BUSES)}", f"{time_us + 150_000} bus good"],
-            [f"{around_us} held {draw.randrange(1, 9)}"],
-            [f"{around_us} coil-fault 1", f"{around_us + 20_000} coil-fault 0"],
-            [f"{around_us} say ABOR"],
-        )
-    )
-
-
-def chances(seed: int, shots: int) -> list[str]:
-    """Shots of both kinds, each asked for ahead of its time, with what befalls them, and then asked about."""
-    draw, script = Random(seed), []
-    for mark in range(1, shots + 1):
-        time_us = 1_000_000 + EVERY_US * mark
-        script += say(time_us - 60_000, "*RST", draw.choice((PULSE, EFFECT)), "ARM", f"TRIG {mark},{time_us}")
-        script += [*mishaps(draw, time_us), *say(time_us + 200_000, "SHOT?")]
-    return script
-
-
-def lasted_us(run: Run, begin: str, end: str, asked_us: int) -> int:
-    """How long something lasted in the time before a shot was asked about; 0 if it was not."""
-    ons, offs = ([time for time in run.times(words) if asked_us - EVERY_US < time < asked_us] for words in (begin, end))
-    return min(time for time in offs if time > ons[0]) - ons[0] if ons else 0
-
-
-def check_records(run: Run) -> int:
-    """Every record is what the coil saw. How many shots were less than whole."""
-    assert well(run)
-    assert run.longest_unfed_us < LEAST_WATCHDOG_US
-    for asked_us, shot in zip(run.times("says SHOT"), run.shots, strict=True):
-        if shot.setting.kind == "EFF":
-            continue
-        coil_us = lasted_us(run, "coil on", "coil off", asked_us)
-        told_us = 0 if shot.ending == "NONE" else shot.end_us - shot.start_us
-        assert coil_us == pytest.approx(told_us, abs=LATE_PULSE_US + 10), shot
-        assert (shot.ending == "DONE") == (told_us == shot.setting.length_us)
-    return sum(shot.ending != "DONE" for shot in run.shots)
 
 
 @pytest.mark.parametrize("seed", range(20))

@@ -5,67 +5,20 @@ Scripts and transcripts are those of `device.twin.scripts`; the times are the sc
 
 from __future__ import annotations
 
-import atexit
 import re
-import shutil
 import subprocess
-import tempfile
-from collections.abc import Iterable, Iterator
-from functools import cache
+from collections.abc import Iterable
 from math import exp
-from pathlib import Path
 
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from device.twin.scripts import random_script, transcript
+from device.twin.scripts import transcript
 from device.wire import errors
 from device.wire.errors import TEXTS, message
 from device.wire.frame import Frame, encode
-from tests.waiting import PATIENCE_S
-
-ROOT = Path(__file__).parent.parent
-EMULATOR = "qemu-system-arm"
-COMPILERS = {"host": "cc", "chip": "arm-none-eabi-gcc"}
-
-
-@cache
-def built(which: str) -> Path:
-    """The folder of what `scripts/firmware` builds; the test is left out where a program for it is missing."""
-    for program in [COMPILERS[which]] + [EMULATOR] * (which == "chip"):
-        if shutil.which(program) is None:
-            pytest.skip(f"{program} is not installed; scripts/system-packages installs it")
-    folder = Path(tempfile.mkdtemp(prefix="recoil-firmware-"))
-    atexit.register(shutil.rmtree, folder, ignore_errors=True)
-    subprocess.run([ROOT / "scripts" / "firmware", f"--{which}", folder], check=True)
-    return folder
-
-
-def command(core: str) -> list[str]:
-    """The program that turns scripts into transcripts by this core."""
-    if core == "host":
-        return [str(built("host") / "filter")]
-    image = str(built("chip") / "filter.elf")
-    quiet = ["-display", "none", "-monitor", "none", "-serial", "none"]
-    return [EMULATOR, "-M", "netduinoplus2", "-kernel", image, *quiet, "-semihosting-config", "enable=on,target=native"]
-
-
-def told(core: str, script: Iterable[str]) -> list[str]:
-    """A core's transcript of a script."""
-    if core == "twin":
-        return list(transcript(script))
-    text = "".join(f"{line}\n" for line in script)
-    return subprocess.run(
-        command(core), input=text, capture_output=True, text=True, check=True, timeout=PATIENCE_S
-    ).stdout.splitlines()
-
-
-def one_after_the_other(seeds: Iterable[int]) -> Iterator[str]:
-    """Random scripts as one: each begins with a gun that boots at 0."""
-    for seed in seeds:
-        yield "reset 0"
-        yield from random_script(seed)
+from tests.firmware import CORES, built, one_after_the_other, told
 
 
 def differences(core: str, script: list[str]) -> list[tuple[str, str]]:
@@ -84,7 +37,6 @@ def by_hand(*lines: tuple[int, str]) -> list[str]:
     return [f"in {time_us} {text.encode().hex().upper()}0A" for time_us, text in lines]
 
 
-CORES = ("host", "chip")
 ALL = ("twin", *CORES)
 
 

@@ -16,8 +16,8 @@ from experiments.config.door import ConfigError
 from experiments.design.streams import generator
 from experiments.synthetic.diffusion import decide_all
 from tests.conftest import Recoil
+from tests.decisions import made
 from tests.log_files import METHODS, TextRow, trial_rows, trials_path, write_rows
-from tests.test_decision_fit import made
 
 DRIFTS = {"vibration": 0.0, "asymmetric-1": 1.0, "asymmetric-2": 1.8}
 BOUNDARIES = {"speed": 1.2, "accuracy": 1.8}

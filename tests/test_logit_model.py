@@ -10,7 +10,7 @@ from scipy import stats
 
 from analysis.stats.logit_model import NO_SPREAD, logit_model
 from analysis.stats.paired import holm
-from tests.test_sphericity import RIGHT
+from tests.made_scores import RIGHT
 
 TEN = np.full_like(RIGHT, 10)
 LABELS = ("v", "a", "b")

@@ -7,7 +7,7 @@ from scipy import stats
 
 from analysis.stats.anova import rm_anova
 from analysis.stats.paired import CONSTANT, EQUAL, holm, paired_t_tests
-from tests.test_sphericity import RIGHT
+from tests.made_scores import RIGHT
 
 
 def test_t_p_and_interval_equal_r() -> None:

@@ -12,7 +12,7 @@ from experiments.clock import date_text, time_text
 from experiments.screens.console.people import cell_text, coming_text, note_text, remark, stopped_text
 from experiments.study.progress import Overview
 from experiments.study.study import Next, Participant, RunStanding, State
-from tests.test_beginnings import ORDER, someone
+from tests.people import ORDER, someone
 
 STOPPED = RunStanding(
     experiment="direction", state="in progress", answered=12, planned=60, last_utc="2026-11-22T01:09:58.895306Z"

@@ -9,6 +9,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from device.physics import GunParameters, simulate, trace
+from tests.extreme_guns import EXTREMES
 
 # 50-digit Taylor integration of equations (1) to (3) with the coil open after the pulse, by another program; in SI.
 TAYLOR_OPEN = {
@@ -266,30 +267,6 @@ def test_a_hop_of_a_billionth_of_a_nanometre_does_not_keep_the_magnet_from_home(
         emf="reciprocal",
     )
     assert simulate(gun).status == "home"
-
-
-EXTREMES = {
-    "1e4 V": {"voltage_V": 1e4},
-    "1e300 V": {"voltage_V": 1e300},
-    "no pulse": {"pulse_s": 0.0},
-    "1 ns": {"pulse_s": 1e-9},
-    "100 s": {"pulse_s": 100.0},
-    "no spring": {"stiffness_N_m": 0.0},
-    "hardly a spring": {"stiffness_N_m": 1e-9},
-    "no spring, no friction": {"stiffness_N_m": 0.0, "friction_N": 0.0},
-    "no friction": {"friction_N": 0.0},
-    "no pre-load, no friction": {"preload_length_m": 0.0, "friction_N": 0.0},
-    "no motor": {"motor_constant_N_A": 0.0},
-    "1 uH": {"inductance_H": 1e-6},
-    "1 nH": {"inductance_H": 1e-9},
-    "10 H": {"inductance_H": 10.0},
-    "1 mg": {"magnet_mass_kg": 1e-6},
-    "1000 t": {"magnet_mass_kg": 1e6},
-    "1 mOhm": {"resistance_ohm": 1e-3},
-    "coil of 1 um": {"coil_reach_m": 1e-6},
-    "coil of 1 m": {"coil_reach_m": 1.0},
-    "back-EMF 1000": {"back_emf_V_s_m": 1e3},
-}
 
 
 @pytest.mark.parametrize("extreme", EXTREMES)

@@ -3,96 +3,13 @@
 A jump is allowed only where the order of events changes; within one status and one order it is a defect.
 """
 
-import dataclasses
 import math
 
-import numpy as np
 import pytest
 
-from device.physics import GunParameters, simulate
-from device.physics.kernel import CONTINUES, pack
-from device.physics.traces import segments
+from tests.extreme_guns import defects, distance
 
-SPREAD = {
-    "magnet_mass_kg": (0.05, 0.3),
-    "back_emf_V_s_m": (1.0, 15.0),
-    "resistance_ohm": (1.0, 6.0),
-    "inductance_H": (1e-5, 2e-3),
-    "motor_constant_N_A": (3.0, 15.0),
-    "coil_reach_m": (0.003, 0.02),
-    "stiffness_N_m": (5.0, 40.0),
-    "preload_length_m": (0.03, 0.15),
-    "friction_N": (0.0, 1.5),
-    "voltage_V": (5.0, 24.0),
-    "pulse_s": (0.002, 0.02),
-    "contact_depth_m": (1e-4, 1e-3),
-}
-HALVINGS = 20
-NOISE = 2e-11  # relative: below it differences are rounding and tolerance, not the gun's
 SOME = 100
-
-
-def order_of(gun):
-    return tuple((s.ended_by, s.heading) for s in segments(pack(gun)) if s.ended_by != CONTINUES)
-
-
-def numbers(gun):
-    summary = simulate(gun)
-    return summary.status, [v for v in dataclasses.astuple(summary)[1:] if v is not None]
-
-
-def pair(rng):
-    """A gun and a direction in the space of guns, as rows."""
-    low, high = (np.array([bounds[k] for bounds in SPREAD.values()]) for k in (0, 1))
-    options = {"drive_off": rng.choice(["shorted", "open"]), "emf": rng.choice(["printed", "reciprocal"])}
-    here = low + (high - low) * rng.random(len(low))
-    there = here * (1 + 1e-3 * rng.uniform(-1, 1, len(low)))
-    return options, here, there
-
-
-def gun_of(options, values):
-    return GunParameters(**options, **dict(zip(SPREAD, values.tolist(), strict=True)))
-
-
-def distance(a, b):
-    return max(abs(x - y) / max(abs(x), abs(y), 1e-12) for x, y in zip(a, b, strict=True)) if a else 0.0
-
-
-def jump_of(rng):
-    """What is left of the difference after 20 halvings, as a multiple of what smoothness allows; 0 if it is smooth.
-
-    The pair is bisected towards the larger part of the difference, so that a jump is not halved away.
-    """
-    options, here, there = pair(rng)
-    ends = [(values, *numbers(gun_of(options, values))) for values in (here, there)]
-    for halving in range(HALVINGS):
-        if ends[0][1] != ends[1][1] or len(ends[0][2]) != len(ends[1][2]):
-            return 0.0  # another status: the numbers may jump
-        whole = distance(ends[0][2], ends[1][2])
-        if whole < NOISE:
-            return 0.0
-        middle = (ends[0][0] + ends[1][0]) / 2
-        centre = (middle, *numbers(gun_of(options, middle)))
-        if centre[1] != ends[0][1] or len(centre[2]) != len(ends[0][2]):
-            return 0.0
-        halves = [distance(end[2], centre[2]) for end in ends]
-        if halving >= 3 and max(halves) < 0.6 * whole:
-            return 0.0  # halved
-        keep = 0 if halves[0] > halves[1] else 1
-        ends = [ends[keep], centre]
-    guns = [gun_of(options, end[0]) for end in ends]
-    return whole if order_of(guns[0]) == order_of(guns[1]) else 0.0
-
-
-def defects(seed, count):
-    rng = np.random.default_rng(seed)
-    found = []
-    for n in range(count):
-        state = rng.bit_generator.state
-        jump = jump_of(rng)
-        if jump > 0.0:
-            found.append((n, jump, state["state"]))
-    return found
 
 
 def test_neighbouring_guns_shoot_alike():

@@ -1,25 +1,14 @@
 """At the extremes every shot has a right answer or a named status."""
 
-import dataclasses
 import math
 
 import pytest
 
 from device.physics import GunParameters, simulate
 from device.physics.trains import repeated
+from tests.extreme_guns import BREAK_AWAY_V, numbers, shoot
 
 OFF = ["shorted", "open"]
-BREAK_AWAY_V = (14.0 * 0.10 + 0.21) * 2.9 / 7.6  # (k x_0 + F_f) R / k_m
-
-
-def numbers(summary):
-    return {k: v for k, v in dataclasses.asdict(summary).items() if k != "status" and v is not None}
-
-
-def shoot(**changes):
-    summary = simulate(GunParameters(**changes))
-    assert all(math.isfinite(value) for value in numbers(summary).values())
-    return summary
 
 
 @pytest.mark.parametrize("drive_off", OFF)

@@ -1,13 +1,9 @@
 """The full model against 50 digits by another method: tests/golden/make_physics.py, which imports nothing of ours."""
 
-import json
-from pathlib import Path
-
 import pytest
 
 from device.physics import GunParameters, simulate
-
-SHOTS = json.loads((Path(__file__).parent / "golden" / "physics.json").read_text(encoding="utf-8"))["shots"]
+from tests.golden_shots import SHOTS
 
 
 def name_of(shot):

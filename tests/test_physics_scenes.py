@@ -11,20 +11,13 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from device.parameters import DriveOff, Emf
+from device.parameters import DriveOff
 from device.physics import FIDELITIES, SCENES, GunParameters, Scene, choose, simulate
 from device.physics.hand import compliant_collision, rigid_collision
 from device.physics.scenes import COSTS, FRICTION_N, NEAR, NEEDED, choose_contact, stated_error
 from tests.benchmarks.flops import operations
 from tests.conftest import Recoil
-
-PAPER = GunParameters()
-NUMBERS = [
-    one.name
-    for one in dataclasses.fields(GunParameters)
-    if isinstance(one.default, float) and one.name not in ("friction_N", "contact_depth_m")
-]
-OPTIONS: list[tuple[DriveOff, Emf]] = [(off, emf) for off in ("open", "shorted") for emf in ("printed", "reciprocal")]
+from tests.extreme_guns import NUMBERS, OPTIONS, PAPER
 
 
 @st.composite

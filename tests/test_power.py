@@ -22,14 +22,11 @@ from experiments.config.door import ConfigError
 from experiments.config.models import leaves
 from experiments.load import load_setup, shipped_folder
 from tests.conftest import RECOIL, Recoil
+from tests.power_files import files
 from tests.waiting import PATIENCE_S, wait_for
 
 SMALL = ("--participants", "8,14", "--effect", "0.75,1", "--studies", "300")
 CONFIG = load_setup("direction").config
-
-
-def files(folder: Path) -> dict[str, bytes]:
-    return {str(path.relative_to(folder)): path.read_bytes() for path in sorted(folder.rglob("*")) if path.is_file()}
 
 
 @pytest.fixture(scope="module")

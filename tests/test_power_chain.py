@@ -2,84 +2,14 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pytest
 
-from analysis.logs.reading import read_logs
-from analysis.predict.power.grid import Request as PowerRequest
-from analysis.predict.power.grid import make_grid
-from analysis.predict.power.planned import ANOVA, ANY_PAIR, Findings, analysed_directions, analysed_ratings
-from analysis.summary.summary import summarize
-from experiments.clock import VirtualClock
-from experiments.config.models import participant_codes
-from experiments.config.setup import Setup
+from analysis.predict.power.planned import ANOVA
 from experiments.load import load_setup
-from experiments.run import Request, run
-from experiments.screens.synthetic import synthetic_screen
-
-EQUAL = [0.0, 0.0, 0.0]
-
-
-def null_setup(experiment: str) -> Setup[Any]:
-    """The shipped config with null participants, as steps and logs know them: guessing, or without preference."""
-    setup = load_setup(experiment)
-    config = make_grid(PowerRequest(config=experiment, participants="14", null=True)).cells[0].config
-    methods = config.design.methods
-    if config.experiment == "direction":
-        half = dict.fromkeys(methods, 0.5)
-        law = {"rates": config.synthetic.rates.model_copy(update={"forward": half, "backward": half})}
-    else:
-        means = config.synthetic.ratings.mean
-        middle = sum(means.values()) / len(means)
-        law = {"ratings": config.synthetic.ratings.model_copy(update={"mean": dict.fromkeys(methods, middle)})}
-    changed = config.model_copy(update={"synthetic": config.synthetic.model_copy(update=law)})
-    return replace(setup, config=type(config).model_validate(changed.model_dump()))
-
-
-def through_the_chain(setup: Setup[Any], participants: int, seed: int, folder: Path) -> dict[str, Any]:
-    """The statistics of a study whose every answer went through a session, a journal and a table."""
-    for code in participant_codes(participants):
-        asked = Request(setup=setup, participant_id=code, results=folder, seed=seed, again="resume")
-        run(asked, synthetic_screen, VirtualClock())
-    logs = read_logs([folder])
-    assert not logs.problems
-    found: dict[str, Any] = summarize(logs)[setup.config.experiment]
-    return found
-
-
-def counted(found: dict[str, Any]) -> Findings:
-    """What the power analysis says of the scores behind a study's statistics."""
-    methods = found["methods"]
-    scores = table(found["participants"], methods)
-    if "backward" not in found:
-        return analysed_ratings(scores[None], methods, EQUAL)
-    both = np.stack([scores, table(found["backward"]["participants"], methods)], axis=-1)
-    return analysed_directions(np.rint(10 * both).astype(np.int64)[None], (10, 10), methods, EQUAL, EQUAL)
-
-
-def table(participants: dict[str, dict[str, float]], methods: list[str]) -> np.ndarray:
-    return np.array([[person[method] for method in methods] for person in participants.values()])
-
-
-def said(found: dict[str, Any]) -> dict[str, bool]:
-    """Which of the planned tests are significant by `statistics.json`, in the words of the power analysis."""
-    tukey = {f"Tukey, {pair['a']} other than {pair['b']}": pair["p"] < 0.05 for pair in found["tukey"]}
-    binomial = {
-        f"binomial, {method} {direction}": test["p"] < 0.05
-        for method, tests in found.get("binomial", {}).items()
-        for direction, test in tests.items()
-    }
-    d_prime = {}
-    for method, row in found.get("sensitivity", {}).items():
-        spread = row["d_prime"]["sd"] / np.sqrt(found["n"])
-        interval = counted(found).half_widths[f"d′, {method}"][0]
-        d_prime[f"d′, {method}"] = abs(row["d_prime"]["mean"]) > interval
-        assert interval > spread
-    return {ANOVA: found["anova"]["p"] < 0.05, **tukey, ANY_PAIR: any(tukey.values()), **binomial, **d_prime}
+from tests.power_chain import counted, null_setup, said, through_the_chain
 
 
 @pytest.mark.parametrize(("experiment", "participants"), [("direction", 4), ("preference", 8)])

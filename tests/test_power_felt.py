@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -24,17 +23,12 @@ from experiments.synthetic.diffusion import People
 from experiments.synthetic.felt import FeltParticipant
 from experiments.synthetic.percept import forward_rates
 from tests.conftest import Recoil
-from tests.felt_configs import felt_text, written
-from tests.test_power_studies import homogeneity_p
+from tests.felt_configs import felt_config
+from tests.power_chain import homogeneity_p
 
 SETUP = load_setup("direction")
 METHODS = SETUP.config.design.methods
 SPREADS = {"drift_factor_sd": 0.3, "log_boundary_sd": 0.2, "logit_start_sd": 0.4}
-
-
-def felt_config(folder: Path, instructions: tuple[str, ...] = (), spreads: Mapping[str, float] | None = None) -> Path:
-    """The shipped config with people who feel the gun and differ so much, told so."""
-    return written(folder, felt_text(instructions, **(spreads or {})))
 
 
 def stepped(setup: Any, people: int) -> np.ndarray:

@@ -45,6 +45,7 @@ from experiments.load import find, load_setup
 from experiments.preference.config import RatingScale
 from experiments.preference.observer import draw_ratings
 from experiments.session.steps import on_scale as one_on_scale
+from tests.power_chain import homogeneity_p
 
 DIRECTION, PREFERENCE = load_setup("direction").config, load_setup("preference").config
 METHODS = DIRECTION.design.methods
@@ -77,16 +78,6 @@ def test_the_answers_are_distributed_as_those_of_the_observer_step_by_step() -> 
     }
     for name, (one, other) in summaries.items():
         assert homogeneity_p(one, other) > 0.001, name
-
-
-def homogeneity_p(one: np.ndarray, other: np.ndarray) -> float:
-    """The chi-square test that two samples of whole numbers have one distribution; rare values pooled."""
-    edges = np.unique(np.quantile(other, [0.0, 0.1, 0.25, 0.5, 0.75, 0.9]))
-    table = [
-        np.bincount(np.clip(np.searchsorted(edges, x, "right") - 1, 0, None), minlength=len(edges))
-        for x in (one, other)
-    ]
-    return float(stats.chi2_contingency(np.array(table)).pvalue)
 
 
 def test_mean_correct_rates_are_those_of_the_config() -> None:

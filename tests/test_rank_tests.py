@@ -16,7 +16,7 @@ from analysis.stats.rank_tests import (
     friedman,
     signed_rank_tests,
 )
-from tests.test_sphericity import RIGHT
+from tests.made_scores import RIGHT
 
 _ROUNDING = """
     5.40 5.50 5.55, 5.85 5.70 5.75, 5.20 5.60 5.50, 5.55 5.50 5.40, 5.90 5.85 5.70, 5.45 5.55 5.60, 5.40 5.40 5.35,

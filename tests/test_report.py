@@ -16,7 +16,7 @@ from analysis.summary.sections.data import ReportData
 from analysis.summary.sections.sections import write_report
 from analysis.summary.summary import summarize
 from tests.log_files import trial_rows, trials_path, write_rows, write_study
-from tests.test_figures import shot_panel
+from tests.shown_panels import shot_panel
 
 
 @pytest.fixture(scope="module")

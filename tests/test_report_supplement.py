@@ -6,8 +6,7 @@ import pytest
 
 from analysis.report.section import Section
 from analysis.summary.sections.supplement import TITLES, supplement_sections
-from tests.test_sphericity import RIGHT
-from tests.test_supplement import CEILING, ONE_AT_CEILING, _ratings, _study
+from tests.made_scores import CEILING, ONE_AT_CEILING, RIGHT, _ratings, _study
 
 
 @pytest.fixture(scope="module")

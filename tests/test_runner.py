@@ -1,164 +1,27 @@
 import csv
-import json
 from collections import Counter
 from contextlib import closing, suppress
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any
 
 import pytest
 
-from device import Identity, LimitError, LinkError, Shot, ShotReport, open_gun
-from device.words import GunStatus
-from experiments import catalogue, limits
+from device import LimitError, LinkError, Shot, ShotReport
+from experiments import catalogue
 from experiments.clock import Clock, VirtualClock
 from experiments.config.setup import Setup
 from experiments.design.plan import Plan
-from experiments.live_run import LiveRun, RunStopped
-from experiments.load import load_setup
-from experiments.rebuild import table
-from experiments.record import replay, storage
+from experiments.live_run import RunStopped
 from experiments.record.journal import Journal, read
-from experiments.record.replay import Standing
 from experiments.run import Request, run
-from experiments.runner import MAX_FAILURES, carry_out
+from experiments.runner import MAX_FAILURES
 from experiments.screens.synthetic import SyntheticScreen, synthetic_screen
 from experiments.session.remarks import Remark
-from experiments.session.states import Position, State
-from experiments.session.steps import History, Outcome, Step, record
-from experiments.stimulus import Desk
-from experiments.study.places import Place, place
+from experiments.session.steps import Outcome, Step
+from experiments.study.places import place
+from tests.sittings import SETUPS, TroubledGun, resumed_rows, sitting
 
-SETUPS = {name: load_setup(name) for name in ("direction", "preference")}
 BOTH = pytest.mark.parametrize("name", SETUPS)
-
-
-class TroubledGun:
-    """The simulated gun, with all that is asked of it written down, and trouble at chosen calls of a word.
-
-    `troubles["fire", 3]` is raised at the third `fire`, before the simulated gun hears of it.
-    """
-
-    def __init__(self, setup: Setup[Any], clock: Clock, troubles: dict[tuple[str, int], BaseException]) -> None:
-        methods = setup.gun.renderings(setup.config.design.methods)
-        self._gun = open_gun("simulated", methods, clock=clock.now)
-        self._troubles = troubles
-        self.asked: list[str] = []
-
-    def _told(self, word: str) -> None:
-        self.asked.append(word)
-        if trouble := self._troubles.get((word, self.asked.count(word))):
-            raise trouble
-
-    @property
-    def armed(self) -> bool:
-        return self._gun.status().state != "disarmed"
-
-    def identify(self) -> Identity:
-        self._told("identify")
-        return self._gun.identify()
-
-    def arm(self) -> None:
-        self._told("arm")
-        self._gun.arm()
-
-    def fire(self, shot: Shot, at_s: float | None = None) -> ShotReport:
-        self._told("fire")
-        return self._gun.fire(shot, at_s)
-
-    def disarm(self) -> None:
-        self._gun.disarm()
-        self._told("disarm")
-
-    def status(self) -> GunStatus:
-        self._told("status")
-        return self._gun.status()
-
-    def close(self) -> None:
-        self._gun.close()
-
-
-class WatchingScreen(SyntheticScreen):
-    """A synthetic participant who looks at gun and journal whenever asked or told something."""
-
-    def __init__(self, config: Any, observer: Any, clock: Clock, gun: TroubledGun, journal: Path) -> None:
-        super().__init__(config, observer, clock)
-        self._gun, self._journal = gun, journal
-        self.acknowledged = 0
-        self.trouble: dict[int, BaseException] = {}
-
-    def act(self, position: Position, until_s: float | None) -> None:
-        assert position.state is State.TRAIN or not self._gun.armed
-        super().act(position, until_s)
-
-    def acknowledge(self, step: Step | None, outcome: Outcome | Remark) -> None:
-        assert not self._gun.armed
-        assert step is not None
-        assert not isinstance(outcome, Remark)
-        lines = self._journal.read_bytes().splitlines(keepends=True)
-        told, done = [one for line in lines if (one := json.loads(line))["kind"] != "shot"][-2:]
-        assert lines[-1].endswith(b"\n")
-        assert (told["kind"], told["body"]) == ("step", json.loads(json.dumps(record(step))))
-        assert (done["kind"], done["body"]) == ("outcome", record(outcome))
-        self.acknowledged += 1
-        if trouble := self.trouble.get(self.acknowledged):
-            raise trouble
-
-
-class Sitting(NamedTuple):
-    """A desk with all that lies on it."""
-
-    plan: Plan
-    setup: Setup[Any]
-    where: Place
-    gun: TroubledGun
-    screen: WatchingScreen
-    clock: VirtualClock
-    journal: Journal
-
-    def carry_out(self) -> History:
-        going = catalogue.CATALOGUE[self.plan.experiment].session(self.plan, self.setup)
-        live = LiveRun(
-            plan=self.plan, gun=self.gun, journal=self.journal, clock=self.clock, screen=self.screen, guard_s=0.25
-        )
-        desk = Desk(
-            gun=self.gun,
-            gun_name="simulated",
-            drives=limits.drives(self.setup),
-            journal=self.journal,
-            clock=self.clock,
-            live=live,
-        )
-        self.screen.begin(live)
-        with self.journal:
-            carry_out(going, desk, Standing(step=next(going)))
-        return replay.history(read(self.where.journal))
-
-    def rows(self) -> list[dict[str, str]]:
-        data = table(read(self.where.journal))
-        return list(csv.DictReader(data.decode().splitlines(keepends=True)))
-
-
-def sitting(
-    name: str, results: Path, troubles: dict[tuple[str, int], BaseException] | None = None, **changes: Any
-) -> Sitting:
-    setup, clock = changes.get("setup", SETUPS[name]), VirtualClock()
-    plan = catalogue.CATALOGUE[name].make_plan(setup.config, "P01", 1, None)
-    where = place(results, "P01", name)
-    storage.make_folder(where.folder)
-    journal = Journal.create(where.journal, clock)
-    heads = {"plan": plan.record(), "plan_sha256": plan.sha256()}
-    journal.append("run", **heads, setup=setup.record(), setup_sha256=setup.sha256())
-    gun = TroubledGun(setup, clock, troubles or {})
-    observer = catalogue.CATALOGUE[name].observer(setup, plan)
-    screen = WatchingScreen(setup.config, observer, clock, gun, where.journal)
-    return Sitting(plan, setup, where, gun, screen, clock, journal)
-
-
-def resumed_rows(desk: Sitting) -> list[dict[str, str]]:
-    request = Request(setup=desk.setup, participant_id="P01", results=desk.where.results, seed=None, again="resume")
-    done = run(request, synthetic_screen, VirtualClock())
-    with done.place.table.open(newline="") as file:
-        return list(csv.DictReader(file))
 
 
 # when all goes well

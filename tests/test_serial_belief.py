@@ -18,8 +18,7 @@ from device.wire.records import ShotRecord, Standing
 from experiments.record.journal import read
 from experiments.study.places import place
 from tests.forger import FORGERIES, ShotLiar, a_lying_pair, a_lying_twin
-from tests.serial_runs import check, hasty, run_all, timings_of
-from tests.test_serial_run import SPEED
+from tests.serial_runs import SPEED, check, hasty, run_all, timings_of
 from tests.twins import Troubles, a_pair, a_shot
 from tests.waiting import wait_for
 

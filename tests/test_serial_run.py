@@ -1,12 +1,10 @@
 """Whole runs on a gun over a serial line: as on the simulated gun but for times; on a bad line nothing goes wrong."""
 
-import csv
 import json
 import re
 import signal
 import subprocess
 from dataclasses import replace
-from pathlib import Path
 
 import pytest
 
@@ -18,28 +16,9 @@ from experiments.study.places import PlaceError
 from recoil.session import check_pace
 from recoil.twin import troubles_of
 from tests.conftest import RECOIL
-from tests.serial_runs import check, hasty, of_trains, one_run, resumed, run_all, timings_of
+from tests.serial_runs import SPEED, TROUBLES, check, hasty, of_trains, one_run, resumed, rows, run_all, timings_of
 from tests.twins import Troubles, a_twin
 from tests.waiting import PATIENCE_S, wait_for
-
-SPEED = 40.0
-TROUBLES = Troubles(
-    jitter_s=0.002,
-    lose=0.004,
-    double=0.004,
-    corrupt=0.004,
-    partial=0.004,
-    reset=0.01,
-    busy=0.01,
-    hang=0.01,
-    unplug=0.01,
-    unplug_reply=0.002,
-    unplug_idle=0.002,
-    hang_s=0.3,
-    replug_s=0.1,
-)
-DIFFERENT = ("onset_utc", "response_time_s", "gun", "exposure_s", "attempts")
-"""Columns that differ from run to run: times, and how often a busy machine, away for long, had to present a trial."""
 
 
 def test_two_hundred_trials_on_a_bad_line_are_each_done_once_or_marked_and_offered_again(tmp_path, quick_configs):
@@ -85,11 +64,6 @@ def plugged(tmp_path):
         program.send_signal(signal.SIGINT)
         assert program.wait(PATIENCE_S) == 130
     assert not (tmp_path / "port").is_symlink()
-
-
-def rows(path: Path) -> list[dict[str, str]]:
-    with path.open(encoding="utf-8", newline="") as file:
-        return [{key: cell for key, cell in row.items() if key not in DIFFERENT} for row in csv.DictReader(file)]
 
 
 @pytest.mark.parametrize("name", ["direction", "preference"])

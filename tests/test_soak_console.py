@@ -20,13 +20,20 @@ from experiments.doctor.verdicts import Latencies, latencies, together
 from experiments.record.journal import read
 from tests import test_console as console
 from tests import test_console_faults as faults
-from tests.at_display import AtConsole, AtDisplay, needs_display, records, virtual_display
+from tests.at_display import (
+    AtConsole,
+    AtDisplay,
+    check_disarmed,
+    lose_the_display,
+    needs_display,
+    records,
+    virtual_display,
+)
 from tests.at_hand import STEM, short_configs, words
 from tests.at_terminal import ANSWERS, AtTerminal
 from tests.conftest import RECOIL, Soak
-from tests.test_console_ends import check_disarmed, lose_the_display
-from tests.test_durability import answers as terminal_answers
-from tests.test_durability import words as terminal_words
+from tests.kills import answers as terminal_answers
+from tests.kills import words as terminal_words
 from tests.waiting import wait_for
 from tests.watched_console import Watch
 

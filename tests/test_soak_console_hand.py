@@ -11,10 +11,9 @@ import pytest
 
 from experiments.session.states import TABLE, No, State
 from tests.at_display import needs_display, virtual_display
-from tests.at_hand import ACTIONS, STATES, Action, Cell, check_cell, check_gun
+from tests.at_hand import ACTIONS, STATES, Action, Cell, check_cell, check_gun, check_participants_keys
 from tests.conftest import Soak
 from tests.random_hands import MOVES, check_random_hands
-from tests.test_console_hand import check_participants_keys
 
 pytest.importorskip("PyQt6")
 pytestmark = [pytest.mark.soak, needs_display]

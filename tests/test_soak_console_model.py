@@ -10,9 +10,9 @@ from typing import Any
 import pytest
 from hypothesis import HealthCheck, given, settings
 
+from tests.at_controls import SETUPS
 from tests.conftest import Soak
 from tests.experimenters import MOVES, Experimenter, check
-from tests.test_console_rules import SETUPS
 
 pytestmark = pytest.mark.soak
 RUNS = 1000

@@ -18,9 +18,7 @@ from analysis.times.people import PeopleFit, fit_people
 from experiments.design.streams import generator
 from experiments.synthetic.diffusion import Diffusion, decide_all, upper_probabilities
 from tests.conftest import Soak
-from tests.test_decision import reference
-from tests.test_decision_fit import RANGE_S, TRUTH, made
-from tests.test_diffusion import EXTREMES, law, scalar
+from tests.decisions import EXTREMES, RANGE_S, TRUTH, law, made, reference, scalar
 
 pytestmark = pytest.mark.soak
 

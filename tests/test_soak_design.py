@@ -19,7 +19,7 @@ from device.parameters import GunParameters
 from device.physics.trains import highest_rate_Hz
 from experiments.synthetic.percept import PerceptParameters
 from tests.conftest import RECOIL, Soak
-from tests.test_power import files
+from tests.power_files import files
 
 pytestmark = pytest.mark.soak
 

@@ -9,11 +9,22 @@ from itertools import zip_longest
 import pytest
 
 from device.twin.scripts import transcript
+from tests.firmware import (
+    BUSES,
+    CORES,
+    FAST,
+    Hand,
+    Run,
+    as_on_the_simulated_gun,
+    chances,
+    check_records,
+    dead_bus,
+    emulated,
+    one_after_the_other,
+    play_all,
+    told,
+)
 from tests.serial_runs import hasty
-from tests.test_firmware_board import BUSES, Run, chances, check_records, dead_bus
-from tests.test_firmware_core import CORES, one_after_the_other, told
-from tests.test_firmware_emulated import Hand, emulated, play_all
-from tests.test_firmware_session import FAST, as_on_the_simulated_gun
 
 pytestmark = pytest.mark.soak
 

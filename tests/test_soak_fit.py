@@ -24,8 +24,8 @@ from experiments.load import load_setup
 from experiments.synthetic.diffusion import People
 from experiments.synthetic.percept import PerceptParameters, evidence, forward_rates, percepts_of
 from tests.conftest import RECOIL, Soak
-from tests.test_power_chain import counted, said, through_the_chain
-from tests.test_power_felt import felt_config
+from tests.felt_configs import felt_config
+from tests.power_chain import counted, said, through_the_chain
 
 pytestmark = pytest.mark.soak
 

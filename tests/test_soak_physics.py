@@ -18,11 +18,9 @@ from device.physics import FIDELITIES, GunParameters, coil, simulate, simulate_b
 from device.physics.audit import audit
 from device.physics.trains import highest_rate_Hz, repeated
 from tests.conftest import Soak
+from tests.extreme_guns import BREAK_AWAY_V, EXTREMES, defects, gun_of, numbers, pair, shoot
+from tests.golden_shots import SHOTS
 from tests.physics_claims import BARE, DAMPED, VARIANTS, motor_peak_N, share_after_turn, slide_mm
-from tests.test_physics import EXTREMES
-from tests.test_physics_continuity import defects, gun_of, pair
-from tests.test_physics_extremes import BREAK_AWAY_V, numbers, shoot
-from tests.test_physics_reference import SHOTS
 
 pytestmark = pytest.mark.soak
 

@@ -12,7 +12,7 @@ from device.parameters import DriveOff, Emf
 from device.physics import FIDELITIES, GunParameters, simulate_batch
 from device.physics.scenes import FRICTION_N, NEAR, OUTPUTS, stated_error
 from tests.conftest import Soak
-from tests.test_physics_scenes import NUMBERS, OPTIONS, PAPER
+from tests.extreme_guns import NUMBERS, OPTIONS, PAPER
 
 pytestmark = pytest.mark.soak
 

@@ -22,8 +22,8 @@ from analysis.predict.power.planned import ANOVA, ANY_PAIR
 from analysis.predict.reproduction.reproduce import direction_odds, preference_odds
 from experiments.load import find, load_setup
 from tests.conftest import RECOIL, Soak
-from tests.test_power import files
-from tests.test_power_chain import counted, null_setup, said, through_the_chain
+from tests.power_chain import counted, null_setup, said, through_the_chain
+from tests.power_files import files
 
 pytestmark = pytest.mark.soak
 

@@ -12,8 +12,7 @@ from device.serial_gun.link import WATCHDOG_S
 from device.serial_gun.opening import MAX_SPEED
 from experiments.record.journal import read
 from tests.forger import ShotLiar, a_lying_twin
-from tests.serial_runs import check, hasty, of_trains, one_run, run_all
-from tests.test_serial_run import SPEED, TROUBLES
+from tests.serial_runs import SPEED, TROUBLES, check, hasty, of_trains, one_run, run_all
 from tests.twins import Troubles, a_pair, a_twin
 
 pytestmark = pytest.mark.soak

@@ -22,9 +22,8 @@ from analysis import binomial_test, one_way_anova, rm_anova, rm_tukey_hsd, rm_tu
 from tests import nist
 from tests.conftest import Soak
 from tests.exact import digits, exact_one_way_F, exact_rm_F, exact_squared_q, p_digits
-from tests.made_scores import KINDS, made_scores
-from tests.test_binomial import GOLDEN, digits_of
-from tests.test_degenerate import ADDITIVE
+from tests.golden_binomial import GOLDEN, digits_of
+from tests.made_scores import ADDITIVE, KINDS, made_scores
 
 pytestmark = pytest.mark.soak
 

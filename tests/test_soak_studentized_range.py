@@ -16,7 +16,7 @@ from analysis import studentized_range_isf, studentized_range_logsf, studentized
 from analysis.stats.studentized_tail import TABLE_PAYS, lower_table, upper_table
 from tests.conftest import Soak
 from tests.golden.make_studentized_range import value
-from tests.test_studentized_range import AS_DOUBLE, DF, DFS, KS, LOG_P, K, P, Q
+from tests.golden_range import AS_DOUBLE, DF, DFS, KS, LOG_P, K, P, Q
 
 pytestmark = pytest.mark.soak
 

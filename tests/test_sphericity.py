@@ -8,10 +8,7 @@ import pytest
 from analysis.stats.anova import rm_anova
 from analysis.stats.diagnostics import residuals
 from analysis.stats.sphericity import NO_VARIANCE, SINGULAR, TOO_FEW, TRIVIAL, Corrected, sphericity
-
-_ROWS = "6 9 10, 2 9 10, 5 7 8, 6 6 10, 5 9 9, 8 8 10, 5 8 10, 8 10 10, 2 8 10, 7 8 9, 6 9 10, 5 8 10, 7 7 9, 7 9 10"
-RIGHT = np.array([row.split() for row in _ROWS.split(",")], dtype=np.int64)
-"""Right forward answers of ten, 14 participants by 3 methods: the data of every "R 4.2.2" number in these tests."""
+from tests.made_scores import RIGHT
 
 
 def _corrected(found: Corrected | None) -> Corrected:

@@ -1,10 +1,8 @@
 from __future__ import annotations
 
-import json
 import math
 import subprocess
 import sys
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -14,14 +12,8 @@ from scipy import special, stats
 
 from analysis import studentized_range_isf, studentized_range_logsf, studentized_range_sf
 from analysis.stats.studentized_tail import TABLE_PAYS
+from tests.golden_range import AS_DOUBLE, DF, DFS, KS, LOG_P, K, P, Q
 
-GOLDEN = json.loads((Path(__file__).parent / "golden" / "studentized_range.json").read_text())["rows"]
-K, DF, Q, P, LOG_P = np.array(GOLDEN, dtype=np.float64).T
-AS_DOUBLE = P > 1e-305
-"""Rows whose p is a double with all its digits; the others are there for the logarithm."""
-
-KS = (2, 3, 4, 5, 10, 20)
-DFS = (2, 3, 5, 10, 26, 100, 1e3, 1e4, 1e5, np.inf)
 SHARES = np.concatenate([1.0 - np.geomspace(1e-6, 0.5, 30), np.geomspace(0.5, 1e-300, 170)])
 
 

@@ -18,8 +18,7 @@ from experiments.run import Request, run
 from experiments.screens.synthetic import synthetic_screen
 from experiments.study.register import append, entry
 from recoil.config_files import new_study
-from tests.conftest import RECOIL, Recoil
-from tests.test_cli import refused
+from tests.conftest import RECOIL, Recoil, refused
 from tests.waiting import PATIENCE_S
 
 RIGHT = ("--age", 25, "--sex", "female", "--handedness", "right")

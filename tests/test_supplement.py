@@ -17,11 +17,9 @@ from analysis.stats.paired import SCALE, jzs_paired
 from analysis.stats.supplement import WITHIN, within_supplement
 from analysis.summary.sections.supplement import supplement_sections
 from analysis.summary.summary import summarize
-from tests.log_files import METHODS, rating_rows, ratings_path, trial_rows, trials_path, write_rows, write_study
-from tests.test_sphericity import RIGHT
+from tests.log_files import METHODS, write_study
+from tests.made_scores import CEILING, ONE_AT_CEILING, RIGHT, Json, _ratings, _study
 from tests.waiting import PATIENCE_S
-
-Json = dict[str, Any]
 
 
 @pytest.fixture(scope="module")
@@ -32,31 +30,6 @@ def logs(tmp_path_factory: pytest.TempPathFactory) -> Logs:
 @pytest.fixture(scope="module")
 def found(logs: Logs) -> Json:
     return summarize(logs)
-
-
-def _study(folder: Path, right: Any, methods: tuple[str, ...] = METHODS) -> Json:
-    """Statistics of participants with so many right forward answers of ten; every second backward answer is right."""
-    for i, counts in enumerate(right):
-        code = f"P{i + 1:02d}"
-        rows = trial_rows(code, methods=methods)
-        for method, count in zip(methods, counts, strict=True):
-            for direction, share in (("forward", int(count)), ("backward", 5)):
-                chosen = [r for r in rows if r["method"] == method and r["direction"] == direction]
-                for place, row in enumerate(chosen):
-                    other = "backward" if direction == "forward" else "forward"
-                    correct = place < share
-                    row.update(response=direction if correct else other, correct=str(int(correct)))
-        write_rows(trials_path(folder, code), rows)
-    return summarize(read_logs([folder]))
-
-
-def _ratings(folder: Path, table: Any, methods: tuple[str, ...] = METHODS) -> Json:
-    for i, ratings in enumerate(table):
-        rows = rating_rows(f"P{i + 1:02d}", methods=methods)
-        for row, rating in zip(rows, ratings, strict=True):
-            row["rating"] = str(rating)
-        write_rows(ratings_path(folder, f"P{i + 1:02d}"), rows)
-    return summarize(read_logs([folder]))
 
 
 @pytest.mark.parametrize("experiment", ["direction", "preference"])
@@ -121,10 +94,8 @@ def test_clustering_that_turns_the_pooled_test_over_is_told_at_the_top(tmp_path:
     assert any("pooled binomial test is not to be read: vibration forward" in warning for warning in found["warnings"])
 
 
-CEILING = np.full((6, 3), 10)
 ALIKE = np.column_stack([RIGHT[:, 0], RIGHT[:, 0], RIGHT[:, 1]])
 ADDITIVE = np.add.outer([3, 5, 4, 6], [0, 1, 3])
-ONE_AT_CEILING = np.column_stack([RIGHT[:, :2], np.full(14, 10)])
 DEGENERATE = {
     "all at ceiling": CEILING,
     "all at floor": 0 * CEILING,

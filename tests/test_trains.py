@@ -18,7 +18,7 @@ from experiments.rebuild import table
 from experiments.record.journal import Journal, read
 from experiments.stimulus import LEAD_S
 from tests.serial_runs import of_trains
-from tests.test_runner import Sitting, TroubledGun, resumed_rows, sitting
+from tests.sittings import Sitting, TroubledGun, resumed_rows, sitting
 
 
 def timing(report: ShotReport) -> ShotTiming:
