@@ -22,7 +22,7 @@ from experiments.record import replay, storage
 from experiments.record.journal import Contents, Journal, JournalError, hold, is_empty
 from experiments.record.journal import read as read_journal
 from experiments.record.provenance import provenance
-from experiments.record.replay import Standing
+from experiments.record.replay import RunPosition
 from experiments.runner import carry_out, gun_name
 from experiments.session.steps import Answered, Rated, Session
 from experiments.stimulus import Desk
@@ -238,7 +238,7 @@ def _open(job: _Job) -> Journal:
     return Journal.create(job.place.journal, job.clock)
 
 
-def _begin(job: _Job, plan: Plan, session: Session, journal: Journal, gun: Gun) -> Standing:
+def _begin(job: _Job, plan: Plan, session: Session, journal: Journal, gun: Gun) -> RunPosition:
     """Write the head of a new journal, or stand where a resumed one broke off."""
     now = {
         "provenance": provenance(),
@@ -256,7 +256,7 @@ def _begin(job: _Job, plan: Plan, session: Session, journal: Journal, gun: Gun) 
     if job.anew_reason:
         plan_head["set_aside_reason"] = job.anew_reason
     journal.append("run", **plan_head, setup=setup.record(), setup_sha256=setup.sha256(), **now)
-    return Standing(step=next(session))
+    return RunPosition(step=next(session))
 
 
 def _experimenter_knows(setup: Setup[Any]) -> list[str]:
@@ -265,7 +265,7 @@ def _experimenter_knows(setup: Setup[Any]) -> list[str]:
     return ["direction", *(f"method {name}" for name in by_hand)]
 
 
-def _to_the_end(session: Session, desk: Desk, standing: Standing, place: Place) -> int:
+def _to_the_end(session: Session, desk: Desk, standing: RunPosition, place: Place) -> int:
     """Carry out what is left. If it is stopped, the journal says why and the table holds what was answered.
 
     Gives back the number of answers, read back from the disk.

@@ -12,7 +12,7 @@ import math
 from device.words import Identity
 from experiments.design.plan import Trial
 from experiments.live_run import RunStopped
-from experiments.record.replay import Standing
+from experiments.record.replay import RunPosition
 from experiments.session import events
 from experiments.session.history import trial_at
 from experiments.session.states import State
@@ -56,7 +56,7 @@ def gun_name(identity: Identity) -> str:
     return identity.model if identity.model == identity.serial else f"{identity.model}:{identity.serial}"
 
 
-def carry_out(session: Session, desk: Desk, standing: Standing) -> None:
+def carry_out(session: Session, desk: Desk, standing: RunPosition) -> None:
     """Carry out a session from where it stands to its end.
 
     `RunStopped`, `JournalError` and interrupts pass through; whatever happens, the gun is disarmed. After an emergency
@@ -84,7 +84,7 @@ class _Runner:
         self._damper = ""
         """As it was set in this sitting; unknown at its beginning."""
 
-    def carry_out(self, standing: Standing) -> None:
+    def carry_out(self, standing: RunPosition) -> None:
         step = standing.step
         if standing.halted:
             self._rearm(trial_at(self._live.plan, standing.told, step))

@@ -27,7 +27,7 @@ from device.twin.core import IDENTITY
 from device.twin.machine import LATE_PULSE_US
 from device.twin.scripts import random_script, transcript
 from device.wire.frame import LAST_NUMBER, Frame, encode
-from device.wire.records import ShotRecord, Standing
+from device.wire.records import ShotRecord, StatusRecord
 from experiments.record.journal import read
 from tests.conftest import Recoil
 from tests.serial_runs import rows, timings_of
@@ -219,8 +219,8 @@ class Hand:
         self.heard += line
         return line
 
-    def standing(self) -> Standing:
-        return Standing.parse(self.ask("STAT?"))
+    def standing(self) -> StatusRecord:
+        return StatusRecord.parse(self.ask("STAT?"))
 
     def shot(self) -> ShotRecord:
         return ShotRecord.parse(self.ask("SHOT?"))
@@ -332,8 +332,8 @@ class Run:
         return [ShotRecord.parse(text) for text in self.said("SHOT ")]
 
     @property
-    def standing(self) -> Standing:
-        return Standing.parse(self.said("STAT ")[-1])
+    def standing(self) -> StatusRecord:
+        return StatusRecord.parse(self.said("STAT ")[-1])
 
     @property
     def seen(self) -> list[str]:

@@ -16,7 +16,7 @@ from experiments.load import load_setup
 from experiments.rebuild import table
 from experiments.record import replay, storage
 from experiments.record.journal import Journal, read
-from experiments.record.replay import Standing
+from experiments.record.replay import RunPosition
 from experiments.run import Request, run
 from experiments.runner import carry_out
 from experiments.screens.synthetic import SyntheticScreen, synthetic_screen
@@ -127,7 +127,7 @@ class Sitting(NamedTuple):
         )
         self.screen.begin(live)
         with self.journal:
-            carry_out(going, desk, Standing(step=next(going)))
+            carry_out(going, desk, RunPosition(step=next(going)))
         return replay.history(read(self.where.journal))
 
     def rows(self) -> list[dict[str, str]]:

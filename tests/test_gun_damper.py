@@ -5,7 +5,7 @@ import pytest
 from device.methods import rendering_of, settle_s
 from device.parameters import GunParameters
 from device.physics import simulate, trace
-from device.physics.audit import audit
+from device.physics.energy_balance import energy_balance
 from device.physics.hand import Hand, compliant_collision, rigid_collision, simulate_held
 from device.physics.trains import highest_rate_Hz, train
 from device.simulated import SimulatedGun
@@ -78,7 +78,7 @@ def test_trace_and_audit_know_the_braked_return():
     shot = trace(BACK)
     home = shot.time_s[(shot.displacement_m <= 0.0) & (shot.time_s > 0.1)][0]
     assert home == pytest.approx(expected.reset_end_s, abs=2e-4)
-    found = audit(BACK)
+    found = energy_balance(BACK)
     assert abs(found.residual_J) < 1e-12
     assert abs(found.residual_impulse_Ns) < 1e-12
     assert found.friction_J > (0.21 + 1.12) * expected.max_displacement_m - 1e-9

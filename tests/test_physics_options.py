@@ -8,8 +8,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from device.physics import GunParameters, hand, simulate
-from device.physics.audit import audit
 from device.physics.damper import damper_friction, strip_stiffness
+from device.physics.energy_balance import energy_balance
 from device.physics.hand import Hand, compliant_collision, rigid_collision, simulate_held
 
 VARIANTS = [(f, off, emf) for f in (0.21, 1.12) for off in ("shorted", "open") for emf in ("printed", "reciprocal")]
@@ -30,7 +30,7 @@ guns = st.builds(
 
 @pytest.mark.parametrize(("friction_N", "drive_off", "emf"), VARIANTS)
 def test_energy_and_momentum_add_up(friction_N, drive_off, emf):
-    found = audit(GunParameters(friction_N=friction_N, drive_off=drive_off, emf=emf))
+    found = energy_balance(GunParameters(friction_N=friction_N, drive_off=drive_off, emf=emf))
     assert abs(found.residual_J) < 1e-12
     assert abs(found.residual_impulse_Ns) < 1e-12
     assert found.force_impulse_Ns + found.collision_impulse_Ns == pytest.approx(0.0, abs=1e-12)
@@ -39,14 +39,14 @@ def test_energy_and_momentum_add_up(friction_N, drive_off, emf):
 
 
 def test_the_printed_back_emf_swallows_energy_in_the_recoil_and_makes_it_in_a_shorted_return():
-    assert audit(GunParameters(drive_off="open")).created_J < -0.05
-    assert audit(GunParameters(drive_off="shorted")).created_J > 0.5
+    assert energy_balance(GunParameters(drive_off="open")).created_J < -0.05
+    assert energy_balance(GunParameters(drive_off="shorted")).created_J > 0.5
 
 
 @given(gun=guns)
 @settings(max_examples=30, deadline=None, derandomize=True)
 def test_the_audit_of_any_gun_closes(gun):
-    found = audit(gun)
+    found = energy_balance(gun)
     size = max(found.supplied_J, 1e-6)
     assert abs(found.residual_J) < 1e-9 * size
     assert abs(found.residual_impulse_Ns) < 1e-10

@@ -14,7 +14,7 @@ from device.serial_gun.checks import MAX_UNCERTAINTY_S, check_record, check_stan
 from device.serial_gun.clocks import HostTime
 from device.serial_gun.commands import Contradiction, CutShort, Reply
 from device.serial_gun.reports import Order, Told, asked, ready_s
-from device.wire.records import ShotRecord, Standing
+from device.wire.records import ShotRecord, StatusRecord
 from experiments.record.journal import read
 from experiments.study.places import place
 from tests.forger import FORGERIES, ShotLiar, a_lying_pair, a_lying_twin
@@ -308,7 +308,7 @@ def test_of_a_twin_in_a_hurry_the_clocks_may_differ_as_much_in_the_worlds_time()
         check_times(told(uncertainty_s=2.1), ORDER, 40.0)
 
 
-STANDING = Standing(state="RESETTING", count=1, clock_us=2_000_000, ready_us=2_200_000, coil_mC=25_000, fault=0)
+STANDING = StatusRecord(state="RESETTING", count=1, clock_us=2_000_000, ready_us=2_200_000, coil_mC=25_000, fault=0)
 
 
 def test_a_magnet_is_home_within_ten_seconds_or_the_gun_is_not_believed():

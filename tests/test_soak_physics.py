@@ -15,7 +15,7 @@ import pytest
 
 from analysis.predict.jobs import cores
 from device.physics import FIDELITIES, GunParameters, coil, simulate, simulate_batch, summary, warm
-from device.physics.audit import audit
+from device.physics.energy_balance import energy_balance
 from device.physics.trains import highest_rate_Hz, repeated
 from tests.conftest import Soak
 from tests.extreme_guns import BREAK_AWAY_V, EXTREMES, defects, gun_of, numbers, pair, shoot
@@ -179,7 +179,7 @@ def test_the_audit_closes(soak: Soak) -> None:
     rng = np.random.default_rng(5)
     guns = [of_options(gun, off, emf) for gun in (BARE, DAMPED) for off, emf in VARIANTS]
     guns += [gun_of(*pair(rng)[:2]) for _ in range(RANDOM_GUNS)]
-    found = [(gun, audit(gun)) for gun in guns]
+    found = [(gun, energy_balance(gun)) for gun in guns]
     energy = max(abs(one.residual_J) / max(one.supplied_J, 1e-6) for _, one in found)
     # with k_e = k_m alone the reciprocal back-EMF gives what the motor takes
     own = [(gun, one) for gun, one in found if gun.emf == "reciprocal" and gun.back_emf_V_s_m == gun.motor_constant_N_A]
@@ -190,7 +190,7 @@ def test_the_audit_closes(soak: Soak) -> None:
     soak("energy that the reciprocal EMF creates", f"{created:.1e}", "1e-12", f"{len(own)} guns with k_e = k_m")
     soak("net impulse over a cycle [N s]", f"{impulse:.1e}", "1e-10", how)
     for off, emf in VARIANTS:
-        made = [audit(of_options(gun, off, emf)).created_J * 1e3 for gun in (BARE, DAMPED)]
+        made = [energy_balance(of_options(gun, off, emf)).created_J * 1e3 for gun in (BARE, DAMPED)]
         soak(
             f"energy that the EMF creates, {off}, {emf} [mJ]", f"{made[0]:.3g}; {made[1]:.3g}", "stated", "0.21; 1.12 N"
         )

@@ -22,7 +22,7 @@ from device.wire.frame import (
     following,
     is_newer,
 )
-from device.wire.records import Named, Refusal, Setting, ShotRecord, Standing, refusal
+from device.wire.records import Named, Refusal, Setting, ShotRecord, StatusRecord, refusal
 
 BODIES = st.text(st.characters(min_codepoint=0x20, max_codepoint=0x7E), min_size=1, max_size=MAX_BODY)
 FRAMES = st.builds(Frame, number=st.integers(1, LAST_NUMBER), body=BODIES)
@@ -50,7 +50,7 @@ SHOTS = st.builds(
     setting=SETTINGS,
 )
 STANDINGS = st.builds(
-    Standing,
+    StatusRecord,
     state=st.sampled_from(["DISARMED", "ARMED", "RESETTING", "WAITING", "FIRING", "FAULT"]),
     **dict.fromkeys(("count", "clock_us", "ready_us", "coil_mC", "fault"), NUMBERS),
 )
@@ -58,7 +58,7 @@ READERS = (
     Named.parse,
     Setting.parse,
     ShotRecord.parse,
-    Standing.parse,
+    StatusRecord.parse,
     records.number,
     lambda text: records.value(text, "TIME"),
     refusal,

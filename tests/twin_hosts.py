@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from device.twin.core import Core
 from device.wire.frame import Frame, Splitter, decode, encode, following
-from device.wire.records import ShotRecord, Standing
+from device.wire.records import ShotRecord, StatusRecord
 
 PULSE = "CONF asymmetric-1,FORW,PULS,16000,10000,211000"
 READY = 1_000_000
@@ -26,7 +26,7 @@ class Hand:
         return self.say("SYST:ERR?")[0]
 
     def standing(self):
-        return Standing.parse(self.say("STAT?")[0])
+        return StatusRecord.parse(self.say("STAT?")[0])
 
     def shot(self):
         return ShotRecord.parse(self.say("SHOT?")[0])
@@ -51,4 +51,4 @@ class Strict(Hand):
         return [decode(line, "gun").body for line in Splitter().feed(out)]
 
     def standing(self):
-        return Standing.parse(self.say("STAT?")[-1])
+        return StatusRecord.parse(self.say("STAT?")[-1])

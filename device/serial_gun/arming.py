@@ -11,7 +11,7 @@ from device.serial_gun.checks import check_standing
 from device.serial_gun.commands import CalledOff, Contradiction, Disconnected, Refused, Reply, TimedOut
 from device.serial_gun.link import Link
 from device.wire.frame import Garbled
-from device.wire.records import ShotRecord, Standing
+from device.wire.records import ShotRecord, StatusRecord
 from device.words import LinkError
 
 TRIES = 4
@@ -33,9 +33,9 @@ def ask(link: Link, body: str, allowed: Callable[[], bool] = lambda: True) -> Re
     raise trouble
 
 
-def standing(link: Link) -> tuple[Reply, Standing]:
+def standing(link: Link) -> tuple[Reply, StatusRecord]:
     """How the gun stands. `Contradiction`: as it cannot stand."""
-    reply, found = _read(link, "STAT?", Standing.parse)
+    reply, found = _read(link, "STAT?", StatusRecord.parse)
     try:
         check_standing(found)
     except Contradiction as error:

@@ -10,7 +10,7 @@ from typing import Final
 
 from device.serial_gun.commands import Contradiction, CutShort
 from device.serial_gun.reports import Order, Told
-from device.wire.records import ShotRecord, Standing
+from device.wire.records import ShotRecord, StatusRecord
 
 MAX_UNCERTAINTY_S: Final = 0.05
 """The most by which the two clocks may disagree for a shot to count, in seconds of the real world. Assumed: it lets
@@ -81,7 +81,7 @@ def check_times(told: Told, order: Order, speed: float) -> None:
         raise Contradiction(f"END is {late_s:.6f} s later than its record was read")
 
 
-def check_standing(standing: Standing) -> None:
+def check_standing(standing: StatusRecord) -> None:
     """Nothing, if the magnet will be home in a time that the wire allows. `Contradiction`: never, as good as."""
     left_us = standing.ready_us - standing.clock_us
     if left_us > MAX_REST_US:

@@ -14,7 +14,7 @@ from device.serial_gun.commands import Disconnected, Refused, TimedOut, Unsure
 from device.serial_gun.link import Link
 from device.serial_gun.reports import Asked, Order, asked, ready_s, report
 from device.serial_gun.triggering import Triggering
-from device.wire.records import Standing
+from device.wire.records import StatusRecord
 from device.words import GunState, GunStatus, Identity, LimitError, Shot, ShotReport
 
 _STATES: dict[str, GunState] = {
@@ -129,7 +129,7 @@ class SerialGun:
             fault=fault,
         )
 
-    def _fault(self, said: Standing) -> str | None:
+    def _fault(self, said: StatusRecord) -> str | None:
         """What is wrong with the gun: its driver, or that it disarmed itself while it was to be armed."""
         if said.fault:
             return f"the driver reports fault {said.fault}"

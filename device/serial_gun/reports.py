@@ -11,7 +11,7 @@ from device.methods import Method, Rendering, rendering_of
 from device.parameters import GunParameters
 from device.serial_gun.clocks import MAX_DRIFT, HostTime
 from device.serial_gun.commands import Reply
-from device.wire.records import METHOD, Setting, ShotRecord, Standing, Way
+from device.wire.records import METHOD, Setting, ShotRecord, StatusRecord, Way
 from device.words import Direction, Drive, Effect, LimitError, Pulse, Shot, ShotReport, ShotTiming
 
 FLOORS_US: Final = {"PULS": 50_000, "EFF": 10_000}
@@ -134,7 +134,7 @@ def report(order: Order, told: Told) -> ShotReport:
     )
 
 
-def ready_s(standing: Standing, reply: Reply, ready: HostTime) -> float:
+def ready_s(standing: StatusRecord, reply: Reply, ready: HostTime) -> float:
     """When the next shot may start, by the clocks, but within what the exchange by itself makes certain.
 
     A clock that was misread cannot put it off.

@@ -13,7 +13,7 @@ from dataclasses import dataclass, replace
 from typing import Final, Literal
 
 from device.wire import errors
-from device.wire.records import Setting, ShotRecord, Standing, State
+from device.wire.records import Setting, ShotRecord, State, StatusRecord
 
 MAX_MILLIVOLTS: Final = 24_000
 MAX_PULSE_US: Final = 20_000
@@ -284,10 +284,10 @@ class Machine:
         self._fault, self.state = fault, "FAULT"
         return ended
 
-    def standing(self, now_us: int) -> Standing:
+    def standing(self, now_us: int) -> StatusRecord:
         """How the gun stands; an armed one is resetting while its magnet is on its way home, by prediction."""
         resetting = self.state == "ARMED" and now_us < self._ready_us
-        return Standing(
+        return StatusRecord(
             state="RESETTING" if resetting else self.state,
             count=self.shot.count,
             clock_us=now_us,

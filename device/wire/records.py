@@ -124,7 +124,7 @@ class ShotRecord:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Standing:
+class StatusRecord:
     """How the gun stands. `fault` is 0, or the number that the driver's fault was given."""
 
     state: State

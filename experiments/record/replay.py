@@ -28,7 +28,7 @@ from experiments.session.steps import (
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Standing:
+class RunPosition:
     """Where a run stands: its next step, `None` at the end, and what was told before.
 
     `halted`: an emergency stop ended it, and no test shot was fired since; one must come before anything else.
@@ -73,7 +73,7 @@ def history(contents: Contents) -> History:
     return [(step, outcome) for step, outcome in told(contents) if step and not isinstance(outcome, Remark)]
 
 
-def replay(session: Session, contents: Contents) -> Standing:
+def replay(session: Session, contents: Contents) -> RunPosition:
     """Send a journal's outcomes into a fresh session. `JournalError` if they are not those of this plan."""
     tale = told(contents)
     done = [(step, outcome) for step, outcome in tale if step and not isinstance(outcome, Remark)]
@@ -81,10 +81,10 @@ def replay(session: Session, contents: Contents) -> Standing:
     for number, (recorded, outcome) in enumerate(done, start=1):
         _compare(contents, number, step, recorded)
         step = _send(session, outcome)
-    return Standing(step=step, told=tale, halted=_halted(contents))
+    return RunPosition(step=step, told=tale, halted=_halted(contents))
 
 
-def go_on(session: Session, contents: Contents, standing: Standing, append: Callable[..., None]) -> Standing:
+def go_on(session: Session, contents: Contents, standing: RunPosition, append: Callable[..., None]) -> RunPosition:
     """Where a replayed run goes on.
 
     A step at which the run broke off is given up, told to the journal through `append`, and its trial presented again:

@@ -262,7 +262,7 @@ def trial_of(step: Step | None) -> Trial | None:
     return step.trial if isinstance(step, TrialStep) else None
 
 
-_WHERE_KNOWN = ("damper", "timing", "key_time_s", "shots", "exposure_s")
+_OPTIONAL_FIELDS = ("damper", "timing", "key_time_s", "shots", "exposure_s")
 _STEP: TypeAdapter[Step] = TypeAdapter(Annotated[Step, Field(discriminator="kind")])
 _OUTCOME: TypeAdapter[Outcome] = TypeAdapter(Annotated[Outcome, Field(discriminator="kind")])
 
@@ -270,7 +270,7 @@ _OUTCOME: TypeAdapter[Outcome] = TypeAdapter(Annotated[Outcome, Field(discrimina
 def record(word: Step | Outcome | TrainShot) -> dict[str, Any]:
     """A step, outcome or shot as plain JSON values; an instruction, and what is not always known, only where it is."""
     words = asdict(word, dict_factory=where_given)
-    return {key: value for key, value in words.items() if key not in _WHERE_KNOWN or value is not None}
+    return {key: value for key, value in words.items() if key not in _OPTIONAL_FIELDS or value is not None}
 
 
 def step_from(body: object) -> Step:

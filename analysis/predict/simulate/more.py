@@ -7,7 +7,7 @@ from dataclasses import asdict, fields
 from typing import Any
 
 from device.parameters import GunParameters
-from device.physics import audit as energy
+from device.physics.energy_balance import energy_balance
 from device.physics.hand import Hand, compliant_collision, rigid_collision, simulate_held
 from experiments.config.door import ConfigError
 
@@ -41,7 +41,7 @@ def asked_for(
 
 def audited(parameters: GunParameters) -> dict[str, Any]:
     """The energies and impulses of the shot by the full model, until the magnet rests."""
-    return asdict(energy.audit(parameters))
+    return asdict(energy_balance(parameters))
 
 
 def held(parameters: GunParameters, words: str) -> dict[str, Any]:

@@ -39,7 +39,7 @@ Motion = tuple[float, float, float]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class ShotAudit:
+class EnergyBalance:
     """The energies of one shot in J and its impulses in N s, from the onset to rest (or to where it was given up)."""
 
     supplied_J: float  # by the drive
@@ -55,7 +55,7 @@ class ShotAudit:
     residual_impulse_Ns: float  # both, and the momentum that is left
 
 
-def audit(gun: GunParameters) -> ShotAudit:
+def energy_balance(gun: GunParameters) -> EnergyBalance:
     """The audit of one shot from rest."""
     shot = list(segments(pack(gun)))
     supplied, heat, motor, emf, force = (math.fsum(row) for row in zip(*map(_integrals, shot), strict=True))
@@ -66,7 +66,7 @@ def audit(gun: GunParameters) -> ShotAudit:
     x, v, i = shot[-1].end
     stored = gun.magnet_mass_kg / 2 * v**2 + gun.stiffness_N_m * x * (gun.preload_length_m + x / 2)
     stored += 0.0 if shot[-1].ended_by == SETTLED else gun.inductance_H / 2 * i**2
-    return ShotAudit(
+    return EnergyBalance(
         supplied_J=supplied,
         created_J=motor - emf,
         heat_J=heat,
