@@ -9,13 +9,13 @@ from typing import Any
 from experiments.config.models import ExperimentConfig
 from experiments.config.setup import Setup
 from experiments.design.plan import Plan
-from experiments.direction import observer as direction_observer
+from experiments.direction import synthetic as direction_synthetic
 from experiments.direction.config import DirectionConfig
 from experiments.direction.session import make_plan as direction_plan
 from experiments.direction.session import make_practice as direction_practice
 from experiments.direction.session import rows as direction_rows
 from experiments.direction.session import session as direction_session
-from experiments.preference import observer as preference_observer
+from experiments.preference import synthetic as preference_synthetic
 from experiments.preference.config import PreferenceConfig
 from experiments.preference.session import make_plan as preference_plan
 from experiments.preference.session import rows as preference_rows
@@ -45,8 +45,8 @@ CATALOGUE: dict[str, Experiment] = {
         make_practice=direction_practice,
         session=direction_session,
         rows=direction_rows,
-        observer=direction_observer.observer,
-        answer_columns=direction_observer.TABLE_COLUMNS,
+        observer=direction_synthetic.synthetic_participant,
+        answer_columns=direction_synthetic.TABLE_COLUMNS,
     ),
     "preference": Experiment(
         config=PreferenceConfig,
@@ -54,8 +54,8 @@ CATALOGUE: dict[str, Experiment] = {
         make_practice=lambda *_: None,
         session=preference_session,
         rows=preference_rows,
-        observer=preference_observer.observer,
-        answer_columns=preference_observer.TABLE_COLUMNS,
+        observer=preference_synthetic.synthetic_participant,
+        answer_columns=preference_synthetic.TABLE_COLUMNS,
     ),
 }
 

@@ -23,7 +23,7 @@ from experiments.study.places import Place, PlaceError, check_code, place, set_a
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Asked:
+class SessionRequest:
     """What was asked for on the command line."""
 
     config: str
@@ -42,7 +42,7 @@ class Asked:
     monitor: int | None = None
 
 
-def run_session(asked: Asked) -> Place:
+def run_session(asked: SessionRequest) -> Place:
     """Carry out what was asked for. `PlaceError` for what cannot be done here; a stop raises `KeyboardInterrupt`."""
     check_code(asked.participant_id)
     _check_screen(asked)
@@ -76,7 +76,7 @@ def _check_resumable(request: Request) -> None:
         )
 
 
-def _check_screen(asked: Asked) -> None:
+def _check_screen(asked: SessionRequest) -> None:
     if asked.screen == "terminal" and not (sys.stdin.isatty() and sys.stdout.isatty()):
         raise PlaceError("--screen terminal: standard input and output are no terminal; use --screen synthetic")
     sides = (asked.visual, asked.participant_screen, asked.participant_keys, asked.noise, asked.monitor is not None)
@@ -96,7 +96,7 @@ def check_pace(screen: str, gun: str) -> None:
         )
 
 
-def _at_terminal(request: Request, asked: Asked) -> Finished:
+def _at_terminal(request: Request, asked: SessionRequest) -> Finished:
     def screen(setup: Setup[Any], plan: Plan, clock: Clock) -> Screen:
         del setup
         return TerminalScreen(plan, clock, simulated=asked.gun == "simulated")
@@ -104,7 +104,7 @@ def _at_terminal(request: Request, asked: Asked) -> Finished:
     return run(request, screen, RealClock())
 
 
-def _synthetic(request: Request, asked: Asked) -> Finished:
+def _synthetic(request: Request, asked: SessionRequest) -> Finished:
     """On a virtual clock; with a gun on a line, whose shots take their time, on the real one."""
     del asked
     speed = _speed(request.gun)
@@ -118,13 +118,13 @@ def _speed(gun: str) -> float | None:
         raise PlaceError(f"--gun {gun}: {error}") from error
 
 
-def _at_console(request: Request, asked: Asked) -> Finished:
+def _at_console(request: Request, asked: SessionRequest) -> Finished:
     live = _console()
     finished: Finished = live.run_live(request, _sides(live, asked))
     return finished
 
 
-def _sides(live: Any, asked: Asked) -> Any:
+def _sides(live: Any, asked: SessionRequest) -> Any:
     return live.Sides(
         visual=asked.visual,
         screen=asked.participant_screen,
@@ -134,7 +134,7 @@ def _sides(live: Any, asked: Asked) -> Any:
     )
 
 
-def run_lab_day(asked: Asked) -> None:
+def run_lab_day(asked: SessionRequest) -> None:
     """The start window at the console, and one run after the other from it."""
     if asked.screen != "console":
         raise PlaceError("give --participant CODE, or --screen console for its start window")
@@ -166,7 +166,7 @@ def _console() -> Any:
 _SCREENS = {"terminal": _at_terminal, "synthetic": _synthetic, "console": _at_console}
 
 
-def _again(asked: Asked) -> Again:
+def _again(asked: SessionRequest) -> Again:
     if asked.resume and asked.fresh:
         raise PlaceError("--resume and --fresh: give one of them; the first goes on with a run, the second starts anew")
     if asked.reason and not asked.fresh:

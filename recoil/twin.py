@@ -17,7 +17,7 @@ from experiments.study.places import PlaceError
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Asked:
+class TwinRequest:
     """What was asked for on the command line."""
 
     gun: str
@@ -30,7 +30,7 @@ class Asked:
     seed: int
 
 
-def serve(asked: Asked, tell: Callable[[dict[str, Any]], None]) -> None:
+def serve(asked: TwinRequest, tell: Callable[[dict[str, Any]], None]) -> None:
     """Be a gun until interrupted. `tell` is called once it can be opened. `PlaceError`: it cannot be so."""
     gun = load_gun(find(asked.gun))
     methods = {name: gun.rendering(name) for name in gun.methods}
@@ -55,7 +55,7 @@ class _Plugged:
         self._socket.unplug()
 
 
-def _socket(asked: Asked) -> Socket:
+def _socket(asked: TwinRequest) -> Socket:
     if asked.tcp is not None and asked.link is not None:
         raise PlaceError("--tcp and --link: give one of them")
     return Pty(asked.link) if asked.tcp is None else Tcp(asked.tcp)
@@ -65,7 +65,7 @@ def _gun_option(address: str, speed: float) -> str:
     return f"serial:{address}" + (f"?speed={speed:g}" if speed != 1 else "")
 
 
-def _make(asked: Asked) -> Make:
+def _make(asked: TwinRequest) -> Make:
     if not 0 < asked.speed <= MAX_SPEED:
         raise PlaceError(f"--speed is {asked.speed:g}; it must be above 0 and at most {MAX_SPEED:g}")
     troubles = troubles_of(asked.troubles)

@@ -10,11 +10,11 @@ import pytest
 from analysis.predict.check import as_text, check
 from experiments.clock import VirtualClock
 from experiments.config.door import ConfigError
-from experiments.direction.observer import mind_of
 from experiments.direction.session import make_plan
+from experiments.direction.synthetic import model_parameters
 from experiments.load import load_setup
 from experiments.screens.synthetic import synthetic_screen
-from experiments.synthetic.felt import Mind
+from experiments.synthetic.model_based import ModelParameters
 from experiments.synthetic.percept import PerceptConfig
 from experiments.synthetic.preference import Appeal
 from tests.felt_configs import BALANCE, changed, felt_text, shipped_text, written
@@ -32,14 +32,14 @@ def without_sections(name: str) -> str:
 def test_sections_that_are_left_out_are_the_models_own_numbers(tmp_path: Path) -> None:
     direction = load_setup(str(written(tmp_path, without_sections("direction")))).config
     preference = load_setup(str(written(tmp_path, without_sections("preference"), "preference"))).config
-    assert mind_of(direction) == Mind()
-    assert preference.synthetic.percept.own == Mind().percept
+    assert model_parameters(direction) == ModelParameters()
+    assert preference.synthetic.percept.own == ModelParameters().percept
     assert preference.synthetic.appeal == Appeal()
 
 
 def test_the_shipped_sections_say_the_same_numbers() -> None:
     direction, preference = load_setup("direction").config, load_setup("preference").config
-    assert mind_of(direction) == Mind()
+    assert model_parameters(direction) == ModelParameters()
     assert preference.synthetic.percept == direction.synthetic.percept == PerceptConfig()
     assert preference.synthetic.appeal == Appeal()
 
@@ -48,7 +48,7 @@ def test_the_shipped_sections_say_the_same_numbers() -> None:
 def test_who_feels_the_gun_is_recorded_with_all_their_numbers(tmp_path: Path, name: str, observer: str) -> None:
     text = changed(without_sections(name), (f'observer = "{observer}"', 'observer = "felt"'))
     record = load_setup(str(written(tmp_path, text, name))).record()["experiment"]["synthetic"]
-    assert record["percept"]["sensitivity"] == Mind().percept.sensitivity
+    assert record["percept"]["sensitivity"] == ModelParameters().percept.sensitivity
     assert ("boundaries" in record["diffusion"]) if name == "direction" else ("gain" in record["appeal"])
 
 

@@ -16,14 +16,14 @@ from analysis.logs.reading import read_logs
 from experiments.config.setup import Setup
 from experiments.design.plan import Plan
 from experiments.design.streams import Stream
-from experiments.direction.observer import FeltObserver, mind_of
-from experiments.direction.observer import observer as direction_observer
 from experiments.direction.session import make_plan
+from experiments.direction.synthetic import ModelParticipant, model_parameters
+from experiments.direction.synthetic import synthetic_participant as direction_participant
 from experiments.load import load_setup, shipped_folder
-from experiments.preference.observer import observer as preference_observer
-from experiments.preference.observer import strengths
 from experiments.preference.session import make_plan as preference_plan
-from experiments.synthetic.felt import rates_by_instruction
+from experiments.preference.synthetic import strengths
+from experiments.preference.synthetic import synthetic_participant as preference_participant
+from experiments.synthetic.model_based import rates_by_instruction
 from experiments.synthetic.percept import evidence, percepts_of
 from experiments.synthetic.preference import feelings, felt_ratings
 from tests.conftest import Recoil
@@ -56,7 +56,7 @@ def plans(setup: Setup[Any], count: int = PEOPLE) -> list[Plan]:
 def test_four_hundred_people_are_right_at_the_papers_forward_rates_in_the_mean() -> None:
     right: dict[str, list[bool]] = {name: [] for name in PAPER}
     for plan in plans(DIRECTION):
-        someone = direction_observer(DIRECTION, plan)
+        someone = direction_participant(DIRECTION, plan)
         for trial in plan.trials:
             if trial.direction == "forward":
                 right[trial.method].append(someone.answer(trial).response == "forward")
@@ -80,7 +80,7 @@ def hurried() -> tuple[Setup[Any], dict[tuple[str, str], list[tuple[bool, float]
     setup = alike_hurry()
     found: dict[tuple[str, str], list[tuple[bool, float]]] = {}
     for plan in plans(setup, 200):
-        someone = direction_observer(setup, plan)
+        someone = direction_participant(setup, plan)
         for trial in plan.trials:
             if trial.direction == "forward":
                 answer = someone.answer(trial)
@@ -91,7 +91,7 @@ def hurried() -> tuple[Setup[Any], dict[tuple[str, str], list[tuple[bool, float]
 
 def test_who_is_hurried_errs_as_much_more_as_the_law_says(hurried: Any) -> None:
     setup, found = hurried
-    mind = mind_of(setup.config)
+    mind = model_parameters(setup.config)
     methods = setup.gun.renderings(setup.config.design.methods)
     for method, percept in percepts_of(methods, mind.percept.leak_s).items():
         for name, rate in rates_by_instruction(mind, percept).items():
@@ -104,7 +104,7 @@ def test_who_is_hurried_errs_as_much_more_as_the_law_says(hurried: Any) -> None:
 def test_who_is_hurried_is_as_much_faster_as_the_law_says(hurried: Any) -> None:
     # optional stopping: E[X] at the answer is z + v E[t], so E[t] = (a P - z) / v; and z (a - z) without drift
     setup, found = hurried
-    mind = mind_of(setup.config)
+    mind = model_parameters(setup.config)
     methods = setup.gun.renderings(setup.config.design.methods)
     start, neutral = mind.percept.start, mind.boundaries["neutral"]
     for method, percept in percepts_of(methods, mind.percept.leak_s).items():
@@ -122,25 +122,25 @@ def test_times_are_whole_milliseconds_and_never_none(tmp_path: Path) -> None:
     text = felt_text(non_decision_s=0.0, boundaries="{ neutral = 0.01 }")
     setup = load_setup(str(written(tmp_path, text)))
     plan = make_plan(setup.config, "P01", 1, None)
-    times = [direction_observer(setup, plan).answer(trial).response_time_s for trial in plan.trials]
+    times = [direction_participant(setup, plan).answer(trial).response_time_s for trial in plan.trials]
     assert min(times) == 0.001
     assert all(time == round(time, 3) for time in times)
 
 
 def test_an_answer_depends_on_seed_and_person_and_not_on_what_was_answered_before() -> None:
     plan = plans(DIRECTION, 1)[0]
-    there = [direction_observer(DIRECTION, plan).answer(trial) for trial in plan.trials]
-    someone = direction_observer(DIRECTION, plan)
-    assert isinstance(someone, FeltObserver)
+    there = [direction_participant(DIRECTION, plan).answer(trial) for trial in plan.trials]
+    someone = direction_participant(DIRECTION, plan)
+    assert isinstance(someone, ModelParticipant)
     assert [someone.answer(trial) for trial in reversed(plan.trials)] == there[::-1]
     for other in (replace(plan, seed=12), replace(plan, participant_id="P999")):
-        assert [direction_observer(DIRECTION, other).answer(trial) for trial in plan.trials] != there
+        assert [direction_participant(DIRECTION, other).answer(trial) for trial in plan.trials] != there
 
 
 def test_the_same_shot_told_otherwise_is_another_decision_of_the_same_person() -> None:
     setup = alike_hurry()
     plan = plans(setup, 1)[0]
-    someone = direction_observer(setup, plan)
+    someone = direction_participant(setup, plan)
     for trial in plan.trials:
         told = [someone.answer(replace(trial, instruction=name)) for name in ("speed", "neutral", "")]
         assert told[1] == told[2]  # no instruction is neutral
@@ -224,7 +224,7 @@ def test_what_is_felt_alike_is_rated_alike_and_nothing_feels_like_something() ->
 def test_seed_and_person_make_the_ratings() -> None:
     def told(seed: int, who: str) -> list[Any]:
         plan = preference_plan(PREFERENCE.config, who, seed, None)
-        someone = preference_observer(PREFERENCE, plan)
+        someone = preference_participant(PREFERENCE, plan)
         return [someone.rate(trial) for trial in sorted(plan.trials, key=lambda trial: trial.method)]
 
     assert told(1, "P01") == told(1, "P01")

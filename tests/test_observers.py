@@ -11,13 +11,13 @@ from experiments.clock import VirtualClock
 from experiments.config.door import ConfigError
 from experiments.config.setup import Setup
 from experiments.design.streams import Stream
-from experiments.direction.observer import RatesObserver, TableObserver
-from experiments.direction.observer import observer as direction_observer
 from experiments.direction.session import make_plan as direction_plan
+from experiments.direction.synthetic import RatesParticipant, TableParticipant
+from experiments.direction.synthetic import synthetic_participant as direction_participant
 from experiments.load import load_setup
-from experiments.preference.observer import RatingsObserver, draw_ratings
-from experiments.preference.observer import observer as preference_observer
 from experiments.preference.session import make_plan as preference_plan
+from experiments.preference.synthetic import RatingsParticipant, draw_ratings
+from experiments.preference.synthetic import synthetic_participant as preference_participant
 from experiments.screens.synthetic import synthetic_screen
 from experiments.session.steps import on_scale
 
@@ -48,7 +48,7 @@ def correct_shares(setup: Setup[Any]) -> dict[tuple[str, str], np.ndarray]:
     shares = {(method, way): np.empty(PEOPLE) for method in METHODS for way in ("forward", "backward")}
     for person in range(PEOPLE):
         plan = replace(PLAN, seed=person, participant_id=f"P{person}")
-        someone = RatesObserver(setup.config, plan)
+        someone = RatesParticipant(setup.config, plan)
         right: Counter = Counter()
         for trial in plan.trials:
             right[trial.method, trial.direction] += someone.answer(trial).response == trial.direction
@@ -105,7 +105,7 @@ def test_people_who_are_alike_scatter_as_coins_do() -> None:
 
 
 def answers_of(setup: Setup[Any], order: list[Any]) -> dict[Any, Any]:
-    someone = direction_observer(setup, PLAN)
+    someone = direction_participant(setup, PLAN)
     return {trial: someone.answer(trial) for trial in order}
 
 
@@ -131,7 +131,7 @@ def test_an_answer_does_not_depend_on_what_was_answered_before(setup: Setup[Any]
     back = answers_of(setup, list(reversed(PLAN.trials)))
     assert there == back
     last = PLAN.trials[-1]
-    assert direction_observer(setup, PLAN).answer(last) == there[last]
+    assert direction_participant(setup, PLAN).answer(last) == there[last]
 
 
 @pytest.mark.parametrize("setup", [DIRECTION, table_setup(ALL_COUNTS)], ids=["rates", "table"])
@@ -147,7 +147,7 @@ def test_response_times_have_the_configured_median_and_spread() -> None:
     logs = []
     for person in range(60):
         plan = replace(PLAN, seed=person)
-        someone = RatesObserver(DIRECTION.config, plan)
+        someone = RatesParticipant(DIRECTION.config, plan)
         logs += [math.log(someone.answer(trial).response_time_s - law.shift_s) for trial in plan.trials]
     assert np.mean(logs) == pytest.approx(math.log(law.median_s), abs=4 * law.sigma / math.sqrt(len(logs)))
     assert np.std(logs) == pytest.approx(law.sigma, rel=4 / math.sqrt(2 * len(logs)))
@@ -156,7 +156,7 @@ def test_response_times_have_the_configured_median_and_spread() -> None:
 def test_seed_and_participant_make_the_person() -> None:
     def told(seed: int, who: str) -> list[Any]:
         plan = replace(PLAN, seed=seed, participant_id=who)
-        someone = RatesObserver(DIRECTION.config, plan)
+        someone = RatesParticipant(DIRECTION.config, plan)
         return [someone.answer(trial) for trial in plan.trials]
 
     assert told(1, "P01") == told(1, "P01")
@@ -170,8 +170,8 @@ def test_seed_and_participant_make_the_person() -> None:
 @pytest.mark.parametrize("seed", range(5))
 def test_a_table_is_answered_with_exactly_its_counts(seed: int) -> None:
     plan = direction_plan(DIRECTION.config, "P01", seed, None)
-    someone = direction_observer(table_setup(ALL_COUNTS), plan)
-    assert isinstance(someone, TableObserver)
+    someone = direction_participant(table_setup(ALL_COUNTS), plan)
+    assert isinstance(someone, TableParticipant)
     right = Counter(
         (trial.method, trial.direction) for trial in plan.trials if someone.answer(trial).response == trial.direction
     )
@@ -183,7 +183,7 @@ def test_a_table_is_answered_with_exactly_its_counts(seed: int) -> None:
 def test_which_trials_are_right_is_random() -> None:
     setup, patterns = table_setup(ALL_COUNTS), set()
     for seed in range(20):
-        someone = direction_observer(setup, replace(PLAN, seed=seed))
+        someone = direction_participant(setup, replace(PLAN, seed=seed))
         trials = [t for t in PLAN.trials if (t.method, t.direction) == ("asymmetric-1", "forward")]
         patterns.add(tuple(someone.answer(trial).response == trial.direction for trial in trials))
     assert len(patterns) > 15
@@ -289,7 +289,7 @@ def test_the_order_of_presentation_does_not_change_a_rating() -> None:
 def test_a_single_method_can_be_the_lowest_of_all() -> None:
     setup = changed(PREFERENCE, design={"methods": ("vibration",)}, synthetic__ratings={"same": None})
     plan = preference_plan(setup.config, "P01", 1, None)
-    rating = preference_observer(setup, plan).rate(plan.trials[0])
+    rating = preference_participant(setup, plan).rate(plan.trials[0])
     assert 0 <= rating <= 10
 
 
@@ -303,7 +303,7 @@ def test_the_nearest_value_of_the_scale_is_as_a_person_would_write_it(value: flo
 def test_exposures_are_positive_last_as_long_as_planned_in_the_mean_and_depend_on_nothing_before() -> None:
     times = []
     for seed in range(400):
-        someone = preference_observer(PREFERENCE, replace(FELT, seed=seed))
+        someone = preference_participant(PREFERENCE, replace(FELT, seed=seed))
         there = [someone.exposure_s(trial) for trial in FELT.trials]
         assert there == [someone.exposure_s(trial) for trial in reversed(FELT.trials)][::-1]
         times += there
@@ -319,8 +319,8 @@ def rating_rows(*cells: str, who: str = "P01") -> list[dict[str, str]]:
 
 
 def test_a_table_of_ratings_is_given_back_as_it_is_with_0_a_rating_and_empty_no_answer() -> None:
-    someone = preference_observer(table_setup(rating_rows("0", "", "7.35"), PREFERENCE), FELT)
-    assert isinstance(someone, RatingsObserver)
+    someone = preference_participant(table_setup(rating_rows("0", "", "7.35"), PREFERENCE), FELT)
+    assert isinstance(someone, RatingsParticipant)
     told = {trial.method: someone.rate(trial) for trial in FELT.trials}
     assert told == {"vibration": 0.0, "asymmetric-1": None, "asymmetric-2": 7.35}
 

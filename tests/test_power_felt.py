@@ -16,11 +16,11 @@ from analysis.predict.power.planned import ANOVA, ANY_PAIR, merged, shares
 from analysis.predict.power.studies import run_chunk
 from experiments.design.streams import generator
 from experiments.direction.config import DirectionConfig
-from experiments.direction.observer import mind_of
 from experiments.direction.session import make_plan
+from experiments.direction.synthetic import model_parameters
 from experiments.load import load_setup
 from experiments.synthetic.diffusion import People
-from experiments.synthetic.felt import FeltParticipant
+from experiments.synthetic.model_based import ModelBasedParticipant
 from experiments.synthetic.percept import forward_rates
 from tests.conftest import Recoil
 from tests.felt_configs import felt_config
@@ -34,11 +34,11 @@ SPREADS = {"drift_factor_sd": 0.3, "log_boundary_sd": 0.2, "logit_start_sd": 0.4
 def stepped(setup: Any, people: int) -> np.ndarray:
     """Correct answers (people, methods, 2 directions) of people who answer trial by trial."""
     config: DirectionConfig = setup.config
-    mind, percepts = mind_of(config), percepts_of_setup(setup)
+    mind, percepts = model_parameters(config), percepts_of_setup(setup)
     steps = np.zeros((people, len(METHODS), 2), dtype=np.int64)
     for person in range(people):
         plan = make_plan(config, f"P{person}", person, None)
-        someone = FeltParticipant(mind, percepts, plan)
+        someone = ModelBasedParticipant(mind, percepts, plan)
         for trial in plan.trials:
             decision = someone.decide(trial, trial.instruction or "neutral")
             right = decision.upper == (trial.direction == "forward")

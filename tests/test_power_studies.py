@@ -39,11 +39,11 @@ from analysis.predict.power.studies import (
 from analysis.predict.reproduction.reproduce import direction_odds, preference_odds
 from analysis.stats.tukey import rm_tukey_hsd
 from experiments.design.streams import Stream, generator
-from experiments.direction.observer import RatesObserver
 from experiments.direction.session import make_plan
+from experiments.direction.synthetic import RatesParticipant
 from experiments.load import find, load_setup
 from experiments.preference.config import RatingScale
-from experiments.preference.observer import draw_ratings
+from experiments.preference.synthetic import draw_ratings
 from experiments.session.steps import on_scale as one_on_scale
 from tests.power_chain import homogeneity_p
 
@@ -66,7 +66,7 @@ def test_the_answers_are_distributed_as_those_of_the_observer_step_by_step() -> 
     plan = make_plan(DIRECTION, "P01", 1, None)
     steps = np.zeros((people, 3, 2), dtype=np.int64)
     for person in range(people):
-        someone = RatesObserver(DIRECTION, replace(plan, seed=person, participant_id=f"P{person}"))
+        someone = RatesParticipant(DIRECTION, replace(plan, seed=person, participant_id=f"P{person}"))
         for trial in plan.trials:
             right = someone.answer(trial).response == trial.direction
             steps[person, METHODS.index(trial.method), int(trial.direction == "backward")] += right

@@ -26,7 +26,7 @@ def silent(_what, _total):
 
 
 def asked(table, *vary, **others):
-    return sweep.Asked(**{"gun": GUN, "fidelity": "full", "vary": vary, "changes": (), "table": table} | others)
+    return sweep.SweepRequest(**{"gun": GUN, "fidelity": "full", "vary": vary, "changes": (), "table": table} | others)
 
 
 def rows_of(path):
@@ -165,11 +165,11 @@ def test_values_that_make_no_sense_are_refused(words, said):
 )
 def test_a_table_that_makes_no_sense_is_refused_before_it_is_begun(tmp_path, changed, said):
     request = asked(tmp_path / "shots.csv", "friction_N=0.1,0.2")
-    values = {name: getattr(request, name) for name in sweep.Asked.__slots__} | changed
+    values = {name: getattr(request, name) for name in sweep.SweepRequest.__slots__} | changed
     if isinstance(values["table"], str):
         values["table"] = tmp_path / values["table"]
     with pytest.raises(ConfigError, match=said):
-        sweep.sweep(sweep.Asked(**values), silent)
+        sweep.sweep(sweep.SweepRequest(**values), silent)
     assert not list(tmp_path.iterdir())
 
 

@@ -15,11 +15,11 @@ from experiments.config.models import participant_codes
 from experiments.config.setup import Setup
 from experiments.design.plan import next_row
 from experiments.direction.config import DirectionConfig
-from experiments.direction.observer import mind_of
+from experiments.direction.synthetic import model_parameters
 from experiments.limits import MethodLimits, check_limits, check_methods
 from experiments.load import find, load_gun, load_setup, load_study
-from experiments.screens.synthetic import observer_of
-from experiments.synthetic.felt import NEUTRAL, rates_by_instruction
+from experiments.screens.synthetic import synthetic_participant_of
+from experiments.synthetic.model_based import NEUTRAL, rates_by_instruction
 from experiments.synthetic.percept import percepts_of
 
 EXAMPLE_SEED = 1
@@ -105,10 +105,10 @@ def _felt(setup: Setup[Any]) -> dict[str, dict[str, float]]:
     if config.synthetic.observer != "felt":
         return {}
     row = next_row(config.design.order, len(config.design.methods), [])
-    observer_of(setup, catalogue.experiment(setup).make_plan(config, "P01", EXAMPLE_SEED, row))
+    synthetic_participant_of(setup, catalogue.experiment(setup).make_plan(config, "P01", EXAMPLE_SEED, row))
     if not isinstance(config, DirectionConfig):
         return {}
-    mind = mind_of(config)
+    mind = model_parameters(config)
     percepts = percepts_of(setup.gun.renderings(config.design.methods), mind.percept.leak_s)
     told = config.design.instructions or (NEUTRAL,)
     return {

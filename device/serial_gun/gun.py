@@ -12,7 +12,7 @@ from device.serial_gun.arming import TRIES, Arming, ask, standing
 from device.serial_gun.checks import MAX_UNCERTAINTY_S
 from device.serial_gun.commands import Disconnected, Refused, TimedOut, Unsure
 from device.serial_gun.link import Link
-from device.serial_gun.reports import Asked, Order, asked, ready_s, report
+from device.serial_gun.reports import Order, ShotRequest, asked, ready_s, report
 from device.serial_gun.triggering import Triggering
 from device.wire.records import StatusRecord
 from device.words import GunState, GunStatus, Identity, LimitError, Shot, ShotReport
@@ -158,7 +158,7 @@ class SerialGun:
             self._counted = boot, standing(self.link)[1].count
         return self._counted
 
-    def _configure(self, wanted: Asked) -> None:
+    def _configure(self, wanted: ShotRequest) -> None:
         text = wanted.setting.text()
         if self._set != (self.link.session, text):
             self._set = (0, "")
@@ -190,7 +190,7 @@ class SerialGun:
         self._spend(order.wanted, max(told.start.time_s + told.start.uncertainty_s, order.requested_s))
         return report(order, told)
 
-    def _spend(self, wanted: Asked, start_s: float) -> None:
+    def _spend(self, wanted: ShotRequest, start_s: float) -> None:
         """Take a shot into account that was fired, or may have been."""
         start_s = max(start_s, self._history.earliest_s(wanted.load))
         self._history = self._history.record(wanted.load, start_s, start_s + wanted.rest_s)

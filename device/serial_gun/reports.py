@@ -21,7 +21,7 @@ _MILLI, _MICRO = 1e3, 1e6
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Asked:
+class ShotRequest:
     """A shot in whole millivolts and microseconds, what the model says of it, and what it asks of the coil."""
 
     shot: Shot
@@ -45,7 +45,7 @@ class Order:
     """
 
     mark: int
-    wanted: Asked
+    wanted: ShotRequest
     requested_s: float
     written_s: float
     at_s: float | None
@@ -56,7 +56,7 @@ class Order:
     disarms: int
 
 
-def asked(shot: Shot, methods: Mapping[str, Method]) -> Asked:
+def asked(shot: Shot, methods: Mapping[str, Method]) -> ShotRequest:
     """A shot as it can be said. `LimitError`: no such method, a drive of another kind, or no way home by the model."""
     if shot.method not in methods:
         raise LimitError(f"method is {shot.method!r}; this gun renders {', '.join(methods)}")
@@ -65,7 +65,7 @@ def asked(shot: Shot, methods: Mapping[str, Method]) -> Asked:
     method = methods[shot.method]
     drive = _sayable(shot.drive)
     rendering = rendering_of(method, drive)
-    return Asked(
+    return ShotRequest(
         shot=Shot(method=shot.method, direction=shot.direction, drive=drive),
         setting=_setting(shot, drive, rendering),
         rendering=rendering,

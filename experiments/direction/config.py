@@ -21,7 +21,7 @@ from experiments.config.models import (
     check_duration,
     once,
 )
-from experiments.synthetic.felt import DiffusionConfig, PeopleConfig
+from experiments.synthetic.model_based import DiffusionConfig, PeopleConfig
 from experiments.synthetic.percept import PerceptConfig
 
 Balance = Literal["session", "set", "set-exact"]

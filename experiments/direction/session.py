@@ -11,7 +11,7 @@ from experiments.design.plan import Plan, Trial, method_order
 from experiments.design.streams import Stream
 from experiments.direction.config import Breaks, Design, DirectionConfig
 from experiments.record.tables import Row, presentation
-from experiments.session.history import Story, Told, stories
+from experiments.session.history import Told, TrialHistory, stories
 from experiments.session.remarks import AnswerCorrected
 from experiments.session.steps import Answered, Ask, Fire, Fired, Prepare, Presenter, Rest, Session, Step
 
@@ -164,7 +164,7 @@ def rows(plan: Plan, told: Told) -> list[Row]:
     ]
 
 
-def _answer(trial: Trial, story: Story) -> Row:
+def _answer(trial: Trial, story: TrialHistory) -> Row:
     """The answer that counts: the last one given, or what it was corrected to, whose time is not the participant's."""
     given = story.last(Answered)
     if given is None:
@@ -180,7 +180,7 @@ def _answer(trial: Trial, story: Story) -> Row:
     }
 
 
-def _marked(row: Row, story: Story) -> Row:
+def _marked(row: Row, story: TrialHistory) -> Row:
     """A presentation whose answer came sooner than anybody reacts is marked: it was kept, and it was guessed."""
     given = story.last(Answered)
     if given is None or given.response_source != "participant" or given.response_time_s >= ANTICIPATION_S:

@@ -9,7 +9,7 @@ from experiments.design.plan import Plan, Trial, method_order
 from experiments.design.streams import Stream
 from experiments.preference.config import PreferenceConfig
 from experiments.record.tables import Row, presentation
-from experiments.session.history import Story, Told, stories
+from experiments.session.history import Told, TrialHistory, stories
 from experiments.session.remarks import DescriptionCorrected, RatingCorrected
 from experiments.session.steps import (
     Describe,
@@ -96,7 +96,7 @@ def rows(plan: Plan, told: Told) -> list[Row]:
     ]
 
 
-def _exposure(story: Story) -> Row:
+def _exposure(story: TrialHistory) -> Row:
     """The last exposure, and how long earlier ones of the same trial were felt before it."""
     felt = [word.exposure_s for word in story.words if isinstance(word, Presented | Interrupted) and word.exposure_s]
     shown = story.last(Presented)
@@ -106,7 +106,7 @@ def _exposure(story: Story) -> Row:
     return row | ({"earlier_exposure_s": sum(felt[:-1])} if felt[:-1] else {})
 
 
-def _rating(story: Story) -> Row:
+def _rating(story: TrialHistory) -> Row:
     """The rating that counts, the participant's words, and whose hand entered them."""
     entered = [word for word in story.words if isinstance(word, Rated | RatingCorrected)]
     described = [word for word in story.words if isinstance(word, Described | DescriptionCorrected)]

@@ -7,7 +7,7 @@ import io
 from collections.abc import Iterable
 
 from experiments.record import columns
-from experiments.session.history import Story, is_attempt
+from experiments.session.history import TrialHistory, is_attempt
 from experiments.session.remarks import (
     AnswerCorrected,
     DescriptionCorrected,
@@ -21,7 +21,7 @@ from experiments.session.steps import Answered, Described, Failed, Fired, Interr
 Row = dict[str, object]
 
 
-def presentation(story: Story, shown: type[Fired | Presented]) -> Row:
+def presentation(story: TrialHistory, shown: type[Fired | Presented]) -> Row:
     """How a trial was presented: attempts, flags, note, onset of the last stimulus, gun. Empty if it never was."""
     attempts = sum(is_attempt(step, word) for step, word in story.events)
     notes = "; ".join(remark.text for remark in story.all(Noted))
@@ -30,7 +30,7 @@ def presentation(story: Story, shown: type[Fired | Presented]) -> Row:
     return row | ({"onset_utc": stimulus.onset_utc, "gun": stimulus.gun} if stimulus else {})
 
 
-def _flags(story: Story) -> list[str]:
+def _flags(story: TrialHistory) -> list[str]:
     """What went wrong with the stimulus on the way, what was changed afterwards, and the experimenter's own marks."""
     found = {
         "device-error": bool(story.all(Failed)),
@@ -50,7 +50,7 @@ _CORRECTIONS: dict[type[Outcome], type[Remark]] = {
 }
 
 
-def _is_corrected(story: Story, given: type[Outcome]) -> bool:
+def _is_corrected(story: TrialHistory, given: type[Outcome]) -> bool:
     """Whether what counts is a correction: what was entered anew, because its trial was presented again, is none."""
     both = [word for word in story.words if isinstance(word, (given, _CORRECTIONS[given]))]
     return bool(both) and not isinstance(both[-1], given)

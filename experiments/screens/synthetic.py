@@ -21,7 +21,7 @@ from experiments.session.states import EMERGENCY, Position, State
 from experiments.session.steps import Ask, Outcome, Present, Rate, Rest, Step
 
 
-def observer_of(setup: Setup[Any], plan: Plan) -> Any:
+def synthetic_participant_of(setup: Setup[Any], plan: Plan) -> Any:
     """The synthetic participant that a setup asks for, the same in data mode and in visual mode.
 
     `ConfigError` if its table does not fit, or its numbers make nobody.
@@ -36,8 +36,8 @@ def observer_of(setup: Setup[Any], plan: Plan) -> Any:
 
 
 def synthetic_screen(setup: Setup[Any], plan: Plan, clock: Clock) -> SyntheticScreen:
-    """The screen of the synthetic participant that a setup asks for. Raises as `observer_of` does."""
-    return SyntheticScreen(setup.config, observer_of(setup, plan), clock)
+    """The screen of the synthetic participant that a setup asks for. Raises as `synthetic_participant_of` does."""
+    return SyntheticScreen(setup.config, synthetic_participant_of(setup, plan), clock)
 
 
 class SyntheticScreen:

@@ -32,7 +32,7 @@ Told = Sequence[tuple[Step | None, Outcome | Remark]]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Story:
+class TrialHistory:
     """What the journal tells of one trial, in order, and whether it was asked to be repeated."""
 
     events: list[tuple[Step | None, Outcome | Remark]]
@@ -52,10 +52,10 @@ class Story:
         return next(reversed(self.all(kind)), None)
 
 
-def stories(trials: Sequence[Trial], told: Told) -> dict[Trial, Story]:
+def stories(trials: Sequence[Trial], told: Told) -> dict[Trial, TrialHistory]:
     """What the journal tells, by trial."""
     repeated = {word.trial for _, word in told if isinstance(word, Repeat)}
-    found = {trial: Story(events=[], repeated=trial in repeated) for trial in trials}
+    found = {trial: TrialHistory(events=[], repeated=trial in repeated) for trial in trials}
     for step, word in told:
         trial = _trial(step, word)
         if trial is not None:

@@ -57,7 +57,7 @@ def simulate(
     if _vibration(find(gun), method, trace, plot, _given(others), as_json):
         return
     parameters = shot.parameters_of(find(gun), method, changes or [])
-    wanted = shot_scene.Asked(fidelity=fidelity, scene=scene, needs=need or [])
+    wanted = shot_scene.ModelRequest(fidelity=fidelity, scene=scene, needs=need or [])
     model, told = shot_scene.picked(wanted, parameters, vary or [])
     if vary or table:
         _sweep(
@@ -107,7 +107,7 @@ def _sweep(told: dict[str, Any], as_json: bool, **asked: Any) -> None:
 
     if note := sweep.interpreted_note():
         say(note)
-    found = sweep.sweep(sweep.Asked(**asked), progress) | told
+    found = sweep.sweep(sweep.SweepRequest(**asked), progress) | told
     show(found, shot_scene.with_scene(told, sweep.as_text(found)), as_json)
 
 
@@ -127,7 +127,7 @@ def twin(
     """The gun's twin on a pseudo-terminal, until interrupted: prints its port, to be given to --gun."""
     from recoil import twin as feature
 
-    asked = feature.Asked(
+    asked = feature.TwinRequest(
         gun=gun, link=link, tcp=tcp, speed=speed, drift_ppm=drift_ppm, wire=wire, troubles=trouble or [], seed=seed
     )
 
@@ -169,11 +169,11 @@ def bench(
 ) -> None:
     """Measure our own methods: error rates of the post-hoc tests, error against time of a simulated shot."""
     from analysis.predict.bench import run as feature
-    from analysis.predict.bench.physics import Asked
+    from analysis.predict.bench.physics import BenchRequest
 
     unknown = set(parts or []) - set(feature.PARTS)
     if unknown:
         raise typer.BadParameter(f"no part {', '.join(sorted(unknown))}; there are {', '.join(feature.PARTS)}")
-    asked = Asked(seed=seed, repeats=repeats, batch=batch, figures=out / "figures", progress=progress)
+    asked = BenchRequest(seed=seed, repeats=repeats, batch=batch, figures=out / "figures", progress=progress)
     found, lines = feature.bench(out, parts or [], asked)
     show(found, "\n".join([*lines, f"Report: {out / 'report.html'}"]), as_json)

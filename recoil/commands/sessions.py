@@ -69,7 +69,7 @@ def run(
     """One run: a participant doing one experiment."""
     from recoil import session
 
-    asked = session.Asked(
+    asked = session.SessionRequest(
         config=config,
         participant_id=participant or "",
         gun=gun,

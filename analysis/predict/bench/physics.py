@@ -23,7 +23,7 @@ Progress = Callable[[str, int], AbstractContextManager[Callable[[str], None]]]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Asked:
+class BenchRequest:
     """What to measure with. `figures` is the folder of the page's pictures; a batch holds `batch` shots."""
 
     seed: int
@@ -63,7 +63,7 @@ class ModelTime:
     batch_us: float | None
 
 
-def physics(asked: Asked) -> Measured:
+def physics(asked: BenchRequest) -> Measured:
     """Each model with the coil open and shorted after the pulse, one shot at a time and in a batch on one core."""
     cases = [(drive_off, fidelity) for drive_off in OFF_STATES for fidelity in FIDELITIES]
     with asked.progress("bench physics", len(cases)) as tell:
@@ -71,7 +71,7 @@ def physics(asked: Asked) -> Measured:
     return Measured(values=[asdict(row) for row in rows], section=_section(rows, asked), lines=tuple(_lines(rows)))
 
 
-def _measured(drive_off: DriveOff, fidelity: str, asked: Asked) -> ModelTime:
+def _measured(drive_off: DriveOff, fidelity: str, asked: BenchRequest) -> ModelTime:
     guns = [GunParameters(friction_N=friction, drive_off=drive_off) for friction in (FRICTION_I_N, FRICTION_II_N)]
 
     def single() -> None:
@@ -109,7 +109,7 @@ def _median_us(run: Callable[[], None], shots: int, repeats: int) -> float:
     return 1e6 * statistics.median(taken_s) / shots
 
 
-def _section(rows: list[ModelTime], asked: Asked) -> Section:
+def _section(rows: list[ModelTime], asked: BenchRequest) -> Section:
     table = Table(
         caption=f"Medians of {asked.repeats} runs on this machine; a batch holds {asked.batch:,} shots on one core",
         header=("Coil", "Model", "Error", "Stated for guns near the paper's", "One at a time [us]", "Batch [us]"),

@@ -8,7 +8,7 @@ from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
-from analysis.predict.bench.physics import Asked, Measured, physics
+from analysis.predict.bench.physics import BenchRequest, Measured, physics
 from analysis.report import apa
 from analysis.report.page import write_page
 from analysis.report.section import Section, Table
@@ -17,7 +17,7 @@ from experiments.record import storage
 from experiments.record.provenance import provenance
 
 
-def bench(out: Path, chosen: list[str], asked: Asked) -> tuple[dict[str, Any], tuple[str, ...]]:
+def bench(out: Path, chosen: list[str], asked: BenchRequest) -> tuple[dict[str, Any], tuple[str, ...]]:
     """Measure the chosen parts (all of `PARTS` if none is named); the JSON, and lines for the terminal.
 
     `out` gets `bench.json`, the report and its figures.
@@ -30,7 +30,7 @@ def bench(out: Path, chosen: list[str], asked: Asked) -> tuple[dict[str, Any], t
     return result, tuple(line for one in found.values() for line in one.lines)
 
 
-def post_hocs(asked: Asked) -> Measured:
+def post_hocs(asked: BenchRequest) -> Measured:
     """Error rates and power of the post-hoc tests at three departures from sphericity."""
     with asked.progress("bench post-hocs", 1) as tell:
         rows = operating.characteristics(asked.seed)
@@ -80,4 +80,4 @@ def _origin(seed: int) -> Section:
     return Section(title="Provenance", tables=(table,))
 
 
-PARTS: dict[str, Callable[[Asked], Measured]] = {"post-hocs": post_hocs, "physics": physics}
+PARTS: dict[str, Callable[[BenchRequest], Measured]] = {"post-hocs": post_hocs, "physics": physics}

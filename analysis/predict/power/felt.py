@@ -14,9 +14,9 @@ from numpy.typing import ArrayLike, NDArray
 
 from experiments.config.setup import Setup
 from experiments.direction.config import DirectionConfig, Synthetic
-from experiments.direction.observer import mind_of
+from experiments.direction.synthetic import model_parameters
 from experiments.synthetic.diffusion import People, upper_probabilities
-from experiments.synthetic.felt import NEUTRAL
+from experiments.synthetic.model_based import NEUTRAL
 from experiments.synthetic.percept import Percept, evidence, own_start, percepts_of
 
 Floats = NDArray[np.float64]
@@ -40,14 +40,14 @@ class Felt:
 def percepts_of_setup(setup: Setup[DirectionConfig]) -> dict[str, Percept]:
     """What the gun's shots give to feel, by method."""
     config = setup.config
-    return percepts_of(setup.gun.renderings(config.design.methods), mind_of(config).percept.leak_s)
+    return percepts_of(setup.gun.renderings(config.design.methods), model_parameters(config).percept.leak_s)
 
 
 def felt_of(
     config: DirectionConfig, percepts: Mapping[str, Percept], methods: Sequence[str], effect: float = 1.0
 ) -> Felt:
     """The participants of a config; `effect` is a factor on the evidence, at 0 nothing is felt."""
-    mind = mind_of(config)
+    mind = model_parameters(config)
     instructions = config.design.instructions or (NEUTRAL,)
     return Felt(
         log_odds=tuple(effect * evidence(percepts[method], mind.percept) for method in methods),

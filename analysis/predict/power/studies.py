@@ -20,7 +20,7 @@ from device.words import DIRECTIONS
 from experiments.config.setup import canonical_json
 from experiments.design.streams import generator
 from experiments.direction.config import DirectionConfig, Rates
-from experiments.direction.observer import probit_of_forward
+from experiments.direction.synthetic import probit_of_forward
 from experiments.preference.config import PreferenceConfig, Ratings, RatingScale
 
 Scores = NDArray[np.float64]
@@ -86,7 +86,7 @@ def null_ratings(law: Ratings) -> Ratings:
 def direction_counts(
     config: DirectionConfig, n: int, studies: int, draws: np.random.Generator, effect: float = 1.0
 ) -> Counts:
-    """Correct answers, (studies, n, methods, 2 directions), of people drawn as `RatesObserver` draws them.
+    """Correct answers, (studies, n, methods, 2 directions), of people drawn as `RatesParticipant` draws them.
 
     `effect` is a factor on the probit of each mean correct rate, so on d': at 0 directions are guessed.
     """

@@ -27,7 +27,7 @@ HONESTY = (
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Seated:
+class ReconstructedPeople:
     """Setups whose synthetic participants are reconstructed, and what is to be said of them."""
 
     setups: tuple[Setup[Any], ...]
@@ -62,7 +62,7 @@ def _other_trials(config: DirectionConfig | PreferenceConfig, paper: Paper) -> s
     return None if (config.rating.minimum, config.rating.maximum) == scale else "preference has another scale"
 
 
-def seat(study: StudyConfig, setups: Sequence[Setup[Any]], paper: Paper, seed: int) -> Seated:
+def seat(study: StudyConfig, setups: Sequence[Setup[Any]], paper: Paper, seed: int) -> ReconstructedPeople:
     """The setups with reconstructed participants. `ConfigError` if no such participants were found."""
     codes, seated, notes = study.codes(), [], [HONESTY]
     for setup in setups:
@@ -74,7 +74,7 @@ def seat(study: StudyConfig, setups: Sequence[Setup[Any]], paper: Paper, seed: i
         config = setup.config.model_copy(update={"synthetic": synthetic})
         seated.append(replace(setup, config=config, answers=answers))
         notes.append(note)
-    return Seated(setups=tuple(seated), notes=tuple(notes))
+    return ReconstructedPeople(setups=tuple(seated), notes=tuple(notes))
 
 
 def table_name(setup: Setup[Any]) -> str:

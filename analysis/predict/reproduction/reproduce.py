@@ -38,7 +38,7 @@ from experiments.design.streams import Stream, generator
 from experiments.direction.config import DirectionConfig
 from experiments.load import load_setup, load_study
 from experiments.preference.config import PreferenceConfig
-from experiments.preference.observer import draw_ratings
+from experiments.preference.synthetic import draw_ratings
 from experiments.rebuild import rebuild
 from experiments.record import storage
 from experiments.record.journal import is_empty
@@ -53,13 +53,13 @@ Counts = NDArray[np.int64]
 
 
 def direction_counts(config: DirectionConfig, methods: list[str], n: int, replications: int, seed: int) -> Counts:
-    """Correct answers, (replications, n, methods, 2 directions), of people drawn as `RatesObserver` draws them."""
+    """Correct answers, (replications, n, methods, 2 directions), of people drawn as `RatesParticipant` draws them."""
     counts = power_studies.direction_counts(config, n, replications, generator(seed, "odds", config.experiment))
     return counts[:, :, [config.design.methods.index(method) for method in methods]]
 
 
 def preference_scores(config: PreferenceConfig, methods: list[str], n: int, replications: int, seed: int) -> Scores:
-    """Ratings, (replications, n, methods), of people drawn as `RatingsObserver` draws them."""
+    """Ratings, (replications, n, methods), of people drawn as `RatingsParticipant` draws them."""
     stream = Stream(seed, "odds", config.experiment)
     law, scale = config.synthetic.ratings, config.rating
     people = (draw_ratings(law, scale, methods, stream) for _ in range(replications * n))

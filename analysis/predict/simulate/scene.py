@@ -16,7 +16,7 @@ _OWN = "needs of your own"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Asked:
+class ModelRequest:
     """Which model is wanted: by its name, by a scene's, or by needs, OUTPUT=ERROR each."""
 
     fidelity: str | None
@@ -24,7 +24,7 @@ class Asked:
     needs: Sequence[str]
 
 
-def picked(asked: Asked, gun: GunParameters, vary: Sequence[str]) -> tuple[str, dict[str, Any]]:
+def picked(asked: ModelRequest, gun: GunParameters, vary: Sequence[str]) -> tuple[str, dict[str, Any]]:
     """The model's name and, for a scene, what to tell of the pick. `ConfigError`: more than one is asked for.
 
     `vary` are the parameters of a table: the pick holds for all of its guns.
@@ -37,7 +37,7 @@ def picked(asked: Asked, gun: GunParameters, vary: Sequence[str]) -> tuple[str, 
     return choice.fidelity, {"scene": {"needs": dict(scene.needs), "why": scene.why} | asdict(choice)}
 
 
-def contact_of(asked: Asked, gun: GunParameters, impact_speed_m_s: float | None) -> dict[str, Any]:
+def contact_of(asked: ModelRequest, gun: GunParameters, impact_speed_m_s: float | None) -> dict[str, Any]:
     """How the collision may be taken, where the scene asks for one and there is one."""
     scene = _scene(asked)
     if scene is None or impact_speed_m_s is None or scene.contact_error is None:
@@ -68,7 +68,7 @@ _CONTACTS = {
 }
 
 
-def _scene(asked: Asked) -> Scene | None:
+def _scene(asked: ModelRequest) -> Scene | None:
     given = [
         name
         for name, value in (("--fidelity", asked.fidelity), ("--scene", asked.scene), ("--need", asked.needs))

@@ -149,7 +149,7 @@ class Axis:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Asked:
+class SweepRequest:
     """A table as it was asked for. `instead` are options that belong to a single shot, `changes` those of --set."""
 
     gun: GunParameters
@@ -161,7 +161,7 @@ class Asked:
     yes: bool = False
 
 
-def sweep(asked: Asked, progress: Progress) -> dict[str, Any]:
+def sweep(asked: SweepRequest, progress: Progress) -> dict[str, Any]:
     """Shoots all of it and writes the table; what it holds. `ConfigError`: what is asked for makes no table."""
     if not asked.vary or asked.table is None:
         raise ConfigError("--vary and --table go together: --vary KEY=FROM:TO:COUNT --table FILE.parquet")
@@ -180,7 +180,7 @@ def sweep(asked: Asked, progress: Progress) -> dict[str, Any]:
 
 
 def _shoot(
-    asked: Asked, axes: Sequence[Axis], rows: int, progress: Progress
+    asked: SweepRequest, axes: Sequence[Axis], rows: int, progress: Progress
 ) -> Iterator[tuple[dict[str, NDArray[Any]], ShotBatch]]:
     """Block by block: the parameters that vary, and the shots."""
     block = _BLOCK if find_spec("numba") else _SLOW_BLOCK
@@ -208,7 +208,7 @@ def as_text(found: dict[str, Any]) -> str:
     return f"Table: {found['table']}, {found['rows']:,} shots ({statuses})\n  varied: {varied}"
 
 
-def _facts(asked: Asked, axes: Sequence[Axis], rows: int) -> dict[str, Any]:
+def _facts(asked: SweepRequest, axes: Sequence[Axis], rows: int) -> dict[str, Any]:
     """Where the table comes from: it can be made again from this."""
     return {
         "rows": rows,
@@ -219,7 +219,7 @@ def _facts(asked: Asked, axes: Sequence[Axis], rows: int) -> dict[str, Any]:
     }
 
 
-def _is_sensible(asked: Asked, rows: int) -> None:
+def _is_sensible(asked: SweepRequest, rows: int) -> None:
     if asked.instead:
         raise ConfigError(
             f"--vary makes a table of shots; {', '.join(asked.instead)} tells of a single one: drop either"
@@ -230,7 +230,7 @@ def _is_sensible(asked: Asked, rows: int) -> None:
         raise ConfigError(f"--vary asks for {rows:,} shots; more than {MOST_ROWS:,} need --yes")
 
 
-def _axes(asked: Asked) -> list[Axis]:
+def _axes(asked: SweepRequest) -> list[Axis]:
     axes = [axis_of(words, asked.gun) for words in asked.vary]
     keys = [axis.key for axis in axes] + [change.partition("=")[0] for change in asked.changes]
     twice = sorted({key for key in keys[: len(axes)] if keys.count(key) > 1})

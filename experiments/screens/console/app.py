@@ -27,7 +27,7 @@ from experiments.screens.console.messages import Began, Ended, GunSeen, Message,
 from experiments.screens.console.view import About
 from experiments.screens.console.window import Bridge, ConsoleWindow
 from experiments.screens.console.windows import let_go, open_as_left, signals_to
-from experiments.screens.synthetic import observer_of
+from experiments.screens.synthetic import synthetic_participant_of
 from experiments.session import events
 from experiments.session.events import Hand
 from experiments.session.remarks import Noted, Remark
@@ -201,7 +201,7 @@ class Console:
 
     def _make_screen(self, setup: Setup[Any], plan: Plan, clock: Clock) -> Screen:
         del clock
-        self.observer = observer_of(setup, plan) if self._hand == "synthetic" else None
+        self.observer = synthetic_participant_of(setup, plan) if self._hand == "synthetic" else None
         about = About(
             setup=setup,
             plan=plan,

@@ -19,7 +19,7 @@ from experiments.config.setup import Setup
 from experiments.design.plan import Plan, Trial
 from experiments.design.streams import Stream
 from experiments.direction.config import DirectionConfig, Rates, ResponseTime
-from experiments.synthetic.felt import NEUTRAL, FeltParticipant, Mind
+from experiments.synthetic.model_based import NEUTRAL, ModelBasedParticipant, ModelParameters
 from experiments.synthetic.percept import Percept, percepts_of
 
 _NORMAL = NormalDist()
@@ -36,22 +36,24 @@ class Answer:
     response_time_s: float
 
 
-def observer(setup: Setup[DirectionConfig], plan: Plan) -> RatesObserver | TableObserver | FeltObserver:
+def synthetic_participant(
+    setup: Setup[DirectionConfig], plan: Plan
+) -> RatesParticipant | TableParticipant | ModelParticipant:
     """The synthetic participant that a setup asks for. `ValueError`: a table or numbers that make none."""
     kind = setup.config.synthetic.observer
     if kind == "table":
-        return TableObserver(setup.config, plan, setup.answers)
+        return TableParticipant(setup.config, plan, setup.answers)
     if kind == "felt":
-        mind = mind_of(setup.config)
+        mind = model_parameters(setup.config)
         methods = setup.gun.renderings(setup.config.design.methods)
-        return FeltObserver(mind, percepts_of(methods, mind.percept.leak_s), plan)
-    return RatesObserver(setup.config, plan)
+        return ModelParticipant(mind, percepts_of(methods, mind.percept.leak_s), plan)
+    return RatesParticipant(setup.config, plan)
 
 
-def mind_of(config: DirectionConfig) -> Mind:
+def model_parameters(config: DirectionConfig) -> ModelParameters:
     """What a config's participants who feel the gun are made of."""
     synthetic = config.synthetic
-    return Mind(
+    return ModelParameters(
         percept=synthetic.percept.own,
         boundaries=synthetic.diffusion.boundaries,
         non_decision_s=synthetic.diffusion.non_decision_s,
@@ -67,7 +69,7 @@ def probit_of_forward(rates: Rates, method: str, direction: Direction) -> float:
     return spread * _NORMAL.inv_cdf(rate) + rates.bias_mean
 
 
-class RatesObserver:
+class RatesParticipant:
     """A person drawn once, by the seed, who then answers each trial from what they are like.
 
     Each trial has a stream of its own, so an answer does not depend on what was answered before.
@@ -89,7 +91,7 @@ class RatesObserver:
         return Answer(response="forward" if forward else "backward", response_time_s=_response_time(self._times, draws))
 
 
-class TableObserver:
+class TableParticipant:
     """A person who gets exactly as many trials right as the table says, at random ones.
 
     `ValueError` if the table has no row for the participant and method, or a count beyond the planned trials.
@@ -116,14 +118,14 @@ class TableObserver:
         )
 
 
-class FeltObserver:
+class ModelParticipant:
     """A person who feels each shot by the full model and decides by a diffusion, as hurried as the trial's instruction.
 
-    Raises as `FeltParticipant` does.
+    Raises as `ModelBasedParticipant` does.
     """
 
-    def __init__(self, mind: Mind, percepts: Mapping[str, Percept], plan: Plan) -> None:
-        self._participant = FeltParticipant(mind, percepts, plan)
+    def __init__(self, mind: ModelParameters, percepts: Mapping[str, Percept], plan: Plan) -> None:
+        self._participant = ModelBasedParticipant(mind, percepts, plan)
 
     def answer(self, trial: Trial) -> Answer:
         """The answer to a shot of this trial's method and direction."""

@@ -21,7 +21,7 @@ NEUTRAL = "neutral"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Mind:
+class ModelParameters:
     """What the participants are made of. All but the percept's fitted numbers is assumed: the paper has no times."""
 
     percept: PerceptParameters = field(default_factory=PerceptParameters)
@@ -31,7 +31,7 @@ class Mind:
     people: People = field(default_factory=People)
 
 
-def rates_by_instruction(mind: Mind, percept: Percept) -> dict[str, float]:
+def rates_by_instruction(mind: ModelParameters, percept: Percept) -> dict[str, float]:
     """The share of "forward" after a forward shot in the mean over people, by instruction."""
     log_odds, neutral = evidence(percept, mind.percept), mind.boundaries[NEUTRAL]
     return {
@@ -40,14 +40,14 @@ def rates_by_instruction(mind: Mind, percept: Percept) -> dict[str, float]:
     }
 
 
-class FeltParticipant:
+class ModelBasedParticipant:
     """A person drawn once, by the seed, who then decides each trial by its own stream.
 
     The sensitivity is that at the neutral boundary, so a hurried person has the same drift and errs more.
     `ValueError`: somebody whose drift, boundary or non-decision time is beyond what a `Diffusion` may be.
     """
 
-    def __init__(self, mind: Mind, percepts: Mapping[str, Percept], plan: Plan) -> None:
+    def __init__(self, mind: ModelParameters, percepts: Mapping[str, Percept], plan: Plan) -> None:
         self._seed, self._who = plan.seed, (plan.experiment, plan.participant_id)
         someone = person(mind.people, Stream(plan.seed, "person", *self._who))
         self._diffusions = {
@@ -72,7 +72,7 @@ def _log_odds(percept: Percept, parameters: PerceptParameters) -> tuple[float, f
     return forward, -forward
 
 
-def _neutral(mind: Mind, log_odds: float) -> Diffusion:
+def _neutral(mind: ModelParameters, log_odds: float) -> Diffusion:
     return diffusion_of(
         log_odds,
         mind.percept,
@@ -82,7 +82,7 @@ def _neutral(mind: Mind, log_odds: float) -> Diffusion:
     )
 
 
-_MIND = Mind()
+_MIND = ModelParameters()
 
 Boundary = Annotated[float, Field(gt=0, le=100)]
 DecisionSeconds = Annotated[float, Field(ge=0, le=60)]

@@ -21,17 +21,17 @@ _EXPOSURE_SIGMA = 0.3
 """Spread of how long people ask for a stimulus (log-normal); assumed."""
 
 
-def observer(setup: Setup[PreferenceConfig], plan: Plan) -> RatingsObserver:
+def synthetic_participant(setup: Setup[PreferenceConfig], plan: Plan) -> RatingsParticipant:
     """The synthetic participant that a setup asks for."""
     config, kind = setup.config, setup.config.synthetic.observer
     if kind == "table":
-        return RatingsObserver(config, plan, _from_table(config, plan, setup.answers))
+        return RatingsParticipant(config, plan, _from_table(config, plan, setup.answers))
     stream = Stream(plan.seed, "ratings", plan.experiment, plan.participant_id)
     if kind == "felt":
         ratings = felt_ratings(config.synthetic.appeal, config.rating, strengths(setup), stream)
     else:
         ratings = draw_ratings(config.synthetic.ratings, config.rating, plan.methods, stream)
-    return RatingsObserver(config, plan, ratings)
+    return RatingsParticipant(config, plan, ratings)
 
 
 def strengths(setup: Setup[PreferenceConfig]) -> dict[str, float]:
@@ -62,7 +62,7 @@ def _kept(value: float, scale: RatingScale) -> float:
     return on_scale(value, scale)
 
 
-class RatingsObserver:
+class RatingsParticipant:
     """A person whose ratings are given beforehand: drawn by the seed, or read from a table. `None` is no answer."""
 
     def __init__(self, config: PreferenceConfig, plan: Plan, ratings: Mapping[str, float | None]) -> None:
