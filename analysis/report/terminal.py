@@ -11,6 +11,8 @@ from typing import Annotated, Any
 
 import typer
 
+from analysis.report.section import Section
+
 DONE, EXCEPTIONS, UNUSABLE, INTERRUPTED = 0, 1, 2, 130
 
 AsJson = Annotated[bool, typer.Option("--json", help="Print the machine-readable result.")]
@@ -27,6 +29,11 @@ Progress = Callable[[str, int], AbstractContextManager[Callable[[str], None]]]
 def say(text: str) -> None:
     """A line on stderr."""
     sys.stderr.write(f"{text}\n")
+
+
+def in_text(section: Section) -> str:
+    """A section's words for a terminal: its title, then what it says, set in."""
+    return "\n".join([section.title, *(f"  {line}" for line in (*section.paragraphs, *section.items))])
 
 
 def show(result: Any, text: str, as_json: bool) -> None:

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+from dataclasses import asdict
 from pathlib import Path
 from typing import Annotated
 
 import typer
 
-from analysis.report.terminal import AsJson, Config, FixedSeed, progress, show
+from analysis.report.terminal import AsJson, Config, FixedSeed, in_text, progress, show
 
 Participants = Annotated[str | None, typer.Option(metavar="N,N-N", help="How many people, such as 8,10,14-20.")]
 TrialsList = Annotated[
@@ -56,4 +57,4 @@ def power(
         paper=paper,
     )
     found = feature.power(request, feature.Where(workers=workers, scheduler=scheduler), out, progress)
-    show(found, f"{feature.as_text(found)}\nReport: {out / 'report.html'}", as_json)
+    show(asdict(found), f"{in_text(feature.in_short(found))}\nReport: {out / 'report.html'}", as_json)

@@ -1,45 +1,95 @@
-"""The report page of `recoil power`: smallest designs, the published pattern, curves, tables, what was assumed."""
+"""What `recoil power` found, as sections: in short, smallest designs, the published pattern, curves, tables."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from pathlib import Path
-from typing import Any
+from typing import Literal, TypeVar
 
 from analysis.predict.power.figures import Curve, Panel, Rate, figure_false_positives, figure_power
-from analysis.predict.power.planned import ANY_PAIR
+from analysis.predict.power.planned import ALL_PAIRS, ANOVA, ANY_PAIR, Share
+from analysis.predict.power.results import PATTERN, DesignPower, Power, PublishedPattern, Reached, Smallest
 from analysis.predict.power.studies import PUBLISHED
-from analysis.predict.power.words import (
-    HEADLINES,
-    claim_name,
-    claims_of,
-    design_name,
-    pattern_sentence,
-    share_cell,
-    varies,
-    wanted,
-)
 from analysis.report import apa
 from analysis.report.section import Picture, Section, Table
 
-Facts = dict[str, Any]
-Pick = Callable[[Facts], Any]
+Axis = Literal["participants", "trials"]
+One = TypeVar("One")
 
+HEADLINES = (ANOVA, ALL_PAIRS, PATTERN)
+"""What is told first, where there is room for little."""
 MOST_TABLES = 12
 """A page of more tables is read by nobody; `power.json` holds all."""
 
 
-def sections(found: Facts, figures: Path) -> tuple[Section, ...]:
+def sections(found: Power, figures: Path) -> tuple[Section, ...]:
     """The page's sections; their figures are written."""
-    parts = [_false_positives(found, figures)] if found["null"] else list(_power(found, figures))
-    return (*parts, _origin(found))
+    parts = [_false_positives(found, figures)] if found.null else list(_power(found, figures))
+    return (in_short(found), *parts, _origin(found))
 
 
-def _power(found: Facts, figures: Path) -> Iterator[Section]:
+def in_short(found: Power) -> Section:
+    """What a reader looks for, in a few lines."""
+    lines = _false_positive_lines(found) if found.null else _power_lines(found)
+    return Section(title=f"{found.title}: {found.studies} studies of each design", items=tuple(lines))
+
+
+def _false_positive_lines(found: Power) -> Iterator[str]:
+    for design in found.designs:
+        rates = ", ".join(f"{share.claim} {share_cell(share)}" for share in design.claims)
+        yield f"{design.participants} people {design.people}, false positives in % of the studies: {rates}"
+
+
+def _power_lines(found: Power) -> Iterator[str]:
+    yield from filter(None, [_pattern_sentence(found.published_pattern)])
+    for row in found.smallest:
+        if row.claim in HEADLINES:
+            methods = f", {', '.join(row.methods)}" if _varies(found, "methods") else ""
+            setting = f"{claim_name(row.claim)}, {_effect(row.effect)}{methods}"
+            yield f"The smallest design that reaches {apa.percent(found.target, 0)}, {setting}: {_reached(found, row)}"
+    if too_long := sum(bool(design.too_long) for design in found.designs):
+        yield f"{too_long} of {len(found.designs)} designs keep a participant too long; none of them is proposed."
+
+
+def claim_name(claim: str) -> str:
+    """A claim as people read it."""
+    return "the paper's whole pattern" if claim == PATTERN else claim
+
+
+def share_cell(share: Share | None) -> str:
+    """A share with its interval, in percent."""
+    return apa.NONE if share is None else f"{apa.number(100.0 * share.share, 1)} {_bounds(share)}"
+
+
+def _bounds(share: Share | PublishedPattern) -> str:
+    return apa.interval(100.0 * share.ci_low, 100.0 * share.ci_high, 1)
+
+
+def _pattern_sentence(pattern: PublishedPattern | None) -> str:
+    """The chance that the paper's whole pattern recurs."""
+    if pattern is None:
+        return ""
+    return (
+        f"With n = {pattern.participants} the paper's whole pattern of significance recurs in "
+        f"{apa.percent(pattern.share)} of the studies (95 % CI {_bounds(pattern)} %)."
+    )
+
+
+def _varies(found: Power, key: str) -> bool:
+    """Whether the designs differ in this."""
+    return len({getattr(design, key) for design in found.designs}) > 1
+
+
+def _is_aim(claim: str) -> bool:
+    """Whether a plan may aim at a claim: any but `any pair`, and of the published ones the whole pattern alone."""
+    return claim != ANY_PAIR and (claim == PATTERN or not claim.startswith(PUBLISHED))
+
+
+def _power(found: Power, figures: Path) -> Iterator[Section]:
     yield _smallest(found)
-    if found["published_pattern"]:
-        yield _pattern(found)
-    groups = _grouped(found["designs"], lambda one: (one["methods"], one["trials"], one["effect"]))
+    if found.published_pattern:
+        yield _pattern(found.studies, found.published_pattern)
+    groups = _grouped(found.designs, lambda one: (one.methods, one.trials, one.effect))
     cut = (f"{len(groups) - MOST_TABLES} more combinations are in power.json.",) if len(groups) > MOST_TABLES else ()
     shown = groups[:MOST_TABLES]
     yield Section(
@@ -61,19 +111,19 @@ def _power(found: Facts, figures: Path) -> Iterator[Section]:
     )
 
 
-def _smallest(found: Facts) -> Section:
-    target = apa.percent(found["target"], 0)
-    rows = [row for row in found["smallest"] if row["claim"] in wanted([row["claim"]])]
-    effects = sorted({row["effect"] for row in rows})
+def _smallest(found: Power) -> Section:
+    target = apa.percent(found.target, 0)
+    rows = [row for row in found.smallest if _is_aim(row.claim)]
+    effects = sorted({row.effect for row in rows})
     tables = []
-    for group in _grouped(rows, lambda row: row["methods"]):
-        claims = list(dict.fromkeys(row["claim"] for row in group))
-        by_place = {(row["claim"], row["effect"]): row for row in group}
+    for group in _grouped(rows, lambda row: row.methods):
+        claims = list(dict.fromkeys(row.claim for row in group))
+        by_place = {(row.claim, row.effect): row for row in group}
         body = tuple(
             (claim_name(claim), *(_reached(found, by_place.get((claim, effect))) for effect in effects))
             for claim in claims
         )
-        caption = f"The smallest design of this grid that reaches {target}: {', '.join(group[0]['methods'])}"
+        caption = f"The smallest design of this grid that reaches {target}: {', '.join(group[0].methods)}"
         tables.append(Table(caption=caption, header=("What is to be found", *map(_effect, effects)), rows=body))
     return Section(
         title=f"The smallest design that reaches {target}",
@@ -86,87 +136,96 @@ def _smallest(found: Facts) -> Section:
     )
 
 
-def _reached(found: Facts, row: Facts | None) -> str:
+def _reached(found: Power, row: Smallest | None) -> str:
     if row is None:
         return apa.NONE
-    if row["design"] is None:
-        return f"none (at most {apa.percent(row['most'])})"
-    return design_name(row["design"], with_trials=varies(found, "trials"))
+    if row.design is None:
+        return f"none (at most {apa.percent(row.most)})"
+    return _design_name(row.design, with_trials=_varies(found, "trials"))
 
 
-def _too_long(found: Facts) -> Iterator[str]:
-    for one in _grouped([one for one in found["designs"] if one["too_long"]], lambda one: one["too_long"]):
-        yield f"{one[0]['trials']} trials of each of {len(one[0]['methods'])} methods: {one[0]['too_long']}."
+def _design_name(design: Reached, *, with_trials: bool) -> str:
+    """A smallest design in a cell; with its trials where the grid has several numbers of them."""
+    trials = f" × {design.trials} trials a method" if with_trials else ""
+    return f"{design.participants} people{trials}, {apa.number(design.lab_hours, 1)} h"
 
 
-def _pattern(found: Facts) -> Section:
-    pattern = found["published_pattern"]
-    rows = tuple((one["claim"].removeprefix(f"{PUBLISHED}, "), share_cell(one)) for one in pattern["claims"])
-    caption = f"{found['studies']} studies of {pattern['participants']} people, {pattern['trials']} trials a method"
+def _too_long(found: Power) -> Iterator[str]:
+    for one in _grouped([one for one in found.designs if one.too_long], lambda one: one.too_long):
+        yield f"{one[0].trials} trials of each of {len(one[0].methods)} methods: {one[0].too_long}."
+
+
+def _pattern(studies: int, pattern: PublishedPattern) -> Section:
+    rows = tuple((one.claim.removeprefix(f"{PUBLISHED}, "), share_cell(one)) for one in pattern.claims)
+    caption = f"{studies} studies of {pattern.participants} people, {pattern.trials} trials a method"
     return Section(
         title="Would the published pattern recur?",
-        paragraphs=(pattern_sentence(found) or "",),
+        paragraphs=(_pattern_sentence(pattern),),
         tables=(Table(caption=caption, header=("Published claim", "Recurs, % of studies [95 % CI]"), rows=rows),),
     )
 
 
-def _power_table(group: Sequence[Facts]) -> Table:
-    names = wanted(dict.fromkeys(claim for one in group for claim in claims_of(one)))
-    rows = [(claim_name(name), *(_share(one, name) for one in group)) for name in names]
-    widest = max((share["ci_high"] - share["ci_low"]) / 2.0 for one in group for share in one["claims"])
+def _power_table(group: Sequence[DesignPower]) -> Table:
+    names = [name for name in _claims(group) if _is_aim(name)]
+    rows = [(claim_name(name), *(_percent(one.share_of(name)) for one in group)) for name in names]
+    widest = max((share.ci_high - share.ci_low) / 2.0 for one in group for share in one.claims)
     caption = f"Power in % of studies, 95 % intervals at most ±{apa.number(100.0 * widest, 1)}: {_setting(group[0])}"
     return _table(caption, "Significant", rows, group)
 
 
-def _precision_table(group: Sequence[Facts]) -> Table:
-    names = [one["measure"] for one in group[0]["precision"]]
+def _claims(designs: Iterable[DesignPower]) -> list[str]:
+    """The claims of all designs, each once."""
+    return list(dict.fromkeys(share.claim for one in designs for share in one.claims))
+
+
+def _precision_table(group: Sequence[DesignPower]) -> Table:
+    names = [one.measure for one in group[0].precision]
     rows = [(name, *(_half_width(one, name) for one in group)) for name in names]
     return _table(f"Half-widths: {_setting(group[0])}", "95 % interval of", rows, group)
 
 
-def _table(caption: str, corner: str, rows: Sequence[tuple[str, ...]], group: Sequence[Facts]) -> Table:
+def _table(caption: str, corner: str, rows: Sequence[tuple[str, ...]], group: Sequence[DesignPower]) -> Table:
     """A column for each number of participants, the hours in the lab first."""
-    hours = ("hours in the lab", *(apa.number(one["lab_hours"], 1) for one in group))
-    header = (f"{corner} / participants", *(str(one["participants"]) for one in group))
+    hours = ("hours in the lab", *(apa.number(one.lab_hours, 1) for one in group))
+    header = (f"{corner} / participants", *(str(one.participants) for one in group))
     return Table(caption=caption, header=header, rows=(hours, *rows))
 
 
-def _share(design: Facts, claim: str) -> str:
-    share = claims_of(design).get(claim)
-    return apa.NONE if share is None else apa.number(100.0 * share["share"], 1)
+def _percent(share: Share | None) -> str:
+    return apa.NONE if share is None else apa.number(100.0 * share.share, 1)
 
 
-def _half_width(design: Facts, measure: str) -> str:
-    return apa.number(next(one["half_width"] for one in design["precision"] if one["measure"] == measure), 3)
+def _half_width(design: DesignPower, measure: str) -> str:
+    return apa.number(next(one.half_width for one in design.precision if one.measure == measure), 3)
 
 
-def _pictures(found: Facts, figures: Path) -> Iterator[Picture]:
+def _pictures(found: Power, figures: Path) -> Iterator[Picture]:
     """A figure for each set of methods."""
-    for number, group in enumerate(_grouped(found["designs"], lambda one: one["methods"]), start=1):
+    for number, group in enumerate(_grouped(found.designs, lambda one: one.methods), start=1):
         stem = "power" if number == 1 else f"power-{number}"
-        x = "participants" if len({one["participants"] for one in group}) > 1 else "trials"
+        x: Axis = "participants" if len({one.participants for one in group}) > 1 else "trials"
         label = {"participants": "participants", "trials": "trials a method"}[x]
-        figure_power(_panels(group, x), label, found["target"], figures / stem)
+        figure_power(_panels(group, x), label, found.target, figures / stem)
         yield Picture(
             stem=stem,
-            caption=f"Power over {label}; bands: 95 % Monte Carlo intervals. Methods: {', '.join(group[0]['methods'])}",
+            caption=f"Power over {label}; bands: 95 % Monte Carlo intervals. Methods: {', '.join(group[0].methods)}",
             alt=f"Curves of the share of studies in which each claim is found, over {label}",
         )
 
 
-def _panels(group: Sequence[Facts], x: str) -> list[list[Panel]]:
+def _panels(group: Sequence[DesignPower], x: Axis) -> list[list[Panel]]:
     """A panel an effect, a curve a claim; with several numbers of trials a row a claim, a curve a number of trials."""
-    by_effect = _grouped(group, lambda one: one["effect"])
-    trials = sorted({one["trials"] for one in group})
-    claims = [name for name in HEADLINES if any(name in claims_of(one) for one in group)]
+    by_effect = _grouped(group, lambda one: one.effect)
+    trials = sorted({one.trials for one in group})
+    claims = [name for name in HEADLINES if name in _claims(group)]
     if x == "trials" or len(trials) == 1:
-        return [[Panel(title=_effect(some[0]["effect"]), curves=_curves(some, claims, x)) for some in by_effect]]
+        return [[Panel(title=_effect(some[0].effect), curves=_curves(some, claims, x)) for some in by_effect]]
     return [
         [
             Panel(
-                title=f"{claim_name(claim)}\n{_effect(some[0]['effect'])}",
+                title=f"{claim_name(claim)}\n{_effect(some[0].effect)}",
                 curves=[
-                    _curve([one for one in some if one["trials"] == each], claim, x, f"{each} trials a method")
+                    _curve([one for one in some if one.trials == each], claim, x, f"{each} trials a method")
                     for each in trials
                 ],
             )
@@ -176,21 +235,26 @@ def _panels(group: Sequence[Facts], x: str) -> list[list[Panel]]:
     ]
 
 
-def _curves(designs: Sequence[Facts], claims: Sequence[str], x: str) -> list[Curve]:
+def _curves(designs: Sequence[DesignPower], claims: Sequence[str], x: Axis) -> list[Curve]:
     return [_curve(designs, claim, x, claim_name(claim)) for claim in claims]
 
 
-def _curve(designs: Sequence[Facts], claim: str, x: str, name: str) -> Curve:
-    points = [(one[x], claims_of(one)[claim]) for one in designs if claim in claims_of(one)]
-    share, low, high = ([point[key] for _, point in points] for key in ("share", "ci_low", "ci_high"))
-    return Curve(name=name, x=[place for place, _ in points], share=share, low=low, high=high)
+def _curve(designs: Sequence[DesignPower], claim: str, x: Axis, name: str) -> Curve:
+    points = [(getattr(one, x), share) for one in designs if (share := one.share_of(claim)) is not None]
+    return Curve(
+        name=name,
+        x=[place for place, _ in points],
+        share=[share.share for _, share in points],
+        low=[share.ci_low for _, share in points],
+        high=[share.ci_high for _, share in points],
+    )
 
 
-def _false_positives(found: Facts, figures: Path) -> Section:
-    groups = _grouped(found["designs"], lambda one: (one["methods"], one["trials"], one["participants"]))
+def _false_positives(found: Power, figures: Path) -> Section:
+    groups = _grouped(found.designs, lambda one: (one.methods, one.trials, one.participants))
     shown = groups[:4]
-    panels = [(f"{some[0]['participants']} people", _null_rates(some)) for some in shown]
-    figure_false_positives(panels, found["level"], figures / "false-positives")
+    panels = [(f"{some[0].participants} people", _null_rates(some)) for some in shown]
+    figure_false_positives(panels, found.level, figures / "false-positives")
     return Section(
         title="False positives of null participants",
         paragraphs=("Each share is of simulated studies in which there is nothing to be found; 5 % is claimed.",),
@@ -205,50 +269,50 @@ def _false_positives(found: Facts, figures: Path) -> Section:
     )
 
 
-def _null_rates(group: Sequence[Facts]) -> list[Rate]:
+def _null_rates(group: Sequence[DesignPower]) -> list[Rate]:
     return [
-        Rate(claim=one["claim"], people=design["people"], share=one["share"], low=one["ci_low"], high=one["ci_high"])
+        Rate(claim=one.claim, people=design.people, share=one.share, low=one.ci_low, high=one.ci_high)
         for design in group
-        for one in design["claims"]
+        for one in design.claims
     ]
 
 
-def _null_table(group: Sequence[Facts]) -> Table:
+def _null_table(group: Sequence[DesignPower]) -> Table:
     one = group[0]
     rows = tuple(
-        (claim, *(share_cell(claims_of(design).get(claim)) for design in group)) for claim in claims_of(group[0])
+        (claim, *(share_cell(design.share_of(claim)) for design in group)) for claim in _claims(group[:1])
     )
     return Table(
         caption=(
-            f"False positives, % of studies [95 % CI]: {one['participants']} people, {one['trials']} trials a method; "
+            f"False positives, % of studies [95 % CI]: {one.participants} people, {one.trials} trials a method; "
             f"{ANY_PAIR} is the familywise error"
         ),
-        header=("Test", *(design["people"] for design in group)),
+        header=("Test", *(design.people for design in group)),
         rows=rows,
     )
 
 
-def _origin(found: Facts) -> Section:
-    facts = {"seed": found["seed"], "studies of each design": found["studies"], **found["provenance"]}
+def _origin(found: Power) -> Section:
+    facts = {"seed": found.seed, "studies of each design": found.studies, **found.provenance}
     rows = tuple((name, str(value)) for name, value in facts.items())
     return Section(
         title="What this rests on",
         tables=(Table(caption="Where the numbers come from", header=("What", "Value"), rows=rows),),
-        items=tuple(found["assumptions"]),
+        items=tuple(found.assumptions),
     )
 
 
-def _grouped(designs: Sequence[Facts], key: Pick) -> list[list[Facts]]:
+def _grouped(some: Iterable[One], key: Callable[[One], object]) -> list[list[One]]:
     """Those with the same key together, in the order of their first."""
-    groups: dict[str, list[Facts]] = {}
-    for one in designs:
-        groups.setdefault(repr(key(one)), []).append(one)
+    groups: dict[object, list[One]] = {}
+    for one in some:
+        groups.setdefault(key(one), []).append(one)
     return list(groups.values())
 
 
-def _setting(design: Facts) -> str:
-    methods = ", ".join(design["methods"])
-    return f"{_effect(design['effect'])}, {design['trials']} trials a method ({methods})"
+def _setting(design: DesignPower) -> str:
+    methods = ", ".join(design.methods)
+    return f"{_effect(design.effect)}, {design.trials} trials a method ({methods})"
 
 
 def _effect(effect: float) -> str:

@@ -9,25 +9,21 @@ from collections.abc import Callable, Iterator, Sequence
 from contextlib import AbstractContextManager
 from dataclasses import asdict, dataclass
 from pathlib import Path
-from typing import Any
 
-from analysis.paper.odds import SIGNIFICANT, WHOLE_PATTERN
 from analysis.predict.jobs import Run, cores, on_cluster, on_processes
-from analysis.predict.power.grid import Cell, Grid, Request, make_grid
-from analysis.predict.power.page import sections
-from analysis.predict.power.planned import Option, Tally, merged, precisions, shares, smallest
-from analysis.predict.power.studies import PUBLISHED, Chunk, run_chunk
-from analysis.predict.power.words import as_text, assumptions
+from analysis.predict.power.assumptions import assumptions
+from analysis.predict.power.grid import Grid, Request, make_grid
+from analysis.predict.power.page import in_short, sections
+from analysis.predict.power.planned import Tally
+from analysis.predict.power.results import Power, power_of
+from analysis.predict.power.studies import Chunk, run_chunk
 from analysis.report.page import write_page
 from analysis.report.terminal import Progress
 from experiments.config.setup import sha256
 from experiments.record import storage
 from experiments.record.provenance import provenance
 
-__all__ = ["Request", "Where", "as_text", "power"]
-
-Facts = dict[str, Any]
-
+__all__ = ["Request", "Where", "in_short", "power"]
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Where:
@@ -37,8 +33,8 @@ class Where:
     scheduler: str | None = None
 
 
-def power(request: Request, where: Where, out: Path, progress: Progress) -> Facts:
-    """Simulate, analyse, write `power.json`, report and figures into `out`; the content of `power.json` is returned.
+def power(request: Request, where: Where, out: Path, progress: Progress) -> Power:
+    """Simulate, analyse, write `power.json`, report and figures into `out`; what was found is returned.
 
     What was done before an interruption is kept there, and the same request goes on with it.
     """
@@ -48,8 +44,8 @@ def power(request: Request, where: Where, out: Path, progress: Progress) -> Fact
     with _workers(where) as run, progress("power", len(chunks)) as tell:
         storage.make_folder(out)
         tallies = _tallies(chunks, run, kept, tell)
-    found = _facts(grid, iter(tallies))
-    data = (json.dumps(found, indent=1, ensure_ascii=False, allow_nan=False) + "\n").encode()
+    found = power_of(grid, iter(tallies), assumptions(grid))
+    data = (json.dumps(asdict(found), indent=1, ensure_ascii=False, allow_nan=False) + "\n").encode()
     storage.write_whole(out / "power.json", data)
     write_page(out, f"Simulated power: {grid.config.title}", sections(found, out / "figures"))
     kept.unlink(missing_ok=True)
@@ -109,80 +105,3 @@ def _kept(path: Path) -> Iterator[tuple[int, Tally]]:
 
 def _name(chunk: Chunk) -> str:
     return f"{chunk.design.participants} people, effect {chunk.design.effect:g}"
-
-
-def _facts(grid: Grid, tallies: Iterator[Tally]) -> Facts:
-    """The content of `power.json`."""
-    cells, request = grid.all_cells, grid.request
-    of_cells = [merged([next(tallies) for _ in grid.chunks_of(cell)]) for cell in cells]
-    designs = [_design(cell, tally) for cell, tally in zip(cells, of_cells, strict=True)]
-    return {
-        "experiment": grid.config.experiment,
-        "title": grid.config.title,
-        "seed": request.seed,
-        "studies": request.studies,
-        "level": SIGNIFICANT,
-        "target": request.target,
-        "null": request.null,
-        "designs": designs[: len(grid.cells)],
-        "smallest": [] if request.null else _smallest(designs[: len(grid.cells)], request.target),
-        "published_pattern": _pattern(designs[cells.index(grid.reference)]) if grid.reference else None,
-        "assumptions": assumptions(grid),
-        "provenance": provenance(),
-    }
-
-
-def _design(cell: Cell, tally: Tally) -> Facts:
-    return {
-        **asdict(cell.design),
-        "methods": list(cell.design.methods),
-        "duration_s": cell.duration_s,
-        "lab_hours": cell.lab_hours,
-        "too_long": cell.too_long,
-        "claims": [asdict(share) for share in shares(tally)],
-        "precision": [asdict(one) for one in precisions(tally)],
-    }
-
-
-def _pattern(design: Facts) -> Facts:
-    """The published claims at the paper's own design."""
-    claims = [one for one in design["claims"] if one["claim"].startswith(PUBLISHED)]
-    whole = next(one for one in claims if one["claim"] == f"{PUBLISHED}, {WHOLE_PATTERN}")
-    return {
-        "participants": design["participants"],
-        "trials": design["trials"],
-        "lab_hours": design["lab_hours"],
-        "share": whole["share"],
-        "ci_low": whole["ci_low"],
-        "ci_high": whole["ci_high"],
-        "claims": claims,
-    }
-
-
-def _smallest(designs: Sequence[Facts], target: float) -> list[Facts]:
-    """For each effect and set of methods: the cheapest design at which each claim holds often enough."""
-    found = []
-    for effect, methods in dict.fromkeys((one["effect"], tuple(one["methods"])) for one in designs):
-        group = [one for one in designs if (one["effect"], tuple(one["methods"])) == (effect, methods)]
-        for place, claim in enumerate(one["claim"] for one in group[0]["claims"]):
-            reached = [one["claims"][place] for one in group]
-            options = [
-                Option(
-                    lab_hours=one["lab_hours"],
-                    participants=one["participants"],
-                    ci_low=share["ci_low"],
-                    allowed=not one["too_long"],
-                )
-                for one, share in zip(group, reached, strict=True)
-            ]
-            best = smallest(options, target)
-            design = None if best is None else _named(group[best]) | reached[best]
-            most = max(reached, key=lambda one: one["share"])
-            found.append(
-                {"claim": claim, "effect": effect, "methods": list(methods), "design": design, "most": most["share"]}
-            )
-    return found
-
-
-def _named(design: Facts) -> Facts:
-    return {key: design[key] for key in ("participants", "trials", "lab_hours")}

@@ -1,24 +1,13 @@
-"""What `recoil power` says in words: what was simulated, and its findings on a terminal."""
+"""What simulated power rests on, in words: how the synthetic participants are drawn, and what is counted."""
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator
-from typing import Any
+from collections.abc import Iterator
 
-from analysis.paper.odds import WHOLE_PATTERN
 from analysis.predict.power.grid import Grid
-from analysis.predict.power.planned import ALL_PAIRS, ANOVA, ANY_PAIR
 from analysis.predict.power.request import FELT
-from analysis.predict.power.studies import PUBLISHED
-from analysis.report import apa
 from experiments.direction.config import DirectionConfig, Rates
 from experiments.preference.config import PreferenceConfig, Ratings
-
-Facts = dict[str, Any]
-
-PATTERN = f"{PUBLISHED}, {WHOLE_PATTERN}"
-HEADLINES = (ANOVA, ALL_PAIRS, PATTERN)
-"""What is told first, where there is room for little."""
 
 
 def assumptions(grid: Grid) -> list[str]:
@@ -40,82 +29,6 @@ def assumptions(grid: Grid) -> list[str]:
         "Intervals are Wilson's, of 95 %: the Monte Carlo error of so many studies, not the uncertainty of the "
         "assumed participants.",
     ]
-
-
-def as_text(found: Facts) -> str:
-    """The findings for a terminal."""
-    return "\n".join([f"{found['title']}: {found['studies']} studies of each design", *_body(found)])
-
-
-def claims_of(design: Facts) -> dict[str, Facts]:
-    """A design's shares by the name of the claim."""
-    return {share["claim"]: share for share in design["claims"]}
-
-
-def share_cell(share: Facts | None) -> str:
-    """A share with its interval, in percent."""
-    if share is None:
-        return apa.NONE
-    low, high = (100.0 * share[end] for end in ("ci_low", "ci_high"))
-    return f"{apa.number(100.0 * share['share'], 1)} {apa.interval(low, high, 1)}"
-
-
-def design_name(design: Facts, *, with_trials: bool) -> str:
-    """A smallest design in a cell; with its trials where the grid has several numbers of them."""
-    trials = f" × {design['trials']} trials a method" if with_trials else ""
-    return f"{design['participants']} people{trials}, {apa.number(design['lab_hours'], 1)} h"
-
-
-def varies(found: Facts, key: str) -> bool:
-    """Do the designs differ in this?"""
-    return len({repr(design[key]) for design in found["designs"]}) > 1
-
-
-def claim_name(claim: str) -> str:
-    """A claim as people read it."""
-    return "the paper's whole pattern" if claim == PATTERN else claim
-
-
-def wanted(claims: Iterable[str]) -> list[str]:
-    """The claims that a plan may aim at: without `any pair`, and of the published ones the whole pattern alone."""
-    return [c for c in claims if c != ANY_PAIR and (c == PATTERN or not c.startswith(PUBLISHED))]
-
-
-def pattern_sentence(found: Facts) -> str | None:
-    """The chance that the paper's whole pattern recurs."""
-    pattern = found["published_pattern"]
-    if pattern is None:
-        return None
-    return (
-        f"With n = {pattern['participants']} the paper's whole pattern of significance recurs in "
-        f"{apa.percent(pattern['share'])} of the studies (95 % CI {_bounds(pattern)} %)."
-    )
-
-
-def _bounds(share: Facts) -> str:
-    return apa.interval(100.0 * share["ci_low"], 100.0 * share["ci_high"], 1)
-
-
-def _body(found: Facts) -> Iterator[str]:
-    if found["null"]:
-        for design in found["designs"]:
-            yield f"  {design['participants']} people {design['people']}: false positives in % of the studies"
-            yield from (f"    {share['claim']:44} {share_cell(share)}" for share in design["claims"])
-        return
-    yield from (f"  {sentence}" for sentence in [pattern_sentence(found)] if sentence)
-    yield f"  The smallest design that reaches {apa.percent(found['target'], 0)}:"
-    yield from (f"    {_smallest(found, row)}" for row in found["smallest"] if row["claim"] in HEADLINES)
-    if too_long := sum(bool(design["too_long"]) for design in found["designs"]):
-        yield f"  {too_long} of {len(found['designs'])} designs keep a participant too long; none of them is proposed."
-
-
-def _smallest(found: Facts, row: Facts) -> str:
-    methods = f", {', '.join(row['methods'])}" if varies(found, "methods") else ""
-    if row["design"] is None:
-        reached = f"none; at most {apa.percent(row['most'])}"
-    else:
-        reached = design_name(row["design"], with_trials=varies(found, "trials"))
-    return f"{claim_name(row['claim']):26} effect × {row['effect']:g}{methods}: {reached}"
 
 
 def _rates(rates: Rates) -> Iterator[str]:

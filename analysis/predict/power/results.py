@@ -1,0 +1,179 @@
+"""What simulated power comes to: each design's shares and half-widths, the smallest designs, the published pattern."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import dataclass
+
+from analysis.paper.odds import SIGNIFICANT, WHOLE_PATTERN
+from analysis.predict.power.grid import Cell, Grid
+from analysis.predict.power.planned import Option, Precision, Share, Tally, merged, precisions, shares, smallest
+from analysis.predict.power.studies import PUBLISHED
+from experiments.record.provenance import provenance
+
+PATTERN = f"{PUBLISHED}, {WHOLE_PATTERN}"
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class DesignPower:
+    """A design, what it costs, and what studies of it found; `too_long` says why it keeps a participant too long."""
+
+    participants: int
+    trials: int
+    methods: tuple[str, ...]
+    effect: float
+    people: str
+    duration_s: float
+    lab_hours: float
+    too_long: str
+    claims: tuple[Share, ...]
+    precision: tuple[Precision, ...]
+
+    def share_of(self, claim: str) -> Share | None:
+        """The share of studies in which a claim held; `None` if it is none of this design's."""
+        return next((share for share in self.claims if share.claim == claim), None)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Reached:
+    """The cheapest design at which a claim holds often enough, and how often."""
+
+    participants: int
+    trials: int
+    lab_hours: float
+    claim: str
+    held: int
+    share: float
+    ci_low: float
+    ci_high: float
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Smallest:
+    """For a claim, an effect and a set of methods: the design that reaches the target, and the most that any does."""
+
+    claim: str
+    effect: float
+    methods: tuple[str, ...]
+    design: Reached | None
+    most: float
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class PublishedPattern:
+    """The published claims at the paper's own design: how often the whole pattern recurs, and each claim alone."""
+
+    participants: int
+    trials: int
+    lab_hours: float
+    share: float
+    ci_low: float
+    ci_high: float
+    claims: tuple[Share, ...]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Power:
+    """The content of `power.json`."""
+
+    experiment: str
+    title: str
+    seed: int
+    studies: int
+    level: float
+    target: float
+    null: bool
+    designs: tuple[DesignPower, ...]
+    smallest: tuple[Smallest, ...]
+    published_pattern: PublishedPattern | None
+    assumptions: tuple[str, ...]
+    provenance: dict[str, str]
+
+
+def power_of(grid: Grid, tallies: Iterator[Tally], assumptions: Iterable[str]) -> Power:
+    """What the tallies of a grid's chunks, in their order, come to."""
+    cells, request = grid.all_cells, grid.request
+    designs = [_design(cell, merged([next(tallies) for _ in grid.chunks_of(cell)])) for cell in cells]
+    own = designs[: len(grid.cells)]
+    return Power(
+        experiment=grid.config.experiment,
+        title=grid.config.title,
+        seed=request.seed,
+        studies=request.studies,
+        level=SIGNIFICANT,
+        target=request.target,
+        null=request.null,
+        designs=tuple(own),
+        smallest=() if request.null else tuple(_smallest(own, request.target)),
+        published_pattern=_pattern(designs[cells.index(grid.reference)]) if grid.reference else None,
+        assumptions=tuple(assumptions),
+        provenance=provenance(),
+    )
+
+
+def _design(cell: Cell, tally: Tally) -> DesignPower:
+    design = cell.design
+    return DesignPower(
+        participants=design.participants,
+        trials=design.trials,
+        methods=design.methods,
+        effect=design.effect,
+        people=design.people,
+        duration_s=cell.duration_s,
+        lab_hours=cell.lab_hours,
+        too_long=cell.too_long,
+        claims=shares(tally),
+        precision=precisions(tally),
+    )
+
+
+def _pattern(design: DesignPower) -> PublishedPattern:
+    claims = tuple(one for one in design.claims if one.claim.startswith(PUBLISHED))
+    whole = next(one for one in claims if one.claim == PATTERN)
+    return PublishedPattern(
+        participants=design.participants,
+        trials=design.trials,
+        lab_hours=design.lab_hours,
+        share=whole.share,
+        ci_low=whole.ci_low,
+        ci_high=whole.ci_high,
+        claims=claims,
+    )
+
+
+def _smallest(designs: Sequence[DesignPower], target: float) -> Iterator[Smallest]:
+    """For each effect and set of methods: the cheapest design at which each claim holds often enough."""
+    for effect, methods in dict.fromkeys((one.effect, one.methods) for one in designs):
+        group = [one for one in designs if (one.effect, one.methods) == (effect, methods)]
+        for place, claim in enumerate(one.claim for one in group[0].claims):
+            reached = [one.claims[place] for one in group]
+            best = smallest([_option(one, share) for one, share in zip(group, reached, strict=True)], target)
+            yield Smallest(
+                claim=claim,
+                effect=effect,
+                methods=methods,
+                design=None if best is None else _reached(group[best], reached[best]),
+                most=max(one.share for one in reached),
+            )
+
+
+def _option(design: DesignPower, share: Share) -> Option:
+    return Option(
+        lab_hours=design.lab_hours,
+        participants=design.participants,
+        ci_low=share.ci_low,
+        allowed=not design.too_long,
+    )
+
+
+def _reached(design: DesignPower, share: Share) -> Reached:
+    return Reached(
+        participants=design.participants,
+        trials=design.trials,
+        lab_hours=design.lab_hours,
+        claim=share.claim,
+        held=share.held,
+        share=share.share,
+        ci_low=share.ci_low,
+        ci_high=share.ci_high,
+    )
