@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import sys
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import AbstractContextManager, contextmanager
@@ -12,6 +11,7 @@ from typing import Annotated, Any
 import typer
 
 from analysis.report.section import Section
+from analysis.report.serial import as_json as in_json
 
 DONE, EXCEPTIONS, UNUSABLE, INTERRUPTED = 0, 1, 2, 130
 
@@ -38,7 +38,7 @@ def in_text(section: Section) -> str:
 
 def show(result: Any, text: str, as_json: bool) -> None:
     """The result on stdout: for programs, or the text for people."""
-    sys.stdout.write(json.dumps(result, indent=1, ensure_ascii=False) + "\n" if as_json else f"{text}\n")
+    sys.stdout.write(in_json(result).decode() if as_json else f"{text}\n")
 
 
 def end(*, exceptions: bool) -> typer.Exit:

@@ -7,7 +7,7 @@ from typing import Annotated
 
 import typer
 
-from analysis.report.terminal import AsJson, FixedSeed, end, progress, show
+from analysis.report.terminal import AsJson, end, FixedSeed, in_text, progress, show
 
 Config = Annotated[str | None, typer.Argument(help="Config whose gun is meant; else the shipped gun.")]
 Gun = Annotated[str | None, typer.Option(help="Config of a gun, instead of CONFIG.")]
@@ -48,5 +48,5 @@ def design(
         seed=seed,
     )
     found = feature.design(request, workers, out, progress)
-    show(found, f"{feature.as_text(found)}\n\nReport: {out / 'report.html'}", as_json)
-    raise end(exceptions=found["best"] is None)
+    show(found, f"{in_text(feature.in_short(found))}\nReport: {out / 'report.html'}", as_json)
+    raise end(exceptions=found.best is None)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import asdict
 from pathlib import Path
 from typing import Annotated
 
@@ -57,4 +56,4 @@ def power(
         paper=paper,
     )
     found = feature.power(request, feature.Where(workers=workers, scheduler=scheduler), out, progress)
-    show(asdict(found), f"{in_text(feature.in_short(found))}\nReport: {out / 'report.html'}", as_json)
+    show(found, f"{in_text(feature.in_short(found))}\nReport: {out / 'report.html'}", as_json)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -14,6 +15,7 @@ from matplotlib.colors import BoundaryNorm, ListedColormap
 from matplotlib.figure import Figure
 from matplotlib.patches import Patch
 
+from analysis.predict.design_search.results import Axes, DesignSearch, OwnMethod, Plane, Predicted
 from analysis.report.figures.style import (
     BLACK,
     BLUE,
@@ -309,51 +311,45 @@ def _legend(figure: Figure, axes: Axes, field: Field) -> None:
     )
 
 
-Facts = dict[str, Any]
-
-
-def field_of(found: Facts, plane: Facts) -> Field:
+def field_of(axes: Axes, plane: Plane) -> Field:
     """A plane of designs, for a map."""
     return Field(
-        pulse_s=plane["pulse_s"],
-        friction_N=np.array(found["axes"]["friction_N"]),
-        voltage_V=np.array(found["axes"]["voltage_V"]),
-        status=np.array(plane["status"]),
-        predicted=np.array(plane["predicted"], dtype=np.float64),
-        shooting_rate_Hz=np.array(plane["shooting_rate_Hz"], dtype=np.float64),
-        beyond=np.array([words is not None for words in plane["limit_of_voltage"]]),
+        pulse_s=plane.pulse_s,
+        friction_N=np.array(axes.friction_N),
+        voltage_V=np.array(axes.voltage_V),
+        status=np.array(plane.status),
+        predicted=plane.predicted,
+        shooting_rate_Hz=plane.shooting_rate_Hz,
+        beyond=np.array([words is not None for words in plane.limit_of_voltage]),
     )
 
 
-def with_pulse(one: Facts, pulse_s: float) -> str:
+def with_pulse(one: OwnMethod, pulse_s: float) -> str:
     """A method's name; with its pulse, if that is another than the map's."""
-    return str(one["name"] if one["pulse_s"] == pulse_s else f"{one['name']} (pulse {1e3 * one['pulse_s']:.3g} ms)")
+    return one.name if one.pulse_s == pulse_s else f"{one.name} (pulse {1e3 * one.pulse_s:.3g} ms)"
 
 
-def felt_methods(found: Facts, *, swept: bool = False) -> list[Facts]:
+def own_marks(found: DesignSearch, *, swept: bool = False, pulse_s: float | None = None) -> list[Mark]:
     """The gun's own methods that have a prediction; those alone that the sweep could come upon, if asked."""
-    return [one for one in found["own"] if one["predicted"] is not None and (one["swept"] or not swept)]
+    own = [one for one in found.own if one.predicted is not None and (one.swept or not swept)]
+    return [mark_of(one.name if pulse_s is None else with_pulse(one, pulse_s), one) for one in own]
 
 
-def own_marks(found: Facts, *, swept: bool = False) -> list[Mark]:
-    """The same by their names."""
-    return [mark_of(one["name"], one) for one in felt_methods(found, swept=swept)]
-
-
-def best_mark(found: Facts) -> Mark | None:
+def best_mark(found: DesignSearch) -> Mark | None:
     """The best design, if one may be proposed."""
-    best = found["best"]
-    return None if best is None else mark_of(f"best at {found['rate_above_Hz']:g} Hz or faster", best)
+    best = found.best
+    return None if best is None else mark_of(f"best at {found.rate_above_Hz:g} Hz or faster", best)
 
 
-def mark_of(name: str, one: Facts) -> Mark:
+def mark_of(name: str, one: Predicted) -> Mark:
     """A design under a name; without known limits its prediction stands for them."""
+    predicted = math.nan if one.predicted is None else one.predicted
     return Mark(
         name=name,
-        friction_N=one["friction_N"],
-        voltage_V=one["voltage_V"],
-        shooting_rate_Hz=one["shooting_rate_Hz"],
-        predicted=one["predicted"],
-        ci_low=one["predicted"] if one["ci_low"] is None else one["ci_low"],
-        ci_high=one["predicted"] if one["ci_high"] is None else one["ci_high"],
+        friction_N=one.friction_N,
+        voltage_V=one.voltage_V,
+        shooting_rate_Hz=one.shooting_rate_Hz,
+        predicted=predicted,
+        ci_low=predicted if one.ci_low is None else one.ci_low,
+        ci_high=predicted if one.ci_high is None else one.ci_high,
     )

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -13,44 +13,53 @@ from analysis.predict.design_search.figures import (
     Lines,
     Trade,
     best_mark,
-    felt_methods,
     field_of,
     figure_critical,
     figure_maps,
     figure_trade,
-    mark_of,
     own_marks,
-    with_pulse,
 )
-from analysis.predict.design_search.words import at_friction, best_sentences, none_sentence, share_cell, swept
+from analysis.predict.design_search.results import (
+    ABOVE,
+    BELOW,
+    REACHED,
+    BestDesign,
+    Critical,
+    Design,
+    DesignSearch,
+    PerceptBehind,
+    Plane,
+    Predicted,
+)
 from analysis.report import apa
 from analysis.report.section import Picture, Section, Table
-
-Facts = dict[str, Any]
 
 BOTH = "both directions alike"
 
 
-def critical_section(found: Facts, figures: Path) -> Section:
+def critical_section(found: DesignSearch, figures: Path) -> Section:
     """The section; its figure is written."""
-    critical = found["critical"]
-    others = {one["name"]: np.array(one["voltage_V"], dtype=np.float64) for one in critical["alternatives"]}
-    others[BOTH] = np.array(critical["both_directions_V"], dtype=np.float64)
-    band = critical["band"]
+    critical = found.critical
+    band = critical.band
     lines = Lines(
-        voltage_V=np.array(critical["voltage_V"], dtype=np.float64),
-        low_V=_ends(band["low_V"], band["reached_low"]),
-        high_V=_ends(band["high_V"], band["reached_high"]),
-        others=others,
+        voltage_V=critical.voltage_V,
+        low_V=band.low_V,
+        high_V=band.high_V,
+        others={one.name: one.voltage_V for one in critical.alternatives} | {BOTH: critical.both_directions_V},
     )
-    plane = critical | {
-        "shooting_rate_Hz": critical["predicted"],
-        "limit_of_voltage": [None] * len(critical["status"][0]),
-    }
+    plane = Plane(
+        pulse_s=critical.pulse_s,
+        status=critical.status,
+        predicted=critical.predicted,
+        ci_low=critical.predicted,
+        ci_high=critical.predicted,
+        shooting_rate_Hz=critical.predicted,
+        limit_of_voltage=(None,) * len(critical.status[0]),
+    )
     figure_critical(
-        field_of(found, plane), lines, critical["level"], own_marks(found, swept=True), figures / "critical"
+        field_of(found.axes, plane), lines, critical.level, own_marks(found, swept=True), figures / "critical"
     )
-    level = apa.percent(critical["level"], 0)
+    level = apa.percent(critical.level, 0)
     return Section(
         title=f"Critical conditions of a directional percept: {level} right",
         paragraphs=tuple(_said(critical, level)),
@@ -59,7 +68,7 @@ def critical_section(found: Facts, figures: Path) -> Section:
                 stem="critical",
                 caption=(
                     f"The voltage from which {level} of the answers to a forward shot are right, over friction; "
-                    f"band: {apa.percent(band['inside'], 0)} of {band['draws']:,} contours drawn from the fit "
+                    f"band: {apa.percent(band.inside, 0)} of {band.draws:,} contours drawn from the fit "
                     "lie wholly within it; other lines: the fit under other assumed numbers, and forward and "
                     "backward shots counted alike"
                 ),
@@ -70,30 +79,27 @@ def critical_section(found: Facts, figures: Path) -> Section:
     )
 
 
-def _said(critical: Facts, level: str) -> Iterator[str]:
+def _said(critical: Critical, level: str) -> Iterator[str]:
     yield (
         f"Below the line the model has fewer than {level} of the answers right; the pulse is the gun's own, "
-        f"{1e3 * critical['pulse_s']:.3g} ms. The band is of the three fitted numbers alone: under other assumed "
+        f"{1e3 * critical.pulse_s:.3g} ms. The band is of the three fitted numbers alone: under other assumed "
         "numbers the line lies elsewhere, as the other lines show, each refitted to the same rates. Where forward and "
         "backward shots count alike the fitted bias towards forward does not help, and it takes more."
     )
-    reached = [last for last, word in zip(critical["lasting"], critical["reached"], strict=True) if word == _AT]
+    reached = [last for last, word in zip(critical.lasting, critical.reached, strict=True) if word == REACHED]
     if reached and not all(reached):
         yield f"At {reached.count(False)} frictions a higher voltage of the sweep falls below {level} again."
-    if (error := critical["interpolation_error_V"]) is not None:
+    if (error := critical.interpolation_error_V) is not None:
         yield f"Band and other lines are interpolated on the grid, the line is solved: at most {error:.2g} V apart."
 
 
-_AT = "at this voltage"
-
-
-def _contour_table(found: Facts) -> Table:
-    critical = found["critical"]
-    frictions = sorted({one["friction_N"] for one in found["own"] if one["swept"]})
+def _contour_table(found: DesignSearch) -> Table:
+    critical = found.critical
+    frictions = sorted({one.friction_N for one in found.own if one.swept})
     rows = [
-        (f"{friction:g} N", at_friction(critical, friction), *_others(critical, friction)) for friction in frictions
+        (f"{friction:g} N", _at_friction(critical, friction), *_others(critical, friction)) for friction in frictions
     ]
-    names = (*(one["name"] for one in critical["alternatives"]), BOTH)
+    names = (*(one.name for one in critical.alternatives), BOTH)
     return Table(
         caption="The contour's voltage at the frictions of the gun's own methods [band]; and under other assumptions",
         header=("Friction", "Voltage", *names),
@@ -101,17 +107,11 @@ def _contour_table(found: Facts) -> Table:
     )
 
 
-def _others(critical: Facts, friction_N: float) -> Iterator[str]:
-    place = critical["friction_N"].index(friction_N) if friction_N in critical["friction_N"] else None
-    for volts in (*(one["voltage_V"] for one in critical["alternatives"]), critical["both_directions_V"]):
-        value = None if place is None else volts[place]
-        yield apa.NONE if value is None else f"{apa.number(value, 1)} V"
-
-
-def _ends(values: list[float | None], reached: list[str]) -> Any:
-    """A band's end, infinite where it lies above or below the range."""
-    outside = {"not within the range": np.inf, "from the lowest voltage on": -np.inf}
-    return np.array([outside.get(word, np.nan) if v is None else v for v, word in zip(values, reached, strict=True)])
+def _others(critical: Critical, friction_N: float) -> Iterator[str]:
+    place = critical.friction_N.index(friction_N) if friction_N in critical.friction_N else None
+    for volts in (*(one.voltage_V for one in critical.alternatives), critical.both_directions_V):
+        known = place is not None and np.isfinite(volts[place])
+        yield f"{apa.number(float(volts[place]), 1)} V" if known else apa.NONE
 
 
 FRONT_ROWS = 12
@@ -119,9 +119,17 @@ FASTEST = 3.0
 """Times the bound: what is faster is in `design.json` alone."""
 
 
-def sections(found: Facts, designs: Designs, figures: Path) -> tuple[Section, ...]:
+STATUS_WORDS = {
+    "no-break-away": "do not move the magnet (no percept)",
+    "stuck": "stick",
+    "not-home": "are not home within the model's horizon",
+}
+
+
+def sections(found: DesignSearch, designs: Designs, figures: Path) -> tuple[Section, ...]:
     """The page's sections; their figures are written."""
     return (
+        in_short(found),
         _best(found),
         _trade(found, designs, figures),
         _maps(found, figures),
@@ -130,37 +138,124 @@ def sections(found: Facts, designs: Designs, figures: Path) -> tuple[Section, ..
     )
 
 
-def _best(found: Facts) -> Section:
-    rows = [("best of the sweep", *_cells(found["best"]))] if found["best"] else []
-    rows += [(one["name"], *_cells(one)) for one in found["own"]]
-    said = tuple(best_sentences(found["best"])) if found["best"] else (none_sentence(found),)
+def in_short(found: DesignSearch) -> Section:
+    """What a reader looks for, in a few lines."""
+    return Section(title=f"Design search: {found.title}", items=tuple(_lines(found)))
+
+
+def _lines(found: DesignSearch) -> Iterator[str]:
+    yield "Predictions of a model fitted to three rates; only the paper's own designs were ever felt."
+    yield from _swept(found)
+    if found.best is not None:
+        yield f"Best at {found.rate_above_Hz:g} Hz or faster: {', '.join(_cells(found.best))} at most."
+        yield from _best_sentences(found.best)
+    else:
+        yield _none_sentence(found)
+    for one in found.own:
+        yield f"{one.name}: {', '.join(_cells(one))} at most."
+    critical = found.critical
+    from_ = f"{apa.percent(critical.level, 0)} are right, at a pulse of {_ms(critical.pulse_s)}, from"
+    for one in (own for own in found.own if own.swept):
+        yield f"{from_} {_at_friction(critical, one.friction_N)} at {one.friction_N:g} N ({one.name})."
+
+
+def _best(found: DesignSearch) -> Section:
+    rows = [] if found.best is None else [("best of the sweep", *_cells(found.best))]
+    rows += [(one.name, *_cells(one)) for one in found.own]
+    said = (_none_sentence(found),) if found.best is None else tuple(_best_sentences(found.best))
     return Section(
-        title=f"Felt best while it shoots at {found['rate_above_Hz']:g} Hz or faster",
+        title=f"Felt best while it shoots at {found.rate_above_Hz:g} Hz or faster",
         paragraphs=(
             "All of this is predicted by a model that was fitted to three rates of the paper. Of the designs only the "
             "paper's own were ever felt by anyone; the intervals are the fit's alone.",
             " ".join(said),
-            f"{'; '.join(swept(found))}.",
+            f"{'; '.join(_swept(found))}.",
         ),
         tables=(Table(caption="The best design beside the gun's own methods", header=_HEADER, rows=tuple(rows)),),
     )
 
 
-_HEADER = ("Design", "Friction", "Voltage", "Pulse", "Right about a forward shot, predicted [95 % CI]", "Highest rate")
+def _swept(found: DesignSearch) -> Iterator[str]:
+    """What was looked at, and what of it is not proposed."""
+    axes, counts = found.axes, found.designs
+    yield (
+        f"{counts.total:,} designs: friction {axes.friction_N[0]:.3g} to {axes.friction_N[-1]:.3g} N, "
+        f"voltage {axes.voltage_V[0]:.3g} to {axes.voltage_V[-1]:.3g} V, "
+        f"pulse {1e3 * axes.pulse_s[0]:.3g} to {_ms(axes.pulse_s[-1])}"
+    )
+    for status, words in STATUS_WORDS.items():
+        if count := counts.by_status.get(status):
+            yield f"{count:,} {words}"
+    if counts.beyond_limits:
+        parts = ", ".join(f"{words} ({count:,})" for words, count in counts.beyond_limits.items())
+        yield f"beyond the device's limits at {found.rate_above_Hz:g} Hz, so not proposed: {parts}"
 
 
-def _cells(one: Facts) -> tuple[str, ...]:
+def _best_sentences(best: BestDesign) -> Iterator[str]:
+    """How far the best design hangs on what is assumed, and on where the sweep ends."""
+    shares = [share for share in best.under_other_assumptions.values() if np.isfinite(share)]
+    if shares:
+        ends = f"{apa.number(100.0 * min(shares), 1)} to {apa.percent(max(shares))}"
+        yield f"Under other assumed exponents and leaks the best design is predicted at {ends}."
+    names = {"friction_N": "friction", "voltage_V": "voltage", "pulse_s": "pulse"}
+    if best.at_an_end_of:
+        words = " and ".join(names[key] for key in best.at_an_end_of)
+        yield f"It lies at the end of the sweep in {words}: what is beyond is not known."
+
+
+def _none_sentence(found: DesignSearch) -> str:
+    """Said where no design may be proposed."""
     return (
-        f"{apa.number(one['friction_N'])} N",
-        f"{apa.number(one['voltage_V'], 1)} V",
-        f"{apa.number(1e3 * one['pulse_s'], 1)} ms",
-        share_cell(one),
-        f"{apa.number(one['shooting_rate_Hz'])} Hz",
+        f"No design of this sweep can be proposed: none both keeps the device's limits and shoots at "
+        f"{found.rate_above_Hz:g} Hz. Lower --rate-above or widen the ranges."
     )
 
 
-def _trade(found: Facts, designs: Designs, figures: Path) -> Section:
-    front = found["front"]
+def _share_cell(one: Predicted) -> str:
+    """A predicted share with its limits, in percent, or why there is none."""
+    if one.predicted is None:
+        return f"no prediction: {one.status}"
+    if one.ci_low is None or one.ci_high is None:
+        return apa.percent(one.predicted)
+    return f"{apa.percent(one.predicted)} {apa.interval(100.0 * one.ci_low, 100.0 * one.ci_high, 1)}"
+
+
+def _at_friction(critical: Critical, friction_N: float) -> str:
+    """The contour's voltage at a friction, with its band, or why there is none."""
+    if friction_N not in critical.friction_N:
+        return "outside the swept frictions"
+    place = critical.friction_N.index(friction_N)
+    voltage_V, band = float(critical.voltage_V[place]), critical.band
+    if not np.isfinite(voltage_V):
+        return critical.reached[place]
+    low, high = _end(band.low_V[place], band.reached_low[place]), _end(band.high_V[place], band.reached_high[place])
+    return f"{apa.number(voltage_V, 1)} V [{low}, {high}]"
+
+
+def _end(voltage_V: float, reached: str) -> str:
+    words = {REACHED: apa.number(float(voltage_V), 1), ABOVE: "above the range", BELOW: "below the range"}
+    return words.get(reached, "unknown")
+
+
+def _ms(seconds: float) -> str:
+    return f"{1e3 * seconds:.3g} ms"
+
+
+_HEADER = ("Design", "Friction", "Voltage", "Pulse", "Right about a forward shot, predicted [95 % CI]", "Highest rate")
+
+
+def _cells(one: Predicted) -> tuple[str, ...]:
+    return (
+        f"{apa.number(one.friction_N)} N",
+        f"{apa.number(one.voltage_V, 1)} V",
+        f"{apa.number(1e3 * one.pulse_s, 1)} ms",
+        _share_cell(one),
+        f"{apa.number(one.shooting_rate_Hz)} Hz",
+    )
+
+
+def _trade(found: DesignSearch, designs: Designs, figures: Path) -> Section:
+    front = found.front
     known = np.isfinite(designs.predicted)
     trade = Trade(
         rate_Hz=designs.shooting_rate_Hz[known],
@@ -171,8 +266,8 @@ def _trade(found: Facts, designs: Designs, figures: Path) -> Section:
         front_low=_column(front, "ci_low"),
         front_high=_column(front, "ci_high"),
     )
-    figure_trade(trade, found["rate_above_Hz"], best_mark(found), own_marks(found), figures / "trade")
-    rows = tuple(_cells(one) for one in _spread(front, FASTEST * found["rate_above_Hz"]))
+    figure_trade(trade, found.rate_above_Hz, best_mark(found), own_marks(found), figures / "trade")
+    rows = tuple(_cells(one) for one in _spread(front, FASTEST * found.rate_above_Hz))
     return Section(
         title="The trade: felt against fast",
         paragraphs=(
@@ -191,23 +286,23 @@ def _trade(found: Facts, designs: Designs, figures: Path) -> Section:
     )
 
 
-def _spread(front: list[Facts], fastest_Hz: float) -> list[Facts]:
+def _spread(front: Sequence[Design], fastest_Hz: float) -> list[Design]:
     """Some designs of the front up to a rate, at about even distances in it."""
-    slow_first = [one for one in front[::-1] if one["shooting_rate_Hz"] <= fastest_Hz]
+    slow_first = [one for one in front[::-1] if one.shooting_rate_Hz <= fastest_Hz]
     if len(slow_first) <= FRONT_ROWS:
         return slow_first
-    reached = np.array([one["shooting_rate_Hz"] for one in slow_first])
+    reached = np.array([one.shooting_rate_Hz for one in slow_first])
     wanted = np.linspace(reached[0], reached[-1], FRONT_ROWS)
     places = {int(np.argmin(np.abs(reached - rate))) for rate in wanted}
     return [slow_first[place] for place in sorted(places)]
 
 
-def _maps(found: Facts, figures: Path) -> Section:
-    plane = found["map"]
-    own = [mark_of(with_pulse(one, plane["pulse_s"]), one) for one in felt_methods(found, swept=True)]
-    lines = (found["critical"]["level"], found["rate_above_Hz"])
-    figure_maps(field_of(found, plane), lines, own, best_mark(found), figures / "maps")
-    pulse = f"{1e3 * plane['pulse_s']:.3g} ms"
+def _maps(found: DesignSearch, figures: Path) -> Section:
+    plane = found.map
+    own = own_marks(found, swept=True, pulse_s=plane.pulse_s)
+    lines = (found.critical.level, found.rate_above_Hz)
+    figure_maps(field_of(found.axes, plane), lines, own, best_mark(found), figures / "maps")
+    pulse = f"{1e3 * plane.pulse_s:.3g} ms"
     return Section(
         title=f"Over friction and voltage, at the pulse of the best design ({pulse})",
         paragraphs=("Where there is no prediction the map says why: no break-away is no percept.",),
@@ -221,16 +316,16 @@ def _maps(found: Facts, figures: Path) -> Section:
     )
 
 
-def _rest(found: Facts) -> Section:
-    percept = found["percept"]
-    facts = {"seed": found["seed"], "gun": found["gun"], **found["provenance"]}
+def _rest(found: DesignSearch) -> Section:
+    percept = found.percept
+    facts = {"seed": found.seed, "gun": found.gun, **found.provenance}
     numbers = tuple(
-        (name, apa.number(one["value"], 3), apa.interval(one["ci_low"], one["ci_high"], 3))
-        for name, one in percept["fitted"].items()
+        (name, apa.number(one.value, 3), apa.interval(one.ci_low, one.ci_high, 3))
+        for name, one in percept.fitted.items()
     )
     return Section(
         title="What this rests on",
-        paragraphs=(f"The percept is that of the {percept['route']}.{_other_route(percept)}",),
+        paragraphs=(f"The percept is that of the {percept.route}.{_other_route(percept)}",),
         tables=(
             Table(caption="The fitted numbers of the percept", header=("Number", "Value", "95 % CI"), rows=numbers),
             Table(
@@ -239,13 +334,13 @@ def _rest(found: Facts) -> Section:
                 rows=tuple((name, str(value)) for name, value in facts.items()),
             ),
         ),
-        items=(*found["assumptions"], *percept["unknown"]),
+        items=(*found.assumptions, *percept.unknown),
     )
 
 
-def _other_route(percept: Facts) -> str:
+def _other_route(percept: PerceptBehind) -> str:
     """What the shot's summary would have cost; nothing where no design is felt."""
-    error = {name: apa.number(100.0 * value, 1) for name, value in percept["summary_differs_in_predicted_rate"].items()}
+    error = {name: apa.number(100.0 * value, 1) for name, value in percept.summary_differs_in_predicted_rate.items()}
     if not error:
         return ""
     return (
@@ -254,5 +349,5 @@ def _other_route(percept: Facts) -> str:
     )
 
 
-def _column(designs: list[Facts], key: str) -> Any:
-    return np.array([one[key] for one in designs], dtype=np.float64)
+def _column(designs: Sequence[Design], key: str) -> Any:
+    return np.array([getattr(one, key) for one in designs], dtype=np.float64)

@@ -4,36 +4,35 @@ from __future__ import annotations
 
 import csv
 import io
-import json
-import math
 from bisect import bisect_right
 from collections.abc import Callable, Sequence
 from contextlib import AbstractContextManager
-from dataclasses import asdict, dataclass, replace
+from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
 from analysis.predict.design_search.choice import LIMITS, Designs, best, designs_of, front, joined, summary_error
 from analysis.predict.design_search.critical import LEAKS, Alternative, Contour, alternatives, contour_of
-from analysis.predict.design_search.facts import (
+from analysis.predict.design_search.page import in_short, sections
+from analysis.predict.design_search.results import (
+    Axes,
+    DesignSearch,
     assumptions,
-    best_facts,
+    best_of,
     counted,
-    critical_facts,
-    design_facts,
-    fit_facts,
-    own_facts,
-    plane_facts,
+    critical_of,
+    design_of,
+    own_of,
+    percept_behind,
+    plane_of,
 )
-from analysis.predict.design_search.page import sections
 from analysis.predict.design_search.shots import Layer, layers, rows_of, simulate_rows
 from analysis.predict.design_search.space import Request, Space, make_space
-from analysis.predict.design_search.words import as_text
 from analysis.predict.fit.percept_model import PAPER_RATES, PerceptFit, fit_percept
 from analysis.predict.jobs import Run, cores, on_processes
 from analysis.report.page import write_page
+from analysis.report.serial import as_json
 from analysis.report.terminal import Progress
 from device.methods import Method, paper_methods
 from device.parameters import GunParameters
@@ -118,9 +117,7 @@ def _simulated(
         return layers(space, rows, simulate_rows(rows, run, tell))
 
 
-__all__ = ["Request", "as_text", "design"]
-
-Facts = dict[str, Any]
+__all__ = ["Request", "design", "in_short"]
 
 COLUMNS = (
     *("friction_N", "voltage_V", "pulse_s", "status", "limit", "shooting_rate_Hz"),
@@ -140,8 +137,8 @@ class _Found:
     others: tuple[Alternative, ...]
 
 
-def design(request: Request, workers: int | None, out: Path, progress: Progress) -> Facts:
-    """Sweep, choose, write `design.json`, `designs.csv`, report and figures into `out`; give the JSON's content back.
+def design(request: Request, workers: int | None, out: Path, progress: Progress) -> DesignSearch:
+    """Sweep, choose, write `design.json`, `designs.csv`, report and figures into `out`.
 
     The same request gives the same bytes however many workers there are. `ConfigError`: a request that cannot be met.
     """
@@ -156,10 +153,10 @@ def design(request: Request, workers: int | None, out: Path, progress: Progress)
         tell("contour")
         others = tuple(alternatives(methods, own, space.voltage_V))
         tell("assumptions")
-        facts = _facts(request, _Found(space=space, fit=fit, search=found, contour=contour, others=others))
-        _write(out, facts, found.designs)
+        result = _results(request, _Found(space=space, fit=fit, search=found, contour=contour, others=others))
+        _write(out, result, found.designs)
         tell("written")
-    return facts
+    return result
 
 
 def readings(gun: GunParameters) -> dict[str, Method]:
@@ -167,48 +164,34 @@ def readings(gun: GunParameters) -> dict[str, Method]:
     return paper_methods(replace(GunParameters(), drive_off=gun.drive_off, emf=gun.emf))
 
 
-def _facts(request: Request, found: _Found) -> Facts:
+def _results(request: Request, found: _Found) -> DesignSearch:
     """The content of `design.json`."""
     space, fit, rate_Hz = found.space, found.fit, request.rate_above_Hz
     designs, chosen = found.search.designs, found.search.chosen
     map_pulse_s = space.pulse_s[-1] if chosen is None else float(designs.pulse_s[chosen])
-    facts: Facts = {
-        "title": space.title,
-        "gun": space.source.name,
-        "parameters": asdict(space.gun),
-        "seed": request.seed,
-        "rate_above_Hz": rate_Hz,
-        "axes": {"friction_N": space.friction_N, "voltage_V": space.voltage_V, "pulse_s": space.pulse_s},
-        "designs": counted(designs, rate_Hz),
-        "best": None if chosen is None else best_facts(space, designs, chosen, rate_Hz, found.others),
-        "own": [own_facts(space, label, fit, rate_Hz) for label in space.own],
-        "front": [design_facts(designs, place, space.gun, rate_Hz) for place in front(designs)],
-        "map": plane_facts(space, found.search.layers[map_pulse_s], fit, rate_Hz),
-        "critical": critical_facts(space, found.search.layers[space.gun.pulse_s], fit, found.contour, found.others),
-        "percept": fit_facts(fit, summary_error(designs)),
-        "assumptions": assumptions(space, rate_Hz),
-        "provenance": provenance(),
-    }
-    made: Facts = plain(facts)
-    return made
+    return DesignSearch(
+        title=space.title,
+        gun=space.source.name,
+        parameters=space.gun,
+        seed=request.seed,
+        rate_above_Hz=rate_Hz,
+        axes=Axes(friction_N=space.friction_N, voltage_V=space.voltage_V, pulse_s=space.pulse_s),
+        designs=counted(designs, rate_Hz),
+        best=None if chosen is None else best_of(space, designs, chosen, rate_Hz, found.others),
+        own=tuple(own_of(space, label, fit, rate_Hz) for label in space.own),
+        front=tuple(design_of(designs, place, space.gun, rate_Hz) for place in front(designs)),
+        map=plane_of(space, found.search.layers[map_pulse_s], fit, rate_Hz),
+        critical=critical_of(space, found.search.layers[space.gun.pulse_s], fit, found.contour, found.others),
+        percept=percept_behind(fit, summary_error(designs)),
+        assumptions=assumptions(space, rate_Hz),
+        provenance=provenance(),
+    )
 
 
-def plain(value: Any) -> Any:
-    """The value for JSON: arrays as lists, what is not finite as None."""
-    if isinstance(value, dict):
-        return {key: plain(one) for key, one in value.items()}
-    if isinstance(value, list | tuple):
-        return [plain(one) for one in value]
-    if isinstance(value, np.ndarray | np.generic):
-        return plain(value.tolist())
-    return None if isinstance(value, float) and not math.isfinite(value) else value
-
-
-def _write(out: Path, facts: Facts, designs: Designs) -> None:
-    data = json.dumps(facts, indent=1, ensure_ascii=False, allow_nan=False) + "\n"
-    storage.write_whole(out / "design.json", data.encode())
+def _write(out: Path, found: DesignSearch, designs: Designs) -> None:
+    storage.write_whole(out / "design.json", as_json(found))
     storage.write_whole(out / "designs.csv", _table(designs).encode())
-    write_page(out, f"Design search: {facts['title']}", sections(facts, designs, out / "figures"))
+    write_page(out, f"Design search: {found.title}", sections(found, designs, out / "figures"))
 
 
 def _table(designs: Designs) -> str:

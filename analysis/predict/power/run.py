@@ -18,6 +18,7 @@ from analysis.predict.power.planned import Tally
 from analysis.predict.power.results import Power, power_of
 from analysis.predict.power.studies import Chunk, run_chunk
 from analysis.report.page import write_page
+from analysis.report.serial import as_json
 from analysis.report.terminal import Progress
 from experiments.config.setup import sha256
 from experiments.record import storage
@@ -45,8 +46,7 @@ def power(request: Request, where: Where, out: Path, progress: Progress) -> Powe
         storage.make_folder(out)
         tallies = _tallies(chunks, run, kept, tell)
     found = power_of(grid, iter(tallies), assumptions(grid))
-    data = (json.dumps(asdict(found), indent=1, ensure_ascii=False, allow_nan=False) + "\n").encode()
-    storage.write_whole(out / "power.json", data)
+    storage.write_whole(out / "power.json", as_json(found))
     write_page(out, f"Simulated power: {grid.config.title}", sections(found, out / "figures"))
     kept.unlink(missing_ok=True)
     return found
