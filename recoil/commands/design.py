@@ -7,7 +7,7 @@ from typing import Annotated
 
 import typer
 
-from analysis.report.terminal import AsJson, end, FixedSeed, in_text, progress, show
+from analysis.report.terminal import AsJson, FixedSeed, end, in_text, progress, show
 
 Config = Annotated[str | None, typer.Argument(help="Config whose gun is meant; else the shipped gun.")]
 Gun = Annotated[str | None, typer.Option(help="Config of a gun, instead of CONFIG.")]

@@ -15,7 +15,7 @@ from matplotlib.colors import BoundaryNorm, ListedColormap
 from matplotlib.figure import Figure
 from matplotlib.patches import Patch
 
-from analysis.predict.design_search.results import Axes, DesignSearch, OwnMethod, Plane, Predicted
+from analysis.predict.design_search.results import DesignSearch, OwnMethod, Plane, Predicted, SweptAxes
 from analysis.report.figures.style import (
     BLACK,
     BLUE,
@@ -311,7 +311,7 @@ def _legend(figure: Figure, axes: Axes, field: Field) -> None:
     )
 
 
-def field_of(axes: Axes, plane: Plane) -> Field:
+def field_of(axes: SweptAxes, plane: Plane) -> Field:
     """A plane of designs, for a map."""
     return Field(
         pulse_s=plane.pulse_s,

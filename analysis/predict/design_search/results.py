@@ -26,7 +26,7 @@ NEVER = "no voltage brings the magnet home"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Axes:
+class SweptAxes:
     """The swept values."""
 
     friction_N: tuple[float, ...]
@@ -163,7 +163,7 @@ class DesignSearch:
     parameters: GunParameters
     seed: int
     rate_above_Hz: float
-    axes: Axes
+    axes: SweptAxes
     designs: Counts
     best: BestDesign | None
     own: tuple[OwnMethod, ...]
@@ -212,9 +212,7 @@ def _known(value: float) -> float | None:
     return float(value) if np.isfinite(value) else None
 
 
-def best_of(
-    space: Space, designs: Designs, place: int, rate_Hz: float, others: Sequence[Alternative]
-) -> BestDesign:
+def best_of(space: Space, designs: Designs, place: int, rate_Hz: float, others: Sequence[Alternative]) -> BestDesign:
     """The best design. An end of the sweep that is the device's own limit is none: nothing beyond may be proposed."""
     one = design_of(designs, place, space.gun, rate_Hz)
     axes = {"friction_N": space.friction_N, "voltage_V": space.voltage_V, "pulse_s": space.pulse_s}

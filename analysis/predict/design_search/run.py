@@ -16,8 +16,8 @@ from analysis.predict.design_search.choice import LIMITS, Designs, best, designs
 from analysis.predict.design_search.critical import LEAKS, Alternative, Contour, alternatives, contour_of
 from analysis.predict.design_search.page import in_short, sections
 from analysis.predict.design_search.results import (
-    Axes,
     DesignSearch,
+    SweptAxes,
     assumptions,
     best_of,
     counted,
@@ -175,7 +175,7 @@ def _results(request: Request, found: _Found) -> DesignSearch:
         parameters=space.gun,
         seed=request.seed,
         rate_above_Hz=rate_Hz,
-        axes=Axes(friction_N=space.friction_N, voltage_V=space.voltage_V, pulse_s=space.pulse_s),
+        axes=SweptAxes(friction_N=space.friction_N, voltage_V=space.voltage_V, pulse_s=space.pulse_s),
         designs=counted(designs, rate_Hz),
         best=None if chosen is None else best_of(space, designs, chosen, rate_Hz, found.others),
         own=tuple(own_of(space, label, fit, rate_Hz) for label in space.own),

@@ -279,9 +279,7 @@ def _null_rates(group: Sequence[DesignPower]) -> list[Rate]:
 
 def _null_table(group: Sequence[DesignPower]) -> Table:
     one = group[0]
-    rows = tuple(
-        (claim, *(share_cell(design.share_of(claim)) for design in group)) for claim in _claims(group[:1])
-    )
+    rows = tuple((claim, *(share_cell(design.share_of(claim)) for design in group)) for claim in _claims(group[:1]))
     return Table(
         caption=(
             f"False positives, % of studies [95 % CI]: {one.participants} people, {one.trials} trials a method; "

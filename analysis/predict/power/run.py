@@ -26,6 +26,7 @@ from experiments.record.provenance import provenance
 
 __all__ = ["Request", "Where", "in_short", "power"]
 
+
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Where:
     """Where the work is done: on so many processes (all cores unless told), or on a Dask cluster."""
