@@ -18,6 +18,8 @@ from analysis.predict.design_search import run as feature
 from analysis.predict.design_search.critical import rate_at
 from analysis.predict.design_search.space import axis, make_space, span
 from analysis.predict.fit.percept_model import PAPER_RATES
+from analysis.report.serial import plain
+from analysis.report.terminal import in_text
 from device.limits import DriveHistory, load_of
 from device.parameters import GunParameters
 from device.physics.trains import highest_rate_Hz
@@ -39,7 +41,7 @@ def silent(_what: str, _total: int) -> Iterator[Callable[[str], None]]:
 def done(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, Any]:
     """A small search, with the gun's own friction, voltage and pulse on its axes."""
     out = tmp_path_factory.mktemp("design")
-    return out, feature.design(feature.Request(grid=6), 1, out, silent)
+    return out, plain(feature.design(feature.Request(grid=6), 1, out, silent))
 
 
 @pytest.fixture
@@ -126,7 +128,6 @@ def test_a_shot_that_does_not_break_away_is_named_and_never_counted_as_guessing(
     for plane in (found["map"], found["critical"]):
         for words, shares in zip(plane["status"], plane["predicted"], strict=True):
             assert [word == "home" for word in words] == [share is not None for share in shares]
-    assert "do not move the magnet (no percept)" in feature.as_text(found)
     assert "do not move the magnet (no percept)" in (out / "report.md").read_text(encoding="utf-8")
 
 
@@ -144,12 +145,13 @@ def test_the_page_says_that_it_predicts_and_what_it_assumes(done: tuple[Path, An
 
 def test_beyond_the_devices_limits_nothing_is_proposed(tmp_path: Path) -> None:
     request = feature.Request(grid=4, friction="0.2-1.2", voltage="15-33", pulse="0.01")
-    found = feature.design(request, 1, tmp_path, silent)
+    result = feature.design(request, 1, tmp_path, silent)
+    found = plain(result)
     assert found["designs"]["beyond_limits"]["voltage above 24 V"] >= 4
     assert found["best"]["voltage_V"] < 24
     assert found["best"]["limit"] is None
     assert all(one["limit"] is None for one in found["front"])
-    assert "voltage above 24 V" in feature.as_text(found)
+    assert "voltage above 24 V" in in_text(feature.in_short(result))
 
 
 def test_without_a_design_to_propose_it_says_so_and_ends_with_1(recoil: Recoil, tmp_path: Path) -> None:
