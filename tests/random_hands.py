@@ -186,8 +186,9 @@ class RandomHands:
     # to the end
 
     def _finish(self, screen: AtConsole) -> None:
-        """Leave what is open, do what is due, and close the window."""
-        screen.keys.focus_on(RUN)
+        """Leave what is open, do what is due, and close the window; but first let it hear all that was pressed."""
+        screen.focus_on(RUN)
+        screen.heard()
         end_s = time.monotonic() + 2 * PATIENCE_S
         while screen.process.poll() is None and not (look := screen.look()).ended:
             if time.monotonic() > end_s:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import importlib.util
 from collections import Counter
 from collections.abc import Iterator
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
 import pytest
@@ -18,7 +19,7 @@ from tests.random_hands import MOVES, check_random_hands
 pytest.importorskip("PyQt6")
 pytestmark = [pytest.mark.soak, needs_display]
 
-HANDS = 100
+HANDS, AT_ONCE = 100, 2
 
 
 @pytest.fixture(scope="module")
@@ -67,12 +68,18 @@ def test_keys_on_the_participants_window(tmp_path: Path, display: str, soak: Soa
     soak(f"{state} × P, Esc, Space there, then F12 there", "nothing; then halted", "nothing; then halted", how)
 
 
-def test_random_hands(tmp_path: Path, display: str, soak: Soak) -> None:
-    seen: Counter[str] = Counter()
-    for seed in range(HANDS):
-        folder = tmp_path / str(seed)
-        folder.mkdir()
-        seen.update(check_random_hands(folder, display, seed))
+def test_random_hands(tmp_path: Path, soak: Soak) -> None:
+    def some(seeds: range) -> Counter[str]:
+        seen: Counter[str] = Counter()
+        with virtual_display() as display:
+            for seed in seeds:
+                folder = tmp_path / str(seed)
+                folder.mkdir()
+                seen.update(check_random_hands(folder, display, seed))
+        return seen
+
+    with ThreadPoolExecutor(AT_ONCE) as pool:
+        seen = sum(pool.map(some, (range(first, HANDS, AT_ONCE) for first in range(AT_ONCE))), Counter[str]())
     of = ", ".join(f"{count} {kind}" for kind, count in sorted(seen.items()))
     how = f"{MOVES} moves a run, then worked to its end; {of}"
     soak(f"rules broken in {HANDS} runs by random hands", 0, "0", how)

@@ -209,7 +209,10 @@ def test_after_an_emergency_stop_nothing_fires_and_a_resumed_run_begins_with_a_t
     with AtTerminal(run(quick_configs, "direction", "--seed", 1), tmp_path) as screen:
         screen.answer_trials(1)
         screen.wait_for(FIRES, 2)
+        screen.type("pause")  # the gun says then that it is disarmed: that vouches for nothing later
+        screen.wait_for("Paused.")
         screen.type("!!")  # as a hand in a hurry types it
+        screen.wait_for("Unless the gun says that it is disarmed, SWITCH OFF ITS POWER.")
         screen.wait_for("The gun says that it is disarmed.")
         screen.type("the cable burnt")
         screen.wait_for("Reason of the emergency stop.")

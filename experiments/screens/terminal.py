@@ -46,10 +46,10 @@ _REARMING = (
 )
 _CLOSING = "\nEverything is answered. `undo` opens the last answer, `note` and `flag` mark.\n  Enter ends the run: "
 _HALTED = (
-    "\n  EMERGENCY STOP. Nothing fires in this run any more.{unsure}\n"
+    "\n  EMERGENCY STOP. Nothing fires in this run any more. "
+    "Unless the gun says that it is disarmed, SWITCH OFF ITS POWER.\n"
     "  Type why, and Enter; Enter alone closes the run, which can be resumed: "
 )
-_UNSURE = " Unless the gun says that it is disarmed, SWITCH OFF ITS POWER."
 _COMMANDS = ("stop", "pause", "undo", "repeat", "flag", "note", "skip", "help")
 _TICK_S = 1.0
 
@@ -67,7 +67,6 @@ class TerminalScreen:
         simulated: bool = False,
     ) -> None:
         self._plan, self._clock, self._simulated = plan, clock, simulated
-        self._disarmed = False
         self._out = out or sys.stdout
         if isinstance(sys.stdin, io.TextIOWrapper):
             sys.stdin.reconfigure(errors="replace")  # a byte that is no UTF-8 is not to end the run
@@ -111,9 +110,9 @@ class TerminalScreen:
 
     def gun_seen(self, status: GunStatus | None, fault: str) -> None:
         """Say what the gun itself says after it was told to disarm."""
-        self._disarmed = status is not None and status.state == "disarmed"
+        disarmed = status is not None and status.state == "disarmed"
         told = f"The gun says nothing ({fault})" if status is None else f"The gun says that it is {status.state}"
-        self._say(f"\n  {told}{'.' if self._disarmed else ': SWITCH OFF ITS POWER.'}")
+        self._say(f"\n  {told}{'.' if disarmed else ': SWITCH OFF ITS POWER.'}")
 
     # what is asked for
 
@@ -148,7 +147,7 @@ class TerminalScreen:
             case State.CORRECTING if position.correcting is not None:
                 return self._correction(position.correcting)
             case State.HALTED:
-                return _HALTED.format(unsure="" if self._disarmed else _UNSURE)
+                return _HALTED
             case _:
                 return ""
 
