@@ -8,6 +8,8 @@ from typing import Any
 import numpy as np
 
 from analysis.logs.reading import read_logs
+from analysis.stats.cells import ByParticipant
+from analysis.summary.results import StudyStatistics
 from analysis.summary.summary import summarize
 from tests.log_files import METHODS, rating_rows, ratings_path, trial_rows, trials_path, write_rows
 
@@ -38,10 +40,7 @@ RIGHT = np.array([row.split() for row in _ROWS.split(",")], dtype=np.int64)
 """Right forward answers of ten, 14 participants by 3 methods: the data of every "R 4.2.2" number in these tests."""
 
 
-Json = dict[str, Any]
-
-
-def _study(folder: Path, right: Any, methods: tuple[str, ...] = METHODS) -> Json:
+def study_of(folder: Path, right: Any, methods: tuple[str, ...] = METHODS) -> StudyStatistics:
     """Statistics of participants with so many right forward answers of ten; every second backward answer is right."""
     for i, counts in enumerate(right):
         code = f"P{i + 1:02d}"
@@ -57,13 +56,18 @@ def _study(folder: Path, right: Any, methods: tuple[str, ...] = METHODS) -> Json
     return summarize(read_logs([folder]))
 
 
-def _ratings(folder: Path, table: Any, methods: tuple[str, ...] = METHODS) -> Json:
+def ratings_of(folder: Path, table: Any, methods: tuple[str, ...] = METHODS) -> StudyStatistics:
     for i, ratings in enumerate(table):
         rows = rating_rows(f"P{i + 1:02d}", methods=methods)
         for row, rating in zip(rows, ratings, strict=True):
             row["rating"] = str(rating)
         write_rows(ratings_path(folder, f"P{i + 1:02d}"), rows)
     return summarize(read_logs([folder]))
+
+
+def crowd_of(people: ByParticipant, n: int) -> ByParticipant:
+    """So many participants: these again and again."""
+    return ByParticipant([f"P{i:05d}" for i in range(n)], people.names, np.resize(people.array, (n, len(people.names))))
 
 
 CEILING = np.full((6, 3), 10)

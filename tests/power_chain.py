@@ -47,7 +47,7 @@ def through_the_chain(setup: Setup[Any], participants: int, seed: int, folder: P
         run(asked, synthetic_screen, VirtualClock())
     logs = read_logs([folder])
     assert not logs.problems
-    found: dict[str, Any] = summarize(logs)[setup.config.experiment]
+    found: dict[str, Any] = summarize(logs).to_dict()[setup.config.experiment]
     return found
 
 

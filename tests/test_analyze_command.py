@@ -48,7 +48,7 @@ def test_the_same_code_at_two_sites_is_two_people(recoil: Recoil, sites: Path, t
     found = _statistics(tmp_path / "out")
     people = ["kyoto/P01", "kyoto/P02", "kyoto/P03", "oslo/P01", "oslo/P02"]
     assert list(found["direction"]["participants"]) == people
-    alone = summarize(read_logs([sites / "oslo"]))
+    alone = summarize(read_logs([sites / "oslo"])).to_dict()
     for key in ("n", "means", "sds", "participants"):
         assert found["studies"]["oslo"]["direction"][key] == alone["direction"][key]
     assert {name: one["preference"]["n"] for name, one in found["studies"].items()} == {"kyoto": 3, "oslo": 2}

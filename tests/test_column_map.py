@@ -48,7 +48,7 @@ def test_psychopys_files_give_the_statistics_of_the_same_answers_in_recoils_own(
     assert mapped.problems == ()
     own = read_logs([write_study(tmp_path / "own", participants=3)])
     keys = ("n", "means", "sds", "anova", "binomial", "response_time")
-    found, expected = (summarize(logs)["direction"] for logs in (mapped, own))
+    found, expected = (summarize(logs).to_dict()["direction"] for logs in (mapped, own))
     assert [found[key] for key in keys] == [expected[key] for key in keys]
     assert found["origin"]["guns"] == {"not stated": 180}
 
@@ -62,7 +62,7 @@ def test_what_was_told_is_read_by_the_map_and_kept_where_it_does_not_say(tmp_pat
     logs = _read(_write(tmp_path / "all.csv", rows, (*HEADER, "told")), text)
     assert logs.problems == ()
     assert logs.trials["instruction"].value_counts().to_dict() == {"speed": 20, "accuracy": 20, "as you like": 20}
-    found = summarize(logs)["direction"]["speed_accuracy"]
+    found = summarize(logs).to_dict()["direction"]["speed_accuracy"]
     assert found["instructions"] == ["accuracy", "as you like", "speed"]
 
 
@@ -70,7 +70,7 @@ def test_times_that_the_map_says_are_the_experimenters_are_nobodys_own(tmp_path:
     text = EXAMPLE.read_text(encoding="utf-8").replace(
         'response_source = "participant"', 'response_source = "experimenter"'
     )
-    found = summarize(_read(_write(tmp_path / "all.csv", _psychopy(trial_rows("P01"))), text))["direction"]
+    found = summarize(_read(_write(tmp_path / "all.csv", _psychopy(trial_rows("P01"))), text)).to_dict()["direction"]
     assert (found["response_times"]["n"], found["speed_accuracy"]["n"]) == (0, 0)
     assert found["speed_accuracy"]["refused"]["experimenter"]["trials"] == 60
 

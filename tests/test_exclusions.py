@@ -54,7 +54,7 @@ def test_dropped_trials_are_counted_by_participant_and_the_first_rule_that_drops
 
 
 def test_statistics_are_over_the_trials_and_people_that_are_kept(effect: Effect) -> None:
-    found = summarize(effect.logs)
+    found = summarize(effect.logs).to_dict()
     assert found["excluded"] == []
     assert (found["direction"]["n"], found["preference"]["n"]) == (3, 4)
     tested = [test["trials"] for tests in found["direction"]["binomial"].values() for test in tests.values()]
@@ -117,7 +117,7 @@ def test_who_has_no_trial_left_is_listed(tmp_path: Path) -> None:
 def test_no_rules_change_nothing(tmp_path: Path) -> None:
     logs = _spoilt(tmp_path)
     effect = apply_rules(logs, Rules())
-    assert summarize(effect.logs) == summarize(logs)
+    assert summarize(effect.logs).to_dict() == summarize(logs).to_dict()
     assert effect.excluded == ()
 
 

@@ -1,12 +1,12 @@
 from __future__ import annotations
 
 import json
+import math
 import re
 import subprocess
 import sys
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pytest
@@ -17,17 +17,20 @@ from matplotlib.text import Text
 from analysis.logs.reading import read_logs
 from analysis.report.figures.shot import ShotPanel, figure_5
 from analysis.report.figures.style import display_name, stars
+from analysis.stats.cells import ByParticipant
 from analysis.summary.figures import directions, results
 from analysis.summary.figures.directions import figure_directions
 from analysis.summary.figures.results import figure_8
 from analysis.summary.figures.times import figure_response_times
+from analysis.summary.results import Scores, StudyStatistics
 from analysis.summary.summary import summarize
-from tests.log_files import write_study
+from tests.log_files import rating_rows, ratings_path, write_rows, write_study
+from tests.made_scores import crowd_of
 from tests.shown_panels import shot_panel
 
 
 @pytest.fixture(scope="module")
-def statistics(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Any]:
+def statistics(tmp_path_factory: pytest.TempPathFactory) -> StudyStatistics:
     return summarize(read_logs([write_study(tmp_path_factory.mktemp("study"), participants=6)]))
 
 
@@ -92,9 +95,9 @@ def test_time_is_logarithmic_where_a_stage_would_be_too_narrow_to_see(
     assert ("$\\mathdefault{10^{2}}$" in svg.read_text(encoding="utf-8")) is logarithmic
 
 
-def test_figure_8_shows_both_experiments_or_the_one_there_is(statistics: dict[str, Any], tmp_path: Path) -> None:
+def test_figure_8_shows_both_experiments_or_the_one_there_is(statistics: StudyStatistics, tmp_path: Path) -> None:
     both, both_svg, _ = figure_8(statistics, tmp_path / "both")
-    one, *_ = figure_8({"preference": statistics["preference"]}, tmp_path / "one")
+    one, *_ = figure_8(replace(statistics, direction=None), tmp_path / "one")
     assert _png_size(both)[0] > 1.7 * _png_size(one)[0]
     text = both_svg.read_text(encoding="utf-8")
     for words in ("correct rate, forward [%]", "rating (0 dislike", "Force II", "6 synthetic participants", "chance"):
@@ -103,11 +106,11 @@ def test_figure_8_shows_both_experiments_or_the_one_there_is(statistics: dict[st
 
 
 def test_nothing_that_is_written_in_a_figure_touches_its_neighbour(
-    statistics: dict[str, Any], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    statistics: StudyStatistics, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     for module, draw, found in (
         (results, figure_8, statistics),
-        (directions, figure_directions, statistics["direction"]),
+        (directions, figure_directions, statistics.direction),
     ):
         drawn: list[Figure] = []
         monkeypatch.setattr(module, "save", lambda figure, _, drawn=drawn: drawn.append(figure))
@@ -124,12 +127,12 @@ def test_nothing_that_is_written_in_a_figure_touches_its_neighbour(
         assert not [one for i, one in enumerate(boxes) for other in boxes[:i] if one.overlaps(other)]
 
 
-def test_figures_are_the_same_bytes_each_time(statistics: dict[str, Any], tmp_path: Path) -> None:
+def test_figures_are_the_same_bytes_each_time(statistics: StudyStatistics, tmp_path: Path) -> None:
     for first, second in (
         (figure_5([shot_panel()], tmp_path / "a"), figure_5([shot_panel()], tmp_path / "b")),
         (figure_8(statistics, tmp_path / "c"), figure_8(statistics, tmp_path / "d")),
         *(
-            (draw(statistics["direction"], tmp_path / "e"), draw(statistics["direction"], tmp_path / "f"))
+            (draw(statistics.direction, tmp_path / "e"), draw(statistics.direction, tmp_path / "f"))
             for draw in (figure_directions, figure_response_times)
         ),
     ):
@@ -140,82 +143,85 @@ def test_figures_are_the_same_bytes_each_time(statistics: dict[str, Any], tmp_pa
 
 
 def test_the_directions_are_shown_against_chance_with_sensitivity_and_criterion(
-    statistics: dict[str, Any], tmp_path: Path
+    statistics: StudyStatistics, tmp_path: Path
 ) -> None:
-    _, svg, _ = figure_directions(statistics["direction"], tmp_path / "directions")
+    _, svg, _ = figure_directions(statistics.direction, tmp_path / "directions")
     text = svg.read_text(encoding="utf-8")
     for words in ("forward shots", "backward shots", "chance", "d′", "possible", "(c) Criterion", "no bias"):
         assert f"<!-- {words}" in text or words in text
 
 
-def test_without_backward_shots_there_is_no_sensitivity_to_draw(statistics: dict[str, Any], tmp_path: Path) -> None:
-    found = statistics["direction"]
-    bare = found | {
-        "backward": {"means": {}, "sds": {}, "participants": {}},
-        "sensitivity": dict.fromkeys(found["methods"]),
-        "binomial": {method: {"forward": tests["forward"]} for method, tests in found["binomial"].items()},
-    }
+def test_without_backward_shots_there_is_no_sensitivity_to_draw(statistics: StudyStatistics, tmp_path: Path) -> None:
+    found = statistics.direction
+    assert found is not None
+    bare = replace(
+        found,
+        backward=Scores(means={}, sds={}, participants=ByParticipant((), (), np.empty((0, 0)))),
+        sensitivity=dict.fromkeys(found.methods),
+        binomial={method: {"forward": tests["forward"]} for method, tests in found.binomial.items()},
+    )
     _, svg, _ = figure_directions(bare, tmp_path / "forward")
     assert "(b)" not in svg.read_text(encoding="utf-8")
 
 
-def test_response_times_say_how_many_and_cut_a_single_slow_one(statistics: dict[str, Any], tmp_path: Path) -> None:
-    found = json.loads(json.dumps(statistics["direction"]))
-    found["response_times"]["methods"]["vibration"]["percentiles"][100] = 41.3
+def test_response_times_say_how_many_and_cut_a_single_slow_one(statistics: StudyStatistics, tmp_path: Path) -> None:
+    assert statistics.direction is not None
+    times = json.loads(json.dumps(statistics.direction.response_times))
+    times["methods"]["vibration"]["percentiles"][100] = 41.3
+    found = replace(statistics.direction, response_times=times)
     _, svg, _ = figure_response_times(found, tmp_path / "times")
     text = svg.read_text(encoding="utf-8")
     for words in ("n = 60 / 60", "Vibration (n = 120)", "the slowest took 41.3 s"):
         assert words in text
 
 
-def test_no_valid_response_time_makes_no_figure(statistics: dict[str, Any], tmp_path: Path) -> None:
-    found = statistics["direction"] | {"response_times": {"n": 0}}
+def test_no_valid_response_time_makes_no_figure(statistics: StudyStatistics, tmp_path: Path) -> None:
+    assert statistics.direction is not None
+    found = replace(statistics.direction, response_times={"n": 0})
     with pytest.raises(ValueError, match="at least one valid time"):
         figure_response_times(found, tmp_path / "times")
 
 
 @pytest.mark.parametrize("people", [200, 201])
 def test_beyond_200_people_their_distribution_is_drawn_instead_of_each(
-    people: int, statistics: dict[str, Any], tmp_path: Path
+    people: int, statistics: StudyStatistics, tmp_path: Path
 ) -> None:
-    one = statistics["preference"]
-    rows = list(one["participants"].values())
-    crowd = one | {"n": people, "participants": {f"P{i}": rows[i % len(rows)] for i in range(people)}}
-    _, svg, _ = figure_8({"preference": crowd}, tmp_path / "crowd")
+    one = statistics.preference
+    assert one is not None
+    crowd = replace(one, n=people, participants=crowd_of(one.participants, people))
+    _, svg, _ = figure_8(StudyStatistics(preference=crowd), tmp_path / "crowd")
     text = svg.read_text(encoding="utf-8")
     assert (text.count("<use ") > 3 * 200) is (people <= 200)
 
 
-def test_an_undefined_comparison_gets_no_bracket(statistics: dict[str, Any], tmp_path: Path) -> None:
-    one = statistics["preference"]
-    undefined = one | {"tukey": [comparison | {"p": None} for comparison in one["tukey"]]}
-    _, svg, _ = figure_8({"preference": undefined}, tmp_path / "undefined")
+def test_an_undefined_comparison_gets_no_bracket(statistics: StudyStatistics, tmp_path: Path) -> None:
+    one = statistics.preference
+    assert one is not None
+    assert one.tukey is not None
+    undefined = replace(one, tukey=tuple(replace(pair, p=math.nan) for pair in one.tukey))
+    _, svg, _ = figure_8(StudyStatistics(preference=undefined), tmp_path / "undefined")
     assert "n.s." not in svg.read_text(encoding="utf-8")
 
 
 def test_a_figure_of_one_participant_and_four_unknown_methods_is_drawn(tmp_path: Path) -> None:
-    methods = ["a", "b", "c", "d"]
-    found = {
-        "n": 1,
-        "methods": methods,
-        "means": dict.fromkeys(methods, 5.0),
-        "sds": dict.fromkeys(methods, None),
-        "tukey": None,
-        "participants": {"P01": dict.fromkeys(methods, 5.0)},
-    }
-    figure_8({"preference": found}, tmp_path / "few")
+    rows = rating_rows("P01", methods=("a", "b", "c", "d"))
+    write_rows(ratings_path(tmp_path, "P01"), [row | {"rating": "5"} for row in rows])
+    found = summarize(read_logs([tmp_path]))
+    assert found.preference is not None
+    assert len(found.preference.methods) == 4
+    figure_8(found, tmp_path / "few")
 
 
 def test_without_data_there_is_no_figure(tmp_path: Path) -> None:
     with pytest.raises(ValueError, match="at least one shot"):
         figure_5([], tmp_path / "x")
     with pytest.raises(ValueError, match="complete participant"):
-        figure_8({"direction": {"n": 0}}, tmp_path / "x")
+        figure_8(StudyStatistics(), tmp_path / "x")
 
 
 def test_names_and_stars_are_the_papers() -> None:
     assert display_name("asymmetric-1") == "Asymmetric Force I"
-    assert [stars(p) for p in (0.001, 0.01, 0.05, None)] == ["**", "*", "n.s.", "n.s."]
+    assert [stars(p) for p in (0.001, 0.01, 0.05, math.nan)] == ["**", "*", "n.s.", "n.s."]
 
 
 def test_importing_analysis_loads_numpy_and_scipy_alone_and_drawing_leaves_pyplot_alone() -> None:

@@ -1,16 +1,23 @@
 from __future__ import annotations
 
+from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pytest
 from scipy import stats
 
 from analysis import rm_anova, rm_tukey_hsd
+from analysis.logs.reading import read_logs
 from analysis.paper.odds import WHOLE_PATTERN, chance_recurs, odds_of, recurs, wilson_interval
 from analysis.paper.paper import Paper, load_paper
-from analysis.paper.published import Prediction, Row, compare, rounds_to
+from analysis.paper.published import Prediction, Row, rounds_to
+from analysis.summary.comparison import compare
+from analysis.summary.results import DirectionStatistics, Pair, StudyStatistics
+from analysis.summary.summary import summarize
+from tests.log_files import write_study
+from tests.made_scores import ratings_of
 
 METHODS = ("vibration", "asymmetric-1", "asymmetric-2")
 
@@ -20,23 +27,44 @@ def paper() -> Paper:
     return load_paper(Path(__file__).parent.parent / "configs" / "paper.toml")
 
 
-def _direction(**changes: Any) -> dict[str, Any]:
-    """Statistics of experiment 1 exactly as the paper has them."""
-    tukey = [
-        ("asymmetric-1", "vibration", 1e-4),
-        ("asymmetric-2", "vibration", 1e-9),
-        ("asymmetric-2", "asymmetric-1", 0.02),
-    ]
-    found = {
-        "n": 14,
-        "means": {"vibration": 78 / 140, "asymmetric-1": 111 / 140, "asymmetric-2": 130 / 140},
-        "sds": dict.fromkeys(METHODS, 0.1),
-        "anova": {"F": 28.4512, "df": [2, 26], "p": 2.7e-7},
-        "tukey": [{"a": a, "b": b, "difference": 0.2, "p": p} for a, b, p in tukey],
-        "binomial": {"vibration": {"forward": {"p": 0.20473}, "backward": {"p": 0.67276}}},
-        "backward": {"means": dict.fromkeys(METHODS, 0.5)},
-    }
-    return {"direction": found | changes}
+@pytest.fixture(scope="module")
+def direction(tmp_path_factory: pytest.TempPathFactory) -> DirectionStatistics:
+    """Statistics of experiment 1 exactly as the paper has them, the rest of a small study."""
+    found = summarize(read_logs([write_study(tmp_path_factory.mktemp("study"), participants=2)])).direction
+    assert found is not None
+    assert found.anova is not None
+    assert found.tukey is not None
+    counts = {"vibration": 78, "asymmetric-1": 111, "asymmetric-2": 130}
+    tests = {way: replace(test, p=p) for (way, test), p in zip(found.binomial["vibration"].items(), P, strict=True)}
+    return replace(
+        found,
+        n=14,
+        means={method: right / 140 for method, right in counts.items()},
+        anova=replace(found.anova, F=28.4512, df=(2, 26), p=2.7e-7),
+        tukey=(
+            _pair("asymmetric-1", "vibration", 1e-4),
+            _pair("asymmetric-2", "vibration", 1e-9),
+            _pair("asymmetric-2", "asymmetric-1", 0.02),
+        ),
+        binomial={"vibration": tests},
+    )
+
+
+P = 0.20473, 0.67276
+"""The paper's, of vibration forward and backward."""
+
+
+def _pair(a: str, b: str, p: float, difference: float = 0.2) -> Pair:
+    return Pair(a=a, b=b, difference=difference, q=5.0, p=p, ci_low=0.0, ci_high=0.4)
+
+
+def _with_anova(found: DirectionStatistics, F: float, df: tuple[int, int], p: float) -> DirectionStatistics:
+    assert found.anova is not None
+    return replace(found, anova=replace(found.anova, F=F, df=df, p=p))
+
+
+def _of(direction: DirectionStatistics | None) -> StudyStatistics:
+    return StudyStatistics(direction=direction)
 
 
 def _row(rows: tuple[Row, ...], quantity: str, experiment: str = "direction") -> Row:
@@ -44,38 +72,54 @@ def _row(rows: tuple[Row, ...], quantity: str, experiment: str = "direction") ->
     return row
 
 
-def test_the_papers_own_numbers_agree_with_the_paper(paper: Paper) -> None:
-    rows = [row for row in compare(_direction(), paper) if row.experiment == "direction"]
+def test_the_papers_own_numbers_agree_with_the_paper(paper: Paper, direction: DirectionStatistics) -> None:
+    rows = [row for row in compare(_of(direction), paper) if row.experiment == "direction"]
     assert {row.verdict for row in rows if row.published} == {"agrees"}
     assert {row.verdict for row in rows if not row.published} == {"not published"}
 
 
 @pytest.mark.parametrize(
-    ("changes", "quantity", "obtained"),
+    ("changed", "quantity", "obtained"),
     [
-        ({"n": 13}, "participants", 13),
-        ({"anova": {"F": 28.46, "df": [2, 26], "p": 1e-7}}, "ANOVA F", 28.46),
-        ({"anova": {"F": 28.45, "df": [2, 39], "p": 1e-7}}, "ANOVA df of the error", 39),
-        ({"anova": {"F": 28.45, "df": [2, 26], "p": 0.001}}, "ANOVA p", 0.001),
-        ({"means": dict.fromkeys(METHODS, 0.5564)}, "mean correct rate forward, vibration", 55.64),
-        ({"binomial": {"vibration": {"forward": {"p": 0.3}}}}, "binomial p, vibration forward", 0.3),
+        (lambda found: replace(found, n=13), "participants", 13),
+        (lambda found: _with_anova(found, 28.46, (2, 26), 1e-7), "ANOVA F", 28.46),
+        (lambda found: _with_anova(found, 28.45, (2, 39), 1e-7), "ANOVA df of the error", 39),
+        (lambda found: _with_anova(found, 28.45, (2, 26), 0.001), "ANOVA p", 0.001),
+        (
+            lambda found: replace(found, means=dict.fromkeys(METHODS, 0.5564)),
+            "mean correct rate forward, vibration",
+            55.64,
+        ),
+        (
+            lambda found: replace(
+                found, binomial={"vibration": {"forward": replace(found.binomial["vibration"]["forward"], p=0.3)}}
+            ),
+            "binomial p, vibration forward",
+            0.3,
+        ),
     ],
 )
 def test_a_different_number_is_said_to_differ(
-    changes: dict[str, Any], quantity: str, obtained: float, paper: Paper
+    changed: Callable[[DirectionStatistics], DirectionStatistics],
+    quantity: str,
+    obtained: float,
+    paper: Paper,
+    direction: DirectionStatistics,
 ) -> None:
-    row = _row(compare(_direction(**changes), paper), quantity)
+    row = _row(compare(_of(changed(direction)), paper), quantity)
     assert row.verdict == "differs"
     assert row.obtained == pytest.approx(obtained)
 
 
-def test_a_significant_difference_in_the_other_direction_is_no_agreement(paper: Paper) -> None:
-    tukey = [{"a": "asymmetric-1", "b": "vibration", "difference": -0.2, "p": 1e-6}]
-    row = _row(compare(_direction(tukey=tukey), paper), "Tukey p, asymmetric-1 above vibration")
+def test_a_significant_difference_in_the_other_direction_is_no_agreement(
+    paper: Paper, direction: DirectionStatistics
+) -> None:
+    turned = replace(direction, tukey=(_pair("asymmetric-1", "vibration", 1e-6, difference=-0.2),))
+    row = _row(compare(_of(turned), paper), "Tukey p, asymmetric-1 above vibration")
     assert (row.verdict, row.note) == ("differs", "asymmetric-1 is not above vibration")
 
 
-def test_a_difference_that_the_audit_predicted_is_said_to_be_one(paper: Paper) -> None:
+def test_a_difference_that_the_audit_predicted_is_said_to_be_one(paper: Paper, direction: DirectionStatistics) -> None:
     """28.51 is what the audit says the published means leave; 28.60 is not, and 28.45 agrees all the same."""
     predicted = {
         "direction: ANOVA F": Prediction(
@@ -83,31 +127,29 @@ def test_a_difference_that_the_audit_predicted_is_said_to_be_one(paper: Paper) -
         )
     }
     for obtained, verdict in ((28.51214, "differs as predicted"), (28.60, "differs"), (28.451, "agrees")):
-        anova = {"F": obtained, "df": [2, 26], "p": 1e-7}
-        row = _row(compare(_direction(anova=anova), paper, predicted), "ANOVA F")
+        found = _with_anova(direction, obtained, (2, 26), 1e-7)
+        row = _row(compare(_of(found), paper, predicted), "ANOVA F")
         assert (row.verdict, row.audit, row.note) == (verdict, "only under a reading", "off the lattice")
 
 
-def test_what_the_audit_says_of_a_mean_is_compared_in_percent(paper: Paper) -> None:
+def test_what_the_audit_says_of_a_mean_is_compared_in_percent(paper: Paper, direction: DirectionStatistics) -> None:
     name = "mean correct rate forward, vibration"
     predicted = {f"direction: {name}": Prediction(verdict="not attainable", nearest=(55.0, 55.714))}
-    means = dict.fromkeys(METHODS, 0.55)
-    assert _row(compare(_direction(means=means), paper, predicted), name).verdict == "differs as predicted"
-    assert _row(compare(_direction(means=means), paper), name).audit == ""
+    found = _of(replace(direction, means=dict.fromkeys(METHODS, 0.55)))
+    assert _row(compare(found, paper, predicted), name).verdict == "differs as predicted"
+    assert _row(compare(found, paper), name).audit == ""
 
 
-def test_what_was_not_run_or_not_testable_is_not_obtained(paper: Paper) -> None:
-    rows = compare(_direction(anova=None, tukey=None), paper)
+def test_what_was_not_run_or_not_testable_is_not_obtained(paper: Paper, direction: DirectionStatistics) -> None:
+    rows = compare(_of(replace(direction, anova=None, tukey=None)), paper)
     assert _row(rows, "ANOVA F").verdict == "not obtained"
     assert _row(rows, "Tukey p, asymmetric-1 above vibration").obtained is None
     preference = [row for row in rows if row.experiment == "preference"]
     assert {row.verdict for row in preference if row.published} == {"not obtained"}
 
 
-def test_orders_of_ratings_are_counted_by_participant(paper: Paper) -> None:
-    ratings = [(1, 5, 5), (0, 3, 7), (4, 4, 9)]
-    people = {f"P{i}": dict(zip(METHODS, row, strict=True)) for i, row in enumerate(ratings)}
-    rows = compare({"preference": {"participants": people}}, paper)
+def test_orders_of_ratings_are_counted_by_participant(paper: Paper, tmp_path: Path) -> None:
+    rows = compare(ratings_of(tmp_path, [(1, 5, 5), (0, 3, 7), (4, 4, 9)]), paper)
     assert _row(rows, "participants who rated vibration lowest", "preference").obtained == 2
     assert _row(rows, "participants with one score for asymmetric-1 and asymmetric-2", "preference").obtained == 1
 

@@ -2,8 +2,8 @@ from __future__ import annotations
 
 import json
 import re
+from dataclasses import replace
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pytest
@@ -11,11 +11,12 @@ import pytest
 from analysis.logs.reading import Logs, Problem, read_logs
 from analysis.paper.odds import odds_of
 from analysis.paper.paper import Paper, load_paper
-from analysis.paper.published import compare
+from analysis.summary.comparison import compare
 from analysis.summary.sections.data import ReportData
 from analysis.summary.sections.sections import write_report
 from analysis.summary.summary import summarize
 from tests.log_files import trial_rows, trials_path, write_rows, write_study
+from tests.made_scores import crowd_of
 from tests.shown_panels import shot_panel
 
 
@@ -32,8 +33,8 @@ def paper() -> Paper:
 @pytest.fixture(scope="module")
 def full(logs: Logs, paper: Paper, tmp_path_factory: pytest.TempPathFactory) -> Path:
     out = tmp_path_factory.mktemp("report") / "out"
-    statistics = summarize(logs)
-    statistics["excluded"] = [{"experiment": "direction", "participant": "P15", "reason": "3 of 60 trials unanswered"}]
+    left_out = {"experiment": "direction", "participant": "P15", "reason": "3 of 60 trials unanswered"}
+    statistics = replace(summarize(logs), excluded=(left_out,))
     problem = Problem(file=Path("sub-<b>_trials.csv"), line=7, column="response", message="'left' is not allowed")
     report = ReportData(
         title="Recoil & co: a <study>",
@@ -125,7 +126,7 @@ def test_the_markdown_links_its_figures_and_keeps_its_tables_whole(full: Path) -
 
 def test_statistics_json_is_unrounded_and_complete(full: Path, logs: Logs) -> None:
     found = json.loads((full / "statistics.json").read_text(encoding="utf-8"))
-    expected = summarize(logs)
+    expected = summarize(logs).to_dict()
     assert {key: found[key] for key in ("direction", "preference")} == {
         key: expected[key] for key in ("direction", "preference")
     }
@@ -155,7 +156,7 @@ def test_sections_without_data_are_left_out(tmp_path: Path) -> None:
 
 
 def test_a_report_of_nothing_says_so(tmp_path: Path) -> None:
-    statistics: dict[str, Any] = summarize(read_logs([tmp_path]))
+    statistics = summarize(read_logs([tmp_path]))
     write_report(tmp_path / "out", ReportData(title="Nothing", statistics=statistics))
     assert "There was nothing to analyse." in (tmp_path / "out" / "report.md").read_text(encoding="utf-8")
     assert not (tmp_path / "out" / "figures").exists()
@@ -211,13 +212,25 @@ def test_times_by_the_experimenters_hand_are_no_response_times(tmp_path: Path) -
 @pytest.fixture(scope="module")
 def crowded(logs: Logs) -> ReportData:
     """Ten thousand people: those of the study again and again."""
-    statistics = json.loads(json.dumps(summarize(logs)))
-    direction = statistics["direction"]
-    crowds = [direction, statistics["preference"], direction["backward"], direction["response_times"]]
-    for one in [*crowds, *direction["sensitivity"].values()]:
-        people = list(one["participants"].values())
-        one["participants"] = {f"P{i:05d}": people[i % len(people)] for i in range(10_000)}
-    direction["n"] = statistics["preference"]["n"] = 10_000
+    statistics, n = summarize(logs), 10_000
+    direction, preference = statistics.direction, statistics.preference
+    assert direction is not None
+    assert preference is not None
+    medians = list(direction.response_times["participants"].values())
+    times = {f"P{i:05d}": medians[i % len(medians)] for i in range(n)}
+    direction = replace(
+        direction,
+        n=n,
+        participants=crowd_of(direction.participants, n),
+        backward=replace(direction.backward, participants=crowd_of(direction.backward.participants, n)),
+        response_times=direction.response_times | {"participants": times},
+        sensitivity={
+            method: one and replace(one, participants=crowd_of(one.participants, n))
+            for method, one in direction.sensitivity.items()
+        },
+    )
+    preference = replace(preference, n=n, participants=crowd_of(preference.participants, n))
+    statistics = replace(statistics, direction=direction, preference=preference)
     files = tuple(Path(f"/logs/sub-P{i:05d}_task-direction_trials.csv") for i in range(10_000))
     bad = tuple(Problem(file=file, line=1, column=None, message="is empty") for file in files)
     return ReportData(title="Ten thousand", statistics=statistics, files=files, problems=bad)

@@ -83,7 +83,7 @@ def study(
 
 
 def found_in(folder: Path) -> Any:
-    return summarize(read_logs([folder]))["direction"]["speed_accuracy"]
+    return summarize(read_logs([folder])).to_dict()["direction"]["speed_accuracy"]
 
 
 def rows_of(folder: Path) -> list[dict[str, str]]:
@@ -218,7 +218,7 @@ def by_hand(rows: list[TextRow]) -> list[TextRow]:
 def test_times_from_the_experimenters_hand_are_refused_with_the_reason(tmp_path: Path) -> None:
     for code in ("P01", "P02"):
         write_rows(trials_path(tmp_path / "study", code), by_hand(trial_rows(code)))
-    statistics = summarize(read_logs([tmp_path / "study"]))
+    statistics = summarize(read_logs([tmp_path / "study"])).to_dict()
     found = statistics["direction"]["speed_accuracy"]
     assert (found["n"], found["answered"], found["methods"]) == (0, 120, {})
     assert "the experimenter's hand" in found["reason"]
@@ -271,7 +271,7 @@ def test_instructions_nobody_knows_are_kept_as_they_are(tmp_path: Path) -> None:
         write_rows(trials_path(tmp_path, code), rows)
     logs = read_logs([tmp_path])
     assert not logs.problems
-    assert summarize(logs)["direction"]["speed_accuracy"]["instructions"] == ["be brave, 100 %", "speed"]
+    assert summarize(logs).to_dict()["direction"]["speed_accuracy"]["instructions"] == ["be brave, 100 %", "speed"]
 
 
 def test_the_effect_of_an_instruction_is_paired_by_person(tmp_path: Path) -> None:
@@ -303,7 +303,7 @@ def test_people_who_were_told_different_things_count_each_for_their_own(tmp_path
         write_rows(trials_path(tmp_path, f"P{i}"), diffused(f"P{i}", 60, (told,)))
     found = found_in(tmp_path)
     assert {one["accuracy"]["people"] for one in found["instruction_effects"]} == {0}
-    section = trade_section(summarize(read_logs([tmp_path]))["direction"])
+    section = trade_section(summarize(read_logs([tmp_path])).to_dict()["direction"])
     assert section is not None
     assert any("No participant was told two things" in text for text in section.paragraphs)
     assert not [table for table in section.tables if "Effect of the instruction" in table.caption]
@@ -351,7 +351,7 @@ def test_whatever_the_log_there_is_a_section_and_no_nan(kind: str, people: int, 
         for row in rows if kind == "one trial" else ():
             row |= {"direction": "forward", "correct": str(int(row["response"] == "forward"))}
         write_rows(trials_path(tmp_path / "study", f"P{i}"), changed(rows, kind))
-    statistics = summarize(read_logs([tmp_path / "study"]))
+    statistics = summarize(read_logs([tmp_path / "study"])).to_dict()
     found = statistics["direction"]
     assert found["n"] == people
     json.dumps(statistics, allow_nan=False)
@@ -375,7 +375,7 @@ def test_whatever_the_log_there_is_a_section_and_no_nan(kind: str, people: int, 
 @pytest.mark.parametrize("kind", ["all correct", "told by method"])
 def test_figures_are_drawn_where_there_is_little_to_draw(kind: str, tmp_path: Path) -> None:
     write_rows(trials_path(tmp_path, "P1"), changed(trial_rows("P1", sets=2), kind))
-    found = summarize(read_logs([tmp_path]))["direction"]
+    found = summarize(read_logs([tmp_path])).to_dict()["direction"]
     assert all(path.is_file() for path in figure_conditional_accuracy(found, tmp_path / "curve"))
     assert all(path.is_file() for path in figure_quantile_probability(found, tmp_path / "points"))
 
@@ -457,7 +457,7 @@ def test_a_crowd_is_fitted_by_a_sample_of_people_whose_codes_are_evenly_spaced(t
     direct = fit(trials, by_person=True)
     assert found.together is not None
     assert found.together.log_likelihood == pytest.approx(direct.log_likelihood)
-    shown = summarize(logs)["direction"]["speed_accuracy"]
+    shown = summarize(logs).to_dict()["direction"]["speed_accuracy"]
     assert (shown["people"], shown["diffusion"]["fitted"]) == (people, MOST_PEOPLE)
 
 
@@ -465,7 +465,7 @@ def test_a_crowd_is_fitted_by_a_sample_of_people_whose_codes_are_evenly_spaced(t
 
 
 def test_the_report_shows_figures_tables_and_caveats(folder: Path, tmp_path: Path) -> None:
-    write_report(tmp_path, ReportData(title="Trade", statistics=summarize(read_logs([folder]))))
+    write_report(tmp_path, ReportData(title="Trade", statistics=summarize(read_logs([folder])).to_dict()))
     text = (tmp_path / "report.md").read_text(encoding="utf-8")
     section = text.partition("## Speed and accuracy")[2].partition("\n## ")[0]
     for words in (

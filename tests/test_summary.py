@@ -25,7 +25,7 @@ def _rate(code: str, seed: int, method: str, direction: str) -> float:
 
 
 def test_the_direction_measure_is_the_correct_rate_on_forward_trials(logs: Logs) -> None:
-    found = summarize(logs)["direction"]
+    found = summarize(logs).to_dict()["direction"]
     assert found["n"] == 14
     assert found["methods"] == list(METHODS)
     for method in METHODS:
@@ -36,7 +36,7 @@ def test_the_direction_measure_is_the_correct_rate_on_forward_trials(logs: Logs)
 
 
 def test_tests_are_the_repeated_measures_ones_on_the_participants_scores(logs: Logs) -> None:
-    for found in (summarize(logs)["direction"], summarize(logs)["preference"]):
+    for found in (summarize(logs).to_dict()["direction"], summarize(logs).to_dict()["preference"]):
         scores = [[row[m] for m in METHODS] for row in found["participants"].values()]
         anova = rm_anova(scores)
         assert found["anova"]["F"] == anova.F
@@ -48,7 +48,7 @@ def test_tests_are_the_repeated_measures_ones_on_the_participants_scores(logs: L
 
 
 def test_binomial_tests_pool_the_trials_of_all_participants(logs: Logs) -> None:
-    found = summarize(logs)["direction"]
+    found = summarize(logs).to_dict()["direction"]
     for method in METHODS:
         for direction in ("forward", "backward"):
             entry = found["binomial"][method][direction]
@@ -59,7 +59,7 @@ def test_binomial_tests_pool_the_trials_of_all_participants(logs: Logs) -> None:
 
 
 def test_sensitivity_takes_forward_said_on_backward_as_a_false_alarm(logs: Logs) -> None:
-    found = summarize(logs)["direction"]["sensitivity"]["asymmetric-1"]
+    found = summarize(logs).to_dict()["direction"]["sensitivity"]["asymmetric-1"]
     values = [
         yes_no(
             round(10 * _rate(f"P{i:02d}", 1000 + i, "asymmetric-1", "forward")),
@@ -79,7 +79,10 @@ def test_response_times_count_only_where_they_are_the_participants_own(tmp_path:
         row["response_time_valid"] = "0"
     rows[0]["response_time_s"] = "1.25"
     write_rows(trials_path(tmp_path, "P01"), rows)
-    assert summarize(read_logs([tmp_path]))["direction"]["response_time"]["vibration"] == {"median": 1.25, "n": 1}
+    assert summarize(read_logs([tmp_path])).to_dict()["direction"]["response_time"]["vibration"] == {
+        "median": 1.25,
+        "n": 1,
+    }
 
 
 def test_participants_who_miss_an_answer_or_a_method_are_left_out_and_listed(tmp_path: Path) -> None:
@@ -91,7 +94,7 @@ def test_participants_who_miss_an_answer_or_a_method_are_left_out_and_listed(tmp
     ratings = rating_rows("P04")
     ratings[0]["rating"] = ""
     write_rows(ratings_path(tmp_path, "P04"), ratings)
-    found = summarize(read_logs([tmp_path]))
+    found = summarize(read_logs([tmp_path])).to_dict()
     assert (found["direction"]["n"], found["preference"]["n"]) == (3, 4)
     assert found["excluded"] == [
         {"experiment": "direction", "participant": "P02", "reason": "1 of 60 trials unanswered"},
@@ -107,7 +110,7 @@ def test_fewer_than_two_complete_participants_give_no_test_but_a_reason(particip
         rows = trial_rows()
         rows[0].update(response="", correct="")
         write_rows(trials_path(tmp_path, "P01"), rows)
-    found = summarize(read_logs([tmp_path]))
+    found = summarize(read_logs([tmp_path])).to_dict()
     assert found["direction"]["n"] == participants
     assert found["direction"]["anova"] is None
     assert found["direction"]["tukey"] is None
@@ -120,7 +123,7 @@ def test_what_is_not_finite_is_null_and_named(tmp_path: Path) -> None:
         for row, rating in zip(rows, ("1", "2", "3"), strict=True):
             row["rating"] = rating
         write_rows(ratings_path(tmp_path, code), rows)
-    found = summarize(read_logs([tmp_path]))
+    found = summarize(read_logs([tmp_path])).to_dict()
     assert found["preference"]["anova"]["F"] is None
     assert found["preference"]["anova"]["p"] == 0.0
     assert any("preference.anova.F is infinite" in warning for warning in found["warnings"])
@@ -128,7 +131,7 @@ def test_what_is_not_finite_is_null_and_named(tmp_path: Path) -> None:
 
 
 def test_the_summary_is_plain_json(logs: Logs) -> None:
-    found = summarize(logs)
+    found = summarize(logs).to_dict()
     assert json.loads(json.dumps(found, allow_nan=False)) == found
     assert set(found["versions"]) == {"python", "numpy", "scipy", "pandas", "pingouin", "recoil"}
 
@@ -136,12 +139,12 @@ def test_the_summary_is_plain_json(logs: Logs) -> None:
 def test_unknown_methods_are_sorted_by_name(tmp_path: Path) -> None:
     for code in ("P01", "P02"):
         write_rows(ratings_path(tmp_path, code), rating_rows(code, methods=("ramp", "click")))
-    assert summarize(read_logs([tmp_path]))["preference"]["methods"] == ["click", "ramp"]
+    assert summarize(read_logs([tmp_path])).to_dict()["preference"]["methods"] == ["click", "ramp"]
 
 
 def test_order_of_files_changes_nothing(logs: Logs) -> None:
     again = read_logs(reversed(logs.files))
-    assert summarize(again) == summarize(logs)
+    assert summarize(again).to_dict() == summarize(logs).to_dict()
 
 
 def _crowd(participants: int) -> Logs:
@@ -173,5 +176,5 @@ def _crowd(participants: int) -> Logs:
 
 
 def test_ten_thousand_participants_are_counted() -> None:
-    found = summarize(_crowd(10_000))
+    found = summarize(_crowd(10_000)).to_dict()
     assert (found["direction"]["n"], found["preference"]["n"]) == (10_000, 10_000)

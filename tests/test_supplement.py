@@ -3,6 +3,7 @@ from __future__ import annotations
 import json
 import subprocess
 import sys
+from dataclasses import fields
 from pathlib import Path
 from typing import Any
 
@@ -12,13 +13,14 @@ import pytest
 
 from analysis import rm_tukey_hsd_paired
 from analysis.logs.reading import Logs, read_logs
-from analysis.stats.assumptions import assumptions
+from analysis.report.serial import undefined
 from analysis.stats.paired import SCALE, jzs_paired
-from analysis.stats.supplement import WITHIN, within_supplement
+from analysis.summary.results import Supplement
 from analysis.summary.sections.supplement import supplement_sections
 from analysis.summary.summary import summarize
+from analysis.summary.supplement import within_supplement
 from tests.log_files import METHODS, write_study
-from tests.made_scores import CEILING, ONE_AT_CEILING, RIGHT, Json, _ratings, _study
+from tests.made_scores import CEILING, ONE_AT_CEILING, RIGHT, ratings_of, study_of
 from tests.waiting import PATIENCE_S
 
 
@@ -28,20 +30,20 @@ def logs(tmp_path_factory: pytest.TempPathFactory) -> Logs:
 
 
 @pytest.fixture(scope="module")
-def found(logs: Logs) -> Json:
-    return summarize(logs)
+def found(logs: Logs) -> dict[str, Any]:
+    return summarize(logs).to_dict()
 
 
 @pytest.mark.parametrize("experiment", ["direction", "preference"])
-def test_every_key_is_there_and_plain_json(experiment: str, found: Json) -> None:
-    assert set(WITHIN) < set(found[experiment])
+def test_every_key_is_there_and_plain_json(experiment: str, found: dict[str, Any]) -> None:
+    assert {field.name for field in fields(Supplement)} < set(found[experiment])
     assert json.loads(json.dumps(found, allow_nan=False)) == found
     assert ("model" in found[experiment]) == (experiment == "direction")
 
 
 def test_published_like_rates_give_the_numbers_of_r(tmp_path: Path) -> None:
     # R 4.2.2, afex 1.2.1 and emmeans 1.8.4: pairs(emmeans(a, "m", model = "multivariate")); see test_sphericity
-    direction = _study(tmp_path, RIGHT)["direction"]
+    direction = study_of(tmp_path, RIGHT).to_dict()["direction"]
     assert direction["sphericity"]["W"] == pytest.approx(0.542433747971877)
     assert direction["effect_size"]["generalized_eta_squared"] == pytest.approx(0.639745796372302)
     assert direction["friedman"]["chi2"] == pytest.approx(25.5294117647059)
@@ -54,7 +56,7 @@ def test_published_like_rates_give_the_numbers_of_r(tmp_path: Path) -> None:
     assert direction["model"]["conditions"][2]["log_odds"] == pytest.approx(3.29583686600253)
 
 
-def test_bayes_factors_belong_to_the_paired_t_tests(found: Json) -> None:
+def test_bayes_factors_belong_to_the_paired_t_tests(found: dict[str, Any]) -> None:
     for experiment in ("direction", "preference"):
         factors = found[experiment]["bayes_factors"]
         assert factors["r"] == SCALE
@@ -64,14 +66,14 @@ def test_bayes_factors_belong_to_the_paired_t_tests(found: Json) -> None:
 
 def test_outliers_are_named_by_participant_and_method(tmp_path: Path) -> None:
     table = [[2.0 + 0.1 * i, 5.0, 8.0 - 0.1 * (i % 3)] for i in range(9)] + [[9.5, 5.0, 7.9]]
-    diagnostics = _ratings(tmp_path, table)["preference"]["diagnostics"]
+    diagnostics = ratings_of(tmp_path, table).to_dict()["preference"]["diagnostics"]
     (outlier,) = diagnostics["outliers"]["found"]
     assert (outlier["participant"], outlier["method"], outlier["score"]) == ("P10", "vibration", 9.5)
     assert diagnostics["scale"] == [0.0, 10.0]
 
 
 def test_low_epsilon_warns_against_the_pooled_tukey_once_at_the_top(tmp_path: Path) -> None:
-    found = _study(tmp_path, RIGHT)
+    found = study_of(tmp_path, RIGHT).to_dict()
     assert found["direction"]["sphericity"]["greenhouse_geisser"]["epsilon"] < 0.75
     assert [warning for warning in found["warnings"] if "tukey_paired" in warning] == [
         "direction: sphericity does not hold (Greenhouse-Geisser epsilon below 0.75): read the corrected F test and "
@@ -80,7 +82,7 @@ def test_low_epsilon_warns_against_the_pooled_tukey_once_at_the_top(tmp_path: Pa
 
 
 def test_milder_departures_stay_beside_the_assumptions(tmp_path: Path) -> None:
-    found = _study(tmp_path, RIGHT)
+    found = study_of(tmp_path, RIGHT).to_dict()
     told = [entry["warning"] for entry in found["direction"]["assumptions"] if entry["warning"]]
     assert any("asymmetric-2 (ceiling 10 of 14)" in warning for warning in told)
     assert len(found["warnings"]) == 1
@@ -88,7 +90,7 @@ def test_milder_departures_stay_beside_the_assumptions(tmp_path: Path) -> None:
 
 def test_clustering_that_turns_the_pooled_test_over_is_told_at_the_top(tmp_path: Path) -> None:
     counts = [[10, 8, 9], [10, 9, 8], [10, 8, 9], [9, 7, 8], [10, 8, 9], [1, 8, 9], [0, 8, 9], [2, 9, 8]]
-    found = _study(tmp_path, counts)
+    found = study_of(tmp_path, counts).to_dict()
     test = found["direction"]["binomial"]["vibration"]["forward"]
     assert test["p"] < 0.05 < test["clustering"]["p_adjusted"]
     assert any("pooled binomial test is not to be read: vibration forward" in warning for warning in found["warnings"])
@@ -121,7 +123,7 @@ def test_supplements_of_any_scores_are_finite_or_have_a_reason() -> None:
         if rng.random() < 0.3:
             scores[:, 1] = scores[:, 0]
         found = within_supplement(pd.DataFrame(scores, index=range(n), columns=range(k)), (0.0, 10.0))
-        json.dumps(found, allow_nan=False)
+        assert not list(undefined(found))
 
 
 def _numbers(value: Any) -> list[float]:
@@ -134,7 +136,8 @@ def _numbers(value: Any) -> list[float]:
 
 @pytest.mark.parametrize("name", DEGENERATE)
 def test_degenerate_answers_never_crash_and_never_give_a_silent_number(name: str, tmp_path: Path) -> None:
-    found = _study(tmp_path, DEGENERATE[name])
+    statistics = study_of(tmp_path, DEGENERATE[name])
+    found = statistics.to_dict()
     direction = found["direction"]
     assert np.isfinite(_numbers(found)).all()
     json.dumps(found, allow_nan=False)
@@ -143,18 +146,18 @@ def test_degenerate_answers_never_crash_and_never_give_a_silent_number(name: str
     for entry in (direction["friedman"], direction["sphericity"], direction["diagnostics"]["normality"]):
         assert entry["p"] is not None or entry["reason"]
     assert direction["model"]["contrasts"] or direction["model"]["reason"]
-    assert supplement_sections(found)
+    assert list(supplement_sections(statistics))
 
 
 @pytest.mark.parametrize("name", DEGENERATE)
 def test_degenerate_ratings_never_crash_either(name: str, tmp_path: Path) -> None:
-    found = _ratings(tmp_path, DEGENERATE[name])
-    assert np.isfinite(_numbers(found)).all()
-    assert supplement_sections(found)
+    statistics = ratings_of(tmp_path, DEGENERATE[name])
+    assert np.isfinite(_numbers(statistics.to_dict())).all()
+    assert list(supplement_sections(statistics))
 
 
 def test_all_at_ceiling_gives_reasons_everywhere(tmp_path: Path) -> None:
-    direction = _study(tmp_path, CEILING)["direction"]
+    direction = study_of(tmp_path, CEILING).to_dict()["direction"]
     assert direction["effect_size"]["partial_eta_squared"] is None
     assert direction["friedman"]["reason"]
     assert [pair["p"] for pair in direction["paired_t"]] == [None] * 3
@@ -165,13 +168,13 @@ def test_all_at_ceiling_gives_reasons_everywhere(tmp_path: Path) -> None:
 
 
 def test_fewer_people_than_methods_have_no_mauchly_test_but_a_reason(tmp_path: Path) -> None:
-    sphericity = _study(tmp_path, RIGHT[:2])["direction"]["sphericity"]
+    sphericity = study_of(tmp_path, RIGHT[:2]).to_dict()["direction"]["sphericity"]
     assert (sphericity["W"], sphericity["huynh_feldt"]) == (None, None)
     assert "fewer participants than conditions" in sphericity["reason"]
 
 
 def test_two_methods_need_no_sphericity(tmp_path: Path) -> None:
-    found = _study(tmp_path, RIGHT[:, :2], ("ramp", "click"))["direction"]
+    found = study_of(tmp_path, RIGHT[:, :2], ("ramp", "click")).to_dict()["direction"]
     (pair,) = found["paired_t"]
     assert found["anova"]["F"] == pytest.approx(pair["t"] ** 2)
     assert found["anova"]["p"] == pytest.approx(pair["p"]) == pytest.approx(found["tukey_paired"][0]["p"])
@@ -183,15 +186,17 @@ def test_two_methods_need_no_sphericity(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize("right", [RIGHT[:1], RIGHT[:, :1]])
 def test_one_person_or_one_method_has_no_supplement(right: Any, tmp_path: Path) -> None:
-    found = _study(tmp_path, right, METHODS[: right.shape[1]])
-    direction = found["direction"]
-    assert [direction[key] for key in WITHIN] == [None] * len(WITHIN)
-    assert direction["assumptions"] == assumptions(direction) == []
-    assert direction["model"]["reason"]
-    assert supplement_sections(found) == ()
+    statistics = study_of(tmp_path, right, METHODS[: right.shape[1]])
+    found, direction = statistics.direction, statistics.to_dict()["direction"]
+    assert found is not None
+    assert found.supplement is None
+    assert [direction[field.name] for field in fields(Supplement)] == [None] * len(fields(Supplement))
+    assert found.assumptions == ()
+    assert found.model.fit.reason
+    assert not list(supplement_sections(statistics))
 
 
-def test_the_paired_tukey_is_the_one_of_the_core(found: Json) -> None:
+def test_the_paired_tukey_is_the_one_of_the_core(found: dict[str, Any]) -> None:
     scores = [[row[m] for m in METHODS] for row in found["preference"]["participants"].values()]
     own = rm_tukey_hsd_paired(scores, METHODS)
     assert [(c["a"], c["b"], c["q"], c["p"]) for c in found["preference"]["tukey_paired"]] == [

@@ -2,20 +2,25 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from typing import Any
+import math
+from collections.abc import Sequence
 
 NONE = "–"
 """Stands where there is no number."""
 
 
+def known(value: float | None) -> float | None:
+    """The number, None if it is NaN or infinite: a page shows neither."""
+    return value if value is not None and math.isfinite(value) else None
+
+
 def number(value: float | None, digits: int = 2) -> str:
     """`value` with so many decimals, and a true minus sign.
 
-    >>> number(-1.2345), number(None)
-    ('−1.23', '–')
+    >>> number(-1.2345), number(None), number(float("nan"))
+    ('−1.23', '–', '–')
     """
-    if value is None:
+    if value is None or not math.isfinite(value):
         return NONE
     text = f"{value:.{digits}f}"
     return text.lstrip("-") if float(text) == 0.0 else text.replace("-", "−")
@@ -36,7 +41,7 @@ def percent(share: float | None, digits: int = 1) -> str:
     >>> percent(0.55714)
     '55.7 %'
     """
-    return NONE if share is None else f"{number(100.0 * share, digits)} %"
+    return NONE if share is None or not math.isfinite(share) else f"{number(100.0 * share, digits)} %"
 
 
 def p_cell(p: float | None) -> str:
@@ -45,7 +50,7 @@ def p_cell(p: float | None) -> str:
     >>> p_cell(0.0004), p_cell(0.0423), p_cell(0.9999)
     ('< .001', '.042', '> .999')
     """
-    if p is None:
+    if p is None or math.isnan(p):
         return NONE
     if p < 0.001:
         return "< .001"
@@ -64,15 +69,15 @@ def p_value(p: float | None) -> str:
     return f"p {cell}" if cell[0] in "<>" else f"p = {cell}"
 
 
-def f_test(anova: Mapping[str, Any]) -> str:
-    """An F test in a sentence.
+def f_test(F: float | None, df: Sequence[float], p: float | None) -> str:
+    """An F test in a sentence; whole degrees of freedom without decimals, corrected ones with two.
 
-    >>> f_test({"F": 28.4512, "df": [2, 26], "p": 2.7e-7})
+    >>> f_test(28.4512, (2, 26), 2.7e-7)
     'F(2, 26) = 28.45, p < .001'
     """
-    df_effect, df_error = anova["df"]
-    F = "undefined or infinite" if anova["F"] is None else number(anova["F"])
-    return f"F({df_effect}, {df_error}) = {F}, {p_value(anova['p'])}"
+    shown = number(F)
+    of = ", ".join(str(one) if isinstance(one, int) else number(one) for one in df)
+    return f"F({of}) = {'undefined or infinite' if shown == NONE else shown}, {p_value(p)}"
 
 
 def interval(low: float | None, high: float | None, digits: int = 2) -> str:

@@ -4,9 +4,17 @@ from __future__ import annotations
 
 import json
 import math
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import fields, is_dataclass
-from typing import Any
+from typing import Any, Final
+
+OPTIONAL: Final = {"optional": True}
+"""Metadata of a field that is left out where it is None."""
+
+
+def beside(result: type) -> dict[str, type]:
+    """Metadata of a field whose own fields, those of `result`, stand beside its neighbours; all null for None."""
+    return {"beside": result}
 
 
 def plain(value: Any) -> Any:
@@ -17,7 +25,7 @@ def plain(value: Any) -> Any:
     {'a': [1.0, None], 'b': [True, None]}
     """
     if is_dataclass(value) and not isinstance(value, type):
-        return {field.name: plain(getattr(value, field.name)) for field in fields(value)}
+        return {name: plain(one) for name, one in _members(value)}
     if isinstance(value, Mapping):
         return {str(key): plain(one) for key, one in value.items()}
     if isinstance(value, list | tuple):
@@ -27,6 +35,36 @@ def plain(value: Any) -> Any:
     return None if isinstance(value, float) and not math.isfinite(value) else value
 
 
+def undefined(value: Any, place: str = "") -> Iterator[tuple[str, float]]:
+    """Every number that `plain` writes as null because it is not finite, with its place in the file.
+
+    A mapping whose attribute `finite` says that all its numbers are is believed, not walked through.
+
+    >>> list(undefined({"a": [1.0, float("inf")], "b": {"c": 2.0}}))
+    [('a[1]', inf)]
+    """
+    if is_dataclass(value) and not isinstance(value, type):
+        value = dict(_members(value))
+    if isinstance(value, Mapping) and not getattr(value, "finite", False):
+        for key, one in value.items():
+            yield from undefined(one, f"{place}.{key}".lstrip("."))
+    elif isinstance(value, list | tuple):
+        for i, one in enumerate(value):
+            yield from undefined(one, f"{place}[{i}]")
+    elif isinstance(value, float) and not math.isfinite(value):
+        yield place, value
+
+
 def as_json(result: Any) -> bytes:
     """A result as the text of a JSON file."""
     return (json.dumps(plain(result), indent=1, ensure_ascii=False, allow_nan=False) + "\n").encode()
+
+
+def _members(result: Any) -> Iterator[tuple[str, Any]]:
+    """The names and values of a result as they are written."""
+    for field in fields(result):
+        value, inner = getattr(result, field.name), field.metadata.get("beside")
+        if inner is not None:
+            yield from dict.fromkeys(f.name for f in fields(inner)).items() if value is None else _members(value)
+        elif value is not None or not field.metadata.get("optional"):
+            yield field.name, value

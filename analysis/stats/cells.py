@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -38,12 +38,35 @@ class TrialCells:
 class Finite(dict[str, Any]):
     """Numbers by name, finite all of them: so many that they were looked at as an array, not one by one."""
 
+    finite = True
 
-def by_name(codes: Sequence[str], names: Sequence[str], values: FloatArray) -> dict[str, Any]:
-    """Rows of numbers by code and name, `Finite` if they are."""
-    rows = zip(*(column.tolist() for column in values.T), strict=True)
-    found = {code: dict(zip(names, row, strict=True)) for code, row in zip(codes, rows, strict=True)}
-    return Finite(found) if np.isfinite(values).all() else found
+
+class ByParticipant(Mapping[str, Mapping[str, float]]):
+    """A number of each participant under each name: `array` (participants, names), read as a mapping of mappings."""
+
+    def __init__(self, codes: Sequence[str], names: Sequence[str], values: FloatArray) -> None:
+        """`values` in the order of `codes` and `names`."""
+        self.codes, self.names, self.array = tuple(codes), tuple(names), values
+        self._place = {code: i for i, code in enumerate(self.codes)}
+
+    def __getitem__(self, code: str) -> dict[str, float]:
+        return dict(zip(self.names, self.array[self._place[code]].tolist(), strict=True))
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(self.codes)
+
+    def __len__(self) -> int:
+        return len(self.codes)
+
+    @property
+    def finite(self) -> bool:
+        """Whether every number is one."""
+        return bool(np.isfinite(self.array).all())
+
+    def column(self, name: str, codes: Iterable[str]) -> FloatArray:
+        """The numbers of these participants under a name; NaN for who or what is not here."""
+        column = self.array[:, self.names.index(name)] if name in self.names else np.full(len(self), np.nan)
+        return np.array([column[self._place[code]] if code in self._place else np.nan for code in codes])
 
 
 def coded(table: pd.DataFrame) -> pd.DataFrame:

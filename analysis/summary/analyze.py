@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any
 
 from analysis.logs.column_map import ColumnMap
 from analysis.logs.exclusions import Effect, Rules, apply_rules, by_study
@@ -15,8 +14,10 @@ from analysis.paper.audit import audit
 from analysis.paper.audit.paper_file import load_paper_file
 from analysis.paper.audit.sentences import predictions
 from analysis.paper.paper import load_paper
-from analysis.paper.published import Prediction, compare
+from analysis.paper.published import Prediction
 from analysis.summary import remarks_coding
+from analysis.summary.comparison import compare
+from analysis.summary.results import StudyStatistics
 from analysis.summary.sections.data import ReportData
 from analysis.summary.sections.sections import write_report
 from analysis.summary.summary import summarize
@@ -25,8 +26,6 @@ from experiments.config.setup import sha256
 from experiments.record import storage
 from experiments.record.provenance import provenance
 from experiments.study.places import PlaceError
-
-_PER_STUDY = ("direction", "preference", "excluded", "warnings")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -41,7 +40,7 @@ class Request:
     codebook: Path | None = None
 
 
-def analyze(request: Request, track: Track = iter) -> tuple[dict[str, Any], tuple[Problem, ...]]:
+def analyze(request: Request, track: Track = iter) -> tuple[StudyStatistics, tuple[Problem, ...]]:
     """Write statistics, tables and report of all usable logs; returns the statistics and what was left out.
 
     `PlaceError` if there is no usable log at all, with every reason.
@@ -56,12 +55,12 @@ def analyze(request: Request, track: Track = iter) -> tuple[dict[str, Any], tupl
         raise PlaceError("\n".join(filter(None, ["no usable log in " + ", ".join(map(str, request.paths)), reasons])))
     effect = apply_rules(logs, rules) if rules is not None else None
     used = effect.logs if effect is not None else logs
-    statistics = summarize(used) | _by_study(used)
+    statistics = replace(summarize(used), studies=_by_study(used))
     if effect is not None and rules is not None and request.rules is not None:
         statistics = _with_rules(statistics, effect, rules, request.rules)
     coded = None if book is None else _coded(used, statistics, book)
     if coded is not None:
-        statistics = statistics | {"remarks": remarks_coding.as_json(coded)}
+        statistics = replace(statistics, remarks=coded)
     storage.make_folder(request.out)
     report = ReportData(
         title="Statistics of " + ", ".join(path.name or str(path) for path in request.paths),
@@ -78,9 +77,9 @@ def analyze(request: Request, track: Track = iter) -> tuple[dict[str, Any], tupl
     return statistics, logs.problems
 
 
-def write_tables(out: Path, logs: Logs, statistics: Mapping[str, Any]) -> None:
+def write_tables(out: Path, logs: Logs, statistics: StudyStatistics) -> None:
     """Write each experiment's results by participant, long and wide, as CSV."""
-    for name, content in result_tables(logs, statistics).items():
+    for name, content in result_tables(logs, statistics.to_dict()).items():
         storage.write_whole(out / name, content)
 
 
@@ -89,8 +88,10 @@ def _predicted(paper: Path | None) -> dict[str, Prediction]:
     return {} if paper is None else predictions(audit(load_paper_file(paper)))
 
 
-def _coded(logs: Logs, statistics: dict[str, Any], book: remarks_coding.Codebook) -> remarks_coding.CodedRemarks:
+def _coded(logs: Logs, statistics: StudyStatistics, book: remarks_coding.Codebook) -> remarks_coding.CodedRemarks:
     """The descriptions of experiment 2, coded. `ConfigError` if the codebook does not fit them."""
+    if statistics.preference is None:
+        raise ConfigError("the codebook: no ratings here")
     ratings = logs.ratings
     columns = ratings["participant_id"].astype(str), ratings["method"].astype(str), ratings["comment"].fillna("")
     remarks = [
@@ -98,29 +99,28 @@ def _coded(logs: Logs, statistics: dict[str, Any], book: remarks_coding.Codebook
         for who, method, text in zip(*columns, strict=True)
     ]
     try:
-        return remarks_coding.code_remarks(remarks, list(statistics["preference"]["participants"]), book)
-    except (KeyError, ValueError) as error:
-        raise ConfigError(f"the codebook: {error if isinstance(error, ValueError) else 'no ratings here'}") from error
+        return remarks_coding.code_remarks(remarks, statistics.preference.participants.codes, book)
+    except ValueError as error:
+        raise ConfigError(f"the codebook: {error}") from error
 
 
-def _by_study(logs: Logs) -> dict[str, Any]:
-    """Each study's own statistics, if there are several."""
-    found = {name: summarize(alone) for name, alone in by_study(logs).items()}
-    kept = {name: {key: one[key] for key in _PER_STUDY if key in one} for name, one in found.items()}
-    return {"studies": kept} if kept else {}
+def _by_study(logs: Logs) -> dict[str, StudyStatistics] | None:
+    """Each study's own statistics, if there are several; what computed them stands above."""
+    return {name: replace(summarize(alone), versions=None) for name, alone in by_study(logs).items()} or None
 
 
-def _with_rules(statistics: dict[str, Any], effect: Effect, rules: Rules, path: Path) -> dict[str, Any]:
-    return statistics | {
-        "excluded": [*effect.excluded, *statistics["excluded"]],
-        "warnings": [*statistics["warnings"], *effect.warnings],
-        "rules": {
+def _with_rules(statistics: StudyStatistics, effect: Effect, rules: Rules, path: Path) -> StudyStatistics:
+    return replace(
+        statistics,
+        excluded=(*effect.excluded, *statistics.excluded),
+        warnings=(*statistics.warnings, *effect.warnings),
+        rules={
             "file": path.name,
             "config": rules.model_dump(mode="json"),
             "trials": effect.trials,
             "dropped": effect.dropped,
         },
-    }
+    )
 
 
 def _notes(effect: Effect | None) -> list[str]:

@@ -21,9 +21,9 @@ from __future__ import annotations
 import csv
 import re
 from collections.abc import Iterable, Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass
 from pathlib import Path
-from typing import Annotated, Any, Self
+from typing import Annotated, Self
 
 from pydantic import AfterValidator, Field, model_validator
 
@@ -166,11 +166,6 @@ def _count(code: Code, remarks: Sequence[Remark], participants: Sequence[str]) -
     return CodeCount(
         code=code.code, label=code.label, method=code.method, participants=who, count=len(who), share=share
     )
-
-
-def as_json(coded: CodedRemarks) -> dict[str, Any]:
-    """Plain values, for `statistics.json`."""
-    return asdict(coded)
 
 
 def section(coded: CodedRemarks) -> Section:

@@ -1,33 +1,46 @@
-"""Log tables into the statistics of the paper, as plain values ready for `statistics.json`. Nothing is rounded here."""
+"""Log tables into the statistics of the paper, as typed results. Nothing is rounded here."""
 
 from __future__ import annotations
 
 import math
 import platform
-from collections.abc import Sequence
-from dataclasses import asdict
+from collections.abc import Iterator, Sequence
+from dataclasses import fields, replace
 from importlib.metadata import PackageNotFoundError, version
-from typing import Any
 
 import numpy as np
 import pandas as pd
 
 from analysis.logs.exclusions import complete_rows
 from analysis.logs.reading import Logs
+from analysis.report.serial import undefined
 from analysis.stats.anova import rm_anova
-from analysis.stats.assumptions import assumptions
+from analysis.stats.arrays import FloatArray
 from analysis.stats.binomial import binomial_test
-from analysis.stats.cells import DIRECTIONS, Finite, TrialCells, by_name, coded, trial_cells
+from analysis.stats.cells import DIRECTIONS, ByParticipant, TrialCells, coded, trial_cells
 from analysis.stats.detection import yes_no
 from analysis.stats.effect_sizes import cousineau_morey
 from analysis.stats.logit_model import METHOD as CLUSTERING_NOTE
-from analysis.stats.supplement import model, pooled_clustering, within_supplement
 from analysis.stats.tukey import rm_tukey_hsd
+from analysis.summary.assumptions import assumptions
+from analysis.summary.results import (
+    AnovaTest,
+    DirectionStatistics,
+    Interval,
+    MeanSd,
+    MedianTime,
+    Origin,
+    Pair,
+    PooledBinomial,
+    Scores,
+    Sensitivity,
+    StudyStatistics,
+    WithinStatistics,
+)
+from analysis.summary.supplement import model, pooled_clustering, within_supplement
 from analysis.times.own_trials import INSTRUCTION
 from analysis.times.response_times import response_times, valid_times
 from analysis.times.speed_accuracy import speed_accuracy
-
-Json = dict[str, Any]
 
 SCALES = {"direction": (0.0, 1.0), "preference": (0.0, 10.0)}
 """The least and the most that a score can be."""
@@ -42,35 +55,17 @@ BINOMIAL_NOTE = (
 )
 
 
-def summarize(logs: Logs, *, trade: bool = True) -> Json:
-    """The statistics of `logs`, in the layout of `statistics.json`: rates 0 to 1, SD with n - 1, JSON-safe.
+def summarize(logs: Logs, *, trade: bool = True) -> StudyStatistics:
+    """The statistics of `logs`: rates 0 to 1, SD with n - 1.
 
     `trade`: with the measures of speed and accuracy. An experiment without a log is left out. Participants who miss an
-    answer or a method are left out of that experiment and listed in `excluded`. What is not finite becomes None and is
-    named in `warnings`.
+    answer or a method are left out of that experiment and listed in `excluded`. What is not finite is named in
+    `warnings`.
     """
-    tables = {"direction": (logs.trials, _direction), "preference": (logs.ratings, _preference)}
-    excluded: list[dict[str, str]] = []
-    result: Json = {}
-    for experiment, (table, describe) in tables.items():
-        if len(table):
-            methods = methods_in(table)
-            complete, left_out = complete_rows(_coded(table), experiment, methods)
-            result[experiment] = _with_assumptions(describe(complete, methods))
-            if trade and experiment == "direction":
-                result[experiment]["speed_accuracy"] = speed_accuracy(complete, methods)
-            excluded += left_out
-    warnings = [warning for experiment, found in result.items() for warning in _warnings(experiment, found)]
-    finite = json_safe(result, "", warnings)
-    return {**finite, "excluded": excluded, "warnings": warnings, "versions": versions()}
-
-
-def _coded(table: pd.DataFrame) -> pd.DataFrame:
-    """The coded table, with the instructions if the table has them."""
-    found = coded(table)
-    if INSTRUCTION in table:
-        found[INSTRUCTION] = table[INSTRUCTION]
-    return found
+    direction, left_out = _direction(logs.trials, trade=trade) if len(logs.trials) else (None, [])
+    preference, also_out = _preference(logs.ratings) if len(logs.ratings) else (None, [])
+    found = StudyStatistics(direction=direction, preference=preference, excluded=(*left_out, *also_out))
+    return replace(found, warnings=tuple(_warnings(found)), versions=versions())
 
 
 def versions() -> dict[str, str]:
@@ -86,26 +81,6 @@ def methods_in(table: pd.DataFrame) -> list[str]:
     return [m for m in METHOD_ORDER if m in found] if set(found) <= set(METHOD_ORDER) else found
 
 
-def json_safe(value: Any, place: str, warnings: list[str]) -> Any:
-    """`value` in plain Python types; NaN and infinities become None, and their place is appended to `warnings`."""
-    if isinstance(value, Finite):
-        return value
-    if isinstance(value, dict):
-        return {str(key): json_safe(item, f"{place}.{key}".lstrip("."), warnings) for key, item in value.items()}
-    if isinstance(value, list | tuple):
-        return [json_safe(item, f"{place}[{i}]", warnings) for i, item in enumerate(value)]
-    if isinstance(value, float | np.floating) and not math.isfinite(value):
-        warnings.append(f"{place} is {_not_finite(float(value))}; written as null")
-        return None
-    return value.item() if isinstance(value, np.generic) else value
-
-
-def _not_finite(value: float) -> str:
-    if math.isnan(value):
-        return "undefined (no variance to divide by, or one value only)"
-    return "infinite (an effect without any error variance)"
-
-
 def _version(name: str) -> str:
     try:
         return version(name)
@@ -113,47 +88,62 @@ def _version(name: str) -> str:
         return "not installed"
 
 
-def _with_assumptions(found: Json) -> Json:
-    return {**found, "assumptions": [asdict(assumption) for assumption in assumptions(found)]}
+def _warnings(found: StudyStatistics) -> Iterator[str]:
+    """Why there is no test, the violated assumptions that change which number to read, and what is written as null."""
+    for experiment in SCALES:
+        one = found.of(experiment)
+        if one is not None and one.anova is None:
+            there = f"there are {one.n} complete participants and {len(one.methods)} methods"
+            yield f"{experiment}: no ANOVA and no Tukey test, which need 2 of each; {there}"
+        elif one is not None:
+            yield from (f"{experiment}: {entry.warning}" for entry in one.assumptions if entry.serious)
+    for place, value in undefined(found):
+        why = "undefined (no variance to divide by, or one value only)"
+        if math.isinf(value):
+            why = "infinite (an effect without any error variance)"
+        yield f"{place} is {why}; written as null"
 
 
-def _warnings(experiment: str, found: Json) -> list[str]:
-    """Why there is no test, or the violated assumptions that change which number to read."""
-    if found["anova"] is None:
-        there = f"there are {found['n']} complete participants and {len(found['methods'])} methods"
-        return [f"{experiment}: no ANOVA and no Tukey test, which need 2 of each; {there}"]
-    return [f"{experiment}: {entry['warning']}" for entry in found["assumptions"] if entry["serious"]]
+def _complete(table: pd.DataFrame, experiment: str) -> tuple[pd.DataFrame, list[str], list[dict[str, str]]]:
+    """The complete participants' coded rows, with the instructions if there are some; the methods; who is left out."""
+    methods, rows = methods_in(table), coded(table)
+    if INSTRUCTION in table:
+        rows[INSTRUCTION] = table[INSTRUCTION]
+    complete, left_out = complete_rows(rows, experiment, methods)
+    return complete, methods, left_out
 
 
-def _direction(complete: pd.DataFrame, methods: list[str]) -> Json:
+def _direction(table: pd.DataFrame, *, trade: bool) -> tuple[DirectionStatistics, list[dict[str, str]]]:
+    complete, methods, left_out = _complete(table, "direction")
     cells = trial_cells(complete, methods)
-    forward, backward = cells.rates("forward"), cells.rates("backward")
-    return {
-        **_within(forward, methods, SCALES["direction"]),
-        "origin": _origin(complete, "response_source"),
-        "backward": {
-            "means": _by_method(backward.mean()),
-            "sds": _by_method(backward.std(ddof=1)),
-            "participants": _by_participant(backward),
-        },
-        "binomial": {method: _binomials(cells, method) for method in methods},
-        "binomial_note": BINOMIAL_NOTE,
-        "clustering_note": CLUSTERING_NOTE,
-        "model": model(cells),
-        "sensitivity": {method: _sensitivity(cells, method) for method in methods},
-        "response_time": _median_times(complete, methods),
-        "response_times": response_times(complete, methods),
-    }
+    within = _within(cells.rates("forward"), "direction", _origin(complete, "response_source"))
+    found = DirectionStatistics(
+        **{field.name: getattr(within, field.name) for field in fields(within)},
+        backward=_scores(cells.rates("backward")),
+        binomial={method: _binomials(cells, method) for method in methods},
+        binomial_note=BINOMIAL_NOTE,
+        clustering_note=CLUSTERING_NOTE,
+        model=model(cells),
+        sensitivity={method: _sensitivity(cells, method) for method in methods},
+        response_time=_median_times(complete, methods),
+        response_times=response_times(complete, methods),
+        speed_accuracy=speed_accuracy(complete, methods) if trade else None,
+    )
+    return replace(found, assumptions=assumptions(found)), left_out
 
 
-def _preference(complete: pd.DataFrame, methods: list[str]) -> Json:
+def _preference(table: pd.DataFrame) -> tuple[WithinStatistics, list[dict[str, str]]]:
+    complete, methods, left_out = _complete(table, "preference")
     scores = _table(complete, "rating", methods)
-    return {**_within(scores, methods, SCALES["preference"]), "origin": _origin(complete, "rating_by")}
+    found = _within(scores, "preference", _origin(complete, "rating_by"))
+    return replace(found, assumptions=assumptions(found)), left_out
 
 
-def _origin(complete: pd.DataFrame, source: str) -> Json:
-    """Whose hand gave how many of the answers, and which guns rendered how many of the trials."""
-    return {kind: complete[column].value_counts().to_dict() for kind, column in (("answers", source), ("guns", "gun"))}
+def _origin(complete: pd.DataFrame, source: str) -> Origin:
+    answers, guns = (
+        {str(name): count for name, count in complete[column].value_counts().items()} for column in (source, "gun")
+    )
+    return Origin(answers=answers, guns=guns)
 
 
 def _table(rows: pd.DataFrame, measure: str, methods: Sequence[str]) -> pd.DataFrame:
@@ -164,85 +154,111 @@ def _table(rows: pd.DataFrame, measure: str, methods: Sequence[str]) -> pd.DataF
     return cells.unstack("method").reindex(columns=list(methods))
 
 
-def _within(scores: pd.DataFrame, methods: list[str], scale: tuple[float, float]) -> Json:
-    return {
-        "n": len(scores),
-        "methods": methods,
-        "means": _by_method(scores.mean()),
-        "sds": _by_method(scores.std(ddof=1)),
-        "participants": _by_participant(scores),
-        "within_ci": _within_ci(scores),
-        **_tests(scores.to_numpy(), methods),
-        "tukey_error_term": TUKEY_ERROR_TERM,
-        **within_supplement(scores, scale),
-    }
+def _within(scores: pd.DataFrame, experiment: str, origin: Origin) -> WithinStatistics:
+    """What every experiment has: scores, tests on them, supplement."""
+    shown, tested = _scores(scores), min(scores.shape) >= 2
+    return WithinStatistics(
+        n=len(scores),
+        methods=shown.participants.names,
+        means=shown.means,
+        sds=shown.sds,
+        participants=shown.participants,
+        within_ci=_within_ci(scores) if tested else None,
+        anova=_anova(scores.to_numpy()) if tested else None,
+        tukey=_tukey(scores) if tested else None,
+        tukey_error_term=TUKEY_ERROR_TERM,
+        supplement=within_supplement(scores, SCALES[experiment]),
+        origin=origin,
+    )
 
 
-def _within_ci(scores: pd.DataFrame) -> Json | None:
-    """Cousineau-Morey intervals of the means, None for fewer than 2 participants or methods."""
-    if min(scores.shape) < 2:
-        return None
-    found = cousineau_morey(scores.to_numpy())
-    rows = zip(scores.columns, found.ci_low, found.ci_high, strict=True)
-    return {str(method): {"ci_low": float(low), "ci_high": float(high)} for method, low, high in rows}
-
-
-def _tests(scores: np.ndarray[Any, Any], methods: list[str]) -> Json:
-    if min(scores.shape) < 2:
-        return {"anova": None, "tukey": None}
-    anova = asdict(rm_anova(scores))
-    df = [anova.pop("df_effect"), anova.pop("df_error")]
-    named = {"name": "one-way repeated-measures ANOVA", "F": anova.pop("F"), "df": df, **anova}
-    return {"anova": named, "tukey": [asdict(comparison) for comparison in rm_tukey_hsd(scores, methods)]}
+def _scores(scores: pd.DataFrame) -> Scores:
+    people, methods = map(str, scores.index), map(str, scores.columns)
+    return Scores(
+        means=_by_method(scores.mean()),
+        sds=_by_method(scores.std(ddof=1)),
+        participants=ByParticipant(tuple(people), tuple(methods), scores.to_numpy(dtype="float64")),
+    )
 
 
 def _by_method(row: pd.Series) -> dict[str, float]:
     return {str(method): float(value) for method, value in row.items()}
 
 
-def _by_participant(scores: pd.DataFrame) -> Json:
-    codes, names = map(str, scores.index), [str(method) for method in scores.columns]
-    return by_name(list(codes), names, scores.to_numpy(dtype="float64"))
+def _within_ci(scores: pd.DataFrame) -> dict[str, Interval]:
+    """Cousineau-Morey intervals of the means."""
+    found = cousineau_morey(scores.to_numpy())
+    rows = zip(scores.columns, found.ci_low, found.ci_high, strict=True)
+    return {str(method): Interval(ci_low=float(low), ci_high=float(high)) for method, low, high in rows}
 
 
-def _binomials(cells: TrialCells, method: str) -> Json:
+def _anova(scores: FloatArray) -> AnovaTest:
+    found = rm_anova(scores)
+    return AnovaTest(
+        F=float(found.F),
+        df=(found.df_effect, found.df_error),
+        p=float(found.p),
+        ss_effect=float(found.ss_effect),
+        ss_error=float(found.ss_error),
+        ms_error=float(found.ms_error),
+        ss_participants=float(found.ss_participants),
+    )
+
+
+def _tukey(scores: pd.DataFrame) -> tuple[Pair, ...]:
+    return tuple(
+        Pair(
+            a=str(pair.a),
+            b=str(pair.b),
+            **{name: float(getattr(pair, name)) for name in ("difference", "q", "p", "ci_low", "ci_high")},
+        )
+        for pair in rm_tukey_hsd(scores.to_numpy(), list(scores.columns))
+    )
+
+
+def _binomials(cells: TrialCells, method: str) -> dict[str, PooledBinomial]:
     """The test of each direction that was presented; empty without complete participants."""
-    result: Json = {}
+    result = {}
     for place, direction in enumerate(DIRECTIONS):
         column = cells.methods.index(method), place
         successes, trials = int(cells.correct[:, *column].sum()), int(cells.trials[:, *column].sum())
         if trials:
-            test = asdict(binomial_test(successes, trials))
-            clustered = pooled_clustering(cells, method, direction)
-            result[direction] = {"successes": successes, "trials": trials, **test, "clustering": clustered}
+            test = binomial_test(successes, trials)
+            result[direction] = PooledBinomial(
+                successes=successes,
+                trials=trials,
+                **{field.name: float(getattr(test, field.name)) for field in fields(test)},
+                clustering=pooled_clustering(cells, method, direction),
+            )
     return result
 
 
-def _sensitivity(cells: TrialCells, method: str) -> Json | None:
-    """Mean and SD over participants of d' and criterion; None where nobody was presented with both directions."""
+def _sensitivity(cells: TrialCells, method: str) -> Sensitivity | None:
+    """D' and criterion of those who were presented with both directions; None where nobody was."""
     column = cells.methods.index(method)
     both = np.flatnonzero(cells.trials[:, column].min(axis=1, initial=np.inf))
     if not both.size:
         return None
     (hits, rejections), (signals, noises) = cells.correct[both, column].T, cells.trials[both, column].T
     found = yes_no(hits, signals, noises - rejections, noises)
-    measures = {"d_prime": np.atleast_1d(found.d_prime), "criterion": np.atleast_1d(found.criterion)}
-    people = [cells.participants[i] for i in both]
-    return {
-        **{name: _mean_sd(values) for name, values in measures.items()},
-        "participants": by_name(people, list(measures), np.column_stack(list(measures.values()))),
-    }
+    d_prime, criterion = np.atleast_1d(found.d_prime), np.atleast_1d(found.criterion)
+    people = tuple(cells.participants[i] for i in both)
+    return Sensitivity(
+        d_prime=_mean_sd(d_prime),
+        criterion=_mean_sd(criterion),
+        participants=ByParticipant(people, ("d_prime", "criterion"), np.column_stack([d_prime, criterion])),
+    )
 
 
-def _mean_sd(values: float | np.ndarray[Any, Any]) -> dict[str, float]:
-    array = np.atleast_1d(values)
-    return {"mean": float(array.mean()), "sd": float(array.std(ddof=1)) if array.size > 1 else math.nan}
+def _mean_sd(values: FloatArray) -> MeanSd:
+    return MeanSd(mean=float(values.mean()), sd=float(values.std(ddof=1)) if values.size > 1 else math.nan)
 
 
-def _median_times(trials: pd.DataFrame, methods: list[str]) -> Json:
+def _median_times(trials: pd.DataFrame, methods: list[str]) -> dict[str, MedianTime]:
     """Median over the times that are the participant's own, by method."""
     valid = valid_times(trials)
     times = {method: trials["response_time_s"][valid & (trials["method"] == method)] for method in methods}
     return {
-        method: {"median": float(own.median()) if len(own) else None, "n": len(own)} for method, own in times.items()
+        method: MedianTime(median=float(own.median()) if len(own) else None, n=len(own))
+        for method, own in times.items()
     }

@@ -68,7 +68,7 @@ def analyze(
     for problem in problems:
         say(f"recoil: left out: {problem}")
     show(statistics, f"Report: {out / 'report.html'}", as_json)
-    raise end(exceptions=bool(problems or statistics["excluded"]))
+    raise end(exceptions=bool(problems or statistics.excluded))
 
 
 def bids(

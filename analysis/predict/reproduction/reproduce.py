@@ -22,10 +22,12 @@ from analysis.paper.audit.run import Finding
 from analysis.paper.audit.sentences import ATTENTION, ELSEWHERE, other_rows, predictions
 from analysis.paper.odds import Odds, chance_recurs, odds_of, recurs
 from analysis.paper.paper import Paper, load_paper
-from analysis.paper.published import Row, compare
+from analysis.paper.published import Row
 from analysis.predict.power import studies as power_studies
 from analysis.predict.reproduction.reconstructed import misfit, seat, table_bytes, table_name
 from analysis.predict.simulate.shot import shot_panel
+from analysis.summary.comparison import compare
+from analysis.summary.results import StudyStatistics
 from analysis.summary.sections.data import ReportData
 from analysis.summary.sections.sections import obtained_text, write_report
 from analysis.summary.summary import summarize
@@ -145,7 +147,7 @@ class Study:
 class Reproduced:
     """The statistics of a reproduction, and every published number beside what was obtained."""
 
-    statistics: dict[str, Any]
+    statistics: StudyStatistics
     comparison: tuple[Row, ...]
 
 
@@ -214,7 +216,7 @@ def _remarkable(row: Row) -> bool:
     return bool(row.note) and row.verdict in {"differs", "differs as predicted", *ATTENTION}
 
 
-def _compared(study: Study, statistics: dict[str, Any]) -> Iterator[Row]:
+def _compared(study: Study, statistics: StudyStatistics) -> Iterator[Row]:
     """Every published number: those that logs hold beside the obtained, the others with the audit's verdict."""
     if study.paper is not None:
         yield from compare(statistics, study.paper, predictions(study.findings))
@@ -262,7 +264,7 @@ def _odds(study: Study) -> Iterator[Odds]:
 
 
 def _report(
-    study: Study, logs: Logs, statistics: dict[str, Any], odds: tuple[Odds, ...], comparison: tuple[Row, ...]
+    study: Study, logs: Logs, statistics: StudyStatistics, odds: tuple[Odds, ...], comparison: tuple[Row, ...]
 ) -> ReportData:
     people = "synthetic, reconstructed from the published numbers" if study.reconstructed else "synthetic"
     return ReportData(

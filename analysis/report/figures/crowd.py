@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 
 import numpy as np
@@ -91,16 +92,14 @@ def draw_histogram(
     )
 
 
-def draw_mean(
-    axes: Axes, place: float, mean: float | None, sd: float | None, *, colour: str, marker: str = "D"
-) -> None:
-    """Mean with a whisker of one SD either way, none where the SD is undefined."""
-    if mean is None:
+def draw_mean(axes: Axes, place: float, mean: float, sd: float, *, colour: str, marker: str = "D") -> None:
+    """Mean with a whisker of one SD either way; nothing where the mean is NaN, no whisker where the SD is."""
+    if math.isnan(mean):
         return
     axes.errorbar(
         [place],
         [mean],
-        yerr=None if sd is None else [sd],
+        yerr=None if math.isnan(sd) else [sd],
         fmt=marker,
         markersize=6.0,
         mfc=colour,

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import textwrap
-from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
@@ -134,22 +133,10 @@ def named(text: str) -> str:
     return text
 
 
-def stars(p: float | None) -> str:
+def stars(p: float) -> str:
     """Significance as the paper marks it.
 
     >>> stars(0.0004), stars(0.004), stars(0.04), stars(0.4)
     ('***', '**', '*', 'n.s.')
     """
-    if p is None:
-        return "n.s."
     return "***" if p < 0.001 else "**" if p < 0.01 else "*" if p < 0.05 else "n.s."
-
-
-def people(found: Mapping[str, Any]) -> str:
-    """How many took part in an experiment of `statistics.json`; said so if nobody of flesh answered.
-
-    >>> people({"n": 14, "origin": {"answers": {"synthetic": 840}}}), people({"n": 1})
-    ('14 synthetic participants', '1 participant')
-    """
-    synthetic = "synthetic " if set(found.get("origin", {}).get("answers", ())) == {"synthetic"} else ""
-    return f"{found['n']:,} {synthetic}participant{'' if found['n'] == 1 else 's'}"

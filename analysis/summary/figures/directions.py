@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Literal
 
 import matplotlib as mpl
 import numpy as np
@@ -21,7 +22,6 @@ from analysis.report.figures.style import (
     light_grid,
     method_colour,
     new_figure,
-    people,
     reference_line,
     save,
     style,
@@ -29,15 +29,14 @@ from analysis.report.figures.style import (
 )
 from analysis.stats.arrays import FloatArray
 from analysis.stats.detection import yes_no
-
-Statistics = Mapping[str, Any]
+from analysis.summary.results import DirectionStatistics, Scores
 
 _SIDES = {"forward": -1, "backward": 1}
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class _Measure:
-    key: str
+    key: Literal["d_prime", "criterion"]
     title: str
     label: str
     zero: str
@@ -49,15 +48,15 @@ _MEASURES = (
 )
 
 
-def figure_directions(found: Statistics, path_stem: Path) -> tuple[Path, Path, Path]:
+def figure_directions(found: DirectionStatistics, path_stem: Path) -> tuple[Path, Path, Path]:
     """Correct rate by method and direction (mean, SD, everybody), d′ and criterion; PNG, SVG and PDF are written.
 
-    `found` is `direction` of `statistics.json` with at least one participant. Where a direction was never presented d′
+    `found` has at least one participant. Where a direction was never presented d′
     and criterion are undefined: without any of them their panels are left out.
     """
-    measures = _MEASURES if any(found["sensitivity"].values()) else ()
+    measures = _MEASURES if any(found.sensitivity.values()) else ()
     with mpl.rc_context(style()):  # type: ignore[arg-type]
-        figure = new_figure(max(8.0, 0.8 + 2.2 * len(found["methods"])), 7.6 if measures else 4.2)
+        figure = new_figure(max(8.0, 0.8 + 2.2 * len(found.methods)), 7.6 if measures else 4.2)
         rows = figure.add_gridspec(2 if measures else 1, 2)
         _draw_rates(figure.add_subplot(rows[0, :]), found)
         for i, measure in enumerate(measures):
@@ -66,8 +65,8 @@ def figure_directions(found: Statistics, path_stem: Path) -> tuple[Path, Path, P
         return save(figure, path_stem)
 
 
-def _draw_rates(axes: Axes, found: Statistics) -> None:
-    methods: list[str] = found["methods"]
+def _draw_rates(axes: Axes, found: DirectionStatistics) -> None:
+    methods = found.methods
     _frame(axes, methods, "(a) Correct rate", "correct rate [%]")
     reference_line(axes, 50.0, "chance")
     for i, method in enumerate(methods):
@@ -77,11 +76,11 @@ def _draw_rates(axes: Axes, found: Statistics) -> None:
     bounded(axes, 0.0, 100.0)
 
 
-def _draw_pair(axes: Axes, found: Statistics, method: str, i: int) -> None:
+def _draw_pair(axes: Axes, found: DirectionStatistics, method: str, i: int) -> None:
     """Forward left, backward right, the mean of each on its outer side."""
-    parts = {"forward": found, "backward": found["backward"]}
-    codes = list(found["participants"])
-    columns = [_column(part["participants"], codes, method, 100.0) for part in parts.values()]
+    parts: dict[str, DirectionStatistics | Scores] = {"forward": found, "backward": found.backward}
+    codes = found.participants.codes
+    columns = [100.0 * part.participants.column(method, codes) for part in parts.values()]
     colour = method_colour(i)
     if len(codes) <= MANY:
         centres = [i + 0.13 * side for side in _SIDES.values()]
@@ -92,19 +91,19 @@ def _draw_pair(axes: Axes, found: Statistics, method: str, i: int) -> None:
         side = _SIDES[direction]
         if len(codes) > MANY:
             draw_histogram(axes, i, values, bin_width=10.0, half_width=0.24, colour=colour, side=side)
-        mean, sd = part["means"].get(method), part["sds"].get(method)
+        mean, sd = part.means.get(method, math.nan), part.sds.get(method, math.nan)
         draw_mean(
             axes,
             i + 0.31 * side,
-            None if mean is None else 100.0 * mean,
-            None if sd is None else 100.0 * sd,
+            100.0 * mean,
+            100.0 * sd,
             colour=colour if direction == "forward" else "white",
             marker=DIRECTION_MARKERS[direction],
         )
 
 
-def _draw_measure(axes: Axes, found: Statistics, measure: _Measure, letter: str) -> None:
-    methods: list[str] = found["methods"]
+def _draw_measure(axes: Axes, found: DirectionStatistics, measure: _Measure, letter: str) -> None:
+    methods = found.methods
     _frame(axes, methods, f"({letter}) {measure.title}", measure.label)
     reference_line(axes, 0.0, measure.zero)
     limit = _largest_d_prime(found) if measure.key == "d_prime" else None
@@ -114,23 +113,22 @@ def _draw_measure(axes: Axes, found: Statistics, measure: _Measure, letter: str)
     if len(values) <= MANY:
         draw_points(axes, range(len(methods)), values, places(len(values), 0.26, 0.08), ["o"] * len(methods))
     for i, method in enumerate(methods):
-        colour, one = method_colour(i), found["sensitivity"][method]
+        colour, one = method_colour(i), found.sensitivity[method]
         if len(values) > MANY:
             draw_histogram(axes, i, values[:, i], bin_width=0.25, half_width=0.36, colour=colour)
         if one is not None:
-            draw_mean(axes, i, one[measure.key]["mean"], one[measure.key]["sd"], colour=colour)
+            mean = one.d_prime if measure.key == "d_prime" else one.criterion
+            draw_mean(axes, i, mean.mean, mean.sd, colour=colour)
     low, high = _extent(axes, values, limit)
     axes.set_ylim(low, high)
 
 
-def _measured(found: Statistics, key: str) -> FloatArray:
-    codes = list(found["participants"])
-    columns = []
-    for method in found["methods"]:
-        one = found["sensitivity"][method]
-        own = {} if one is None else one["participants"]
-        columns.append([own.get(code, {}).get(key, np.nan) for code in codes])
-    return np.array(columns, dtype=np.float64).T
+def _measured(found: DirectionStatistics, key: str) -> FloatArray:
+    """Everybody's measure with each method (participants, methods); NaN where it is undefined."""
+    codes = found.participants.codes
+    of = [found.sensitivity[method] for method in found.methods]
+    nobody = np.full(len(codes), np.nan)
+    return np.stack([nobody if one is None else one.participants.column(key, codes) for one in of], axis=1)
 
 
 def _extent(axes: Axes, values: FloatArray, limit: float | None) -> tuple[float, float]:
@@ -141,23 +139,16 @@ def _extent(axes: Axes, values: FloatArray, limit: float | None) -> tuple[float,
     return low - room, high + room
 
 
-def _largest_d_prime(found: Statistics) -> float | None:
+def _largest_d_prime(found: DirectionStatistics) -> float | None:
     """d′ of somebody who is always right; None if the numbers of trials differ or are not known."""
     counts = {
-        tuple(tests[direction]["trials"] / found["n"] for direction in _SIDES if direction in tests)
-        for tests in found["binomial"].values()
+        tuple(tests[direction].trials / found.n for direction in _SIDES if direction in tests)
+        for tests in found.binomial.values()
     }
     trials = counts.pop() if len(counts) == 1 else ()
     if len(trials) != 2 or not all(count == int(count) for count in trials):
         return None
     return float(yes_no(trials[0], trials[0], 0, trials[1]).d_prime)
-
-
-def _column(
-    participants: Mapping[str, Mapping[str, float | None]], codes: Sequence[str], method: str, scale: float
-) -> FloatArray:
-    found = [participants.get(code, {}).get(method) for code in codes]
-    return np.array([np.nan if value is None else scale * value for value in found])
 
 
 def _frame(axes: Axes, methods: Sequence[str], title: str, label: str) -> None:
@@ -168,11 +159,11 @@ def _frame(axes: Axes, methods: Sequence[str], title: str, label: str) -> None:
     axes.set_ylabel(label)
 
 
-def _explain(figure: Figure, found: Statistics) -> None:
+def _explain(figure: Figure, found: DirectionStatistics) -> None:
     """The legend below: which mark is which direction, and what stands for whom."""
     handles = [
         Line2D([], [], marker=marker, linestyle="", mfc=fill, mec=BLACK, label=f"{direction} shots")
         for (direction, marker), fill in zip(DIRECTION_MARKERS.items(), (BLACK, "white"), strict=True)
     ]
     figure.legend(handles=handles, loc="outside upper right", ncols=2, frameon=False, fontsize=8.5)
-    figure.supxlabel(people(found), fontsize=8.0)
+    figure.supxlabel(found.people, fontsize=8.0)

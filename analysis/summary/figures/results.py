@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
 
 import matplotlib as mpl
 import numpy as np
@@ -19,15 +19,13 @@ from analysis.report.figures.style import (
     light_grid,
     method_colour,
     new_figure,
-    people,
     reference_line,
     save,
     stars,
     style,
     wrapped,
 )
-
-Statistics = Mapping[str, Any]
+from analysis.summary.results import Pair, StudyStatistics, WithinStatistics
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -64,59 +62,57 @@ _PANELS = (
 )
 
 
-def figure_8(statistics: Statistics, path_stem: Path) -> tuple[Path, Path, Path]:
+def figure_8(statistics: StudyStatistics, path_stem: Path) -> tuple[Path, Path, Path]:
     """Bars (mean, SD), participants as points and lines, brackets from the Tukey tests; PNG, SVG and PDF are written.
 
-    `statistics` is the content of `statistics.json`; an experiment it does not hold, or that holds no complete
-    participant, gets no panel. `ValueError` if none is left.
+    An experiment without a complete participant gets no panel. `ValueError` if none is left.
     """
-    panels = [panel for panel in _PANELS if statistics.get(panel.experiment, {}).get("n", 0) > 0]
+    found = statistics.analysed
+    panels = [panel for panel in _PANELS if panel.experiment in found]
     if not panels:
         raise ValueError("figure 8 needs an experiment with at least one complete participant")
-    widest = max(len(statistics[panel.experiment]["methods"]) for panel in panels)
+    widest = max(len(found[panel.experiment].methods) for panel in panels)
     with mpl.rc_context(style()):  # type: ignore[arg-type]
         figure = new_figure(
             0.4 + (0.9 + max(widest, 3)) * len(panels), 4.5 + 0.16 * max(0, widest * (widest - 1) // 2 - 3)
         )
         row = figure.subplots(1, len(panels), squeeze=False)[0]
         for i, (axes, panel) in enumerate(zip(row, panels, strict=True)):
-            _draw_panel(axes, panel, statistics[panel.experiment], chr(ord("a") + i))
+            _draw_panel(axes, panel, found[panel.experiment], chr(ord("a") + i))
         return save(figure, path_stem)
 
 
-def _draw_panel(axes: Axes, panel: _Panel, found: Statistics, letter: str) -> None:
-    methods: list[str] = found["methods"]
+def _draw_panel(axes: Axes, panel: _Panel, found: WithinStatistics, letter: str) -> None:
+    methods = found.methods
     light_grid(axes)
     axes.set_xlim(-0.6, len(methods) - 0.4)
     if panel.chance is not None:
         reference_line(axes, panel.chance, "chance")
     ceiling = max(_draw_bars(axes, panel, found, methods), _draw_people(axes, panel, found, methods))
-    highest = _draw_brackets(axes, found["tukey"] or [], methods, ceiling, 0.075 * panel.top)
+    highest = _draw_brackets(axes, found.tukey or (), methods, ceiling, 0.075 * panel.top)
     axes.set_ylim(0.0, max(highest, panel.top) + 0.04 * panel.top)
     axes.set_yticks(np.linspace(0.0, panel.top, 6))
     bounded(axes, 0.0, panel.top)
     axes.set_xticks(range(len(methods)), [wrapped(method) for method in methods])
-    axes.set_xlabel(people(found), fontsize=8.0, labelpad=8.0)
+    axes.set_xlabel(found.people, fontsize=8.0, labelpad=8.0)
     axes.set_ylabel(panel.label)
     axes.set_title(f"({letter}) {panel.title}", loc="left", fontweight="bold")
 
 
-def _draw_bars(axes: Axes, panel: _Panel, found: Statistics, methods: Sequence[str]) -> float:
+def _draw_bars(axes: Axes, panel: _Panel, found: WithinStatistics, methods: Sequence[str]) -> float:
     """The bars; gives back the top of the highest whisker."""
-    means = [panel.scale * found["means"][method] for method in methods]
-    spreads = [panel.scale * (found["sds"][method] or 0.0) for method in methods]
-    for i, mean in enumerate(means):
+    means = [panel.scale * found.means[method] for method in methods]
+    spreads = [panel.scale * found.sds[method] for method in methods]
+    for i, (mean, spread) in enumerate(zip(means, spreads, strict=True)):
         colour = method_colour(i)
         axes.bar(i, mean, width=0.64, color=to_rgba(colour, 0.35), edgecolor=colour, linewidth=1.2, zorder=2.0)
-        sd = found["sds"][methods[i]]
-        draw_mean(axes, i, mean, None if sd is None else panel.scale * sd, colour=colour)
-    return float(max(mean + spread for mean, spread in zip(means, spreads, strict=True)))
+        draw_mean(axes, i, mean, spread, colour=colour)
+    return float(np.max(np.array(means) + np.nan_to_num(spreads)))
 
 
-def _draw_people(axes: Axes, panel: _Panel, found: Statistics, methods: Sequence[str]) -> float:
+def _draw_people(axes: Axes, panel: _Panel, found: WithinStatistics, methods: Sequence[str]) -> float:
     """Everybody at the same place in every bar; gives back the highest value."""
-    rows = [[person[method] for method in methods] for person in found["participants"].values()]
-    values = panel.scale * np.array(rows, dtype=np.float64)
+    values = panel.scale * found.participants.array
     if len(values) > MANY:
         for i in range(len(methods)):
             draw_histogram(axes, i, values[:, i], bin_width=panel.bin_width, half_width=0.27, colour=method_colour(i))
@@ -125,11 +121,9 @@ def _draw_people(axes: Axes, panel: _Panel, found: Statistics, methods: Sequence
     return float(values.max())
 
 
-def _draw_brackets(
-    axes: Axes, comparisons: Sequence[Statistics], methods: Sequence[str], floor: float, step: float
-) -> float:
+def _draw_brackets(axes: Axes, comparisons: Sequence[Pair], methods: Sequence[str], floor: float, step: float) -> float:
     """Short brackets low, long ones above them; gives back the height that they need."""
-    spans = [_span(comparison, methods) for comparison in comparisons if comparison["p"] is not None]
+    spans = [_span(comparison, methods) for comparison in comparisons if not math.isnan(comparison.p)]
     height, level_end = floor + 0.6 * step, -1
     for left, right, text in sorted(spans, key=lambda span: (span[1] - span[0], span[0])):
         if left < level_end:
@@ -155,6 +149,6 @@ def _draw_brackets(
     return height + 0.8 * step
 
 
-def _span(comparison: Statistics, methods: Sequence[str]) -> tuple[int, int, str]:
-    ends = [methods.index(comparison["a"]), methods.index(comparison["b"])]
-    return min(ends), max(ends), stars(comparison["p"])
+def _span(comparison: Pair, methods: Sequence[str]) -> tuple[int, int, str]:
+    ends = [methods.index(comparison.a), methods.index(comparison.b)]
+    return min(ends), max(ends), stars(comparison.p)

@@ -26,36 +26,35 @@ from analysis.report.figures.style import (
     style,
     wrapped,
 )
-
-Statistics = Mapping[str, Any]
+from analysis.summary.results import DirectionStatistics
 
 _PLACES = {"forward": -0.19, "backward": 0.19}
 
 
-def figure_response_times(found: Statistics, path_stem: Path) -> tuple[Path, Path, Path]:
+def figure_response_times(found: DirectionStatistics, path_stem: Path) -> tuple[Path, Path, Path]:
     """Valid response times as cumulative shares and as boxes (5, 25, 50, 75, 95 %); PNG, SVG and PDF are written.
 
-    `found` is `direction` of `statistics.json`. `ValueError` if it holds no valid time.
+    `ValueError` if there is no valid time.
     """
-    times = found["response_times"]
+    times = found.response_times
     if not times["n"]:
         raise ValueError("the figure of response times needs at least one valid time")
     with mpl.rc_context(style()):  # type: ignore[arg-type]
-        figure = new_figure(8.6 + 1.6 * max(0, len(found["methods"]) - 3), 3.9)
+        figure = new_figure(8.6 + 1.6 * max(0, len(found.methods) - 3), 3.9)
         left, right = figure.subplots(1, 2, width_ratios=[1.0, 1.15])
         limit = _limit(times)
-        _draw_shares(left, times, found["methods"], limit)
-        _draw_boxes(right, times, found["methods"])
+        _draw_shares(left, times, found.methods, limit)
+        _draw_boxes(right, times, found.methods)
         return save(figure, path_stem)
 
 
-def _limit(times: Statistics) -> float:
+def _limit(times: Mapping[str, Any]) -> float:
     """The end of the time axis: the slowest, but no more than half as much again as 99 in 100 need."""
     spreads = [spread["percentiles"] for spread in times["methods"].values() if spread]
     return float(min(1.05 * max(p[100] for p in spreads), 1.5 * max(p[99] for p in spreads))) or 1.0
 
 
-def _draw_shares(axes: Axes, times: Statistics, methods: Sequence[str], limit: float) -> None:
+def _draw_shares(axes: Axes, times: Mapping[str, Any], methods: Sequence[str], limit: float) -> None:
     light_grid(axes)
     slowest = 0.0
     for i, method in enumerate(methods):
@@ -75,7 +74,7 @@ def _draw_shares(axes: Axes, times: Statistics, methods: Sequence[str], limit: f
     axes.legend(loc="best", fontsize=8.0, handlelength=3.2, framealpha=0.9)
 
 
-def _draw_boxes(axes: Axes, times: Statistics, methods: Sequence[str]) -> None:
+def _draw_boxes(axes: Axes, times: Mapping[str, Any], methods: Sequence[str]) -> None:
     light_grid(axes)
     for i, method in enumerate(methods):
         for direction, place in _PLACES.items():
@@ -113,7 +112,7 @@ def _draw_box(axes: Axes, place: float, percentiles: Sequence[float], colour: st
     )
 
 
-def _draw_medians(axes: Axes, place: float, participants: Statistics, method: str, direction: str) -> None:
+def _draw_medians(axes: Axes, place: float, participants: Mapping[str, Any], method: str, direction: str) -> None:
     """A point a participant; beyond 200 of them the boxes stand alone."""
     medians = [own[method][direction] for own in participants.values() if direction in own.get(method, {})]
     if len(participants) <= MANY:
@@ -123,10 +122,10 @@ def _draw_medians(axes: Axes, place: float, participants: Statistics, method: st
         axes.plot(across, medians, marker, markersize=size, mfc="white", mec=INK, mew=0.6, zorder=3.0)
 
 
-def _counts(times: Statistics, method: str) -> str:
+def _counts(times: Mapping[str, Any], method: str) -> str:
     spreads = times["directions"].get(method, {})
     return "n = " + " / ".join(f"{spreads[d]['n'] if d in spreads else 0:,}" for d in _PLACES)
 
 
-def _medians_note(times: Statistics) -> str:
+def _medians_note(times: Mapping[str, Any]) -> str:
     return "" if len(times["participants"]) > MANY else "; points: participants' medians"

@@ -25,6 +25,7 @@ from analysis.report.figures.style import (
     save,
     style,
 )
+from analysis.summary.results import DirectionStatistics
 
 Statistics = Mapping[str, Any]
 
@@ -34,7 +35,7 @@ _ACROSS = 3
 
 
 class _Draw(Protocol):
-    def __call__(self, axes: Axes, cells: Statistics, found: Statistics, *, last: bool) -> None:
+    def __call__(self, axes: Axes, cells: Statistics, found: DirectionStatistics, *, last: bool) -> None:
         """Draw one instruction's cells, by method; `last` of its row of panels."""
 
 
@@ -49,7 +50,7 @@ class _Panel:
     lines: bool
 
 
-def figure_conditional_accuracy(found: Statistics, path_stem: Path) -> tuple[Path, Path, Path]:
+def figure_conditional_accuracy(found: DirectionStatistics, path_stem: Path) -> tuple[Path, Path, Path]:
     """Accuracy over response time, a line a method, a panel an instruction; PNG, SVG and PDF are written.
 
     `found` is `direction` of `statistics.json`. `ValueError` if nobody has a trial in every bin.
@@ -59,7 +60,7 @@ def figure_conditional_accuracy(found: Statistics, path_stem: Path) -> tuple[Pat
     return _panels(found, path_stem, _CURVES)
 
 
-def figure_quantile_probability(found: Statistics, path_stem: Path) -> tuple[Path, Path, Path]:
+def figure_quantile_probability(found: DirectionStatistics, path_stem: Path) -> tuple[Path, Path, Path]:
     """Quantiles of the times of errors and correct answers over their probabilities; PNG, SVG and PDF are written.
 
     `found` is `direction` of `statistics.json`. `ValueError` if nobody has enough answers of a kind.
@@ -69,23 +70,23 @@ def figure_quantile_probability(found: Statistics, path_stem: Path) -> tuple[Pat
     return _panels(found, path_stem, _POINTS)
 
 
-def has_curve(found: Statistics) -> bool:
+def has_curve(found: DirectionStatistics) -> bool:
     """Whether there is a conditional accuracy function to draw."""
-    return any(cell["conditional_accuracy"]["people"] for cell in _cells_of(found.get("speed_accuracy", {})))
+    return any(cell["conditional_accuracy"]["people"] for cell in _cells_of(found.speed_accuracy or {}))
 
 
-def has_points(found: Statistics) -> bool:
+def has_points(found: DirectionStatistics) -> bool:
     """Whether there is a point of a quantile-probability plot."""
-    return any(any(cell["quantile_probability"]["people"]) for cell in _cells_of(found.get("speed_accuracy", {})))
+    return any(any(cell["quantile_probability"]["people"]) for cell in _cells_of(found.speed_accuracy or {}))
 
 
 def _cells_of(trade: Statistics) -> list[Statistics]:
     return [cell for by_instruction in trade.get("methods", {}).values() for cell in by_instruction.values()]
 
 
-def _panels(found: Statistics, path_stem: Path, panel: _Panel) -> tuple[Path, Path, Path]:
+def _panels(found: DirectionStatistics, path_stem: Path, panel: _Panel) -> tuple[Path, Path, Path]:
     """A panel an instruction on shared axes, the methods' legend above all."""
-    trade = found["speed_accuracy"]
+    trade = found.speed_accuracy or {}
     instructions = [i for i in trade["instructions"] if any(i in one for one in trade["methods"].values())]
     columns = min(_ACROSS, len(instructions))
     rows = -(-len(instructions) // columns)
@@ -109,7 +110,7 @@ def _panels(found: Statistics, path_stem: Path, panel: _Panel) -> tuple[Path, Pa
         return save(figure, path_stem)
 
 
-def _handles(found: Statistics, *, lines: bool) -> list[Line2D]:
+def _handles(found: DirectionStatistics, *, lines: bool) -> list[Line2D]:
     """The methods by colour, mark and, where there are lines, line."""
     return [
         Line2D(
@@ -121,14 +122,14 @@ def _handles(found: Statistics, *, lines: bool) -> list[Line2D]:
             markersize=5.5,
             label=display_name(method),
         )
-        for i, method in enumerate(found["methods"])
-        if method in found["speed_accuracy"]["methods"]
+        for i, method in enumerate(found.methods)
+        if method in (found.speed_accuracy or {})["methods"]
     ]
 
 
-def _draw_curves(axes: Axes, cells: Statistics, found: Statistics, *, last: bool) -> None:
+def _draw_curves(axes: Axes, cells: Statistics, found: DirectionStatistics, *, last: bool) -> None:
     for method, cell in cells.items():
-        curve, i = cell["conditional_accuracy"], found["methods"].index(method)
+        curve, i = cell["conditional_accuracy"], found.methods.index(method)
         if curve["people"]:
             axes.plot(
                 curve["mean_time_s"],
@@ -150,11 +151,11 @@ def _limit_curves(axes: Axes, trade: Statistics) -> None:
     axes.set_ylim(0.0, 100.0)
 
 
-def _draw_points(axes: Axes, cells: Statistics, found: Statistics, *, last: bool) -> None:
+def _draw_points(axes: Axes, cells: Statistics, found: DirectionStatistics, *, last: bool) -> None:
     """Each kind of answer of each method as a column of quantiles; grey lines join equal quantiles."""
     columns: list[tuple[float, Sequence[float]]] = []
     for method, cell in cells.items():
-        i, points = found["methods"].index(method), cell["quantile_probability"]
+        i, points = found.methods.index(method), cell["quantile_probability"]
         for kind, fill in ((0, "white"), (1, method_colour(i))):
             if points["people"][kind]:
                 probability, quantiles = points["probability"][kind], points["quantiles_s"][kind]
@@ -171,7 +172,7 @@ def _draw_points(axes: Axes, cells: Statistics, found: Statistics, *, last: bool
                     zorder=3.0,
                     clip_on=False,
                 )
-    _join(axes, columns, found["speed_accuracy"]["quantiles"])
+    _join(axes, columns, (found.speed_accuracy or {})["quantiles"])
     axes.axvline(0.5, color="#666666", linewidth=0.9, linestyle=(0, (4, 3)), zorder=1.5)
     if last:
         kinds = (("white", "errors"), (INK, "correct answers"))

@@ -2,16 +2,16 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator, Mapping
 from itertools import islice
 from typing import Any
 
 from analysis.report import apa
-from analysis.report.figures.style import display_name, people
+from analysis.report.figures.style import display_name
 from analysis.report.section import LISTED, SHOWN, Section, Table
+from analysis.summary.results import DirectionStatistics, Interval, Pair, WithinStatistics
 from analysis.summary.sections.pictures import directions_picture, response_times_picture
-
-Statistics = Mapping[str, Any]
 
 _WITHIN = (
     ". The CI is within-subject (Cousineau–Morey): it tells of differences between methods, not between people, and is "
@@ -19,38 +19,41 @@ _WITHIN = (
 )
 
 
-def tukey_table(found: Statistics, measure: str, scale: float, digits: int) -> Table:
-    """The pairs with their simultaneous intervals."""
-    df = found["anova"]["df"][1]
+def tukey_tables(found: WithinStatistics, measure: str, scale: float, digits: int) -> tuple[Table, ...]:
+    """The pairs with their simultaneous intervals; no table where nothing was tested."""
+    if found.anova is None or not found.tukey:
+        return ()
     rows = (
         (
-            f"{display_name(c['a'])} − {display_name(c['b'])}",
-            apa.number(scaled(c["difference"], scale), digits),
+            f"{display_name(c.a)} − {display_name(c.b)}",
+            apa.number(scale * c.difference, digits),
             _interval_cell(c, scale, digits),
-            apa.number(c["q"]),
-            apa.p_cell(c["p"]),
+            apa.number(c.q),
+            apa.p_cell(c.p),
         )
-        for c in found["tukey"]
+        for c in found.tukey
     )
-    return Table(
+    df = found.anova.df[1]
+    table = Table(
         caption=f"Tukey's HSD of the {measure}, repeated-measures error term, {df} degrees of freedom",
         header=("Pair", "Difference", "95 % CI, simultaneous", "q", "p"),
         rows=tuple(rows),
     )
+    return (table,)
 
 
-def means_table(found: Statistics, scale: float, digits: int, unit: str) -> Table:
+def means_table(found: WithinStatistics, scale: float, digits: int, unit: str) -> Table:
     """Mean, SD and within-subject interval; the interval is left out where there is none."""
-    intervals = found["within_ci"]
+    intervals = found.within_ci
     rows = (
         (
             display_name(m),
-            f"{found['n']:,}",
-            apa.number(scaled(found["means"][m], scale), digits),
-            apa.number(scaled(found["sds"][m], scale), digits),
+            f"{found.n:,}",
+            apa.number(scale * found.means[m], digits),
+            apa.number(scale * found.sds[m], digits),
             *((_interval_cell(intervals[m], scale, digits),) if intervals else ()),
         )
-        for m in found["methods"]
+        for m in found.methods
     )
     measure = "Correct rate on forward shots" if unit else "Rating"
     return Table(
@@ -60,61 +63,53 @@ def means_table(found: Statistics, scale: float, digits: int, unit: str) -> Tabl
     )
 
 
-def _interval_cell(ends: Statistics, scale: float, digits: int) -> str:
-    return apa.interval(scaled(ends["ci_low"], scale), scaled(ends["ci_high"], scale), digits)
+def _interval_cell(ends: Pair | Interval, scale: float, digits: int) -> str:
+    return apa.interval(scale * ends.ci_low, scale * ends.ci_high, digits)
 
 
-def scaled(value: float | None, scale: float) -> float | None:
-    """`value` in another unit, nothing if there is none."""
-    return None if value is None else scale * value
-
-
-def direction_means(found: Statistics) -> Table:
+def direction_means(found: DirectionStatistics) -> Table:
     """Rates of both directions, d′, criterion and response time."""
     return Table(
         caption="Both directions: mean (SD) over participants of rates, sensitivity and criterion; pooled median of "
         "the valid response times",
         header=("Method", "Forward", "Backward", "d′", "Criterion", "Response time [s]"),
-        rows=tuple(_direction_row(found, method) for method in found["methods"]),
+        rows=tuple(_direction_row(found, method) for method in found.methods),
     )
 
 
-def _direction_row(found: Statistics, method: str) -> tuple[str, ...]:
-    backward, sensitivity = found["backward"], found["sensitivity"][method]
-    time = found["response_time"][method]
+def _direction_row(found: DirectionStatistics, method: str) -> tuple[str, ...]:
+    backward, sensitivity = found.backward, found.sensitivity[method]
+    time = found.response_time[method]
+    measures = () if sensitivity is None else (sensitivity.d_prime, sensitivity.criterion)
     return (
         display_name(method),
-        mean_sd(found["means"][method], found["sds"][method], 100.0, 1, " %"),
-        mean_sd(backward["means"].get(method), backward["sds"].get(method), 100.0, 1, " %"),
-        *(_sensitivity(sensitivity, key) for key in ("d_prime", "criterion")),
-        f"{apa.number(time['median'])} (n = {time['n']:,})" if time["n"] else apa.NONE,
+        mean_sd(found.means[method], found.sds[method], 100.0, 1, " %"),
+        mean_sd(backward.means.get(method), backward.sds.get(method), 100.0, 1, " %"),
+        *((mean_sd(one.mean, one.sd, 1.0, 2, "") for one in measures) if measures else (apa.NONE, apa.NONE)),
+        f"{apa.number(time.median)} (n = {time.n:,})" if time.n else apa.NONE,
     )
-
-
-def _sensitivity(sensitivity: Statistics | None, key: str) -> str:
-    return apa.NONE if sensitivity is None else mean_sd(sensitivity[key]["mean"], sensitivity[key]["sd"], 1.0, 2, "")
 
 
 def mean_sd(mean: float | None, sd: float | None, scale: float, digits: int, unit: str) -> str:
     """`mean unit (SD)`; a dash for what is undefined."""
-    if mean is None:
+    if mean is None or math.isnan(mean):
         return apa.NONE
     spread = apa.NONE if sd is None else apa.number(scale * sd, digits)
     return f"{apa.number(scale * mean, digits)}{unit} ({spread})"
 
 
-def binomial_table(found: Statistics) -> Table:
+def binomial_table(found: DirectionStatistics) -> Table:
     """Each method and direction against guessing."""
     rows = (
         (
             display_name(method),
             direction,
-            f"{test['successes']} of {test['trials']}",
-            apa.percent(test["estimate"]),
-            apa.interval(100.0 * test["ci_low"], 100.0 * test["ci_high"], 1),
-            apa.p_cell(test["p"]),
+            f"{test.successes} of {test.trials}",
+            apa.percent(test.estimate),
+            apa.interval(100.0 * test.ci_low, 100.0 * test.ci_high, 1),
+            apa.p_cell(test.p),
         )
-        for method, tests in found["binomial"].items()
+        for method, tests in found.binomial.items()
         for direction, test in tests.items()
     )
     return Table(
@@ -124,11 +119,11 @@ def binomial_table(found: Statistics) -> Table:
     )
 
 
-def direction_people(found: Statistics) -> Table:
+def direction_people(found: DirectionStatistics) -> Table:
     """Forward and backward rate of each participant in one cell a method."""
-    backward = found["backward"]["participants"]
+    backward = found.backward.participants
     rows = tuple(
-        (code, *(_both(row[m], backward.get(code, {}).get(m)) for m in found["methods"])) for code, row in _few(found)
+        (code, *(_both(row[m], backward.get(code, {}).get(m)) for m in found.methods)) for code, row in _few(found)
     )
     return _people_table(found, rows, "Correct rate of each participant, forward / backward", "direction_wide.csv")
 
@@ -137,21 +132,20 @@ def _both(forward: float | None, backward: float | None) -> str:
     return f"{apa.percent(forward, 0)} / {apa.percent(backward, 0)}"
 
 
-def preference_people(found: Statistics) -> Table:
+def preference_people(found: WithinStatistics) -> Table:
     """The rating of each participant."""
-    rows = tuple((code, *(apa.number(row[m], 1) for m in found["methods"])) for code, row in _few(found))
+    rows = tuple((code, *(apa.number(row[m], 1) for m in found.methods)) for code, row in _few(found))
     return _people_table(found, rows, "Rating of each participant", "preference_wide.csv")
 
 
-def _few(found: Statistics) -> Iterator[tuple[str, Mapping[str, float | None]]]:
+def _few(found: WithinStatistics) -> Iterator[tuple[str, Mapping[str, float]]]:
     """Everybody, or the first 50 of more than 100."""
-    people: Mapping[str, Mapping[str, float | None]] = found["participants"]
-    return islice(people.items(), SHOWN if len(people) > LISTED else None)
+    return islice(found.participants.items(), SHOWN if len(found.participants) > LISTED else None)
 
 
-def _people_table(found: Statistics, rows: tuple[tuple[str, ...], ...], caption: str, file: str) -> Table:
-    rest = f": the first {len(rows)} of {found['n']:,}; everybody is in {file}" if len(rows) < found["n"] else ""
-    header = ("Participant", *(display_name(method) for method in found["methods"]))
+def _people_table(found: WithinStatistics, rows: tuple[tuple[str, ...], ...], caption: str, file: str) -> Table:
+    rest = f": the first {len(rows)} of {found.n:,}; everybody is in {file}" if len(rows) < found.n else ""
+    header = ("Participant", *(display_name(method) for method in found.methods))
     return Table(caption=caption + rest, header=header, rows=rows)
 
 
@@ -162,9 +156,9 @@ _DIRECTION_NOTE = (
 )
 
 
-def direction_section(found: Statistics) -> Section:
+def direction_section(found: DirectionStatistics) -> Section:
     """Experiment 1: correct rates, sensitivity, response times, tests."""
-    tests = (tukey_table(found, "correct rate, forward (percentage points)", 100.0, 1),) if found["tukey"] else ()
+    tests = tukey_tables(found, "correct rate, forward (percentage points)", 100.0, 1)
     times = response_times_picture(found)
     return Section(
         title="Direction recognition",
@@ -173,7 +167,7 @@ def direction_section(found: Statistics) -> Section:
             *_post_hoc_sentences(found, 100.0, 1, " percentage points"),
             _DIRECTION_NOTE,
             _binomial_sentence(found),
-            _times_sentence(found["response_times"]),
+            _times_sentence(found.response_times),
         ),
         pictures=(directions_picture(found), *((times,) if times else ())),
         tables=(
@@ -186,9 +180,9 @@ def direction_section(found: Statistics) -> Section:
     )
 
 
-def preference_section(found: Statistics) -> Section:
+def preference_section(found: WithinStatistics) -> Section:
     """Experiment 2: ratings and tests."""
-    tests = (tukey_table(found, "rating", 1.0, 2),) if found["tukey"] else ()
+    tests = tukey_tables(found, "rating", 1.0, 2)
     return Section(
         title="Preference",
         paragraphs=(
@@ -200,55 +194,55 @@ def preference_section(found: Statistics) -> Section:
     )
 
 
-def _effect_sentence(found: Statistics, measure: str, scale: float, digits: int, unit: str) -> str:
+def _effect_sentence(found: WithinStatistics, measure: str, scale: float, digits: int, unit: str) -> str:
     means = ", ".join(
-        f"{display_name(m)} {mean_sd(found['means'][m], found['sds'][m], scale, digits, unit)}"
-        for m in found["methods"]
+        f"{display_name(m)} {mean_sd(found.means[m], found.sds[m], scale, digits, unit)}" for m in found.methods
     )
-    means = f"Means (SD) of {measure} over {people(found)}: {means}."
-    anova = found["anova"]
+    means = f"Means (SD) of {measure} over {found.people}: {means}."
+    anova = found.anova
     if anova is None:
         return f"{means} There are too few participants or methods for a test."
-    if anova["p"] is None:
-        return f"{means} The {anova['name']} is undefined: all scores are equal."
-    effect = "had a significant effect" if anova["p"] < 0.05 else "had no significant effect"
-    return f"{means} The rendering method {effect} on {measure}, {apa.f_test(anova)}{_size(found)} ({anova['name']})."
+    if math.isnan(anova.p):
+        return f"{means} The {anova.name} is undefined: all scores are equal."
+    effect = "had a significant effect" if anova.p < 0.05 else "had no significant effect"
+    test = f"{apa.f_test(anova.F, anova.df, anova.p)}{_size(found)} ({anova.name})"
+    return f"{means} The rendering method {effect} on {measure}, {test}."
 
 
-def _size(found: Statistics) -> str:
+def _size(found: WithinStatistics) -> str:
     """The partial eta squared, if there is one."""
-    partial = (found.get("effect_size") or {}).get("partial_eta_squared")
+    partial = found.supplement.effect_size.size.partial_eta_squared if found.supplement else None
     return "" if partial is None else f", partial η² = {apa.below_one(partial)}"
 
 
-def _post_hoc_sentences(found: Statistics, scale: float, digits: int, unit: str) -> tuple[str, ...]:
-    if not found["tukey"]:
+def _post_hoc_sentences(found: WithinStatistics, scale: float, digits: int, unit: str) -> tuple[str, ...]:
+    if not found.tukey:
         return ()
-    pairs = "; ".join(_pair_words(comparison, scale, digits, unit) for comparison in found["tukey"])
-    return (f"Post-hoc comparisons (95 % CIs are simultaneous): {pairs}. {found['tukey_error_term']}",)
+    pairs = "; ".join(_pair_words(comparison, scale, digits, unit) for comparison in found.tukey)
+    return (f"Post-hoc comparisons (95 % CIs are simultaneous): {pairs}. {found.tukey_error_term}",)
 
 
-def _pair_words(comparison: Statistics, scale: float, digits: int, unit: str) -> str:
+def _pair_words(comparison: Pair, scale: float, digits: int, unit: str) -> str:
     """The larger mean first."""
-    a, b = display_name(comparison["a"]), display_name(comparison["b"])
-    low, high, p = comparison["ci_low"], comparison["ci_high"], comparison["p"]
-    if comparison["difference"] < 0.0:
-        a, b, low, high = b, a, scaled(high, -1.0), scaled(low, -1.0)
-    amount = f"{apa.number(scale * abs(comparison['difference']), digits)}{unit}"
-    tested = f"95 % CI {apa.interval(scaled(low, scale), scaled(high, scale), digits)}, {apa.p_value(p)}"
-    if p is None or p >= 0.05:
+    a, b = display_name(comparison.a), display_name(comparison.b)
+    low, high, p = comparison.ci_low, comparison.ci_high, comparison.p
+    if comparison.difference < 0.0:
+        a, b, low, high = b, a, -high, -low
+    amount = f"{apa.number(scale * abs(comparison.difference), digits)}{unit}"
+    tested = f"95 % CI {apa.interval(scale * low, scale * high, digits)}, {apa.p_value(p)}"
+    if not p < 0.05:
         return f"{a} and {b} do not differ significantly (by {amount}, {tested})"
     return f"{a} is above {b} by {amount}, {tested}"
 
 
-def _binomial_sentence(found: Statistics) -> str:
+def _binomial_sentence(found: DirectionStatistics) -> str:
     """Which rates differ from guessing; the reservation about pooling with it."""
     tests = [
         (
-            test["p"] < 0.05,
-            f"{display_name(method)} {direction} {test['successes']} of {test['trials']}, {apa.p_value(test['p'])}",
+            test.p < 0.05,
+            f"{display_name(method)} {direction} {test.successes} of {test.trials}, {apa.p_value(test.p)}",
         )
-        for method, directions in found["binomial"].items()
+        for method, directions in found.binomial.items()
         for direction, test in directions.items()
     ]
     parts = []
@@ -258,10 +252,10 @@ def _binomial_sentence(found: Statistics) -> str:
     ):
         named = "; ".join(text for significant, text in tests if significant is differs)
         parts += [f"{words} ({named})"] if named else []
-    return f"Exact binomial tests of the correct rate: {', and '.join(parts)}. {found['binomial_note']}"
+    return f"Exact binomial tests of the correct rate: {', and '.join(parts)}. {found.binomial_note}"
 
 
-def _times_sentence(times: Statistics) -> str:
+def _times_sentence(times: Mapping[str, Any]) -> str:
     """How many response times there are, and which are none."""
     left_out = (
         f"{times['left_out']:,} answered trials have none: it was entered or corrected by the experimenter, whose hand "

@@ -8,7 +8,7 @@ from typing import Any
 
 from analysis.report import apa
 from analysis.report.figures.shot import ShotPanel, figure_5
-from analysis.report.figures.style import named, people
+from analysis.report.figures.style import named
 from analysis.report.section import Picture
 from analysis.summary.figures.directions import figure_directions
 from analysis.summary.figures.results import figure_8
@@ -19,13 +19,12 @@ from analysis.summary.figures.trade import (
     has_curve,
     has_points,
 )
-from analysis.summary.sections.data import EXPERIMENTS, ReportData, analysed
+from analysis.summary.results import DirectionStatistics, Sensitivity, StudyStatistics, WithinStatistics
+from analysis.summary.sections.data import EXPERIMENTS, ReportData
 from analysis.summary.sections.trade import CONDITIONAL_ACCURACY, QUANTILE_PROBABILITY
 
 FIGURE_5, FIGURE_8 = "figure-5", "figure-8"
 DIRECTIONS, RESPONSE_TIMES = "figure-directions", "figure-response-times"
-
-Statistics = Mapping[str, Any]
 
 _PANELS = " (a), sensitivity d′ (b) and criterion c (c)"
 _LINES = ", the absence of bias, and the d′ of somebody who is always right (log-linear correction)"
@@ -34,38 +33,38 @@ _MARKS = "* p < .05, ** p < .01, *** p < .001, n.s. not significant"
 
 def write_figures(folder: Path, report: ReportData) -> None:
     """Every figure that has data, under the stem that its picture names."""
-    statistics = report.statistics
-    if any(analysed(statistics, name) for name in EXPERIMENTS):
+    statistics, direction = report.statistics, report.statistics.direction
+    if statistics.analysed:
         figure_8(statistics, folder / FIGURE_8)
-    if analysed(statistics, "direction"):
-        figure_directions(statistics["direction"], folder / DIRECTIONS)
-        if statistics["direction"]["response_times"]["n"]:
-            figure_response_times(statistics["direction"], folder / RESPONSE_TIMES)
-        _write_trade(folder, statistics["direction"])
+    if direction is not None and direction.n:
+        figure_directions(direction, folder / DIRECTIONS)
+        if direction.response_times["n"]:
+            figure_response_times(direction, folder / RESPONSE_TIMES)
+        _write_trade(folder, direction)
     if report.panels:
         figure_5(report.panels, folder / FIGURE_5)
 
 
-def _write_trade(folder: Path, found: Statistics) -> None:
+def _write_trade(folder: Path, found: DirectionStatistics) -> None:
     if has_curve(found):
         figure_conditional_accuracy(found, folder / CONDITIONAL_ACCURACY)
     if has_points(found):
         figure_quantile_probability(found, folder / QUANTILE_PROBABILITY)
 
 
-def results_picture(statistics: Statistics) -> Picture:
+def results_picture(statistics: StudyStatistics) -> Picture:
     """Figure 8 of the paper, of the experiments that have people."""
-    shown = [name for name in EXPERIMENTS if analysed(statistics, name)]
-    counts = "; ".join(f"{EXPERIMENTS[name]}, {people(statistics[name])}" for name in shown)
-    largest = max(analysed(statistics, name) for name in shown)
-    tested = any(statistics[name]["tukey"] for name in shown)
+    shown = statistics.analysed
+    counts = "; ".join(f"{EXPERIMENTS[name]}, {found.people}" for name, found in shown.items())
+    largest = max(found.n for found in shown.values())
+    tested = any(found.tukey for found in shown.values())
     brackets = f" Brackets: Tukey's HSD with the repeated-measures error term ({_MARKS})." if tested else ""
     caption = (
         f"As the paper's Figure 8: {counts}. Bars and whiskers: mean and SD between participants; an SD may reach "
         f"beyond the scale. {_crowd_words(largest)}{brackets}"
     )
-    means = ". ".join(f"{EXPERIMENTS[name].capitalize()}: {_means_words(statistics[name], name)}" for name in shown)
-    tests = " ".join(_tests_words(statistics[name], name) for name in shown)
+    means = ". ".join(f"{EXPERIMENTS[name].capitalize()}: {_means_words(one, name)}" for name, one in shown.items())
+    tests = " ".join(_tests_words(one, name) for name, one in shown.items())
     alt = f"Bar chart with one bar a rendering method and everybody's values. {means}. {tests}".strip()
     return Picture(stem=FIGURE_8, caption=caption, alt=alt)
 
@@ -76,24 +75,24 @@ def _crowd_words(largest: int) -> str:
     return "Points: participants, each at the same place in every bar; thin lines join the values of one."
 
 
-def _means_words(found: Statistics, experiment: str) -> str:
+def _means_words(found: WithinStatistics, experiment: str) -> str:
     shown = apa.percent if experiment == "direction" else apa.number
-    return ", ".join(f"{named(method)} {shown(mean)}" for method, mean in found["means"].items())
+    return ", ".join(f"{named(method)} {shown(mean)}" for method, mean in found.means.items())
 
 
-def _tests_words(found: Statistics, experiment: str) -> str:
-    pairs = "; ".join(f"{named(c['a'])} against {named(c['b'])} {apa.p_value(c['p'])}" for c in found["tukey"] or [])
+def _tests_words(found: WithinStatistics, experiment: str) -> str:
+    pairs = "; ".join(f"{named(c.a)} against {named(c.b)} {apa.p_value(c.p)}" for c in found.tukey or ())
     return f"Tukey's tests, {EXPERIMENTS[experiment]}: {pairs}." if pairs else ""
 
 
-def directions_picture(found: Statistics) -> Picture:
+def directions_picture(found: DirectionStatistics) -> Picture:
     """Correct rates by direction beside d′ and criterion."""
-    sensitive = any(found["sensitivity"].values())
+    sensitive = any(found.sensitivity.values())
     caption = (
-        f"Correct rate on forward and backward shots{_PANELS if sensitive else ''} of {people(found)}. Large marks and "
-        f"whiskers: mean and SD. {_direction_crowd(found['n'])} Dashed lines: guessing{_LINES if sensitive else ''}."
+        f"Correct rate on forward and backward shots{_PANELS if sensitive else ''} of {found.people}. Large marks and "
+        f"whiskers: mean and SD. {_direction_crowd(found.n)} Dashed lines: guessing{_LINES if sensitive else ''}."
     )
-    rates = "; ".join(_rates_words(found, method) for method in found["methods"])
+    rates = "; ".join(_rates_words(found, method) for method in found.methods)
     alt = f"Dot plot of the mean correct rates with everybody's values and a line at chance, 50 %. {rates}."
     return Picture(stem=DIRECTIONS, caption=caption, alt=alt)
 
@@ -104,26 +103,26 @@ def _direction_crowd(n: int) -> str:
     return "Small marks: participants; thin lines join the values of one."
 
 
-def _rates_words(found: Statistics, method: str) -> str:
-    forward, backward = found["means"][method], found["backward"]["means"].get(method)
+def _rates_words(found: DirectionStatistics, method: str) -> str:
+    forward, backward = found.means[method], found.backward.means.get(method)
     rates = f"{named(method)} {apa.percent(forward)} forward, {apa.percent(backward)} backward"
-    return rates + _sensitivity_words(found["sensitivity"][method])
+    return rates + _sensitivity_words(found.sensitivity[method])
 
 
-def _sensitivity_words(one: Statistics | None) -> str:
+def _sensitivity_words(one: Sensitivity | None) -> str:
     if one is None:
         return ""
-    return f", d′ {apa.number(one['d_prime']['mean'])}, criterion {apa.number(one['criterion']['mean'])}"
+    return f", d′ {apa.number(one.d_prime.mean)}, criterion {apa.number(one.criterion.mean)}"
 
 
-def response_times_picture(found: Statistics) -> Picture | None:
+def response_times_picture(found: DirectionStatistics) -> Picture | None:
     """Response times, if there is a valid one."""
-    times = found["response_times"]
+    times = found.response_times
     if not times["n"]:
         return None
     medians = " Points: medians of the participants." if len(times["participants"]) <= 200 else ""
     caption = (
-        f"Response times from the onset of the pulse, {times['n']:,} valid times of {people(found)}. "
+        f"Response times from the onset of the pulse, {times['n']:,} valid times of {found.people}. "
         f"(a) Share of the trials answered by then. (b) By direction, n forward / backward; boxes: quartiles, "
         f"whiskers: 5 and 95 %.{medians}"
     )
@@ -132,7 +131,7 @@ def response_times_picture(found: Statistics) -> Picture | None:
     return Picture(stem=RESPONSE_TIMES, caption=caption, alt=alt)
 
 
-def _spread_words(method: str, spread: Statistics) -> str:
+def _spread_words(method: str, spread: Mapping[str, Any]) -> str:
     low, median, high = (apa.number(spread["percentiles"][at]) for at in (25, 50, 75))
     return f"{named(method)} median {median} s, quartiles {low} and {high} s"
 

@@ -2,12 +2,9 @@
 
 from __future__ import annotations
 
-import json
 import os
-from collections.abc import Mapping
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
 
 from analysis.paper.odds import Odds
 from analysis.paper.published import AUDITED, Row
@@ -16,7 +13,9 @@ from analysis.report.figures.shot import ShotPanel
 from analysis.report.figures.style import named
 from analysis.report.page import write_page
 from analysis.report.section import LISTED, SHOWN, Section, Table, shortened
-from analysis.summary.sections.data import EXPERIMENTS, ReportData, analysed
+from analysis.report.serial import as_json
+from analysis.summary.results import DirectionStatistics, Origin, StudyStatistics
+from analysis.summary.sections.data import EXPERIMENTS, ReportData
 from analysis.summary.sections.experiments import direction_section, preference_section
 from analysis.summary.sections.pictures import results_picture, shot_picture, write_figures
 from analysis.summary.sections.supplement import supplement_sections
@@ -37,13 +36,17 @@ _LUCK = (
 def sections(report: ReportData) -> tuple[Section, ...]:
     """All sections that have something to say."""
     statistics = report.statistics
+    direction, preference = (statistics.analysed.get(name) for name in EXPERIMENTS)
     found = [
         _analysed(report),
-        _glance(statistics) if any(analysed(statistics, name) for name in EXPERIMENTS) else None,
+        _glance(statistics) if statistics.analysed else None,
         _verdicts(report.comparison) if report.comparison else None,
-        direction_section(statistics["direction"]) if analysed(statistics, "direction") else None,
-        trade_section(statistics["direction"]) if analysed(statistics, "direction") else None,
-        preference_section(statistics["preference"]) if analysed(statistics, "preference") else None,
+        *(
+            (direction_section(direction), trade_section(direction))
+            if isinstance(direction, DirectionStatistics)
+            else ()
+        ),
+        preference_section(preference) if preference is not None else None,
         *supplement_sections(statistics),
         *report.extra,
         _odds(report.odds) if report.odds else None,
@@ -56,17 +59,16 @@ def sections(report: ReportData) -> tuple[Section, ...]:
 
 def _analysed(report: ReportData) -> Section:
     rows = tuple(
-        (name.capitalize(), f"{analysed(report.statistics, key):,}", f"{_excluded(report.statistics, key):,}")
+        (name.capitalize(), f"{found.n:,}", f"{_excluded(report.statistics, key):,}")
         for key, name in EXPERIMENTS.items()
-        if key in report.statistics
+        if (found := report.statistics.of(key)) is not None
     )
     table = Table(caption="Participants", header=("Experiment", "Analysed", "Left out as incomplete"), rows=rows)
     files = f"{len(report.files):,} log files were read. " if report.files else ""
     bad = f"Left out, with the reasons listed below: {len(report.problems)}." if report.problems else ""
     text = (files + bad).strip()
     nothing = () if rows else ("There was nothing to analyse.",)
-    present = [key for key in EXPERIMENTS if analysed(report.statistics, key)]
-    origins = tuple(_origin(EXPERIMENTS[key], report.statistics[key]) for key in present)
+    origins = tuple(_origin(EXPERIMENTS[key], found.origin) for key, found in report.statistics.analysed.items())
     return Section(
         title="What was analysed",
         paragraphs=(*((text,) if text else ()), *nothing, *origins),
@@ -74,10 +76,10 @@ def _analysed(report: ReportData) -> Section:
     )
 
 
-def _origin(name: str, found: Mapping[str, Any]) -> str:
+def _origin(name: str, origin: Origin) -> str:
     """Who answered, and on which gun: nobody is to take synthetic participants for people."""
-    answers = ", ".join(f"{count} by {_HANDS[hand]}" for hand, count in found["origin"]["answers"].items())
-    guns = ", ".join(f"{count} on {_gun(gun)}" for gun, count in found["origin"]["guns"].items())
+    answers = ", ".join(f"{count} by {_HANDS[hand]}" for hand, count in origin.answers.items())
+    guns = ", ".join(f"{count} on {_gun(gun)}" for gun, count in origin.guns.items())
     trials = f"; trials {guns}" if guns else ""
     return f"{name.capitalize()}: answers {answers}{trials}."
 
@@ -86,8 +88,8 @@ def _gun(name: str) -> str:
     return "the simulated gun" if name == "simulated" else f"the gun {name}"
 
 
-def _excluded(statistics: Mapping[str, Any], experiment: str) -> int:
-    return sum(entry["experiment"] == experiment for entry in statistics.get("excluded", []))
+def _excluded(statistics: StudyStatistics, experiment: str) -> int:
+    return sum(entry["experiment"] == experiment for entry in statistics.excluded)
 
 
 def _verdicts(comparison: tuple[Row, ...]) -> Section:
@@ -154,7 +156,7 @@ def obtained_text(row: Row) -> str:
     return f"{apa.number(row.obtained, decimals)} {unit}".strip()
 
 
-def _glance(statistics: Mapping[str, Any]) -> Section:
+def _glance(statistics: StudyStatistics) -> Section:
     return Section(title="Results at a glance", pictures=(results_picture(statistics),))
 
 
@@ -182,11 +184,11 @@ def _left_out(report: ReportData) -> Section | None:
     excluded = tuple(
         f"Participant {entry['participant']} in {EXPERIMENTS.get(entry['experiment'], entry['experiment'])}: "
         f"{entry['reason']}."
-        for entry in report.statistics.get("excluded", [])
+        for entry in report.statistics.excluded
     )
     names = _short_names(report)
     problems = tuple(str(replace(problem, file=names[problem.file])) for problem in report.problems)
-    warnings = tuple(f"Warning: {warning}." for warning in report.statistics.get("warnings", []))
+    warnings = tuple(f"Warning: {warning}." for warning in report.statistics.warnings)
     items = (*shortened(excluded, "exclusions"), *shortened(problems, "problems"), *shortened(warnings, "warnings"))
     return Section(title="Exclusions and problems", items=items) if items else None
 
@@ -200,7 +202,7 @@ def _short_names(report: ReportData) -> dict[Path, Path]:
 
 
 def _provenance(report: ReportData) -> Section | None:
-    pairs = [*report.provenance.items(), *report.statistics.get("versions", {}).items()]
+    pairs = [*report.provenance.items(), *(report.statistics.versions or {}).items()]
     rows = [*dict.fromkeys(pairs), *_file_rows(report)]
     if not rows and not report.notes:
         return None
@@ -224,5 +226,4 @@ def write_report(out: Path, report: ReportData) -> None:
     out.mkdir(parents=True, exist_ok=True)
     write_figures(out / "figures", report)
     write_page(out, report.title, sections(report))
-    text = json.dumps(report.statistics, indent=1, ensure_ascii=False, allow_nan=False) + "\n"
-    (out / "statistics.json").write_text(text, encoding="utf-8", newline="\n")
+    (out / "statistics.json").write_bytes(as_json(report.statistics))

@@ -2,14 +2,26 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
-from typing import Any
+from collections.abc import Iterable, Iterator
 
 from analysis.report import apa
 from analysis.report.figures.style import display_name, named
 from analysis.report.section import Section, Table
-
-Statistics = Mapping[str, Any]
+from analysis.stats.logit_model import Contrast
+from analysis.stats.sphericity import Sphericity
+from analysis.summary.results import (
+    Assumption,
+    Diagnostics,
+    DirectionStatistics,
+    FriedmanTest,
+    NamedModel,
+    NotedEffectSize,
+    NotedNormality,
+    Pair,
+    StudyStatistics,
+    Supplement,
+    WithinStatistics,
+)
 
 TITLES = {
     "direction": "Direction recognition: further statistics",
@@ -18,97 +30,96 @@ TITLES = {
 _LARGE = 1000.0
 
 
-def supplement_sections(statistics: Statistics) -> tuple[Section, ...]:
+def supplement_sections(statistics: StudyStatistics) -> Iterator[Section]:
     """A section for each experiment that was tested."""
-    tested = [name for name in TITLES if statistics.get(name, {}).get("anova") is not None]
-    return tuple(_section(TITLES[name], statistics[name]) for name in tested)
+    for name, title in TITLES.items():
+        found = statistics.of(name)
+        if found is not None and found.supplement is not None and found.anova is not None:
+            yield _section(title, found, found.supplement, found.anova.F)
 
 
-def _section(title: str, found: Statistics) -> Section:
-    binary = "model" in found
-    tables = [_pairs(found), *([_model_table(found), _clustering_table(found)] if binary else []), _ends(found)]
+def _section(title: str, found: WithinStatistics, beside: Supplement, F: float) -> Section:
+    answers = found if isinstance(found, DirectionStatistics) else None
+    tables = [_pairs(found, beside), *((_model_table(answers), _clustering_table(answers)) if answers else ())]
+    tables.append(_ends(found, beside.diagnostics))
     return Section(
         title=title,
         paragraphs=(
-            _corrected(found),
-            _sizes(found["effect_size"]),
-            _friedman(found["friedman"]),
-            _pairs_words(found),
-            *((_model_words(found["model"]), named(found["clustering_note"])) if binary else ()),
-            _residuals(found["diagnostics"]["normality"]),
+            _corrected(F, beside.sphericity),
+            _sizes(beside.effect_size),
+            _friedman(beside.friedman),
+            _pairs_words(beside),
+            *((_model_words(answers.model), named(answers.clustering_note)) if answers else ()),
+            _residuals(beside.diagnostics.normality),
         ),
         tables=tuple(table for table in tables if table.rows),
-        items=tuple(_assumption(entry) for entry in found["assumptions"]),
+        items=tuple(_assumption(entry) for entry in found.assumptions),
     )
 
 
-def _corrected(found: Statistics) -> str:
+def _corrected(F: float, sphericity: Sphericity) -> str:
     """The F test with Mauchly's test and both corrections.
 
-    >>> _corrected({"anova": {"F": 9.0}, "sphericity": {"p": None, "greenhouse_geisser": None, "huynh_feldt": None,
-    ...     "reason": "There is no error variance."}})
+    >>> _corrected(9.0, Sphericity(reason="There is no error variance."))
     'Sphericity: There is no error variance.'
     """
-    sphericity = found["sphericity"]
-    parts = [_mauchly(sphericity)] if sphericity["p"] is not None else []
-    for name, key in (("Greenhouse-Geisser", "greenhouse_geisser"), ("Huynh-Feldt", "huynh_feldt")):
-        if sphericity[key] is not None:
-            test = _f(found["anova"]["F"], sphericity[key])
-            parts.append(f"{name} corrected (ε = {apa.below_one(sphericity[key]['epsilon'])}): {test}")
+    parts = [_mauchly(sphericity)] if sphericity.p is not None else []
+    corrections = {"Greenhouse-Geisser": sphericity.greenhouse_geisser, "Huynh-Feldt": sphericity.huynh_feldt}
+    for name, one in corrections.items():
+        if one is not None:
+            parts.append(f"{name} corrected (ε = {apa.below_one(one.epsilon)}): {apa.f_test(F, one.df, one.p)}")
     told = "; ".join(parts)
-    return f"Sphericity: {' '.join(filter(None, [told and told + '.', sphericity['reason']]))}"
+    return f"Sphericity: {' '.join(filter(None, [told and told + '.', sphericity.reason]))}"
 
 
-def _mauchly(sphericity: Statistics) -> str:
-    W, chi2 = apa.below_one(sphericity["W"]), apa.number(sphericity["chi2"])
-    return f"Mauchly's W = {W}, χ²({sphericity['df']}) = {chi2}, {apa.p_value(sphericity['p'])}"
+def _mauchly(sphericity: Sphericity) -> str:
+    W, chi2 = apa.below_one(sphericity.W), apa.number(sphericity.chi2)
+    return f"Mauchly's W = {W}, χ²({sphericity.df}) = {chi2}, {apa.p_value(sphericity.p)}"
 
 
-def _f(F: float | None, corrected: Statistics) -> str:
-    return apa.f_test({"F": F, "df": [apa.number(df) for df in corrected["df"]], "p": corrected["p"]})
+def _sizes(effect: NotedEffectSize) -> str:
+    size = effect.size
+    partial = f"Partial η² = {apa.below_one(size.partial_eta_squared)}"
+    for level, ends in ((90, size.ci_90), (95, size.ci_95)):
+        if ends is not None:
+            partial += f", {level} % CI {apa.interval(*ends)}"
+    told = f"{partial}; generalised η² = {apa.below_one(size.generalized_eta_squared)}."
+    return f"{told} {size.reason or effect.note}"
 
 
-def _sizes(effect: Statistics) -> str:
-    partial = f"Partial η² = {apa.below_one(effect['partial_eta_squared'])}"
-    for level in (90, 95):
-        if effect[f"ci_{level}"] is not None:
-            partial += f", {level} % CI {apa.interval(*effect[f'ci_{level}'])}"
-    told = f"{partial}; generalised η² = {apa.below_one(effect['generalized_eta_squared'])}."
-    return " ".join(filter(None, [told, effect["reason"] or effect["note"]]))
+def _friedman(test: FriedmanTest) -> str:
+    if test.reason:
+        return f"Friedman test: {test.reason}"
+    told = f"χ²({test.df}) = {apa.number(test.chi2)}, {apa.p_value(test.p)}"
+    return f"Friedman test: {told}, Kendall's W = {apa.below_one(test.kendall_w)}. {test.post_hoc.name}"
 
 
-def _friedman(test: Statistics) -> str:
-    if test["reason"]:
-        return f"Friedman test: {test['reason']}"
-    told = f"χ²({test['df']}) = {apa.number(test['chi2'])}, {apa.p_value(test['p'])}"
-    return f"Friedman test: {told}, Kendall's W = {apa.below_one(test['kendall_w'])}. {test['post_hoc']['name']}"
+def _residuals(noted: NotedNormality) -> str:
+    test = noted.test
+    if test.reason:
+        return f"Residuals: {test.reason}"
+    shape = f"skewness {apa.number(test.skewness)}, excess kurtosis {apa.number(test.excess_kurtosis)}"
+    return f"Residuals: W = {apa.below_one(test.W)}, {apa.p_value(test.p)}, {shape}. {noted.note}"
 
 
-def _residuals(test: Statistics) -> str:
-    if test["reason"]:
-        return f"Residuals: {test['reason']}"
-    shape = f"skewness {apa.number(test['skewness'])}, excess kurtosis {apa.number(test['excess_kurtosis'])}"
-    return f"Residuals: W = {apa.below_one(test['W'])}, {apa.p_value(test['p'])}, {shape}. {test['note']}"
-
-
-def _pairs_words(found: Statistics) -> str:
-    factors = found["bayes_factors"]
+def _pairs_words(found: Supplement) -> str:
+    factors = found.bayes_factors
     return (
         "The pairs in several ways. Tukey with the pooled error is the test of the main text. Tukey with a pair's own "
-        f"error: {found['tukey_paired_note']} t: paired t-tests with Holm's correction, a check on both. "
-        f"{factors['note']} Here r = {apa.number(factors['r'], 3)}."
+        f"error: {found.tukey_paired_note} t: paired t-tests with Holm's correction, a check on both. "
+        f"{factors.note} Here r = {apa.number(factors.r, 3)}."
     )
 
 
-def _pairs(found: Statistics) -> Table:
+def _pairs(found: WithinStatistics, beside: Supplement) -> Table:
     columns = (
         (pooled, own, t, ranks, factor)
         for pooled, own, t, ranks, factor in zip(
-            found["tukey"],
-            found["tukey_paired"],
-            found["paired_t"],
-            found["friedman"]["post_hoc"]["pairs"],
-            found["bayes_factors"]["pairs"],
+            found.tukey or (),
+            beside.tukey_paired,
+            beside.paired_t,
+            beside.friedman.post_hoc.pairs,
+            beside.bayes_factors.pairs,
             strict=True,
         )
     )
@@ -118,12 +129,12 @@ def _pairs(found: Statistics) -> Table:
         rows=tuple(
             (
                 _pair(pooled),
-                apa.p_cell(pooled["p"]),
-                apa.p_cell(own["p"]),
-                apa.p_cell(t["p_holm"]),
-                apa.p_cell(ranks["p_holm"]),
-                apa.number(t["d_z"]),
-                bayes_cell(factor["bf10"]),
+                apa.p_cell(pooled.p),
+                apa.p_cell(own.p),
+                apa.p_cell(t.p_holm),
+                apa.p_cell(ranks.p_holm),
+                apa.number(t.d_z),
+                bayes_cell(factor.bf10),
             )
             for pooled, own, t, ranks, factor in columns
         ),
@@ -143,36 +154,37 @@ def bayes_cell(factor: float | None) -> str:
     return f"< {1.0 / _LARGE:g}" if factor < 1.0 / _LARGE else apa.number(factor, 2 if factor >= 0.1 else 3)
 
 
-def _pair(comparison: Statistics) -> str:
-    return f"{display_name(comparison['a'])} − {display_name(comparison['b'])}"
+def _pair(pair: Pair | Contrast) -> str:
+    return f"{display_name(str(pair.a))} − {display_name(str(pair.b))}"
 
 
-def _model_words(model: Statistics) -> str:
-    if model["reason"]:
-        return f"No logistic model of the forward answers. {named(model['reason'])}"
-    test = f"Equal odds of all methods: {apa.f_test(model['test'])}. " if model["test"] else ""
-    return f"Model of the forward answers: {model['name']}. {test}{model['note']}"
+def _model_words(model: NamedModel) -> str:
+    equal = model.fit.test
+    if model.fit.reason:
+        return f"No logistic model of the forward answers. {named(model.fit.reason)}"
+    test = f"Equal odds of all methods: {apa.f_test(equal.F, equal.df, equal.p)}. " if equal else ""
+    return f"Model of the forward answers: {model.name}. {test}{model.note}"
 
 
-def _model_table(found: Statistics) -> Table:
+def _model_table(found: DirectionStatistics) -> Table:
     return Table(
         caption="Odds ratios of a right forward answer, logistic model; 95 % interval of each pair for itself",
         header=("Pair", "Odds ratio", "95 % CI", "t", "df", "p, Holm"),
         rows=tuple(
             (
                 _pair(contrast),
-                apa.number(contrast["odds_ratio"]),
-                apa.interval(contrast["ci_low"], contrast["ci_high"]),
-                apa.number(contrast["t"]),
-                str(contrast["df"]),
-                apa.p_cell(contrast["p_holm"]),
+                apa.number(contrast.odds_ratio),
+                apa.interval(contrast.ci_low, contrast.ci_high),
+                apa.number(contrast.t),
+                str(contrast.df),
+                apa.p_cell(contrast.p_holm),
             )
-            for contrast in found["model"]["contrasts"]
+            for contrast in found.model.fit.contrasts
         ),
     )
 
 
-def _clustering_table(found: Statistics) -> Table:
+def _clustering_table(found: DirectionStatistics) -> Table:
     return Table(
         caption="Binomial tests against 50 % and what the clustering of the answers in people leaves of them",
         header=("Method", "Direction", "Intraclass correlation", "Design effect", "p pooled", "p adjusted"),
@@ -180,30 +192,29 @@ def _clustering_table(found: Statistics) -> Table:
             (
                 display_name(method),
                 direction,
-                apa.number(test["clustering"]["icc"]),
-                apa.number(test["clustering"]["design_effect"]),
-                apa.p_cell(test["p"]),
-                apa.p_cell(test["clustering"]["p_adjusted"]),
+                apa.number(test.clustering.icc),
+                apa.number(test.clustering.design_effect),
+                apa.p_cell(test.p),
+                apa.p_cell(test.clustering.p_adjusted),
             )
-            for method, tests in found["binomial"].items()
+            for method, tests in found.binomial.items()
             for direction, test in tests.items()
         ),
     )
 
 
-def _ends(found: Statistics) -> Table:
-    diagnostics = found["diagnostics"]
+def _ends(found: WithinStatistics, diagnostics: Diagnostics) -> Table:
     return Table(
-        caption=f"Scores at the ends of the scale, and outliers. {diagnostics['outliers']['rule']}",
+        caption=f"Scores at the ends of the scale, and outliers. {diagnostics.outliers.rule}",
         header=("Method", "At the floor", "At the ceiling", "Outliers"),
         rows=tuple(
             (
                 display_name(method),
-                str(diagnostics["floor"][method]),
-                str(diagnostics["ceiling"][method]),
-                _some(o["participant"] for o in diagnostics["outliers"]["found"] if o["method"] == method),
+                str(diagnostics.floor[method]),
+                str(diagnostics.ceiling[method]),
+                _some(o.participant for o in diagnostics.outliers.found if o.method == method),
             )
-            for method in found["methods"]
+            for method in found.methods
         ),
     )
 
@@ -215,6 +226,6 @@ def _some(codes: Iterable[str], shown: int = 10) -> str:
     return ", ".join(people[:shown]) + more if people else "none"
 
 
-def _assumption(entry: Statistics) -> str:
-    warning = f" Warning: {named(entry['warning'])}." if entry["warning"] else ""
-    return f"Assumed: {entry['assumption']}{warning}"
+def _assumption(entry: Assumption) -> str:
+    warning = f" Warning: {named(entry.warning)}." if entry.warning else ""
+    return f"Assumed: {entry.assumption}{warning}"

@@ -6,9 +6,10 @@ from collections.abc import Iterator, Mapping
 from typing import Any
 
 from analysis.report import apa
-from analysis.report.figures.style import display_name, named, people
+from analysis.report.figures.style import display_name, named
 from analysis.report.section import Picture, Section, Table
 from analysis.summary.figures.trade import has_curve, has_points
+from analysis.summary.results import DirectionStatistics
 
 Statistics = Mapping[str, Any]
 
@@ -169,9 +170,9 @@ TITLE = "Speed and accuracy"
 CONDITIONAL_ACCURACY, QUANTILE_PROBABILITY = "figure-conditional-accuracy", "figure-quantile-probability"
 
 
-def trade_section(found: Statistics) -> Section | None:
+def trade_section(found: DirectionStatistics) -> Section | None:
     """The section, or the sentence why there is nothing to show; `found` is `direction` of `statistics.json`."""
-    trade = found.get("speed_accuracy")
+    trade = found.speed_accuracy
     if trade is None:
         return None
     if trade["reason"]:
@@ -196,10 +197,10 @@ def _lower(text: str) -> str:
     return text[:1].lower() + text[1:]
 
 
-def _used(found: Statistics, trade: Statistics) -> str:
+def _used(found: DirectionStatistics, trade: Statistics) -> str:
     """How many trials count, and whose they are."""
     used = f"{trade['n']:,} of {trade['answered']:,} answered trials have a time of the answerer's own hand"
-    synthetic = set(found.get("origin", {}).get("answers", ())) == {"synthetic"}
+    synthetic = found.origin.synthetic
     model = " All times are synthetic: they show the observer's model, and nothing of people." if synthetic else ""
     return " ".join([f"{used} ({_count(trade['people'])}).{model}", *_refused(trade)])
 
@@ -244,20 +245,20 @@ def _fitted(trade: Statistics) -> Iterator[str]:
         yield caveats["together"]
 
 
-def trade_pictures(found: Statistics) -> tuple[Picture, ...]:
+def trade_pictures(found: DirectionStatistics) -> tuple[Picture, ...]:
     """The two figures, as far as there is something to draw."""
     pictures = []
-    panels = "; one panel an instruction" if len(found["speed_accuracy"]["instructions"]) > 1 else ""
+    panels = "; one panel an instruction" if len((found.speed_accuracy or {})["instructions"]) > 1 else ""
     if has_curve(found):
         caption = (
-            f"Conditional accuracy functions of {people(found)}{panels}: each one's trials in order of time, cut into "
+            f"Conditional accuracy functions of {found.people}{panels}: each one's trials in order of time, cut into "
             "five bins, then averaged over participants. A rising line: fast answers are guesses more often."
         )
         alt = f"Line chart of accuracy over response time. {'; '.join(_curve_words(found))}."
         pictures.append(Picture(stem=CONDITIONAL_ACCURACY, caption=caption, alt=alt))
     if has_points(found):
         caption = (
-            f"Quantile-probability plot of {people(found)}{panels}: the 10, 30, 50, 70 and 90 % quantiles of the times "
+            f"Quantile-probability plot of {found.people}{panels}: the 10, 30, 50, 70 and 90 % quantiles of the times "
             "of errors (empty) and correct answers (filled) over how often they are given, averaged over the "
             "participants who gave at least 5 of the kind; lines join equal quantiles."
         )
@@ -266,16 +267,16 @@ def trade_pictures(found: Statistics) -> tuple[Picture, ...]:
     return tuple(pictures)
 
 
-def _curve_words(found: Statistics) -> Iterator[str]:
-    for name, cell in cells_of(found["speed_accuracy"]):
+def _curve_words(found: DirectionStatistics) -> Iterator[str]:
+    for name, cell in cells_of(found.speed_accuracy or {}):
         curve = cell["conditional_accuracy"]
         if curve["people"]:
             ends = [f"{apa.percent(curve['accuracy'][k])} at {apa.number(curve['mean_time_s'][k])} s" for k in (0, -1)]
             yield f"{name} from {ends[0]} to {ends[1]}"
 
 
-def _points_words(found: Statistics) -> Iterator[str]:
-    for name, cell in cells_of(found["speed_accuracy"]):
+def _points_words(found: DirectionStatistics) -> Iterator[str]:
+    for name, cell in cells_of(found.speed_accuracy or {}):
         points = cell["quantile_probability"]
         kinds = zip(("errors", "correct answers"), points["quantiles_s"], points["people"], strict=True)
         medians = [f"median of {kind} {apa.number(row[2])} s" for kind, row, count in kinds if count]

@@ -2,11 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from dataclasses import dataclass
-from typing import Any
-
-Statistics = Mapping[str, Any]
+from analysis.summary.results import Assumption, DirectionStatistics, PooledBinomial, Supplement, WithinStatistics
 
 EPSILON = 0.75
 """Below it the pooled Tukey test is not to be read: its familywise error grows to .064 at .72 and .088 at .45."""
@@ -15,31 +11,30 @@ END_SHARE = 0.15
 ALPHA = 0.05
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Assumption:
-    """A sentence, the warning if it does not hold, and whether that changes which number to read (`serious`)."""
-
-    assumption: str
-    warning: str | None = None
-    serious: bool = False
-
-
-def assumptions(found: Statistics) -> list[Assumption]:
-    """The assumptions behind one experiment's entry of `statistics.json`; none where nothing was tested."""
-    if found["anova"] is None:
-        return []
-    direction = [_answers_independent(found), _log_odds(found)] if "binomial" in found else []
-    return [_people_independent(), _sphericity(found), _normality(found), _ends(found), _outliers(found), *direction]
+def assumptions(found: WithinStatistics) -> tuple[Assumption, ...]:
+    """The assumptions behind one experiment's tests; none where nothing was tested."""
+    if found.supplement is None:
+        return ()
+    common = (
+        _people_independent(),
+        _sphericity(found.supplement),
+        _normality(found.supplement),
+        _ends(found, found.supplement),
+        _outliers(found.supplement),
+    )
+    if isinstance(found, DirectionStatistics):
+        return *common, _answers_independent(found), _log_odds(found)
+    return common
 
 
 def _people_independent() -> Assumption:
     return Assumption(assumption="Participants are independent of each other; the design has to see to it.")
 
 
-def _sphericity(found: Statistics) -> Assumption:
+def _sphericity(found: Supplement) -> Assumption:
     text = "The uncorrected F test and the pooled Tukey test take all differences of two methods to vary alike."
-    corrected = found["sphericity"]["greenhouse_geisser"]
-    if corrected is None or corrected["epsilon"] >= EPSILON:
+    corrected = found.sphericity.greenhouse_geisser
+    if corrected is None or corrected.epsilon >= EPSILON:
         return Assumption(assumption=text)
     warning = (
         f"sphericity does not hold (Greenhouse-Geisser epsilon below {EPSILON}): read the corrected F test and "
@@ -48,21 +43,21 @@ def _sphericity(found: Statistics) -> Assumption:
     return Assumption(assumption=text, warning=warning, serious=True)
 
 
-def _normality(found: Statistics) -> Assumption:
+def _normality(found: Supplement) -> Assumption:
     text = "The residuals of the ANOVA are normal; F and t tests of means hardly mind small departures."
-    p = found["diagnostics"]["normality"]["p"]
+    p = found.diagnostics.normality.test.p
     departs = p is not None and p < ALPHA
     warning = f"the residuals depart from normal (Shapiro-Wilk p < {ALPHA}): see the Friedman test" if departs else None
     return Assumption(assumption=text, warning=warning)
 
 
-def _ends(found: Statistics) -> Assumption:
-    counts, n = found["diagnostics"], found["n"]
+def _ends(found: WithinStatistics, beside: Supplement) -> Assumption:
+    n, diagnostics = found.n, beside.diagnostics
     hit = [
-        f"{method} ({end} {counts[end][method]} of {n})"
-        for end in ("floor", "ceiling")
-        for method in found["methods"]
-        if counts[end][method] > END_SHARE * n
+        f"{method} ({end} {counts[method]} of {n})"
+        for end, counts in (("floor", diagnostics.floor), ("ceiling", diagnostics.ceiling))
+        for method in found.methods
+        if counts[method] > END_SHARE * n
     ]
     warning = (
         f"many participants score at an end of the scale, which shrinks variances: {', '.join(hit)}" if hit else None
@@ -70,17 +65,17 @@ def _ends(found: Statistics) -> Assumption:
     return Assumption(assumption="The scale leaves room at both ends for every participant.", warning=warning)
 
 
-def _outliers(found: Statistics) -> Assumption:
-    people = sorted({outlier["participant"] for outlier in found["diagnostics"]["outliers"]["found"]})
+def _outliers(found: Supplement) -> Assumption:
+    people = sorted({outlier.participant for outlier in found.diagnostics.outliers.found})
     shown = ", ".join(people[:5]) + (f" and {len(people) - 5} more" if len(people) > 5 else "")
     warning = f"participants with a score far from the others' (kept): {shown}" if people else None
     return Assumption(assumption="No single participant decides a mean.", warning=warning)
 
 
-def _answers_independent(found: Statistics) -> Assumption:
+def _answers_independent(found: DirectionStatistics) -> Assumption:
     turned = [
         f"{method} {direction}"
-        for method, tests in found["binomial"].items()
+        for method, tests in found.binomial.items()
         for direction, test in tests.items()
         if _turned(test)
     ]
@@ -93,18 +88,18 @@ def _answers_independent(found: Statistics) -> Assumption:
     return Assumption(assumption=text, warning=warning, serious=bool(turned))
 
 
-def _turned(test: Statistics) -> bool:
+def _turned(pooled: PooledBinomial) -> bool:
     """Does the clustering change on which side of .05 the pooled p lies?"""
-    found = test["clustering"]
-    if found["design_effect"] is None or found["design_effect"] <= 1.0:
+    found = pooled.clustering
+    if found.design_effect is None or found.p_adjusted is None or found.design_effect <= 1.0:
         return False
-    return bool((test["p"] < ALPHA) != (found["p_adjusted"] < ALPHA))
+    return bool((pooled.p < ALPHA) != (found.p_adjusted < ALPHA))
 
 
-def _log_odds(found: Statistics) -> Assumption:
-    model = found["model"]
+def _log_odds(found: DirectionStatistics) -> Assumption:
+    model = found.model.fit
     text = "The logistic model takes every method to have right and wrong answers, enough of both."
-    warning = f"there is no logistic model. {model['reason'].rstrip('.')}" if model["reason"] else None
-    if model["few"]:
-        warning = f"fewer than 5 right or wrong answers, so its tests are unreliable: {', '.join(model['few'])}"
+    warning = f"there is no logistic model. {model.reason.rstrip('.')}" if model.reason else None
+    if model.few:
+        warning = f"fewer than 5 right or wrong answers, so its tests are unreliable: {', '.join(map(str, model.few))}"
     return Assumption(assumption=text, warning=warning)

@@ -1,0 +1,176 @@
+"""The published numbers beside the obtained ones, row by row."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import replace
+
+from analysis.paper.paper import Paper, PublishedDirection, PublishedExperiment, PublishedPreference, TukeyClaim
+from analysis.paper.published import (
+    ANOVA_F,
+    ANOVA_P,
+    PARTICIPANTS,
+    Prediction,
+    Row,
+    Verdict,
+    anova_df,
+    binomial_p,
+    mean_rate,
+    named_in,
+    one_score,
+    rated_lowest,
+    rounds_to,
+    tukey_p,
+)
+from analysis.report.apa import known
+from analysis.summary.results import DirectionStatistics, Pair, StudyStatistics, WithinStatistics
+
+
+def compare(
+    statistics: StudyStatistics, paper: Paper, predicted: Mapping[str, Prediction] | None = None
+) -> tuple[Row, ...]:
+    """Every published number against the statistics of a study.
+
+    A number agrees if it rounds to the printed digits; a bound or an order, if it is true of the obtained numbers. What
+    the paper draws but does not print is listed as not published. `predicted`: by `named_in`, what the audit
+    says; a difference to one of the nearest attainable values is the one that it predicts.
+    """
+    direction, preference = statistics.direction, statistics.preference
+    rows = [*_common("direction", paper.direction, direction), *_direction(paper.direction, direction)]
+    rows += [*_common("preference", paper.preference, preference), *_preference(paper.preference, preference)]
+    audited = predicted or {}
+    return tuple(_with_audit(row, audited.get(named_in(row.experiment, row.quantity))) for row in rows)
+
+
+def _with_audit(row: Row, prediction: Prediction | None) -> Row:
+    """The row with what the audit says of its number."""
+    if prediction is None or row.verdict == "not published":
+        return row
+    printed = row.published.split(" ", maxsplit=1)[0]
+    obtained = row.obtained
+    nearest = obtained is not None and any(_alike(obtained, value, printed) for value in prediction.nearest)
+    verdict: Verdict = "differs as predicted" if row.verdict == "differs" and nearest else row.verdict
+    note = "; ".join(text for text in (row.note, prediction.note) if text)
+    return replace(row, verdict=verdict, note=note, audit=prediction.verdict)
+
+
+def _alike(one: float, other: float, printed: str) -> bool:
+    """Do both print alike, with the digits of `printed`?"""
+    digits = len(printed.partition(".")[2])
+    return abs(one - other) < 1e-9 or f"{one:.{digits}f}" == f"{other:.{digits}f}"
+
+
+def _number(experiment: str, quantity: str, printed: str, obtained: float | None, unit: str = "") -> Row:
+    verdict: Verdict = "not obtained"
+    if obtained is not None:
+        verdict = "agrees" if rounds_to(obtained, printed) else "differs"
+    published = f"{printed} {unit}".strip()
+    return Row(
+        experiment=experiment, quantity=quantity, published=published, obtained=_float(obtained), verdict=verdict
+    )
+
+
+def _claim(
+    experiment: str, quantity: str, published: str, obtained: float | None, *, truth: bool, note: str = ""
+) -> Row:
+    verdict: Verdict = "not obtained" if obtained is None else "agrees" if truth else "differs"
+    return Row(
+        experiment=experiment,
+        quantity=quantity,
+        published=published,
+        obtained=_float(obtained),
+        verdict=verdict,
+        note=note,
+    )
+
+
+def _unpublished(experiment: str, quantity: str, obtained: float | None, note: str) -> Row:
+    return Row(
+        experiment=experiment,
+        quantity=quantity,
+        published="",
+        obtained=_float(obtained),
+        verdict="not published",
+        note=note,
+    )
+
+
+def _float(value: float | None) -> float | None:
+    return None if value is None else float(value)
+
+
+def _common(name: str, published: PublishedExperiment, found: WithinStatistics | None) -> Iterator[Row]:
+    anova = found.anova if found is not None else None
+    yield _number(name, PARTICIPANTS, str(published.n), found.n if found is not None else None)
+    for i, (df, kind) in enumerate(zip(published.anova.df, ("effect", "error"), strict=True)):
+        yield _number(name, anova_df(kind), str(df), anova.df[i] if anova is not None else None)
+    yield _number(name, ANOVA_F, published.anova.F, known(anova.F if anova is not None else None))
+    p, bound = known(anova.p if anova is not None else None), published.anova.p_below
+    yield _claim(name, ANOVA_P, f"< {bound}", p, truth=p is not None and p < float(bound))
+    for claim in published.tukey:
+        yield _tukey(name, claim, (found.tukey if found is not None else None) or ())
+
+
+def _tukey(name: str, claim: TukeyClaim, pairs: Sequence[Pair]) -> Row:
+    quantity, published = tukey_p(claim), f"< {claim.p_below}"
+    found = next((pair for pair in pairs if {pair.a, pair.b} == {claim.higher, claim.lower}), None)
+    if found is None or math.isnan(found.p):
+        return _claim(name, quantity, published, None, truth=False)
+    above = found.difference > 0 if found.a == claim.higher else found.difference < 0
+    note = "" if above else f"{claim.higher} is not above {claim.lower}"
+    return _claim(name, quantity, published, found.p, truth=above and found.p < float(claim.p_below), note=note)
+
+
+def _direction(published: PublishedDirection, found: DirectionStatistics | None) -> Iterator[Row]:
+    name = "direction"
+    means, sds, backward = (found.means, found.sds, found.backward.means) if found is not None else ({}, {}, {})
+    for method, printed in published.means.items():
+        yield _number(name, mean_rate(method), printed, _percent(means.get(method)), "%")
+    for claim in published.binomial:
+        tests = found.binomial.get(claim.method, {}) if found is not None else {}
+        test = tests.get(claim.direction)
+        yield _number(name, binomial_p(claim), claim.p, test.p if test is not None else None)
+    for method in published.methods:
+        sd = _percent(sds.get(method))
+        yield _unpublished(name, f"SD of the correct rate, {method} (%)", sd, "drawn in Fig. 8 (a) only")
+    for method in published.methods:
+        note = "not printed; its binomial p is" if method == "vibration" else "not printed"
+        mean = _percent(backward.get(method))
+        yield _unpublished(name, f"mean correct rate backward, {method} (%)", mean, note)
+
+
+def _percent(share: float | None) -> float | None:
+    value = known(share)
+    return None if value is None else 100.0 * value
+
+
+def _preference(published: PublishedPreference, found: WithinStatistics | None) -> Iterator[Row]:
+    name, lowest, same = "preference", published.lowest, published.same_score
+    ratings = None if found is None else found.participants.values()
+    yield _number(
+        name,
+        rated_lowest(lowest),
+        str(lowest.participants),
+        None if ratings is None else sum(_is_lowest(row, lowest.method) for row in ratings),
+    )
+    yield _number(
+        name,
+        one_score(same),
+        str(same.participants),
+        None if ratings is None else sum(_is_same(row, same.methods) for row in ratings),
+    )
+    means, sds = (found.means, found.sds) if found is not None else ({}, {})
+    for kind, values in (("mean", means), ("SD", sds)):
+        for method in published.methods:
+            obtained = known(values.get(method))
+            yield _unpublished(name, f"{kind} rating, {method}", obtained, "drawn in Fig. 8 (b) only")
+
+
+def _is_lowest(row: Mapping[str, float], method: str) -> bool:
+    """Strictly below every other method."""
+    return method in row and all(row[method] < score for other, score in row.items() if other != method)
+
+
+def _is_same(row: Mapping[str, float], methods: list[str]) -> bool:
+    return all(method in row for method in methods) and row[methods[0]] == row[methods[1]]

@@ -1,0 +1,320 @@
+"""The statistics of a study as typed results; a field is called what it is called in `statistics.json`.
+
+Rates 0 to 1, times in s, SD with n - 1; nothing is rounded. NaN and infinities are written as null and are named in
+`warnings`; None stands where a test was not made, and a `reason` beside it says why.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import Any
+
+from analysis.report.serial import OPTIONAL, beside, plain
+from analysis.stats.cells import ByParticipant
+from analysis.stats.diagnostics import Normality
+from analysis.stats.effect_sizes import EffectSize
+from analysis.stats.logit_model import Clustering, LogitModel
+from analysis.stats.paired import PairedT
+from analysis.stats.rank_tests import SignedRanks
+from analysis.stats.sphericity import Sphericity
+from analysis.summary.remarks_coding import CodedRemarks
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Interval:
+    """The ends of a confidence interval."""
+
+    ci_low: float
+    ci_high: float
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class AnovaTest:
+    """The repeated-measures ANOVA of one experiment; `df` of the effect and of the error."""
+
+    F: float
+    df: tuple[int, int]
+    p: float
+    ss_effect: float
+    ss_error: float
+    ms_error: float
+    ss_participants: float
+    name: str = "one-way repeated-measures ANOVA"
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Pair:
+    """Tukey's test of two methods: the mean of `a` less that of `b`, with its simultaneous interval."""
+
+    a: str
+    b: str
+    difference: float
+    q: float
+    p: float
+    ci_low: float
+    ci_high: float
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class OwnErrorPair:
+    """Tukey's test of two methods with the pair's own error; None without a variance of the differences."""
+
+    a: str
+    b: str
+    difference: float
+    q: float | None = None
+    p: float | None = None
+    ci_low: float | None = None
+    ci_high: float | None = None
+    reason: str | None = None
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class NotedEffectSize:
+    """Effect sizes, and what their intervals are of."""
+
+    size: EffectSize = field(metadata=beside(EffectSize))
+    note: str
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class PostHoc:
+    """Signed-rank tests of all pairs, and why these."""
+
+    name: str
+    pairs: tuple[SignedRanks, ...]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class FriedmanTest:
+    """Friedman's test with the mean rank of each method."""
+
+    chi2: float | None
+    df: int | None
+    p: float | None
+    kendall_w: float | None
+    reason: str | None
+    mean_ranks: Mapping[str, float]
+    post_hoc: PostHoc
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class BayesFactor:
+    """A pair's Bayes factor against no difference."""
+
+    a: str
+    b: str
+    bf10: float | None
+    reason: str | None
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class BayesFactors:
+    """The Bayes factors of all pairs and the scale `r` of their prior."""
+
+    r: float
+    note: str
+    pairs: tuple[BayesFactor, ...]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class NotedNormality:
+    """The test of the residuals, and how to read it."""
+
+    test: Normality = field(metadata=beside(Normality))
+    note: str
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class FarScore:
+    """An outlier: whose, with which method, and the fence that it lies beyond."""
+
+    participant: str
+    method: str
+    score: float
+    fence: float
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Outliers:
+    """All outliers by a rule."""
+
+    rule: str
+    found: tuple[FarScore, ...]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Diagnostics:
+    """Residuals, outliers, and how many participants score at each end of the `scale`, by method."""
+
+    normality: NotedNormality
+    outliers: Outliers
+    scale: tuple[float, float]
+    floor: Mapping[str, int]
+    ceiling: Mapping[str, int]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Supplement:
+    """What a reader asks for beside F and Tukey."""
+
+    sphericity: Sphericity
+    effect_size: NotedEffectSize
+    friedman: FriedmanTest
+    paired_t: tuple[PairedT, ...]
+    tukey_paired: tuple[OwnErrorPair, ...]
+    tukey_paired_note: str
+    bayes_factors: BayesFactors
+    diagnostics: Diagnostics
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Assumption:
+    """A sentence, the warning if it does not hold, and whether that changes which number to read (`serious`)."""
+
+    assumption: str
+    warning: str | None = None
+    serious: bool = False
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Origin:
+    """Whose hand gave how many of the answers, and which guns rendered how many of the trials."""
+
+    answers: Mapping[str, int]
+    guns: Mapping[str, int]
+
+    @property
+    def synthetic(self) -> bool:
+        """Whether nobody of flesh answered."""
+        return set(self.answers) == {"synthetic"}
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class WithinStatistics:
+    """The scores of `n` complete participants with each method, and the tests on them.
+
+    The tests and the supplement are None for fewer than two participants or methods.
+    """
+
+    n: int
+    methods: tuple[str, ...]
+    means: Mapping[str, float]
+    sds: Mapping[str, float]
+    participants: ByParticipant
+    within_ci: Mapping[str, Interval] | None
+    anova: AnovaTest | None
+    tukey: tuple[Pair, ...] | None
+    tukey_error_term: str
+    supplement: Supplement | None = field(metadata=beside(Supplement))
+    origin: Origin
+    assumptions: tuple[Assumption, ...] = ()
+
+    @property
+    def people(self) -> str:
+        """How many took part; said so if nobody of flesh answered."""
+        return f"{self.n:,} {'synthetic ' if self.origin.synthetic else ''}participant{'' if self.n == 1 else 's'}"
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Scores:
+    """Means, SDs and participants' values of a measure by method."""
+
+    means: Mapping[str, float]
+    sds: Mapping[str, float]
+    participants: ByParticipant
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class PooledBinomial:
+    """The exact binomial test of all participants' answers against guessing, and how they cluster in people."""
+
+    successes: int
+    trials: int
+    p: float
+    log_p: float
+    estimate: float
+    ci_low: float
+    ci_high: float
+    wilson_low: float
+    wilson_high: float
+    clustering: Clustering
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class NamedModel:
+    """The logistic model of the forward answers, its name and what it is."""
+
+    name: str
+    note: str
+    fit: LogitModel = field(metadata=beside(LogitModel))
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class MeanSd:
+    """Over participants."""
+
+    mean: float
+    sd: float
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Sensitivity:
+    """d' and criterion, over participants and each one's own."""
+
+    d_prime: MeanSd
+    criterion: MeanSd
+    participants: ByParticipant
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class MedianTime:
+    """The median of `n` response times in s, None of none."""
+
+    median: float | None
+    n: int
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class DirectionStatistics(WithinStatistics):
+    """Experiment 1; the scores are correct rates on forward shots. `sensitivity` None where a direction is missing."""
+
+    backward: Scores
+    binomial: Mapping[str, Mapping[str, PooledBinomial]]
+    binomial_note: str
+    clustering_note: str
+    model: NamedModel
+    sensitivity: Mapping[str, Sensitivity | None]
+    response_time: Mapping[str, MedianTime]
+    response_times: Mapping[str, Any]
+    speed_accuracy: Mapping[str, Any] | None = field(default=None, metadata=OPTIONAL)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class StudyStatistics:
+    """The statistics of logs; None for an experiment without a log. `studies` of each study, if there are several."""
+
+    direction: DirectionStatistics | None = field(default=None, metadata=OPTIONAL)
+    preference: WithinStatistics | None = field(default=None, metadata=OPTIONAL)
+    excluded: tuple[Mapping[str, str], ...] = ()
+    warnings: tuple[str, ...] = ()
+    versions: Mapping[str, str] | None = field(default=None, metadata=OPTIONAL)
+    studies: Mapping[str, StudyStatistics] | None = field(default=None, metadata=OPTIONAL)
+    rules: Mapping[str, Any] | None = field(default=None, metadata=OPTIONAL)
+    remarks: CodedRemarks | None = field(default=None, metadata=OPTIONAL)
+
+    def of(self, experiment: str) -> WithinStatistics | None:
+        """The statistics of an experiment by its name."""
+        return {"direction": self.direction, "preference": self.preference}.get(experiment)
+
+    @property
+    def analysed(self) -> dict[str, WithinStatistics]:
+        """The experiments that have a complete participant, by name."""
+        both = {"direction": self.direction, "preference": self.preference}
+        return {name: found for name, found in both.items() if found is not None and found.n}
+
+    def to_dict(self) -> dict[str, Any]:
+        """The content of `statistics.json`."""
+        written: dict[str, Any] = plain(self)
+        return written
