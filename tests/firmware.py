@@ -237,14 +237,6 @@ class Hand:
         time.sleep(max(0, standing.ready_us - standing.clock_us) / 1e6)
 
 
-@pytest.fixture
-def hand(tmp_path):
-    with emulated(tmp_path) as chip:
-        hand = Hand(chip)
-        yield hand
-        hand.close()
-
-
 def play(hand: Hand, script: Iterator[str]) -> None:
     """Says what a script says, as fast as may be; power is not switched off."""
     before_us = 0

@@ -294,13 +294,13 @@ def test_work_that_is_interrupted_may_put_away_what_it_holds(tmp_path: Path) -> 
     program = (
         "import os, signal, threading\n"
         "from pathlib import Path\n"
-        "from experiments.doctor import deadline\n"
+        "from experiments.doctor import children\n"
         "interrupted = threading.Event()\n"
         "def interrupt(*_):\n    interrupted.set()\n    raise KeyboardInterrupt\n"
         "signal.signal(signal.SIGINT, interrupt)\n"
         "def work():\n    os.kill(os.getpid(), signal.SIGINT)\n    interrupted.wait()\n    Path({!r}).touch()\n"
-        "deadline._PUT_AWAY_S = {}\n"
-        "deadline.within({}, work)"
+        "children._PUT_AWAY_S = {}\n"
+        "children.within({}, work)"
     )
     program = program.format(str(tmp_path / "put away"), PATIENCE_S, PATIENCE_S)
     answer = children.run([sys.executable, "-c", program], PATIENCE_S)

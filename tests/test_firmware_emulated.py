@@ -11,10 +11,18 @@ import time
 import pytest
 
 from device.wire.errors import message
-from tests.firmware import Hand, agree, play_all
+from tests.firmware import Hand, agree, emulated, play_all
 from tests.waiting import wait_for
 
 SCRIPTS = 6
+
+
+@pytest.fixture
+def hand(tmp_path):
+    with emulated(tmp_path) as chip:
+        hand = Hand(chip)
+        yield hand
+        hand.close()
 
 
 def test_the_chip_in_real_time_says_and_does_what_the_twin_does_for_the_same_calls(hand):

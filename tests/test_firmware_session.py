@@ -39,5 +39,5 @@ def test_the_doctor_measures_the_way_to_the_emulated_chip(recoil, tmp_path):
         done = recoil("doctor", "--json", "--gun", f"serial:{chip.port}")
     (gun,) = [row for row in json.loads(done.stdout)["checks"] if row["check"] == "gun"]
     assert gun["verdict"] in {"good", "warning"}  # a busy machine makes the way longer
-    assert gun["figures"]["round_trip_ms"]["n"] == 200
+    assert 0 < gun["figures"]["round_trip_ms"]["n"] <= 200  # a busy machine has time for fewer
     assert gun["measured"].startswith("haptic-gun:QEMU-1, disarmed; round trip median")

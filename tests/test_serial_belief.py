@@ -146,7 +146,9 @@ def test_a_clock_that_was_misread_is_learnt_again_before_a_shot_is_disbelieved(t
                 assert "earlier than" in str(error) or "later than" in str(error) or "not fired" in str(error)  # noqa: PT017
             else:
                 done += 1
-                assert report.timing.written_s - 0.01 <= report.pulse_start_s <= report.timing.acknowledged_s + 0.01
+                timing = report.timing
+                near_s = 0.01 + timing.uncertainty_s  # on a busy machine the clock is known less well
+                assert timing.written_s - near_s <= report.pulse_start_s <= timing.acknowledged_s + near_s
         assert done > 4
 
 

@@ -88,6 +88,8 @@ def test_a_run_on_the_twin_logs_what_one_on_the_simulated_gun_does_but_for_times
         assert done.returncode == 0, done.stderr
         logs.append({key: tmp_path / path for key, path in json.loads(done.stdout).items()})
     simulated, twin = (rows(log["table"]) for log in logs)
+    for row in (*twin, *simulated) if name == "preference" else ():
+        assert int(row.pop("shots")) > 1  # as many as the train had time for, which on the twin is real time
     assert twin == simulated
     contents = read(logs[1]["journal"])
     causes = [outcome.cause for _, outcome in told(contents) if isinstance(outcome, Failed)]

@@ -218,8 +218,8 @@ def by_hand(rows: list[TextRow]) -> list[TextRow]:
 def test_times_from_the_experimenters_hand_are_refused_with_the_reason(tmp_path: Path) -> None:
     for code in ("P01", "P02"):
         write_rows(trials_path(tmp_path / "study", code), by_hand(trial_rows(code)))
-    statistics = summarize(read_logs([tmp_path / "study"])).to_dict()
-    found = statistics["direction"]["speed_accuracy"]
+    statistics = summarize(read_logs([tmp_path / "study"]))
+    found = statistics.to_dict()["direction"]["speed_accuracy"]
     assert (found["n"], found["answered"], found["methods"]) == (0, 120, {})
     assert "the experimenter's hand" in found["reason"]
     assert found["refused"]["experimenter"]["trials"] == 120
@@ -231,7 +231,7 @@ def test_times_from_the_experimenters_hand_are_refused_with_the_reason(tmp_path:
     assert not list((tmp_path / "out" / "figures").glob("figure-[cq][ou]*"))
     for figure in (figure_conditional_accuracy, figure_quantile_probability):
         with pytest.raises(ValueError, match="needs somebody"):
-            figure(statistics["direction"], tmp_path / "none")
+            figure(statistics.direction, tmp_path / "none")
 
 
 def test_single_times_that_are_nobodys_own_are_counted_by_reason(tmp_path: Path) -> None:
@@ -303,7 +303,7 @@ def test_people_who_were_told_different_things_count_each_for_their_own(tmp_path
         write_rows(trials_path(tmp_path, f"P{i}"), diffused(f"P{i}", 60, (told,)))
     found = found_in(tmp_path)
     assert {one["accuracy"]["people"] for one in found["instruction_effects"]} == {0}
-    section = trade_section(summarize(read_logs([tmp_path])).to_dict()["direction"])
+    section = trade_section(summarize(read_logs([tmp_path])).direction)
     assert section is not None
     assert any("No participant was told two things" in text for text in section.paragraphs)
     assert not [table for table in section.tables if "Effect of the instruction" in table.caption]
@@ -351,11 +351,11 @@ def test_whatever_the_log_there_is_a_section_and_no_nan(kind: str, people: int, 
         for row in rows if kind == "one trial" else ():
             row |= {"direction": "forward", "correct": str(int(row["response"] == "forward"))}
         write_rows(trials_path(tmp_path / "study", f"P{i}"), changed(rows, kind))
-    statistics = summarize(read_logs([tmp_path / "study"])).to_dict()
-    found = statistics["direction"]
-    assert found["n"] == people
-    json.dumps(statistics, allow_nan=False)
-    assert not [warning for warning in statistics["warnings"] if "speed_accuracy" in warning]
+    statistics = summarize(read_logs([tmp_path / "study"]))
+    found = statistics.direction
+    assert found.n == people
+    json.dumps(statistics.to_dict(), allow_nan=False)
+    assert not [warning for warning in statistics.warnings if "speed_accuracy" in warning]
     section = trade_section(found)
     assert section is not None
     cells = [*section.paragraphs, *(cell for table in section.tables for row in table.rows for cell in row)]
@@ -365,7 +365,7 @@ def test_whatever_the_log_there_is_a_section_and_no_nan(kind: str, people: int, 
         for stem, there in ((CONDITIONAL_ACCURACY, has_curve(found)), (QUANTILE_PROBABILITY, has_points(found)))
         if there
     }
-    fits = found["speed_accuracy"].get("diffusion") or {"together": None}
+    fits = statistics.to_dict()["direction"]["speed_accuracy"].get("diffusion") or {"together": None}
     clear = fits["together"] is not None and fits["together"]["reason"] is None
     one_fit = any("With one participant" in text for text in section.paragraphs)
     assert one_fit == (people == 1 and clear)
@@ -375,7 +375,7 @@ def test_whatever_the_log_there_is_a_section_and_no_nan(kind: str, people: int, 
 @pytest.mark.parametrize("kind", ["all correct", "told by method"])
 def test_figures_are_drawn_where_there_is_little_to_draw(kind: str, tmp_path: Path) -> None:
     write_rows(trials_path(tmp_path, "P1"), changed(trial_rows("P1", sets=2), kind))
-    found = summarize(read_logs([tmp_path])).to_dict()["direction"]
+    found = summarize(read_logs([tmp_path])).direction
     assert all(path.is_file() for path in figure_conditional_accuracy(found, tmp_path / "curve"))
     assert all(path.is_file() for path in figure_quantile_probability(found, tmp_path / "points"))
 
@@ -465,7 +465,7 @@ def test_a_crowd_is_fitted_by_a_sample_of_people_whose_codes_are_evenly_spaced(t
 
 
 def test_the_report_shows_figures_tables_and_caveats(folder: Path, tmp_path: Path) -> None:
-    write_report(tmp_path, ReportData(title="Trade", statistics=summarize(read_logs([folder])).to_dict()))
+    write_report(tmp_path, ReportData(title="Trade", statistics=summarize(read_logs([folder]))))
     text = (tmp_path / "report.md").read_text(encoding="utf-8")
     section = text.partition("## Speed and accuracy")[2].partition("\n## ")[0]
     for words in (
