@@ -168,6 +168,9 @@ def test_analyze_leaves_out_what_was_edited_and_says_so(recoil: Recoil, tmp_path
     done = recoil("analyze", "results", "--out", "analysis")
     assert done.returncode == 1
     assert "edited since the run" in done.stderr
+    text = (tmp_path / "analysis" / "report.html").read_text(encoding="utf-8")
+    assert "edited since the run" in text
+    assert str(tmp_path) not in text  # a report says nothing of the machine it was made on
     assert json.loads((tmp_path / "analysis" / "statistics.json").read_text())["direction"]["n"] == 2
 
 

@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 import os
-from dataclasses import replace
 from pathlib import Path
 
+from analysis.logs.reading import Problem
 from analysis.paper.odds import Odds
 from analysis.paper.published import AUDITED, Row
 from analysis.report import apa
@@ -187,10 +187,18 @@ def _left_out(report: ReportData) -> Section | None:
         for entry in report.statistics.excluded
     )
     names = _short_names(report)
-    problems = tuple(str(replace(problem, file=names[problem.file])) for problem in report.problems)
+    problems = tuple(_without_folder(problem, names[problem.file].parent) for problem in report.problems)
     warnings = tuple(f"Warning: {warning}." for warning in report.statistics.warnings)
     items = (*shortened(excluded, "exclusions"), *shortened(problems, "problems"), *shortened(warnings, "warnings"))
     return Section(title="Exclusions and problems", items=items) if items else None
+
+
+def _without_folder(problem: Problem, shown: Path) -> str:
+    """A problem with its file's folder as it is shown: its remedy names the journal there as well."""
+    text, instead = str(problem), "" if shown == Path() else f"{shown.as_posix()}/"
+    for folder in (problem.file.parent.absolute(), problem.file.parent):
+        text = text.replace(f"{folder}{os.sep}", instead) if folder != Path() else text
+    return text
 
 
 def _short_names(report: ReportData) -> dict[Path, Path]:
