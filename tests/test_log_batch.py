@@ -89,13 +89,18 @@ def _row_by_row(content: bytes) -> Table | Fault:
 
 def _over_arrays(tables: list[TextTable]) -> tuple[dict[int, pd.DataFrame], dict[int, Fault]]:
     """Each good file's rows, and what is wrong with each bad one, by their numbers."""
-    frames, faults = {}, {}
+    frames, faults = dict[int, pd.DataFrame](), dict[int, Fault]()
     for table in tables:
-        found = check(table, dict.fromkeys(table.logs, "P01"))
-        faults |= {number: (bad.message, bad.line, bad.column) for number, bad in found.faults.items()}
-        for number in found.codes:
-            assert found.block is not None
-            frames[number] = joined(found.block.experiment, [found.block], {number: "study"})
+        try:
+            block, logs = check(table, dict.fromkeys(table.logs, "P01"))
+        except BadLogError as bad:
+            faults |= dict.fromkeys(table.logs, (bad.message, bad.line, bad.column))
+            continue
+        for number, log in logs.items():
+            if isinstance(log, BadLogError):
+                faults[number] = log.message, log.line, log.column
+            else:
+                frames[number] = joined(log.experiment, [block], {number: "study"})
     return frames, faults
 
 

@@ -11,10 +11,10 @@ from pathlib import Path
 
 import pandas as pd
 
-from analysis.logs.column_map import ColumnMap, is_recoils, read_mapped
+from analysis.logs.column_map import ColumnMap, MappedLog, is_recoils, read_mapped
 from analysis.logs.files import ENDINGS, BadLogError, Problem, code_in_name, find_logs, read_content, study_names
 from analysis.logs.frames import Block, joined
-from analysis.logs.rules import check
+from analysis.logs.rules import Log, check
 from analysis.logs.texts import TextTable, table_of_records, text_tables
 from experiments.record import columns
 from experiments.study import register
@@ -57,31 +57,14 @@ class _Waiting:
     content: bytes | BadLogError
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class _Log:
-    """A log that keeps every rule: the participant's code, the experiment, and the study if the column map knows it."""
-
-    code: str
-    experiment: str
-    study: str | None = None
-
-
 @dataclass(slots=True, kw_only=True)
 class _Batch:
     """What is in some files: the rows of good logs, and by number each log, or what is wrong with it."""
 
     blocks: list[Block] = field(default_factory=list)
-    logs: dict[int, _Log | BadLogError] = field(default_factory=dict)
-
-    def check(self, texts: TextTable, names: Mapping[int, str | None], studies: Mapping[int, str | None]) -> None:
-        """Check logs with the same header, and add them."""
-        found = check(texts, names)
-        self.logs |= found.faults
-        if found.block is not None:
-            self.blocks.append(found.block)
-            experiment = found.block.experiment
-            for number, code in found.codes.items():
-                self.logs[number] = _Log(code=code, experiment=experiment, study=studies.get(number))
+    logs: dict[int, Log | BadLogError] = field(default_factory=dict)
+    studies: dict[int, str | None] = field(default_factory=dict)
+    """The studies that a column map knows."""
 
 
 @dataclass(slots=True, kw_only=True)
@@ -109,12 +92,12 @@ class _Reading:
             try:
                 if isinstance(log, BadLogError):
                     raise log
-                self._admit(number, one, log)
+                self._admit(number, one, log, batch.studies.get(number) or one.study)
             except BadLogError as bad:
                 problem = Problem(file=one.file, line=bad.line, column=bad.column, message=bad.message)
                 self.problems.append(problem)
 
-    def _admit(self, number: int, one: _Waiting, log: _Log) -> None:
+    def _admit(self, number: int, one: _Waiting, log: Log, study: str) -> None:
         """Take a participant's log of an experiment. `BadLogError`: they are excluded, or have one already."""
         results = one.path.rpartition(os.sep)[0].rpartition(os.sep)[0] or str(one.file.parent.parent)
         if results not in self.excluded:
@@ -122,12 +105,11 @@ class _Reading:
         reason = self.excluded[results].get(log.code)
         if reason is not None:
             raise BadLogError(f"participant {log.code} is excluded: {reason} (`recoil study` readmits them)")
-        study = log.study or one.study
         self._check_new(study, log, number)
         self.studies[number], self.codes[number] = study, log.code
         self.files[number // _LOGS_A_FILE] = one.file
 
-    def _check_new(self, study: str, log: _Log, number: int) -> None:
+    def _check_new(self, study: str, log: Log, number: int) -> None:
         first = self.firsts.setdefault((study, log.experiment, log.code.casefold()), number)
         if first != number:
             there = self.codes[first]
@@ -197,36 +179,43 @@ def _checked_batches(
 
 def _checked(waiting: Sequence[_Waiting], mapping: ColumnMap | None) -> _Batch:
     """The logs of some files: one a file, but for files that are mapped."""
-    batch = _Batch()
+    batch, tables = _Batch(), list[TextTable]()
     contents: dict[int, bytes] = {}
     names: dict[int, str | None] = {}
     for one in waiting:
         number = one.number * _LOGS_A_FILE
-        if isinstance(one.content, BadLogError):
-            batch.logs[number] = one.content
-        elif mapping is not None and not is_recoils(one.content):
-            _add_mapped(batch, one.content, one, mapping)
-        else:
-            contents[number], names[number] = one.content, code_in_name(one.path)
-    tables, faults = text_tables(contents)
+        try:
+            if isinstance(one.content, BadLogError):
+                raise one.content
+            if mapping is not None and not is_recoils(one.content):
+                tables.append(_mapped(batch, number, read_mapped(one.content, one.file.name, mapping), mapping))
+            else:
+                contents[number], names[number] = one.content, code_in_name(one.path)
+        except BadLogError as bad:
+            batch.logs[number] = bad
+    own, faults = text_tables(contents)
     batch.logs |= faults
-    for texts in tables:
-        batch.check(texts, names, {})
+    for texts in (*own, *tables):
+        try:
+            block, logs = check(texts, names)
+        except BadLogError as bad:
+            batch.logs |= dict.fromkeys(texts.logs, bad)
+        else:
+            batch.blocks.append(block)
+            batch.logs |= logs
     return batch
 
 
-def _add_mapped(batch: _Batch, content: bytes, one: _Waiting, mapping: ColumnMap) -> None:
-    """Add the logs of a file that Recoil did not write."""
-    first = one.number * _LOGS_A_FILE
-    try:
-        logs = dict(enumerate(read_mapped(content, one.file.name, mapping), start=first))
-    except BadLogError as bad:
-        batch.logs[first] = bad
-        return
-    batch.logs |= {number: log.records for number, log in logs.items() if isinstance(log.records, BadLogError)}
-    records = {number: log.records for number, log in logs.items() if not isinstance(log.records, BadLogError)}
-    texts = table_of_records(columns.names(mapping.experiment), records)
-    batch.check(texts, {}, {number: log.study for number, log in logs.items()})
+def _mapped(batch: _Batch, first: int, logs: Sequence[MappedLog], mapping: ColumnMap) -> TextTable:
+    """The logs of a file that Recoil did not write, numbered from `first`, as far as they could be mapped."""
+    records = {}
+    for number, log in enumerate(logs, start=first):
+        batch.studies[number] = log.study
+        if isinstance(log.records, BadLogError):
+            batch.logs[number] = log.records
+        else:
+            records[number] = log.records
+    return table_of_records(columns.names(mapping.experiment), records)
 
 
 def _exclusions(results: str) -> dict[str, str]:

@@ -1,15 +1,15 @@
 """The rules that a log table has to keep, each written once, over many logs with the same header at once.
 
-Of each log the first breach is told, with its place. Rules stand in an order: a cell's own, then whose log it is, then
-what binds cells of a row, then what binds rows; of the same rule's breaches the one in the first row is told.
+Of each log the first breach is told, with its place: by the first rule that it breaks, in the first row that does. The
+rules of the cells come first, then whose log it is, then what binds the cells of a row, then what binds rows.
 """
 
 from __future__ import annotations
 
 import math
 import re
-from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, field
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
 from functools import partial
 
 import numpy as np
@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 
 from analysis.logs.files import BadLogError
 from analysis.logs.frames import Block, Cell, Cells, Coded, chosen
-from analysis.logs.texts import TEXT, Texts, TextTable, decimals, few, has_many_values, unguarded
+from analysis.logs.texts import Texts, TextTable, decimals, few, has_many_values, unguarded
 from experiments.record import columns
 from experiments.record.columns import Column
 
@@ -34,21 +34,11 @@ _NO_ROWS: Integers = np.empty(0, dtype=np.int64)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Checked:
-    """The rows of the logs that keep every rule, and by the logs' numbers each one's participant, or what is wrong."""
+class Log:
+    """A log that keeps every rule: the participant's code and the experiment."""
 
-    block: Block | None = None
-    codes: Mapping[int, str] = field(default_factory=dict)
-    faults: Mapping[int, BadLogError] = field(default_factory=dict)
-
-
-@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class _Parsed:
-    """A column's values, and the rows whose text is none that the column may hold."""
-
-    column: Column
-    cells: Cells
-    wrong: Integers = field(default_factory=lambda: _NO_ROWS)
+    code: str
+    experiment: str
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -56,12 +46,12 @@ class _Table:
     """Rows with their parsed columns, and the row with which each log begins."""
 
     texts: TextTable
-    parsed: Mapping[str, _Parsed]
+    cells: Mapping[str, Cells]
     first: Integers
 
     def coded(self, name: str) -> Coded:
         """A column of few values."""
-        cells = self.parsed[name].cells
+        cells = self.cells[name]
         if not isinstance(cells, Coded):
             raise TypeError(f"column {name!r} has no codes")
         return cells
@@ -76,83 +66,76 @@ class _Table:
         values = [-1 if value is None else value for value in self.coded(name).values]
         return np.array(values, dtype=np.int64)[self.coded(name).codes]
 
-    def log(self, row: int) -> int:
-        """The place of the log that a row is of."""
-        return int(np.searchsorted(self.first, row, side="right")) - 1
-
     def logs(self, rows: Integers) -> Integers:
         """The place of the log that each row is of."""
         return np.asarray(np.searchsorted(self.first, rows, side="right") - 1)
 
-    def rows_of_log(self, row: int) -> range:
-        """The rows of the log that a row is of."""
-        log = self.log(row)
-        return range(int(self.first[log]), int(self.first[log]) + self.texts.rows[log])
+    def log(self, row: int) -> tuple[int, range]:
+        """The place of the log that a row is of, and the log's rows."""
+        place = int(self.logs(np.array(row)))
+        first = int(self.first[place])
+        return place, range(first, first + self.texts.rows[place])
 
-    def line(self, row: int) -> int:
-        """The line of its file on which a row starts."""
-        return self.texts.lines[self.log(row)][row - self.rows_of_log(row).start]
-
-
-@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class _Breach:
-    """Rows that break a rule, and what is to be said of one of them."""
-
-    rows: Integers
-    said: Callable[[int], BadLogError]
+    def fault(self, message: str, row: int, column: str | None) -> BadLogError:
+        """What is wrong in a row, with the line on which it starts."""
+        place, rows = self.log(row)
+        return BadLogError(message, self.texts.lines[place][row - rows.start], column)
 
 
-def check(texts: TextTable, codes_in_names: Mapping[int, str | None]) -> Checked:
-    """Check logs with the same header by every rule. `codes_in_names` are those of participants in the files' names."""
-    try:
-        experiment = experiment_of(texts.header)
-        if not sum(texts.rows):
-            raise BadLogError("has a header but no rows (rule: one row a planned trial)", 1)
-    except BadLogError as bad:
-        return Checked(faults=dict.fromkeys(texts.logs, bad))
+Rule = tuple[Integers, Callable[[int], BadLogError]]
+"""The rows that break a rule, and what is to be said of one of them."""
+
+
+def check(texts: TextTable, codes_in_names: Mapping[int, str | None]) -> tuple[Block, dict[int, Log | BadLogError]]:
+    """The rows of those logs of a table that keep every rule, and each log by its number, or what is wrong with it.
+
+    `codes_in_names` are the participants' codes in the names of the logs' files, as far as there are some.
+    `BadLogError`: what is wrong with all logs of the table, as their header is.
+    """
+    experiment = experiment_of(texts.header)
+    if not sum(texts.rows):
+        raise BadLogError("has a header but no rows (rule: one row a planned trial)", 1)
     rows = np.array(texts.rows, dtype=np.int64)
-    parsed = {column.name: _parsed(column, texts, int(rows.sum())) for column in columns.TABLES[experiment]}
-    table = _Table(texts=texts, parsed=parsed, first=np.cumsum(rows) - rows)
-    faults = _first_faults(table, _rules(experiment, table, codes_in_names))
+    parsed = {column.name: _parsed(column, texts.column(column.name)) for column in columns.TABLES[experiment]}
+    cells = {name: values for name, (values, _) in parsed.items()}
+    table = _Table(texts=texts, cells=cells, first=np.cumsum(rows) - rows)
+    wrong = np.concatenate([list(texts.ragged), *(odd for _, odd in parsed.values())]).astype(np.int64)
+    rules: list[Rule] = [(wrong, partial(_say_cell, table, experiment)), *_rules(table, experiment, codes_in_names)]
+    faults = _first_faults(table, rules)
     good = np.array([place not in faults for place in range(len(rows))], dtype=np.bool_)
     kept = None if good.all() else np.flatnonzero(np.repeat(good, rows))
-    return Checked(
-        block=Block(
-            experiment=experiment,
-            columns={name: one.cells if kept is None else chosen(one.cells, kept) for name, one in parsed.items()},
-            log=np.array(texts.logs, dtype=np.int64)[good],
-            rows=rows[good],
-        ),
-        codes={texts.logs[at]: str(table.value("participant_id", int(table.first[at]))) for at in np.flatnonzero(good)},
-        faults={texts.logs[at]: fault for at, fault in faults.items()},
+    block = Block(
+        experiment=experiment,
+        columns=cells if kept is None else {name: chosen(values, kept) for name, values in cells.items()},
+        log=np.array(texts.logs, dtype=np.int64)[good],
+        rows=rows[good],
     )
+    codes = (str(table.value("participant_id", row)) for row in table.first.tolist())
+    logs = (faults.get(place) or Log(code=code, experiment=experiment) for place, code in enumerate(codes))
+    return block, dict(zip(texts.logs, logs, strict=True))
 
 
-def _first_faults(table: _Table, rules: Iterator[Sequence[_Breach]]) -> dict[int, BadLogError]:
-    """By the places of logs what is wrong first: by the first rules that a log breaks, there in the first row."""
+def _first_faults(table: _Table, rules: Iterable[Rule]) -> dict[int, BadLogError]:
+    """By the places of logs what is wrong first: by the first rule that a log breaks, in the first row that does."""
     found: dict[int, BadLogError] = {}
-    for breaches in rules:
-        which = np.repeat(np.arange(len(breaches)), [one.rows.size for one in breaches])
-        rows = np.concatenate([one.rows for one in breaches])
-        order = np.argsort(rows, kind="stable")
-        logs, firsts = np.unique(table.logs(rows[order]), return_index=True)
-        for log, at in zip(logs.tolist(), order[firsts].tolist(), strict=True):
+    for rows, said in rules:
+        rows_in_order = np.sort(rows)
+        logs, firsts = np.unique(table.logs(rows_in_order), return_index=True)
+        for log, row in zip(logs.tolist(), rows_in_order[firsts].tolist(), strict=True):
             if log not in found:
-                found[log] = breaches[which[at]].said(int(rows[at]))
+                found[log] = said(row)
     return found
 
 
-def _rules(experiment: str, table: _Table, codes_in_names: Mapping[int, str | None]) -> Iterator[Sequence[_Breach]]:
-    """The breaches of each rule, in the order of the rules."""
-    wrong = [_Breach(rows=one.wrong, said=partial(_wrong_cell, table, one.column)) for one in table.parsed.values()]
-    yield [_ragged(table), *wrong]
-    yield from _one_participant(table, codes_in_names)
+def _rules(table: _Table, experiment: str, codes_in_names: Mapping[int, str | None]) -> Iterator[Rule]:
+    """The rules that bind cells together, in their order."""
+    yield _one_participant(table, codes_in_names)
     if experiment == "direction":
-        yield [_wrong_answers(table)]
+        yield _right_answers(table)
         yield from _numbered_sessions(table)
     else:
-        yield [_off_the_scale(table)]
-        yield [_numbered_trials(table, _sessions(table, np.zeros(sum(table.texts.rows), dtype=np.int64)))]
+        yield _ratings_on_the_scale(table)
+        yield _numbered_trials(table, _sessions(table, np.zeros(sum(table.texts.rows), dtype=np.int64)))
 
 
 def experiment_of(header: Sequence[str]) -> str:
@@ -199,108 +182,83 @@ def cell_value(column: Column, text: str) -> Cell:
     return columns.unguard(text) if column.type == "text" else text
 
 
-def _parsed(column: Column, texts: TextTable, rows: int) -> _Parsed:
-    if column.name not in texts.texts:
-        return _Parsed(column=column, cells=_empty(column, rows))
-    cells = texts.texts[column.name]
+def _parsed(column: Column, texts: Texts) -> tuple[Cells, Integers]:
+    """A column's values, and the rows whose text is none that it may hold."""
     if column.type == "number":
-        return _numbers(column, cells)
+        return _numbers(column, texts)
     if has_many_values(column):
-        empty = np.flatnonzero(cells.is_null()) if column.required else _NO_ROWS
-        return _Parsed(column=column, cells=unguarded(cells), wrong=empty)
-    return _few_values(column, *few(cells))
+        return unguarded(texts), np.flatnonzero(texts.is_null()) if column.required else _NO_ROWS
+    return _few_values(column, *few(texts))
 
 
-def _empty(column: Column, rows: int) -> Cells:
-    if column.type == "number":
-        return np.full(rows, np.nan)
-    if has_many_values(column):
-        return pa.nulls(rows, TEXT)
-    return Coded(codes=np.zeros(rows, dtype=np.int32), values=(None,))
-
-
-def _few_values(column: Column, codes: NDArray[np.int32], texts: list[str]) -> _Parsed:
+def _few_values(column: Column, codes: NDArray[np.int32], texts: list[str]) -> tuple[Cells, Integers]:
     """A column of few values, each parsed once; texts that mean the same get the same code."""
     wrong = np.array([cell_fault(column, text) != "" for text in texts])
     values = [None if bad else cell_value(column, text) for bad, text in zip(wrong, texts, strict=True)]
     places = {value: place for place, value in enumerate(dict.fromkeys(values))}
     if len(places) < len(values):
         codes_of_texts = np.array([places[value] for value in values], dtype=np.int32)
-        cells = Coded(codes=codes_of_texts[codes], values=tuple(places))
-    else:
-        cells = Coded(codes=codes, values=tuple(values))
-    return _Parsed(column=column, cells=cells, wrong=np.flatnonzero(wrong[codes]) if wrong.any() else _NO_ROWS)
+        return Coded(codes=codes_of_texts[codes], values=tuple(places)), np.flatnonzero(wrong[codes])
+    return Coded(codes=codes, values=tuple(values)), np.flatnonzero(wrong[codes]) if wrong.any() else _NO_ROWS
 
 
-def _numbers(column: Column, texts: Texts) -> _Parsed:
+def _numbers(column: Column, texts: Texts) -> tuple[Cells, Integers]:
     numbers, odd = decimals(texts)
     if not odd.size:
-        return _Parsed(column=column, cells=numbers)
+        return numbers, odd
     cells = texts.take(pa.array(odd)).to_pylist()
     wrong = np.array([cell_fault(column, cell) != "" for cell in cells])
     numbers = numbers.copy()
     numbers[odd[~wrong]] = [float(cell) for cell, bad in zip(cells, wrong, strict=True) if not bad]
-    return _Parsed(column=column, cells=numbers, wrong=odd[wrong])
+    return numbers, odd[wrong]
 
 
-def _ragged(table: _Table) -> _Breach:
-    """Rows that have not as many fields as the header."""
-    return _Breach(rows=np.array(sorted(table.texts.ragged), dtype=np.int64), said=partial(_say_ragged, table))
+def _say_cell(table: _Table, experiment: str, row: int) -> BadLogError:
+    """The first cell of a row that its column may not hold, or how many there are."""
+    if row in table.texts.ragged:
+        rule = f"(rule: {len(table.texts.header)}, as in the header)"
+        return table.fault(f"has {table.texts.ragged[row]} fields {rule}", row, None)
+    texts = ((column, table.texts.column(column.name)[row].as_py()) for column in columns.TABLES[experiment])
+    faults = ((column.name, cell_fault(column, text or columns.MISSING)) for column, text in texts)
+    name, message = next((name, message) for name, message in faults if message)
+    return table.fault(message, row, name)
 
 
-def _say_ragged(table: _Table, row: int) -> BadLogError:
-    rule = f"(rule: {len(table.texts.header)}, as in the header)"
-    return BadLogError(f"has {table.texts.ragged[row]} fields {rule}", table.line(row))
-
-
-def _wrong_cell(table: _Table, column: Column, row: int) -> BadLogError:
-    text = table.texts.texts[column.name][row].as_py() or columns.MISSING
-    return BadLogError(cell_fault(column, text), table.line(row), column.name)
-
-
-def _one_participant(table: _Table, names: Mapping[int, str | None]) -> Iterator[Sequence[_Breach]]:
+def _one_participant(table: _Table, names: Mapping[int, str | None]) -> Rule:
     """One participant a file, with a code that is one, and that of the file's name."""
     column = table.coded("participant_id")
     own = column.codes[table.first]
     codes = [str(column.values[code]) for code in own.tolist()]
-    no_code = np.array([_CODE.fullmatch(code) is None for code in codes])
-    yield [_Breach(rows=table.first[no_code], said=partial(_say_no_code, table))]
     named = [names.get(log) for log in table.texts.logs]
-    other_name = np.array([name not in (None, code) for name, code in zip(named, codes, strict=True)])
-    yield [_Breach(rows=table.first[other_name], said=partial(_say_other_name, table, names))]
+    unfit = [not _CODE.fullmatch(code) or name not in (None, code) for code, name in zip(codes, named, strict=True)]
     others = np.flatnonzero(column.codes != np.repeat(own, table.texts.rows))
-    yield [_Breach(rows=others, said=partial(_say_another, table))]
+    return np.append(table.first[np.array(unfit)], others), partial(_say_participant, table, names)
 
 
-def _say_no_code(table: _Table, row: int) -> BadLogError:
-    shown = _shown(str(table.value("participant_id", row)))
-    return BadLogError(f"{shown} is not a code (rule: 1 to 32 letters or digits)", table.line(row), "participant_id")
+def _say_participant(table: _Table, names: Mapping[int, str | None], row: int) -> BadLogError:
+    place, rows = table.log(row)
+    code, own = (str(table.value("participant_id", one)) for one in (row, rows.start))
+    if code != own:
+        message = f"{_shown(code)} after {own!r} (rule: one participant a file)"
+    elif not _CODE.fullmatch(code):
+        message = f"{_shown(code)} is not a code (rule: 1 to 32 letters or digits)"
+    else:
+        rule = f"sub-{names[table.texts.logs[place]]} (rule: one participant a file, the one in its name)"
+        message = f"participant {code!r}, but the file is named {rule}"
+    return table.fault(message, row, "participant_id")
 
 
-def _say_other_name(table: _Table, names: Mapping[int, str | None], row: int) -> BadLogError:
-    name = names[table.texts.logs[table.log(row)]]
-    rule = f"the file is named sub-{name} (rule: one participant a file, the one in its name)"
-    message = f"participant {table.value('participant_id', row)!r}, but {rule}"
-    return BadLogError(message, table.line(row), "participant_id")
-
-
-def _say_another(table: _Table, row: int) -> BadLogError:
-    own = table.value("participant_id", table.rows_of_log(row).start)
-    other = _shown(str(table.value("participant_id", row)))
-    return BadLogError(f"{other} after {own!r} (rule: one participant a file)", table.line(row), "participant_id")
-
-
-def _wrong_answers(table: _Table) -> _Breach:
-    """Rows where `correct` does not say whether the response is the direction."""
+def _right_answers(table: _Table) -> Rule:
+    """`correct` says whether the response is the direction."""
     direction, response = table.coded("direction"), table.coded("response")
     due = np.array(
         [[-1 if given is None else int(given == shown) for given in response.values] for shown in direction.values]
     )
     wrong = np.flatnonzero(due[direction.codes, response.codes] != table.whole("correct"))
-    return _Breach(rows=wrong, said=partial(_say_wrong_answer, table))
+    return wrong, partial(_say_answer, table)
 
 
-def _say_wrong_answer(table: _Table, row: int) -> BadLogError:
+def _say_answer(table: _Table, row: int) -> BadLogError:
     direction, response, correct = (table.value(name, row) for name in ("direction", "response", "correct"))
     if response is None or correct is None:
         given, so = ("empty" if one is None else repr(one) for one in (response, correct))
@@ -308,17 +266,16 @@ def _say_wrong_answer(table: _Table, row: int) -> BadLogError:
     else:
         shown = f"correct is {correct}, but the direction was {direction} and the response {response}"
         message = f"{shown} (rule: 1 if they are the same, else 0)"
-    return BadLogError(message, table.line(row), "correct")
+    return table.fault(message, row, "correct")
 
 
-def _off_the_scale(table: _Table) -> _Breach:
-    """Ratings that are not 0 to 10."""
-    rating = np.asarray(table.parsed["rating"].cells, dtype=np.float64)
-    return _Breach(rows=np.flatnonzero((rating < 0.0) | (rating > 10.0)), said=partial(_say_rating, table, rating))
+def _ratings_on_the_scale(table: _Table) -> Rule:
+    rating = np.asarray(table.cells["rating"], dtype=np.float64)
 
+    def said(row: int) -> BadLogError:
+        return table.fault(f"rating {rating[row]:g} is out of range (rule: 0 to 10)", row, "rating")
 
-def _say_rating(table: _Table, rating: NDArray[np.float64], row: int) -> BadLogError:
-    return BadLogError(f"rating {rating[row]:g} is out of range (rule: 0 to 10)", table.line(row), "rating")
+    return np.flatnonzero((rating < 0.0) | (rating > 10.0)), said
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -350,57 +307,57 @@ def _miscounted(numbers: Integers, begins: Integers) -> Integers:
     return np.unique(run[numbers != np.arange(1, len(numbers) + 1) - begins[run]])
 
 
-def _numbered_sessions(table: _Table) -> Iterator[Sequence[_Breach]]:
+def _numbered_sessions(table: _Table) -> Iterator[Rule]:
     """One method a session; sessions 1, 2, 3, ... in a log, and trials 1, 2, 3, ... in a session, in any order."""
     found = _sessions(table, table.whole("session"))
     method = table.coded("method").codes
     first = np.repeat(found.first, np.diff(np.append(found.begins, len(found.order))))
-    others = found.order[method[found.order] != method[first]]
-    yield [_Breach(rows=others, said=partial(_say_method, table, found))]
+    yield found.order[method[found.order] != method[first]], partial(_say_method, table, found)
     logs = _begins(np.diff(table.logs(found.first)) != 0)
-    rows = found.first[logs[_miscounted(found.session[found.first], logs)]]
-    yield [_Breach(rows=rows, said=partial(_say_session, table, found))]
-    yield [_numbered_trials(table, found)]
+    yield found.first[logs[_miscounted(found.session[found.first], logs)]], partial(_say_session, table, found)
+    yield _numbered_trials(table, found)
 
 
-def _numbered_trials(table: _Table, found: _Sessions) -> _Breach:
-    """The first rows of sessions whose trials are not 1, 2, 3, ..."""
-    wrong = _miscounted(found.trial[found.order], found.begins)
-    return _Breach(rows=found.first[wrong], said=partial(_say_trial, table, found))
+def _numbered_trials(table: _Table, found: _Sessions) -> Rule:
+    """The trials of a session are 1, 2, 3, ...; of one where they are not, the first row stands for all."""
+    return found.first[_miscounted(found.trial[found.order], found.begins)], partial(_say_trial, table, found)
 
 
 def _say_method(table: _Table, found: _Sessions, row: int) -> BadLogError:
-    session = found.session[row]
-    first = next(one for one in table.rows_of_log(row) if found.session[one] == session)
-    shown = f"{table.value('method', row)!r} in session {session}, which began with {table.value('method', first)!r}"
-    return BadLogError(f"{shown} (rule: one method a session)", table.line(row), "method")
+    first = _rows_of_session(table, found, row)[0]
+    shown = f"{table.value('method', row)!r} in session {found.session[row]}"
+    rule = f"which began with {table.value('method', first)!r} (rule: one method a session)"
+    return table.fault(f"{shown}, {rule}", row, "method")
 
 
 def _say_session(table: _Table, found: _Sessions, row: int) -> BadLogError:
     firsts: dict[int, int] = {}
-    for one in table.rows_of_log(row):
+    for one in table.log(row)[1]:
         firsts.setdefault(int(found.session[one]), one)
-    return _miscount(table, "session", list(firsts), list(firsts.values()), "the run")
+    return _miscount(table, "session", firsts, list(firsts.values()), "the run")
 
 
 def _say_trial(table: _Table, found: _Sessions, row: int) -> BadLogError:
+    rows = _rows_of_session(table, found, row)
     session = found.session[row]  # 0 where a table has no sessions; where it has, 0 is refused before
-    rows = [one for one in table.rows_of_log(row) if found.session[one] == session]
     where = f"session {session}" if session else "the run"
     return _miscount(table, "trial", found.trial[rows].tolist(), rows, where)
 
 
-def _miscount(table: _Table, column: str, numbers: Sequence[int], rows: Sequence[int], where: str) -> BadLogError:
+def _rows_of_session(table: _Table, found: _Sessions, row: int) -> list[int]:
+    return [one for one in table.log(row)[1] if found.session[one] == found.session[row]]
+
+
+def _miscount(table: _Table, column: str, numbers: Iterable[int], rows: Sequence[int], where: str) -> BadLogError:
     """What is wrong with numbers that are not 1, 2, 3, ..., each once, in any order."""
     seen: set[int] = set()
     for number, row in zip(numbers, rows, strict=True):
         if number in seen:
-            rule = "(rule: 1, 2, 3, ... once each)"
-            return BadLogError(f"{column} {number} stands twice in {where} {rule}", table.line(row), column)
+            return table.fault(f"{column} {number} stands twice in {where} (rule: 1, 2, 3, ... once each)", row, column)
         seen.add(number)
-    missing = next(number for number in range(1, len(numbers) + 1) if number not in seen)
+    missing = next(number for number in range(1, len(rows) + 1) if number not in seen)
     rule = f"(rule: 1, 2, 3, ... without a gap; found {_shown(', '.join(map(str, sorted(seen))))})"
-    return BadLogError(f"{column} {missing} is missing in {where} {rule}", table.line(rows[-1]), column)
+    return table.fault(f"{column} {missing} is missing in {where} {rule}", rows[-1], column)
 
 
 def _shown(text: str) -> str:

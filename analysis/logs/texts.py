@@ -65,6 +65,12 @@ class TextTable:
     lines: tuple[Sequence[int], ...]
     ragged: Mapping[int, int]
 
+    def column(self, name: str) -> Texts:
+        """The texts of a column; nothing but empty cells if there is no such column."""
+        if name in self.texts:
+            return self.texts[name]
+        return pa.nulls(sum(self.rows), TEXT if name in _MANY else _FEW)
+
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class _Plain:
