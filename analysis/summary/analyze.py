@@ -10,12 +10,13 @@ from typing import Any
 from analysis.logs.column_map import ColumnMap
 from analysis.logs.exclusions import Effect, Rules, apply_rules, by_study
 from analysis.logs.reading import Logs, Problem, Track, read_logs
-from analysis.logs.tables_out import result_tables
+from analysis.logs.tables_out import Analysed, result_tables
 from analysis.paper.audit import audit
 from analysis.paper.audit.paper_file import load_paper_file
 from analysis.paper.audit.sentences import predictions
 from analysis.paper.paper import load_paper
 from analysis.paper.published import Prediction, compare
+from analysis.report.serial import plain
 from analysis.summary import remarks_coding
 from analysis.summary.sections.data import ReportData
 from analysis.summary.sections.sections import write_report
@@ -80,8 +81,17 @@ def analyze(request: Request, track: Track = iter) -> tuple[dict[str, Any], tupl
 
 def write_tables(out: Path, logs: Logs, statistics: Mapping[str, Any]) -> None:
     """Write each experiment's results by participant, long and wide, as CSV."""
-    for name, content in result_tables(logs, statistics).items():
+    for name, content in result_tables(logs, _analysed(statistics)).items():
         storage.write_whole(out / name, content)
+
+
+def _analysed(statistics: Mapping[str, Any]) -> dict[str, Analysed]:
+    """Who was analysed in each experiment."""
+    found = {name: statistics[name] for name in ("direction", "preference") if name in statistics}
+    return {
+        name: Analysed(methods=tuple(one["methods"]), participants=frozenset(one["participants"]))
+        for name, one in found.items()
+    }
 
 
 def _predicted(paper: Path | None) -> dict[str, Prediction]:
@@ -112,12 +122,12 @@ def _by_study(logs: Logs) -> dict[str, Any]:
 
 def _with_rules(statistics: dict[str, Any], effect: Effect, rules: Rules, path: Path) -> dict[str, Any]:
     return statistics | {
-        "excluded": [*effect.excluded, *statistics["excluded"]],
+        "excluded": [*plain(effect.excluded), *statistics["excluded"]],
         "warnings": [*statistics["warnings"], *effect.warnings],
         "rules": {
             "file": path.name,
             "config": rules.model_dump(mode="json"),
-            "trials": effect.trials,
+            "trials": plain(effect.trials),
             "dropped": effect.dropped,
         },
     }
@@ -134,7 +144,7 @@ def _notes(effect: Effect | None) -> list[str]:
             for rule, count in by_rule.items():
                 counts[rule] = counts.get(rule, 0) + count
         shown = ", ".join(f"{rule} {count}" for rule, count in sorted(counts.items())) or "none"
-        recorded = effect.trials[experiment]["recorded"]
+        recorded = effect.trials[experiment].recorded
         notes.append(f"Trials dropped by rule in {experiment}, of {recorded}: {shown}.")
     return notes
 

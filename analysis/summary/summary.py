@@ -14,6 +14,7 @@ import pandas as pd
 
 from analysis.logs.exclusions import complete_rows
 from analysis.logs.reading import Logs
+from analysis.report.serial import plain
 from analysis.stats.anova import rm_anova
 from analysis.stats.assumptions import assumptions
 from analysis.stats.binomial import binomial_test
@@ -23,8 +24,8 @@ from analysis.stats.effect_sizes import cousineau_morey
 from analysis.stats.logit_model import METHOD as CLUSTERING_NOTE
 from analysis.stats.supplement import model, pooled_clustering, within_supplement
 from analysis.stats.tukey import rm_tukey_hsd
-from analysis.times.own_trials import INSTRUCTION
-from analysis.times.response_times import response_times, valid_times
+from analysis.times.own_trials import INSTRUCTION, timed
+from analysis.times.response_times import response_times
 from analysis.times.speed_accuracy import speed_accuracy
 
 Json = dict[str, Any]
@@ -58,8 +59,8 @@ def summarize(logs: Logs, *, trade: bool = True) -> Json:
             complete, left_out = complete_rows(_coded(table), experiment, methods)
             result[experiment] = _with_assumptions(describe(complete, methods))
             if trade and experiment == "direction":
-                result[experiment]["speed_accuracy"] = speed_accuracy(complete, methods)
-            excluded += left_out
+                result[experiment]["speed_accuracy"] = plain(speed_accuracy(complete, methods))
+            excluded += plain(left_out)
     warnings = [warning for experiment, found in result.items() for warning in _warnings(experiment, found)]
     finite = json_safe(result, "", warnings)
     return {**finite, "excluded": excluded, "warnings": warnings, "versions": versions()}
@@ -142,7 +143,7 @@ def _direction(complete: pd.DataFrame, methods: list[str]) -> Json:
         "model": model(cells),
         "sensitivity": {method: _sensitivity(cells, method) for method in methods},
         "response_time": _median_times(complete, methods),
-        "response_times": response_times(complete, methods),
+        "response_times": plain(response_times(complete, methods)),
     }
 
 
@@ -241,7 +242,7 @@ def _mean_sd(values: float | np.ndarray[Any, Any]) -> dict[str, float]:
 
 def _median_times(trials: pd.DataFrame, methods: list[str]) -> Json:
     """Median over the times that are the participant's own, by method."""
-    valid = valid_times(trials)
+    valid = timed(trials).own
     times = {method: trials["response_time_s"][valid & (trials["method"] == method)] for method in methods}
     return {
         method: {"median": float(own.median()) if len(own) else None, "n": len(own)} for method, own in times.items()
