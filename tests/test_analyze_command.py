@@ -16,8 +16,8 @@ import pytest
 
 from analysis.logs.files import study_names
 from analysis.logs.reading import read_logs
-from analysis.logs.tables_out import MAX_NAME, short_names
 from analysis.summary.summary import summarize
+from analysis.summary.tables_out import MAX_NAME, short_names
 from tests.conftest import RECOIL, Recoil
 from tests.log_files import METHODS, trial_rows, trials_path, write_rows, write_study
 from tests.waiting import PATIENCE_S, wait_for

@@ -17,7 +17,7 @@ def test_a_left_out_participant_leaves_no_empty_cell(tmp_path: Path) -> None:
     write_rows(trials_path(tmp_path, "P02"), trial_rows("P02", methods=METHODS[:2]))
     rows, left_out = complete_rows(coded(read_logs([tmp_path]).trials), "direction", METHODS)
     cells = trial_cells(rows, METHODS)
-    assert [entry["participant"] for entry in left_out] == ["P02"]
+    assert [one.participant for one in left_out] == ["P02"]
     assert cells.participants == ("P01", "P03")
     assert (cells.trials == 10).all()
 

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from analysis.logs.exclusions import Effect, Rules, apply_rules
+from analysis.logs.exclusions import Effect, KeptTrials, LeftOutByRule, Rules, apply_rules
 from analysis.logs.reading import Logs, read_logs
 from analysis.summary.summary import summarize
 from experiments.config.door import ConfigError, load
@@ -50,7 +50,7 @@ def test_dropped_trials_are_counted_by_participant_and_the_first_rule_that_drops
         },
         "preference": {},
     }
-    assert effect.trials["direction"] == {"recorded": 240, "kept": 235}
+    assert effect.trials["direction"] == KeptTrials(recorded=240, kept=235)
 
 
 def test_statistics_are_over_the_trials_and_people_that_are_kept(effect: Effect) -> None:
@@ -64,7 +64,7 @@ def test_statistics_are_over_the_trials_and_people_that_are_kept(effect: Effect)
 def test_who_says_always_the_same_is_left_out_with_rule_and_reason(effect: Effect) -> None:
     reason = "1 of the answers are the same (rule: at most 0.95)"
     assert effect.excluded == (
-        {"experiment": "direction", "participant": "P03", "reason": reason, "rule": "max_same_response_share"},
+        LeftOutByRule(experiment="direction", participant="P03", reason=reason, rule="max_same_response_share"),
     )
 
 
@@ -79,7 +79,7 @@ accuracy = [{method = "vibration", min_share = 0.51}, {method = "ramp", min_shar
 """,
     )
     effect = apply_rules(_spoilt(tmp_path), rules)
-    found = {entry["participant"]: (entry["rule"], entry["reason"]) for entry in effect.excluded}
+    found = {one.participant: (one.rule, one.reason) for one in effect.excluded}
     assert found["P02"] == ("min_kept_share", "58 of 60 trials kept (rule: at least 0.98 of them)")
     assert found["P03"] == ("accuracy", "0.5 correct with vibration (rule: at least 0.51)")
     assert effect.warnings == ("the rules ask for accuracy with ramp, which no direction log has",)
@@ -89,7 +89,7 @@ def test_listed_participants_are_left_out_of_both_experiments_and_unknown_ones_a
     write_study(tmp_path, participants=2)
     entries = '[[excluded]]\ncode = "P02"\nreason = "left-handed"\n[[excluded]]\ncode = "P9"\nreason = "typing error"'
     effect = apply_rules(read_logs([tmp_path]), _rules(tmp_path, entries))
-    assert [(entry["experiment"], entry["participant"], entry["reason"]) for entry in effect.excluded] == [
+    assert [(one.experiment, one.participant, one.reason) for one in effect.excluded] == [
         ("direction", "P02", "left-handed"),
         ("preference", "P02", "left-handed"),
     ]
@@ -109,7 +109,7 @@ def test_who_has_no_trial_left_is_listed(tmp_path: Path) -> None:
     write_study(tmp_path, participants=2)
     write_rows(ratings_path(tmp_path, "P02"), [row | {"flags": "noise"} for row in rating_rows("P02")])
     effect = apply_rules(read_logs([tmp_path]), _rules(tmp_path, 'trials.drop_flags = ["noise"]'))
-    assert [(one["participant"], one["reason"]) for one in effect.excluded] == [
+    assert [(one.participant, one.reason) for one in effect.excluded] == [
         ("P02", "0 of 3 trials kept (rule: at least one)")
     ]
 

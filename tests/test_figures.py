@@ -1,6 +1,5 @@
 from __future__ import annotations
 
-import json
 import math
 import re
 import subprocess
@@ -166,8 +165,11 @@ def test_without_backward_shots_there_is_no_sensitivity_to_draw(statistics: Stud
 
 def test_response_times_say_how_many_and_cut_a_single_slow_one(statistics: StudyStatistics, tmp_path: Path) -> None:
     assert statistics.direction is not None
-    times = json.loads(json.dumps(statistics.direction.response_times))
-    times["methods"]["vibration"]["percentiles"][100] = 41.3
+    times = statistics.direction.response_times
+    one = times.methods["vibration"]
+    assert one is not None
+    slow = replace(one, percentiles=(*one.percentiles[:100], 41.3))
+    times = replace(times, methods={**times.methods, "vibration": slow})
     found = replace(statistics.direction, response_times=times)
     _, svg, _ = figure_response_times(found, tmp_path / "times")
     text = svg.read_text(encoding="utf-8")
@@ -177,7 +179,7 @@ def test_response_times_say_how_many_and_cut_a_single_slow_one(statistics: Study
 
 def test_no_valid_response_time_makes_no_figure(statistics: StudyStatistics, tmp_path: Path) -> None:
     assert statistics.direction is not None
-    found = replace(statistics.direction, response_times={"n": 0})
+    found = replace(statistics.direction, response_times=replace(statistics.direction.response_times, n=0))
     with pytest.raises(ValueError, match="at least one valid time"):
         figure_response_times(found, tmp_path / "times")
 

@@ -1,4 +1,4 @@
-"""The quick way of reading takes a file only if the careful one does, and then with the same values."""
+"""Arrow and the csv module read the same; and the checks over arrays say what checks row after row say."""
 
 from __future__ import annotations
 
@@ -13,17 +13,19 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from analysis.logs import frames as log_cells
-from analysis.logs import reading as logs
-from analysis.logs.batch import read_batch
-from analysis.logs.files import find_logs
-from analysis.logs.frames import Block, joined
+from analysis.logs import reading
+from analysis.logs.files import BadLogError, find_logs
+from analysis.logs.frames import joined
 from analysis.logs.reading import read_logs
-from analysis.logs.rules import BadLogError, records
+from analysis.logs.rules import check
+from analysis.logs.texts import TEXT, TextTable, arrow_tables, csv_tables, decimals, records, text_tables
 from experiments.record import columns
 from tests.log_files import TextRow, rating_rows, trial_rows, trials_path, write_rows, write_study
+from tests.plain_rules import Table, check_table
 
 Rows = list[TextRow]
+Fault = tuple[str, int | None, str | None]
+"""Message, line and column."""
 
 ODD_CELLS = (
     "", " ", "0", "00", "01", "1", "2", "3", "61", "-1", "+1", "1.5", "1e3", "1e-05", ".5", "5.", ".", "..",
@@ -77,39 +79,63 @@ def _spoilt(draw: st.DrawFn) -> bytes:
     return content
 
 
-def _carefully(content: bytes) -> pd.DataFrame | None:
-    """The one file's rows by the careful reader alone; None if it refuses."""
+def _row_by_row(content: bytes) -> Table | Fault:
+    """A file's rows as plain values, or what is wrong with it."""
     try:
-        table = logs.check_table(records(content), "P01")
-    except BadLogError:
-        return None
-    block = logs.block_of_rows(table.experiment, table.rows, 0)
-    return joined(table.experiment, [block], {0: "study"})
+        return check_table(records(content), "P01")
+    except BadLogError as bad:
+        return bad.message, bad.line, bad.column
 
 
-def _quickly(block: Block, number: int) -> pd.DataFrame:
-    return joined(block.experiment, [block], {number: "study"})
-
-
-def _read(contents: list[bytes]) -> tuple[list[Block], dict[int, str]]:
-    return read_batch(contents, ["P01"] * len(contents))
+def _over_arrays(tables: list[TextTable]) -> tuple[dict[int, pd.DataFrame], dict[int, Fault]]:
+    """Each good file's rows, and what is wrong with each bad one, by their numbers."""
+    frames, faults = dict[int, pd.DataFrame](), dict[int, Fault]()
+    for table in tables:
+        try:
+            block, logs = check(table, dict.fromkeys(table.logs, "P01"))
+        except BadLogError as bad:
+            faults |= dict.fromkeys(table.logs, (bad.message, bad.line, bad.column))
+            continue
+        for number, log in logs.items():
+            if isinstance(log, BadLogError):
+                faults[number] = log.message, log.line, log.column
+            else:
+                frames[number] = joined(log.experiment, [block], {number: "study"})
+    return frames, faults
 
 
 @settings(max_examples=300)
 @given(st.lists(_spoilt(), min_size=1, max_size=5))
-def test_what_the_quick_reader_takes_the_careful_one_takes_with_equal_values(contents: list[bytes]) -> None:
-    blocks, codes = _read(contents)
-    taken = {number: block for block in blocks for number in set(block.log.tolist())}
-    assert set(taken) == set(codes)
-    for number, block in taken.items():
-        expected = _carefully(contents[number])
-        assert expected is not None, contents[number]
-        pd.testing.assert_frame_equal(_quickly(block, number), expected)
+def test_checks_over_arrays_say_and_read_what_checks_row_after_row_do(contents: list[bytes]) -> None:
+    tables, no_text = text_tables(dict(enumerate(contents)))
+    frames, faults = _over_arrays(tables)
+    faults |= {number: (bad.message, bad.line, bad.column) for number, bad in no_text.items()}
+    for number, content in enumerate(contents):
+        expected = _row_by_row(content)
+        if not isinstance(expected, Table):
+            assert faults[number] == expected, content
+            continue
+        rows = frames[number].astype(object).where(frames[number].notna(), None)
+        assert rows.drop(columns="study").to_dict("records") == list(expected.rows), content
+
+
+@settings(max_examples=300)
+@given(st.lists(_spoilt(), min_size=1, max_size=5))
+def test_what_arrow_reads_the_csv_module_reads_alike(contents: list[bytes]) -> None:
+    tables = arrow_tables(dict(enumerate(contents)))
+    frames, faults = _over_arrays(tables)
+    taken = [number for table in tables for number in table.logs]
+    others, no_text = csv_tables({number: contents[number] for number in taken})
+    expected_frames, expected_faults = _over_arrays(others)
+    assert (no_text, faults) == ({}, expected_faults)
+    assert set(frames) == set(expected_frames)
+    for number, frame in frames.items():
+        pd.testing.assert_frame_equal(frame, expected_frames[number])
 
 
 @settings(max_examples=40)
 @given(contents=st.lists(_spoilt(), min_size=1, max_size=4))
-def test_both_ways_of_reading_a_folder_give_equal_tables_and_problems(
+def test_a_folder_read_by_the_csv_module_alone_gives_equal_tables_and_problems(
     tmp_path_factory: pytest.TempPathFactory, contents: list[bytes]
 ) -> None:
     folder = write_study(tmp_path_factory.mktemp("both"), participants=2, seed=9)
@@ -119,7 +145,7 @@ def test_both_ways_of_reading_a_folder_give_equal_tables_and_problems(
         path.write_bytes(content.replace(b"P01", f"P{number:02d}x".encode()))
     quick = read_logs([folder])
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(logs, "read_batch", lambda *_: ([], {}))
+        patch.setattr(reading, "text_tables", csv_tables)
         careful = read_logs([folder])
     assert quick.problems == careful.problems
     assert quick.files == careful.files
@@ -131,56 +157,72 @@ def _file(rows: Rows, line_end: str = "\r\n") -> bytes:
     return _bytes(rows, columns.names(rows[0]["experiment"]), line_end)
 
 
+def _taken(contents: list[bytes]) -> set[int]:
+    """The files that Arrow reads."""
+    return {number for table in arrow_tables(dict(enumerate(contents))) for number in table.logs}
+
+
 @pytest.mark.parametrize("line_end", ["\r\n", "\n"])
-def test_logs_as_recoil_writes_them_take_the_quick_way(line_end: str) -> None:
+def test_logs_as_recoil_writes_them_are_read_by_arrow(line_end: str) -> None:
     rows = trial_rows()
     rows[3].update(note="ünruhig, gähnt".replace(",", ""), flags="interrupted repeated", response="", correct="")
-    _, codes = _read([_file(rows, line_end=line_end), _file(rating_rows(), line_end=line_end)])
-    assert codes == {0: "P01", 1: "P01"}
+    assert _taken([_file(rows, line_end=line_end), _file(rating_rows(), line_end=line_end)]) == {0, 1}
 
 
-def test_quoted_notes_take_the_quick_way_and_come_back_as_they_were() -> None:
+def test_quoted_notes_are_read_by_arrow_and_come_back_as_they_were() -> None:
     rows = trial_rows()
     said = 'he said "no",\r\nthen left; \'=1'
     rows[3]["note"] = columns.guard(said)
-    blocks, codes = _read([_file(rows), _file(trial_rows())])
-    assert codes == {0: "P01", 1: "P01"}
-    assert _quickly(blocks[0], 0)["note"][3] == said
+    rows[9]["response"] = "left"
+    good, bad = _file([row | {"response": row["direction"], "correct": "1"} for row in rows]), _file(rows)
+    assert _taken([good, bad, _file(trial_rows())]) == {0, 1, 2}
+    frames, faults = _over_arrays(arrow_tables({0: good, 1: bad, 2: _file(trial_rows())}))
+    assert set(frames) == {0, 2}
+    assert frames[0]["note"][3] == said
+    assert faults[1][1:] == (12, "response")
 
 
-def test_a_guarded_code_is_left_to_the_careful_reader() -> None:
+def test_a_guarded_code_is_the_code(tmp_path: Path) -> None:
     rows = trial_rows()
     rows[0]["participant_id"] = "'P01"
-    assert set(_read([_file(trial_rows()), _file(rows)])[1]) == {0}
+    write_rows(trials_path(tmp_path, "P01"), rows)
+    assert read_logs([tmp_path]).trials["participant_id"].unique().tolist() == ["P01"]
 
 
-def test_a_bad_file_among_many_leaves_the_others_on_the_quick_way() -> None:
+def test_bad_values_and_orders_are_found_without_the_csv_module() -> None:
     rows = trial_rows()
     rows[5]["response"] = "left"
     cut = _file(trial_rows())
-    sources = [_file(trial_rows()), _file(rows), cut[:-40], cut]
-    assert set(_read(sources)[1]) == {0, 3}
+    sources = [_file(trial_rows()), _file(rows), cut[:-40], cut, _file(trial_rows()[::-1])]
+    assert _taken(sources) == {0, 1, 3, 4}
 
 
-def test_files_with_bad_rows_among_many_leave_the_others_on_the_quick_way() -> None:
+def test_a_file_with_bad_rows_leaves_the_others_to_arrow() -> None:
     good, ragged = _file(trial_rows()), _file(trial_rows()).replace(b",forward,", b",forward,,", 1)
     not_text, cr = good.replace(b"synthetic", b"synth\xe9tic", 1), good.replace(b"\r\n", b"\r", 3)
-    assert set(_read([ragged, good, not_text, good, good, cr])[1]) == {1, 3, 4}
+    assert _taken([ragged, good, not_text, good, good, cr]) == {1, 3, 4}
 
 
-@pytest.mark.parametrize("bom_at", ["content", "first row"])
-def test_a_byte_order_mark_is_left_to_the_careful_reader(bom_at: str) -> None:
+def test_a_byte_order_mark_is_left_to_the_csv_module() -> None:
     content = _file(trial_rows())
-    bad = b"\xef\xbb\xbf" + content if bom_at == "content" else content.replace(b"\nP01", b"\n\xef\xbb\xbfP01", 1)
-    assert set(_read([bad, content])[1]) == {1}
+    assert _taken([b"\xef\xbb\xbf" + content, content]) == {1}
+
+
+def test_a_byte_order_mark_in_a_row_is_no_code(tmp_path: Path) -> None:
+    path = write_rows(trials_path(tmp_path, "P01"), trial_rows())
+    path.write_bytes(path.read_bytes().replace(b"\nP01", b"\n\xef\xbb\xbfP01", 1))
+    (problem,) = read_logs([tmp_path]).problems
+    assert "is not a code" in problem.message
 
 
 @pytest.mark.parametrize("name", ["note", "mood"])
-def test_cells_too_long_for_the_careful_reader_are_left_to_it(name: str) -> None:
+def test_cells_too_long_for_the_csv_module_are_refused(name: str) -> None:
     rows = trial_rows()
     rows[3][name] = "x" * (csv.field_size_limit() + 1)
     header = [*columns.names("direction"), "mood"]
-    assert set(_read([_bytes(rows, header), _bytes(trial_rows(), header)])[1]) == {1}
+    contents = [_bytes(rows, header), _bytes(trial_rows(), header)]
+    assert _taken(contents) == {1}
+    assert "field limit" in text_tables(dict(enumerate(contents)))[1][0].message
 
 
 _DECIMALS = st.one_of(
@@ -194,7 +236,7 @@ _DECIMALS = st.one_of(
 @settings(max_examples=300)
 @given(st.lists(_DECIMALS, min_size=1))
 def test_decimals_are_read_to_the_last_bit_or_doubted(texts: list[str]) -> None:
-    numbers, odd = log_cells.decimals(pa.array([text or None for text in texts], log_cells.TEXT))
+    numbers, odd = decimals(pa.array([text or None for text in texts], TEXT))
     for row, (text, number) in enumerate(zip(texts, numbers.tolist(), strict=True)):
         assert row in odd or (number == float(text) if text else number != number)  # noqa: PLR0124 - NaN
 

@@ -8,6 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from analysis.logs.exclusions import LeftOut
 from analysis.logs.reading import Logs, Problem, read_logs
 from analysis.paper.odds import odds_of
 from analysis.paper.paper import Paper, load_paper
@@ -33,7 +34,7 @@ def paper() -> Paper:
 @pytest.fixture(scope="module")
 def full(logs: Logs, paper: Paper, tmp_path_factory: pytest.TempPathFactory) -> Path:
     out = tmp_path_factory.mktemp("report") / "out"
-    left_out = {"experiment": "direction", "participant": "P15", "reason": "3 of 60 trials unanswered"}
+    left_out = LeftOut(experiment="direction", participant="P15", reason="3 of 60 trials unanswered")
     statistics = replace(summarize(logs), excluded=(left_out,))
     problem = Problem(file=Path("sub-<b>_trials.csv"), line=7, column="response", message="'left' is not allowed")
     report = ReportData(
@@ -216,14 +217,14 @@ def crowded(logs: Logs) -> ReportData:
     direction, preference = statistics.direction, statistics.preference
     assert direction is not None
     assert preference is not None
-    medians = list(direction.response_times["participants"].values())
+    medians = list(direction.response_times.participants.values())
     times = {f"P{i:05d}": medians[i % len(medians)] for i in range(n)}
     direction = replace(
         direction,
         n=n,
         participants=crowd_of(direction.participants, n),
         backward=replace(direction.backward, participants=crowd_of(direction.backward.participants, n)),
-        response_times=direction.response_times | {"participants": times},
+        response_times=replace(direction.response_times, participants=times),
         sensitivity={
             method: one and replace(one, participants=crowd_of(one.participants, n))
             for method, one in direction.sensitivity.items()

@@ -24,7 +24,7 @@ where they have the columns; then participants.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Annotated, Self
 
@@ -36,22 +36,37 @@ from pydantic import Field, model_validator
 from analysis.logs.frames import STUDY
 from analysis.logs.reading import Logs
 from analysis.stats.cells import codes_of, places_among
+from analysis.times.own_trials import timed
 from experiments.config.door import Model
 
 _MEASURES = {"direction": ("correct", "trials unanswered"), "preference": ("rating", "ratings missing")}
 
 
-def complete_rows(
-    table: pd.DataFrame, experiment: str, methods: Sequence[str]
-) -> tuple[pd.DataFrame, list[dict[str, str]]]:
-    """The rows of the participants who answered everything, and the others: experiment, participant, reason.
+@dataclass(frozen=True, slots=True, kw_only=True)
+class LeftOut:
+    """A participant who is left out of an experiment, and why."""
+
+    experiment: str
+    participant: str
+    reason: str
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class LeftOutByRule(LeftOut):
+    """A participant whom a rule leaves out."""
+
+    rule: str
+
+
+def complete_rows(table: pd.DataFrame, experiment: str, methods: Sequence[str]) -> tuple[pd.DataFrame, list[LeftOut]]:
+    """The rows of the participants who answered everything, and the others.
 
     Every method must be there; for direction with forward trials, because these are what the measure counts. `table` is
     coded.
     """
     reasons = _incomplete(table, experiment, methods)
     left_out = [
-        {"experiment": experiment, "participant": code, "reason": reason} for code, reason in sorted(reasons.items())
+        LeftOut(experiment=experiment, participant=code, reason=reason) for code, reason in sorted(reasons.items())
     ]
     return (rows_without(table, reasons) if reasons else table), left_out
 
@@ -105,7 +120,6 @@ Share = Annotated[float, Field(ge=0, le=1)]
 Seconds = Annotated[float, Field(ge=0, le=86_400)]
 Text = Annotated[str, Field(min_length=1, max_length=500)]
 Flags = NDArray[np.bool_]
-Left = dict[str, str]
 
 
 class TrialRules(Model):
@@ -156,21 +170,32 @@ class Rules(Model):
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
+class KeptTrials:
+    """How many trials of an experiment were recorded, and how many of them are kept."""
+
+    recorded: int
+    kept: int
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
 class Effect:
-    """What rules did: the logs that are left, who was left out, and dropped trials by experiment, person and rule."""
+    """What rules did: the logs that are left, who was left out, and of each experiment how many trials were kept.
+
+    `dropped` counts dropped trials by experiment, person and rule.
+    """
 
     logs: Logs
-    excluded: tuple[Left, ...]
-    dropped: dict[str, dict[str, dict[str, int]]]
-    trials: dict[str, dict[str, int]]
+    excluded: tuple[LeftOutByRule, ...]
+    dropped: Mapping[str, Mapping[str, Mapping[str, int]]]
+    trials: Mapping[str, KeptTrials]
     warnings: tuple[str, ...]
 
 
 def apply_rules(logs: Logs, rules: Rules) -> Effect:
     """Leave out what the rules say. A trial that several rules drop counts for the first of them."""
-    excluded: list[Left] = []
+    excluded: list[LeftOutByRule] = []
     dropped: dict[str, dict[str, dict[str, int]]] = {}
-    trials: dict[str, dict[str, int]] = {}
+    trials: dict[str, KeptTrials] = {}
     tables = {"direction": logs.trials, "preference": logs.ratings}
     for experiment, table in tables.items():
         if len(table):
@@ -178,11 +203,11 @@ def apply_rules(logs: Logs, rules: Rules) -> Effect:
             found = [*_reasons(table, kept, rules, experiment)]
             reasons = {code: (rule, reason) for code, rule, reason in reversed(found)}  # the first rule is told
             excluded += [
-                {"experiment": experiment, "participant": code, "reason": reason, "rule": rule}
+                LeftOutByRule(experiment=experiment, participant=code, reason=reason, rule=rule)
                 for code, (rule, reason) in sorted(reasons.items())
             ]
             tables[experiment] = rows_without(kept, reasons) if reasons else kept
-            trials[experiment] = {"recorded": len(table), "kept": len(kept)}
+            trials[experiment] = KeptTrials(recorded=len(table), kept=len(kept))
     return Effect(
         logs=replace(logs, trials=tables["direction"], ratings=tables["preference"]),
         excluded=tuple(excluded),
@@ -214,7 +239,7 @@ def _trial_rules(table: pd.DataFrame, rules: TrialRules, experiment: str) -> Ite
         bad = {text for text in marks.unique() if unwanted & set(text.split())}
         yield "drop_flags", marks.isin(bad).to_numpy(dtype=np.bool_)
     if experiment == "direction":
-        own = (table["response_time_valid"] == 1).fillna(value=False).to_numpy(dtype=np.bool_)
+        own = timed(table).by_own_hand
         time = table["response_time_s"].to_numpy(dtype=np.float64)
         if rules.response_time_min_s is not None:
             yield "response_time_min_s", own & (time < rules.response_time_min_s)

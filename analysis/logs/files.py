@@ -11,7 +11,7 @@ from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path, PurePath
 
-from analysis.logs.rules import BadLogError
+from device.words import RecoilError
 from experiments.record import columns
 
 ENDINGS = tuple(f"_{suffix}.csv" for suffix in columns.FILE_SUFFIX.values())
@@ -21,6 +21,14 @@ _READ_ONLY = os.O_RDONLY | getattr(os, "O_BINARY", 0)
 _PIECE_BYTES = 1 << 16
 _TAIL_BYTES = (1 << 12, 1 << 16)
 """As much of a journal as mostly, and as surely, holds its last record."""
+
+
+class BadLogError(RecoilError):
+    """A log that breaks a rule: what, and where. It never leaves the room."""
+
+    def __init__(self, message: str, line: int | None = None, column: str | None = None) -> None:
+        super().__init__(message)
+        self.message, self.line, self.column = message, line, column
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -1,243 +1,365 @@
-"""The rules a log table has to keep, as pure checks on its rows. The first breach is raised, with its place."""
+"""The rules that a log table has to keep, each written once, over many logs with the same header at once.
+
+Of each log the first breach is told, with its place: by the first rule that it breaks, in the first row that does. The
+rules of the cells come first, then whose log it is, then what binds the cells of a row, then what binds rows.
+"""
 
 from __future__ import annotations
 
-import csv
-import io
 import math
 import re
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from functools import partial
 
-from device.words import RecoilError
+import numpy as np
+import pyarrow as pa
+from numpy.typing import NDArray
+
+from analysis.logs.files import BadLogError
+from analysis.logs.frames import Block, Cell, Cells, Coded, chosen
+from analysis.logs.texts import Texts, TextTable, decimals, few, has_many_values, unguarded
 from experiments.record import columns
 from experiments.record.columns import Column
 
-Cell = str | int | float | None
-Row = dict[str, Cell]
+Integers = NDArray[np.int64]
+Flags = NDArray[np.bool_]
 
 _MEASURES = {"direction": ("response", "correct"), "preference": ("rating",)}
 """Columns without which a table has nothing to analyse, though a cell of them may be empty."""
 _CODE = re.compile(r"[A-Za-z0-9]{1,32}")
 _INTEGER = re.compile(r"[+-]?[0-9]{1,15}")
 _NUMBER = re.compile(r"[+-]?([0-9]+\.?[0-9]*|\.[0-9]+)([eE][+-]?[0-9]{1,4})?")
-
-
-class BadLogError(RecoilError):
-    """A table that breaks a rule: what, and where. It never leaves the room."""
-
-    def __init__(self, message: str, line: int | None = None, column: str | None = None) -> None:
-        super().__init__(message)
-        self.message, self.line, self.column = message, line, column
+_NO_ROWS: Integers = np.empty(0, dtype=np.int64)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Table:
-    """A checked log table: the experiment, its parsed rows, and the line of the file each row starts on."""
+class Log:
+    """A log that keeps every rule: the participant's code and the experiment."""
 
+    code: str
     experiment: str
-    rows: tuple[Row, ...]
-    lines: tuple[int, ...]
 
 
-def check_table(records: Sequence[tuple[int, list[str]]], code_in_name: str | None) -> Table:
-    """The table in `records` (line number and cells, header first) if it keeps every rule; else `BadLogError`."""
-    line, header = records[0]
-    experiment = experiment_of(header, line)
-    if len(records) == 1:
-        raise BadLogError("has a header but no rows (rule: one row a planned trial)", line)
-    rows = tuple(_row(experiment, header, number, cells) for number, cells in records[1:])
-    table = Table(experiment=experiment, rows=rows, lines=tuple(number for number, _ in records[1:]))
-    _check_participant(table, code_in_name)
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class _Table:
+    """Rows with their parsed columns, and the row with which each log begins."""
+
+    texts: TextTable
+    cells: Mapping[str, Cells]
+    first: Integers
+
+    def coded(self, name: str) -> Coded:
+        """A column of few values."""
+        cells = self.cells[name]
+        if not isinstance(cells, Coded):
+            raise TypeError(f"column {name!r} has no codes")
+        return cells
+
+    def value(self, name: str, row: int) -> Cell:
+        """A cell of such a column."""
+        found = self.coded(name)
+        return found.values[int(found.codes[row])]
+
+    def whole(self, name: str) -> Integers:
+        """The values of such a column as whole numbers, -1 for none."""
+        values = [-1 if value is None else value for value in self.coded(name).values]
+        return np.array(values, dtype=np.int64)[self.coded(name).codes]
+
+    def logs(self, rows: Integers) -> Integers:
+        """The place of the log that each row is of."""
+        return np.asarray(np.searchsorted(self.first, rows, side="right") - 1)
+
+    def log(self, row: int) -> tuple[int, range]:
+        """The place of the log that a row is of, and the log's rows."""
+        place = int(self.logs(np.array(row)))
+        first = int(self.first[place])
+        return place, range(first, first + self.texts.rows[place])
+
+    def fault(self, message: str, row: int, column: str | None) -> BadLogError:
+        """What is wrong in a row, with the line on which it starts."""
+        place, rows = self.log(row)
+        return BadLogError(message, self.texts.lines[place][row - rows.start], column)
+
+
+Rule = tuple[Integers, Callable[[int], BadLogError]]
+"""The rows that break a rule, and what is to be said of one of them."""
+
+
+def check(texts: TextTable, codes_in_names: Mapping[int, str | None]) -> tuple[Block, dict[int, Log | BadLogError]]:
+    """The rows of those logs of a table that keep every rule, and each log by its number, or what is wrong with it.
+
+    `codes_in_names` are the participants' codes in the names of the logs' files, as far as there are some.
+    `BadLogError`: what is wrong with all logs of the table, as their header is.
+    """
+    experiment = experiment_of(texts.header)
+    if not sum(texts.rows):
+        raise BadLogError("has a header but no rows (rule: one row a planned trial)", 1)
+    rows = np.array(texts.rows, dtype=np.int64)
+    parsed = {column.name: _parsed(column, texts.column(column.name)) for column in columns.TABLES[experiment]}
+    cells = {name: values for name, (values, _) in parsed.items()}
+    table = _Table(texts=texts, cells=cells, first=np.cumsum(rows) - rows)
+    wrong = np.concatenate([list(texts.ragged), *(odd for _, odd in parsed.values())]).astype(np.int64)
+    rules: list[Rule] = [(wrong, partial(_say_cell, table, experiment)), *_rules(table, experiment, codes_in_names)]
+    faults = _first_faults(table, rules)
+    good = np.array([place not in faults for place in range(len(rows))], dtype=np.bool_)
+    kept = None if good.all() else np.flatnonzero(np.repeat(good, rows))
+    block = Block(
+        experiment=experiment,
+        columns=cells if kept is None else {name: chosen(values, kept) for name, values in cells.items()},
+        log=np.array(texts.logs, dtype=np.int64)[good],
+        rows=rows[good],
+    )
+    codes = (str(table.value("participant_id", row)) for row in table.first.tolist())
+    logs = (faults.get(place) or Log(code=code, experiment=experiment) for place, code in enumerate(codes))
+    return block, dict(zip(texts.logs, logs, strict=True))
+
+
+def _first_faults(table: _Table, rules: Iterable[Rule]) -> dict[int, BadLogError]:
+    """By the places of logs what is wrong first: by the first rule that a log breaks, in the first row that does."""
+    found: dict[int, BadLogError] = {}
+    for rows, said in rules:
+        rows_in_order = np.sort(rows)
+        logs, firsts = np.unique(table.logs(rows_in_order), return_index=True)
+        for log, row in zip(logs.tolist(), rows_in_order[firsts].tolist(), strict=True):
+            if log not in found:
+                found[log] = said(row)
+    return found
+
+
+def _rules(table: _Table, experiment: str, codes_in_names: Mapping[int, str | None]) -> Iterator[Rule]:
+    """The rules that bind cells together, in their order."""
+    yield _one_participant(table, codes_in_names)
     if experiment == "direction":
-        _check_answers(table)
-        _check_sessions(table)
+        yield _right_answers(table)
+        yield from _numbered_sessions(table)
     else:
-        _check_ratings(table)
-        _check_run("trial", [(row["trial"], number) for row, number in _numbered(table)], "the run")
-    return table
+        yield _ratings_on_the_scale(table)
+        yield _numbered_trials(table, _sessions(table, np.zeros(sum(table.texts.rows), dtype=np.int64)))
 
 
-def _numbered(table: Table) -> Iterable[tuple[Row, int]]:
-    return zip(table.rows, table.lines, strict=True)
-
-
-def experiment_of(header: list[str], line: int) -> str:
-    """Which table the header is of: the one that shares most columns with it."""
+def experiment_of(header: Sequence[str]) -> str:
+    """Which table the header is of: the one that shares most columns with it. `BadLogError`: none, or not all of it."""
     shared = {name: len(set(header) & set(columns.names(name))) for name in columns.TABLES}
     experiment = max(shared, key=lambda name: shared[name])
     if shared[experiment] < 4:
         raise BadLogError(
             f"the header {_shown(','.join(header))} is neither a trials nor a ratings table of Recoil "
             "(a log of another experiment or program, or not comma-separated)",
-            line,
+            1,
         )
-    _check_header(experiment, header, line)
-    return experiment
-
-
-def _check_header(experiment: str, header: list[str], line: int) -> None:
     for name in header:
         if header.count(name) > 1:
-            raise BadLogError(
-                f"column {name!r} stands {header.count(name)} times in the header (rule: once)", line, name
-            )
+            raise BadLogError(f"column {name!r} stands {header.count(name)} times in the header (rule: once)", 1, name)
     required = [column.name for column in columns.TABLES[experiment] if column.required]
     for name in (*required, *_MEASURES[experiment]):
         if name not in header:
-            raise BadLogError(f"column {name!r} is missing (rule: a {experiment} table has it)", line, name)
+            raise BadLogError(f"column {name!r} is missing (rule: a {experiment} table has it)", 1, name)
+    return experiment
 
 
-def _row(experiment: str, header: list[str], line: int, cells: list[str]) -> Row:
-    if len(cells) != len(header):
-        raise BadLogError(f"has {len(cells)} fields (rule: {len(header)}, as in the header)", line)
-    given = dict(zip(header, cells, strict=True))
-    return {
-        column.name: parse_cell(column, given.get(column.name, columns.MISSING), line) for column in _of(experiment)
-    }
-
-
-def _of(experiment: str) -> tuple[Column, ...]:
-    return columns.TABLES[experiment]
-
-
-def parse_cell(column: Column, text: str, line: int) -> Cell:
-    """The value of a cell, None if it is empty; `BadLogError` if it is none that the column may hold."""
+def cell_fault(column: Column, text: str) -> str:
+    """Why a column may not hold a text; empty if it may."""
     if text == columns.MISSING:
-        if column.required:
-            raise BadLogError("the cell is empty (rule: a value is required)", line, column.name)
-        return None
-    if column.type == "text":
-        return columns.unguard(text)
-    if column.type == "integer":
-        return _integer(column, text, line)
-    if column.type == "number":
-        return _number(column, text, line)
-    return _level(column, text, line)
-
-
-def _integer(column: Column, text: str, line: int) -> int:
-    if not _INTEGER.fullmatch(text):
-        raise BadLogError(f"{_shown(text)} is not a whole number of at most 15 digits", line, column.name)
-    return int(text)
-
-
-def _number(column: Column, text: str, line: int) -> float:
-    if not _NUMBER.fullmatch(text) or not math.isfinite(float(text)):
-        raise BadLogError(f"{_shown(text)} is not a finite number with a decimal point", line, column.name)
-    return float(text)
-
-
-def _level(column: Column, text: str, line: int) -> Cell:
+        return "the cell is empty (rule: a value is required)" if column.required else ""
+    if column.type == "integer" and not _INTEGER.fullmatch(text):
+        return f"{_shown(text)} is not a whole number of at most 15 digits"
+    if column.type == "number" and not (_NUMBER.fullmatch(text) and math.isfinite(float(text))):
+        return f"{_shown(text)} is not a finite number with a decimal point"
     if column.levels and text not in column.levels:
-        raise BadLogError(f"{_shown(text)} is not allowed (rule: one of {', '.join(column.levels)})", line, column.name)
-    return int(text) if column.type == "flag" else text
+        return f"{_shown(text)} is not allowed (rule: one of {', '.join(column.levels)})"
+    return ""
 
 
-def is_code(text: str) -> bool:
-    """Whether a text may be a participant's code."""
-    return _CODE.fullmatch(text) is not None
+def cell_value(column: Column, text: str) -> Cell:
+    """The value of a text that a column may hold; `None` for an empty one."""
+    if text == columns.MISSING:
+        return None
+    if column.type == "number":
+        return float(text)
+    if column.type in ("integer", "flag"):
+        return int(text)
+    return columns.unguard(text) if column.type == "text" else text
 
 
-def _check_participant(table: Table, code_in_name: str | None) -> None:
-    code = str(table.rows[0]["participant_id"])
-    first = table.lines[0]
-    if not is_code(code):
-        raise BadLogError(f"{_shown(code)} is not a code (rule: 1 to 32 letters or digits)", first, "participant_id")
-    if code_in_name is not None and code_in_name != code:
-        rule = f"the file is named sub-{code_in_name} (rule: one participant a file, the one in its name)"
-        raise BadLogError(f"participant {code!r}, but {rule}", first, "participant_id")
-    for row, line in _numbered(table):
-        if row["participant_id"] != code:
-            other = _shown(str(row["participant_id"]))
-            raise BadLogError(f"{other} after {code!r} (rule: one participant a file)", line, "participant_id")
+def _parsed(column: Column, texts: Texts) -> tuple[Cells, Integers]:
+    """A column's values, and the rows whose text is none that it may hold."""
+    if column.type == "number":
+        return _numbers(column, texts)
+    if has_many_values(column):
+        return unguarded(texts), np.flatnonzero(texts.is_null()) if column.required else _NO_ROWS
+    return _few_values(column, *few(texts))
 
 
-def _check_answers(table: Table) -> None:
-    for row, line in _numbered(table):
-        response, correct = row["response"], row["correct"]
-        if (response is None) != (correct is None):
-            shown = f"response {_cell_text(response)} with correct {_cell_text(correct)}"
-            raise BadLogError(f"{shown} (rule: both or neither are given)", line, "correct")
-        if response is not None and correct != int(response == row["direction"]):
-            shown = f"correct is {correct}, but the direction was {row['direction']} and the response {response}"
-            raise BadLogError(f"{shown} (rule: 1 if they are the same, else 0)", line, "correct")
+def _few_values(column: Column, codes: NDArray[np.int32], texts: list[str]) -> tuple[Cells, Integers]:
+    """A column of few values, each parsed once; texts that mean the same get the same code."""
+    wrong = np.array([cell_fault(column, text) != "" for text in texts])
+    values = [None if bad else cell_value(column, text) for bad, text in zip(wrong, texts, strict=True)]
+    places = {value: place for place, value in enumerate(dict.fromkeys(values))}
+    if len(places) < len(values):
+        codes_of_texts = np.array([places[value] for value in values], dtype=np.int32)
+        return Coded(codes=codes_of_texts[codes], values=tuple(places)), np.flatnonzero(wrong[codes])
+    return Coded(codes=codes, values=tuple(values)), np.flatnonzero(wrong[codes]) if wrong.any() else _NO_ROWS
 
 
-def _check_ratings(table: Table) -> None:
-    for row, line in _numbered(table):
-        rating = row["rating"]
-        if isinstance(rating, float) and not 0.0 <= rating <= 10.0:
-            raise BadLogError(f"rating {rating:g} is out of range (rule: 0 to 10)", line, "rating")
+def _numbers(column: Column, texts: Texts) -> tuple[Cells, Integers]:
+    numbers, odd = decimals(texts)
+    if not odd.size:
+        return numbers, odd
+    cells = texts.take(pa.array(odd)).to_pylist()
+    wrong = np.array([cell_fault(column, cell) != "" for cell in cells])
+    numbers = numbers.copy()
+    numbers[odd[~wrong]] = [float(cell) for cell, bad in zip(cells, wrong, strict=True) if not bad]
+    return numbers, odd[wrong]
 
 
-def _check_sessions(table: Table) -> None:
-    first_line: dict[Cell, int] = {}
-    methods: dict[Cell, Cell] = {}
-    for row, line in _numbered(table):
-        session, method = row["session"], row["method"]
-        first_line.setdefault(session, line)
-        if methods.setdefault(session, method) != method:
-            shown = f"{method!r} in session {session}, which began with {methods[session]!r}"
-            raise BadLogError(f"{shown} (rule: one method a session)", line, "method")
-    _check_run("session", list(first_line.items()), "the run")
-    for session in first_line:
-        trials = [(row["trial"], line) for row, line in _numbered(table) if row["session"] == session]
-        _check_run("trial", trials, f"session {session}")
+def _say_cell(table: _Table, experiment: str, row: int) -> BadLogError:
+    """The first cell of a row that its column may not hold, or how many there are."""
+    if row in table.texts.ragged:
+        rule = f"(rule: {len(table.texts.header)}, as in the header)"
+        return table.fault(f"has {table.texts.ragged[row]} fields {rule}", row, None)
+    texts = ((column, table.texts.column(column.name)[row].as_py()) for column in columns.TABLES[experiment])
+    faults = ((column.name, cell_fault(column, text or columns.MISSING)) for column, text in texts)
+    name, message = next((name, message) for name, message in faults if message)
+    return table.fault(message, row, name)
 
 
-def _check_run(column: str, numbered: list[tuple[Cell, int]], where: str) -> None:
-    """`numbered` holds 1..N, each once, in any order."""
-    seen: set[Cell] = set()
-    last = len(numbered)
-    for number, line in numbered:
+def _one_participant(table: _Table, names: Mapping[int, str | None]) -> Rule:
+    """One participant a file, with a code that is one, and that of the file's name."""
+    column = table.coded("participant_id")
+    own = column.codes[table.first]
+    codes = [str(column.values[code]) for code in own.tolist()]
+    named = [names.get(log) for log in table.texts.logs]
+    unfit = [not _CODE.fullmatch(code) or name not in (None, code) for code, name in zip(codes, named, strict=True)]
+    others = np.flatnonzero(column.codes != np.repeat(own, table.texts.rows))
+    return np.append(table.first[np.array(unfit)], others), partial(_say_participant, table, names)
+
+
+def _say_participant(table: _Table, names: Mapping[int, str | None], row: int) -> BadLogError:
+    place, rows = table.log(row)
+    code, own = (str(table.value("participant_id", one)) for one in (row, rows.start))
+    if code != own:
+        message = f"{_shown(code)} after {own!r} (rule: one participant a file)"
+    elif not _CODE.fullmatch(code):
+        message = f"{_shown(code)} is not a code (rule: 1 to 32 letters or digits)"
+    else:
+        rule = f"sub-{names[table.texts.logs[place]]} (rule: one participant a file, the one in its name)"
+        message = f"participant {code!r}, but the file is named {rule}"
+    return table.fault(message, row, "participant_id")
+
+
+def _right_answers(table: _Table) -> Rule:
+    """`correct` says whether the response is the direction."""
+    direction, response = table.coded("direction"), table.coded("response")
+    due = np.array(
+        [[-1 if given is None else int(given == shown) for given in response.values] for shown in direction.values]
+    )
+    wrong = np.flatnonzero(due[direction.codes, response.codes] != table.whole("correct"))
+    return wrong, partial(_say_answer, table)
+
+
+def _say_answer(table: _Table, row: int) -> BadLogError:
+    direction, response, correct = (table.value(name, row) for name in ("direction", "response", "correct"))
+    if response is None or correct is None:
+        given, so = ("empty" if one is None else repr(one) for one in (response, correct))
+        message = f"response {given} with correct {so} (rule: both or neither are given)"
+    else:
+        shown = f"correct is {correct}, but the direction was {direction} and the response {response}"
+        message = f"{shown} (rule: 1 if they are the same, else 0)"
+    return table.fault(message, row, "correct")
+
+
+def _ratings_on_the_scale(table: _Table) -> Rule:
+    rating = np.asarray(table.cells["rating"], dtype=np.float64)
+
+    def said(row: int) -> BadLogError:
+        return table.fault(f"rating {rating[row]:g} is out of range (rule: 0 to 10)", row, "rating")
+
+    return np.flatnonzero((rating < 0.0) | (rating > 10.0)), said
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class _Sessions:
+    """Rows in the order of log, session and trial; where there each session of a log begins, and its first row."""
+
+    session: Integers
+    trial: Integers
+    order: Integers
+    begins: Integers
+    first: Integers
+
+
+def _sessions(table: _Table, session: Integers) -> _Sessions:
+    trial, log = table.whole("trial"), np.repeat(np.arange(len(table.first)), table.texts.rows)
+    order = np.lexsort((trial, session, log))
+    begins = _begins((np.diff(log[order]) != 0) | (np.diff(session[order]) != 0))
+    return _Sessions(session=session, trial=trial, order=order, begins=begins, first=np.minimum.reduceat(order, begins))
+
+
+def _begins(changes: Flags) -> Integers:
+    """Where runs begin, from whether each but the first begins one."""
+    return np.append(0, np.flatnonzero(changes) + 1)
+
+
+def _miscounted(numbers: Integers, begins: Integers) -> Integers:
+    """The runs of sorted numbers that are not 1, 2, 3, ..., by their places."""
+    run = np.repeat(np.arange(len(begins)), np.diff(np.append(begins, len(numbers))))
+    return np.unique(run[numbers != np.arange(1, len(numbers) + 1) - begins[run]])
+
+
+def _numbered_sessions(table: _Table) -> Iterator[Rule]:
+    """One method a session; sessions 1, 2, 3, ... in a log, and trials 1, 2, 3, ... in a session, in any order."""
+    found = _sessions(table, table.whole("session"))
+    method = table.coded("method").codes
+    first = np.repeat(found.first, np.diff(np.append(found.begins, len(found.order))))
+    yield found.order[method[found.order] != method[first]], partial(_say_method, table, found)
+    logs = _begins(np.diff(table.logs(found.first)) != 0)
+    yield found.first[logs[_miscounted(found.session[found.first], logs)]], partial(_say_session, table, found)
+    yield _numbered_trials(table, found)
+
+
+def _numbered_trials(table: _Table, found: _Sessions) -> Rule:
+    """The trials of a session are 1, 2, 3, ...; of one where they are not, the first row stands for all."""
+    return found.first[_miscounted(found.trial[found.order], found.begins)], partial(_say_trial, table, found)
+
+
+def _say_method(table: _Table, found: _Sessions, row: int) -> BadLogError:
+    first = _rows_of_session(table, found, row)[0]
+    shown = f"{table.value('method', row)!r} in session {found.session[row]}"
+    rule = f"which began with {table.value('method', first)!r} (rule: one method a session)"
+    return table.fault(f"{shown}, {rule}", row, "method")
+
+
+def _say_session(table: _Table, found: _Sessions, row: int) -> BadLogError:
+    firsts: dict[int, int] = {}
+    for one in table.log(row)[1]:
+        firsts.setdefault(int(found.session[one]), one)
+    return _miscount(table, "session", firsts, list(firsts.values()), "the run")
+
+
+def _say_trial(table: _Table, found: _Sessions, row: int) -> BadLogError:
+    rows = _rows_of_session(table, found, row)
+    session = found.session[row]  # 0 where a table has no sessions; where it has, 0 is refused before
+    where = f"session {session}" if session else "the run"
+    return _miscount(table, "trial", found.trial[rows].tolist(), rows, where)
+
+
+def _rows_of_session(table: _Table, found: _Sessions, row: int) -> list[int]:
+    return [one for one in table.log(row)[1] if found.session[one] == found.session[row]]
+
+
+def _miscount(table: _Table, column: str, numbers: Iterable[int], rows: Sequence[int], where: str) -> BadLogError:
+    """What is wrong with numbers that are not 1, 2, 3, ..., each once, in any order."""
+    seen: set[int] = set()
+    for number, row in zip(numbers, rows, strict=True):
         if number in seen:
-            raise BadLogError(f"{column} {number} stands twice in {where} (rule: 1, 2, 3, ... once each)", line, column)
+            return table.fault(f"{column} {number} stands twice in {where} (rule: 1, 2, 3, ... once each)", row, column)
         seen.add(number)
-    missing = next((number for number in range(1, last + 1) if number not in seen), None)
-    if missing is not None:
-        rule = f"(rule: 1, 2, 3, ... without a gap; found {_shown(', '.join(map(str, sorted(map(_as_int, seen)))))})"
-        raise BadLogError(f"{column} {missing} is missing in {where} {rule}", numbered[-1][1], column)
-
-
-def _as_int(number: Cell) -> int:
-    return number if isinstance(number, int) else 0
-
-
-def _cell_text(cell: Cell) -> str:
-    return "empty" if cell is None else repr(cell)
+    missing = next(number for number in range(1, len(rows) + 1) if number not in seen)
+    rule = f"(rule: 1, 2, 3, ... without a gap; found {_shown(', '.join(map(str, sorted(seen))))})"
+    return table.fault(f"{column} {missing} is missing in {where} {rule}", rows[-1], column)
 
 
 def _shown(text: str) -> str:
     """`text` in quotes, cut to what fits into a message."""
     return repr(text if len(text) <= 80 else text[:77] + "...")
-
-
-def records(content: bytes) -> list[tuple[int, list[str]]]:
-    """The records of an RFC 4180 file, each with the line it starts on."""
-    text = _text(content)
-    reader = csv.reader(io.StringIO(text, newline=""), strict=True)
-    records: list[tuple[int, list[str]]] = []
-    start = 1
-    try:
-        for cells in reader:
-            records.append((start, cells))
-            start = reader.line_num + 1
-    except csv.Error as error:
-        raise BadLogError(f"is not comma-separated text by RFC 4180: {error}", start) from error
-    if not text.endswith(("\n", "\r")):
-        raise BadLogError(
-            "the last line has no end (rule: every row ends with a line end; was the file cut off?)", start - 1
-        )
-    return records
-
-
-def _text(content: bytes) -> str:
-    try:
-        text = content.decode("utf-8-sig")
-    except UnicodeDecodeError as error:
-        line = content[: error.start].count(b"\n") + 1
-        raise BadLogError(f"byte 0x{content[error.start]:02x} is not UTF-8 (rule: UTF-8 text)", line) from error
-    if not text.strip():
-        raise BadLogError("is empty (rule: a header and one row a planned trial)")
-    return text

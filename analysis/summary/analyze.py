@@ -9,7 +9,6 @@ from pathlib import Path
 from analysis.logs.column_map import ColumnMap
 from analysis.logs.exclusions import Effect, Rules, apply_rules, by_study
 from analysis.logs.reading import Logs, Problem, Track, read_logs
-from analysis.logs.tables_out import result_tables
 from analysis.paper.audit import audit
 from analysis.paper.audit.paper_file import load_paper_file
 from analysis.paper.audit.sentences import predictions
@@ -17,10 +16,11 @@ from analysis.paper.paper import load_paper
 from analysis.paper.published import Prediction
 from analysis.summary import remarks_coding
 from analysis.summary.comparison import compare
-from analysis.summary.results import StudyStatistics
+from analysis.summary.results import RulesApplied, StudyStatistics
 from analysis.summary.sections.data import ReportData
 from analysis.summary.sections.sections import write_report
 from analysis.summary.summary import summarize
+from analysis.summary.tables_out import result_tables
 from experiments.config.door import ConfigError, load
 from experiments.config.setup import sha256
 from experiments.record import storage
@@ -79,7 +79,7 @@ def analyze(request: Request, track: Track = iter) -> tuple[StudyStatistics, tup
 
 def write_tables(out: Path, logs: Logs, statistics: StudyStatistics) -> None:
     """Write each experiment's results by participant, long and wide, as CSV."""
-    for name, content in result_tables(logs, statistics.to_dict()).items():
+    for name, content in result_tables(logs, statistics.analysed).items():
         storage.write_whole(out / name, content)
 
 
@@ -114,12 +114,9 @@ def _with_rules(statistics: StudyStatistics, effect: Effect, rules: Rules, path:
         statistics,
         excluded=(*effect.excluded, *statistics.excluded),
         warnings=(*statistics.warnings, *effect.warnings),
-        rules={
-            "file": path.name,
-            "config": rules.model_dump(mode="json"),
-            "trials": effect.trials,
-            "dropped": effect.dropped,
-        },
+        rules=RulesApplied(
+            file=path.name, config=rules.model_dump(mode="json"), trials=effect.trials, dropped=effect.dropped
+        ),
     )
 
 
@@ -134,7 +131,7 @@ def _notes(effect: Effect | None) -> list[str]:
             for rule, count in by_rule.items():
                 counts[rule] = counts.get(rule, 0) + count
         shown = ", ".join(f"{rule} {count}" for rule, count in sorted(counts.items())) or "none"
-        recorded = effect.trials[experiment]["recorded"]
+        recorded = effect.trials[experiment].recorded
         notes.append(f"Trials dropped by rule in {experiment}, of {recorded}: {shown}.")
     return notes
 

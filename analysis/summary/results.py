@@ -10,6 +10,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
+from analysis.logs.exclusions import KeptTrials, LeftOut
 from analysis.report.serial import OPTIONAL, beside, plain
 from analysis.stats.cells import ByParticipant
 from analysis.stats.diagnostics import Normality
@@ -19,6 +20,8 @@ from analysis.stats.paired import PairedT
 from analysis.stats.rank_tests import SignedRanks
 from analysis.stats.sphericity import Sphericity
 from analysis.summary.remarks_coding import CodedRemarks
+from analysis.times.response_times import ResponseTimes
+from analysis.times.speed_accuracy import NoSpeedAccuracy, SpeedAccuracy
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -287,8 +290,18 @@ class DirectionStatistics(WithinStatistics):
     model: NamedModel
     sensitivity: Mapping[str, Sensitivity | None]
     response_time: Mapping[str, MedianTime]
-    response_times: Mapping[str, Any]
-    speed_accuracy: Mapping[str, Any] | None = field(default=None, metadata=OPTIONAL)
+    response_times: ResponseTimes
+    speed_accuracy: SpeedAccuracy | NoSpeedAccuracy | None = field(default=None, metadata=OPTIONAL)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class RulesApplied:
+    """The rules of exclusion that were asked for, and what they dropped: trials by participant and rule."""
+
+    file: str
+    config: Mapping[str, Any]
+    trials: Mapping[str, KeptTrials]
+    dropped: Mapping[str, Mapping[str, Mapping[str, int]]]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -297,11 +310,11 @@ class StudyStatistics:
 
     direction: DirectionStatistics | None = field(default=None, metadata=OPTIONAL)
     preference: WithinStatistics | None = field(default=None, metadata=OPTIONAL)
-    excluded: tuple[Mapping[str, str], ...] = ()
+    excluded: tuple[LeftOut, ...] = ()
     warnings: tuple[str, ...] = ()
     versions: Mapping[str, str] | None = field(default=None, metadata=OPTIONAL)
     studies: Mapping[str, StudyStatistics] | None = field(default=None, metadata=OPTIONAL)
-    rules: Mapping[str, Any] | None = field(default=None, metadata=OPTIONAL)
+    rules: RulesApplied | None = field(default=None, metadata=OPTIONAL)
     remarks: CodedRemarks | None = field(default=None, metadata=OPTIONAL)
 
     def of(self, experiment: str) -> WithinStatistics | None:

@@ -11,7 +11,7 @@ from importlib.metadata import PackageNotFoundError, version
 import numpy as np
 import pandas as pd
 
-from analysis.logs.exclusions import complete_rows
+from analysis.logs.exclusions import LeftOut, complete_rows
 from analysis.logs.reading import Logs
 from analysis.report.serial import undefined
 from analysis.stats.anova import rm_anova
@@ -38,8 +38,8 @@ from analysis.summary.results import (
     WithinStatistics,
 )
 from analysis.summary.supplement import model, pooled_clustering, within_supplement
-from analysis.times.own_trials import INSTRUCTION
-from analysis.times.response_times import response_times, valid_times
+from analysis.times.own_trials import INSTRUCTION, timed
+from analysis.times.response_times import response_times
 from analysis.times.speed_accuracy import speed_accuracy
 
 SCALES = {"direction": (0.0, 1.0), "preference": (0.0, 10.0)}
@@ -104,7 +104,7 @@ def _warnings(found: StudyStatistics) -> Iterator[str]:
         yield f"{place} is {why}; written as null"
 
 
-def _complete(table: pd.DataFrame, experiment: str) -> tuple[pd.DataFrame, list[str], list[dict[str, str]]]:
+def _complete(table: pd.DataFrame, experiment: str) -> tuple[pd.DataFrame, list[str], list[LeftOut]]:
     """The complete participants' coded rows, with the instructions if there are some; the methods; who is left out."""
     methods, rows = methods_in(table), coded(table)
     if INSTRUCTION in table:
@@ -113,7 +113,7 @@ def _complete(table: pd.DataFrame, experiment: str) -> tuple[pd.DataFrame, list[
     return complete, methods, left_out
 
 
-def _direction(table: pd.DataFrame, *, trade: bool) -> tuple[DirectionStatistics, list[dict[str, str]]]:
+def _direction(table: pd.DataFrame, *, trade: bool) -> tuple[DirectionStatistics, list[LeftOut]]:
     complete, methods, left_out = _complete(table, "direction")
     cells = trial_cells(complete, methods)
     within = _within(cells.rates("forward"), "direction", _origin(complete, "response_source"))
@@ -132,7 +132,7 @@ def _direction(table: pd.DataFrame, *, trade: bool) -> tuple[DirectionStatistics
     return replace(found, assumptions=assumptions(found)), left_out
 
 
-def _preference(table: pd.DataFrame) -> tuple[WithinStatistics, list[dict[str, str]]]:
+def _preference(table: pd.DataFrame) -> tuple[WithinStatistics, list[LeftOut]]:
     complete, methods, left_out = _complete(table, "preference")
     scores = _table(complete, "rating", methods)
     found = _within(scores, "preference", _origin(complete, "rating_by"))
@@ -256,7 +256,7 @@ def _mean_sd(values: FloatArray) -> MeanSd:
 
 def _median_times(trials: pd.DataFrame, methods: list[str]) -> dict[str, MedianTime]:
     """Median over the times that are the participant's own, by method."""
-    valid = valid_times(trials)
+    valid = timed(trials).own
     times = {method: trials["response_time_s"][valid & (trials["method"] == method)] for method in methods}
     return {
         method: MedianTime(median=float(own.median()) if len(own) else None, n=len(own))

@@ -146,6 +146,43 @@ REFUSALS = {
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Timed:
+    """Which trials of a table are answered with a time of the answerer's own, and why the other answered ones are not.
+
+    `by_own_hand` are those with a time that is said to be the answerer's own, also if it is not above 0.
+    """
+
+    own: Flags
+    by_own_hand: Flags
+    answered: int
+    refused: dict[str, int]  # reason in `REFUSALS` -> trials
+
+
+def timed(trials: pd.DataFrame) -> Timed:
+    """Look at every trial of a log: the one rule of what is a valid response time."""
+    sources, source = _names(trials["response_source"])
+    time_s = trials["response_time_s"].to_numpy(dtype=np.float64)
+    faults = {
+        "experimenter": (sources == "experimenter")[source],
+        "no_source": ~np.isin(sources, (*OWN, "experimenter"))[source],
+        "not_valid": ~(trials["response_time_valid"] == 1).fillna(value=False).to_numpy(dtype=np.bool_),
+        "no_time": np.isnan(time_s),
+        "not_above_0": time_s <= 0.0,
+    }
+    answered = trials["correct"].notna().to_numpy(dtype=np.bool_)
+    left, refused = answered, dict[str, int]()
+    for reason, fault in faults.items():
+        refused[reason] = int(np.count_nonzero(left & fault))
+        left = left & ~fault
+    return Timed(
+        own=left,
+        by_own_hand=answered & ~np.logical_or.reduce([faults[name] for name in REFUSALS if name != "not_above_0"]),
+        answered=int(np.count_nonzero(answered)),
+        refused={reason: count for reason, count in refused.items() if count},
+    )
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class OwnTrials:
     """Trials, one axis, each person's in order of time; persons, methods and instructions as places in their names."""
 
@@ -178,9 +215,8 @@ def own_trials(trials: pd.DataFrame, methods: Sequence[str]) -> OwnTrials:
     instructions, instruction = _instructions(trials)
     sources, source = _names(trials["response_source"])
     time_s = trials["response_time_s"].to_numpy(dtype=np.float64)
-    answered = trials["correct"].notna().to_numpy(dtype=np.bool_)
-    refused, used = _refused(trials, answered, time_s, sources[source])
-    rows = np.flatnonzero(used)
+    found = timed(trials)
+    rows = np.flatnonzero(found.own)
     person = codes_of(trials["participant_id"])
     rows = rows[ordered(person[rows], time_s[rows]).rows]
     return OwnTrials(
@@ -194,28 +230,9 @@ def own_trials(trials: pd.DataFrame, methods: Sequence[str]) -> OwnTrials:
         people=tuple(map(str, trials["participant_id"].cat.categories)),
         methods=tuple(methods),
         instructions=instructions,
-        answered=int(np.count_nonzero(answered)),
-        refused=refused,
+        answered=found.answered,
+        refused=found.refused,
     )
-
-
-def _refused(
-    trials: pd.DataFrame, answered: Flags, time_s: FloatArray, source: NDArray[np.str_]
-) -> tuple[dict[str, int], Flags]:
-    """How many answered trials are refused for which reason, and which are left."""
-    valid = (trials["response_time_valid"] == 1).fillna(value=False).to_numpy(dtype=np.bool_)
-    faults = {
-        "experimenter": source == "experimenter",
-        "no_source": ~np.isin(source, (*OWN, "experimenter")),
-        "not_valid": ~valid,
-        "no_time": np.isnan(time_s),
-        "not_above_0": time_s <= 0.0,
-    }
-    left, counts = answered, dict[str, int]()
-    for reason, fault in faults.items():
-        counts[reason] = int(np.count_nonzero(left & fault))
-        left = left & ~fault
-    return {reason: count for reason, count in counts.items() if count}, left
 
 
 def _instructions(trials: pd.DataFrame) -> tuple[tuple[str, ...], Places]:

@@ -124,14 +124,25 @@ class PersonCells:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
+class Mean:
+    """A mean over people with its 95 % interval, and the SD of their values; `None` for what so few leave undefined."""
+
+    mean: float | None
+    sd: float | None
+    ci_low: float | None
+    ci_high: float | None
+    people: int
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
 class InstructionEffect:
     """What instruction `a` gives more than `b`, paired by person; `method` None for the mean over all methods."""
 
     a: str
     b: str
     method: str | None
-    accuracy: MeanEstimate
-    mean_s: MeanEstimate
+    accuracy: Mean
+    mean_s: Mean
 
 
 def person_cells(own: OwnTrials) -> PersonCells:
@@ -158,9 +169,16 @@ def _shares(sums: FloatArray, counts: FloatArray) -> FloatArray:
     return np.divide(sums, counts, out=np.full_like(sums, np.nan), where=counts > 0.0)
 
 
-def over_people(name: str, values: FloatArray) -> MeanEstimate:
-    """The mean over the people who have a value."""
-    return mean_estimate(name, values[np.isfinite(values)])
+def over_people(values: FloatArray) -> Mean:
+    """The mean over the people who have a value, those whose is not NaN."""
+    one = mean_estimate("", values[np.isfinite(values)])
+    low, high = defined(one.ci_low), defined(one.ci_high)
+    return Mean(mean=defined(one.value), sd=defined(one.sd), ci_low=low, ci_high=high, people=one.people)
+
+
+def defined(value: float) -> float | None:
+    """`None` for what is undefined: the counts beside it say why."""
+    return float(value) if math.isfinite(value) else None
 
 
 def instruction_effects(
@@ -180,8 +198,8 @@ def instruction_effects(
                 a=instructions[a],
                 b=instructions[b],
                 method=method,
-                accuracy=over_people("accuracy", by_rate),
-                mean_s=over_people("mean_s", by_time),
+                accuracy=over_people(by_rate),
+                mean_s=over_people(by_time),
             )
 
 

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from typing import Any
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 
 import numpy as np
 import pandas as pd
@@ -11,64 +11,80 @@ from numpy.typing import NDArray
 
 from analysis.stats.arrays import FloatArray
 from analysis.stats.cells import Finite
-
-Json = dict[str, Any]
-Flags = NDArray[np.bool_]
+from analysis.times.own_trials import timed
 
 DIRECTIONS = ("forward", "backward")
 _KEYS = ("participant_id", "method", "direction")
 _PERCENT = np.arange(101)
 
 
-def response_times(trials: pd.DataFrame, methods: Sequence[str]) -> Json:
-    """Distributions of the valid response times in seconds, for `direction.response_times` of `statistics.json`.
+@dataclass(frozen=True, slots=True, kw_only=True)
+class TimeSpread:
+    """How some times spread: mean and SD (`None` of a single time) in s, and the percentiles 0, 1, ..., 100."""
 
-    `n` valid times and `left_out` answered trials without one (corrected, or by the experimenter's hand); `methods`
-    and `directions` hold n, mean, SD and the percentiles 0, 1, ..., 100; `participants` the median of each one's times
-    by method and direction.
+    n: int
+    participants: int
+    mean: float
+    sd: float | None
+    percentiles: tuple[float, ...]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ResponseTimes:
+    """Distributions of the valid response times in s, as in `direction.response_times` of `statistics.json`.
+
+    `n` valid times and `left_out` answered trials without one; their spread by method (`None` without a time) and by
+    method and direction; each participant's median by method and direction.
     """
-    valid = trials[[*_KEYS, "response_time_s"]][valid_times(trials)]
+
+    n: int
+    left_out: int
+    methods: Mapping[str, TimeSpread | None]
+    directions: Mapping[str, Mapping[str, TimeSpread]]
+    participants: Mapping[str, Mapping[str, Mapping[str, float]]]
+
+
+def response_times(trials: pd.DataFrame, methods: Sequence[str]) -> ResponseTimes:
+    """The distributions of a table's response times, as far as `own_trials.timed` finds them valid."""
+    found = timed(trials)
+    valid = trials[[*_KEYS, "response_time_s"]][found.own]
     seconds, people = valid["response_time_s"].to_numpy(dtype=np.float64), _codes(valid["participant_id"])
     under = {method: np.asarray(valid["method"] == method) for method in methods}
     towards = {direction: np.asarray(valid["direction"] == direction) for direction in DIRECTIONS}
+    both = {method: {way: rows & there for way, there in towards.items()} for method, rows in under.items()}
 
-    def by_direction(rows: Flags) -> Json:
-        chosen = {direction: rows & there for direction, there in towards.items()}
-        return {direction: _spread(seconds[rows], people[rows]) for direction, rows in chosen.items() if rows.any()}
+    def spread(rows: NDArray[np.bool_]) -> TimeSpread | None:
+        return _spread(seconds[rows], people[rows]) if rows.any() else None
 
-    return {
-        "n": len(valid),
-        "left_out": int(trials["correct"].notna().sum()) - len(valid),
-        "methods": {method: _spread(seconds[rows], people[rows]) for method, rows in under.items()},
-        "directions": {method: by_direction(rows) for method, rows in under.items()},
-        "participants": _medians(valid),
-    }
-
-
-def valid_times(trials: pd.DataFrame) -> pd.Series:
-    """Which rows hold a response time that is the participant's own."""
-    return (trials["response_time_valid"] == 1).fillna(False).astype(bool) & trials["response_time_s"].notna()
+    return ResponseTimes(
+        n=len(valid),
+        left_out=found.answered - len(valid),
+        methods={method: spread(rows) for method, rows in under.items()},
+        directions={
+            method: {way: times for way, rows in ways.items() if (times := spread(rows))}
+            for method, ways in both.items()
+        },
+        participants=_medians(valid),
+    )
 
 
 def _codes(column: pd.Series) -> NDArray[np.intp]:
     return column.astype("category").cat.codes.to_numpy().astype(np.intp)
 
 
-def _spread(seconds: FloatArray, people: NDArray[np.intp]) -> Json | None:
-    """None without a time; the SD None of a single one. Sorted first: the order of the files changes no last digit."""
+def _spread(seconds: FloatArray, people: NDArray[np.intp]) -> TimeSpread:
+    """Of at least one time. Sorted first: the order of the files changes no last digit."""
     times = np.sort(seconds)
-    if not times.size:
-        return None
-    return {
-        "n": int(times.size),
-        "participants": int(np.count_nonzero(np.bincount(people))),
-        "mean": float(times.mean()),
-        "sd": float(times.std(ddof=1)) if times.size > 1 else None,
-        "percentiles": np.percentile(times, _PERCENT).tolist(),
-    }
+    return TimeSpread(
+        n=int(times.size),
+        participants=int(np.count_nonzero(np.bincount(people))),
+        mean=float(times.mean()),
+        sd=float(times.std(ddof=1)) if times.size > 1 else None,
+        percentiles=tuple(np.percentile(times, _PERCENT).tolist()),
+    )
 
 
-def _medians(valid: pd.DataFrame) -> Json:
+def _medians(valid: pd.DataFrame) -> Mapping[str, Mapping[str, Mapping[str, float]]]:
     """The median of each participant's times by method and direction, as far as there are some."""
     keys = [valid[name].astype("category").cat for name in _KEYS]
     names = [[str(name) for name in key.categories] for key in keys]
@@ -77,9 +93,9 @@ def _medians(valid: pd.DataFrame) -> Json:
     shape = tuple(map(len, names))
     cell = np.ravel_multi_index(tuple(key.codes.to_numpy().astype(np.intp) for key in keys), shape)
     medians = pd.Series(valid["response_time_s"].to_numpy()).groupby(cell).median()
-    found: Json = {}
+    found = Finite()
     places = (place.tolist() for place in np.unravel_index(medians.index.to_numpy(), shape))
     for person, method, direction, median in zip(*places, medians.tolist(), strict=True):
         own = found.setdefault(names[0][person], {}).setdefault(names[1][method], {})
         own[names[2][direction]] = median
-    return Finite(found) if np.isfinite(medians).all() else found
+    return found

@@ -1,39 +1,38 @@
-"""The speed-accuracy trade-off of experiment 1, as plain values for `direction.speed_accuracy` of `statistics.json`."""
+"""The speed-accuracy trade-off of experiment 1: `direction.speed_accuracy` of `statistics.json`, as typed results."""
 
 from __future__ import annotations
 
-import math
 from collections.abc import Mapping, Sequence
-from typing import Any
+from dataclasses import dataclass
 
 import numpy as np
 import pandas as pd
-from numpy.typing import NDArray
 
 from analysis.stats.arrays import FloatArray
 from analysis.times.ez import ez_people
-from analysis.times.fit import DiffusionFit, Estimate
+from analysis.times.fit import DiffusionFit
 from analysis.times.own_trials import REFUSALS, OwnTrials, own_trials
 from analysis.times.people import (
-    MeanEstimate,
+    InstructionEffect,
+    Mean,
     PeopleFit,
     PersonCells,
     SampledFit,
+    defined,
     instruction_effects,
-    mean_estimate,
     over_people,
     person_cells,
     sampled_fit,
 )
 from analysis.times.trade import (
     QUANTILES,
+    ConditionalAccuracy,
+    QuantileProbability,
     balanced_integration,
     conditional_accuracy,
     inverse_efficiency,
     quantile_probability,
 )
-
-Json = dict[str, Any]
 
 BINS = 5
 FEWEST_CORRECT = 5
@@ -74,59 +73,174 @@ ALL_BY_HAND = (
 NO_TIMES = "No measure of the speed-accuracy trade-off is given: no answered trial has a time of the answerer's own."
 
 
-def speed_accuracy(trials: pd.DataFrame, methods: Sequence[str]) -> Json:
-    """Measures of speed and accuracy by method and instruction, over times of the answerer's own hand alone.
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Refused:
+    """How many answered trials are refused, and why."""
 
-    `n` of the `answered` trials are used, the others are `refused`, with the reason. Without any of use `methods` is
-    empty and `reason` says why. What is undefined is None. `trials` is a coded table.
+    trials: int
+    why: str
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class EZLeftOut:
+    """How many people have no EZ estimate, by the reason."""
+
+    few_correct: int
+    equal_times: int
+    non_decision_below_0: int
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class EZMeans:
+    """EZ-diffusion over people; `corrected` of them had no error or nothing but errors."""
+
+    drift: Mean
+    boundary: Mean
+    non_decision_s: Mean
+    corrected: int
+    left_out: EZLeftOut
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class CellTrade:
+    """The measures of a method under an instruction."""
+
+    n: int
+    accuracy: Mean
+    mean_s: Mean
+    median_s: Mean
+    inverse_efficiency_s: Mean
+    balanced_integration: Mean
+    conditional_accuracy: ConditionalAccuracy
+    quantile_probability: QuantileProbability
+    ez: EZMeans
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Parameter:
+    """A parameter of the fit of all trials; `None` for what the data do not tell."""
+
+    value: float | None
+    se: float | None
+    ci_low: float | None
+    ci_high: float | None
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class EachFit:
+    """Each parameter's mean over the people who have it; fits without a clear peak are left out."""
+
+    estimates: Mapping[str, Mean]
+    left_out: int
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class TogetherFit:
+    """The fit of all trials as if they were of one person."""
+
+    estimates: Mapping[str, Parameter]
+    log_likelihood: float | None
+    unidentified: tuple[str, ...]
+    reason: str | None
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Diffusion:
+    """The diffusion fitted to `fitted` of the people: person by person, and together; without fits, the reason."""
+
+    people: int
+    fitted: int
+    trials: int
+    reason: str | None
+    each: EachFit | None
+    together: TogetherFit | None
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class _UsedTrials:
+    """`n` of the `answered` trials are used, the others refused; `reason` says why none is."""
+
+    n: int
+    people: int
+    answered: int
+    refused: Mapping[str, Refused]
+    reason: str | None
+    instructions: tuple[str, ...]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class NoSpeedAccuracy(_UsedTrials):
+    """A log without a trial of use; so `methods` is empty."""
+
+    methods: Mapping[str, Mapping[str, CellTrade]]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class SpeedAccuracy(_UsedTrials):
+    """The measures by method and instruction, as far as there are such trials, over times of the answerer's own."""
+
+    quantiles: tuple[float, ...]
+    methods: Mapping[str, Mapping[str, CellTrade]]
+    instruction_effects: tuple[InstructionEffect, ...]
+    diffusion: Diffusion
+    caveats: Mapping[str, str]
+
+
+def speed_accuracy(trials: pd.DataFrame, methods: Sequence[str]) -> SpeedAccuracy | NoSpeedAccuracy:
+    """Measures of speed and accuracy over times of the answerer's own hand alone, if there are some.
+
+    `trials` is a coded table.
     """
     own = own_trials(trials, methods)
-    found: Json = {
-        "n": int(own.time_s.size),
-        "people": int(np.unique(own.person).size),
-        "answered": own.answered,
-        "refused": {reason: {"trials": count, "why": REFUSALS[reason]} for reason, count in own.refused.items()},
-        "reason": None,
-        "instructions": list(own.instructions),
-    }
-    if not own.time_s.size:
-        by_hand = set(own.refused) == {"experimenter"}
-        return found | {"reason": ALL_BY_HAND if by_hand else NO_TIMES, "methods": {}}
+    n, people = int(own.time_s.size), int(np.unique(own.person).size)
+    refused = {reason: Refused(trials=count, why=REFUSALS[reason]) for reason, count in own.refused.items()}
+    if not n:
+        return NoSpeedAccuracy(
+            n=n,
+            people=people,
+            answered=own.answered,
+            refused=refused,
+            reason=ALL_BY_HAND if set(refused) == {"experimenter"} else NO_TIMES,
+            instructions=own.instructions,
+            methods={},
+        )
     cells = person_cells(own)
-    return found | {
-        "quantiles": list(QUANTILES),
-        "methods": _methods(own, cells),
-        "instruction_effects": [
-            {"a": one.a, "b": one.b, "method": one.method, "accuracy": _mean(one.accuracy), "mean_s": _mean(one.mean_s)}
-            for one in instruction_effects(cells, own.methods, own.instructions)
-        ],
-        "diffusion": _diffusion(sampled_fit(own)),
-        "caveats": CAVEATS,
-    }
+    return SpeedAccuracy(
+        n=n,
+        people=people,
+        answered=own.answered,
+        refused=refused,
+        reason=None,
+        instructions=own.instructions,
+        quantiles=QUANTILES,
+        methods=_methods(own, cells),
+        instruction_effects=tuple(instruction_effects(cells, own.methods, own.instructions)),
+        diffusion=_diffusion(sampled_fit(own)),
+        caveats=CAVEATS,
+    )
 
 
-def _methods(own: OwnTrials, cells: PersonCells) -> Json:
-    """What is told of each method and instruction that has trials."""
+def _methods(own: OwnTrials, cells: PersonCells) -> dict[str, dict[str, CellTrade]]:
+    """The measures of each method and instruction that has trials."""
     efficiency, balanced = _inverse_efficiency(cells), _balanced_integration(cells)
-    result: Json = {}
+    found: dict[str, dict[str, CellTrade]] = {}
     for i, method in enumerate(own.methods):
         for k, instruction in enumerate(own.instructions):
             some = own.cell(method, instruction)
+            columns = some.correct, some.time_s, some.source, some.person
             if some.time_s.size:
-                means = {name: _mean(over_people(name, values[:, i, k])) for name, values in _measures(cells).items()}
-                result.setdefault(method, {})[instruction] = {
-                    "n": int(some.time_s.size),
-                    **means,
-                    "inverse_efficiency_s": _mean(over_people("", efficiency[:, i, k])),
-                    "balanced_integration": _mean(over_people("", balanced[:, i, k])),
-                    **_curves(some),
-                    "ez": _ez(some),
-                }
-    return result
-
-
-def _measures(cells: PersonCells) -> dict[str, FloatArray]:
-    return {"accuracy": cells.rate, "mean_s": cells.mean_s, "median_s": cells.median_s}
+                found.setdefault(method, {})[instruction] = CellTrade(
+                    n=int(some.time_s.size),
+                    accuracy=over_people(cells.rate[:, i, k]),
+                    mean_s=over_people(cells.mean_s[:, i, k]),
+                    median_s=over_people(cells.median_s[:, i, k]),
+                    inverse_efficiency_s=over_people(efficiency[:, i, k]),
+                    balanced_integration=over_people(balanced[:, i, k]),
+                    conditional_accuracy=conditional_accuracy(*columns, bins=BINS),
+                    quantile_probability=quantile_probability(*columns),
+                    ez=_ez(some),
+                )
+    return found
 
 
 def _inverse_efficiency(cells: PersonCells) -> FloatArray:
@@ -150,82 +264,51 @@ def _balanced_integration(cells: PersonCells) -> FloatArray:
     return found
 
 
-def _curves(some: OwnTrials) -> Json:
-    """Conditional accuracy function and quantile-probability points, errors before correct answers."""
-    columns = some.correct, some.time_s, some.source, some.person
-    curve, points = conditional_accuracy(*columns, bins=BINS), quantile_probability(*columns)
-    return {
-        "conditional_accuracy": {
-            "mean_time_s": _list(curve.mean_time_s),
-            "accuracy": _list(curve.accuracy),
-            "people": curve.people,
-            "left_out": curve.left_out,
-        },
-        "quantile_probability": {
-            "probability": _list(points.probability),
-            "quantiles_s": [_list(row) for row in points.quantiles_s],
-            "people": points.people.tolist(),
-        },
-    }
-
-
-def _ez(some: OwnTrials) -> Json:
+def _ez(some: OwnTrials) -> EZMeans:
     found = ez_people(some.correct, some.time_s, some.source, some.person, FEWEST_CORRECT)
-    left_out: dict[str, NDArray[np.bool_]] = {
-        "few_correct": found.few,
-        "equal_times": found.flat,
-        "non_decision_below_0": found.impossible,
-    }
-    return {
-        **{name: _mean(over_people(name, getattr(found, name))) for name in ("drift", "boundary", "non_decision_s")},
-        "corrected": int(found.corrected.sum()),
-        "left_out": {why: int(flags.sum()) for why, flags in left_out.items()},
-    }
+    return EZMeans(
+        drift=over_people(found.drift),
+        boundary=over_people(found.boundary),
+        non_decision_s=over_people(found.non_decision_s),
+        corrected=int(found.corrected.sum()),
+        left_out=EZLeftOut(
+            few_correct=int(found.few.sum()),
+            equal_times=int(found.flat.sum()),
+            non_decision_below_0=int(found.impossible.sum()),
+        ),
+    )
 
 
-def _diffusion(found: SampledFit) -> Json:
-    return {
-        "people": found.people,
-        "fitted": found.fitted,
-        "trials": found.trials,
-        "reason": found.reason,
-        "each": None if found.each is None else _each(found.each),
-        "together": None if found.together is None else _together(found.together),
-    }
+def _diffusion(found: SampledFit) -> Diffusion:
+    return Diffusion(
+        people=found.people,
+        fitted=found.fitted,
+        trials=found.trials,
+        reason=found.reason,
+        each=None if found.each is None else _each(found.each),
+        together=None if found.together is None else _together(found.together),
+    )
 
 
-def _each(found: PeopleFit) -> Json:
-    """The mean of each parameter over the people who have it; fits without a clear peak are left out."""
+def _each(found: PeopleFit) -> EachFit:
     clear = [one for one in found.fits if one.reason is None]
     values: dict[str, list[float]] = {}
     for estimate in (estimate for one in clear for estimate in one.estimates):
         values.setdefault(estimate.name, []).append(estimate.value)
-    means = {name: _mean(mean_estimate(name, own)) for name, own in values.items()}
-    return {"estimates": means, "left_out": len(found.fits) - len(clear)}
+    means = {name: over_people(np.array(own)) for name, own in values.items()}
+    return EachFit(estimates=means, left_out=len(found.fits) - len(clear))
 
 
-def _together(found: DiffusionFit) -> Json:
-    return {
-        "estimates": {} if found.reason else {one.name: _estimate(one) for one in found.estimates},
-        "log_likelihood": _some(found.log_likelihood),
-        "unidentified": list(found.unidentified),
-        "reason": found.reason,
-    }
-
-
-def _estimate(one: Estimate) -> Json:
-    return {name: _some(getattr(one, name)) for name in ("value", "se", "ci_low", "ci_high")}
-
-
-def _mean(one: MeanEstimate) -> Json:
-    values: Mapping[str, float] = {"mean": one.value, "sd": one.sd, "ci_low": one.ci_low, "ci_high": one.ci_high}
-    return {**{name: _some(value) for name, value in values.items()}, "people": one.people}
-
-
-def _list(values: FloatArray) -> list[float | None]:
-    return [_some(value) for value in values.tolist()]
-
-
-def _some(value: float) -> float | None:
-    """None for what is undefined: the counts beside it say why."""
-    return float(value) if math.isfinite(value) else None
+def _together(found: DiffusionFit) -> TogetherFit:
+    known = () if found.reason else found.estimates
+    return TogetherFit(
+        estimates={
+            one.name: Parameter(
+                value=defined(one.value), se=defined(one.se), ci_low=defined(one.ci_low), ci_high=defined(one.ci_high)
+            )
+            for one in known
+        },
+        log_likelihood=defined(found.log_likelihood),
+        unidentified=found.unidentified,
+        reason=found.reason,
+    )

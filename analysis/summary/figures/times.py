@@ -27,6 +27,7 @@ from analysis.report.figures.style import (
     wrapped,
 )
 from analysis.summary.results import DirectionStatistics
+from analysis.times.response_times import ResponseTimes
 
 _PLACES = {"forward": -0.19, "backward": 0.19}
 
@@ -37,7 +38,7 @@ def figure_response_times(found: DirectionStatistics, path_stem: Path) -> tuple[
     `ValueError` if there is no valid time.
     """
     times = found.response_times
-    if not times["n"]:
+    if not times.n:
         raise ValueError("the figure of response times needs at least one valid time")
     with mpl.rc_context(style()):  # type: ignore[arg-type]
         figure = new_figure(8.6 + 1.6 * max(0, len(found.methods) - 3), 3.9)
@@ -48,23 +49,23 @@ def figure_response_times(found: DirectionStatistics, path_stem: Path) -> tuple[
         return save(figure, path_stem)
 
 
-def _limit(times: Mapping[str, Any]) -> float:
+def _limit(times: ResponseTimes) -> float:
     """The end of the time axis: the slowest, but no more than half as much again as 99 in 100 need."""
-    spreads = [spread["percentiles"] for spread in times["methods"].values() if spread]
+    spreads = [spread.percentiles for spread in times.methods.values() if spread]
     return float(min(1.05 * max(p[100] for p in spreads), 1.5 * max(p[99] for p in spreads))) or 1.0
 
 
-def _draw_shares(axes: Axes, times: Mapping[str, Any], methods: Sequence[str], limit: float) -> None:
+def _draw_shares(axes: Axes, times: ResponseTimes, methods: Sequence[str], limit: float) -> None:
     light_grid(axes)
     slowest = 0.0
     for i, method in enumerate(methods):
-        spread = times["methods"].get(method)
+        spread = times.methods.get(method)
         if spread:
-            label = f"{display_name(method)} (n = {spread['n']:,})"
+            label = f"{display_name(method)} (n = {spread.n:,})"
             line = METHOD_LINES[i % len(METHOD_LINES)]
-            shares = np.arange(len(spread["percentiles"]))
-            axes.plot(spread["percentiles"], shares, color=method_colour(i), linestyle=line, linewidth=1.7, label=label)
-            slowest = max(slowest, spread["percentiles"][-1])
+            shares = np.arange(len(spread.percentiles))
+            axes.plot(spread.percentiles, shares, color=method_colour(i), linestyle=line, linewidth=1.7, label=label)
+            slowest = max(slowest, spread.percentiles[-1])
     axes.set_xlim(0.0, limit)
     axes.set_ylim(0.0, 101.0)
     beyond = f"\n(cut: the slowest took {slowest:.1f} s)" if slowest > limit else ""
@@ -74,14 +75,14 @@ def _draw_shares(axes: Axes, times: Mapping[str, Any], methods: Sequence[str], l
     axes.legend(loc="best", fontsize=8.0, handlelength=3.2, framealpha=0.9)
 
 
-def _draw_boxes(axes: Axes, times: Mapping[str, Any], methods: Sequence[str]) -> None:
+def _draw_boxes(axes: Axes, times: ResponseTimes, methods: Sequence[str]) -> None:
     light_grid(axes)
     for i, method in enumerate(methods):
         for direction, place in _PLACES.items():
-            spread = times["directions"].get(method, {}).get(direction)
+            spread = times.directions.get(method, {}).get(direction)
             if spread:
-                _draw_box(axes, i + place, spread["percentiles"], method_colour(i), filled=direction == "forward")
-                _draw_medians(axes, i + place, times["participants"], method, direction)
+                _draw_box(axes, i + place, spread.percentiles, method_colour(i), filled=direction == "forward")
+                _draw_medians(axes, i + place, times.participants, method, direction)
     axes.set_xlim(-0.6, len(methods) - 0.4)
     axes.set_ylim(bottom=0.0)
     axes.set_xticks(range(len(methods)), [f"{_counts(times, m)}\n{wrapped(m)}" for m in methods])
@@ -122,10 +123,10 @@ def _draw_medians(axes: Axes, place: float, participants: Mapping[str, Any], met
         axes.plot(across, medians, marker, markersize=size, mfc="white", mec=INK, mew=0.6, zorder=3.0)
 
 
-def _counts(times: Mapping[str, Any], method: str) -> str:
-    spreads = times["directions"].get(method, {})
-    return "n = " + " / ".join(f"{spreads[d]['n'] if d in spreads else 0:,}" for d in _PLACES)
+def _counts(times: ResponseTimes, method: str) -> str:
+    spreads = times.directions.get(method, {})
+    return "n = " + " / ".join(f"{spreads[d].n if d in spreads else 0:,}" for d in _PLACES)
 
 
-def _medians_note(times: Mapping[str, Any]) -> str:
-    return "" if len(times["participants"]) > MANY else "; points: participants' medians"
+def _medians_note(times: ResponseTimes) -> str:
+    return "" if len(times.participants) > MANY else "; points: participants' medians"

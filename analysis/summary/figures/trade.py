@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 import textwrap
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, Protocol
+from typing import Protocol
 
 import matplotlib as mpl
 import numpy as np
@@ -26,8 +26,10 @@ from analysis.report.figures.style import (
     style,
 )
 from analysis.summary.results import DirectionStatistics
+from analysis.times.speed_accuracy import CellTrade, NoSpeedAccuracy, SpeedAccuracy
 
-Statistics = Mapping[str, Any]
+_Cells = Sequence[tuple[int, CellTrade]]
+"""One instruction's cells, each with the place of its method, which has its colour and mark from there."""
 
 _MARKERS = ("o", "s", "D", "^", "v", "P", "X")
 _ACROSS = 3
@@ -35,8 +37,8 @@ _ACROSS = 3
 
 
 class _Draw(Protocol):
-    def __call__(self, axes: Axes, cells: Statistics, found: DirectionStatistics, *, last: bool) -> None:
-        """Draw one instruction's cells, by method; `last` of its row of panels."""
+    def __call__(self, axes: Axes, cells: _Cells, trade: SpeedAccuracy, *, last: bool) -> None:
+        """Draw one instruction's cells; `last` of its row of panels."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -44,7 +46,7 @@ class _Panel:
     """What is drawn in each panel, and how far the axes go that all share."""
 
     draw: _Draw
-    limit: Callable[[Axes, Statistics], None]
+    limit: Callable[[Axes, SpeedAccuracy], None]
     across: str
     upward: str
     lines: bool
@@ -53,41 +55,42 @@ class _Panel:
 def figure_conditional_accuracy(found: DirectionStatistics, path_stem: Path) -> tuple[Path, Path, Path]:
     """Accuracy over response time, a line a method, a panel an instruction; PNG, SVG and PDF are written.
 
-    `found` is `direction` of `statistics.json`. `ValueError` if nobody has a trial in every bin.
+    `ValueError` if nobody has a trial in every bin.
     """
-    if not has_curve(found):
+    if not isinstance(found.speed_accuracy, SpeedAccuracy) or not has_curve(found):
         raise ValueError("the figure of conditional accuracy needs somebody with a trial in every bin")
-    return _panels(found, path_stem, _CURVES)
+    return _panels(found.methods, found.speed_accuracy, path_stem, _CURVES)
 
 
 def figure_quantile_probability(found: DirectionStatistics, path_stem: Path) -> tuple[Path, Path, Path]:
     """Quantiles of the times of errors and correct answers over their probabilities; PNG, SVG and PDF are written.
 
-    `found` is `direction` of `statistics.json`. `ValueError` if nobody has enough answers of a kind.
+    `ValueError` if nobody has enough answers of a kind.
     """
-    if not has_points(found):
+    if not isinstance(found.speed_accuracy, SpeedAccuracy) or not has_points(found):
         raise ValueError("the quantile-probability plot needs somebody with five answers of a kind")
-    return _panels(found, path_stem, _POINTS)
+    return _panels(found.methods, found.speed_accuracy, path_stem, _POINTS)
 
 
 def has_curve(found: DirectionStatistics) -> bool:
     """Whether there is a conditional accuracy function to draw."""
-    return any(cell["conditional_accuracy"]["people"] for cell in _cells_of(found.speed_accuracy or {}))
+    return any(cell.conditional_accuracy.people for cell in _cells_of(found.speed_accuracy))
 
 
 def has_points(found: DirectionStatistics) -> bool:
     """Whether there is a point of a quantile-probability plot."""
-    return any(any(cell["quantile_probability"]["people"]) for cell in _cells_of(found.speed_accuracy or {}))
+    return any(any(cell.quantile_probability.people) for cell in _cells_of(found.speed_accuracy))
 
 
-def _cells_of(trade: Statistics) -> list[Statistics]:
-    return [cell for by_instruction in trade.get("methods", {}).values() for cell in by_instruction.values()]
+def _cells_of(trade: SpeedAccuracy | NoSpeedAccuracy | None) -> list[CellTrade]:
+    if trade is None:
+        return []
+    return [cell for by_instruction in trade.methods.values() for cell in by_instruction.values()]
 
 
-def _panels(found: DirectionStatistics, path_stem: Path, panel: _Panel) -> tuple[Path, Path, Path]:
+def _panels(methods: Sequence[str], trade: SpeedAccuracy, path_stem: Path, panel: _Panel) -> tuple[Path, Path, Path]:
     """A panel an instruction on shared axes, the methods' legend above all."""
-    trade = found.speed_accuracy or {}
-    instructions = [i for i in trade["instructions"] if any(i in one for one in trade["methods"].values())]
+    instructions = [i for i in trade.instructions if any(i in one for one in trade.methods.values())]
     columns = min(_ACROSS, len(instructions))
     rows = -(-len(instructions) // columns)
     with mpl.rc_context(style()):  # type: ignore[arg-type]
@@ -97,8 +100,8 @@ def _panels(found: DirectionStatistics, path_stem: Path, panel: _Panel) -> tuple
             spare.set_visible(False)
         for k, (axes, instruction) in enumerate(zip(grid, instructions, strict=False)):
             light_grid(axes)
-            cells = {m: one[instruction] for m, one in trade["methods"].items() if instruction in one}
-            panel.draw(axes, cells, found, last=(k + 1) % columns == 0)
+            told = [(methods.index(m), one[instruction]) for m, one in trade.methods.items() if instruction in one]
+            panel.draw(axes, told, trade, last=(k + 1) % columns == 0)
             axes.tick_params(labelbottom=True)
             axes.set_xlabel(panel.across)
             axes.set_ylabel("" if k % columns else panel.upward)
@@ -106,11 +109,12 @@ def _panels(found: DirectionStatistics, path_stem: Path, panel: _Panel) -> tuple
                 title = textwrap.shorten(f"({chr(ord('a') + k)}) {instruction}", 36, placeholder=" ...")
                 axes.set_title(title, loc="left", fontweight="bold", parse_math=False)
         panel.limit(grid[0], trade)
-        figure.legend(handles=_handles(found, lines=panel.lines), loc="outside upper center", ncols=3, frameon=False)
+        shown = [(i, method) for i, method in enumerate(methods) if method in trade.methods]
+        figure.legend(handles=_handles(shown, lines=panel.lines), loc="outside upper center", ncols=3, frameon=False)
         return save(figure, path_stem)
 
 
-def _handles(found: DirectionStatistics, *, lines: bool) -> list[Line2D]:
+def _handles(methods: Sequence[tuple[int, str]], *, lines: bool) -> list[Line2D]:
     """The methods by colour, mark and, where there are lines, line."""
     return [
         Line2D(
@@ -122,18 +126,17 @@ def _handles(found: DirectionStatistics, *, lines: bool) -> list[Line2D]:
             markersize=5.5,
             label=display_name(method),
         )
-        for i, method in enumerate(found.methods)
-        if method in (found.speed_accuracy or {})["methods"]
+        for i, method in methods
     ]
 
 
-def _draw_curves(axes: Axes, cells: Statistics, found: DirectionStatistics, *, last: bool) -> None:
-    for method, cell in cells.items():
-        curve, i = cell["conditional_accuracy"], found.methods.index(method)
-        if curve["people"]:
+def _draw_curves(axes: Axes, cells: _Cells, trade: SpeedAccuracy, *, last: bool) -> None:  # noqa: ARG001 - one of two
+    for i, cell in cells:
+        curve = cell.conditional_accuracy
+        if curve.people:
             axes.plot(
-                curve["mean_time_s"],
-                100.0 * np.array(curve["accuracy"]),
+                curve.mean_time_s,
+                100.0 * np.array(curve.accuracy),
                 color=method_colour(i),
                 linestyle=METHOD_LINES[i % len(METHOD_LINES)],
                 marker=_MARKERS[i % len(_MARKERS)],
@@ -145,20 +148,20 @@ def _draw_curves(axes: Axes, cells: Statistics, found: DirectionStatistics, *, l
     reference_line(axes, 50.0, "chance" if last else "")
 
 
-def _limit_curves(axes: Axes, trade: Statistics) -> None:
-    times = [t for cell in _cells_of(trade) for t in cell["conditional_accuracy"]["mean_time_s"] if t is not None]
+def _limit_curves(axes: Axes, trade: SpeedAccuracy) -> None:
+    times = [t for cell in _cells_of(trade) for t in cell.conditional_accuracy.mean_time_s if t is not None]
     axes.set_xlim(0.0, 1.05 * max(times))
     axes.set_ylim(0.0, 100.0)
 
 
-def _draw_points(axes: Axes, cells: Statistics, found: DirectionStatistics, *, last: bool) -> None:
+def _draw_points(axes: Axes, cells: _Cells, trade: SpeedAccuracy, *, last: bool) -> None:
     """Each kind of answer of each method as a column of quantiles; grey lines join equal quantiles."""
     columns: list[tuple[float, Sequence[float]]] = []
-    for method, cell in cells.items():
-        i, points = found.methods.index(method), cell["quantile_probability"]
+    for i, cell in cells:
+        points = cell.quantile_probability
         for kind, fill in ((0, "white"), (1, method_colour(i))):
-            if points["people"][kind]:
-                probability, quantiles = points["probability"][kind], points["quantiles_s"][kind]
+            if points.people[kind]:
+                probability, quantiles = points.probability[kind], points.quantiles_s[kind]
                 columns.append((probability, quantiles))
                 axes.plot(
                     [probability] * len(quantiles),
@@ -172,7 +175,7 @@ def _draw_points(axes: Axes, cells: Statistics, found: DirectionStatistics, *, l
                     zorder=3.0,
                     clip_on=False,
                 )
-    _join(axes, columns, (found.speed_accuracy or {})["quantiles"])
+    _join(axes, columns, trade.quantiles)
     axes.axvline(0.5, color="#666666", linewidth=0.9, linestyle=(0, (4, 3)), zorder=1.5)
     if last:
         kinds = (("white", "errors"), (INK, "correct answers"))
@@ -180,8 +183,8 @@ def _draw_points(axes: Axes, cells: Statistics, found: DirectionStatistics, *, l
         axes.legend(handles=handles, loc="lower left", fontsize=8.0, framealpha=0.9)
 
 
-def _limit_points(axes: Axes, trade: Statistics) -> None:
-    rows = [row for cell in _cells_of(trade) for row in cell["quantile_probability"]["quantiles_s"]]
+def _limit_points(axes: Axes, trade: SpeedAccuracy) -> None:
+    rows = [row for cell in _cells_of(trade) for row in cell.quantile_probability.quantiles_s]
     axes.set_xlim(0.0, 1.0)
     axes.set_ylim(0.0, 1.05 * max(t for row in rows for t in row if t is not None))
 

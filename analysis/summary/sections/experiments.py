@@ -5,13 +5,13 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator, Mapping
 from itertools import islice
-from typing import Any
 
 from analysis.report import apa
 from analysis.report.figures.style import display_name
 from analysis.report.section import LISTED, SHOWN, Section, Table
 from analysis.summary.results import DirectionStatistics, Interval, Pair, WithinStatistics
 from analysis.summary.sections.pictures import directions_picture, response_times_picture
+from analysis.times.response_times import ResponseTimes
 
 _WITHIN = (
     ". The CI is within-subject (Cousineau–Morey): it tells of differences between methods, not between people, and is "
@@ -255,12 +255,12 @@ def _binomial_sentence(found: DirectionStatistics) -> str:
     return f"Exact binomial tests of the correct rate: {', and '.join(parts)}. {found.binomial_note}"
 
 
-def _times_sentence(times: Mapping[str, Any]) -> str:
+def _times_sentence(times: ResponseTimes) -> str:
     """How many response times there are, and which are none."""
     left_out = (
-        f"{times['left_out']:,} answered trials have none: it was entered or corrected by the experimenter, whose hand "
+        f"{times.left_out:,} answered trials have none: it was entered or corrected by the experimenter, whose hand "
         "tells nothing of the participant's time."
     )
-    if not times["n"]:
+    if not times.n:
         return f"There is no valid response time, and so no figure of them. {left_out}"
-    return f"Response times: {times['n']:,} valid ones.{' ' + left_out if times['left_out'] else ''}"
+    return f"Response times: {times.n:,} valid ones.{' ' + left_out if times.left_out else ''}"

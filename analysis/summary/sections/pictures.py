@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from pathlib import Path
-from typing import Any
 
 from analysis.report import apa
 from analysis.report.figures.shot import ShotPanel, figure_5
@@ -22,6 +20,7 @@ from analysis.summary.figures.trade import (
 from analysis.summary.results import DirectionStatistics, Sensitivity, StudyStatistics, WithinStatistics
 from analysis.summary.sections.data import EXPERIMENTS, ReportData
 from analysis.summary.sections.trade import CONDITIONAL_ACCURACY, QUANTILE_PROBABILITY
+from analysis.times.response_times import TimeSpread
 
 FIGURE_5, FIGURE_8 = "figure-5", "figure-8"
 DIRECTIONS, RESPONSE_TIMES = "figure-directions", "figure-response-times"
@@ -38,7 +37,7 @@ def write_figures(folder: Path, report: ReportData) -> None:
         figure_8(statistics, folder / FIGURE_8)
     if direction is not None and direction.n:
         figure_directions(direction, folder / DIRECTIONS)
-        if direction.response_times["n"]:
+        if direction.response_times.n:
             figure_response_times(direction, folder / RESPONSE_TIMES)
         _write_trade(folder, direction)
     if report.panels:
@@ -118,21 +117,21 @@ def _sensitivity_words(one: Sensitivity | None) -> str:
 def response_times_picture(found: DirectionStatistics) -> Picture | None:
     """Response times, if there is a valid one."""
     times = found.response_times
-    if not times["n"]:
+    if not times.n:
         return None
-    medians = " Points: medians of the participants." if len(times["participants"]) <= 200 else ""
+    medians = " Points: medians of the participants." if len(times.participants) <= 200 else ""
     caption = (
-        f"Response times from the onset of the pulse, {times['n']:,} valid times of {found.people}. "
+        f"Response times from the onset of the pulse, {times.n:,} valid times of {found.people}. "
         f"(a) Share of the trials answered by then. (b) By direction, n forward / backward; boxes: quartiles, "
         f"whiskers: 5 and 95 %.{medians}"
     )
-    spreads = "; ".join(_spread_words(method, spread) for method, spread in times["methods"].items() if spread)
+    spreads = "; ".join(_spread_words(method, spread) for method, spread in times.methods.items() if spread)
     alt = f"Cumulative distributions and box plots of the response times. {spreads}."
     return Picture(stem=RESPONSE_TIMES, caption=caption, alt=alt)
 
 
-def _spread_words(method: str, spread: Mapping[str, Any]) -> str:
-    low, median, high = (apa.number(spread["percentiles"][at]) for at in (25, 50, 75))
+def _spread_words(method: str, spread: TimeSpread) -> str:
+    low, median, high = (apa.number(spread.percentiles[at]) for at in (25, 50, 75))
     return f"{named(method)} median {median} s, quartiles {low} and {high} s"
 
 

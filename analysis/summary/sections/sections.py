@@ -89,7 +89,7 @@ def _gun(name: str) -> str:
 
 
 def _excluded(statistics: StudyStatistics, experiment: str) -> int:
-    return sum(entry["experiment"] == experiment for entry in statistics.excluded)
+    return sum(entry.experiment == experiment for entry in statistics.excluded)
 
 
 def _verdicts(comparison: tuple[Row, ...]) -> Section:
@@ -182,8 +182,7 @@ def _odds(odds: tuple[Odds, ...]) -> Section:
 
 def _left_out(report: ReportData) -> Section | None:
     excluded = tuple(
-        f"Participant {entry['participant']} in {EXPERIMENTS.get(entry['experiment'], entry['experiment'])}: "
-        f"{entry['reason']}."
+        f"Participant {entry.participant} in {EXPERIMENTS.get(entry.experiment, entry.experiment)}: {entry.reason}."
         for entry in report.statistics.excluded
     )
     names = _short_names(report)

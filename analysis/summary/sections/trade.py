@@ -2,130 +2,134 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
-from typing import Any
+from collections.abc import Iterator
 
 from analysis.report import apa
 from analysis.report.figures.style import display_name, named
 from analysis.report.section import Picture, Section, Table
 from analysis.summary.figures.trade import has_curve, has_points
 from analysis.summary.results import DirectionStatistics
-
-Statistics = Mapping[str, Any]
+from analysis.times.people import Mean
+from analysis.times.speed_accuracy import CellTrade, EZLeftOut, NoSpeedAccuracy, Parameter, SpeedAccuracy
 
 _UNITS = {"drift": "1/√s", "boundary": "√s", "start": "0 to 1", "non_decision_s": "s"}
 _WORDS = {"start": "start (towards forward)", "non_decision_s": "non-decision time"}
-_EZ = {"drift": 2, "boundary": 2, "non_decision_s": 3}
-_LEFT_OUT = {"few_correct": "few correct", "equal_times": "equal times", "non_decision_below_0": "time below 0"}
 
 
-def cells_of(trade: Statistics) -> Iterator[tuple[str, Statistics]]:
+def cells_of(trade: SpeedAccuracy) -> Iterator[tuple[str, CellTrade]]:
     """Each cell under its method's name in print, with the instruction where there are several."""
-    several = len(trade["instructions"]) > 1
-    for method, cells in trade["methods"].items():
+    several = len(trade.instructions) > 1
+    for method, cells in trade.methods.items():
         for instruction, cell in cells.items():
             yield display_name(method) + (f", {instruction}" if several else ""), cell
 
 
-def trade_tables(trade: Statistics) -> Iterator[Table]:
+def trade_tables(trade: SpeedAccuracy) -> Iterator[Table]:
     """Every table; one without rows has nothing to say."""
     yield _accuracy(trade)
     yield _scores(trade)
     yield _effects(trade)
     yield _ez(trade)
-    if not trade["diffusion"]["reason"]:
+    if not trade.diffusion.reason:
         yield _diffusion(trade)
 
 
-def _accuracy(trade: Statistics) -> Table:
+def _accuracy(trade: SpeedAccuracy) -> Table:
     return Table(
         caption="Accuracy and response time: means over participants with 95 % intervals",
         header=("Condition", "Trials", "Correct [%]", "Mean time [s]", "Median time [s]"),
         rows=tuple(
             (
                 name,
-                f"{cell['n']:,}",
-                _mean(cell["accuracy"], 1, 100.0),
-                _mean(cell["mean_s"], 3),
-                _mean(cell["median_s"], 3),
+                f"{cell.n:,}",
+                _mean(cell.accuracy, 1, 100.0),
+                _mean(cell.mean_s, 3),
+                _mean(cell.median_s, 3),
             )
             for name, cell in cells_of(trade)
         ),
     )
 
 
-def _scores(trade: Statistics) -> Table:
+def _scores(trade: SpeedAccuracy) -> Table:
     return Table(
         caption="Scores that join speed and accuracy: means over participants with 95 % intervals, inverse efficiency "
         "(participants with a correct answer) and balanced integration (with one in every condition)",
         header=("Condition", "Participants", "IES [s]", "Participants", "BIS"),
         rows=tuple(
-            (name, *_counted(cell["inverse_efficiency_s"], 3), *_counted(cell["balanced_integration"], 2))
+            (name, *_counted(cell.inverse_efficiency_s, 3), *_counted(cell.balanced_integration, 2))
             for name, cell in cells_of(trade)
         ),
     )
 
 
-def _counted(one: Statistics, digits: int) -> tuple[str, str]:
-    return f"{one['people']:,}", _mean(one, digits)
+def _counted(one: Mean, digits: int) -> tuple[str, str]:
+    return f"{one.people:,}", _mean(one, digits)
 
 
-def _mean(one: Statistics, digits: int, scale: float = 1.0) -> str:
+def _mean(one: Mean, digits: int, scale: float = 1.0) -> str:
     """`mean [low, high]`; a dash for what is undefined, and no interval from one participant."""
-    if one["mean"] is None:
+    if one.mean is None:
         return apa.NONE
-    mean = apa.number(scale * one["mean"], digits)
-    return mean if one["ci_low"] is None else f"{mean} {_ends(one, digits, scale)}"
+    mean = apa.number(scale * one.mean, digits)
+    return mean if one.ci_low is None else f"{mean} {_ends(one, digits, scale)}"
 
 
-def _ends(one: Statistics, digits: int, scale: float = 1.0) -> str:
-    low, high = (None if one[end] is None else scale * one[end] for end in ("ci_low", "ci_high"))
+def _ends(one: Mean | Parameter, digits: int, scale: float = 1.0) -> str:
+    low, high = (None if end is None else scale * end for end in (one.ci_low, one.ci_high))
     return apa.interval(low, high, digits)
 
 
-def _effects(trade: Statistics) -> Table:
+def _effects(trade: SpeedAccuracy) -> Table:
     return Table(
         caption="Effect of the instruction, paired by participant: mean difference with 95 % interval, not corrected "
         "for the number of pairs; positive where the first has more",
         header=("Instructions", "Method", "Participants", "Correct [percentage points]", "Mean time [s]"),
         rows=tuple(
             (
-                f"{one['a']} − {one['b']}",
-                "all methods" if one["method"] is None else display_name(one["method"]),
-                f"{one['accuracy']['people']:,}",
-                _mean(one["accuracy"], 1, 100.0),
-                _mean(one["mean_s"], 3),
+                f"{one.a} − {one.b}",
+                "all methods" if one.method is None else display_name(one.method),
+                f"{one.accuracy.people:,}",
+                _mean(one.accuracy, 1, 100.0),
+                _mean(one.mean_s, 3),
             )
-            for one in trade["instruction_effects"]
-            if one["accuracy"]["people"]
+            for one in trade.instruction_effects
+            if one.accuracy.people
         ),
     )
 
 
-def _ez(trade: Statistics) -> Table:
+def _ez(trade: SpeedAccuracy) -> Table:
     return Table(
         caption="EZ-diffusion by participant: means with 95 % intervals over participants",
         header=("Condition", "Participants", "Drift [1/√s]", "Boundary [√s]", "Non-decision time [s]", "Left out"),
         rows=tuple(
             (
                 name,
-                f"{cell['ez']['drift']['people']:,}",
-                *(_mean(cell["ez"][parameter], digits) for parameter, digits in _EZ.items()),
-                _left_out(cell["ez"]["left_out"]),
+                f"{cell.ez.drift.people:,}",
+                _mean(cell.ez.drift, 2),
+                _mean(cell.ez.boundary, 2),
+                _mean(cell.ez.non_decision_s, 3),
+                _left_out(cell.ez.left_out),
             )
             for name, cell in cells_of(trade)
         ),
     )
 
 
-def _left_out(counts: Statistics) -> str:
-    return ", ".join(f"{count:,} ({_LEFT_OUT[why]})" for why, count in counts.items() if count) or "none"
+def _left_out(people: EZLeftOut) -> str:
+    counts = {
+        "few correct": people.few_correct,
+        "equal times": people.equal_times,
+        "time below 0": people.non_decision_below_0,
+    }
+    return ", ".join(f"{count:,} ({why})" for why, count in counts.items() if count) or "none"
 
 
-def _diffusion(trade: Statistics) -> Table:
-    fits = trade["diffusion"]
-    each, together = fits["each"]["estimates"], fits["together"]["estimates"]
-    order = [*(f"drift {m}" for m in trade["methods"]), *(f"boundary {i}" for i in trade["instructions"]), *_WORDS]
+def _diffusion(trade: SpeedAccuracy) -> Table:
+    each = trade.diffusion.each.estimates if trade.diffusion.each else {}
+    together = trade.diffusion.together.estimates if trade.diffusion.together else {}
+    order = [*(f"drift {m}" for m in trade.methods), *(f"boundary {i}" for i in trade.instructions), *_WORDS]
     return Table(
         caption="Diffusion model by maximum likelihood: mean over participants' own fits, SD of these, and the fit of "
         "all trials together, which is biased where people differ; 95 % intervals",
@@ -147,14 +151,14 @@ def _digits(name: str) -> int:
     return 3 if name in ("start", "non_decision_s") else 2
 
 
-def _of_each(one: Statistics | None, digits: int) -> tuple[str, str, str, str]:
+def _of_each(one: Mean | None, digits: int) -> tuple[str, str, str, str]:
     if one is None:
         return "0", apa.NONE, apa.NONE, apa.NONE
-    return f"{one['people']:,}", apa.number(one["mean"], digits), _ends(one, digits), apa.number(one["sd"], digits)
+    return f"{one.people:,}", apa.number(one.mean, digits), _ends(one, digits), apa.number(one.sd, digits)
 
 
-def _of_all(one: Statistics | None, digits: int) -> tuple[str, str]:
-    return (apa.NONE, apa.NONE) if one is None else (apa.number(one["value"], digits), _ends(one, digits))
+def _of_all(one: Parameter | None, digits: int) -> tuple[str, str]:
+    return (apa.NONE, apa.NONE) if one is None else (apa.number(one.value, digits), _ends(one, digits))
 
 
 def _parameter(name: str) -> str:
@@ -171,13 +175,13 @@ CONDITIONAL_ACCURACY, QUANTILE_PROBABILITY = "figure-conditional-accuracy", "fig
 
 
 def trade_section(found: DirectionStatistics) -> Section | None:
-    """The section, or the sentence why there is nothing to show; `found` is `direction` of `statistics.json`."""
+    """The section, or the sentence why there is nothing to show."""
     trade = found.speed_accuracy
     if trade is None:
         return None
-    if trade["reason"]:
-        return Section(title=TITLE, paragraphs=(trade["reason"], *_refused(trade)))
-    caveats = trade["caveats"]
+    if isinstance(trade, NoSpeedAccuracy):
+        return Section(title=TITLE, paragraphs=(trade.reason or "", *_refused(trade)))
+    caveats = trade.caveats
     return Section(
         title=TITLE,
         paragraphs=(
@@ -188,7 +192,7 @@ def trade_section(found: DirectionStatistics) -> Section | None:
             caveats["ez"],
             *_fitted(trade),
         ),
-        pictures=trade_pictures(found),
+        pictures=trade_pictures(found, trade),
         tables=tuple(table for table in trade_tables(trade) if table.rows),
     )
 
@@ -197,24 +201,24 @@ def _lower(text: str) -> str:
     return text[:1].lower() + text[1:]
 
 
-def _used(found: DirectionStatistics, trade: Statistics) -> str:
+def _used(found: DirectionStatistics, trade: SpeedAccuracy) -> str:
     """How many trials count, and whose they are."""
-    used = f"{trade['n']:,} of {trade['answered']:,} answered trials have a time of the answerer's own hand"
+    used = f"{trade.n:,} of {trade.answered:,} answered trials have a time of the answerer's own hand"
     synthetic = found.origin.synthetic
     model = " All times are synthetic: they show the observer's model, and nothing of people." if synthetic else ""
-    return " ".join([f"{used} ({_count(trade['people'])}).{model}", *_refused(trade)])
+    return " ".join([f"{used} ({_count(trade.people)}).{model}", *_refused(trade)])
 
 
-def _refused(trade: Statistics) -> tuple[str, ...]:
+def _refused(trade: SpeedAccuracy | NoSpeedAccuracy) -> tuple[str, ...]:
     """How many trials are refused, and why; nothing if none is."""
-    refused = "; ".join(f"{one['trials']:,} because {one['why']}" for one in trade["refused"].values())
-    return (f"Refused of {trade['answered']:,} answered trials: {refused}.",) if refused else ()
+    refused = "; ".join(f"{one.trials:,} because {one.why}" for one in trade.refused.values())
+    return (f"Refused of {trade.answered:,} answered trials: {refused}.",) if refused else ()
 
 
-def _unpaired(trade: Statistics) -> tuple[str, ...]:
+def _unpaired(trade: SpeedAccuracy) -> tuple[str, ...]:
     """That there is no effect to tell where nobody was told two things."""
-    effects = trade["instruction_effects"]
-    if not effects or any(one["accuracy"]["people"] for one in effects):
+    effects = trade.instruction_effects
+    if not effects or any(one.accuracy.people for one in effects):
         return ()
     return ("No participant was told two things, so no effect of an instruction is paired: compare the means below.",)
 
@@ -223,38 +227,38 @@ def _count(number: int) -> str:
     return f"{number:,} participant{'' if number == 1 else 's'}"
 
 
-def _fitted(trade: Statistics) -> Iterator[str]:
+def _fitted(trade: SpeedAccuracy) -> Iterator[str]:
     """What the fits are of, and what they can tell."""
-    fits, caveats = trade["diffusion"], trade["caveats"]
-    if fits["reason"]:
-        yield f"The diffusion model was not fitted: {fits['reason']}."
+    fits, caveats = trade.diffusion, trade.caveats
+    if fits.reason:
+        yield f"The diffusion model was not fitted: {fits.reason}."
         return
-    if fits["fitted"] < fits["people"]:
-        whom = f"{fits['fitted']} of the {fits['people']:,} participants, evenly spaced in the order of their codes"
+    if fits.fitted < fits.people:
+        whom = f"{fits.fitted} of the {fits.people:,} participants, evenly spaced in the order of their codes"
     else:
-        whom = _count(fits["fitted"])
-    left_out = fits["each"]["left_out"]
+        whom = _count(fits.fitted)
+    left_out = fits.each.left_out if fits.each else 0
     gone = f" {left_out} of their own fits have no clear peak and are left out." if left_out else ""
-    yield f"Diffusion model by maximum likelihood, {whom}, {fits['trials']:,} trials.{gone} {caveats['diffusion']}"
-    failed = fits["together"]["reason"]
+    yield f"Diffusion model by maximum likelihood, {whom}, {fits.trials:,} trials.{gone} {caveats['diffusion']}"
+    failed = fits.together.reason if fits.together else None
     if failed:
         yield f"All trials in one fit: {failed}."
-    elif fits["fitted"] == 1:
+    elif fits.fitted == 1:
         yield "With one participant both columns are the same fit; its intervals come from the likelihood alone."
     else:
         yield caveats["together"]
 
 
-def trade_pictures(found: DirectionStatistics) -> tuple[Picture, ...]:
+def trade_pictures(found: DirectionStatistics, trade: SpeedAccuracy) -> tuple[Picture, ...]:
     """The two figures, as far as there is something to draw."""
     pictures = []
-    panels = "; one panel an instruction" if len((found.speed_accuracy or {})["instructions"]) > 1 else ""
+    panels = "; one panel an instruction" if len(trade.instructions) > 1 else ""
     if has_curve(found):
         caption = (
             f"Conditional accuracy functions of {found.people}{panels}: each one's trials in order of time, cut into "
             "five bins, then averaged over participants. A rising line: fast answers are guesses more often."
         )
-        alt = f"Line chart of accuracy over response time. {'; '.join(_curve_words(found))}."
+        alt = f"Line chart of accuracy over response time. {'; '.join(_curve_words(trade))}."
         pictures.append(Picture(stem=CONDITIONAL_ACCURACY, caption=caption, alt=alt))
     if has_points(found):
         caption = (
@@ -262,22 +266,22 @@ def trade_pictures(found: DirectionStatistics) -> tuple[Picture, ...]:
             "of errors (empty) and correct answers (filled) over how often they are given, averaged over the "
             "participants who gave at least 5 of the kind; lines join equal quantiles."
         )
-        alt = f"Plot of response time quantiles over answer probabilities. {'; '.join(_points_words(found))}."
+        alt = f"Plot of response time quantiles over answer probabilities. {'; '.join(_points_words(trade))}."
         pictures.append(Picture(stem=QUANTILE_PROBABILITY, caption=caption, alt=alt))
     return tuple(pictures)
 
 
-def _curve_words(found: DirectionStatistics) -> Iterator[str]:
-    for name, cell in cells_of(found.speed_accuracy or {}):
-        curve = cell["conditional_accuracy"]
-        if curve["people"]:
-            ends = [f"{apa.percent(curve['accuracy'][k])} at {apa.number(curve['mean_time_s'][k])} s" for k in (0, -1)]
+def _curve_words(trade: SpeedAccuracy) -> Iterator[str]:
+    for name, cell in cells_of(trade):
+        curve = cell.conditional_accuracy
+        if curve.people:
+            ends = [f"{apa.percent(curve.accuracy[k])} at {apa.number(curve.mean_time_s[k])} s" for k in (0, -1)]
             yield f"{name} from {ends[0]} to {ends[1]}"
 
 
-def _points_words(found: DirectionStatistics) -> Iterator[str]:
-    for name, cell in cells_of(found.speed_accuracy or {}):
-        points = cell["quantile_probability"]
-        kinds = zip(("errors", "correct answers"), points["quantiles_s"], points["people"], strict=True)
+def _points_words(trade: SpeedAccuracy) -> Iterator[str]:
+    for name, cell in cells_of(trade):
+        points = cell.quantile_probability
+        kinds = zip(("errors", "correct answers"), points.quantiles_s, points.people, strict=True)
         medians = [f"median of {kind} {apa.number(row[2])} s" for kind, row, count in kinds if count]
-        yield ", ".join([f"{name} {apa.percent(points['probability'][1])} correct", *medians])
+        yield ", ".join([f"{name} {apa.percent(points.probability[1])} correct", *medians])

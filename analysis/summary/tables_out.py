@@ -9,41 +9,39 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterable, Mapping, Sequence
-from typing import Any
 
 import numpy as np
 import pandas as pd
 
 from analysis.logs.frames import STUDY
 from analysis.logs.reading import Logs
+from analysis.summary.results import WithinStatistics
+from analysis.times.own_trials import timed
 
 MAX_NAME = 64
 _KEYS = [STUDY, "participant_id", "method"]
 
 
-def result_tables(logs: Logs, statistics: Mapping[str, Any]) -> dict[str, bytes]:
+def result_tables(logs: Logs, analysed: Mapping[str, WithinStatistics]) -> dict[str, bytes]:
     """File names and contents: `direction_long.csv`, `direction_wide.csv`, `preference_long.csv`, ..."""
     files: dict[str, bytes] = {}
-    for experiment, table, measure in (
-        ("direction", logs.trials, _direction),
-        ("preference", logs.ratings, _preference),
-    ):
-        people = statistics.get(experiment, {}).get("participants", {})
-        if people:
-            methods = statistics[experiment]["methods"]
+    tables = {"direction": (logs.trials, _direction), "preference": (logs.ratings, _preference)}
+    for experiment, (table, measure) in tables.items():
+        whose = analysed.get(experiment)
+        if whose is not None:
             keys = table[_KEYS].astype(str)
-            mine = keys["participant_id"].isin(list(people))
+            mine = keys["participant_id"].isin(whose.participants.codes)
             long = measure(pd.concat([keys, table.drop(columns=_KEYS)], axis=1)[mine])
             files[f"{experiment}_long.csv"] = _csv(long)
-            files[f"{experiment}_wide.csv"] = _csv(_wide(long, methods))
+            files[f"{experiment}_wide.csv"] = _csv(_wide(long, whose.methods))
     return files
 
 
 def _direction(trials: pd.DataFrame) -> pd.DataFrame:
     """Trials, correct answers and rates by direction, and the median of the participant's own response times."""
-    own = (trials["response_time_valid"] == 1).fillna(value=False)
-    keyed = trials.assign(correct=trials["correct"].astype("float64"), own_time_s=trials["response_time_s"].where(own))
-    found: dict[str, Any] = {}
+    own_s = trials["response_time_s"].where(timed(trials).own)
+    keyed = trials.assign(correct=trials["correct"].astype("float64"), own_time_s=own_s)
+    found: dict[str, pd.Series] = {}
     for direction in ("forward", "backward"):
         rows = keyed[keyed["direction"] == direction].groupby(_KEYS)["correct"]
         found |= {f"trials_{direction}": rows.size(), f"correct_{direction}": rows.sum()}

@@ -1,0 +1,252 @@
+"""Log files as columns of text: files with one header together, however RFC 4180 lets them look.
+
+Arrow reads plain files, many at once. It is kinder than RFC 4180, so what it would mend is left to the csv module.
+"""
+
+from __future__ import annotations
+
+import csv
+import io
+import re
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+import pyarrow as pa
+import pyarrow.compute as pc
+import pyarrow.csv
+from numpy.typing import NDArray
+
+from analysis.logs.files import BadLogError
+from experiments.record import columns
+from experiments.record.columns import Column
+
+Texts = Any
+"""An Arrow array of texts, null for an empty cell. Arrow ships no types."""
+Record = tuple[int, list[str]]
+"""The line on which a record starts, and its cells."""
+
+TEXT = pa.large_string()
+_FEW = pa.dictionary(pa.int32(), pa.string())
+_HEADER = re.compile(rb"[A-Za-z0-9_, ]+\r?\n")
+_QUOTED = re.compile(rb'(?<![^,\r\n])"[^"]*(?:""[^"]*)*"(?=[,\r\n])')
+"""A quoted cell, all of it: after a separator and before one."""
+_LONE_CR = re.compile(rb"\r(?!\n)")
+_MAX_BLOCK_BYTES = 1 << 30
+
+
+def is_category(column: Column) -> bool:
+    """Whether a column holds few values, and is kept as categories."""
+    return column.type == "level" or column.name in {"participant_id", "gun"}
+
+
+def has_many_values(column: Column) -> bool:
+    """Whether nearly every row may hold another value."""
+    return column.type == "number" or (column.type == "text" and not is_category(column))
+
+
+_MANY = {column.name for table in columns.TABLES.values() for column in table if has_many_values(column)}
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class TextTable:
+    """Rows of logs with one header, log after log.
+
+    `texts` holds each column as an Arrow dictionary where values are few, else as an array of strings. For each log
+    there are its number, how many rows it has, and the lines on which these start. `ragged` gives, for a row that has
+    not as many fields as the header, how many it has; its cells are left empty.
+    """
+
+    header: tuple[str, ...]
+    texts: Mapping[str, Texts]
+    logs: tuple[int, ...]
+    rows: tuple[int, ...]
+    lines: tuple[Sequence[int], ...]
+    ragged: Mapping[int, int]
+
+    def column(self, name: str) -> Texts:
+        """The texts of a column; nothing but empty cells if there is no such column."""
+        if name in self.texts:
+            return self.texts[name]
+        return pa.nulls(sum(self.rows), TEXT if name in _MANY else _FEW)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class _Plain:
+    """A file that Arrow reads as RFC 4180 has it, if it finds as many rows."""
+
+    number: int
+    content: bytes
+    header: bytes
+    quoted: bool
+    rows: int
+
+    @property
+    def lines(self) -> Sequence[int]:
+        """The line on which each row starts: one after the other, unless a quoted cell holds a line end."""
+        if self.quoted and (self.content.count(b"\n") > self.rows + 1 or _LONE_CR.search(self.content)):
+            return [line for line, _ in records(self.content)[1:]]
+        return range(2, self.rows + 2)
+
+
+def text_tables(contents: Mapping[int, bytes]) -> tuple[list[TextTable], dict[int, BadLogError]]:
+    """Numbered files' contents as tables, and why a file is no text as RFC 4180 has it."""
+    tables = arrow_tables(contents)
+    taken = {number for table in tables for number in table.logs}
+    others, faults = csv_tables({number: content for number, content in contents.items() if number not in taken})
+    return [*tables, *others], faults
+
+
+def arrow_tables(contents: Mapping[int, bytes]) -> list[TextTable]:
+    """The tables of those files that Arrow reads as RFC 4180 has it, as far as that is sure."""
+    plain: dict[tuple[bytes, bool], list[_Plain]] = {}
+    for number, content in contents.items():
+        if file := _plain(number, content):
+            plain.setdefault((file.header, file.quoted), []).append(file)
+    return [table for files in plain.values() for table in _plain_tables(files)]
+
+
+def _plain(number: int, content: bytes) -> _Plain | None:
+    """How a file looks; `None` if Arrow might read it otherwise than RFC 4180 has it."""
+    header = _HEADER.match(content)
+    if header is None or not content.endswith(b"\n") or len(header[0]) == len(content) or _has_long_cell(content):
+        return None
+    quoted = b'"' in content
+    bare = _QUOTED.sub(b"", content) if quoted else content
+    if (quoted and b'"' in bare) or b"\n\n" in bare or b"\n\r\n" in bare:  # a blank line is no row of empty cells
+        return None
+    return _Plain(number=number, content=content, header=header[0], quoted=quoted, rows=bare.count(b"\n") - 1)
+
+
+def _has_long_cell(content: bytes) -> bool:
+    """Whether a cell may be longer than the csv module takes."""
+    limit = csv.field_size_limit()
+    return len(content) > limit and (b'"' in content or max(map(len, content.splitlines())) > limit)
+
+
+def _plain_tables(files: Sequence[_Plain]) -> Iterator[TextTable]:
+    """Files with one header; if not all have rows as they should be, each half by itself, and no single one."""
+    table = _arrow_table(files)
+    if table is not None:
+        yield TextTable(
+            header=tuple(table.column_names),
+            texts={name: table.column(at).chunk(0) for at, name in enumerate(table.column_names)},
+            logs=tuple(file.number for file in files),
+            rows=tuple(file.rows for file in files),
+            lines=tuple(file.lines for file in files),
+            ragged={},
+        )
+    elif len(files) > 1:
+        half = len(files) // 2
+        yield from _plain_tables(files[:half])
+        yield from _plain_tables(files[half:])
+
+
+def _arrow_table(files: Sequence[_Plain]) -> pa.Table | None:
+    """The rows of files with one header, one file after the other; `None` if they are not as many as they look."""
+    header, quoted = files[0].header, files[0].quoted
+    data = b"".join([header, *(memoryview(file.content)[len(header) :] for file in files)])
+    names = header.decode("ascii").rstrip().split(",")
+    try:
+        found = pa.csv.read_csv(
+            pa.BufferReader(data),
+            pa.csv.ReadOptions(use_threads=False, block_size=min(len(data) + 1, _MAX_BLOCK_BYTES)),
+            pa.csv.ParseOptions(
+                quote_char='"' if quoted else False, newlines_in_values=quoted, ignore_empty_lines=False
+            ),
+            pa.csv.ConvertOptions(
+                column_types={name: TEXT if name in _MANY else _FEW for name in names},
+                null_values=[columns.MISSING],
+                strings_can_be_null=True,
+            ),
+        )
+    except pa.ArrowInvalid:
+        return None
+    return found.combine_chunks() if found.num_rows == sum(file.rows for file in files) else None
+
+
+def csv_tables(contents: Mapping[int, bytes]) -> tuple[list[TextTable], dict[int, BadLogError]]:
+    """As `text_tables`, every file read by the csv module. Files without a row are in tables of their own."""
+    groups: dict[tuple[tuple[str, ...], bool], dict[int, list[Record]]] = {}
+    faults: dict[int, BadLogError] = {}
+    for number, content in contents.items():
+        try:
+            (_, header), *rows = records(content)
+        except BadLogError as bad:
+            faults[number] = bad
+        else:
+            groups.setdefault((tuple(header), bool(rows)), {})[number] = rows
+    return [table_of_records(header, logs) for (header, _), logs in groups.items()], faults
+
+
+def table_of_records(header: Sequence[str], logs: Mapping[int, Sequence[Record]]) -> TextTable:
+    """Records of numbered logs as a table."""
+    cells = [row for rows in logs.values() for _, row in rows]
+    empty = [columns.MISSING] * len(header)
+    ragged = {at: len(row) for at, row in enumerate(cells) if len(row) != len(header)}
+    whole = [empty if at in ragged else row for at, row in enumerate(cells)]
+    return TextTable(
+        header=tuple(header),
+        texts={name: _column(name, texts) for name, texts in zip(header, zip(*whole, strict=True), strict=False)},
+        logs=tuple(logs),
+        rows=tuple(len(rows) for rows in logs.values()),
+        lines=tuple([line for line, _ in rows] for rows in logs.values()),
+        ragged=ragged,
+    )
+
+
+def _column(name: str, texts: Iterable[str]) -> Texts:
+    """The texts of a column, as Arrow reads them."""
+    cells = [text or None for text in texts]
+    return pa.array(cells, TEXT) if name in _MANY else pa.array(cells, pa.string()).dictionary_encode()
+
+
+def records(content: bytes) -> list[Record]:
+    """The records of an RFC 4180 file. `BadLogError` if it is none."""
+    text = _text(content)
+    reader = csv.reader(io.StringIO(text, newline=""), strict=True)
+    found: list[Record] = []
+    start = 1
+    try:
+        for cells in reader:
+            found.append((start, cells))
+            start = reader.line_num + 1
+    except csv.Error as error:
+        raise BadLogError(f"is not comma-separated text by RFC 4180: {error}", start) from error
+    if not text.endswith(("\n", "\r")):
+        raise BadLogError(
+            "the last line has no end (rule: every row ends with a line end; was the file cut off?)", start - 1
+        )
+    return found
+
+
+def _text(content: bytes) -> str:
+    try:
+        text = content.decode("utf-8-sig")
+    except UnicodeDecodeError as error:
+        line = content[: error.start].count(b"\n") + 1
+        raise BadLogError(f"byte 0x{content[error.start]:02x} is not UTF-8 (rule: UTF-8 text)", line) from error
+    if not text.strip():
+        raise BadLogError("is empty (rule: a header and one row a planned trial)")
+    return text
+
+
+def few(cells: pa.DictionaryArray) -> tuple[NDArray[np.int32], list[str]]:
+    """For every cell the number of its text, and these texts; the last is the empty cell's, whether there is one."""
+    texts = cells.dictionary.to_pylist()
+    return cells.indices.fill_null(len(texts)).to_numpy(), [*texts, columns.MISSING]
+
+
+def decimals(cells: Texts) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
+    """Texts as numbers, NaN for none; and the rows, here NaN too, with more than digits and one point, or too many."""
+    plain = pc.ascii_is_decimal(pc.replace_substring(cells, ".", "", max_replacements=1))
+    numbers = pc.if_else(plain, cells, None).cast(pa.float64()).to_numpy(zero_copy_only=False)
+    odd = np.flatnonzero(~np.isfinite(numbers) & cells.is_valid().to_numpy(zero_copy_only=False))
+    return numbers, odd
+
+
+def unguarded(cells: Texts) -> Texts:
+    """The texts without the guard against formulas (`columns.unguard`)."""
+    guarded = pc.starts_with(cells, "'")
+    return pc.if_else(guarded, pc.utf8_slice_codeunits(cells, 1), cells) if pc.any(guarded).as_py() else cells

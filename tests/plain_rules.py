@@ -1,0 +1,132 @@
+"""The rules that bind rows once more, row after row: what the checks over arrays are held to."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+
+from analysis.logs.files import BadLogError
+from analysis.logs.rules import cell_fault, cell_value, experiment_of
+from experiments.record import columns
+
+Cell = str | int | float | None
+Row = dict[str, Cell]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Table:
+    """A checked log table: the experiment, its parsed rows, and the line of the file each row starts on."""
+
+    experiment: str
+    rows: tuple[Row, ...]
+    lines: tuple[int, ...]
+
+
+def check_table(records: Sequence[tuple[int, list[str]]], code_in_name: str | None) -> Table:
+    """The table in `records` (line number and cells, header first) if it keeps every rule; else `BadLogError`."""
+    line, header = records[0]
+    experiment = experiment_of(header)
+    if len(records) == 1:
+        raise BadLogError("has a header but no rows (rule: one row a planned trial)", line)
+    rows = tuple(_row(experiment, header, number, cells) for number, cells in records[1:])
+    table = Table(experiment=experiment, rows=rows, lines=tuple(number for number, _ in records[1:]))
+    _check_participant(table, code_in_name)
+    if experiment == "direction":
+        _check_answers(table)
+        _check_sessions(table)
+    else:
+        _check_ratings(table)
+        _check_run("trial", [(row["trial"], number) for row, number in _numbered(table)], "the run")
+    return table
+
+
+def _numbered(table: Table) -> Iterable[tuple[Row, int]]:
+    return zip(table.rows, table.lines, strict=True)
+
+
+def _row(experiment: str, header: list[str], line: int, cells: list[str]) -> Row:
+    if len(cells) != len(header):
+        raise BadLogError(f"has {len(cells)} fields (rule: {len(header)}, as in the header)", line)
+    given = dict(zip(header, cells, strict=True))
+    row: Row = {}
+    for column in columns.TABLES[experiment]:
+        text = given.get(column.name, columns.MISSING)
+        if fault := cell_fault(column, text):
+            raise BadLogError(fault, line, column.name)
+        row[column.name] = cell_value(column, text)
+    return row
+
+
+def _check_participant(table: Table, code_in_name: str | None) -> None:
+    code = str(table.rows[0]["participant_id"])
+    first = table.lines[0]
+    if not re.fullmatch("[A-Za-z0-9]{1,32}", code):
+        raise BadLogError(f"{_shown(code)} is not a code (rule: 1 to 32 letters or digits)", first, "participant_id")
+    if code_in_name is not None and code_in_name != code:
+        rule = f"the file is named sub-{code_in_name} (rule: one participant a file, the one in its name)"
+        raise BadLogError(f"participant {code!r}, but {rule}", first, "participant_id")
+    for row, line in _numbered(table):
+        if row["participant_id"] != code:
+            other = _shown(str(row["participant_id"]))
+            raise BadLogError(f"{other} after {code!r} (rule: one participant a file)", line, "participant_id")
+
+
+def _check_answers(table: Table) -> None:
+    for row, line in _numbered(table):
+        response, correct = row["response"], row["correct"]
+        if (response is None) != (correct is None):
+            shown = f"response {_cell_text(response)} with correct {_cell_text(correct)}"
+            raise BadLogError(f"{shown} (rule: both or neither are given)", line, "correct")
+        if response is not None and correct != int(response == row["direction"]):
+            shown = f"correct is {correct}, but the direction was {row['direction']} and the response {response}"
+            raise BadLogError(f"{shown} (rule: 1 if they are the same, else 0)", line, "correct")
+
+
+def _check_ratings(table: Table) -> None:
+    for row, line in _numbered(table):
+        rating = row["rating"]
+        if isinstance(rating, float) and not 0.0 <= rating <= 10.0:
+            raise BadLogError(f"rating {rating:g} is out of range (rule: 0 to 10)", line, "rating")
+
+
+def _check_sessions(table: Table) -> None:
+    first_line: dict[Cell, int] = {}
+    methods: dict[Cell, Cell] = {}
+    for row, line in _numbered(table):
+        session, method = row["session"], row["method"]
+        first_line.setdefault(session, line)
+        if methods.setdefault(session, method) != method:
+            shown = f"{method!r} in session {session}, which began with {methods[session]!r}"
+            raise BadLogError(f"{shown} (rule: one method a session)", line, "method")
+    _check_run("session", list(first_line.items()), "the run")
+    for session in first_line:
+        trials = [(row["trial"], line) for row, line in _numbered(table) if row["session"] == session]
+        _check_run("trial", trials, f"session {session}")
+
+
+def _check_run(column: str, numbered: list[tuple[Cell, int]], where: str) -> None:
+    """`numbered` holds 1..N, each once, in any order."""
+    seen: set[Cell] = set()
+    last = len(numbered)
+    for number, line in numbered:
+        if number in seen:
+            raise BadLogError(f"{column} {number} stands twice in {where} (rule: 1, 2, 3, ... once each)", line, column)
+        seen.add(number)
+    missing = next((number for number in range(1, last + 1) if number not in seen), None)
+    if missing is not None:
+        rule = f"(rule: 1, 2, 3, ... without a gap; found {_shown(', '.join(map(str, sorted(map(_as_int, seen)))))})"
+        raise BadLogError(f"{column} {missing} is missing in {where} {rule}", numbered[-1][1], column)
+
+
+def _as_int(number: Cell) -> int:
+    return number if isinstance(number, int) else 0
+
+
+def _cell_text(cell: Cell) -> str:
+    return "empty" if cell is None else repr(cell)
+
+
+def _shown(text: str) -> str:
+    """`text` in quotes, cut to what fits into a message."""
+    return repr(text if len(text) <= 80 else text[:77] + "...")
