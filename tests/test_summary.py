@@ -130,6 +130,17 @@ def test_what_is_not_finite_is_null_and_named(tmp_path: Path) -> None:
     assert "direction" not in found
 
 
+def test_in_a_notebook_the_statistics_are_a_table_with_the_tests(logs: Logs) -> None:
+    found = summarize(logs)
+    assert found.direction is not None
+    frame = found.to_frame()
+    assert list(frame["method"]) == [*METHODS, *METHODS]
+    row = frame[(frame["experiment"] == "direction") & (frame["method"] == "vibration")].iloc[0]
+    assert (row["n"], row["mean"]) == (14, found.direction.means["vibration"])
+    assert row["ci_low"] < row["mean"] < row["ci_high"]
+    assert "F(2, 26) = " in found._repr_html_()
+
+
 def test_the_summary_is_plain_json(logs: Logs) -> None:
     found = summarize(logs).to_dict()
     assert json.loads(json.dumps(found, allow_nan=False)) == found

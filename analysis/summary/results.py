@@ -6,11 +6,16 @@ Rates 0 to 1, times in s, SD with n - 1; nothing is rounded. NaN and infinities 
 
 from __future__ import annotations
 
+import html
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
+import pandas as pd
+
 from analysis.logs.exclusions import KeptTrials, LeftOut
+from analysis.report import apa
 from analysis.report.serial import OPTIONAL, beside, plain
 from analysis.stats.cells import ByParticipant
 from analysis.stats.diagnostics import Normality
@@ -331,3 +336,23 @@ class StudyStatistics:
         """The content of `statistics.json`."""
         written: dict[str, Any] = plain(self)
         return written
+
+    def to_frame(self) -> pd.DataFrame:
+        """A row an experiment and method: participants, mean and SD, and the within-subject interval of the mean."""
+        blank = Interval(ci_low=math.nan, ci_high=math.nan)
+        rows = [
+            (name, method, found.n, found.means[method], found.sds[method], ends.ci_low, ends.ci_high)
+            for name, found in self.analysed.items()
+            for method in found.methods
+            for ends in [(found.within_ci or {}).get(method, blank)]
+        ]
+        return pd.DataFrame(rows, columns=["experiment", "method", "n", "mean", "sd", "ci_low", "ci_high"])
+
+    def _repr_html_(self) -> str:
+        """The table of means with each experiment's F test, for a notebook."""
+        tests = [
+            f"<p>{name.capitalize()}: {html.escape(apa.f_test(anova.F, anova.df, anova.p))}</p>"
+            for name, found in self.analysed.items()
+            if (anova := found.anova) is not None
+        ]
+        return self.to_frame().to_html(index=False, float_format="%.4g") + "".join(tests)
