@@ -355,4 +355,4 @@ class StudyStatistics:
             for name, found in self.analysed.items()
             if (anova := found.anova) is not None
         ]
-        return self.to_frame().to_html(index=False, float_format="%.4g") + "".join(tests)
+        return self.to_frame().to_html(index=False, float_format="{:.4g}".format) + "".join(tests)
