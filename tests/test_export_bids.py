@@ -14,9 +14,8 @@ from typing import Any
 import pandas as pd
 import pytest
 
-from analysis.archive.bids import export as feature
-from analysis.archive.bids import files as data_set
-from analysis.archive.bids import files as words
+from analysis.archive import bids
+from analysis.archive import bids_export as feature
 from analysis.logs.reading import read_logs
 from experiments.clock import RealClock, VirtualClock
 from experiments.load import load_setup, shipped_folder
@@ -226,9 +225,9 @@ def test_a_studys_title_is_the_data_sets_name(tmp_path: Path) -> None:
 
 
 def test_every_column_and_level_of_the_logs_has_its_words() -> None:
-    assert set(words.TASKS) == set(words.ANSWERED_BY) == set(columns.TABLES)
+    assert set(bids.TASKS) == set(bids.ANSWERED_BY) == set(columns.TABLES)
     for column in (column for table in columns.TABLES.values() for column in table):
-        described = words.described(column, column.name)
+        described = bids.described(column, column.name)
         assert described["LongName"]
         assert described["Description"]
         assert list(described.get("Levels", {})) == list(column.levels)
@@ -237,7 +236,7 @@ def test_every_column_and_level_of_the_logs_has_its_words() -> None:
 
 @pytest.mark.parametrize("text", [NASTY, "\x00\x1b[31m\u2028x", '"', "\t\r\n", "a\x85b\x0bc"])
 def test_text_stays_in_its_cell(text: str) -> None:
-    assert not set(data_set.one_line(text)) & set('\t\r\n\x0b\x85\u2028\x00\x1b"')
+    assert not set(bids.one_line(text)) & set('\t\r\n\x0b\x85\u2028\x00\x1b"')
 
 
 def test_json_gives_the_counts(recoil: Recoil, real: Path) -> None:

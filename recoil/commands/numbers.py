@@ -82,7 +82,7 @@ def bids(
     as_json: AsJson = False,
 ) -> None:
     """The logs as a BIDS data set of behavioural runs; an earlier export is replaced."""
-    from analysis.archive.bids.export import export as feature
+    from analysis.archive.bids_export import export as feature
 
     done = feature(folder, out or folder / "bids", free_text=free_text, track=tracked)
     for problem in done.problems:

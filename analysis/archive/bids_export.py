@@ -14,7 +14,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from analysis.archive.bids import files as bids
+from analysis.archive import bids
 from analysis.logs.reading import Logs, Track, read_logs
 from experiments.load import load_study
 from experiments.record import storage
