@@ -323,7 +323,7 @@ def test_practice_is_not_exported(tmp_path: Path) -> None:
     logs = write_study(tmp_path / "logs", 1)
     log = trials_path(logs, "P01")
     log.with_name("sub-P01_task-direction_practice_trials.csv").write_bytes(log.read_bytes())
-    assert feature.export(logs, logs / "bids").problems == ()
+    assert feature.export(logs, logs / "bids").left_out == ()
 
 
 # where it goes
@@ -332,10 +332,10 @@ def test_practice_is_not_exported(tmp_path: Path) -> None:
 def test_an_earlier_export_is_replaced_and_is_no_log(tmp_path: Path) -> None:
     logs = write_study(tmp_path / "logs", 2)
     for _ in range(2):
-        assert feature.export(logs, logs / "bids").problems == ()
+        assert feature.export(logs, logs / "bids").left_out == ()
     trials_path(logs, "P02").unlink()
     ratings_path(logs, "P02").unlink()
-    assert feature.export(logs, logs / "bids").as_json()["participants"] == 1
+    assert feature.export(logs, logs / "bids").participants == 1
     assert not (logs / "bids" / "sub-P02").exists()
     assert not [path for path in logs.iterdir() if path.name.startswith(".")]
     assert len(read_logs([logs]).files) == 2
