@@ -14,9 +14,8 @@ from typing import Any
 import pandas as pd
 import pytest
 
-from analysis.archive.bids import export as feature
-from analysis.archive.bids import files as data_set
-from analysis.archive.bids import files as words
+from analysis.archive import bids
+from analysis.archive import bids_export as feature
 from analysis.logs.reading import read_logs
 from experiments.clock import RealClock, VirtualClock
 from experiments.load import load_setup, shipped_folder
@@ -226,9 +225,9 @@ def test_a_studys_title_is_the_data_sets_name(tmp_path: Path) -> None:
 
 
 def test_every_column_and_level_of_the_logs_has_its_words() -> None:
-    assert set(words.TASKS) == set(words.ANSWERED_BY) == set(columns.TABLES)
+    assert set(bids.TASKS) == set(bids.ANSWERED_BY) == set(columns.TABLES)
     for column in (column for table in columns.TABLES.values() for column in table):
-        described = words.described(column, column.name)
+        described = bids.described(column, column.name)
         assert described["LongName"]
         assert described["Description"]
         assert list(described.get("Levels", {})) == list(column.levels)
@@ -237,7 +236,7 @@ def test_every_column_and_level_of_the_logs_has_its_words() -> None:
 
 @pytest.mark.parametrize("text", [NASTY, "\x00\x1b[31m\u2028x", '"', "\t\r\n", "a\x85b\x0bc"])
 def test_text_stays_in_its_cell(text: str) -> None:
-    assert not set(data_set.one_line(text)) & set('\t\r\n\x0b\x85\u2028\x00\x1b"')
+    assert not set(bids.one_line(text)) & set('\t\r\n\x0b\x85\u2028\x00\x1b"')
 
 
 def test_json_gives_the_counts(recoil: Recoil, real: Path) -> None:
@@ -324,7 +323,7 @@ def test_practice_is_not_exported(tmp_path: Path) -> None:
     logs = write_study(tmp_path / "logs", 1)
     log = trials_path(logs, "P01")
     log.with_name("sub-P01_task-direction_practice_trials.csv").write_bytes(log.read_bytes())
-    assert feature.export(logs, logs / "bids").problems == ()
+    assert feature.export(logs, logs / "bids").left_out == ()
 
 
 # where it goes
@@ -333,10 +332,10 @@ def test_practice_is_not_exported(tmp_path: Path) -> None:
 def test_an_earlier_export_is_replaced_and_is_no_log(tmp_path: Path) -> None:
     logs = write_study(tmp_path / "logs", 2)
     for _ in range(2):
-        assert feature.export(logs, logs / "bids").problems == ()
+        assert feature.export(logs, logs / "bids").left_out == ()
     trials_path(logs, "P02").unlink()
     ratings_path(logs, "P02").unlink()
-    assert feature.export(logs, logs / "bids").as_json()["participants"] == 1
+    assert feature.export(logs, logs / "bids").participants == 1
     assert not (logs / "bids" / "sub-P02").exists()
     assert not [path for path in logs.iterdir() if path.name.startswith(".")]
     assert len(read_logs([logs]).files) == 2

@@ -82,13 +82,14 @@ def bids(
     as_json: AsJson = False,
 ) -> None:
     """The logs as a BIDS data set of behavioural runs; an earlier export is replaced."""
-    from analysis.archive.bids.export import export as feature
+    from analysis.archive.bids_export import export as feature
 
     done = feature(folder, out or folder / "bids", free_text=free_text, track=tracked)
-    for problem in done.problems:
+    for problem in done.left_out:
         say(f"recoil: left out: {problem}")
-    show(done.as_json(), done.as_text(), as_json)
-    raise end(exceptions=bool(done.problems))
+    counts = f"participants: {done.participants}, runs: {sum(done.runs.values())}, files: {done.files}"
+    show(done, f"BIDS data set: {done.out} ({counts})", as_json)
+    raise end(exceptions=bool(done.left_out))
 
 
 def audit(

@@ -12,9 +12,8 @@ from collections.abc import Mapping
 from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
 
-from analysis.archive.bids import files as bids
+from analysis.archive import bids
 from analysis.logs.reading import Logs, Track, read_logs
 from experiments.load import load_study
 from experiments.record import storage
@@ -29,33 +28,19 @@ _AT_FDCWD, _RENAME_EXCHANGE = -100, 2
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Exported:
-    """Where the data set lies, what is in it, and what was left out with the reason."""
+    """Where the data set lies, what is in it, and what was left out with the reason.
 
-    out: Path
-    runs: bids.Runs
+    Runs and rows are counted by experiment; `synthetic` participants are those of whose answers a simulation gave any.
+    """
+
+    out: str
+    bids_version: str
+    participants: int
+    synthetic: int
+    runs: Mapping[str, int]
+    rows: Mapping[str, int]
     files: int
-    problems: tuple[str, ...]
-
-    def as_json(self) -> dict[str, Any]:
-        """The counts as plain JSON values."""
-        people, runs = self.runs.by_code, self.runs.runs
-        return {
-            "out": str(self.out),
-            "bids_version": bids.BIDS_VERSION,
-            "participants": len(people),
-            "synthetic": sum(any("synthetic" in run.hands for run in done) for done in people.values()),
-            "runs": {task: sum(run.experiment == task for run in runs) for task in self.runs.experiments},
-            "rows": {
-                task: sum(len(run.rows) for run in runs if run.experiment == task) for task in self.runs.experiments
-            },
-            "files": self.files,
-            "left_out": list(self.problems),
-        }
-
-    def as_text(self) -> str:
-        """The counts for people."""
-        people, runs = len(self.runs.by_code), len(self.runs.runs)
-        return f"BIDS data set: {self.out} (participants: {people}, runs: {runs}, files: {self.files})"
+    left_out: tuple[str, ...]
 
 
 def export(folder: Path, out: Path, *, free_text: bool = False, track: Track = iter) -> Exported:
@@ -75,8 +60,17 @@ def export(folder: Path, out: Path, *, free_text: bool = False, track: Track = i
     runs = bids.runs_of(logs)
     files = bids.data_set(runs, _members(results), _name(results), recoil_version(), free_text=free_text)
     _put(target, files | _filled_in(earlier, files))
-    problems = (*map(str, logs.problems), *runs.problems)
-    return Exported(out=out, runs=runs, files=len(files), problems=problems)
+    by_task = {task: [run for run in runs.runs if run.experiment == task] for task in runs.experiments}
+    return Exported(
+        out=str(out),
+        bids_version=bids.BIDS_VERSION,
+        participants=len(runs.by_code),
+        synthetic=sum(any("synthetic" in run.hands for run in done) for done in runs.by_code.values()),
+        runs={task: len(done) for task, done in by_task.items()},
+        rows={task: sum(len(run.rows) for run in done) for task, done in by_task.items()},
+        files=len(files),
+        left_out=(*map(str, logs.problems), *runs.problems),
+    )
 
 
 def _earlier(target: Path) -> Path | None:
@@ -100,7 +94,7 @@ def _is_export(target: Path) -> bool:
     return any(isinstance(one, dict) and one.get("Name") == bids.GENERATOR for one in generators)
 
 
-def _read_json(path: Path) -> dict[str, Any]:
+def _read_json(path: Path) -> dict[str, object]:
     """What a JSON file holds; nothing if there is none."""
     try:
         values = json.loads(path.read_bytes())

@@ -14,10 +14,11 @@ import re
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from datetime import UTC, datetime
-from typing import Any
+from typing import TypedDict
 
 import pandas as pd
 
+from analysis.logs.frames import Cell
 from analysis.logs.reading import Logs
 from experiments.record import columns
 from experiments.record.columns import Column
@@ -44,7 +45,20 @@ _LEVELS = {
 
 _FORMATS = {"integer": "integer", "number": "number", "flag": "integer", "text": "string", "level": "string"}
 
-_MORE: dict[str, dict[str, Any]] = {
+
+class ColumnDescription(TypedDict, total=False):
+    """A column as BIDS describes it, in the words of its JSON files."""
+
+    LongName: str
+    Description: str
+    Format: str
+    Units: str
+    Levels: dict[str, str]
+    Minimum: int
+    Maximum: int
+
+
+_MORE: dict[str, ColumnDescription] = {
     "rating": {"Minimum": 0, "Maximum": 10},
     "onset": {
         "Format": "number",
@@ -57,7 +71,7 @@ _MORE: dict[str, dict[str, Any]] = {
 
 _CLEANED = "line breaks and tabs are blanks, double quotes single ones; a leading = + - @ or ' has a ' in front"
 
-PARTICIPANTS: dict[str, dict[str, Any]] = {
+PARTICIPANTS: dict[str, ColumnDescription] = {
     "participant_id": {
         "LongName": "Participant",
         "Description": "sub- and the participant's code, as in the names of folders and files",
@@ -120,17 +134,19 @@ _LEFT_IN = (
 )
 
 
-def described(column: Column, name: str) -> dict[str, Any]:
+def described(column: Column, name: str) -> ColumnDescription:
     """A column as BIDS describes it, from the data dictionary. `name` is what it is called in the data set."""
     text = re.sub(r"\bempty\b", "n/a", column.description).replace("`", "'")
-    found = {
+    found: ColumnDescription = {
         "LongName": long_name(name),
         "Description": f"{text}; {_CLEANED}" if name in ("comment", "note") else text,
         "Format": _FORMATS[column.type],
-        "Units": column.unit,
-        "Levels": {level: _LEVELS.get(level, level) for level in column.levels},
     }
-    return {key: value for key, value in (found | _MORE.get(name, {})).items() if value not in ("", {})}
+    if column.unit:
+        found["Units"] = column.unit
+    if column.levels:
+        found["Levels"] = {level: _LEVELS.get(level, level) for level in column.levels}
+    return found | _MORE.get(name, {})
 
 
 def long_name(name: str) -> str:
@@ -167,8 +183,6 @@ _OURS = re.compile(
     r"|sub-([A-Za-z0-9]+)(/beh(/sub-\2_task-[a-z]+_beh\.tsv)?)?"
 )
 
-Row = dict[str, Any]
-
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Run:
@@ -176,12 +190,12 @@ class Run:
 
     participant_id: str
     experiment: str
-    rows: tuple[Row, ...]
+    rows: tuple[Mapping[str, Cell], ...]
 
     @property
     def hands(self) -> set[str]:
         """Whose hands gave the answers."""
-        return {row[ANSWERED_BY[self.experiment]] for row in self.rows} - {None}
+        return {str(row[ANSWERED_BY[self.experiment]]) for row in self.rows if row[ANSWERED_BY[self.experiment]]}
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -238,7 +252,7 @@ def _runs(experiment: str, table: pd.DataFrame) -> Iterator[Run]:
 
 
 def _unreadable_onsets(run: Run) -> Iterator[str]:
-    bad = [row["onset_utc"] for row in run.rows if row["onset_utc"] and _moment(row["onset_utc"]) is None]
+    bad = [str(row["onset_utc"]) for row in run.rows if row["onset_utc"] and _moment(row["onset_utc"]) is None]
     if bad:
         where = f"onset of {len(bad)} trials of participant {run.participant_id!r}, {run.experiment}"
         yield f"{where}: onset_utc = {bad[0][:80]!r} is no ISO 8601 time"
@@ -265,7 +279,7 @@ def json_bytes(values: object) -> bytes:
     return (json.dumps(values, indent=2, ensure_ascii=False) + "\n").encode()
 
 
-def _description(name: str, version: str) -> Row:
+def _description(name: str, version: str) -> dict[str, object]:
     generator = {"Name": GENERATOR, "Version": version, "Description": "recoil export bids"}
     return {"Name": name, "BIDSVersion": BIDS_VERSION, "DatasetType": "raw", "GeneratedBy": [generator]}
 
@@ -298,14 +312,14 @@ def _name(column: Column) -> str:
     return _NAMES.get(column.name, column.name)
 
 
-def _sidecar(experiment: str, free_text: bool) -> Row:
+def _sidecar(experiment: str, free_text: bool) -> dict[str, object]:
     found = {_name(column): described(column, _name(column)) for column in _exported(experiment, free_text)}
     return {"TaskName": experiment, "TaskDescription": TASKS[experiment], **found}
 
 
 def _beh(run: Run, free_text: bool) -> bytes:
     table = _exported(run.experiment, free_text)
-    rows = [row | {"onset_utc": onset} for row, onset in zip(run.rows, _onsets(run), strict=True)]
+    rows = [{**row, "onset_utc": onset} for row, onset in zip(run.rows, _onsets(run), strict=True)]
     cells = ([_cell(column, row[column.name]) for column in table] for row in rows)
     return _tsv([_name(column) for column in table], cells)
 
@@ -317,16 +331,16 @@ def _onsets(run: Run) -> list[float | None]:
     return [(moment - start).total_seconds() if moment and start else None for moment in moments]
 
 
-def _moment(text: str | None) -> datetime | None:
+def _moment(cell: Cell) -> datetime | None:
     """When that was; nothing if there is none, or if it is no time."""
     try:
-        moment = datetime.fromisoformat(text or "")
+        moment = datetime.fromisoformat(str(cell or ""))
     except ValueError:
         return None
     return moment if moment.tzinfo else moment.replace(tzinfo=UTC)
 
 
-def _cell(column: Column, value: Any) -> str:
+def _cell(column: Column, value: Cell) -> str:
     if value is None:
         return MISSING
     if isinstance(value, float):

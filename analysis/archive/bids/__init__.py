@@ -1,1 +1,0 @@
-"""Logs as a BIDS data set."""
