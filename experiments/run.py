@@ -31,6 +31,8 @@ from experiments.study.places import Place, PlaceError
 
 Again = Literal["ask", "resume", "fresh"]
 """What to do with an unfinished run: refuse and say what is there, go on with it, or set it aside."""
+ScreenName = Literal["terminal", "synthetic", "console"]
+"""Where a run is shown and worked."""
 
 
 class UnfinishedRun(PlaceError):  # noqa: N818 - what is there, not what went wrong
@@ -38,11 +40,28 @@ class UnfinishedRun(PlaceError):  # noqa: N818 - what is there, not what went wr
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Request:
-    """Who does what, where, with which gun and seed; `seed` is `None` where the config or the system gives it.
+class ParticipantOptions:
+    """What the participant has beside the console; `monitor` is the index of their screen, `None` for the last one."""
 
-    A `practice` is not analysed: it has files of its own and can be done again. `anew_reason` is why an unfinished run
-    is set aside for a fresh one: for the register and the head of the new journal.
+    screen: bool = False
+    keys: bool = False
+    noise: bool = False
+    monitor: int | None = None
+
+    @property
+    def any(self) -> bool:
+        """Whether the participant's own process runs at all."""
+        return self.screen or self.keys or self.noise
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class RunRequest:
+    """Who does what, where, at which screen, with which gun and seed.
+
+    `seed` is `None` where the config or the system gives it. A `practice` is not analysed: it has files of its own and
+    can be done again; nothing of a `training` is kept. `anew_reason` is why an unfinished run is set aside for a fresh
+    one: for the register and the head of the new journal. At the console the participant may have `options` of their
+    own, and a `visual` run is worked by a synthetic one.
     """
 
     setup: Setup[Any]
@@ -53,6 +72,10 @@ class Request:
     again: Again = "ask"
     anew_reason: str = ""
     practice: bool = False
+    training: bool = False
+    screen: ScreenName = "synthetic"
+    visual: bool = False
+    options: ParticipantOptions = ParticipantOptions()
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -67,7 +90,7 @@ class Finished:
 MakeScreen = Callable[[Setup[Any], Plan, Clock], Screen]
 
 
-def resolve_seed(request: Request) -> int:
+def resolve_seed(request: RunRequest) -> int:
     """The seed of a new run: asked for, else the config's, else drawn from the system."""
     for seed in (request.seed, request.setup.config.seed):
         if seed is not None:
@@ -79,7 +102,7 @@ def resolve_seed(request: Request) -> int:
 class _Job:
     """A run about to begin: what was asked for, where, by which clock, and the unfinished run to go on with, if any."""
 
-    request: Request
+    request: RunRequest
     place: Place
     clock: Clock
     before: Contents | None
@@ -90,7 +113,7 @@ class _Job:
         return catalogue.experiment(self.request.setup)
 
 
-def run(request: Request, make_screen: MakeScreen, clock: Clock) -> Finished:
+def run(request: RunRequest, make_screen: MakeScreen, clock: Clock) -> Finished:
     """Carry out a run. `PlaceError`, `JournalError`, `ConfigError`, `RunStopped`: nothing acknowledged is ever lost."""
     limits.check_limits(request.setup)
     place = places.place(request.results, request.participant_id, request.setup.config.experiment)
@@ -113,7 +136,7 @@ def _refuse_excluded(place: Place) -> None:
         )
 
 
-def _open_gun(request: Request, clock: Clock) -> Gun:
+def _open_gun(request: RunRequest, clock: Clock) -> Gun:
     methods = request.setup.gun.renderings(request.setup.config.design.methods)
     try:
         return open_gun(request.gun, methods, clock=clock.now)
@@ -121,7 +144,7 @@ def _open_gun(request: Request, clock: Clock) -> Gun:
         raise PlaceError(f"--gun {request.gun}: {error}") from error
 
 
-def _before(where: Place, request: Request, clock: Clock) -> Contents | None:
+def _before(where: Place, request: RunRequest, clock: Clock) -> Contents | None:
     """The unfinished run to go on with, if there is one and it is wanted."""
     if not where.journal.exists():
         return None
@@ -215,7 +238,7 @@ def _practice(job: _Job) -> Plan:
     return plan
 
 
-def _refuse_changes(request: Request, before: Contents) -> None:
+def _refuse_changes(request: RunRequest, before: Contents) -> None:
     began, now = before.header["setup_sha256"], request.setup.sha256()
     if began != now:
         given_back = f"`recoil configs --from {shlex.quote(str(before.path))} --copy DIR`"

@@ -27,7 +27,7 @@ from experiments.rebuild import table
 from experiments.record import storage
 from experiments.record.journal import Contents, read
 from experiments.record.replay import told
-from experiments.run import Finished, Request, run
+from experiments.run import Finished, RunRequest, run
 from experiments.screens.console import overview, parts, view
 from experiments.screens.console.controls import Controls
 from experiments.screens.console.keys import Name, Presses
@@ -448,7 +448,7 @@ class Sitting:
 
     def __post_init__(self) -> None:
         again = "resume" if self.resumed else "ask"
-        self._request = Request(setup=self.setup, participant_id="P01", results=self.results, seed=1, again=again)
+        self._request = RunRequest(setup=self.setup, participant_id="P01", results=self.results, seed=1, again=again)
         self.error: BaseException | None = None
         self.result: Finished | None = None
         self.ended = threading.Event()

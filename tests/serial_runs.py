@@ -20,7 +20,7 @@ from experiments.live_run import RunStopped
 from experiments.load import load_setup
 from experiments.record.journal import Contents, read
 from experiments.record.replay import told
-from experiments.run import Request
+from experiments.run import RunRequest
 from experiments.screens.synthetic import synthetic_screen
 from experiments.session.steps import Answered, Failed, Fired
 from experiments.study.places import Place, place
@@ -51,7 +51,7 @@ def one_run(config: Path, results: Path, gun: str, code: str, again: Any) -> Pla
     """A person's run, on a clock as fast as the twin lives."""
     setup = load_setup(str(config))
     seed = int(code.removeprefix("P"))
-    request = Request(setup=setup, participant_id=code, results=results, gun=gun, seed=seed, again=again)
+    request = RunRequest(setup=setup, participant_id=code, results=results, gun=gun, seed=seed, again=again)
     return runs.run(request, synthetic_screen, RealClock(speed_of(gun) or 1.0)).place
 
 

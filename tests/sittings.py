@@ -17,7 +17,7 @@ from experiments.rebuild import table
 from experiments.record import replay, storage
 from experiments.record.journal import Journal, read
 from experiments.record.replay import RunPosition
-from experiments.run import Request, run
+from experiments.run import RunRequest, run
 from experiments.runner import carry_out
 from experiments.screens.synthetic import SyntheticScreen, synthetic_screen
 from experiments.session.remarks import Remark
@@ -152,7 +152,7 @@ def sitting(
 
 
 def resumed_rows(desk: Sitting) -> list[dict[str, str]]:
-    request = Request(setup=desk.setup, participant_id="P01", results=desk.where.results, seed=None, again="resume")
+    request = RunRequest(setup=desk.setup, participant_id="P01", results=desk.where.results, seed=None, again="resume")
     done = run(request, synthetic_screen, VirtualClock())
     with done.place.table.open(newline="") as file:
         return list(csv.DictReader(file))

@@ -29,7 +29,7 @@ from experiments.load import load_setup
 from experiments.record import storage
 from experiments.record.journal import Contents, read
 from experiments.record.replay import told
-from experiments.run import Request
+from experiments.run import RunRequest
 from experiments.screens.console import parts
 from experiments.session.states import State
 from experiments.session.steps import Answered, Ask, Failed, Fire, Fired
@@ -185,9 +185,9 @@ def program(case: str, folder: Path) -> dict[str, Any]:
         drivers.append(VisualParticipant(console, clock))
 
     setup, clock = short_direction(sets=1, trials=3, set_break_s=0.0), RealClock()
-    request = Request(setup=setup, participant_id="P01", results=folder, seed=1)
+    request = RunRequest(setup=setup, participant_id="P01", results=folder, seed=1, screen="console", visual=True)
     try:
-        run_console(request, clock, hand="synthetic", watch=watch)
+        run_console(request, clock, watch=watch)
     except RunStopped as stop:
         stopped = str(stop)
     gun = guns[0]
@@ -315,7 +315,7 @@ def test_what_was_fired_when_the_gun_vanished_is_marked_and_presented_again_on_r
 
     case("vanishes")
     setup = short_direction(sets=1, trials=3, set_break_s=0.0)
-    request = Request(setup=setup, participant_id="P01", results=tmp_path, again="resume")
+    request = RunRequest(setup=setup, participant_id="P01", results=tmp_path, again="resume")
     done = runs.run(request, synthetic_screen, VirtualClock())
     with done.place.table.open(newline="", encoding="utf-8") as file:
         rows = list(csv.DictReader(file))

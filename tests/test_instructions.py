@@ -22,7 +22,7 @@ from experiments.direction.session import make_plan, make_practice, session
 from experiments.load import load_setup, shipped_folder
 from experiments.record.journal import read
 from experiments.record.replay import told
-from experiments.run import Request, run
+from experiments.run import RunRequest, run
 from experiments.screens.console.overview import coming
 from experiments.screens.console.view import About, Seen, instruction
 from experiments.screens.synthetic import synthetic_screen
@@ -161,7 +161,7 @@ def typed(plan: Plan, step: Prepare) -> str:
 @pytest.fixture(scope="module")
 def done(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, Path]:
     """A run of the example: its journal and its table."""
-    request = Request(setup=HURRY, participant_id="P01", results=tmp_path_factory.mktemp("results"), seed=1)
+    request = RunRequest(setup=HURRY, participant_id="P01", results=tmp_path_factory.mktemp("results"), seed=1)
     finished = run(request, synthetic_screen, VirtualClock())
     return finished.place.journal, finished.place.table
 

@@ -19,7 +19,7 @@ from experiments.load import load_setup
 from experiments.rebuild import plan_of, rebuild
 from experiments.record.journal import Journal, JournalError, link, read
 from experiments.record.replay import go_on, history, replay
-from experiments.run import Again, Request, run
+from experiments.run import Again, RunRequest, run
 from experiments.screens.synthetic import synthetic_screen
 from experiments.session.states import EMERGENCY
 from experiments.study import register
@@ -35,9 +35,9 @@ ANSWERS = {
 LAST_ANSWER = {"direction": "ask", "preference": "describe"}
 
 
-def request(name: str, results: Path, again: Again = "ask", seed: int | None = 1, **changes: Any) -> Request:
+def request(name: str, results: Path, again: Again = "ask", seed: int | None = 1, **changes: Any) -> RunRequest:
     setup = changes.pop("setup", SETUPS[name])
-    return Request(setup=setup, participant_id="P01", results=results, seed=seed, again=again)
+    return RunRequest(setup=setup, participant_id="P01", results=results, seed=seed, again=again)
 
 
 class Unbroken(NamedTuple):

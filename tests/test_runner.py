@@ -13,7 +13,7 @@ from experiments.config.setup import Setup
 from experiments.design.plan import Plan
 from experiments.live_run import RunStopped
 from experiments.record.journal import Journal, read
-from experiments.run import Request, run
+from experiments.run import RunRequest, run
 from experiments.runner import MAX_FAILURES
 from experiments.screens.synthetic import SyntheticScreen, synthetic_screen
 from experiments.session.remarks import Remark
@@ -242,7 +242,7 @@ def test_an_interrupted_run_leaves_a_reason_and_a_table_of_what_was_answered(tmp
     def impatient(setup: Setup[Any], plan: Plan, clock: Clock) -> SyntheticScreen:
         return Impatient(setup.config, catalogue.experiment(setup).observer(setup, plan), clock)
 
-    request = Request(setup=SETUPS["direction"], participant_id="P01", results=tmp_path, seed=1)
+    request = RunRequest(setup=SETUPS["direction"], participant_id="P01", results=tmp_path, seed=1)
     with pytest.raises(KeyboardInterrupt):
         run(request, impatient, VirtualClock())
     where = place(tmp_path, "P01", "direction")
@@ -255,7 +255,7 @@ def test_an_interrupted_run_leaves_a_reason_and_a_table_of_what_was_answered(tmp
 
 
 def test_the_gun_is_closed_and_the_journal_let_go_after_a_run(tmp_path: Path) -> None:
-    request = Request(setup=SETUPS["preference"], participant_id="P01", results=tmp_path, seed=1)
+    request = RunRequest(setup=SETUPS["preference"], participant_id="P01", results=tmp_path, seed=1)
     done = run(request, synthetic_screen, VirtualClock())
     with closing(Journal.reopen(read(done.place.journal), VirtualClock())) as journal:
         assert journal.path == done.place.journal

@@ -44,7 +44,7 @@ from experiments.record import storage
 from experiments.record.journal import is_empty
 from experiments.record.journal import read as read_journal
 from experiments.record.provenance import git_commit, provenance, recoil_version
-from experiments.run import Request, run
+from experiments.run import RunRequest, run
 from experiments.screens.synthetic import synthetic_screen
 from experiments.study import places
 
@@ -240,7 +240,7 @@ def _seat(study: Study, setup: Setup[Any], code: str, results: Path) -> None:
     """Have a synthetic participant do an experiment, unless the logs hold it already."""
     where = places.place(results, code, setup.config.experiment)
     if not _finished(where):
-        request = Request(setup=setup, participant_id=code, results=results, seed=study.seed, again="resume")
+        request = RunRequest(setup=setup, participant_id=code, results=results, seed=study.seed, again="resume")
         run(request, synthetic_screen, VirtualClock())
     elif not where.table.exists():  # killed between the last record and the table
         table, data, _ = rebuild(where.journal)

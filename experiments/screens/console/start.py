@@ -19,10 +19,10 @@ from PyQt6.QtWidgets import (
 from experiments.clock import Clock
 from experiments.config.setup import Setup
 from experiments.record.journal import JournalError
-from experiments.run import Again
+from experiments.run import Again, RunRequest
 from experiments.screens.console import parts, people
 from experiments.screens.console.fields import WHY, Answer, Lines, Question, sheet, unfit
-from experiments.screens.console.form import Choice, Form, Opening
+from experiments.screens.console.form import Form, Opening
 from experiments.screens.console.keyboard import FreshShortcuts
 from experiments.screens.console.people import PeopleTable
 from experiments.screens.console.shot_page import ShotPage
@@ -45,7 +45,7 @@ class StartWindow(QWidget):
     def __init__(self, study: StudyFolder, opening: Opening, clock: Clock) -> None:
         super().__init__()
         self._study, self._opening, self._clock = study, opening, clock
-        self.choice: Choice | None = None
+        self.choice: RunRequest | None = None
         self.question: Question | None = None
         self._simulation_is_known = False
         self._closing = False
@@ -59,7 +59,7 @@ class StartWindow(QWidget):
 
     def _build(self) -> None:
         self.setWindowTitle("Recoil – start")
-        self.form = Form(self._study.experiments, self._study.config.eligibility.ask, self._opening.beside)
+        self.form = Form(self._study.experiments, self._study.config.eligibility.ask, self._opening.options)
         self.shots = ShotPage(self._opening.gun, self._clock)
         self.table = PeopleTable(self._study.experiments)
         self.next, self.saved = Lines("detail"), Lines("saved", most_lines=5)
@@ -289,18 +289,17 @@ class StartWindow(QWidget):
     ) -> None:
         if self.choice is not None:
             return
-        beside = self.form.beside()
-        self.choice = Choice(
+        self.choice = RunRequest(
             setup=self._setup(),
             participant_id=code,
+            results=self._study.results,
+            gun=SIMULATED if training else self._opening.gun,
             again=again,
             anew_reason=reason,
             practice=practice,
             training=training,
-            participant_screen=beside.participant_screen,
-            participant_keys=beside.participant_keys,
-            noise=beside.noise,
-            monitor=beside.monitor,
+            screen="console",
+            options=self.form.options(),
         )
         self.close()
 
@@ -370,7 +369,7 @@ class StartWindow(QWidget):
         self.form.code_again.setFocus()
 
 
-def choose(study: StudyFolder, opening: Opening, clock: Clock) -> Choice | None:
+def choose(study: StudyFolder, opening: Opening, clock: Clock) -> RunRequest | None:
     """Show the start window until something is chosen; `None` if it was closed, or a signal ended it."""
     window = StartWindow(study, opening, clock)
     loop = QEventLoop()

@@ -12,7 +12,7 @@ from PyQt6.QtCore import QEventLoop, Qt, QTimer
 from PyQt6.QtWidgets import QDialog, QLabel, QPushButton, QVBoxLayout
 
 from experiments.record.journal import JournalError
-from experiments.run import Again, Request
+from experiments.run import Again, RunRequest
 from experiments.screens.console import parts, people
 from experiments.screens.console.fields import WHY, Answer, Lines, Question, sheet, unfit
 from experiments.screens.console.keyboard import FreshShortcuts
@@ -27,10 +27,10 @@ class Unfinished(QDialog):
     Nothing is chosen by Enter or by closing the window.
     """
 
-    def __init__(self, request: Request) -> None:
+    def __init__(self, request: RunRequest) -> None:
         super().__init__()
         self._request = request
-        self.decided: Request | None = None
+        self.decided: RunRequest | None = None
         self.setWindowTitle("Recoil – unfinished run")
         self.setStyleSheet(parts.sheet("dark") + sheet())
         answers = (
@@ -60,7 +60,7 @@ class Unfinished(QDialog):
         self.accept()
 
 
-def _text(request: Request) -> str:
+def _text(request: RunRequest) -> str:
     where = place(request.results, request.participant_id, request.setup.config.experiment)
     try:
         return people.stopped_text(request.participant_id, run_standing(where))
@@ -68,7 +68,7 @@ def _text(request: Request) -> str:
         return str(error)
 
 
-def ask(request: Request) -> Request | None:
+def ask(request: RunRequest) -> RunRequest | None:
     """The request with the decision of the person at the console; `None` if they leave the run as it is.
 
     `KeyboardInterrupt` if a signal ended the question.
