@@ -56,14 +56,14 @@ def gun_name(identity: Identity) -> str:
     return identity.model if identity.model == identity.serial else f"{identity.model}:{identity.serial}"
 
 
-def carry_out(session: Session, desk: Desk, standing: RunPosition) -> None:
+def carry_out(session: Session, desk: Desk, position: RunPosition) -> None:
     """Carry out a session from where it stands to its end.
 
     `RunStopped`, `JournalError` and interrupts pass through; whatever happens, the gun is disarmed. After an emergency
     stop the run stays where it is until it is closed, also if the gun does not answer.
     """
     try:
-        _Runner(session, desk).carry_out(standing)
+        _Runner(session, desk).carry_out(position)
     except RunStopped as stop:
         if desk.live.position.base is not State.HALTED:
             raise
@@ -84,10 +84,10 @@ class _Runner:
         self._damper = ""
         """As it was set in this sitting; unknown at its beginning."""
 
-    def carry_out(self, standing: RunPosition) -> None:
-        step = standing.step
-        if standing.halted:
-            self._rearm(trial_at(self._live.plan, standing.told, step))
+    def carry_out(self, position: RunPosition) -> None:
+        step = position.step
+        if position.halted:
+            self._rearm(trial_at(self._live.plan, position.history, step))
         while step is not None:
             self._desk.journal.append("step", body=record(step))
             outcome = self._do(step)

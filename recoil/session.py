@@ -10,11 +10,11 @@ from pathlib import Path
 from typing import Any
 
 from device.serial_gun.opening import speed_of
+from experiments.catalogue import rebuild
 from experiments.clock import Clock, RealClock, VirtualClock
 from experiments.config.setup import Setup
 from experiments.design.plan import Plan
 from experiments.live_run import RunStopped, Screen
-from experiments.rebuild import rebuild
 from experiments.record import storage
 from experiments.run import Again, Finished, ParticipantOptions, RunRequest, ScreenName, run
 from experiments.screens.synthetic import synthetic_screen

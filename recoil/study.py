@@ -18,7 +18,7 @@ from experiments.clock import RealClock, date_text
 from experiments.study import enrolment
 from experiments.study.places import PlaceError
 from experiments.study.progress import Overview, StudyFolder, open_study, overview
-from experiments.study.study import Facts, Participant, RunStanding, eligible
+from experiments.study.study import Facts, Participant, RunProgress, eligible
 
 _OPTIONS = {"age_years": "--age", "sex": "--sex", "handedness": "--handedness"}
 _UNDER_WAY = ("in progress", "open elsewhere")
@@ -115,7 +115,7 @@ def _participant(found: Found, one: Participant) -> dict[str, Any]:
     }
 
 
-def _run(run: RunStanding) -> dict[str, Any]:
+def _run(run: RunProgress) -> dict[str, Any]:
     return {key: value for key, value in asdict(run).items() if key != "experiment"}
 
 
@@ -154,7 +154,7 @@ def _cells(found: Found, one: Participant) -> Iterator[str]:
     yield "\n".join([*excluded, *(f"not eligible: {reason}" for reason in _not_eligible(found, one))])
 
 
-def _state(run: RunStanding) -> str:
+def _state(run: RunProgress) -> str:
     counts = f", {run.answered} of {run.planned} trials, last record {date_text(run.last_utc)}"
     lines = [f"{run.state}{counts if run.state in _UNDER_WAY and run.planned else ''}", " > ".join(run.methods)]
     return "\n".join(filter(None, [*lines, "practice done" if run.practised else ""]))

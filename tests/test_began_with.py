@@ -101,7 +101,7 @@ def test_the_files_that_a_run_began_with_load_to_the_same_setup(case: str, tmp_p
     journal = journal_of(config, tmp_path / "results")
     copied = copy_began_with(journal, tmp_path / "back")
     assert load_setup(str(copied[0])).record() == load_setup(str(config)).record()
-    assert load_setup(str(copied[0])).sha256() == read(journal).header["setup_sha256"]
+    assert load_setup(str(copied[0])).sha256() == read(journal).head.setup_sha256
     assert all(path.is_relative_to(tmp_path / "back") for path in copied)
 
 

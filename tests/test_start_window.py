@@ -560,13 +560,13 @@ def test_somebody_is_excluded_for_a_reason_and_readmitted(study: StudyFolder, op
     assert said(window) == "Type why, first."
     QTest.keyClicks(QApplication.focusWidget(), "fell ill")
     key(window, "D", CTRL)
-    assert register.excluded(study.results) == {"P01": "fell ill"}
+    assert register.read(study.results).excluded() == {"P01": "fell ill"}
     assert (table(window)["P01"][-1], remark(window)) == ("excluded: fell ill", "P01 is excluded: fell ill.")
     assert window.exclude_button.text().startswith("Readmit")
     key(window, "E", ALT)
     QTest.keyClicks(QApplication.focusWidget(), "well again")
     key(window, "D", CTRL)
-    assert register.excluded(study.results) == {}
+    assert register.read(study.results).excluded() == {}
     assert entries(study) == [("excluded", "P01"), ("readmitted", "P01")]
 
 
@@ -588,7 +588,7 @@ def test_the_exclusion_is_of_the_code_it_was_asked_for(study: StudyFolder, opene
     window.question.reason.setText("fell ill")
     window.form.code.setText("P02")
     key(window, "D", CTRL)
-    assert register.excluded(study.results) == {}
+    assert register.read(study.results).excluded() == {}
 
 
 # the simulated gun

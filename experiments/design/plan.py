@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import asdict, dataclass
-from typing import Any
 
 from pydantic import TypeAdapter
 
@@ -74,11 +73,11 @@ class Trial:
     """The name of what the participant was told for this set; empty if nothing."""
 
 
-def where_given(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
-    """A `dict_factory` that leaves out an instruction where there is none: a plan without any keeps its old hash.
+def without_blank_instruction(pairs: Iterable[tuple[str, object]]) -> dict[str, object]:
+    """A `dict_factory` for what has an instruction: where there is none, its record has no such key.
 
-    >>> where_given([("set", 1), ("instruction", "")]), where_given([("instruction", "speed")])
-    ({'set': 1}, {'instruction': 'speed'})
+    >>> without_blank_instruction([("set", 1), ("instruction", "")])
+    {'set': 1}
     """
     return {key: value for key, value in pairs if key != "instruction" or value}
 
@@ -106,9 +105,9 @@ class Plan:
         """Whether a trial is the first of its set."""
         return trial == next(t for t in self.trials if (t.session, t.set) == (trial.session, trial.set))
 
-    def record(self) -> dict[str, Any]:
+    def record(self) -> dict[str, object]:
         """The plan as plain JSON values, without instructions where there are none."""
-        return asdict(self, dict_factory=where_given)
+        return asdict(self, dict_factory=without_blank_instruction)
 
     @classmethod
     def from_record(cls, record: object) -> Plan:

@@ -51,8 +51,8 @@ def run_live(request: RunRequest, words: Words | None = None) -> Finished:
     application()
     try:
         return _carry_out(request, words or Words())
-    except UnfinishedRun:
-        decided = None if request.visual else ask(request)
+    except UnfinishedRun as found:
+        decided = None if request.visual else ask(request, found)
         if decided is None:
             raise
         return _carry_out(decided, words or Words())

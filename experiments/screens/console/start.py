@@ -30,7 +30,7 @@ from experiments.screens.console.windows import let_go, open_as_left, remember, 
 from experiments.study import enrolment
 from experiments.study.places import PlaceError
 from experiments.study.progress import Overview, StudyFolder, overview
-from experiments.study.study import Participant, RunStanding
+from experiments.study.study import Participant, RunProgress
 
 NAME = "start"
 SIMULATED = "simulated"
@@ -229,12 +229,12 @@ class StartWindow(QWidget):
     def _training(self) -> None:
         self._leave("training", practice=True, training=True)
 
-    def _admit(self, *, practice: bool) -> RunStanding | None:
+    def _admit(self, *, practice: bool) -> RunProgress | None:
         """How the run stands that may begin now; `None`, with the reason shown, if it may not."""
         entered = self.form.entered()
         return self._checked(lambda: enrolment.admit(self._study, entered, self._clock, practice=practice))
 
-    def _checked(self, check: Callable[[], RunStanding]) -> RunStanding | None:
+    def _checked(self, check: Callable[[], RunProgress]) -> RunProgress | None:
         self._take_back()
         try:
             return check()
@@ -256,7 +256,7 @@ class StartWindow(QWidget):
         text = f"The gun is SIMULATED: {self.form.participant_id} will feel nothing. Start all the same?"
         self._ask(Question(text, (Answer(text="Start, simulated", key="Ctrl+S", do=known), self._leave_it())))
 
-    def _ask_resume(self, run: RunStanding) -> None:
+    def _ask_resume(self, run: RunProgress) -> None:
         answers = (
             Answer(text="Go on with it", key="Ctrl+G", do=lambda _: self._begin_again("resume", "")),
             Answer(text="Set it aside, start anew", key="Ctrl+N", do=lambda why: self._begin_again("fresh", why)),
