@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from dataclasses import asdict, dataclass
 
 from pydantic import TypeAdapter
 
 from device.words import Direction
 from experiments.config.models import Order
-from experiments.config.setup import sha256
+from experiments.config.setup import sha256, without_blank_instruction
 from experiments.design.streams import Stream
 
 
@@ -71,15 +71,6 @@ class Trial:
     direction: Direction
     instruction: str = ""
     """The name of what the participant was told for this set; empty if nothing."""
-
-
-def without_blank_instruction(pairs: Iterable[tuple[str, object]]) -> dict[str, object]:
-    """A `dict_factory` for what has an instruction: where there is none, its record has no such key.
-
-    >>> without_blank_instruction([("set", 1), ("instruction", "")])
-    {'set': 1}
-    """
-    return {key: value for key, value in pairs if key != "instruction" or value}
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

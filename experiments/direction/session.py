@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from functools import partial
 from itertools import pairwise
 
@@ -106,7 +107,8 @@ def _ways(forward: int, backward: int) -> list[Direction]:
 
 def session(plan: Plan, setup: Setup[DirectionConfig]) -> Session:
     """The steps of a run, from the first hand-over to its end."""
-    presenter = Presenter(partial(_steps, setup))
+    texts = {name: setup.config.instruction_text(name) for name in ("", *setup.config.design.instructions)}
+    presenter = Presenter(partial(_steps, setup, texts))
     yield from presenter.present(plan.trials[0])
     for before, trial in pairwise(plan.trials):
         yield from _rest(presenter, before, trial, setup.config.breaks)
@@ -121,14 +123,14 @@ def _rest(presenter: Presenter, before: Trial, trial: Trial, breaks: Breaks) -> 
         yield from presenter.until_done(Rest(between="sets", duration_s=breaks.between_sets_s))
 
 
-def _steps(setup: Setup[DirectionConfig], trial: Trial, attempt: int) -> tuple[Step, ...]:
+def _steps(setup: Setup[DirectionConfig], texts: Mapping[str, str], trial: Trial, attempt: int) -> tuple[Step, ...]:
     question = setup.config.question
     return (
         Prepare(
             trial=trial,
             attempt=attempt,
             damper=setup.gun.methods[trial.method].damper,
-            instruction=setup.config.instruction_text(trial.instruction),
+            instruction=texts[trial.instruction],
         ),
         Fire(trial=trial, attempt=attempt),
         Ask(

@@ -11,7 +11,8 @@ from typing import Annotated, Literal
 from pydantic import Field, TypeAdapter
 
 from device.words import Direction
-from experiments.design.plan import Trial, without_blank_instruction
+from experiments.config.setup import without_blank_instruction
+from experiments.design.plan import Trial
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

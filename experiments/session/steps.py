@@ -14,7 +14,8 @@ from typing import Annotated, Literal, Protocol
 from pydantic import Field, TypeAdapter
 
 from device.words import Direction, ShotTiming
-from experiments.design.plan import Trial, without_blank_instruction
+from experiments.config.setup import without_blank_instruction
+from experiments.design.plan import Trial
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
