@@ -2,18 +2,14 @@
 
 from __future__ import annotations
 
-import io
-import shutil
 from collections.abc import Iterator, Mapping
 from dataclasses import asdict, dataclass
 from pathlib import Path
-from typing import Any
 
 from pydantic import ValidationError
-from rich.console import Console
-from rich.table import Table
-from rich.text import Text
 
+from analysis.report.section import Section, Table
+from analysis.report.terminal import with_tables
 from experiments.clock import RealClock, date_text
 from experiments.study import enrolment
 from experiments.study.places import PlaceError
@@ -22,8 +18,6 @@ from experiments.study.study import Facts, Participant, RunProgress, eligible
 
 _OPTIONS = {"age_years": "--age", "sex": "--sex", "handedness": "--handedness"}
 _UNDER_WAY = ("in progress", "open elsewhere")
-_WIDTH = 160
-"""Columns of the table where it does not go to a terminal."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -91,7 +85,7 @@ def _carry_out(where: StudyFolder, wanted: Change) -> tuple[str, ...]:
     return ()
 
 
-def as_json(found: Found) -> dict[str, Any]:
+def as_json(found: Found) -> dict[str, object]:
     """The study as plain JSON values."""
     coming = found.overview.next
     return {
@@ -104,7 +98,7 @@ def as_json(found: Found) -> dict[str, Any]:
     }
 
 
-def _participant(found: Found, one: Participant) -> dict[str, Any]:
+def _participant(found: Found, one: Participant) -> dict[str, object]:
     return {
         "participant_id": one.participant_id,
         "facts": one.facts and one.facts.model_dump(mode="json"),
@@ -115,7 +109,7 @@ def _participant(found: Found, one: Participant) -> dict[str, Any]:
     }
 
 
-def _run(run: RunProgress) -> dict[str, Any]:
+def _run(run: RunProgress) -> dict[str, object]:
     return {key: value for key, value in asdict(run).items() if key != "experiment"}
 
 
@@ -123,24 +117,20 @@ def _not_eligible(found: Found, one: Participant) -> tuple[str, ...]:
     return eligible(one.facts, found.study.config.eligibility) if one.facts else ()
 
 
-def as_text(found: Found) -> str:
+def section(found: Found) -> Section:
     """The study for people: a table, then who comes next."""
-    text = io.StringIO()
-    console = Console(file=text, width=shutil.get_terminal_size((_WIDTH, 24)).columns, highlight=False, markup=False)
-    console.print(found.study.config.title, soft_wrap=True)
-    console.print(_table(found))
-    for line in (*_count_lines(found), *_next_lines(found)):
-        console.print(line, soft_wrap=True)
-    return text.getvalue().rstrip("\n")
+    header = ("code", "age", "sex", "hand", *found.study.experiments, "remark")
+    rows = tuple(tuple(_cells(found, one)) for one in found.overview.participants)
+    return Section(
+        title=found.study.config.title,
+        tables=(Table(caption="", header=header, rows=rows),),
+        items=(*_count_lines(found), *_next_lines(found)),
+    )
 
 
-def _table(found: Found) -> Table:
-    table = Table()
-    for heading in ("code", "age", "sex", "hand", *found.study.experiments, "remark"):
-        table.add_column(heading, overflow="fold")
-    for one in found.overview.participants:
-        table.add_row(*map(Text, _cells(found, one)))  # as text: a reason in brackets is no mark-up
-    return table
+def as_text(found: Found) -> str:
+    """The study for people at a terminal."""
+    return with_tables(section(found))
 
 
 def _cells(found: Found, one: Participant) -> Iterator[str]:

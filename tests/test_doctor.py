@@ -20,6 +20,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from analysis.report.serial import plain
 from device import LinkError
 from experiments.clock import VirtualClock
 from experiments.config.door import ConfigError
@@ -231,7 +232,7 @@ def test_every_figure_has_its_verdict_and_all_but_good_ones_advice(finding: Find
     assert finding.verdict == verdict
     assert advice in finding.advice
     assert bool(finding.advice) == (verdict != "good")
-    json.dumps(dict(finding.figures), allow_nan=False)
+    json.dumps(plain(finding.figures), allow_nan=False)
 
 
 @pytest.mark.parametrize(("slowest", "verdict"), [(50.0, "good"), (50.1, "warning")])
@@ -276,7 +277,7 @@ def test_a_dead_child_is_explained_by_the_library_it_missed_or_by_its_first_word
 
 
 def test_the_table_shows_names_in_brackets_as_they_are() -> None:
-    text = as_text([Finding(check="sound", verdict="good", measured="[red]Headphones[/red]")])
+    text = as_text((Finding(check="sound", verdict="good", measured="[red]Headphones[/red]"),))
     assert "[red]Headphones[/red]" in text
 
 

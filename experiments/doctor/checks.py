@@ -8,12 +8,11 @@ from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
-from typing import Any
 
 from device import DeviceError
 from experiments.doctor import children, measures, verdicts
 from experiments.doctor.children import Answer, within
-from experiments.doctor.figures import Display, Finding, Keys, Sound, Stage
+from experiments.doctor.figures import Finding
 from experiments.doctor.verdicts import Latencies, latencies, together
 from experiments.record import journal
 from experiments.record.journal import JournalError
@@ -40,10 +39,10 @@ def checks(results: Path, gun: str, limit_s: float) -> tuple[Check, ...]:
         "disk": partial(_disk, results),
         "gun": partial(_gun, gun, limit_s),
         "USB adapter": lambda: (verdicts.of_adapters(measures.adapters()),),
-        "display": partial(_on_display, "display", "display", _display),
-        "PsychoPy": partial(_on_display, "PsychoPy", "stage", _stage, PSYCHOPY_DEADLINE_S),
+        "display": partial(_on_display, "display", "display"),
+        "PsychoPy": partial(_on_display, "PsychoPy", "stage", PSYCHOPY_DEADLINE_S),
         "sound": _sound,
-        "keyboard": partial(_on_display, "keyboard", "keys", _keys),
+        "keyboard": partial(_on_display, "keyboard", "keys"),
         "console": partial(_console, results),
     }
     return tuple(Check(name=name, look=look) for name, look in looks.items())
@@ -84,37 +83,18 @@ def _gun(address: str, limit_s: float) -> tuple[Finding, ...]:
         return (verdicts.of_link_failure(str(error)),)
 
 
-def _on_display(
-    name: str, program: str, judge: Callable[[dict[str, Any]], Finding], seconds: float = DEADLINE_S
-) -> tuple[Finding, ...]:
+def _on_display(name: str, program: str, seconds: float = DEADLINE_S) -> tuple[Finding, ...]:
     missing = no_display(os.environ, sys.platform)
     answer = Answer(absent=missing) if missing else children.ask(program, seconds)
-    return (_judged(name, answer, judge),)
-
-
-def _judged(name: str, answer: Answer, judge: Callable[[dict[str, Any]], Finding]) -> Finding:
-    if answer.absent:
-        return verdicts.of_absent(name, answer.absent)
-    return verdicts.of_failure(name, answer.error) if answer.error else judge(answer.figures)
-
-
-def _display(figures: dict[str, Any]) -> Finding:
-    return verdicts.of_display(Display(**figures))
-
-
-def _stage(figures: dict[str, Any]) -> Finding:
-    return verdicts.of_stage(Stage(**figures))
-
-
-def _keys(figures: dict[str, Any]) -> Finding:
-    return verdicts.of_keys(Keys(**figures))
+    if answer.figures is not None:
+        return (verdicts.of_seen(answer.figures),)
+    return (verdicts.of_absent(name, answer.absent) if answer.absent else verdicts.of_failure(name, answer.error),)
 
 
 def _sound() -> tuple[Finding, ...]:
     answer = children.ask("sound", DEADLINE_S)
-    if answer.figures:
-        return (verdicts.of_sound(Sound(**answer.figures)),)
-    return (verdicts.no_sound(answer.absent or answer.error),)
+    seen = answer.figures
+    return (verdicts.no_sound(answer.absent or answer.error) if seen is None else verdicts.of_seen(seen),)
 
 
 def _console(results: Path) -> tuple[Finding, ...]:

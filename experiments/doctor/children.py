@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import os
 import re
 import subprocess
@@ -11,9 +10,13 @@ import tempfile
 import threading
 from collections.abc import Callable
 from contextlib import suppress
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from pathlib import Path
-from typing import IO, Any, TypeVar
+from typing import IO, TypeVar
+
+from pydantic import TypeAdapter
+
+from experiments.doctor.figures import Seen
 
 Result = TypeVar("Result")
 
@@ -62,9 +65,12 @@ _MISSING = re.compile(r"\S+\.so[.\d]*: cannot open shared object file")
 class Answer:
     """What a child said: figures, or why there are none: it is `absent` here, or an `error` came in between."""
 
-    figures: dict[str, Any] = field(default_factory=dict)
+    figures: Seen | None = None
     absent: str = ""
     error: str = ""
+
+
+_ANSWER = TypeAdapter(Answer)
 
 
 def ask(program: str, seconds: float) -> Answer:
@@ -91,7 +97,7 @@ def run(command: list[str], seconds: float) -> Answer:
 
 def _answer(code: int, said: str, errors: str) -> Answer:
     if code == 0 and said:
-        return Answer(**json.loads(said))
+        return _ANSWER.validate_json(said)
     ending = f"was killed by signal {-code}" if code < 0 else f"ended with exit code {code}"
     return Answer(error=f"{ending}: {cause(errors)}")
 

@@ -8,18 +8,22 @@ where that is another), to the `synced_s` of the answer's record, which stands i
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass
 from itertools import pairwise
 from typing import Literal
 
 from experiments.doctor.figures import (
     Adapter,
+    Adapters,
     Appends,
+    ConsoleLatency,
     Display,
+    Figures,
     Finding,
     Keys,
     Link,
     Machine,
+    Seen,
     Sound,
     Spread,
     Stage,
@@ -175,7 +179,7 @@ def of_link(found: Link, limit_s: float) -> Finding:
             verdict="fails",
             measured=measured if found.fault is None else f"{measured}; fault: {found.fault}",
             advice="switch off the gun's power, remove the cause, and look again before anybody holds it",
-            figures=asdict(found),
+            figures=found,
         )
     advice = (
         f"95th percentile above the limit of {1000 * limit_s:g} ms (the gun's serial.round_trip_limit_s): set the USB "
@@ -206,8 +210,21 @@ def of_adapters(found: Sequence[Adapter]) -> Finding:
         verdict="warning" if slow else "good",
         measured=", ".join(f"{adapter.name}: latency timer {adapter.latency_ms} ms" for adapter in found),
         advice="; ".join(f"echo {MAX_ADAPTER_MS} | sudo tee {adapter.setting}" for adapter in slow),
-        figures={"adapters": [asdict(adapter) for adapter in found]},
+        figures=Adapters(adapters=tuple(found)),
     )
+
+
+def of_seen(found: Seen) -> Finding:
+    """What a program of its own saw."""
+    match found:
+        case Display():
+            return of_display(found)
+        case Stage():
+            return of_stage(found)
+        case Sound():
+            return of_sound(found)
+        case Keys():
+            return of_keys(found)
 
 
 def of_display(found: Display) -> Finding:
@@ -215,9 +232,8 @@ def of_display(found: Display) -> Finding:
     size = f"{found.width_px} x {found.height_px} at {found.refresh_Hz:.0f} Hz ({found.platform})"
     if found.opened_ms is None:
         advice = "see that the desktop shows windows, then look again"
-        figures = asdict(found)
         return Finding(
-            check="display", verdict="fails", measured=f"{size}; no window was seen", advice=advice, figures=figures
+            check="display", verdict="fails", measured=f"{size}; no window was seen", advice=advice, figures=found
         )
     advice = ""
     if found.platform in ("offscreen", "minimal"):
@@ -260,7 +276,7 @@ def of_keys(found: Keys) -> Finding:
     if came == 0:
         measured = f"none of {found.injected} injected keys came to the window"
         advice = "leave the doctor's window in front, keep your hands off, and look again"
-        return Finding(check="keyboard", verdict="warning", measured=measured, advice=advice, figures=asdict(found))
+        return Finding(check="keyboard", verdict="warning", measured=measured, advice=advice, figures=found)
     event, painted = spread(found.to_event_ms), spread(found.to_painted_ms)
     measured = f"{came} of {found.injected} keys; to the event {_short(event)}; until painted {_short(painted)}"
     advice = "" if came == found.injected else "some keys went elsewhere: leave the doctor's window in front"
@@ -293,7 +309,7 @@ def _latency(check: str, values: Sequence[float], bound: float, what: str, trial
         verdict="warning" if slow else "good",
         measured=measured,
         advice=f"more than {bound:g} ms: close other programs; see the disk and display above" if slow else "",
-        figures={"ms": asdict(found), "bound_ms": bound, "trials": trials},
+        figures=ConsoleLatency(ms=found, bound_ms=bound, trials=trials),
     )
 
 
@@ -331,12 +347,10 @@ def overall(verdicts: Sequence[Verdict]) -> Literal["good", "warning", "fails"]:
     return "fails" if "fails" in verdicts else "warning" if "warning" in verdicts else "good"
 
 
-def _judged(
-    check: str, measured: str, advice: str, figures: Machine | Ticks | Appends | Link | Display | Stage | Sound | Keys
-) -> Finding:
+def _judged(check: str, measured: str, advice: str, figures: Figures) -> Finding:
     """Good if there is nothing to advise, else a warning."""
     verdict: Verdict = "warning" if advice else "good"
-    return Finding(check=check, verdict=verdict, measured=measured, advice=advice, figures=asdict(figures))
+    return Finding(check=check, verdict=verdict, measured=measured, advice=advice, figures=figures)
 
 
 def _tail(of: Spread) -> str:

@@ -9,7 +9,7 @@ from collections.abc import Callable
 from dataclasses import asdict
 from typing import NoReturn
 
-from experiments.doctor.figures import Display, Keys, Sound, Stage
+from experiments.doctor.figures import Seen
 
 OPTIONAL = ("PyQt6", "Xlib", "psychopy", "sounddevice")
 
@@ -18,7 +18,7 @@ class Absent(Exception):  # noqa: N818 - that something is not there is no error
     """This machine does not have what the program looks at; the message says what is missing."""
 
 
-def answer(look: Callable[[], Display | Keys | Sound | Stage]) -> NoReturn:
+def answer(look: Callable[[], Seen]) -> NoReturn:
     """Look, answer, and end at once: no library's last acts are waited for."""
     with os.fdopen(os.dup(1), "w", encoding="utf-8") as said:
         os.dup2(2, 1)  # what libraries print goes to the errors
@@ -27,7 +27,7 @@ def answer(look: Callable[[], Display | Keys | Sound | Stage]) -> NoReturn:
     os._exit(0)
 
 
-def _answer(look: Callable[[], Display | Keys | Sound | Stage]) -> dict[str, object]:
+def _answer(look: Callable[[], Seen]) -> dict[str, object]:
     try:
         return {"figures": asdict(look())}
     except Absent as absent:
