@@ -41,7 +41,7 @@ class Experiment:
     make_practice: Callable[[Any, str, int], Plan | None]
     session: Callable[[Plan, Setup[Any]], Session]
     rows: Callable[[Plan, History], list[Row]]
-    observer: Callable[[Setup[Any], Plan], Any]
+    synthetic_participant: Callable[[Setup[Any], Plan], Any]
     answer_columns: tuple[str, ...]
 
 
@@ -52,7 +52,7 @@ CATALOGUE: dict[str, Experiment] = {
         make_practice=direction_practice,
         session=direction_session,
         rows=direction_rows,
-        observer=direction_synthetic.synthetic_participant,
+        synthetic_participant=direction_synthetic.synthetic_participant,
         answer_columns=direction_synthetic.TABLE_COLUMNS,
     ),
     "preference": Experiment(
@@ -61,7 +61,7 @@ CATALOGUE: dict[str, Experiment] = {
         make_practice=lambda *_: None,
         session=preference_session,
         rows=preference_rows,
-        observer=preference_synthetic.synthetic_participant,
+        synthetic_participant=preference_synthetic.synthetic_participant,
         answer_columns=preference_synthetic.TABLE_COLUMNS,
     ),
 }

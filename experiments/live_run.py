@@ -191,7 +191,7 @@ class LiveRun:
             position = self._position
         self._screen.show(position)
 
-    def felt(self, onset_s: float | None, *, least_s: float = 0.0) -> None:
+    def stimulus_begins(self, onset_s: float | None, *, least_s: float = 0.0) -> None:
         """A stimulus began, or is about to (`None`): what carries a train on is not taken before the least exposure."""
         not_before_s = math.inf if onset_s is None else onset_s + least_s
         with self._news:

@@ -310,7 +310,7 @@ class Stimulus:
             return self._failed(error, felt=asked and not isinstance(error, LimitError))
         finally:
             disarm(self._desk.gun)
-        self._live.felt(report.pulse_start_s)
+        self._live.stimulus_begins(report.pulse_start_s)
         return Fired(gun=self._desk.gun_name, onset_utc=onset_utc, **_times(report))
 
     def present(self, step: Present) -> Presented | Failed | Interrupted:
@@ -341,7 +341,7 @@ class Stimulus:
         try:
             self._live.enter(state, step)
             if state is State.TRAIN:
-                self._live.felt(None)
+                self._live.stimulus_begins(None)
             self._arm()
         except RunStopped:
             self._desk.journal.append("outcome", body=record(Interrupted(presented=False)))
@@ -397,7 +397,7 @@ class _Train:
     def began(self, onset_utc: str, first: ShotReport) -> None:
         """Take the first shot; `next` counts after the least exposure."""
         self._onset_utc, self._onset_s = onset_utc, first.pulse_start_s
-        self._desk.live.felt(first.pulse_start_s, least_s=self._step.least_exposure_s)
+        self._desk.live.stimulus_begins(first.pulse_start_s, least_s=self._step.least_exposure_s)
         self.fired(first)
 
     def fired(self, report: ShotReport) -> None:

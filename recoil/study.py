@@ -38,12 +38,12 @@ class Found:
     overview: Overview
 
 
-def change(asked: Mapping[str, str | None], facts: Mapping[str, object], reason: str | None) -> Change | None:
+def change(options: Mapping[str, str | None], facts: Mapping[str, object], reason: str | None) -> Change | None:
     """What is to be changed; `None` for a look alone. `PlaceError` for options that do not go together."""
-    wanted = [(action, code) for action, code in asked.items() if code is not None]
-    if len(wanted) > 1:
-        raise PlaceError(f"{' and '.join(f'--{action}' for action, _ in wanted)}: give one of them at a time")
-    action, code = wanted[0] if wanted else ("", "")
+    given = [(action, code) for action, code in options.items() if code is not None]
+    if len(given) > 1:
+        raise PlaceError(f"{' and '.join(f'--{action}' for action, _ in given)}: give one of them at a time")
+    action, code = given[0] if given else ("", "")
     _refuse_stray(action, facts, reason)
     if not action:
         return None
@@ -68,20 +68,20 @@ def _facts(values: Mapping[str, object]) -> Facts:
         raise PlaceError(f"{_OPTIONS[str(first['loc'][0])]} {first['input']!r}: {first['msg']}") from error
 
 
-def study(folder: Path, wanted: Change | None) -> tuple[Found, tuple[str, ...]]:
+def study(folder: Path, change: Change | None) -> tuple[Found, tuple[str, ...]]:
     """How a folder's study stands after a change, and what there is to say of the change. Errors name what to do."""
     where = open_study(folder)
-    notes = _carry_out(where, wanted) if wanted else ()
+    notes = _carry_out(where, change) if change else ()
     return Found(study=where, overview=overview(where)), notes
 
 
-def _carry_out(where: StudyFolder, wanted: Change) -> tuple[str, ...]:
-    clock, code = RealClock(), wanted.participant_id
-    if wanted.action == "join":
-        reasons = enrolment.join(where, code, wanted.facts, clock)
+def _carry_out(where: StudyFolder, change: Change) -> tuple[str, ...]:
+    clock, code = RealClock(), change.participant_id
+    if change.action == "join":
+        reasons = enrolment.join(where, code, change.facts, clock)
         return tuple(f"participant {code} is not eligible: {reason}; recorded, exclude?" for reason in reasons)
-    act = enrolment.exclude if wanted.action == "exclude" else enrolment.readmit
-    act(where.results, code, wanted.reason, clock)
+    act = enrolment.exclude if change.action == "exclude" else enrolment.readmit
+    act(where.results, code, change.reason, clock)
     return ()
 
 

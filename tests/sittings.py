@@ -145,7 +145,7 @@ def sitting(
     heads = {"plan": plan.record(), "plan_sha256": plan.sha256()}
     journal.append("run", **heads, setup=setup.record(), setup_sha256=setup.sha256())
     gun = TroubledGun(setup, clock, troubles or {})
-    observer = catalogue.CATALOGUE[name].observer(setup, plan)
+    observer = catalogue.CATALOGUE[name].synthetic_participant(setup, plan)
     screen = WatchingScreen(setup.config, observer, clock, gun, where.journal)
     return Sitting(plan, setup, where, gun, screen, clock, journal)
 

@@ -26,9 +26,8 @@ from experiments.clock import VirtualClock
 from experiments.config.door import ConfigError
 from experiments.config.setup import sha256
 from experiments.design.plan import Trial
-from experiments.doctor import children, verdicts
-from experiments.doctor.checks import Check, carry_out, checks, no_display
-from experiments.doctor.children import within
+from experiments.doctor import verdicts
+from experiments.doctor.checks import Check, Reply, carry_out, cause, checks, no_display, run_child, within
 from experiments.doctor.figures import (
     VERDICTS,
     Adapter,
@@ -271,9 +270,9 @@ def test_a_display_is_asked_for_on_linux_before_a_window_is_tried(
 def test_a_dead_child_is_explained_by_the_library_it_missed_or_by_its_first_words() -> None:
     search = 'qt.core.plugin.factoryloader: looking at "libqxcb.so"\n'
     lacking = f"{search}cannot load: libxcb-icccm.so.4: cannot open shared object file: No such file\nqt.qpa: sorry\n"
-    assert children.cause(lacking) == "libxcb-icccm.so.4: cannot open shared object file"
-    assert children.cause(f"{search}\nqt.qpa.xcb: could not connect to display :9\nmore\n").endswith("display :9")
-    assert children.cause("") == "it said nothing"
+    assert cause(lacking) == "libxcb-icccm.so.4: cannot open shared object file"
+    assert cause(f"{search}\nqt.qpa.xcb: could not connect to display :9\nmore\n").endswith("display :9")
+    assert cause("") == "it said nothing"
 
 
 def test_the_table_shows_names_in_brackets_as_they_are() -> None:
@@ -320,16 +319,16 @@ def test_work_that_is_interrupted_may_put_away_what_it_holds(tmp_path: Path) -> 
     program = (
         "import os, signal, threading\n"
         "from pathlib import Path\n"
-        "from experiments.doctor import deadline\n"
+        "from experiments.doctor import checks\n"
         "interrupted = threading.Event()\n"
         "def interrupt(*_):\n    interrupted.set()\n    raise KeyboardInterrupt\n"
         "signal.signal(signal.SIGINT, interrupt)\n"
         "def work():\n    os.kill(os.getpid(), signal.SIGINT)\n    interrupted.wait()\n    Path({!r}).touch()\n"
-        "deadline._PUT_AWAY_S = {}\n"
-        "deadline.within({}, work)"
+        "checks.PUT_AWAY_S = {}\n"
+        "checks.within({}, work)"
     )
     program = program.format(str(tmp_path / "put away"), PATIENCE_S, PATIENCE_S)
-    answer = children.run([sys.executable, "-c", program], PATIENCE_S)
+    answer = run_child([sys.executable, "-c", program], PATIENCE_S)
     assert "signal 2" in answer.error
     assert (tmp_path / "put away").exists()
 
@@ -351,22 +350,22 @@ def lose_the_gun() -> NoReturn:
     ],
 )
 def test_a_child_that_hangs_or_dies_is_an_answer(program: str, seconds: float, error: str) -> None:
-    assert children.run([sys.executable, "-S", "-c", program], seconds).error == error
+    assert run_child([sys.executable, "-S", "-c", program], seconds).error == error
 
 
 def test_what_the_libraries_of_a_child_print_and_raise_does_not_spoil_its_answer() -> None:
     program = (
-        "from experiments.doctor.programs.answer import answer, Absent\n"
+        "from experiments.doctor.programs import answer, Absent\n"
         "def look():\n    print('noise')\n    raise {}\n"
         "answer(look)"
     )
     for error, said in (
-        ("SystemExit(0)", children.Answer(error="SystemExit: 0")),
-        ("Absent('no screen')", children.Answer(absent="no screen")),
-        ("ModuleNotFoundError(name='Xlib')", children.Answer(absent="Xlib is not installed")),
-        ("ModuleNotFoundError('no wx', name='wx')", children.Answer(error="ModuleNotFoundError: no wx")),
+        ("SystemExit(0)", Reply(error="SystemExit: 0")),
+        ("Absent('no screen')", Reply(absent="no screen")),
+        ("ModuleNotFoundError(name='Xlib')", Reply(absent="Xlib is not installed")),
+        ("ModuleNotFoundError('no wx', name='wx')", Reply(error="ModuleNotFoundError: no wx")),
     ):
-        assert children.run([sys.executable, "-c", program.format(error)], PATIENCE_S) == said
+        assert run_child([sys.executable, "-c", program.format(error)], PATIENCE_S) == said
 
 
 def test_a_check_that_breaks_off_is_a_finding_and_an_impossible_wish_is_refused() -> None:
@@ -475,13 +474,13 @@ def console_run(results: Path) -> None:
     with Journal.create(folder / "sub-P01_task-direction_journal.jsonl", clock) as journal:
         journal.append("run", **parts, **hashes, clock="real")
         for _ in range(25):
-            journal.append("step", body={"kind": "fire"})
+            journal.append("step", body=record(Fire(trial=TRIAL, attempt=1)))
             fired_s = clock.now()
-            journal.append("outcome", body={"kind": "fired", "pulse_start_s": fired_s})
-            journal.append("step", body={"kind": "ask"})
+            journal.append("outcome", body=record(replace(FIRED, pulse_start_s=fired_s)))
+            journal.append("step", body=record(ASK))
             clock.sleep(1)
-            answered = {"kind": "answered", "response_time_s": 1 - 0.004}
-            journal.append("outcome", body=answered, shown_s=fired_s + 0.020)
+            answered = replace(ANSWERED, response_time_s=1 - 0.004)
+            journal.append("outcome", body=record(answered), shown_s=fired_s + 0.020)
         journal.append("finished")
 
 

@@ -241,7 +241,7 @@ def test_an_interrupted_run_leaves_a_reason_and_a_table_of_what_was_answered(tmp
                 raise KeyboardInterrupt
 
     def impatient(setup: Setup[Any], plan: Plan, clock: Clock) -> SyntheticScreen:
-        return Impatient(setup.config, catalogue.experiment(setup).observer(setup, plan), clock)
+        return Impatient(setup.config, catalogue.experiment(setup).synthetic_participant(setup, plan), clock)
 
     request = RunRequest(setup=SETUPS["direction"], participant_id="P01", results=tmp_path, seed=1)
     with pytest.raises(KeyboardInterrupt):

@@ -121,8 +121,8 @@ def study(
     from recoil import study as feature
 
     facts = {"age_years": age, "sex": sex, "handedness": handedness}
-    asked = {"join": join, "exclude": exclude, "readmit": readmit}
-    found, notes = feature.study(folder, feature.change(asked, facts, reason))
+    options = {"join": join, "exclude": exclude, "readmit": readmit}
+    found, notes = feature.study(folder, feature.change(options, facts, reason))
     for message in (*notes, *found.overview.problems):
         say(f"recoil: {message}")
     show(feature.as_json(found), feature.as_text(found), as_json)

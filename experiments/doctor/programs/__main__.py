@@ -6,7 +6,7 @@ import sys
 from importlib import import_module
 
 from experiments.doctor.figures import Seen
-from experiments.doctor.programs.answer import answer
+from experiments.doctor.programs import answer
 
 
 def look() -> Seen:
