@@ -160,14 +160,9 @@ def decide(diffusion: Diffusion, draws: Draws) -> Decision:
     a, w = diffusion.boundary, diffusion.start
     upper = side < float(upper_probabilities(diffusion.drift, a, w))
     gap, back = ((1.0 - w) * a, w * a) if upper else (w * a, (1.0 - w) * a)
-    way = crossing_times(
-        np.array([abs(diffusion.drift)]), np.array([gap]), np.array([back]), lambda count: _drawn(draws, count)
-    )
-    return Decision(upper=upper, time_s=diffusion.non_decision_s + float(way[0]))
-
-
-def _drawn(draws: Draws, count: int) -> Floats:
-    return np.array([draws.uniform() for _ in range(count)])
+    ahead, behind, speed = np.array([gap]), np.array([back]), np.array([abs(diffusion.drift)])
+    (way,) = crossing_times(speed, ahead, behind, lambda count: np.array([draws.uniform() for _ in range(count)]))
+    return Decision(upper=upper, time_s=diffusion.non_decision_s + float(way))
 
 
 def upper_probabilities(drift: ArrayLike, boundary: ArrayLike, start: ArrayLike) -> Floats:
