@@ -21,7 +21,7 @@ from device import LinkError
 from experiments import run as runs
 from experiments.clock import RealClock
 from experiments.live_run import RunStopped
-from experiments.run import Request
+from experiments.run import RunRequest
 from experiments.screens.console import app
 from experiments.screens.console.messages import Ended, ParticipantSeen
 from experiments.session import events
@@ -349,7 +349,7 @@ def one_run(  # noqa: PLR0917 - each is needed once
     look: Callable[[str, Any], None],
 ) -> None:
     setup = _setup(experiment)
-    request = Request(setup=setup, participant_id="P" * 8, results=results, seed=1, again=again)
+    request = RunRequest(setup=setup, participant_id="P" * 8, results=results, seed=1, again=again)
     keep: list[Shown] = []
 
     def watch(console: Any) -> None:

@@ -20,7 +20,7 @@ from experiments.config.setup import Setup
 from experiments.design.plan import Plan
 from experiments.live_run import LiveRun, RunStopped, Screen
 from experiments.record.journal import JournalError
-from experiments.run import Finished, Request, run
+from experiments.run import Finished, RunRequest, run
 from experiments.screens.console import tone, windows
 from experiments.screens.console.beside import ParticipantSide
 from experiments.screens.console.messages import Began, Ended, GunSeen, Message, Saved, Shown, Trouble
@@ -133,16 +133,16 @@ class Console:
 
     def __init__(
         self,
-        request: Request,
+        request: RunRequest,
         clock: Clock,
-        hand: Hand,
         beside: ParticipantSide | None,
         *,
         band: str = "",
         last: str = "Thank the participant.",
     ) -> None:
         self._request, self._clock = request, clock
-        self._hand, self._beside = hand, beside
+        self._hand: Hand = "synthetic" if request.visual else "experimenter"
+        self._beside = beside
         self._band, self._last = band, last
         self._bridge, self._opening = Bridge(), _Opening()
         self._opened = threading.Event()
@@ -238,10 +238,9 @@ class Console:
 
 
 def run_console(
-    request: Request,
+    request: RunRequest,
     clock: Clock,
     *,
-    hand: Hand = "experimenter",
     beside: ParticipantSide | None = None,
     band: str = "",
     last: str = "Thank the participant.",
@@ -252,7 +251,7 @@ def run_console(
     The window stays open at the end until it is closed. Without a window, an error is raised at once.
     """
     application()
-    console, loop = Console(request, clock, hand, beside, band=band, last=last), QEventLoop()
+    console, loop = Console(request, clock, beside, band=band, last=last), QEventLoop()
     console.closed = loop.quit
     wake = QTimer()  # lets Python look at signals such as Ctrl-C while Qt waits
     wake.timeout.connect(lambda: _leave_without_window(loop, console))

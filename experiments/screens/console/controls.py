@@ -268,7 +268,7 @@ class Controls:
     def entered_so_far(self) -> str:
         """What the open correction says now, to be typed over."""
         entry = self.drawn.correcting
-        said = None if entry is None else value(self._live.told, entry)
+        said = None if entry is None else value(self._live.history, entry)
         return "" if said is None else f"{said:g}" if isinstance(said, float) else said
 
     # lines

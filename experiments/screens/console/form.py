@@ -4,15 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field
-from typing import Any, get_args
+from typing import get_args
 
 from PyQt6.QtCore import Qt, pyqtSignal
 from PyQt6.QtGui import QGuiApplication, QScreen
 from PyQt6.QtWidgets import QFormLayout, QFrame, QLabel, QScrollArea, QSizePolicy, QVBoxLayout, QWidget
 
 from experiments.config.models import Fact, Handedness, Sex
-from experiments.config.setup import Setup
-from experiments.run import Again
+from experiments.run import ParticipantOptions
 from experiments.screens.console import parts
 from experiments.screens.console.fields import LineEdit, Lines, ListBox, TickBox
 from experiments.study.enrolment import Entered, typed_facts
@@ -24,16 +23,6 @@ _HOW_TO_START = "Read the code back with the participant, fill in what is asked,
 _AGE_DIGITS = 3
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Beside:
-    """What the participant has beside the console; `monitor` is the index of their screen, `None` for the last one."""
-
-    participant_screen: bool = False
-    participant_keys: bool = False
-    noise: bool = False
-    monitor: int | None = None
-
-
 class Form(QFrame):
     """The fields. `edited` after any change; `code_edited` after one of the code, `experiment_edited` of the other."""
 
@@ -41,7 +30,7 @@ class Form(QFrame):
     code_edited = pyqtSignal()
     experiment_edited = pyqtSignal()
 
-    def __init__(self, experiments: Sequence[str], asked: Sequence[Fact], beside: Beside) -> None:
+    def __init__(self, experiments: Sequence[str], asked: Sequence[Fact], options: ParticipantOptions) -> None:
         super().__init__()
         self.setObjectName("panel")
         self.experiment, self.code, self.code_again = ListBox(experiments), LineEdit(), LineEdit()
@@ -50,7 +39,7 @@ class Form(QFrame):
         self.noise, self.monitor = TickBox("hears masking noise"), ListBox(monitors())
         self.remark = Lines("remark")
         self._typed: dict[str, str] | None = None
-        self._tick(beside)
+        self._tick(options)
         self._lay_out()
         self._connect()
 
@@ -92,12 +81,12 @@ class Form(QFrame):
         self.code.textChanged.connect(self.code_edited)
         self.experiment.currentIndexChanged.connect(self.experiment_edited)
 
-    def _tick(self, beside: Beside) -> None:
-        self.own_screen.setChecked(beside.participant_screen)
-        self.own_keys.setChecked(beside.participant_keys)
-        self.noise.setChecked(beside.noise)
+    def _tick(self, options: ParticipantOptions) -> None:
+        self.own_screen.setChecked(options.screen)
+        self.own_keys.setChecked(options.keys)
+        self.noise.setChecked(options.noise)
         last = self.monitor.count() - 1
-        self.monitor.setCurrentIndex(last if beside.monitor is None else beside.monitor)
+        self.monitor.setCurrentIndex(last if options.monitor is None else options.monitor)
 
     @property
     def participant_id(self) -> str:
@@ -110,14 +99,14 @@ class Form(QFrame):
             participant_id=self.participant_id,
             read_back=self.code_again.text().strip(),
             experiment=self.experiment.currentText(),
-            facts={fact: _text(field) for fact, widget in self.facts.items()},
+            facts={fact: _text(widget) for fact, widget in self.facts.items()},
         )
 
-    def beside(self) -> Beside:
+    def options(self) -> ParticipantOptions:
         """What is ticked."""
-        return Beside(
-            participant_screen=self.own_screen.isChecked(),
-            participant_keys=self.own_keys.isChecked(),
+        return ParticipantOptions(
+            screen=self.own_screen.isChecked(),
+            keys=self.own_keys.isChecked(),
             noise=self.noise.isChecked(),
             monitor=self.monitor.currentIndex() if self.monitor.count() > 1 else None,
         )
@@ -156,8 +145,8 @@ def _fact(fact: str) -> LineEdit | ListBox:
     return line
 
 
-def _text(field: Any) -> str:
-    return str(field.text() if isinstance(field, LineEdit) else field.currentText())
+def _text(widget: LineEdit | ListBox) -> str:
+    return widget.text() if isinstance(widget, LineEdit) else widget.currentText()
 
 
 def monitors() -> list[str]:
@@ -171,22 +160,6 @@ def _monitor(number: int, screen: QScreen) -> str:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Choice:
-    """What was chosen: who does which experiment, and how. `anew_reason`: why an unfinished run is set aside."""
-
-    setup: Setup[Any]
-    participant_id: str
-    again: Again = "ask"
-    anew_reason: str = ""
-    practice: bool = False
-    training: bool = False
-    participant_screen: bool = False
-    participant_keys: bool = False
-    noise: bool = False
-    monitor: int | None = None
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
 class Opening:
     """How a start window opens: on which gun, with what ticked, with whom (empty: who comes next), and what it says.
 
@@ -195,6 +168,6 @@ class Opening:
 
     gun: str
     named: str = ""
-    beside: Beside = field(default_factory=Beside)
+    options: ParticipantOptions = field(default_factory=ParticipantOptions)
     participant_id: str = ""
     said: str = ""

@@ -16,7 +16,7 @@ NAMES: tuple[Name, ...] = ("end break", "repeat", "flag", "note", "reason", "sto
 
 def question(name: Name, trial: Trial, live: LiveRun) -> str:
     """What is asked for."""
-    place = short_place(trial, trial_at(live.plan, live.told, live.position.step))
+    place = short_place(trial, trial_at(live.plan, live.history, live.position.step))
     match name:
         case "end break":
             return "Why does the break end early?"

@@ -17,10 +17,10 @@ from experiments.config.setup import Setup
 from experiments.live_run import RunStopped
 from experiments.load import load_setup, load_study
 from experiments.record.journal import JournalError
-from experiments.run import Finished, Request, UnfinishedRun
+from experiments.run import Finished, RunRequest, UnfinishedRun
 from experiments.screens.console.app import Console, application, run_console
 from experiments.screens.console.beside import WAIT, ParticipantSide
-from experiments.screens.console.form import Beside, Choice, Opening, monitors
+from experiments.screens.console.form import Opening, monitors
 from experiments.screens.console.start import choose
 from experiments.screens.console.unfinished import ask, while_shown
 from experiments.screens.console.visual import Rater, VisualParticipant
@@ -28,7 +28,6 @@ from experiments.screens.console.windows import signals_to
 from experiments.screens.participant.link import ParticipantLink
 from experiments.screens.participant.process import ParticipantError
 from experiments.screens.participant.words import Look, NoiseIs
-from experiments.session.events import Hand
 from experiments.study.places import PlaceError
 from experiments.study.progress import StudyFolder
 
@@ -44,68 +43,49 @@ class Words:
 _NO_HANDS = "--visual --participant-screen rates by synthetic events, which only an X display takes"
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Sides:
-    """Who works the console, and what the participant has beside it; `monitor` is theirs, the last one if `None`."""
-
-    visual: bool = False
-    screen: bool = False
-    own_keys: bool = False
-    noise: bool = False
-    monitor: int | None = None
-
-    @property
-    def beside(self) -> bool:
-        """Whether the participant's own process runs at all."""
-        return self.screen or self.own_keys or self.noise
-
-
-def run_live(request: Request, sides: Sides, words: Words | None = None) -> Finished:
+def run_live(request: RunRequest, words: Words | None = None) -> Finished:
     """Carry out a run at the console. An unfinished one is shown and asked about, but for a synthetic participant.
 
     `PlaceError` without a display, or if the participant's screen does not open.
     """
     application()
     try:
-        return _carry_out(request, sides, words or Words())
-    except UnfinishedRun:
-        decided = None if sides.visual else ask(request)
+        return _carry_out(request, words or Words())
+    except UnfinishedRun as found:
+        decided = None if request.visual else ask(request, found)
         if decided is None:
             raise
-        return _carry_out(decided, sides, words or Words())
+        return _carry_out(decided, words or Words())
 
 
-def _carry_out(request: Request, sides: Sides, words: Words) -> Finished:
+def _carry_out(request: RunRequest, words: Words) -> Finished:
     driver: list[VisualParticipant] = []
     clock = RealClock()
 
     with ExitStack() as stack:
-        rater = _rater(stack) if sides.visual and sides.screen else None
-        beside = _participant(stack, request, sides) if sides.beside else None
+        rater = _rater(stack) if request.visual and request.options.screen else None
+        beside = _participant(stack, request) if request.options.any else None
 
         def watch(console: Console) -> None:
-            if sides.visual:
+            if request.visual:
                 driver.append(VisualParticipant(console, clock, rater, beside))
 
-        hand: Hand = "synthetic" if sides.visual else "experimenter"
-        return run_console(request, clock, hand=hand, beside=beside, band=words.band, last=words.last, watch=watch)
+        return run_console(request, clock, beside=beside, band=words.band, last=words.last, watch=watch)
 
 
-def lab_day(request: Request, sides: Sides) -> None:
+def lab_day(request: RunRequest) -> None:
     """One run after the other from the start window, until it is closed.
 
-    `request` says what all have in common, `sides` what is ticked at first. `KeyboardInterrupt` if a signal ended it.
+    `request` says what all have in common, and what is ticked at first. `KeyboardInterrupt` if a signal ended it.
     """
     application()
-    check_monitor(sides.monitor)
+    check_monitor(request.options.monitor)
     study, named = _study(request), request.setup.config.experiment
-    opening = Opening(gun=request.gun, named=named, beside=_ticked(sides))
+    opening = Opening(gun=request.gun, named=named, options=request.options)
     with signals_to() as signalled:
         while not signalled and (choice := choose(study, opening, RealClock())) is not None:
             said = _of_the_day(request, study, choice)
-            opening = Opening(
-                gun=request.gun, beside=_ticked(_sides(choice)), participant_id=_seated(choice), said=said
-            )
+            opening = Opening(gun=request.gun, options=choice.options, participant_id=_seated(choice), said=said)
     if signalled:
         raise KeyboardInterrupt(signalled[0])
 
@@ -117,18 +97,12 @@ def check_monitor(monitor: int | None) -> None:
         raise PlaceError(f"--participant-monitor {monitor}: there is no such screen; known are {'; '.join(known)}")
 
 
-def _ticked(sides: Sides) -> Beside:
-    return Beside(
-        participant_screen=sides.screen, participant_keys=sides.own_keys, noise=sides.noise, monitor=sides.monitor
-    )
-
-
-def _seated(choice: Choice) -> str:
+def _seated(choice: RunRequest) -> str:
     """Who was there; nobody in a training."""
     return "" if choice.training else choice.participant_id
 
 
-def _words(study: StudyFolder, choice: Choice) -> Words:
+def _words(study: StudyFolder, choice: RunRequest) -> Words:
     """What the window of a chosen run is to say of it."""
     if choice.training:
         return Words(band="TRAINING – nothing of it is kept", last="The training is over.")
@@ -139,12 +113,12 @@ def _words(study: StudyFolder, choice: Choice) -> Words:
     return Words(last=f"Next: {later[0]}.") if later else Words()
 
 
-def _of_the_day(request: Request, study: StudyFolder, choice: Choice) -> str:
+def _of_the_day(request: RunRequest, study: StudyFolder, choice: RunRequest) -> str:
     """Carry out what was chosen; what went wrong, for the start window, which it must not end."""
     with ExitStack() as stack:
         results = Path(stack.enter_context(tempfile.TemporaryDirectory())) if choice.training else request.results
         try:
-            run_live(_chosen(request, choice, results), _sides(choice), _words(study, choice))
+            run_live(replace(choice, seed=request.seed, results=results), _words(study, choice))
         except RunStopped as stop:
             return _stopped(choice, str(stop))
         except (PlaceError, JournalError, ConfigError, DeviceError) as error:
@@ -152,7 +126,7 @@ def _of_the_day(request: Request, study: StudyFolder, choice: Choice) -> str:
     return ""
 
 
-def _stopped(choice: Choice, reason: str) -> str:
+def _stopped(choice: RunRequest, reason: str) -> str:
     if choice.training:
         return f"The training stopped: {reason}."
     if choice.practice:
@@ -160,7 +134,7 @@ def _stopped(choice: Choice, reason: str) -> str:
     return f"{choice.participant_id} stopped: {reason}. Start asks whether to go on there or to start anew."
 
 
-def _study(request: Request) -> StudyFolder:
+def _study(request: RunRequest) -> StudyFolder:
     """The study that the config lies in, if the study names it; else this experiment alone, by the rules of that study.
 
     Where there is no study beside the config, they are those of the shipped one.
@@ -173,33 +147,11 @@ def _study(request: Request) -> StudyFolder:
     return StudyFolder(config=config, source=folder / "study.toml", setups=setups, results=request.results)
 
 
-def _chosen(request: Request, choice: Choice, results: Path) -> Request:
-    gun = "simulated" if choice.training else request.gun
-    return replace(
-        request,
-        setup=choice.setup,
-        participant_id=choice.participant_id,
-        results=results,
-        gun=gun,
-        again=choice.again,
-        anew_reason=choice.anew_reason,
-        practice=choice.practice,
-    )
-
-
-def _sides(choice: Choice) -> Sides:
-    return Sides(
-        screen=choice.participant_screen,
-        own_keys=choice.participant_keys,
-        noise=choice.noise,
-        monitor=choice.monitor,
-    )
-
-
-def _participant(stack: ExitStack, request: Request, sides: Sides) -> ParticipantSide:
+def _participant(stack: ExitStack, request: RunRequest) -> ParticipantSide:
     """The participant's screen, once it is open: PsychoPy takes its time, and a window says so meanwhile."""
-    check_monitor(sides.monitor)
-    look = _look(sides.monitor)
+    options = request.options
+    check_monitor(options.monitor)
+    look = _look(options.monitor)
 
     def open_link() -> ParticipantLink:
         link = stack.enter_context(ParticipantLink.start(look))
@@ -215,10 +167,10 @@ def _participant(stack: ExitStack, request: Request, sides: Sides) -> Participan
         link,
         open_link,
         request.setup,
-        rates=sides.screen,
-        own_keys=sides.own_keys,
-        noise=_noise(link) if sides.noise else None,
-        hand="synthetic" if sides.visual else "participant",
+        rates=options.screen,
+        own_keys=options.keys,
+        noise=_noise(link) if options.noise else None,
+        hand="synthetic" if request.visual else "participant",
     )
 
 

@@ -12,7 +12,7 @@ from experiments.design.plan import Plan, Trial
 from experiments.screens import texts
 from experiments.screens.console.messages import GunSeen
 from experiments.screens.console.view import About, Seen
-from experiments.session.history import Told, done, entries, together
+from experiments.session.history import History, done, entries, together
 from experiments.session.remarks import AnswerCorrected, DescriptionCorrected, Flagged, Noted, RatingCorrected, Remark
 from experiments.session.states import Position, State
 from experiments.session.steps import (
@@ -47,7 +47,7 @@ class Progress:
     planned: int
 
 
-def progress(plan: Plan, told: Told, current: Trial, *, rated_last: bool) -> list[Progress]:
+def progress(plan: Plan, told: History, current: Trial, *, rated_last: bool) -> list[Progress]:
     """How far the run is, seen from the current trial.
 
     Trials of the set, of the session and of the experiment; where all are rated after all were felt, felt and rated.
@@ -104,7 +104,7 @@ class Pace:
 
 
 def remaining_s(  # noqa: PLR0917 - each is looked at
-    config: ExperimentConfig, plan: Plan, told: Told, pace: Pace, position: Position, now_s: float
+    config: ExperimentConfig, plan: Plan, told: History, pace: Pace, position: Position, now_s: float
 ) -> float:
     """Seconds still to go: trials left, breaks left, what is left of this one, and the ratings still to come."""
     left = len(plan.trials) - len(done(told))
@@ -113,7 +113,7 @@ def remaining_s(  # noqa: PLR0917 - each is looked at
     return left * pace.trial_s(config.trial_s) + _breaks_left_s(config, told, position, now_s) + ratings_s
 
 
-def _breaks_left_s(config: ExperimentConfig, told: Told, position: Position, now_s: float) -> float:
+def _breaks_left_s(config: ExperimentConfig, told: History, position: Position, now_s: float) -> float:
     taken: list[Step | None] = [step for step, word in told if isinstance(step, Rest) and isinstance(word, Rested)]
     left_s = config.break_s - sum(step.duration_s for step in taken if isinstance(step, Rest))
     if position.base is State.RESTING and position.until_s is not None and isinstance(position.step, Rest):

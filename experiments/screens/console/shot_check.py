@@ -13,10 +13,10 @@ from dataclasses import dataclass
 from typing import Any, Literal
 
 from device import DeviceError, Gun, GunStatus, Shot, ShotReport, open_gun
+from device.methods import drive_of
 from device.words import Drive, Effect
 from experiments.clock import Clock
 from experiments.config.setup import Setup
-from experiments.limits import drives
 
 COUNTDOWN_S = 3
 SWITCH_OFF = "SWITCH OFF ITS POWER."
@@ -91,7 +91,7 @@ class ShotCheck:
         """Open, fire, disarm, read back, close; what came of it, and a word for the colour."""
         self._tell(Told(phase="opening"))
         methods = self._setup.gun.renderings(self._setup.config.design.methods)
-        drive = drives(self._setup)[self._method]
+        drive = drive_of(methods[self._method])
         with closing(open_gun(self._address, methods, clock=self._clock.now)) as gun:
             self._gun = gun
             try:

@@ -19,10 +19,10 @@ from PyQt6.QtWidgets import (
 from experiments.clock import Clock
 from experiments.config.setup import Setup
 from experiments.record.journal import JournalError
-from experiments.run import Again
+from experiments.run import Again, RunRequest
 from experiments.screens.console import parts, people
 from experiments.screens.console.fields import WHY, Answer, Lines, Question, sheet, unfit
-from experiments.screens.console.form import Choice, Form, Opening
+from experiments.screens.console.form import Form, Opening
 from experiments.screens.console.keyboard import FreshShortcuts
 from experiments.screens.console.people import PeopleTable
 from experiments.screens.console.shot_page import ShotPage
@@ -30,7 +30,7 @@ from experiments.screens.console.windows import let_go, open_as_left, remember, 
 from experiments.study import enrolment
 from experiments.study.places import PlaceError
 from experiments.study.progress import Overview, StudyFolder, overview
-from experiments.study.study import Participant, RunStanding
+from experiments.study.study import Participant, RunProgress
 
 NAME = "start"
 SIMULATED = "simulated"
@@ -45,7 +45,7 @@ class StartWindow(QWidget):
     def __init__(self, study: StudyFolder, opening: Opening, clock: Clock) -> None:
         super().__init__()
         self._study, self._opening, self._clock = study, opening, clock
-        self.choice: Choice | None = None
+        self.choice: RunRequest | None = None
         self.question: Question | None = None
         self._simulation_is_known = False
         self._closing = False
@@ -59,7 +59,7 @@ class StartWindow(QWidget):
 
     def _build(self) -> None:
         self.setWindowTitle("Recoil – start")
-        self.form = Form(self._study.experiments, self._study.config.eligibility.ask, self._opening.beside)
+        self.form = Form(self._study.experiments, self._study.config.eligibility.ask, self._opening.options)
         self.shots = ShotPage(self._opening.gun, self._clock)
         self.table = PeopleTable(self._study.experiments)
         self.next, self.saved = Lines("detail"), Lines("saved", most_lines=5)
@@ -229,12 +229,12 @@ class StartWindow(QWidget):
     def _training(self) -> None:
         self._leave("training", practice=True, training=True)
 
-    def _admit(self, *, practice: bool) -> RunStanding | None:
+    def _admit(self, *, practice: bool) -> RunProgress | None:
         """How the run stands that may begin now; `None`, with the reason shown, if it may not."""
         entered = self.form.entered()
         return self._checked(lambda: enrolment.admit(self._study, entered, self._clock, practice=practice))
 
-    def _checked(self, check: Callable[[], RunStanding]) -> RunStanding | None:
+    def _checked(self, check: Callable[[], RunProgress]) -> RunProgress | None:
         self._take_back()
         try:
             return check()
@@ -256,7 +256,7 @@ class StartWindow(QWidget):
         text = f"The gun is SIMULATED: {self.form.participant_id} will feel nothing. Start all the same?"
         self._ask(Question(text, (Answer(text="Start, simulated", key="Ctrl+S", do=known), self._leave_it())))
 
-    def _ask_resume(self, run: RunStanding) -> None:
+    def _ask_resume(self, run: RunProgress) -> None:
         answers = (
             Answer(text="Go on with it", key="Ctrl+G", do=lambda _: self._begin_again("resume", "")),
             Answer(text="Set it aside, start anew", key="Ctrl+N", do=lambda why: self._begin_again("fresh", why)),
@@ -289,18 +289,17 @@ class StartWindow(QWidget):
     ) -> None:
         if self.choice is not None:
             return
-        beside = self.form.beside()
-        self.choice = Choice(
+        self.choice = RunRequest(
             setup=self._setup(),
             participant_id=code,
+            results=self._study.results,
+            gun=SIMULATED if training else self._opening.gun,
             again=again,
             anew_reason=reason,
             practice=practice,
             training=training,
-            participant_screen=beside.participant_screen,
-            participant_keys=beside.participant_keys,
-            noise=beside.noise,
-            monitor=beside.monitor,
+            screen="console",
+            options=self.form.options(),
         )
         self.close()
 
@@ -370,7 +369,7 @@ class StartWindow(QWidget):
         self.form.code_again.setFocus()
 
 
-def choose(study: StudyFolder, opening: Opening, clock: Clock) -> Choice | None:
+def choose(study: StudyFolder, opening: Opening, clock: Clock) -> RunRequest | None:
     """Show the start window until something is chosen; `None` if it was closed, or a signal ended it."""
     window = StartWindow(study, opening, clock)
     loop = QEventLoop()

@@ -12,13 +12,12 @@ from PyQt6.QtCore import QEventLoop, Qt, QTimer
 from PyQt6.QtWidgets import QDialog, QLabel, QPushButton, QVBoxLayout
 
 from experiments.record.journal import JournalError
-from experiments.run import Again, Request
+from experiments.run import Again, RunRequest, UnfinishedRun
 from experiments.screens.console import parts, people
 from experiments.screens.console.fields import WHY, Answer, Lines, Question, sheet, unfit
 from experiments.screens.console.keyboard import FreshShortcuts
 from experiments.screens.console.windows import let_go, signals_to
-from experiments.study.places import place
-from experiments.study.progress import run_standing
+from experiments.study.progress import progress_of
 
 
 class Unfinished(QDialog):
@@ -27,10 +26,10 @@ class Unfinished(QDialog):
     Nothing is chosen by Enter or by closing the window.
     """
 
-    def __init__(self, request: Request) -> None:
+    def __init__(self, request: RunRequest, found: UnfinishedRun) -> None:
         super().__init__()
         self._request = request
-        self.decided: Request | None = None
+        self.decided: RunRequest | None = None
         self.setWindowTitle("Recoil – unfinished run")
         self.setStyleSheet(parts.sheet("dark") + sheet())
         answers = (
@@ -38,7 +37,7 @@ class Unfinished(QDialog):
             Answer(text="Set it aside, start anew", key="Ctrl+N", do=self._fresh),
             Answer(text="Leave it", key="Esc", do=lambda _: self.reject()),
         )
-        self.question = Question(_text(request), answers, reason=f"to start anew: {WHY}")
+        self.question = Question(_text(found), answers, reason=f"to start anew: {WHY}")
         self.said = Lines("saved")
         down = QVBoxLayout(self)
         down.addWidget(self.question)
@@ -60,20 +59,19 @@ class Unfinished(QDialog):
         self.accept()
 
 
-def _text(request: Request) -> str:
-    where = place(request.results, request.participant_id, request.setup.config.experiment)
+def _text(found: UnfinishedRun) -> str:
     try:
-        return people.stopped_text(request.participant_id, run_standing(where))
+        return people.stopped_text(found.where.participant_id, progress_of(found.where, found.contents))
     except JournalError as error:
         return str(error)
 
 
-def ask(request: Request) -> Request | None:
+def ask(request: RunRequest, found: UnfinishedRun) -> RunRequest | None:
     """The request with the decision of the person at the console; `None` if they leave the run as it is.
 
     `KeyboardInterrupt` if a signal ended the question.
     """
-    dialog = Unfinished(request)
+    dialog = Unfinished(request, found)
     FreshShortcuts(dialog, time.monotonic)
     with signals_to(lambda _: dialog.reject()) as signalled:
         dialog.exec()

@@ -232,7 +232,7 @@ class ConsoleWindow(QMainWindow):
         return Seen(
             about=self.about,
             position=self.drawn,
-            told=() if self.live is None else self.live.told,
+            told=() if self.live is None else self.live.history,
             gun=self.gun,
             participant=self.participant,
             ended=self.ended,
