@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from typing import Any
 
@@ -10,12 +11,12 @@ NONE = "–"
 
 
 def number(value: float | None, digits: int = 2) -> str:
-    """`value` with so many decimals, and a true minus sign.
+    """`value` with so many decimals, and a true minus sign; a dash for None and for what is not finite.
 
-    >>> number(-1.2345), number(None)
-    ('−1.23', '–')
+    >>> number(-1.2345), number(None), number(math.nan)
+    ('−1.23', '–', '–')
     """
-    if value is None:
+    if value is None or not math.isfinite(value):
         return NONE
     text = f"{value:.{digits}f}"
     return text.lstrip("-") if float(text) == 0.0 else text.replace("-", "−")

@@ -10,13 +10,12 @@ from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from analysis.paper.odds import WHOLE_PATTERN, Recurrence, wilson_interval
 from analysis.paper.paper import PublishedDirection
 from analysis.paper.published import rounds_to
 from analysis.predict.fit.percept_model import FITTED, PerceptPeak, best_percept
-from analysis.predict.fit.request import ASSUMED_SPREAD, scaled
+from analysis.predict.fit.percept_request import ASSUMED_SPREAD, scaled
 from analysis.predict.power.felt import Counts, Felt, Floats, correct_shares
 from analysis.predict.power.grid import PEOPLE_A_CHUNK
 from analysis.predict.power.studies import published_directions
@@ -77,13 +76,33 @@ class Recurs:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Judged:
-    """What a case's studies say. `histograms`: of each quantity, edges and counts."""
+    """What the studies of a case say: the people and their percept, the published numbers' places, the claims."""
 
-    case: Case
-    studies: int
+    name: str
+    people: People
+    parameters: PerceptParameters
     places: tuple[Place, ...]
     claims: tuple[Recurs, ...]
-    histograms: Mapping[str, tuple[Floats, NDArray[np.int64]]]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Judgement:
+    """All cases' studies against what is published; `main` is the place of the case to report."""
+
+    studies: int
+    seed: int
+    main: int
+    percentiles: tuple[float, ...]
+    cases: tuple[Judged, ...]
+
+    @property
+    def main_case(self) -> Judged:
+        """The case to report."""
+        return self.cases[self.main]
+
+
+Histograms = dict[str, tuple[tuple[float, ...], tuple[float, ...]]]
+"""Of each quantity the simulated values: edges and counts."""
 
 
 def cases_of(
@@ -107,7 +126,7 @@ def judge(
     studies: int,
     seed: int,
     tell: Callable[[str], None],
-) -> Judged:
+) -> tuple[Judged, Histograms]:
     """Draw the studies of a case at the paper's design, and find the published numbers' places.
 
     They are drawn in pieces, each with a stream of its own; `tell` is told of each.
@@ -120,13 +139,14 @@ def judge(
         tell(case.name)
     correct = np.concatenate(pieces)
     quantities = _quantities(correct, published)
-    return Judged(
-        case=case,
-        studies=studies,
+    judged = Judged(
+        name=case.name,
+        people=case.people,
+        parameters=case.fit.parameters,
         places=tuple(place_of(*one) for one in quantities),
         claims=tuple(_claims(correct, published)),
-        histograms={name: _histogram(values) for name, _, values, _ in quantities},
     )
+    return judged, {name: _histogram(values) for name, _, values, _ in quantities}
 
 
 def pieces_of(studies: int, published: PublishedDirection) -> int:
@@ -247,7 +267,7 @@ def _recurs(claim: str, held: Recurrence, fitted: bool) -> Recurs:
     return Recurs(claim=claim, share=float(held.mean()), ci_low=low, ci_high=high, fitted=fitted)
 
 
-def _histogram(values: Floats) -> tuple[Floats, NDArray[np.int64]]:
+def _histogram(values: Floats) -> tuple[tuple[float, ...], tuple[float, ...]]:
     """Of whole numbers one bin each, of others so many between the 0.1 and 99.9 percent points."""
     finite = values[np.isfinite(values)]
     if (finite == np.rint(finite)).all():
@@ -256,4 +276,4 @@ def _histogram(values: Floats) -> tuple[Floats, NDArray[np.int64]]:
         low, high = np.percentile(finite, (0.1, 99.9))
         edges = np.linspace(low, high, BINS + 1)
     counts, edges = np.histogram(finite, edges)
-    return edges, counts
+    return tuple(edges.tolist()), tuple(counts.astype(np.float64).tolist())

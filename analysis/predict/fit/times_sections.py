@@ -1,25 +1,21 @@
-"""What `recoil fit times` says, on a terminal and as a page: estimates, times beside the fit, EZ-diffusion."""
+"""What a fit of response times found, in words: estimates, times beside the fit, EZ-diffusion, person by person."""
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
 from analysis.predict.fit.figures import TimesPanel, figure_times
-from analysis.predict.fit.words import NO_TIMES
+from analysis.predict.fit.percept_sections import NO_TIMES
+from analysis.predict.fit.times_results import EZCell, FittedTimes, TimesFit
 from analysis.report import apa
 from analysis.report.section import Picture, Section, Table
 from analysis.stats.arrays import FloatArray
-from analysis.times.fit import AnsweredBy, DiffusionFit, answered_by
-from analysis.times.likelihood import Range, Trials
-from analysis.times.own_trials import OwnTrials
-from analysis.times.people import PeopleFit
-
-Facts = dict[str, Any]
+from analysis.times.fit import AnsweredBy, DiffusionFit, Estimate, answered_by
+from analysis.times.people import MeanEstimate
 
 CAVEATS = (
     "Decisions are taken to be a simple diffusion: one drift a method (its sign that of the shot), one boundary an "
@@ -32,124 +28,102 @@ CAVEATS = (
 )
 
 
-def as_text(found: Facts) -> str:
-    """The findings for a terminal."""
-    return "\n".join(_lines(found))
-
-
-def main_estimates(found: Facts) -> list[Facts]:
-    """The estimates to report: means over people where there are several, else the one person's."""
-    return list(found["mean_of_people"] or found["together"]["estimates"])
-
-
-def left_out(found: Facts) -> Iterator[str]:
-    """What was left out, in words."""
-    for one in found["refused"].values():
-        yield f"{one['trials']} of {found['answered']} answered trials: {one['reason']}"
-    if found["together"]["reason"]:
-        yield f"intervals of all trials together: {found['together']['reason']}"
-    for who in found["left_out"]:
-        yield f"participant {who}, of the mean over people: a method or instruction is missing, or the fit has no peak"
-
-
-def _lines(found: Facts) -> Iterator[str]:
-    several = found["mean_of_people"] is not None
-    yield f"The diffusion model fitted to {found['trials']} trials of {people_count(found)}"
-    yield f"  95 % CI of {'the mean over people of their own fits' if several else 'the one fit'}"
-    for one in main_estimates(found):
-        yield f"  {one['name']:26} {apa.number(one['value'], 3):>7} {interval(one)}"
-    if several:
-        yield "  one fit of all together (a compromise person, intervals by person)"
-        for one in found["together"]["estimates"]:
-            yield f"  {one['name']:26} {apa.number(one['value'], 3):>7} {interval(one)}"
-    yield from (f"  not identified: {name}" for name in found["together"]["unidentified"])
-    yield f"  {NO_TIMES}"
-
-
-def people_count(found: Facts) -> str:
-    """How many took part.
-
-    >>> people_count({"people": ["P01"]})
-    '1 participant'
-    """
-    n = len(found["people"])
-    return f"{n} participant{'' if n == 1 else 's'}"
-
-
-def interval(one: Facts) -> str:
-    """An estimate's interval, or that there is none."""
-    if one["ci_low"] is None:
-        return "[not identified]"
-    return apa.interval(one["ci_low"], one["ci_high"], 3)
-
-
 SHOWN_PEOPLE = 60
 """A table of more people is read by nobody; `fit.json` has all."""
 _LIKELY = 0.995
 _POINTS = 200
 
 
-@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class Fitted:
-    """The trials and their fits: of all together, and of each person where there are several."""
-
-    own: OwnTrials
-    trials: Trials
-    lapse_range_s: Range | None
-    together: DiffusionFit
-    each: PeopleFit | None
+def in_short(found: TimesFit) -> Section:
+    """What a reader looks for, in a few lines."""
+    return Section(
+        title=f"The diffusion model fitted to {found.trials} trials of {_people_count(found)}",
+        items=tuple(_lines(found)),
+    )
 
 
-def sections(found: Facts, fitted: Fitted, figures: Path) -> tuple[Section, ...]:
+def _lines(found: TimesFit) -> Iterator[str]:
+    several = found.mean_of_people is not None
+    yield f"95 % CI of {'the mean over people of their own fits' if several else 'the one fit'}"
+    yield from map(_estimate_line, found.main_estimates)
+    if several:
+        yield "one fit of all together (a compromise person, intervals by person)"
+        yield from map(_estimate_line, found.together.estimates)
+    yield from (f"not identified: {name}" for name in found.together.unidentified)
+    yield NO_TIMES
+
+
+def _estimate_line(one: MeanEstimate | Estimate) -> str:
+    return f"{one.name:26} {apa.number(one.value, 3):>7} {_interval(one)}"
+
+
+def left_out(found: TimesFit) -> Iterator[str]:
+    """What was left out, in words."""
+    for one in found.refused.values():
+        yield f"{one.trials} of {found.answered} answered trials: {one.reason}"
+    if found.together.reason:
+        yield f"intervals of all trials together: {found.together.reason}"
+    for who in found.left_out:
+        yield f"participant {who}, of the mean over people: a method or instruction is missing, or the fit has no peak"
+
+
+def _people_count(found: TimesFit) -> str:
+    n = len(found.people)
+    return f"{n} participant{'' if n == 1 else 's'}"
+
+
+def _interval(one: MeanEstimate | Estimate, digits: int = 3) -> str:
+    """An estimate's interval, or that there is none."""
+    return apa.interval(one.ci_low, one.ci_high, digits) if math.isfinite(one.ci_low) else "[not identified]"
+
+
+def sections(found: TimesFit, fitted: FittedTimes, figures: Path) -> tuple[Section, ...]:
     """The page's sections; their figure is written."""
     parts = [_estimates(found), _against(fitted, figures), _ez(found)]
-    parts += [_people(found)] if found["each"] else []
+    parts += [_people(found)] if found.each else []
     return (*parts, _origin(found))
 
 
-def _estimates(found: Facts) -> Section:
-    together = {one["name"]: one for one in found["together"]["estimates"]}
+def _estimates(found: TimesFit) -> Section:
     header = ["Parameter", "Unit", "All together", "95 % CI"]
-    rows = [[name, unit(name), apa.number(one["value"], 3), interval(one)] for name, one in together.items()]
-    if found["mean_of_people"] is not None:
+    rows = [[one.name, _unit(one.name), apa.number(one.value, 3), _interval(one)] for one in found.together.estimates]
+    if found.mean_of_people is not None:
         header[2:2] = ["Mean over people", "95 % CI", "SD of people"]
-        means = {one["name"]: one for one in found["mean_of_people"]}
+        means = {one.name: one for one in found.mean_of_people}
         for row in rows:
-            mean = means.get(row[0])
-            row[2:2] = ["–"] * 3 if mean is None else _mean_cells(mean)
+            row[2:2] = _mean_cells(means.get(row[0]))
     return Section(
         title="Estimates",
         paragraphs=(
-            f"{found['trials']} trials of {people_count(found)} with times of their own; lapses: {found['lapses']}; "
-            f"start {'fitted' if found['bias'] else 'held at one half'}.",
-            *(f"Not identified by these data: {name}." for name in found["together"]["unidentified"]),
+            f"{found.trials} trials of {_people_count(found)} with times of their own; lapses: {found.lapses}; "
+            f"start {'fitted' if found.bias else 'held at one half'}.",
+            *(f"Not identified by these data: {name}." for name in found.together.unidentified),
         ),
         tables=(
             Table(caption="The diffusion by maximum likelihood", header=tuple(header), rows=tuple(map(tuple, rows))),
-            *_profiles(found["together"]["profiles"]),
+            *_profiles(found.together.profiles),
         ),
         items=tuple(left_out(found)),
     )
 
 
-def _profiles(profiles: Facts) -> list[Table]:
+def _profiles(profiles: dict[str, tuple[float, float]]) -> list[Table]:
     """Of all together, where they were asked for; an end that is never reached is a dash."""
     rows = tuple((name, apa.interval(low, high, 3)) for name, (low, high) in profiles.items())
     caption = "Likelihood intervals of all together, 95 %; as if people were alike"
     return [Table(caption=caption, header=("Parameter", "95 % CI"), rows=rows)] if rows else []
 
 
-def _mean_cells(mean: Facts) -> list[str]:
-    return [apa.number(mean["value"], 3), interval(mean), apa.number(mean["sd"], 3)]
+def _mean_cells(mean: MeanEstimate | None) -> list[str]:
+    return [apa.NONE] * 3 if mean is None else [apa.number(mean.value, 3), _interval(mean), apa.number(mean.sd, 3)]
 
 
-def unit(name: str) -> str:
-    """The unit of a parameter."""
+def _unit(name: str) -> str:
     units = {"drift": "1/√s", "boundary": "√s", "start": "z/a", "non_decision_s": "s", "lapse": "share"}
     return units[name.split(" ", maxsplit=1)[0]]
 
 
-def _against(fitted: Fitted, figures: Path) -> Section:
+def _against(fitted: FittedTimes, figures: Path) -> Section:
     panels = [
         [_panel(fitted, method, instruction) for method in fitted.own.methods]
         for instruction in fitted.own.instructions
@@ -171,7 +145,7 @@ def _against(fitted: Fitted, figures: Path) -> Section:
     )
 
 
-def _panel(fitted: Fitted, method: str, instruction: str) -> TimesPanel:
+def _panel(fitted: FittedTimes, method: str, instruction: str) -> TimesPanel:
     cell = fitted.own.cell(method, instruction)
     told = fitted.own.instruction == fitted.own.instructions.index(instruction)
     end_s = float(np.quantile(fitted.own.time_s[told], _LIKELY))
@@ -192,7 +166,7 @@ def _panel(fitted: Fitted, method: str, instruction: str) -> TimesPanel:
 
 
 def _predicted(
-    fits: Sequence[DiffusionFit], fitted: Fitted, grid: FloatArray, method: str, instruction: str
+    fits: Sequence[DiffusionFit], fitted: FittedTimes, grid: FloatArray, method: str, instruction: str
 ) -> AnsweredBy | None:
     """The mean prediction of the fits that know the cell."""
     cell = fitted.own.cell(method, instruction)
@@ -223,15 +197,9 @@ def _as_lists(found: AnsweredBy | None) -> tuple[list[float], list[float]]:
     return ([], []) if found is None else (found.right.tolist(), found.wrong.tolist())
 
 
-def _ez(found: Facts) -> Section:
-    rows = tuple(
-        (one["method"], one["instruction"], *(_mean_ez(one, name, digits) for name, digits in _EZ), _whose(one))
-        for one in found["ez"]
-    )
-    pooled = tuple(
-        (one["method"], one["instruction"], *(apa.number(one["pooled"][name], digits) for name, digits in _EZ))
-        for one in found["ez"]
-    )
+def _ez(found: TimesFit) -> Section:
+    rows = tuple((one.method, one.instruction, *_mean_ez(one), _whose(one)) for one in found.ez)
+    pooled = tuple((one.method, one.instruction, *_pooled_ez(one)) for one in found.ez)
     header = ("Method", "Instruction", "Drift [1/√s]", "Boundary [√s]", "Non-decision time [s]")
     return Section(
         title="EZ-diffusion beside it",
@@ -247,31 +215,33 @@ def _ez(found: Facts) -> Section:
     )
 
 
-_EZ = (("drift", 2), ("boundary", 2), ("non_decision_s", 3))
+def _mean_ez(cell: EZCell) -> tuple[str, ...]:
+    return _with_interval(cell.drift, 2), _with_interval(cell.boundary, 2), _with_interval(cell.non_decision_s, 3)
 
 
-def _mean_ez(one: Facts, name: str, digits: int) -> str:
-    return f"{apa.number(one[name]['value'], digits)} {_short(one[name], digits)}".rstrip()
+def _pooled_ez(cell: EZCell) -> tuple[str, ...]:
+    found = cell.pooled
+    return apa.number(found.drift, 2), apa.number(found.boundary, 2), apa.number(found.non_decision_s, 3)
 
 
-def _whose(one: Facts) -> str:
-    had = one["drift"]["people"]
-    return f"{had} of {had + one['few'] + one['flat'] + one['impossible']}"
+def _whose(cell: EZCell) -> str:
+    had = cell.drift.people
+    return f"{had} of {had + cell.few + cell.flat + cell.impossible}"
 
 
-def _short(one: Facts, digits: int = 2) -> str:
-    return "" if one["ci_low"] is None else apa.interval(one["ci_low"], one["ci_high"], digits)
+def _with_interval(one: MeanEstimate | Estimate, digits: int) -> str:
+    """A value with its interval, if it has one."""
+    value = apa.number(one.value, digits)
+    return f"{value} {_interval(one, digits)}" if math.isfinite(one.ci_low) else value
 
 
-def _people(found: Facts) -> Section:
-    names = [one["name"] for one in found["together"]["estimates"]]
-    shown = list(found["each"].items())[:SHOWN_PEOPLE]
+def _people(found: TimesFit) -> Section:
+    names = [one.name for one in found.together.estimates]
     rows = []
-    for who, one in shown:
-        own = {estimate["name"]: estimate for estimate in one["estimates"]}
-        cells = (f"{apa.number(own[n]['value'], 2)} {_short(own[n])}" if n in own else apa.NONE for n in names)
-        rows.append((who, str(one["trials"]), *cells))
-    more = len(found["each"]) - len(shown)
+    for who, one in list(found.each.items())[:SHOWN_PEOPLE]:
+        own = {estimate.name: _with_interval(estimate, 2) for estimate in one.estimates}
+        rows.append((who, str(one.trials), *(own.get(name, apa.NONE) for name in names)))
+    more = len(found.each) - len(rows)
     return Section(
         title="Person by person",
         paragraphs=("Each person's own fit [95 % CI]" + (f"; {more} more people are in fit.json." if more else "."),),
@@ -279,8 +249,8 @@ def _people(found: Facts) -> Section:
     )
 
 
-def _origin(found: Facts) -> Section:
-    rows = tuple((name, str(value)) for name, value in found["provenance"].items())
+def _origin(found: TimesFit) -> Section:
+    rows = tuple((name, str(value)) for name, value in found.provenance.items())
     return Section(
         title="What this rests on",
         items=CAVEATS,
