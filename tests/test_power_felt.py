@@ -10,10 +10,10 @@ import numpy as np
 import pytest
 from scipy import stats
 
-from analysis.predict.power.felt import Felt, felt_counts, felt_of, percepts_of_setup
 from analysis.predict.power.grid import Request, make_grid
 from analysis.predict.power.planned import ANOVA, ANY_PAIR, merged, shares
 from analysis.predict.power.studies import run_chunk
+from analysis.predict.synthetic_studies import Felt, felt_counts, felt_of, percepts_of_setup
 from experiments.design.streams import generator
 from experiments.direction.config import DirectionConfig
 from experiments.direction.session import make_plan

@@ -9,9 +9,9 @@ import numpy as np
 import pytest
 
 from analysis.logs.reading import Logs, Problem, read_logs
-from analysis.paper.odds import odds_of
 from analysis.paper.paper import Paper, load_paper
 from analysis.paper.published import compare
+from analysis.paper.recurrence import odds_of
 from analysis.summary.sections.data import ReportData
 from analysis.summary.sections.sections import write_report
 from analysis.summary.summary import summarize

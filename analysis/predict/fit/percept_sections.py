@@ -7,11 +7,12 @@ from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import Protocol
 
-from analysis.paper.odds import WHOLE_PATTERN, wilson_interval
+from analysis.paper.recurrence import WHOLE_PATTERN, wilson_interval
 from analysis.predict.fit.figures import RateCurve, RatePoint, Spread, figure_percept, figure_places
 from analysis.predict.fit.percept_model import Fitted
 from analysis.predict.fit.percept_results import AssumedNumbers, FittedPercept, FrictionCurve, OtherFit
 from analysis.predict.fit.studies import Histograms, Judged, Judgement, Place
+from analysis.predict.synthetic_studies import spread_sentence
 from analysis.report import apa
 from analysis.report.section import Picture, Section, Table
 from experiments.synthetic.diffusion import People
@@ -105,16 +106,6 @@ def _config_lines(found: FittedPercept) -> Iterator[str]:
         yield f"log_boundary_sd = {people.log_boundary_sd!r}"
         yield f"log_non_decision_sd = {people.log_non_decision_sd!r}"
         yield f"logit_start_sd = {people.logit_start_sd!r}"
-
-
-def spread_sentence(people: People) -> str:
-    """How the people differ."""
-    if people == People():
-        return "People are taken to be alike."
-    return (
-        f"People differ (assumed): SD {people.drift_factor_sd:g} of the factor on the drift, "
-        f"{people.log_boundary_sd:g} of the log boundary, {people.logit_start_sd:g} of the logit of the start."
-    )
 
 
 def _limits(one: Fitted) -> str:

@@ -11,14 +11,12 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from analysis.paper.odds import WHOLE_PATTERN, Recurrence, wilson_interval
 from analysis.paper.paper import PublishedDirection
 from analysis.paper.published import rounds_to
+from analysis.paper.recurrence import WHOLE_PATTERN, Recurrence, answers_recur, recurs, share_of, wilson_interval
 from analysis.predict.fit.percept_model import FITTED, PerceptPeak, best_percept
 from analysis.predict.fit.percept_request import ASSUMED_SPREAD, scaled
-from analysis.predict.power.felt import Counts, Felt, Floats, correct_shares
-from analysis.predict.power.grid import PEOPLE_A_CHUNK
-from analysis.predict.power.studies import published_directions
+from analysis.predict.synthetic_studies import Counts, Felt, Floats, felt_counts, piece_sizes
 from analysis.stats.anova import rm_anova
 from analysis.stats.binomial import binomial_test
 from device.methods import Method
@@ -64,8 +62,8 @@ class Place:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Recurs:
-    """The share of studies in which a published claim holds, with its 95 % Wilson interval."""
+class RecurringClaim:
+    """The share of studies in which a published claim holds, with its 95 % Wilson interval; has the fit seen it?"""
 
     claim: str
     share: float
@@ -82,7 +80,7 @@ class Judged:
     people: People
     parameters: PerceptParameters
     places: tuple[Place, ...]
-    claims: tuple[Recurs, ...]
+    claims: tuple[RecurringClaim, ...]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -133,7 +131,7 @@ def judge(
     """
     percepts = percepts_of({name: methods[name] for name in published.methods}, case.fit.parameters.leak_s)
     pieces = []
-    for number, count in enumerate(_sizes(studies, published.n)):
+    for number, count in enumerate(piece_sizes(studies, published.n)):
         draws = generator(seed, "fit", case.name, str(number))
         pieces.append(_counts(case, percepts, published, count, draws))
         tell(case.name)
@@ -151,12 +149,7 @@ def judge(
 
 def pieces_of(studies: int, published: PublishedDirection) -> int:
     """How many pieces a case's studies are drawn in."""
-    return len(list(_sizes(studies, published.n)))
-
-
-def _sizes(studies: int, n: int) -> Iterator[int]:
-    each = max(1, PEOPLE_A_CHUNK // n)
-    yield from (min(each, studies - first) for first in range(0, studies, each))
+    return len(piece_sizes(studies, published.n))
 
 
 def _counts(
@@ -170,9 +163,8 @@ def _counts(
     fitted = _drawn(case.fit, studies, draws) if case.drawn else [case.fit.parameters]
     log_odds = np.array([[[evidence(percepts[name], one) for name in published.methods]] for one in fitted])
     start = np.array([[one.start] for one in fitted])
-    felt = Felt(log_odds=(), start=0.5, people=case.people)
-    shares = correct_shares(log_odds, start, felt, (studies, published.n), draws)
-    return draws.binomial(_trials(published), shares[..., 0])
+    felt = Felt(log_odds=log_odds, start=start, people=case.people)
+    return felt_counts(felt, _trials(published), published.n, studies, draws)
 
 
 def _drawn(fit: PerceptPeak, studies: int, draws: np.random.Generator) -> list[PerceptParameters]:
@@ -239,8 +231,8 @@ def place_of(quantity: str, published: tuple[str, float, float], values: Floats,
     )
 
 
-def _claims(correct: Counts, published: PublishedDirection) -> Iterator[Recurs]:
-    held = published_directions(correct, _trials(published), published)
+def _claims(correct: Counts, published: PublishedDirection) -> Iterator[RecurringClaim]:
+    held = answers_recur(correct, _trials(published), published)
     fitted = {name: name.startswith("binomial") and " forward" in name for name in held}
     tukey = {name: flags for name, flags in held.items() if " above " in name}
     yield from (_recurs(name, flags, fitted[name]) for name, flags in held.items())
@@ -255,16 +247,14 @@ def _not_further(correct: Counts, published: PublishedDirection) -> Iterator[Rec
     bounds = sorted({claim.p_below for claim in published.tukey}, key=float)
     for claim in published.tukey:
         if smaller := bounds[: bounds.index(claim.p_below)]:
-            bold = published.model_copy(
-                update={"tukey": [claim.model_copy(update={"p_below": smaller[-1]})], "binomial": []}
-            )
-            held = published_directions(correct, _trials(published), bold)
+            bold = published.model_copy(update={"tukey": [claim.model_copy(update={"p_below": smaller[-1]})]})
+            held = recurs(correct[..., 0] / _trials(published)[0], bold)
             yield from (~flags for name, flags in held.items() if " above " in name)
 
 
-def _recurs(claim: str, held: Recurrence, fitted: bool) -> Recurs:
-    low, high = wilson_interval(int(held.sum()), held.size)
-    return Recurs(claim=claim, share=float(held.mean()), ci_low=low, ci_high=high, fitted=fitted)
+def _recurs(claim: str, held: Recurrence, fitted: bool) -> RecurringClaim:
+    found = share_of(claim, int(held.sum()), held.size)
+    return RecurringClaim(claim=claim, share=found.share, ci_low=found.ci_low, ci_high=found.ci_high, fitted=fitted)
 
 
 def _histogram(values: Floats) -> tuple[tuple[float, ...], tuple[float, ...]]:

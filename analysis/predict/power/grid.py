@@ -7,7 +7,6 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 from analysis.paper.paper import PublishedExperiment, load_paper
-from analysis.predict.power.felt import Felt, felt_of, null_felt, percepts_of_setup
 from analysis.predict.power.request import (
     FELT,
     Request,
@@ -18,7 +17,16 @@ from analysis.predict.power.request import (
     numbers,
     trials_of,
 )
-from analysis.predict.power.studies import Chunk, Config, Design, People, null_rates, null_ratings
+from analysis.predict.power.studies import Chunk, Config, Design, People
+from analysis.predict.synthetic_studies import (
+    Felt,
+    felt_of,
+    null_felt,
+    null_rates,
+    null_ratings,
+    percepts_of_setup,
+    piece_sizes,
+)
 from experiments.direction.config import DirectionConfig
 from experiments.load import find
 from experiments.preference.config import PreferenceConfig
@@ -29,8 +37,6 @@ __all__ = ["Cell", "Grid", "Request", "make_grid"]
 DEFAULT_PARTICIPANTS = "6,8,10,12,14,16,18,20,24,28,32,40"
 NULL_PARTICIPANTS = "8,14,24"
 DEFAULT_EFFECTS = "0.5,0.75,1"
-PEOPLE_A_CHUNK = 70_000
-"""Participants drawn together: 5000 studies of 14. It is part of what a seed means, so it never depends on workers."""
 _MOST_PEOPLE = 999
 
 
@@ -75,7 +81,6 @@ class Grid:
 
     def chunks_of(self, cell: Cell) -> list[Chunk]:
         """The pieces of a cell."""
-        each = max(1, PEOPLE_A_CHUNK // cell.design.participants)
         published = self.published if _is_of(self.published, cell) else None
         return [
             Chunk(
@@ -84,10 +89,10 @@ class Grid:
                 published=published,
                 seed=self.request.seed,
                 number=number,
-                studies=min(each, self.request.studies - first),
+                studies=studies,
                 felt=self._felt(cell),
             )
-            for number, first in enumerate(range(0, self.request.studies, each))
+            for number, studies in enumerate(piece_sizes(self.request.studies, cell.design.participants))
         ]
 
     def _felt(self, cell: Cell) -> Felt | None:

@@ -6,8 +6,9 @@ from collections.abc import Callable, Iterable, Iterator, Sequence
 from pathlib import Path
 from typing import Literal, TypeVar
 
+from analysis.paper.recurrence import Share
 from analysis.predict.power.figures import Curve, Panel, Rate, figure_false_positives, figure_power
-from analysis.predict.power.planned import ALL_PAIRS, ANOVA, ANY_PAIR, Share
+from analysis.predict.power.planned import ALL_PAIRS, ANOVA, ANY_PAIR
 from analysis.predict.power.results import PATTERN, DesignPower, Power, PublishedPattern, Reached, Smallest
 from analysis.predict.power.studies import PUBLISHED
 from analysis.report import apa

@@ -12,20 +12,17 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, Literal
 
-import numpy as np
-from numpy.typing import NDArray
-
 from analysis.logs.reading import Logs, read_logs
 from analysis.paper.audit import audit
 from analysis.paper.audit.paper_file import load_paper_file
 from analysis.paper.audit.run import Finding
 from analysis.paper.audit.sentences import ATTENTION, ELSEWHERE, other_rows, predictions
-from analysis.paper.odds import Odds, chance_recurs, odds_of, recurs
-from analysis.paper.paper import Paper, load_paper
+from analysis.paper.paper import Paper, PublishedExperiment, load_paper
 from analysis.paper.published import Row, compare
-from analysis.predict.power import studies as power_studies
+from analysis.paper.recurrence import PatternOdds
 from analysis.predict.reproduction.reconstructed import misfit, seat, table_bytes, table_name
 from analysis.predict.simulate.shot import shot_panel
+from analysis.predict.synthetic_studies import pattern_odds
 from analysis.summary.sections.data import ReportData
 from analysis.summary.sections.sections import obtained_text, write_report
 from analysis.summary.summary import summarize
@@ -34,11 +31,7 @@ from experiments.clock import VirtualClock
 from experiments.config.door import ConfigError
 from experiments.config.models import StudyConfig
 from experiments.config.setup import Setup, sha256
-from experiments.design.streams import Stream, generator
-from experiments.direction.config import DirectionConfig
 from experiments.load import load_setup, load_study
-from experiments.preference.config import PreferenceConfig
-from experiments.preference.synthetic import draw_ratings
 from experiments.rebuild import rebuild
 from experiments.record import storage
 from experiments.record.journal import is_empty
@@ -47,53 +40,6 @@ from experiments.record.provenance import git_commit, provenance, recoil_version
 from experiments.run import Request, run
 from experiments.screens.synthetic import synthetic_screen
 from experiments.study import places
-
-Scores = NDArray[np.float64]
-Counts = NDArray[np.int64]
-
-
-def direction_counts(config: DirectionConfig, methods: list[str], n: int, replications: int, seed: int) -> Counts:
-    """Correct answers, (replications, n, methods, 2 directions), of people drawn as `RatesParticipant` draws them."""
-    counts = power_studies.direction_counts(config, n, replications, generator(seed, "odds", config.experiment))
-    return counts[:, :, [config.design.methods.index(method) for method in methods]]
-
-
-def preference_scores(config: PreferenceConfig, methods: list[str], n: int, replications: int, seed: int) -> Scores:
-    """Ratings, (replications, n, methods), of people drawn as `RatingsParticipant` draws them."""
-    stream = Stream(seed, "odds", config.experiment)
-    law, scale = config.synthetic.ratings, config.rating
-    people = (draw_ratings(law, scale, methods, stream) for _ in range(replications * n))
-    ratings = [person[method] for person in people for method in methods]
-    return np.array(ratings).reshape(replications, n, len(methods))
-
-
-def direction_odds(config: DirectionConfig, paper: Paper, replications: int, seed: int) -> Odds:
-    """The odds of experiment 1's claims at the published rates."""
-    published, rates, forward = paper.direction, config.synthetic.rates, config.design.forward_per_session
-    counts = direction_counts(config, published.methods, published.n, replications, seed)
-    claims = recurs(counts[..., 0] / forward, published)
-    return odds_of(
-        config.experiment,
-        claims | chance_recurs(counts.sum(axis=1), published.n * forward, published),
-        f"{published.n} people whose correct rates are, in the mean, the published ones; people differ by an ability "
-        f"of SD {rates.ability_sd:g} and a bias of SD {rates.bias_sd:g} in probit units (assumed); "
-        f"{forward} forward and as many backward trials a method; seed {seed}.",
-    )
-
-
-def preference_odds(config: PreferenceConfig, paper: Paper, replications: int, seed: int) -> Odds:
-    """The odds of experiment 2's claims at the assumed ratings."""
-    published, law = paper.preference, config.synthetic.ratings
-    scores = preference_scores(config, published.methods, published.n, replications, seed)
-    means = ", ".join(f"{method} {law.mean[method]:g}" for method in published.methods)
-    return odds_of(
-        config.experiment,
-        recurs(scores, published),
-        f"{published.n} people; the means and SDs are not published, so these are assumed: {means}; SD between people "
-        f"{law.person_sd:g}, within {law.noise_sd:g}; a share of {law.same_share:g} give "
-        f"{' and '.join(law.same or ())} the same score; seed {seed}.",
-    )
-
 
 MANIFEST = "reproduction.json"
 
@@ -251,18 +197,18 @@ def _finished(where: places.Place) -> bool:
     return where.journal.exists() and not is_empty(where.journal) and read_journal(where.journal).finished
 
 
-def _odds(study: Study) -> Iterator[Odds]:
+def _odds(study: Study) -> Iterator[PatternOdds]:
     if study.paper is None or not study.config.replications:
         return
     for setup in study.setups:
-        if isinstance(setup.config, DirectionConfig) and setup.config.synthetic.observer == "rates":
-            yield direction_odds(setup.config, study.paper, study.config.replications, study.seed)
-        if isinstance(setup.config, PreferenceConfig) and setup.config.synthetic.observer == "ratings":
-            yield preference_odds(setup.config, study.paper, study.config.replications, study.seed)
+        config = setup.config
+        if config.synthetic.observer in ("rates", "ratings"):
+            published: PublishedExperiment = getattr(study.paper, config.experiment)
+            yield pattern_odds(config, published, study.config.replications, study.seed)
 
 
 def _report(
-    study: Study, logs: Logs, statistics: dict[str, Any], odds: tuple[Odds, ...], comparison: tuple[Row, ...]
+    study: Study, logs: Logs, statistics: dict[str, Any], odds: tuple[PatternOdds, ...], comparison: tuple[Row, ...]
 ) -> ReportData:
     people = "synthetic, reconstructed from the published numbers" if study.reconstructed else "synthetic"
     return ReportData(
