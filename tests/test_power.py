@@ -291,7 +291,7 @@ def test_a_worker_without_this_recoil_is_named() -> None:
             return {"tcp://w:1": versions() | {"numpy": "1.0"}}
 
     with pytest.raises(JobError, match=r"worker tcp://w:1 has numpy 1\.0, not"):
-        jobs._check_workers(Client(), "tcp://s:1")
+        jobs.check_workers(Client(), "tcp://s:1")
 
 
 def test_a_missing_dask_is_named(monkeypatch: pytest.MonkeyPatch) -> None:
