@@ -136,12 +136,12 @@ def bench(
     as_json: AsJson = False,
 ) -> None:
     """Measure our own methods: error rates of the post-hoc tests, error against time of a simulated shot."""
-    from analysis.predict.bench import run as feature
-    from analysis.predict.bench.physics import BenchRequest
+    from analysis.predict import bench as feature
 
     unknown = set(parts or []) - set(feature.PARTS)
     if unknown:
         raise typer.BadParameter(f"no part {', '.join(sorted(unknown))}; there are {', '.join(feature.PARTS)}")
-    asked = BenchRequest(seed=seed, repeats=repeats, batch=batch, figures=out / "figures", progress=progress)
-    found, lines = feature.bench(out, parts or [], asked)
-    show(found, "\n".join([*lines, f"Report: {out / 'report.html'}"]), as_json)
+    request = feature.BenchRequest(seed=seed, repeats=repeats, batch=batch, progress=progress)
+    found = feature.bench(out, parts or [], request)
+    lines = [line for part in found.parts.values() for line in part.lines]
+    show(found.content, "\n".join([*lines, f"Report: {out / 'report.html'}"]), as_json)
