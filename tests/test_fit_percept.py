@@ -18,7 +18,7 @@ from scipy import stats
 from analysis.paper.paper import load_paper
 from analysis.predict.fit.percept import percept
 from analysis.predict.fit.percept_model import PAPER_RATES, PAPER_TRIALS
-from analysis.predict.fit.percept_request import ASSUMED_SPREAD, PerceptRequest, read
+from analysis.predict.fit.percept_request import ASSUMED_SPREAD, PerceptRequest, read_request
 from analysis.predict.fit.percept_results import FittedPercept
 from analysis.predict.fit.percept_sections import config_text, verdict_sentence
 from analysis.predict.fit.studies import Case, Judged, cases_of, judge, place_of
@@ -248,7 +248,7 @@ def test_a_number_beyond_the_central_95_percent_is_called_at_odds(fitted: Fitted
 )
 def test_what_cannot_be_fitted_is_refused_in_words(request_: PerceptRequest, words: str) -> None:
     with pytest.raises(ConfigError, match=re.escape(words)):
-        read(request_)
+        read_request(request_)
 
 
 def test_a_paper_of_which_a_mean_is_missing_is_refused(tmp_path: Path) -> None:
@@ -256,4 +256,4 @@ def test_a_paper_of_which_a_mean_is_missing_is_refused(tmp_path: Path) -> None:
     path = tmp_path / "paper.toml"
     path.write_text(text.replace('vibration = "55.7"\n', "", 1), encoding="utf-8")
     with pytest.raises(ConfigError, match="has no rate of vibration"):
-        read(PerceptRequest(paper=str(path)))
+        read_request(PerceptRequest(paper=str(path)))

@@ -13,7 +13,7 @@ from scipy import stats
 
 from analysis.paper.paper import load_paper
 from analysis.paper.recurrence import WHOLE_PATTERN, answers_recur, recurs, with_whole_pattern
-from analysis.predict.power.grid import Request, make_grid
+from analysis.predict.power.grid import PowerRequest, make_grid
 from analysis.predict.power.planned import (
     ALL_PAIRS,
     ANOVA,
@@ -27,7 +27,7 @@ from analysis.predict.power.planned import (
     shares,
     tallied,
 )
-from analysis.predict.power.studies import Chunk, Design, run_chunk
+from analysis.predict.power.studies import Chunk, StudyDesign, run_chunk
 from analysis.predict.synthetic_studies import (
     direction_counts,
     null_rates,
@@ -211,7 +211,7 @@ def test_tallies_add_up_in_any_order() -> None:
 
 def tally_of(experiment: str, studies: int) -> Mapping[str, float]:
     config = {"direction": DIRECTION, "preference": PREFERENCE}[experiment]
-    design = Design(participants=14, trials=20, methods=METHODS)
+    design = StudyDesign(participants=14, trials=20, methods=METHODS)
     published = getattr(PAPER, experiment)
     chunk = Chunk(config=config, design=design, published=published, seed=1, number=0, studies=studies)
     return {share.claim: share.share for share in shares(run_chunk(chunk))}
@@ -261,7 +261,7 @@ def test_every_published_claim_recurs_as_often_as_among_people_drawn_one_by_one(
 
 def test_null_participants_give_five_percent_and_the_exact_test_its_own_size() -> None:
     """The size of the exact test by its definition: all outcomes of 140 that it rejects."""
-    grid = make_grid(Request(config="direction", participants="14", null=True, studies=20_000))
+    grid = make_grid(PowerRequest(config="direction", participants="14", null=True, studies=20_000))
     guessing, biased = (merged([run_chunk(c) for c in grid.chunks_of(cell)]) for cell in grid.cells)
     for tally in (guessing, biased):
         found = {share.claim: share for share in shares(tally)}
@@ -281,7 +281,7 @@ def test_null_people_differ_in_their_bias_alone() -> None:
 
 
 def test_a_chunk_has_a_stream_of_its_own() -> None:
-    design = Design(participants=8, trials=20, methods=METHODS)
+    design = StudyDesign(participants=8, trials=20, methods=METHODS)
     chunks = [
         Chunk(config=DIRECTION, design=d, published=None, seed=seed, number=number, studies=200)
         for d, seed, number in [(design, 1, 0), (design, 1, 1), (design, 2, 0), (replace(design, effect=0.9), 1, 0)]

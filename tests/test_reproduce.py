@@ -143,12 +143,15 @@ def test_the_tables_of_reconstructed_answers_seat_the_same_people_again(reproduc
 
 def test_participants_drawn_by_the_configs_stay_an_option() -> None:
     """Loaded, not run: they are the setups of the configs themselves."""
-    study = reproduce.load("study", 1, "rates")
-    assert study.seated == study.setups
+    study = reproduce.prepared("study", 1, "rates")
+    assert study.answering == study.setups
     assert "other participants were asked for" in study.notes[0]
-    assert reproduce.load("study", 1).manifest() == reproduce.load("study", 1, "reconstructed").manifest()
-    assert reproduce.load("study", 1).manifest() != study.manifest()
-    assert [setup.config.synthetic.observer for setup in reproduce.load("study", 2).seated] == ["table", "table"]
+    assert reproduce.prepared("study", 1).manifest() == reproduce.prepared("study", 1, "reconstructed").manifest()
+    assert reproduce.prepared("study", 1).manifest() != study.manifest()
+    assert [setup.config.synthetic.observer for setup in reproduce.prepared("study", 2).answering] == [
+        "table",
+        "table",
+    ]
 
 
 def test_the_same_seed_gives_the_same_answers_and_another_seed_others(reproduction: Path, tmp_path: Path) -> None:

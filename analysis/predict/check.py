@@ -110,10 +110,10 @@ class PaperCheck:
     experiments: dict[str, int]
 
 
-Check = ExperimentCheck | StudyCheck | GunCheck | PaperCheck
+AnyCheck = ExperimentCheck | StudyCheck | GunCheck | PaperCheck
 
 
-def check(name: str, seed: int | None, participants: int) -> Check:
+def check(name: str, seed: int | None, participants: int) -> AnyCheck:
     """What any config means. `ConfigError` names what is wrong with it."""
     path = find(name)
     table = read_toml(path)
@@ -222,7 +222,7 @@ def _method(setup: Setup[Any], limit: MethodLimits) -> MethodCheck:
     return found
 
 
-def as_text(found: Check) -> str:
+def as_text(found: AnyCheck) -> str:
     """What was found, for a person."""
     if isinstance(found, GunCheck | PaperCheck):
         return "\n".join(f"{one.name}: {plain(getattr(found, one.name))}" for one in fields(found))

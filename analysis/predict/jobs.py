@@ -27,7 +27,7 @@ from experiments.record.provenance import recoil_version, versions
 Function = Callable[[Any], Any]
 Done = Callable[[int, Any], None]
 """Told the number of a piece and what came of it, in the order in which they end."""
-Run = Callable[[Function, Sequence[Any], Done], None]
+RunPieces = Callable[[Function, Sequence[Any], Done], None]
 """Works out a function of each piece."""
 
 CONNECT_S = 10
@@ -48,7 +48,7 @@ def cores() -> int:
 
 
 @contextmanager
-def on_processes(workers: int) -> Iterator[Run]:
+def on_processes(workers: int) -> Iterator[RunPieces]:
     """On so many processes of their own, started anew ("spawn") so that it is the same on every system.
 
     When interrupted, what has begun ends and nothing more begins. `JobError` if a process is killed.
@@ -57,7 +57,7 @@ def on_processes(workers: int) -> Iterator[Run]:
 
 
 @contextmanager
-def on_cluster(address: str) -> Iterator[Run]:
+def on_cluster(address: str) -> Iterator[RunPieces]:
     """On the workers of the Dask scheduler at `address`. `JobError` if there is none, or its workers lack Recoil."""
     with _cluster(address) as client:
         check_workers(client, address)

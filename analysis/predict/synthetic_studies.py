@@ -119,7 +119,7 @@ def percepts_of_setup(setup: Setup[DirectionConfig]) -> dict[str, Percept]:
     return percepts_of(setup.gun.renderings(config.design.methods), model_parameters(config).percept.leak_s)
 
 
-def felt_of(
+def felt_people(
     config: DirectionConfig, percepts: Mapping[str, Percept], methods: Sequence[str], effect: float = 1.0
 ) -> Felt:
     """The participants of a config; `effect` is a factor on the evidence, at 0 nothing is felt."""

@@ -7,7 +7,7 @@ from dataclasses import replace
 from pathlib import Path
 
 from analysis.predict.fit.percept_model import PerceptFit, PerceptPeak, best_percept, fit_percept
-from analysis.predict.fit.percept_request import PerceptRequest, PerceptTask, read
+from analysis.predict.fit.percept_request import PerceptRequest, PerceptTask, read_request
 from analysis.predict.fit.percept_results import FittedPercept, fitted_percept
 from analysis.predict.fit.percept_sections import assumptions, config_text, in_short, sections
 from analysis.predict.fit.studies import MAIN, PERCENTILES, Histograms, Judgement, cases_of, judge, pieces_of
@@ -28,7 +28,7 @@ def percept(request: PerceptRequest, out: Path, progress: Progress) -> FittedPer
 
     `ConfigError`: rates or files that cannot be used.
     """
-    task = read(request)
+    task = read_request(request)
     pieces = pieces_of(request.studies, task.published) if task.published else 0
     with progress("fit", 2 + len(OTHERS) + CASES * pieces) as tell:
         fit = fit_percept(task.rates, task.methods, trials=task.trials, people=task.people)

@@ -49,7 +49,7 @@ class PerceptTask:
     published: PublishedDirection | None
 
 
-def read(request: PerceptRequest) -> PerceptTask:
+def read_request(request: PerceptRequest) -> PerceptTask:
     """The task of a request. `ConfigError`: rates, trials, a paper or a gun that cannot be used."""
     if not 0.0 <= request.spread <= _LARGEST_SPREAD:
         raise ConfigError(f"--spread {request.spread:g}: must be a factor from 0 (people alike) to {_LARGEST_SPREAD:g}")
@@ -67,7 +67,7 @@ def read(request: PerceptRequest) -> PerceptTask:
         rates=rates,
         trials=trials,
         methods=_methods(request.gun, rates),
-        people=scaled(ASSUMED_SPREAD, request.spread),
+        people=scaled_spread(ASSUMED_SPREAD, request.spread),
         published=published,
     )
 
@@ -99,7 +99,7 @@ def published_rates(published: PublishedDirection) -> tuple[dict[str, float], in
     return rates, published.n * published.protocol.forward_trials_per_session
 
 
-def scaled(people: People, factor: float) -> People:
+def scaled_spread(people: People, factor: float) -> People:
     """People who differ so many times as much."""
     return People(
         drift_factor_sd=factor * people.drift_factor_sd,

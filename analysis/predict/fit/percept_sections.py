@@ -8,17 +8,17 @@ from pathlib import Path
 from typing import Protocol
 
 from analysis.paper.recurrence import WHOLE_PATTERN, wilson_interval
-from analysis.predict.fit.figures import RateCurve, RatePoint, Spread, figure_percept, figure_places
+from analysis.predict.fit.figures import RateCurve, RatePoint, SimulatedSpread, figure_percept, figure_places
 from analysis.predict.fit.percept_model import Fitted
 from analysis.predict.fit.percept_results import AssumedNumbers, FittedPercept, FrictionCurve, OtherFit
-from analysis.predict.fit.studies import Histograms, Judged, Judgement, Place
+from analysis.predict.fit.studies import Histograms, Judged, Judgement, PublishedPlace
 from analysis.predict.synthetic_studies import spread_sentence
 from analysis.report import apa
 from analysis.report.section import Picture, Section, Table
 from experiments.synthetic.diffusion import People
 from experiments.synthetic.percept import PerceptParameters
 
-NO_TIMES = (
+NO_OWN_TIMES = (
     "The paper's protocol gives no response times from the participant's own hand, so drift and boundary cannot be "
     "told apart from it: rates fix only their product."
 )
@@ -119,7 +119,7 @@ def _percents(one: HasInterval) -> str:
     return apa.interval(100.0 * one.ci_low, 100.0 * one.ci_high, 1)
 
 
-def _place_sentence(place: Place) -> str:
+def _place_sentence(place: PublishedPlace) -> str:
     """Where a published number lies."""
     fitted = "; fitted, so no test" if place.fitted else ""
     return (
@@ -130,7 +130,7 @@ def _place_sentence(place: Place) -> str:
 
 def verdict_sentence(case: Judged) -> str:
     """Is the model at odds with what was not fitted? It is where all that a printed number may be lies outside 95 %."""
-    places: dict[str, list[Place]] = {}
+    places: dict[str, list[PublishedPlace]] = {}
     for place in case.places:
         if not place.fitted:
             places.setdefault(place.quantity, []).append(place)
@@ -257,7 +257,7 @@ def _unknown(found: FittedPercept) -> Section:
         title="What these rates cannot tell",
         items=(
             *found.unknown,
-            NO_TIMES,
+            NO_OWN_TIMES,
             "Each number is left open (below) from 0, if the rates fix it alone, to 1, if they do not bear on it: its "
             "part in the directions in which the rates have no information.",
         ),
@@ -310,7 +310,7 @@ def _draw_places(judged: Judgement, histograms: Sequence[Histograms], path_stem:
         texts = [place.published.split(",")[0] for place in places if place.quantity == quantity]
         cases = {one.name: of_case[quantity] for one, of_case in zip(judged.cases, histograms, strict=True)}
         spreads.append(
-            Spread(
+            SimulatedSpread(
                 title=title, x_label=label or "F", cases=cases, published={f" {text}": float(text) for text in texts}
             )
         )

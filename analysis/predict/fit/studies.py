@@ -15,7 +15,7 @@ from analysis.paper.paper import PublishedDirection
 from analysis.paper.published import rounds_to
 from analysis.paper.recurrence import WHOLE_PATTERN, Recurrence, answers_recur, recurs, share_of, wilson_interval
 from analysis.predict.fit.percept_model import FITTED, PerceptPeak, best_percept
-from analysis.predict.fit.percept_request import ASSUMED_SPREAD, scaled
+from analysis.predict.fit.percept_request import ASSUMED_SPREAD, scaled_spread
 from analysis.predict.synthetic_studies import Counts, Felt, Floats, felt_counts, piece_sizes
 from analysis.stats.anova import rm_anova
 from analysis.stats.binomial import binomial_test
@@ -26,11 +26,11 @@ from experiments.synthetic.diffusion import People
 from experiments.synthetic.percept import Percept, PerceptParameters, evidence, percepts_of
 
 PERCENTILES = (2.5, 25.0, 50.0, 75.0, 97.5)
-BINS = 40
+HISTOGRAM_BINS = 40
 LARGEST_VARIANCE = 2.0
 """Of a fitted number's logarithm: beyond, the normal approximation describes nothing that could be drawn (assumed)."""
 MAIN = "assumed spread"
-KINDS = {"people alike": People(), MAIN: ASSUMED_SPREAD, "twice the spread": scaled(ASSUMED_SPREAD, 2.0)}
+PEOPLE_KINDS = {"people alike": People(), MAIN: ASSUMED_SPREAD, "twice the spread": scaled_spread(ASSUMED_SPREAD, 2.0)}
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -44,7 +44,7 @@ class Case:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Place:
+class PublishedPlace:
     """Where a published number lies among the simulated ones.
 
     `percentile`: share below it plus half of those that print alike, 0 to 1, with its 95 % Monte Carlo interval.
@@ -79,7 +79,7 @@ class Judged:
     name: str
     people: People
     parameters: PerceptParameters
-    places: tuple[Place, ...]
+    places: tuple[PublishedPlace, ...]
     claims: tuple[RecurringClaim, ...]
 
 
@@ -109,7 +109,7 @@ def cases_of(
     """The kinds of people that are judged, the percept fitted anew for each; `assumed` has what is not fitted."""
     cases = [
         Case(name=name, people=people, fit=best_percept(rates, methods, trials=trials, people=people, base=assumed))
-        for name, people in KINDS.items()
+        for name, people in PEOPLE_KINDS.items()
     ]
     if (np.diag(cases[1].fit.covariance) < LARGEST_VARIANCE).all():  # not so if it is NaN
         cases.append(replace(cases[1], name=f"{MAIN}, fit's error drawn", drawn=True))
@@ -209,7 +209,7 @@ def _printed(text: str) -> tuple[str, float, float]:
     return text, float(text) - half, float(text) + half
 
 
-def place_of(quantity: str, published: tuple[str, float, float], values: Floats, fitted: bool) -> Place:
+def place_of(quantity: str, published: tuple[str, float, float], values: Floats, fitted: bool) -> PublishedPlace:
     """The place of a published number among simulated values; it is text with the bounds of what prints alike.
 
     A value that is undefined or infinite (nothing varies within people) counts as above.
@@ -219,7 +219,7 @@ def place_of(quantity: str, published: tuple[str, float, float], values: Floats,
     below, above = float((known < low).mean()), float((known > high).mean())
     percentile = (below + 1.0 - above) / 2.0
     ci_low, ci_high = wilson_interval(round(percentile * values.size), values.size)
-    return Place(
+    return PublishedPlace(
         quantity=quantity,
         published=text,
         percentile=percentile,
@@ -264,6 +264,6 @@ def _histogram(values: Floats) -> tuple[tuple[float, ...], tuple[float, ...]]:
         edges = np.arange(finite.min() - 0.5, finite.max() + 1.0)
     else:
         low, high = np.percentile(finite, (0.1, 99.9))
-        edges = np.linspace(low, high, BINS + 1)
+        edges = np.linspace(low, high, HISTOGRAM_BINS + 1)
     counts, edges = np.histogram(finite, edges)
     return tuple(edges.tolist()), tuple(counts.astype(np.float64).tolist())

@@ -11,7 +11,7 @@ from pathlib import Path
 import numpy as np
 
 from analysis.logs.reading import Logs, Problem, Track, read_logs
-from analysis.predict.fit.percept_sections import NO_TIMES
+from analysis.predict.fit.percept_sections import NO_OWN_TIMES
 from analysis.predict.fit.times_results import FittedTimes, TimesFit, times_fit
 from analysis.predict.fit.times_sections import in_short, left_out, sections
 from analysis.report.page import write_page
@@ -91,7 +91,7 @@ def _own(paths: Sequence[Path], logs: Logs) -> OwnTrials:
     own = own_trials(logs.trials, methods)
     if not own.time_s.size:
         reasons = [f"{count} trials: {REFUSALS[name]}" for name, count in own.refused.items()]
-        raise PlaceError("\n".join([f"no response time in {where} is the participant's own", *reasons, NO_TIMES]))
+        raise PlaceError("\n".join([f"no response time in {where} is the participant's own", *reasons, NO_OWN_TIMES]))
     if own.time_s.size < FEWEST_TRIALS:
         raise PlaceError(f"{own.time_s.size} response times in {where}; the fit needs at least {FEWEST_TRIALS}")
     return own

@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 
 from analysis.predict.fit.figures import TimesPanel, figure_times
-from analysis.predict.fit.percept_sections import NO_TIMES
+from analysis.predict.fit.percept_sections import NO_OWN_TIMES
 from analysis.predict.fit.times_results import EZCell, FittedTimes, TimesFit
 from analysis.report import apa
 from analysis.report.section import Picture, Section, Table
@@ -17,14 +17,14 @@ from analysis.stats.arrays import FloatArray
 from analysis.times.fit import AnsweredBy, DiffusionFit, Estimate, answered_by
 from analysis.times.people import MeanEstimate
 
-CAVEATS = (
+TIMES_CAVEATS = (
     "Decisions are taken to be a simple diffusion: one drift a method (its sign that of the shot), one boundary an "
     "instruction, one start and one non-decision time; nothing varies from trial to trial but the noise.",
     "Where people differ, the fit of all together is that of a compromise person (non-decision time towards the "
     "fastest, drifts towards 0, boundaries up); the mean over people of their own fits is the one to report.",
     "A person's own fit rests on few trials: see results/soak/decision.md for its bias and spread at 60 trials.",
     "EZ-diffusion knows no bias and no lapses, and takes forward and backward shots together.",
-    NO_TIMES,
+    NO_OWN_TIMES,
 )
 
 
@@ -50,7 +50,7 @@ def _lines(found: TimesFit) -> Iterator[str]:
         yield "one fit of all together (a compromise person, intervals by person)"
         yield from map(_estimate_line, found.together.estimates)
     yield from (f"not identified: {name}" for name in found.together.unidentified)
-    yield NO_TIMES
+    yield NO_OWN_TIMES
 
 
 def _estimate_line(one: MeanEstimate | Estimate) -> str:
@@ -253,6 +253,6 @@ def _origin(found: TimesFit) -> Section:
     rows = tuple((name, str(value)) for name, value in found.provenance.items())
     return Section(
         title="What this rests on",
-        items=CAVEATS,
+        items=TIMES_CAVEATS,
         tables=(Table(caption="Where the numbers come from", header=("What", "Value"), rows=rows),),
     )

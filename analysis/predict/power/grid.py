@@ -9,18 +9,18 @@ from typing import Any
 from analysis.paper.paper import PublishedExperiment, load_paper
 from analysis.predict.power.request import (
     FELT,
-    Request,
+    PowerRequest,
     check_scalars,
     checked_setup,
     factors,
     method_sets_of,
-    numbers,
     trials_of,
+    whole_numbers,
 )
-from analysis.predict.power.studies import Chunk, Config, Design, People
+from analysis.predict.power.studies import Chunk, DrawnConfig, PeopleKind, StudyDesign
 from analysis.predict.synthetic_studies import (
     Felt,
-    felt_of,
+    felt_people,
     null_felt,
     null_rates,
     null_ratings,
@@ -32,7 +32,7 @@ from experiments.load import find
 from experiments.preference.config import PreferenceConfig
 from experiments.synthetic.percept import Percept
 
-__all__ = ["Cell", "Grid", "Request", "make_grid"]
+__all__ = ["Grid", "GridCell", "PowerRequest", "make_grid"]
 
 DEFAULT_PARTICIPANTS = "6,8,10,12,14,16,18,20,24,28,32,40"
 NULL_PARTICIPANTS = "8,14,24"
@@ -41,11 +41,11 @@ _MOST_PEOPLE = 999
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Cell:
+class GridCell:
     """A design with the config that it makes, and its cost; `too_long` says why it may not be run, or nothing."""
 
-    design: Design
-    config: Config
+    design: StudyDesign
+    config: DrawnConfig
     duration_s: float
     too_long: str
 
@@ -62,15 +62,15 @@ class Grid:
     `percepts`: what the gun's shots give to feel, by method, if the participants feel it.
     """
 
-    config: Config
-    cells: tuple[Cell, ...]
-    reference: Cell | None
+    config: DrawnConfig
+    cells: tuple[GridCell, ...]
+    reference: GridCell | None
     published: PublishedExperiment | None
-    request: Request
+    request: PowerRequest
     percepts: Mapping[str, Percept] | None = None
 
     @property
-    def all_cells(self) -> tuple[Cell, ...]:
+    def all_cells(self) -> tuple[GridCell, ...]:
         """The cells, and the reference after them if it is none of them."""
         apart = [self.reference] if self.reference and self.reference not in self.cells else []
         return (*self.cells, *apart)
@@ -79,7 +79,7 @@ class Grid:
         """The work, in its order: so many studies of every cell, in pieces."""
         return [chunk for cell in self.all_cells for chunk in self.chunks_of(cell)]
 
-    def chunks_of(self, cell: Cell) -> list[Chunk]:
+    def chunks_of(self, cell: GridCell) -> list[Chunk]:
         """The pieces of a cell."""
         published = self.published if _is_of(self.published, cell) else None
         return [
@@ -95,22 +95,22 @@ class Grid:
             for number, studies in enumerate(piece_sizes(self.request.studies, cell.design.participants))
         ]
 
-    def _felt(self, cell: Cell) -> Felt | None:
+    def _felt(self, cell: GridCell) -> Felt | None:
         if self.percepts is None or not isinstance(cell.config, DirectionConfig):
             return None
-        return felt_of(cell.config, self.percepts, cell.design.methods, cell.design.effect)
+        return felt_people(cell.config, self.percepts, cell.design.methods, cell.design.effect)
 
 
-def make_grid(request: Request) -> Grid:
+def make_grid(request: PowerRequest) -> Grid:
     """The grid of a request. `ConfigError` with a message for people for whatever is wrong with it."""
     check_scalars(request)
     setup = checked_setup(request.config)
-    config: Config = setup.config
+    config: DrawnConfig = setup.config
     people = request.participants or (NULL_PARTICIPANTS if request.null else DEFAULT_PARTICIPANTS)
-    participants = numbers(people, "--participants", 2, _MOST_PEOPLE)
+    participants = whole_numbers(people, "--participants", 2, _MOST_PEOPLE)
     effects = [0.0] if request.null else factors(request.effects or DEFAULT_EFFECTS)
     designs = [
-        (_varied(config, methods, trials), Design(participants=n, trials=trials, methods=methods, effect=effect))
+        (_varied(config, methods, trials), StudyDesign(participants=n, trials=trials, methods=methods, effect=effect))
         for methods in method_sets_of(request.methods, config)
         for trials in trials_of(request.trials, config)
         for effect in effects
@@ -129,7 +129,7 @@ def make_grid(request: Request) -> Grid:
     )
 
 
-def _varied(config: Config, methods: tuple[str, ...], trials: int) -> Config:
+def _varied(config: DrawnConfig, methods: tuple[str, ...], trials: int) -> DrawnConfig:
     """The config with these methods and trials; not checked again, so that what it breaks can be told."""
     changes: dict[str, Any] = {"methods": methods}
     if isinstance(config, DirectionConfig):
@@ -143,19 +143,19 @@ def _varied(config: Config, methods: tuple[str, ...], trials: int) -> Config:
     return config.model_copy(update={"design": config.design.model_copy(update=changes)})
 
 
-def _null_people(config: Config) -> tuple[People, ...]:
+def _null_people(config: DrawnConfig) -> tuple[PeopleKind, ...]:
     if isinstance(config, PreferenceConfig):
         return ("without preference",)
     return ("guessing", "guessing, with the config's bias")
 
 
-def _null(config: Config, design: Design, people: People) -> tuple[Config, Design]:
+def _null(config: DrawnConfig, design: StudyDesign, people: PeopleKind) -> tuple[DrawnConfig, StudyDesign]:
     """The design with null participants."""
     config = config.model_copy(update={"synthetic": _null_synthetic(config, people)})
     return config, replace(design, people=people)
 
 
-def _null_synthetic(config: Config, people: People) -> Any:
+def _null_synthetic(config: DrawnConfig, people: PeopleKind) -> Any:
     if isinstance(config, PreferenceConfig):
         return config.synthetic.model_copy(update={"ratings": null_ratings(config.synthetic.ratings)})
     if config.synthetic.observer == FELT:
@@ -163,14 +163,14 @@ def _null_synthetic(config: Config, people: People) -> Any:
     return config.synthetic.model_copy(update={"rates": null_rates(config.synthetic.rates, biased="bias" in people)})
 
 
-def _cell(config: Config, design: Design) -> Cell:
+def _cell(config: DrawnConfig, design: StudyDesign) -> GridCell:
     longest = config.fatigue.max_planned_s
     longer = config.duration_s > longest
     reason = f"{config.duration_s:g} s a participant exceed fatigue.max_planned_s = {longest:g} s" if longer else ""
-    return Cell(design=design, config=config, duration_s=config.duration_s, too_long=reason)
+    return GridCell(design=design, config=config, duration_s=config.duration_s, too_long=reason)
 
 
-def _published(name: str, config: Config) -> PublishedExperiment | None:
+def _published(name: str, config: DrawnConfig) -> PublishedExperiment | None:
     """The published claims about these methods; `None` if the paper is about others."""
     paper = load_paper(find(name))
     published: PublishedExperiment = getattr(paper, config.experiment)
@@ -178,13 +178,13 @@ def _published(name: str, config: Config) -> PublishedExperiment | None:
     return None if one_way or set(published.methods) != set(config.design.methods) else published
 
 
-def _is_of(published: PublishedExperiment | None, cell: Cell) -> bool:
+def _is_of(published: PublishedExperiment | None, cell: GridCell) -> bool:
     return published is not None and set(published.methods) == set(cell.design.methods)
 
 
-def _reference(config: Config, published: PublishedExperiment | None) -> Cell | None:
+def _reference(config: DrawnConfig, published: PublishedExperiment | None) -> GridCell | None:
     """The paper's own number of people with the config's trials and effects."""
     if published is None:
         return None
     trials = next(iter(trials_of(None, config)))
-    return _cell(config, Design(participants=published.n, trials=trials, methods=config.design.methods))
+    return _cell(config, StudyDesign(participants=published.n, trials=trials, methods=config.design.methods))

@@ -7,7 +7,7 @@ import re
 from dataclasses import dataclass
 from typing import Any
 
-from analysis.predict.power.studies import Config
+from analysis.predict.power.studies import DrawnConfig
 from experiments.config.door import ConfigError
 from experiments.config.setup import Setup
 from experiments.direction.config import DirectionConfig
@@ -26,7 +26,7 @@ class GridError(ConfigError):
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Request:
+class PowerRequest:
     """What the command line asks for. Lists are text, as in `8,10,14-20`."""
 
     config: str
@@ -41,7 +41,7 @@ class Request:
     paper: str = "paper"
 
 
-def check_scalars(request: Request) -> None:
+def check_scalars(request: PowerRequest) -> None:
     """`GridError` for a target that is no share, and for an effect of people who feel none."""
     if not 0.0 < request.target < 1.0:
         raise GridError(f"--target {request.target:g}: must lie between 0 and 1, such as 0.8")
@@ -62,7 +62,7 @@ def checked_setup(name: str) -> Setup[Any]:
     return setup
 
 
-def method_sets_of(asked: tuple[str, ...], config: Config) -> list[tuple[str, ...]]:
+def method_sets_of(asked: tuple[str, ...], config: DrawnConfig) -> list[tuple[str, ...]]:
     """The sets of methods to compare: the config's own unless some are named."""
     known, sets = config.design.methods, []
     for text in asked or (",".join(known),):
@@ -74,7 +74,7 @@ def method_sets_of(asked: tuple[str, ...], config: Config) -> list[tuple[str, ..
     return list(dict.fromkeys(sets))
 
 
-def trials_of(asked: str | None, config: Config) -> list[int]:
+def trials_of(asked: str | None, config: DrawnConfig) -> list[int]:
     """The trials of one method: the config's own unless some are named."""
     if isinstance(config, PreferenceConfig):
         if asked is not None:
@@ -85,7 +85,7 @@ def trials_of(asked: str | None, config: Config) -> list[int]:
         return [design.trials_per_session]
     whole = design.trials_per_session // math.gcd(design.trials_per_session, design.forward_per_session)
     step = math.lcm(design.trials_per_set * max(1, len(design.instructions)), whole)
-    found = numbers(asked, "--trials", 1, 10_000)
+    found = whole_numbers(asked, "--trials", 1, 10_000)
     uneven = [trials for trials in found if trials % step]
     if uneven and "-" not in asked:
         raise GridError(
@@ -99,7 +99,7 @@ def trials_of(asked: str | None, config: Config) -> list[int]:
     return fitting
 
 
-def numbers(text: str, option: str, low: int, high: int) -> list[int]:
+def whole_numbers(text: str, option: str, low: int, high: int) -> list[int]:
     """Whole numbers and ranges, in order and once each. `GridError` for others, or outside `low`..`high`.
 
     >>> numbers("14, 8-10", "--participants", 2, 999)

@@ -27,8 +27,8 @@ from experiments.direction.config import DirectionConfig, Rates
 from experiments.direction.synthetic import probit_of_forward
 from experiments.preference.config import PreferenceConfig
 
-Config = DirectionConfig | PreferenceConfig
-People = Literal["own", "guessing", "guessing, with the config's bias", "without preference"]
+DrawnConfig = DirectionConfig | PreferenceConfig
+PeopleKind = Literal["own", "guessing", "guessing, with the config's bias", "without preference"]
 """Who takes part: the config's own synthetic participants, or null participants who feel no difference."""
 
 PUBLISHED = "published"
@@ -36,14 +36,14 @@ PUBLISHED = "published"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Design:
+class StudyDesign:
     """A cell of the grid; `effect` is the factor on what people feel, `trials` those of one method."""
 
     participants: int
     trials: int
     methods: tuple[str, ...]
     effect: float = 1.0
-    people: People = "own"
+    people: PeopleKind = "own"
 
     @property
     def key(self) -> str:
@@ -55,8 +55,8 @@ class Design:
 class Chunk:
     """So many studies of a design. `config` is that of the design: its methods and trials; `felt` who feel the gun."""
 
-    config: Config
-    design: Design
+    config: DrawnConfig
+    design: StudyDesign
     published: PublishedExperiment | None
     seed: int
     number: int
@@ -73,7 +73,7 @@ def run_chunk(chunk: Chunk) -> Tally:
     return tallied(_ratings(config, design, chunk, draws))
 
 
-def _directions(config: DirectionConfig, design: Design, chunk: Chunk, draws: np.random.Generator) -> Findings:
+def _directions(config: DirectionConfig, design: StudyDesign, chunk: Chunk, draws: np.random.Generator) -> Findings:
     trials = config.design.forward_per_session, config.design.backward_per_session
     if chunk.felt is None:
         correct = direction_counts(config, design.participants, chunk.studies, draws, design.effect)
@@ -85,7 +85,7 @@ def _directions(config: DirectionConfig, design: Design, chunk: Chunk, draws: np
     return _with_published(found, correct, trials, chunk)
 
 
-def _expected(rates: Rates, design: Design) -> tuple[list[float], list[float]]:
+def _expected(rates: Rates, design: StudyDesign) -> tuple[list[float], list[float]]:
     """What is expected of the correct rates on forward shots (their order), and of d' (its sign), by method."""
     felt = [
         [design.effect * (probit_of_forward(rates, m, way) - rates.bias_mean) for way in DIRECTIONS]
@@ -94,7 +94,7 @@ def _expected(rates: Rates, design: Design) -> tuple[list[float], list[float]]:
     return [row[0] for row in felt], [row[0] - row[1] for row in felt]
 
 
-def _ratings(config: PreferenceConfig, design: Design, chunk: Chunk, draws: np.random.Generator) -> Findings:
+def _ratings(config: PreferenceConfig, design: StudyDesign, chunk: Chunk, draws: np.random.Generator) -> Findings:
     scores = preference_scores(config, design.participants, chunk.studies, draws, design.effect)
     expected = scaled_means(config.synthetic.ratings, design.methods, design.effect)
     found = analysed_ratings(scores, design.methods, expected.tolist())

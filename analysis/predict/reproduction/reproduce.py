@@ -20,7 +20,7 @@ from analysis.paper.audit.sentences import ATTENTION, ELSEWHERE, other_rows, pre
 from analysis.paper.paper import Paper, PublishedExperiment, load_paper
 from analysis.paper.published import Row, compare
 from analysis.paper.recurrence import PatternOdds
-from analysis.predict.reproduction.reconstructed import misfit, seat, table_bytes, table_name
+from analysis.predict.reproduction.reconstructed import answers_table, misfit, reconstructed_people, table_name
 from analysis.predict.simulate.shot import shot_panel
 from analysis.predict.synthetic_studies import pattern_odds
 from analysis.summary.sections.data import ReportData
@@ -51,15 +51,15 @@ Tell = Callable[[str], None]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Study:
+class ReproducedStudy:
     """A study ready to run: its config, its experiments' setups, the seed and the published numbers.
 
-    `seated`: the setups with the participants who answer; `findings`: the audit of the published numbers.
+    `answering`: the setups with the participants who answer; `findings`: the audit of the published numbers.
     """
 
     config: StudyConfig
     setups: tuple[Setup[Any], ...]
-    seated: tuple[Setup[Any], ...]
+    answering: tuple[Setup[Any], ...]
     seed: int
     paper: Paper | None
     findings: tuple[Finding, ...] = ()
@@ -68,16 +68,16 @@ class Study:
     @property
     def reconstructed(self) -> bool:
         """Are the participants rebuilt from the published numbers?"""
-        return self.seated != self.setups
+        return self.answering != self.setups
 
     @property
     def runs(self) -> list[tuple[Setup[Any], str]]:
         """Each experiment with each participant."""
-        return [(setup, code) for code in self.config.codes() for setup in self.seated]
+        return [(setup, code) for code in self.config.codes() for setup in self.answering]
 
     def manifest(self) -> dict[str, object]:
         """What makes one reproduction the same as another."""
-        setups = sha256([setup.record() for setup in self.seated])
+        setups = sha256([setup.record() for setup in self.answering])
         return {
             "seed": self.seed,
             "participants": self.config.codes(),
@@ -95,7 +95,7 @@ class Reproduced:
     comparison: tuple[Row, ...]
 
 
-def load(name: str, seed: int, observer: Observer | None = None) -> Study:
+def prepared(name: str, seed: int, observer: Observer | None = None) -> ReproducedStudy:
     """A study from its config, with reconstructed participants unless others are asked for or those do not fit it.
 
     `ConfigError` for configs that cannot be used, and if reconstructed participants are asked for and do not fit.
@@ -104,24 +104,24 @@ def load(name: str, seed: int, observer: Observer | None = None) -> Study:
     setups = tuple(load_setup(str(folder / experiment)) for experiment in config.experiments)
     paper = load_paper(folder / config.paper) if config.paper else None
     findings = audit(load_paper_file(folder / config.paper)) if config.paper else ()
-    study = Study(config=config, setups=setups, seated=setups, seed=seed, paper=paper, findings=findings)
+    study = ReproducedStudy(config=config, setups=setups, answering=setups, seed=seed, paper=paper, findings=findings)
     reason = "other participants were asked for" if observer == "rates" else misfit(config, setups, paper)
     if observer == "reconstructed" and reason:
         raise ConfigError(f"{name}: no reconstructed participants: {reason}")
     if paper is None or reason:
         return replace(study, notes=(f"The participants are those of the configs: {reason}.",))
-    seated = seat(config, setups, paper, seed)
-    return replace(study, seated=seated.setups, notes=seated.notes)
+    people = reconstructed_people(config, setups, paper, seed)
+    return replace(study, answering=people.setups, notes=people.notes)
 
 
-def reproduce(study: Study, out: Path, tell: Tell) -> Reproduced:
+def reproduce(study: ReproducedStudy, out: Path, tell: Tell) -> Reproduced:
     """Run, log, analyse and report a study into `out`.
 
     An unfinished reproduction of the same study is gone on with; another one in `out` is set aside.
     """
     _claim(study, out)
     for setup, code in study.runs:
-        _seat(study, setup, code, out / "logs")
+        _take_part(study, setup, code, out / "logs")
         tell(f"{code} {setup.config.experiment}")
     logs = read_logs([out / "logs"])
     statistics = summarize(logs)
@@ -160,14 +160,14 @@ def _remarkable(row: Row) -> bool:
     return bool(row.note) and row.verdict in {"differs", "differs as predicted", *ATTENTION}
 
 
-def _compared(study: Study, statistics: dict[str, Any]) -> Iterator[Row]:
+def _compared(study: ReproducedStudy, statistics: dict[str, Any]) -> Iterator[Row]:
     """Every published number: those that logs hold beside the obtained, the others with the audit's verdict."""
     if study.paper is not None:
         yield from compare(statistics, study.paper, predictions(study.findings))
         yield from other_rows(study.findings)
 
 
-def _claim(study: Study, out: Path) -> None:
+def _claim(study: ReproducedStudy, out: Path) -> None:
     """Make `out` this study's: go on with the same, set aside another, refuse what is not a reproduction."""
     manifest, wanted = out / MANIFEST, study.manifest()
     if manifest.is_file():
@@ -177,12 +177,12 @@ def _claim(study: Study, out: Path) -> None:
     elif out.exists() and (not out.is_dir() or any(out.iterdir())):
         raise places.PlaceError(f"{out}: exists and is no reproduction of a study; choose another --out")
     storage.make_folder(out)
-    for setup in study.seated if study.reconstructed else ():
-        storage.write_whole(out / table_name(setup), table_bytes(setup))
+    for setup in study.answering if study.reconstructed else ():
+        storage.write_whole(out / table_name(setup), answers_table(setup))
     storage.write_whole(manifest, (json.dumps(wanted, indent=1) + "\n").encode())
 
 
-def _seat(study: Study, setup: Setup[Any], code: str, results: Path) -> None:
+def _take_part(study: ReproducedStudy, setup: Setup[Any], code: str, results: Path) -> None:
     """Have a synthetic participant do an experiment, unless the logs hold it already."""
     where = places.place(results, code, setup.config.experiment)
     if not _finished(where):
@@ -197,7 +197,7 @@ def _finished(where: places.Place) -> bool:
     return where.journal.exists() and not is_empty(where.journal) and read_journal(where.journal).finished
 
 
-def _odds(study: Study) -> Iterator[PatternOdds]:
+def _odds(study: ReproducedStudy) -> Iterator[PatternOdds]:
     if study.paper is None or not study.config.replications:
         return
     for setup in study.setups:
@@ -208,7 +208,11 @@ def _odds(study: Study) -> Iterator[PatternOdds]:
 
 
 def _report(
-    study: Study, logs: Logs, statistics: dict[str, Any], odds: tuple[PatternOdds, ...], comparison: tuple[Row, ...]
+    study: ReproducedStudy,
+    logs: Logs,
+    statistics: dict[str, Any],
+    odds: tuple[PatternOdds, ...],
+    comparison: tuple[Row, ...],
 ) -> ReportData:
     people = "synthetic, reconstructed from the published numbers" if study.reconstructed else "synthetic"
     return ReportData(
@@ -232,7 +236,7 @@ def _panels(setup: Setup[Any]) -> Iterator[Any]:
             yield shot_panel(f"{label} (friction {parameters.friction_N:g} N)", parameters)
 
 
-def _notes(study: Study) -> Iterator[str]:
+def _notes(study: ReproducedStudy) -> Iterator[str]:
     """What the numbers rest on beyond the paper."""
     yield from study.notes
     gun = study.setups[0].gun

@@ -79,10 +79,10 @@ class SimulateRequest:
         return [name for name, value in options.items() if value]
 
 
-Simulated = SimulatedShot | SimulatedVibration | Sweep
+AnySimulated = SimulatedShot | SimulatedVibration | Sweep
 
 
-def simulate(request: SimulateRequest, progress: Progress, tell: Callable[[str], None]) -> Simulated:
+def simulate(request: SimulateRequest, progress: Progress, tell: Callable[[str], None]) -> AnySimulated:
     """What was asked for; trace, figure and table are written. `ConfigError` for whatever cannot be."""
     config = load_gun(find(request.gun))
     rendering = config.rendering(request.method) if request.method in config.methods else None
@@ -94,7 +94,7 @@ def simulate(request: SimulateRequest, progress: Progress, tell: Callable[[str],
     return _shot(request, gun)
 
 
-def sections(found: Simulated) -> tuple[Section, ...]:
+def sections(found: AnySimulated) -> tuple[Section, ...]:
     """What was simulated, in words."""
     if isinstance(found, SimulatedVibration):
         return (vibration_section(found),)

@@ -32,7 +32,7 @@ from experiments.config.door import ConfigError
 from experiments.config.gun import GunConfig
 from experiments.record import storage
 
-ASSUMED = "assumed"
+USUAL_HAND = "assumed"
 """The word for the hand of assumed numbers."""
 _BALANCE_WORDS = {
     "supplied_J": "by the drive",
@@ -134,7 +134,7 @@ def _or_nan(value: float | None) -> float:
     return math.nan if value is None else value
 
 
-KINDS: dict[str, type[float] | type[str]] = {
+PARAMETER_KINDS: dict[str, type[float] | type[str]] = {
     field.name: str if isinstance(field.default, str) else float for field in fields(GunParameters)
 }
 """What each of a gun's parameters is: a number or a word."""
@@ -163,9 +163,9 @@ def _changed(parameters: GunParameters, changes: Sequence[str]) -> GunParameters
     values: dict[str, Any] = {}
     for change in changes:
         key, equals, text = change.partition("=")
-        if not equals or key not in KINDS:
-            raise ConfigError(f"--set {change}: must be key=value with a key of {', '.join(KINDS)}")
-        values[key] = _value(change, text, KINDS[key])
+        if not equals or key not in PARAMETER_KINDS:
+            raise ConfigError(f"--set {change}: must be key=value with a key of {', '.join(PARAMETER_KINDS)}")
+        values[key] = _value(change, text, PARAMETER_KINDS[key])
     try:
         return replace(parameters, **values)
     except ValueError as error:
@@ -200,14 +200,16 @@ def in_hand(parameters: GunParameters, words: str) -> ShotInHand:
 
 
 def _hand(words: str) -> Hand:
-    if words == ASSUMED:
+    if words == USUAL_HAND:
         return Hand()
     known = [field.name for field in fields(Hand)]
     numbers: dict[str, float] = {}
     for word in words.split(","):
         key, equals, text = word.partition("=")
         if not equals or key not in known:
-            raise ConfigError(f"--hand {words}: must be `{ASSUMED}`, or key=value,... with keys of {', '.join(known)}")
+            raise ConfigError(
+                f"--hand {words}: must be `{USUAL_HAND}`, or key=value,... with keys of {', '.join(known)}"
+            )
         numbers[key] = _number(f"--hand {words}", text)
     try:
         return Hand(**numbers)

@@ -24,7 +24,7 @@ import pyarrow.parquet
 from numpy.typing import NDArray
 
 from analysis.predict.simulate.scene import ScenePick, scene_section
-from analysis.predict.simulate.shot import KINDS
+from analysis.predict.simulate.shot import PARAMETER_KINDS
 from analysis.report.section import Section
 from analysis.report.serial import LEFT_OUT_IF_NONE, as_json
 from analysis.report.terminal import Progress
@@ -162,7 +162,7 @@ _FORMS = "FROM:TO:COUNT, log:FROM:TO:COUNT or A,B,C"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Axis:
+class SweepAxis:
     """One parameter's values, and the words that asked for them."""
 
     key: str
@@ -197,7 +197,7 @@ def sweep(request: SweepRequest, progress: Progress) -> Sweep:
     check_place(path)
     origin = _origin(request, axes, rows)
     counts = np.zeros(len(STATUSES), dtype=np.int64)
-    with opened(path, {axis.key: KINDS[axis.key] for axis in axes}, origin) as write:
+    with opened(path, {axis.key: PARAMETER_KINDS[axis.key] for axis in axes}, origin) as write:
         for arrays, shots in _shoot(request, axes, rows, progress):
             write(arrays, shots)
             counts += np.bincount(shots.status, minlength=len(STATUSES))
@@ -207,7 +207,7 @@ def sweep(request: SweepRequest, progress: Progress) -> Sweep:
 
 
 def _shoot(
-    request: SweepRequest, axes: Sequence[Axis], rows: int, progress: Progress
+    request: SweepRequest, axes: Sequence[SweepAxis], rows: int, progress: Progress
 ) -> Iterator[tuple[dict[str, NDArray[Any]], ShotBatch]]:
     """Block by block: the parameters that vary, and the shots."""
     block = _BLOCK if find_spec("numba") else _SLOW_BLOCK
@@ -236,7 +236,7 @@ def sections(found: Sweep) -> tuple[Section, ...]:
     return (table,) if found.scene is None else (scene_section(found.scene), table)
 
 
-def _origin(request: SweepRequest, axes: Sequence[Axis], rows: int) -> SweepOrigin:
+def _origin(request: SweepRequest, axes: Sequence[SweepAxis], rows: int) -> SweepOrigin:
     varied = {axis.key: axis.words for axis in axes}
     return SweepOrigin(
         rows=rows,
@@ -258,7 +258,7 @@ def _is_sensible(request: SweepRequest, rows: int) -> None:
         raise ConfigError(f"--vary asks for {rows:,} shots; more than {MOST_ROWS:,} need --yes")
 
 
-def _axes(request: SweepRequest) -> list[Axis]:
+def _axes(request: SweepRequest) -> list[SweepAxis]:
     axes = [axis_of(words, request.gun) for words in request.vary]
     keys = [axis.key for axis in axes] + [change.partition("=")[0] for change in request.changes]
     twice = sorted({key for key in keys[: len(axes)] if keys.count(key) > 1})
@@ -267,22 +267,22 @@ def _axes(request: SweepRequest) -> list[Axis]:
     return axes
 
 
-def axis_of(words: str, gun: GunParameters) -> Axis:
+def axis_of(words: str, gun: GunParameters) -> SweepAxis:
     """The values that KEY=FROM:TO:COUNT, KEY=log:FROM:TO:COUNT or KEY=A,B,C asks for. `ConfigError`: none do.
 
     >>> axis_of("friction_N=0.25:0.75:3", GunParameters()).values.tolist()
     [0.25, 0.5, 0.75]
     """
     key, equals, text = words.partition("=")
-    if not equals or key not in KINDS:
-        raise ConfigError(f"--vary {words}: must be KEY={_FORMS} with a key of {', '.join(KINDS)}")
-    values = _range(words, text) if ":" in text else _list(words, text, KINDS[key])
-    for value in values.tolist() if KINDS[key] is str else (values.min().item(), values.max().item()):
+    if not equals or key not in PARAMETER_KINDS:
+        raise ConfigError(f"--vary {words}: must be KEY={_FORMS} with a key of {', '.join(PARAMETER_KINDS)}")
+    values = _range(words, text) if ":" in text else _list(words, text, PARAMETER_KINDS[key])
+    for value in values.tolist() if PARAMETER_KINDS[key] is str else (values.min().item(), values.max().item()):
         try:
             replace(gun, **{key: value})
         except ValueError as error:
             raise ConfigError(f"--vary {words}: {error}") from error
-    return Axis(key=key, words=text, values=values)
+    return SweepAxis(key=key, words=text, values=values)
 
 
 def _list(words: str, text: str, kind: type[float] | type[str]) -> NDArray[Any]:
