@@ -11,7 +11,7 @@ from pathlib import Path
 
 from analysis.report import apa
 from analysis.report.page import write_page
-from analysis.report.section import Section, Table
+from analysis.report.section import Section, Table, origin_table
 from analysis.report.serial import as_json
 from analysis.report.terminal import Progress
 from analysis.stats import operating
@@ -203,9 +203,7 @@ def _post_hoc_cells(row: operating.Characteristics) -> tuple[str, ...]:
 
 
 def _origin(found: Bench) -> Section:
-    rows = (("seed", str(found.seed)), *found.provenance.items())
-    table = Table(caption="Where the numbers come from", header=("What", "Value"), rows=rows)
-    return Section(title="Provenance", tables=(table,))
+    return Section(title="Provenance", tables=(origin_table({"seed": found.seed, **found.provenance}),))
 
 
 PARTS: dict[str, Callable[[BenchRequest], Measured]] = {"post-hocs": post_hocs, "physics": physics}

@@ -32,7 +32,7 @@ from analysis.predict.design_search.results import (
     SweptDesign,
 )
 from analysis.report import apa
-from analysis.report.section import Picture, Section, Table
+from analysis.report.section import Picture, Section, Table, origin_table
 
 BOTH = "both directions alike"
 
@@ -328,11 +328,7 @@ def _rest(found: DesignSearch) -> Section:
         paragraphs=(f"The percept is that of the {percept.route}.{_other_route(percept)}",),
         tables=(
             Table(caption="The fitted numbers of the percept", header=("Number", "Value", "95 % CI"), rows=numbers),
-            Table(
-                caption="Where the numbers come from",
-                header=("What", "Value"),
-                rows=tuple((name, str(value)) for name, value in facts.items()),
-            ),
+            origin_table(facts),
         ),
         items=(*found.assumptions, *percept.unknown),
     )

@@ -5,16 +5,15 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator, Sequence
 from pathlib import Path
-from typing import Protocol
 
 from analysis.paper.recurrence import WHOLE_PATTERN, wilson_interval
 from analysis.predict.fit.figures import RateCurve, RatePoint, SimulatedSpread, figure_percept, figure_places
 from analysis.predict.fit.percept_model import Fitted
 from analysis.predict.fit.percept_results import AssumedNumbers, FittedPercept, FrictionCurve, OtherFit
-from analysis.predict.fit.studies import Histograms, Judged, Judgement, PublishedPlace
+from analysis.predict.fit.studies import Histograms, Judged, Judgement, PublishedPlace, RecurringClaim
 from analysis.predict.synthetic_studies import spread_sentence
 from analysis.report import apa
-from analysis.report.section import Picture, Section, Table
+from analysis.report.section import Picture, Section, Table, origin_table
 from experiments.synthetic.diffusion import People
 from experiments.synthetic.percept import PerceptParameters
 
@@ -25,18 +24,6 @@ NO_OWN_TIMES = (
 OUTSIDE = 0.05
 """A number farther out than this share of the studies is at odds with the model."""
 UNITS = {"sensitivity": "log odds per N^n", "confusion": "", "start": "z/a"}
-
-
-class HasInterval(Protocol):
-    """An estimate between its limits, NaN where there are none."""
-
-    @property
-    def ci_low(self) -> float:
-        """The lower limit."""
-
-    @property
-    def ci_high(self) -> float:
-        """The upper limit."""
 
 
 def assumptions(parameters: PerceptParameters, people: People) -> tuple[str, ...]:
@@ -114,7 +101,7 @@ def _limits(one: Fitted) -> str:
     return f"[{low}, {high}]"
 
 
-def _percents(one: HasInterval) -> str:
+def _percents(one: Fitted | PublishedPlace | RecurringClaim) -> str:
     """An interval of shares, in percent; dashes where there is none."""
     return apa.interval(100.0 * one.ci_low, 100.0 * one.ci_high, 1)
 
@@ -360,9 +347,4 @@ def _cases_table(cases: Sequence[Judged]) -> Table:
 
 
 def _origin(found: FittedPercept) -> Section:
-    rows = tuple((name, str(value)) for name, value in found.provenance.items())
-    return Section(
-        title="What this rests on",
-        items=found.assumptions,
-        tables=(Table(caption="Where the numbers come from", header=("What", "Value"), rows=rows),),
-    )
+    return Section(title="What this rests on", items=found.assumptions, tables=(origin_table(found.provenance),))

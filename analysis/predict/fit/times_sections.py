@@ -12,7 +12,7 @@ from analysis.predict.fit.figures import TimesPanel, figure_times
 from analysis.predict.fit.percept_sections import NO_OWN_TIMES
 from analysis.predict.fit.times_results import EZCell, FittedTimes, TimesFit
 from analysis.report import apa
-from analysis.report.section import Picture, Section, Table
+from analysis.report.section import Picture, Section, Table, origin_table
 from analysis.stats.arrays import FloatArray
 from analysis.times.fit import AnsweredBy, DiffusionFit, Estimate, answered_by
 from analysis.times.people import MeanEstimate
@@ -250,9 +250,4 @@ def _people(found: TimesFit) -> Section:
 
 
 def _origin(found: TimesFit) -> Section:
-    rows = tuple((name, str(value)) for name, value in found.provenance.items())
-    return Section(
-        title="What this rests on",
-        items=TIMES_CAVEATS,
-        tables=(Table(caption="Where the numbers come from", header=("What", "Value"), rows=rows),),
-    )
+    return Section(title="What this rests on", items=TIMES_CAVEATS, tables=(origin_table(found.provenance),))

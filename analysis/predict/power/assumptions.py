@@ -4,8 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
-from analysis.predict.power.grid import Grid
-from analysis.predict.power.request import FELT
+from analysis.predict.power.grid import FELT, Grid
 from analysis.predict.synthetic_studies import rates_law, ratings_law, spread_sentence
 from experiments.direction.config import DirectionConfig, Rates
 from experiments.preference.config import PreferenceConfig, Ratings

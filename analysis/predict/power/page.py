@@ -12,7 +12,7 @@ from analysis.predict.power.planned import ALL_PAIRS, ANOVA, ANY_PAIR
 from analysis.predict.power.results import PATTERN, DesignPower, Power, PublishedPattern, Reached, Smallest
 from analysis.predict.power.studies import PUBLISHED
 from analysis.report import apa
-from analysis.report.section import Picture, Section, Table
+from analysis.report.section import Picture, Section, Table, origin_table
 
 XAxis = Literal["participants", "trials"]
 One = TypeVar("One")
@@ -293,12 +293,7 @@ def _null_table(group: Sequence[DesignPower]) -> Table:
 
 def _origin(found: Power) -> Section:
     facts = {"seed": found.seed, "studies of each design": found.studies, **found.provenance}
-    rows = tuple((name, str(value)) for name, value in facts.items())
-    return Section(
-        title="What this rests on",
-        tables=(Table(caption="Where the numbers come from", header=("What", "Value"), rows=rows),),
-        items=tuple(found.assumptions),
-    )
+    return Section(title="What this rests on", tables=(origin_table(facts),), items=found.assumptions)
 
 
 def _grouped(some: Iterable[One], key: Callable[[One], object]) -> list[list[One]]:
