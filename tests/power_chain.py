@@ -10,8 +10,7 @@ import numpy as np
 from scipy import stats
 
 from analysis.logs.reading import read_logs
-from analysis.predict.power.grid import Request as PowerRequest
-from analysis.predict.power.grid import make_grid
+from analysis.predict.power.grid import PowerRequest, make_grid
 from analysis.predict.power.planned import ANOVA, ANY_PAIR, Findings, analysed_directions, analysed_ratings
 from analysis.summary.summary import summarize
 from experiments.clock import VirtualClock

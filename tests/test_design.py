@@ -41,7 +41,7 @@ def silent(_what: str, _total: int) -> Iterator[Callable[[str], None]]:
 def done(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, Any]:
     """A small search, with the gun's own friction, voltage and pulse on its axes."""
     out = tmp_path_factory.mktemp("design")
-    return out, plain(feature.design(feature.Request(grid=6), 1, out, silent))
+    return out, plain(feature.design(feature.DesignRequest(grid=6), 1, out, silent))
 
 
 @pytest.fixture
@@ -144,7 +144,7 @@ def test_the_page_says_that_it_predicts_and_what_it_assumes(done: tuple[Path, An
 
 
 def test_beyond_the_devices_limits_nothing_is_proposed(tmp_path: Path) -> None:
-    request = feature.Request(grid=4, friction="0.2-1.2", voltage="15-33", pulse="0.01")
+    request = feature.DesignRequest(grid=4, friction="0.2-1.2", voltage="15-33", pulse="0.01")
     result = feature.design(request, 1, tmp_path, silent)
     found = plain(result)
     assert found["designs"]["beyond_limits"]["voltage above 24 V"] >= 4
@@ -166,20 +166,20 @@ def test_without_a_design_to_propose_it_says_so_and_ends_with_1(recoil: Recoil, 
 @pytest.mark.parametrize(
     ("request_", "words"),
     [
-        (feature.Request(friction="1.2-0.2"), "--friction 1.2-0.2: FROM must be below TO"),
-        (feature.Request(friction="0.5"), "--friction 0.5: must be FROM-TO"),
-        (feature.Request(voltage="a-b"), "--voltage a-b: must be FROM-TO"),
-        (feature.Request(voltage="-3-4"), "--voltage -3-4: must be FROM-TO"),
-        (feature.Request(voltage="1-1e999"), "--voltage 1-1e999: must be at most 1000"),
-        (feature.Request(pulse="0.02-0.01"), "--pulse 0.02-0.01: FROM must be below TO"),
-        (feature.Request(rate_above_Hz=5.1), "--rate-above 5.1: must be above 0 and at most 5 Hz"),
-        (feature.Request(rate_above_Hz=float("nan")), "--rate-above nan"),
-        (feature.Request(grid=3), "--grid 3: must be 4 to 200"),
-        (feature.Request(config="direction", gun="gun"), "--gun gun: the config direction names its gun"),
-        (feature.Request(gun="nothing"), "nothing: no such file"),
+        (feature.DesignRequest(friction="1.2-0.2"), "--friction 1.2-0.2: FROM must be below TO"),
+        (feature.DesignRequest(friction="0.5"), "--friction 0.5: must be FROM-TO"),
+        (feature.DesignRequest(voltage="a-b"), "--voltage a-b: must be FROM-TO"),
+        (feature.DesignRequest(voltage="-3-4"), "--voltage -3-4: must be FROM-TO"),
+        (feature.DesignRequest(voltage="1-1e999"), "--voltage 1-1e999: must be at most 1000"),
+        (feature.DesignRequest(pulse="0.02-0.01"), "--pulse 0.02-0.01: FROM must be below TO"),
+        (feature.DesignRequest(rate_above_Hz=5.1), "--rate-above 5.1: must be above 0 and at most 5 Hz"),
+        (feature.DesignRequest(rate_above_Hz=float("nan")), "--rate-above nan"),
+        (feature.DesignRequest(grid=3), "--grid 3: must be 4 to 200"),
+        (feature.DesignRequest(config="direction", gun="gun"), "--gun gun: the config direction names its gun"),
+        (feature.DesignRequest(gun="nothing"), "nothing: no such file"),
     ],
 )
-def test_what_cannot_be_swept_is_refused_with_option_value_and_rule(request_: feature.Request, words: str) -> None:
+def test_what_cannot_be_swept_is_refused_with_option_and_rule(request_: feature.DesignRequest, words: str) -> None:
     with pytest.raises(ConfigError) as refused:
         make_space(request_)
     assert str(refused.value).startswith(words)
@@ -189,15 +189,15 @@ def test_a_gun_without_a_voice_coil_is_refused(tmp_path: Path) -> None:
     path = tmp_path / "buzz.toml"
     path.write_text('title = "Buzz"\n[methods.buzz]\nlabel = "Buzz"\nactuator = "vibration"\n', encoding="utf-8")
     with pytest.raises(ConfigError, match=r"buzz\.toml: methods: none has the actuator voice-coil"):
-        make_space(feature.Request(gun=str(path)))
+        make_space(feature.DesignRequest(gun=str(path)))
 
 
 def test_a_config_brings_its_gun() -> None:
-    assert make_space(feature.Request(config="direction")) == make_space(feature.Request())
+    assert make_space(feature.DesignRequest(config="direction")) == make_space(feature.DesignRequest())
 
 
 def test_an_axis_goes_through_the_guns_own_values() -> None:
-    space = make_space(feature.Request(grid=11))
+    space = make_space(feature.DesignRequest(grid=11))
     assert {0.21, 1.12} <= set(space.friction_N)
     assert 16.0 in space.voltage_V
     assert 0.01 in space.pulse_s

@@ -19,13 +19,13 @@ from analysis.predict.design_search.critical import (
 )
 from analysis.predict.design_search.rates import Floats
 from analysis.predict.design_search.shots import Layer, layers, rows_of, simulate_rows
-from analysis.predict.design_search.space import Request, Space, make_space
+from analysis.predict.design_search.space import DesignRequest, Space, make_space
 from analysis.predict.fit.percept_model import PAPER_RATES, PerceptFit, fit_percept, predicted_rate
 from analysis.predict.jobs import on_processes
 from device.methods import paper_methods
 from experiments.synthetic.percept import percept_of
 
-SPACE = make_space(Request(grid=9, voltage="1-24", pulse="0.01"))
+SPACE = make_space(DesignRequest(grid=9, voltage="1-24", pulse="0.01"))
 
 
 @pytest.fixture(scope="module")

@@ -15,7 +15,15 @@ from analysis.predict.design_search import shots as design_shots
 from analysis.predict.design_search.choice import DUTY, HEAT, PULSE, VOLTAGE, broken_limit, steady_coil_C
 from analysis.predict.design_search.critical import both_ways
 from analysis.predict.design_search.rates import evidences, logits, predict, rates
-from analysis.predict.design_search.shots import COIL_POINTS, FREE_POINTS, HOME, Row, felt_of, shots, summarised
+from analysis.predict.design_search.shots import (
+    COIL_POINTS,
+    FREE_POINTS,
+    HOME,
+    FrictionRow,
+    shot_percepts,
+    shots,
+    summarised,
+)
 from analysis.predict.fit.percept_model import PAPER_RATES, fit_percept, predicted_rate
 from device.limits import DriveHistory, Load, load_of
 from device.methods import paper_methods
@@ -56,19 +64,21 @@ def rate_of(percept: Percept) -> float:
 @pytest.mark.parametrize("gun", GUNS)
 def test_four_times_the_points_change_the_rate_by_less_than_half_a_thousandth(gun: GunParameters) -> None:
     summary, fine = simulate(gun), (4 * COIL_POINTS, 4 * FREE_POINTS)
-    (coarse,), (exact,) = (felt_of(gun, summary, (0.02,), points) for points in ((COIL_POINTS, FREE_POINTS), fine))
+    (coarse,), (exact,) = (
+        shot_percepts(gun, summary, (0.02,), points) for points in ((COIL_POINTS, FREE_POINTS), fine)
+    )
     assert rate_of(coarse) == pytest.approx(rate_of(exact), abs=5e-4)
 
 
 @pytest.mark.parametrize("gun", GUNS)
 def test_a_fine_trace_gives_the_same_percept(gun: GunParameters) -> None:
-    (felt,) = felt_of(gun, simulate(gun), (0.02,))
+    (felt,) = shot_percepts(gun, simulate(gun), (0.02,))
     traced = percept_of_trace(trace(gun, 20_000), gun.magnet_mass_kg, 0.02)
     assert rate_of(felt) == pytest.approx(rate_of(traced), abs=1e-3)
 
 
 def test_a_shot_that_sticks_or_stays_has_no_percept() -> None:
-    found = shots(Row(gun=replace(GUN, friction_N=1.54), voltage_V=(0.0, 12.0), leaks_s=(0.02,)))
+    found = shots(FrictionRow(gun=replace(GUN, friction_N=1.54), voltage_V=(0.0, 12.0), leaks_s=(0.02,)))
     assert [shot.felt for shot in found] == [(), ()]
     assert HOME not in [shot.status for shot in found]
     assert all(math.isnan(shot.period_s) and shot.by_summary is None for shot in found)
@@ -77,7 +87,7 @@ def test_a_shot_that_sticks_or_stays_has_no_percept() -> None:
 def test_the_compiled_summaries_give_the_same_shots() -> None:
     """To rounding: the summary and the course then come from two runs of the model."""
     pytest.importorskip("numba")
-    row = Row(gun=GUN, voltage_V=(0.0, 8.0, 16.0, 24.0), leaks_s=(0.02,))
+    row = FrictionRow(gun=GUN, voltage_V=(0.0, 8.0, 16.0, 24.0), leaks_s=(0.02,))
     for one, other in zip(shots(row), shots(summarised(row)), strict=True):
         assert one.status == other.status
         assert one.period_s == pytest.approx(other.period_s, rel=1e-9, nan_ok=True)
@@ -87,7 +97,7 @@ def test_the_compiled_summaries_give_the_same_shots() -> None:
 
 def test_without_the_compiler_the_workers_simulate(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(design_shots, "find_spec", lambda _name: None)
-    row = Row(gun=GUN, voltage_V=(16.0,), leaks_s=(0.02,))
+    row = FrictionRow(gun=GUN, voltage_V=(16.0,), leaks_s=(0.02,))
     assert summarised(row) is row
     assert shots(row)[0].status == HOME
 

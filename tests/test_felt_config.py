@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from analysis.predict.check import as_text, check
+from analysis.predict.check import ExperimentCheck, as_text, check
 from experiments.clock import VirtualClock
 from experiments.config.door import ConfigError
 from experiments.direction.session import make_plan
@@ -155,7 +155,8 @@ def test_numbers_that_make_nobody_are_refused_with_the_config(tmp_path: Path) ->
 def test_a_check_tells_of_who_feels_the_gun(tmp_path: Path, name: str) -> None:
     text = changed(shipped_text(name), ('"rates"' if name == "direction" else '"ratings"', '"felt"'))
     found = check(str(written(tmp_path, text, name)), None, 2)
-    told = {method: set(rates) for method, rates in found["felt_forward_rates"].items()}
+    assert isinstance(found, ExperimentCheck)
+    told = {method: set(rates) for method, rates in found.felt_forward_rates.items()}
     methods = ("vibration", "asymmetric-1", "asymmetric-2")
     assert told == ({method: {"neutral"} for method in methods} if name == "direction" else {})
     assert ("Felt  " in as_text(found)) == (name == "direction")

@@ -7,7 +7,7 @@ import re
 import tomllib
 from collections.abc import Callable
 from contextlib import AbstractContextManager, nullcontext
-from dataclasses import asdict
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -18,9 +18,11 @@ from scipy import stats
 from analysis.paper.paper import load_paper
 from analysis.predict.fit.percept import percept
 from analysis.predict.fit.percept_model import PAPER_RATES, PAPER_TRIALS
-from analysis.predict.fit.request import ASSUMED_SPREAD, Request, read
+from analysis.predict.fit.percept_request import ASSUMED_SPREAD, PerceptRequest, read_request
+from analysis.predict.fit.percept_results import FittedPercept
+from analysis.predict.fit.percept_sections import config_text, verdict_sentence
 from analysis.predict.fit.studies import Case, Judged, cases_of, judge, place_of
-from analysis.predict.fit.words import fragment, verdict_sentence
+from analysis.report.serial import plain
 from device.methods import paper_methods
 from experiments.config.door import ConfigError
 from experiments.load import find, load_setup, shipped_folder
@@ -38,10 +40,20 @@ def cases() -> list[Case]:
 
 
 @pytest.fixture(scope="module")
-def found(tmp_path_factory: pytest.TempPathFactory) -> Any:
-    """What the command made of the shipped paper, with its folder under `folder`."""
-    out = tmp_path_factory.mktemp("fit")
-    return percept(Request(studies=300), out, silent) | {"folder": out}
+def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    return tmp_path_factory.mktemp("fit")
+
+
+@pytest.fixture(scope="module")
+def fitted(folder: Path) -> FittedPercept:
+    """What the command made of the shipped paper."""
+    return percept(PerceptRequest(studies=300), folder, silent)
+
+
+@pytest.fixture
+def found(fitted: FittedPercept) -> Any:
+    """The same as its file has it."""
+    return plain(fitted)
 
 
 def silent(_: str, __: int) -> AbstractContextManager[Callable[[str], None]]:
@@ -49,7 +61,7 @@ def silent(_: str, __: int) -> AbstractContextManager[Callable[[str], None]]:
 
 
 def judged(case: Case, studies: int = 300, seed: int = 1) -> Judged:
-    return judge(case, METHODS, PUBLISHED, studies=studies, seed=seed, tell=lambda _: None)
+    return judge(case, METHODS, PUBLISHED, studies=studies, seed=seed, tell=lambda _: None)[0]
 
 
 def pasted(text: str, folder: Path) -> Any:
@@ -67,21 +79,19 @@ def pasted(text: str, folder: Path) -> Any:
 # what it leaves
 
 
-def test_the_fit_to_the_shipped_paper_has_intervals_around_the_shipped_numbers(found: Any) -> None:
+def test_the_fit_to_the_shipped_paper_has_intervals_around_the_shipped_numbers(found: Any, folder: Path) -> None:
     for name, one in found["fitted"].items():
         assert one["ci_low"] < one["value"] < one["ci_high"]
         assert one["value"] == pytest.approx(getattr(PerceptParameters(), name), rel=5e-3)
     assert {name: one["observed"] for name, one in found["rates"].items()} == pytest.approx(PAPER_RATES)
     assert found["trials"] == PAPER_TRIALS
-    assert json.loads((found["folder"] / "fit.json").read_text(encoding="utf-8")) == {
-        key: value for key, value in found.items() if key != "folder"
-    }
+    assert json.loads((folder / "fit.json").read_text(encoding="utf-8")) == found
 
 
-def test_it_says_what_is_assumed_and_what_cannot_be_told(found: Any) -> None:
+def test_it_says_what_is_assumed_and_what_cannot_be_told(found: Any, folder: Path) -> None:
     assert found["assumed"] == {"exponent": 1.7, "leak_s": 0.02}
     assert found["untold"]["boundary"] == pytest.approx(1.0)
-    page = (found["folder"] / "report.md").read_text(encoding="utf-8").replace("\N{NO-BREAK SPACE}", " ")
+    page = (folder / "report.md").read_text(encoding="utf-8").replace("\N{NO-BREAK SPACE}", " ")
     for words in (
         "no response times from the participant's own hand, so drift and boundary cannot be told apart",
         "A prediction, not a measurement",
@@ -112,21 +122,20 @@ def test_a_backward_shot_is_the_forward_one_s_mirror_but_for_the_bias(found: Any
         assert one["backward"]["value"] < one["forward"]["value"]
 
 
-def test_the_page_and_the_figures_are_there(found: Any) -> None:
-    folder = found["folder"]
+def test_the_page_and_the_figures_are_there(found: Any, folder: Path) -> None:
     assert {path.stem for path in (folder / "figures").iterdir()} == {"percept", "places"}
     assert "data:image/png;base64," in (folder / "report.html").read_text(encoding="utf-8")
 
 
-def test_the_fragment_loads_back_through_the_config(found: Any, tmp_path: Path) -> None:
-    synthetic = pasted((found["folder"] / "percept.toml").read_text(encoding="utf-8"), tmp_path)
+def test_the_fragment_loads_back_through_the_config(found: Any, folder: Path, tmp_path: Path) -> None:
+    synthetic = pasted((folder / "percept.toml").read_text(encoding="utf-8"), tmp_path)
     for name, one in found["fitted"].items():
         assert getattr(synthetic.percept.own, name) == pytest.approx(one["value"], rel=1e-5)
     assert synthetic.people.own == People()
 
 
-def test_with_a_spread_the_fragment_brings_the_people_too(found: Any, tmp_path: Path) -> None:
-    text = fragment(found | {"people": asdict(ASSUMED_SPREAD)})
+def test_with_a_spread_the_fragment_brings_the_people_too(fitted: FittedPercept, tmp_path: Path) -> None:
+    text = config_text(replace(fitted, people=ASSUMED_SPREAD))
     assert pasted(text, tmp_path).people.own == ASSUMED_SPREAD
 
 
@@ -145,7 +154,7 @@ def test_rates_at_the_ends_are_fitted_with_what_intervals_there_are(
     rates: tuple[float, float, float], tmp_path: Path
 ) -> None:
     text = ",".join(f"{name}={rate}" for name, rate in zip(METHODS, rates, strict=True))
-    percept(Request(rates=text, trials=20), tmp_path, silent)
+    percept(PerceptRequest(rates=text, trials=20), tmp_path, silent)
     text = (tmp_path / "percept.toml").read_text(encoding="utf-8")
     assert pasted(text, tmp_path).percept.own.sensitivity >= 0.0
 
@@ -208,12 +217,13 @@ def test_a_percentile_counts_those_below_and_half_of_those_that_print_alike() ->
     assert place.outside == pytest.approx(2 * place.percentile)
 
 
-def test_a_number_beyond_the_central_95_percent_is_called_at_odds(found: Any) -> None:
-    case = found["judged"]["cases"][found["judged"]["main"]]
+def test_a_number_beyond_the_central_95_percent_is_called_at_odds(fitted: FittedPercept) -> None:
+    assert fitted.judged is not None
+    case = fitted.judged.main_case
     assert verdict_sentence(case).startswith("Every number that was not fitted lies within")
-    far = case | {"places": [case["places"][0] | {"outside": 0.01}, *case["places"][1:]]}
-    places = [place | ({"outside": 0.01} if place["published"].startswith("73") else {}) for place in case["places"]]
-    odd_count = case | {"places": places}
+    far = replace(case, places=(replace(case.places[0], outside=0.01), *case.places[1:]))
+    places = tuple(replace(place, outside=0.01) if place.published.startswith("73") else place for place in case.places)
+    odd_count = replace(case, places=places)
     assert verdict_sentence(odd_count) == verdict_sentence(case)  # 67 gives the same printed p
     assert verdict_sentence(far).startswith(
         "At odds with the paper (outside the central 95 % of the studies): F(2, 26)"
@@ -226,19 +236,19 @@ def test_a_number_beyond_the_central_95_percent_is_called_at_odds(found: Any) ->
 @pytest.mark.parametrize(
     ("request_", "words"),
     [
-        (Request(rates="vibration=0.5,asymmetric-1=0.7"), "at least 3"),
-        (Request(rates="vibration=0.5,asymmetric-1=70,asymmetric-2=0.9"), "asymmetric-1=70"),
-        (Request(rates="vibration=0.5,vibration=0.7,asymmetric-2=0.9"), "vibration stands there twice"),
-        (Request(rates="vibration=0.5,ramp=0.7,asymmetric-2=0.9"), "no such method"),
-        (Request(trials=20), "--trials 20"),
-        (Request(spread=-1.0), "--spread -1"),
-        (Request(paper="nowhere"), "nowhere"),
-        (Request(gun="paper"), "paper.toml"),
+        (PerceptRequest(rates="vibration=0.5,asymmetric-1=0.7"), "at least 3"),
+        (PerceptRequest(rates="vibration=0.5,asymmetric-1=70,asymmetric-2=0.9"), "asymmetric-1=70"),
+        (PerceptRequest(rates="vibration=0.5,vibration=0.7,asymmetric-2=0.9"), "vibration stands there twice"),
+        (PerceptRequest(rates="vibration=0.5,ramp=0.7,asymmetric-2=0.9"), "no such method"),
+        (PerceptRequest(trials=20), "--trials 20"),
+        (PerceptRequest(spread=-1.0), "--spread -1"),
+        (PerceptRequest(paper="nowhere"), "nowhere"),
+        (PerceptRequest(gun="paper"), "paper.toml"),
     ],
 )
-def test_what_cannot_be_fitted_is_refused_in_words(request_: Request, words: str) -> None:
+def test_what_cannot_be_fitted_is_refused_in_words(request_: PerceptRequest, words: str) -> None:
     with pytest.raises(ConfigError, match=re.escape(words)):
-        read(request_)
+        read_request(request_)
 
 
 def test_a_paper_of_which_a_mean_is_missing_is_refused(tmp_path: Path) -> None:
@@ -246,4 +256,4 @@ def test_a_paper_of_which_a_mean_is_missing_is_refused(tmp_path: Path) -> None:
     path = tmp_path / "paper.toml"
     path.write_text(text.replace('vibration = "55.7"\n', "", 1), encoding="utf-8")
     with pytest.raises(ConfigError, match="has no rate of vibration"):
-        read(Request(paper=str(path)))
+        read_request(PerceptRequest(paper=str(path)))

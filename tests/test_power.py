@@ -16,7 +16,7 @@ import pytest
 
 from analysis.predict.jobs import JobError, on_cluster, on_processes
 from analysis.predict.power import run as feature
-from analysis.predict.power.grid import Request, make_grid
+from analysis.predict.power.grid import PowerRequest, make_grid
 from analysis.predict.power.planned import ALL_PAIRS, ANOVA
 from analysis.report.serial import plain
 from experiments.config.door import ConfigError
@@ -227,7 +227,7 @@ def test_what_cannot_be_is_refused_in_one_message(
 
 def test_experiment_2_has_one_trial_a_method() -> None:
     with pytest.raises(ConfigError, match="one trial a method"):
-        make_grid(Request(config="preference", trials="5"))
+        make_grid(PowerRequest(config="preference", trials="5"))
 
 
 def test_answers_from_a_table_have_no_power(tmp_path: Path) -> None:
@@ -237,11 +237,11 @@ def test_answers_from_a_table_have_no_power(tmp_path: Path) -> None:
     config.write_text(config.read_text().replace('observer = "rates"', 'observer = "table"\ntable = "answers.csv"'))
     (tmp_path / "answers.csv").write_text("participant_id,method,forward_correct,backward_correct\n")
     with pytest.raises(ConfigError, match='observer = "table" has no power'):
-        make_grid(Request(config=str(config)))
+        make_grid(PowerRequest(config=str(config)))
 
 
 def test_trials_keep_the_sets_and_the_share_of_forward_trials() -> None:
-    grid = make_grid(Request(config="direction", participants="8", trials="10-40", effects="1"))
+    grid = make_grid(PowerRequest(config="direction", participants="8", trials="10-40", effects="1"))
     designs = {cell.design.trials: cell.config.design for cell in grid.cells}
     assert list(designs) == [10, 20, 30, 40]
     for trials, design in designs.items():
@@ -251,7 +251,7 @@ def test_trials_keep_the_sets_and_the_share_of_forward_trials() -> None:
 
 
 def test_a_design_that_keeps_people_too_long_is_shown_and_never_proposed(tmp_path: Path) -> None:
-    request = Request(config="direction", participants="14", trials="20,40", effects="1", studies=200, target=0.75)
+    request = PowerRequest(config="direction", participants="14", trials="20,40", effects="1", studies=200, target=0.75)
     with on_processes(1):
         found = plain(feature.power(request, feature.Where(workers=1), tmp_path, _silent))
     short, long = found["designs"]
@@ -262,7 +262,7 @@ def test_a_design_that_keeps_people_too_long_is_shown_and_never_proposed(tmp_pat
 
 
 def test_methods_can_be_compared_in_sets(tmp_path: Path) -> None:
-    request = Request(
+    request = PowerRequest(
         config="direction",
         participants="8",
         methods=("asymmetric-2,vibration", "asymmetric-1,asymmetric-2"),
@@ -291,7 +291,7 @@ def test_a_worker_without_this_recoil_is_named() -> None:
             return {"tcp://w:1": versions() | {"numpy": "1.0"}}
 
     with pytest.raises(JobError, match=r"worker tcp://w:1 has numpy 1\.0, not"):
-        jobs._check_workers(Client(), "tcp://s:1")
+        jobs.check_workers(Client(), "tcp://s:1")
 
 
 def test_a_missing_dask_is_named(monkeypatch: pytest.MonkeyPatch) -> None:

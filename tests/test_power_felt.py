@@ -10,10 +10,10 @@ import numpy as np
 import pytest
 from scipy import stats
 
-from analysis.predict.power.felt import Felt, felt_counts, felt_of, percepts_of_setup
-from analysis.predict.power.grid import Request, make_grid
+from analysis.predict.power.grid import PowerRequest, make_grid
 from analysis.predict.power.planned import ANOVA, ANY_PAIR, merged, shares
 from analysis.predict.power.studies import run_chunk
+from analysis.predict.synthetic_studies import Felt, felt_counts, felt_people, percepts_of_setup
 from experiments.design.streams import generator
 from experiments.direction.config import DirectionConfig
 from experiments.direction.session import make_plan
@@ -53,7 +53,7 @@ def test_the_answers_are_distributed_as_those_of_the_participant_step_by_step(
     """Counts of a cell, and sums and differences over cells, in which people's differences show."""
     setup = load_setup(str(felt_config(tmp_path, instructions, SPREADS)))
     steps = stepped(setup, 500)
-    felt = felt_of(setup.config, percepts_of_setup(setup), METHODS)
+    felt = felt_people(setup.config, percepts_of_setup(setup), METHODS)
     at_once = felt_counts(felt, (10, 10), 50, 400, generator(1, "test")).reshape(-1, 3, 2)
     summaries = {
         **{str(cell): (steps[:, *cell], at_once[:, *cell]) for cell in np.ndindex(3, 2)},
@@ -75,7 +75,7 @@ def test_mean_rates_are_those_of_the_quadrature() -> None:
 
 def test_the_effect_is_a_factor_on_the_evidence() -> None:
     percepts = percepts_of_setup(SETUP)
-    one, half = (felt_of(SETUP.config, percepts, METHODS, effect) for effect in (1.0, 0.5))
+    one, half = (felt_people(SETUP.config, percepts, METHODS, effect) for effect in (1.0, 0.5))
     assert half.log_odds == pytest.approx([0.5 * value for value in one.log_odds])
     assert half.log_odds[METHODS.index("vibration")] == 0.0
 
@@ -83,7 +83,7 @@ def test_the_effect_is_a_factor_on_the_evidence() -> None:
 def test_an_instruction_changes_the_rate_by_its_boundary(tmp_path: Path) -> None:
     setup = load_setup(str(felt_config(tmp_path, ("speed", "accuracy"))))
     boundaries = setup.config.synthetic.diffusion.boundaries
-    felt = felt_of(setup.config, percepts_of_setup(setup), METHODS)
+    felt = felt_people(setup.config, percepts_of_setup(setup), METHODS)
     assert felt.cautions == pytest.approx([boundaries[n] / boundaries["neutral"] for n in ("speed", "accuracy")])
     means = felt_counts(felt, (10, 10), 100, 400, generator(3, "test")).mean(axis=(0, 1)) / 10
     rates = [forward_rates(np.array(felt.log_odds) * caution, felt.start, felt.people) for caution in felt.cautions]
@@ -92,7 +92,7 @@ def test_an_instruction_changes_the_rate_by_its_boundary(tmp_path: Path) -> None
 
 def test_null_participants_give_five_percent(tmp_path: Path) -> None:
     config = felt_config(tmp_path, spreads=SPREADS)
-    grid = make_grid(Request(config=str(config), participants="14", null=True, studies=20_000))
+    grid = make_grid(PowerRequest(config=str(config), participants="14", null=True, studies=20_000))
     assert [cell.design.people for cell in grid.cells] == ["guessing", "guessing, with the config's bias"]
     for cell in grid.cells:
         found = {one.claim: one.share for one in shares(merged([run_chunk(c) for c in grid.chunks_of(cell)]))}
@@ -103,7 +103,7 @@ def test_null_participants_give_five_percent(tmp_path: Path) -> None:
 def test_those_who_guess_without_bias_keep_the_exact_test_at_its_size(tmp_path: Path) -> None:
     """The size by its definition: all outcomes of 140 that the test rejects."""
     config = felt_config(tmp_path, spreads=SPREADS)
-    grid = make_grid(Request(config=str(config), participants="14", null=True, studies=20_000))
+    grid = make_grid(PowerRequest(config=str(config), participants="14", null=True, studies=20_000))
     guessing = merged([run_chunk(chunk) for chunk in grid.chunks_of(grid.cells[0])])
     outcomes = range(141)
     size = sum(stats.binom.pmf(k, 140, 0.5) for k in outcomes if stats.binomtest(k, 140).pvalue < 0.05)
@@ -113,7 +113,7 @@ def test_those_who_guess_without_bias_keep_the_exact_test_at_its_size(tmp_path: 
 
 def test_a_piece_travels_with_all_that_it_needs(tmp_path: Path) -> None:
     """No config file, gun or physics at the worker: the evidence is in the piece."""
-    grid = make_grid(Request(config=str(felt_config(tmp_path)), participants="14", effects="0.5", studies=10))
+    grid = make_grid(PowerRequest(config=str(felt_config(tmp_path)), participants="14", effects="0.5", studies=10))
     chunk = grid.chunks()[0]
     assert chunk.felt is not None
     again = run_chunk(replace(chunk, config=chunk.config.model_copy(update={"gun": "gone.toml"})))
@@ -122,7 +122,7 @@ def test_a_piece_travels_with_all_that_it_needs(tmp_path: Path) -> None:
 
 def test_trials_must_give_every_instruction_its_sets(tmp_path: Path) -> None:
     config = str(felt_config(tmp_path, ("speed", "accuracy")))
-    grid = make_grid(Request(config=config, participants="14", trials="10-40", studies=10))
+    grid = make_grid(PowerRequest(config=config, participants="14", trials="10-40", studies=10))
     assert {cell.design.trials for cell in grid.cells} == {10, 20, 30, 40}
 
 

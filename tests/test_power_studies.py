@@ -11,9 +11,9 @@ import numpy as np
 import pytest
 from scipy import stats
 
-from analysis.paper.odds import WHOLE_PATTERN
 from analysis.paper.paper import load_paper
-from analysis.predict.power.grid import Request, make_grid
+from analysis.paper.recurrence import WHOLE_PATTERN, answers_recur, recurs, with_whole_pattern
+from analysis.predict.power.grid import PowerRequest, make_grid
 from analysis.predict.power.planned import (
     ALL_PAIRS,
     ANOVA,
@@ -27,18 +27,17 @@ from analysis.predict.power.planned import (
     shares,
     tallied,
 )
-from analysis.predict.power.studies import (
-    Chunk,
-    Design,
+from analysis.predict.power.studies import Chunk, StudyDesign, run_chunk
+from analysis.predict.synthetic_studies import (
     direction_counts,
     null_rates,
     on_scale,
+    pattern_odds,
     preference_scores,
-    run_chunk,
 )
-from analysis.predict.reproduction.reproduce import direction_odds, preference_odds
 from analysis.stats.tukey import rm_tukey_hsd
 from experiments.design.streams import Stream, generator
+from experiments.direction.config import Rates
 from experiments.direction.session import make_plan
 from experiments.direction.synthetic import RatesParticipant
 from experiments.load import find, load_setup
@@ -212,26 +211,57 @@ def test_tallies_add_up_in_any_order() -> None:
 
 def tally_of(experiment: str, studies: int) -> Mapping[str, float]:
     config = {"direction": DIRECTION, "preference": PREFERENCE}[experiment]
-    design = Design(participants=14, trials=20, methods=METHODS)
+    design = StudyDesign(participants=14, trials=20, methods=METHODS)
     published = getattr(PAPER, experiment)
     chunk = Chunk(config=config, design=design, published=published, seed=1, number=0, studies=studies)
     return {share.claim: share.share for share in shares(run_chunk(chunk))}
 
 
-@pytest.mark.parametrize(("experiment", "odds"), [("direction", direction_odds), ("preference", preference_odds)])
-def test_every_published_claim_recurs_as_often_as_the_odds_say(experiment: str, odds: object) -> None:
+def one_by_one(experiment: str, studies: int) -> Mapping[str, float]:
+    """The claims' shares among people who are drawn one after the other, as a session draws them."""
+    stream, published = Stream(5, "test"), getattr(PAPER, experiment)
+    if experiment == "preference":
+        law, scale = PREFERENCE.synthetic.ratings, PREFERENCE.rating
+        people = [draw_ratings(law, scale, published.methods, stream) for _ in range(studies * published.n)]
+        ratings = [[person[method] for method in published.methods] for person in people]
+        claims = recurs(np.array(ratings).reshape(studies, published.n, 3), published)
+    else:
+        people = [rates_of(DIRECTION.synthetic.rates, stream) for _ in range(studies * published.n)]
+        shares = np.array(people).reshape(studies, published.n, 3, 2)
+        correct = draws(6).random((*shares.shape, 10)) < shares[..., None]
+        claims = answers_recur(correct.sum(axis=-1), (10, 10), published)
+    return {claim: float(held.mean()) for claim, held in with_whole_pattern(claims).items()}
+
+
+def rates_of(rates: Rates, stream: Stream) -> list[list[float]]:
+    """A person's chances of being right, by method and direction: own ability and bias around the mean rates."""
+    phi, spread = NormalDist(), np.sqrt(1 + rates.ability_sd**2 + rates.bias_sd**2)
+    ability, bias = rates.ability_sd * stream.normal(), rates.bias_mean + rates.bias_sd * stream.normal()
+    return [
+        [
+            phi.cdf(spread * phi.inv_cdf(rates.forward[method]) + ability + bias),
+            phi.cdf(spread * phi.inv_cdf(rates.backward[method]) + ability - bias),
+        ]
+        for method in METHODS
+    ]
+
+
+@pytest.mark.parametrize("experiment", ["direction", "preference"])
+def test_every_published_claim_recurs_as_often_as_among_people_drawn_one_by_one(experiment: str) -> None:
     config = {"direction": DIRECTION, "preference": PREFERENCE}[experiment]
-    theirs = odds(config, PAPER, 2000, 5)  # type: ignore[operator]
-    ours = tally_of(experiment, 10_000)
-    assert any(row.claim == WHOLE_PATTERN for row in theirs.rows)
-    for row in theirs.rows:
-        error = np.sqrt(row.share * (1 - row.share) * (1 / 2000 + 1 / 10_000))
-        assert abs(ours[f"published, {row.claim}"] - row.share) <= 4 * error + 1e-3, row.claim
+    theirs, ours = one_by_one(experiment, 2000), tally_of(experiment, 10_000)
+    odds = {row.claim: row.share for row in pattern_odds(config, getattr(PAPER, experiment), 5000, 1).rows}
+    assert WHOLE_PATTERN in theirs
+    assert odds.keys() == theirs.keys()
+    for claim, share in theirs.items():
+        error = np.sqrt(share * (1 - share) * (1 / 2000 + 1 / 5000))
+        assert abs(ours[f"published, {claim}"] - share) <= 4 * error + 1e-3, claim
+        assert abs(odds[claim] - share) <= 4 * error + 1e-3, claim
 
 
 def test_null_participants_give_five_percent_and_the_exact_test_its_own_size() -> None:
     """The size of the exact test by its definition: all outcomes of 140 that it rejects."""
-    grid = make_grid(Request(config="direction", participants="14", null=True, studies=20_000))
+    grid = make_grid(PowerRequest(config="direction", participants="14", null=True, studies=20_000))
     guessing, biased = (merged([run_chunk(c) for c in grid.chunks_of(cell)]) for cell in grid.cells)
     for tally in (guessing, biased):
         found = {share.claim: share for share in shares(tally)}
@@ -251,7 +281,7 @@ def test_null_people_differ_in_their_bias_alone() -> None:
 
 
 def test_a_chunk_has_a_stream_of_its_own() -> None:
-    design = Design(participants=8, trials=20, methods=METHODS)
+    design = StudyDesign(participants=8, trials=20, methods=METHODS)
     chunks = [
         Chunk(config=DIRECTION, design=d, published=None, seed=seed, number=number, studies=200)
         for d, seed, number in [(design, 1, 0), (design, 1, 1), (design, 2, 0), (replace(design, effect=0.9), 1, 0)]

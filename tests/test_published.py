@@ -10,9 +10,9 @@ from scipy import stats
 
 from analysis import rm_anova, rm_tukey_hsd
 from analysis.logs.reading import read_logs
-from analysis.paper.odds import WHOLE_PATTERN, chance_recurs, odds_of, recurs, wilson_interval
 from analysis.paper.paper import Paper, load_paper
 from analysis.paper.published import Prediction, Row, rounds_to
+from analysis.paper.recurrence import WHOLE_PATTERN, chance_recurs, odds_of, recurs, wilson_interval
 from analysis.summary.comparison import compare
 from analysis.summary.results import DirectionStatistics, Pair, StudyStatistics
 from analysis.summary.summary import summarize
@@ -205,7 +205,7 @@ def test_odds_are_shares_with_wilson_intervals() -> None:
 def test_chance_recurs_where_the_binomial_test_rejects_as_published(paper: Paper) -> None:
     correct = np.full((3, 3, 2), 120)
     correct[:, 0, :] = [[78, 67], [95, 67], [78, 40]]
-    forward, backward = chance_recurs(correct, 140, paper.direction).values()
+    forward, backward = chance_recurs(correct, (140, 140), paper.direction).values()
     assert forward.tolist() == [True, False, True]
     assert backward.tolist() == [True, True, False]
 

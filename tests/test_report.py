@@ -10,8 +10,8 @@ import pytest
 
 from analysis.logs.exclusions import LeftOut
 from analysis.logs.reading import Logs, Problem, read_logs
-from analysis.paper.odds import odds_of
 from analysis.paper.paper import Paper, load_paper
+from analysis.paper.recurrence import odds_of
 from analysis.summary.comparison import compare
 from analysis.summary.sections.data import ReportData
 from analysis.summary.sections.sections import write_report

@@ -14,7 +14,8 @@ from statsmodels.stats.anova import AnovaRM
 
 from analysis.logs.reading import read_logs
 from analysis.predict.reproduction import reproduce
-from analysis.predict.reproduction.reproduce import direction_counts, preference_scores
+from analysis.predict.synthetic_studies import direction_counts, preference_scores
+from experiments.design.streams import generator
 from experiments.load import load_setup
 from tests.conftest import RECOIL
 
@@ -142,12 +143,15 @@ def test_the_tables_of_reconstructed_answers_seat_the_same_people_again(reproduc
 
 def test_participants_drawn_by_the_configs_stay_an_option() -> None:
     """Loaded, not run: they are the setups of the configs themselves."""
-    study = reproduce.load("study", 1, "rates")
-    assert study.seated == study.setups
+    study = reproduce.prepared("study", 1, "rates")
+    assert study.answering == study.setups
     assert "other participants were asked for" in study.notes[0]
-    assert reproduce.load("study", 1).manifest() == reproduce.load("study", 1, "reconstructed").manifest()
-    assert reproduce.load("study", 1).manifest() != study.manifest()
-    assert [setup.config.synthetic.observer for setup in reproduce.load("study", 2).seated] == ["table", "table"]
+    assert reproduce.prepared("study", 1).manifest() == reproduce.prepared("study", 1, "reconstructed").manifest()
+    assert reproduce.prepared("study", 1).manifest() != study.manifest()
+    assert [setup.config.synthetic.observer for setup in reproduce.prepared("study", 2).answering] == [
+        "table",
+        "table",
+    ]
 
 
 def test_the_same_seed_gives_the_same_answers_and_another_seed_others(reproduction: Path, tmp_path: Path) -> None:
@@ -192,7 +196,7 @@ def test_another_study_in_the_folder_is_set_aside_and_a_strangers_folder_is_refu
 def test_the_odds_draw_the_same_kind_of_people_as_the_session(reproduction: Path) -> None:
     """The people behind the odds are drawn without a session; here they have the session's rates and spread."""
     config = load_setup("direction").config
-    counts = direction_counts(config, METHODS, 14, 2000, 1)
+    counts = direction_counts(config, 14, 2000, generator(1, "odds", "direction"))
     rates = config.synthetic.rates
     for place, method in enumerate(METHODS):
         assert counts[:, :, place, 0].mean() / 10 == pytest.approx(rates.forward[method], abs=0.004)
@@ -204,6 +208,6 @@ def test_the_odds_draw_the_same_kind_of_people_as_the_session(reproduction: Path
 
 
 def test_simulated_ratings_keep_the_published_habits() -> None:
-    ratings = preference_scores(load_setup("preference").config, METHODS, 14, 300, 1)
+    ratings = preference_scores(load_setup("preference").config, 14, 300, generator(1, "test"))
     assert (ratings[..., 0] <= ratings[..., 1:].min(axis=-1)).all()
     assert (ratings[..., 1] == ratings[..., 2]).mean() == pytest.approx(0.143, abs=0.03)

@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from analysis.paper.odds import wilson_interval
+from analysis.paper.recurrence import wilson_interval
 from analysis.predict.fit.percept_model import FITTED, Fitted, fit_percept
 from analysis.predict.jobs import cores, on_processes
 from analysis.predict.power.planned import ANOVA, ANY_PAIR

@@ -15,11 +15,11 @@ from typing import Any
 
 import pytest
 
-from analysis.paper.odds import WHOLE_PATTERN, wilson_interval
 from analysis.paper.paper import load_paper
+from analysis.paper.recurrence import WHOLE_PATTERN, wilson_interval
 from analysis.predict.jobs import cores, on_processes
 from analysis.predict.power.planned import ANOVA, ANY_PAIR
-from analysis.predict.reproduction.reproduce import direction_odds, preference_odds
+from analysis.predict.synthetic_studies import pattern_odds
 from experiments.load import find, load_setup
 from tests.conftest import RECOIL, Soak
 from tests.power_chain import counted, null_setup, said, through_the_chain
@@ -95,10 +95,10 @@ def test_null_participants_through_real_logs(tmp_path: Path, soak: Soak, experim
         assert low <= 0.05 <= high
 
 
-@pytest.mark.parametrize(("experiment", "odds"), [("direction", direction_odds), ("preference", preference_odds)])
-def test_the_pattern_recurs_as_the_odds_say(tmp_path: Path, soak: Soak, experiment: str, odds: Any) -> None:
+@pytest.mark.parametrize("experiment", ["direction", "preference"])
+def test_the_pattern_recurs_as_the_odds_say(tmp_path: Path, soak: Soak, experiment: str) -> None:
     found = power(tmp_path / "out", experiment, "--participants", 14, "--effect", 1, "--studies", STUDIES)
-    theirs = odds(load_setup(experiment).config, load_paper(find("paper")), 2000, 1)
+    theirs = pattern_odds(load_setup(experiment).config, getattr(load_paper(find("paper")), experiment), 2000, 1)
     row = next(row for row in theirs.rows if row.claim == WHOLE_PATTERN)
     pattern = found["published_pattern"]
     how = f"{STUDIES:,} studies; `recoil reproduce` says {100 * row.share:.1f} % of 2000"

@@ -38,7 +38,7 @@ def test_every_combination_is_shot_the_last_parameter_fastest(tmp_path):
     table = tmp_path / "shots.csv"
     found = sweep.sweep(asked(table, "friction_N=0.21:1.12:2", "drive_off=open,shorted", "voltage_V=12,16,20"), silent)
     rows = rows_of(table)
-    assert found["rows"] == len(rows) == 12
+    assert found.rows == len(rows) == 12
     assert [row["voltage_V"] for row in rows[:4]] == ["12", "16", "20", "12"]
     assert [row["drive_off"] for row in rows[:6]] == ["open"] * 3 + ["shorted"] * 3
     for row in rows:
@@ -65,7 +65,7 @@ def test_parquet_and_csv_hold_the_same(tmp_path):
 def test_what_was_not_reached_is_missing_and_statuses_are_words(tmp_path):
     table = tmp_path / "b.parquet"
     found = sweep.sweep(asked(table, "friction_N=0.21,1.7,1000"), silent)
-    assert found["statuses"] == {"home": 1, "no-break-away": 1, "stuck": 1}
+    assert found.statuses == {"home": 1, "no-break-away": 1, "stuck": 1}
     columns = pq.read_table(table).to_pydict()
     assert columns["status"] == ["home", "stuck", "no-break-away"]
     assert columns["reset_end_s"][1:] == [None, None]

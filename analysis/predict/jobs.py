@@ -1,5 +1,7 @@
 """Pieces of work done side by side: here, on processes of this machine, or on an existing Dask cluster.
 
+Why the pool is our own and not joblib's: `docs/decisions/worker-processes.md`.
+
 A piece is a function of one argument, both of which travel by pickle; what comes back does not depend on where or when
 it was worked out, so the caller puts it in order by its number. Each is handed over as soon as it is there.
 """
@@ -15,6 +17,7 @@ from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import ProcessPoolExecutor, as_completed
 from concurrent.futures.process import BrokenProcessPool
 from contextlib import contextmanager
+from functools import partial
 from multiprocessing import get_context, parent_process
 from typing import Any
 
@@ -24,7 +27,7 @@ from experiments.record.provenance import recoil_version, versions
 Function = Callable[[Any], Any]
 Done = Callable[[int, Any], None]
 """Told the number of a piece and what came of it, in the order in which they end."""
-Run = Callable[[Function, Sequence[Any], Done], None]
+RunPieces = Callable[[Function, Sequence[Any], Done], None]
 """Works out a function of each piece."""
 
 CONNECT_S = 10
@@ -45,23 +48,23 @@ def cores() -> int:
 
 
 @contextmanager
-def on_processes(workers: int) -> Iterator[Run]:
+def on_processes(workers: int) -> Iterator[RunPieces]:
     """On so many processes of their own, started anew ("spawn") so that it is the same on every system.
 
     When interrupted, what has begun ends and nothing more begins. `JobError` if a process is killed.
     """
-    yield lambda function, pieces, done: _on_processes(function, pieces, done, workers)
+    yield partial(_on_processes, workers)
 
 
 @contextmanager
-def on_cluster(address: str) -> Iterator[Run]:
+def on_cluster(address: str) -> Iterator[RunPieces]:
     """On the workers of the Dask scheduler at `address`. `JobError` if there is none, or its workers lack Recoil."""
     with _cluster(address) as client:
-        _check_workers(client, address)
-        yield lambda function, pieces, done: _on_cluster(function, pieces, done, client)
+        check_workers(client, address)
+        yield partial(_on_cluster, client)
 
 
-def _on_processes(function: Function, pieces: Sequence[Any], done: Done, workers: int) -> None:
+def _on_processes(workers: int, function: Function, pieces: Sequence[Any], done: Done) -> None:
     workers = min(workers, len(pieces))
     if workers < 2:
         for number, piece in enumerate(pieces):
@@ -79,7 +82,7 @@ def _on_processes(function: Function, pieces: Sequence[Any], done: Done, workers
         pool.shutdown(wait=True, cancel_futures=True)
 
 
-def _on_cluster(function: Function, pieces: Sequence[Any], done: Done, client: Any) -> None:
+def _on_cluster(client: Any, function: Function, pieces: Sequence[Any], done: Done) -> None:
     import distributed  # noqa: PLC0415 - the extra `dask`
 
     gathered: Any = distributed.as_completed  # it has no types
@@ -154,7 +157,7 @@ def _result(future: Any) -> Any:
         raise JobError(f"--scheduler: {type(error).__name__}: {error}") from error
 
 
-def _check_workers(client: Any, address: str) -> None:
+def check_workers(client: Any, address: str) -> None:
     """There must be workers, with this machine's versions of what the numbers depend on."""
     try:
         client.wait_for_workers(1, timeout=CONNECT_S)

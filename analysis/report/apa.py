@@ -15,9 +15,9 @@ def known(value: float | None) -> float | None:
 
 
 def number(value: float | None, digits: int = 2) -> str:
-    """`value` with so many decimals, and a true minus sign.
+    """`value` with so many decimals, and a true minus sign; a dash for None and for what is not finite.
 
-    >>> number(-1.2345), number(None), number(float("nan"))
+    >>> number(-1.2345), number(None), number(math.nan)
     ('−1.23', '–', '–')
     """
     if value is None or not math.isfinite(value):

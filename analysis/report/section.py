@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 LISTED = 100
@@ -38,6 +38,12 @@ class Section:
     pictures: tuple[Picture, ...] = ()
     tables: tuple[Table, ...] = ()
     items: tuple[str, ...] = ()
+
+
+def origin_table(facts: Mapping[str, object]) -> Table:
+    """Where the numbers of a page come from."""
+    rows = tuple((name, str(value)) for name, value in facts.items())
+    return Table(caption="Where the numbers come from", header=("What", "Value"), rows=rows)
 
 
 def shortened(items: Sequence[str], noun: str) -> tuple[str, ...]:

@@ -18,7 +18,7 @@ def beside(result: type) -> dict[str, type]:
 
 
 def plain(value: Any) -> Any:
-    """The value for JSON: results as objects, arrays as lists, what is not finite as null.
+    """The value for JSON: results and config models as objects, arrays as lists, what is not finite as null.
 
     >>> import numpy as np
     >>> plain({"a": np.array([1.0, np.nan]), "b": (True, None)})
@@ -26,6 +26,8 @@ def plain(value: Any) -> Any:
     """
     if is_dataclass(value) and not isinstance(value, type):
         return {name: plain(one) for name, one in _members(value)}
+    if hasattr(value, "model_dump"):  # pydantic's, which is not imported for this either
+        return value.model_dump(mode="json", exclude_none=True)
     if isinstance(value, Mapping):
         return {str(key): plain(one) for key, one in value.items()}
     if isinstance(value, list | tuple):

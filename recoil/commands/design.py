@@ -37,7 +37,7 @@ def design(
     """Which damper, voltage and pulse would be felt best, and where a direction begins to be felt. Predictions."""
     from analysis.predict.design_search import run as feature
 
-    request = feature.Request(
+    request = feature.DesignRequest(
         config=config,
         gun=gun,
         friction=friction,

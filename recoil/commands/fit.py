@@ -8,7 +8,7 @@ from typing import Annotated
 import typer
 from typer.core import TyperGroup
 
-from analysis.report.terminal import AsJson, FixedSeed, GunConfig, end, progress, say, show, tracked
+from analysis.report.terminal import AsJson, FixedSeed, GunConfig, end, in_text, progress, say, show, tracked
 
 
 class _PerceptUnlessNamed(TyperGroup):
@@ -57,11 +57,12 @@ def percept(
     """The percept fitted to forward rates, what they cannot tell, and studies of it against what else is published."""
     from analysis.predict.fit import percept as feature
 
-    asked = feature.Request(paper=paper, rates=rates, trials=trials, gun=gun, spread=spread, studies=studies, seed=seed)
-    found = feature.percept(asked, out, progress)
-    show(
-        found, f"{feature.as_text(found)}\nReport: {out / 'report.html'}; for a config: {out / 'percept.toml'}", as_json
+    request = feature.PerceptRequest(
+        paper=paper, rates=rates, trials=trials, gun=gun, spread=spread, studies=studies, seed=seed
     )
+    found = feature.percept(request, out, progress)
+    text = "\n".join(map(in_text, feature.in_short(found)))
+    show(found, f"{text}\nReport: {out / 'report.html'}; for a config: {out / 'percept.toml'}", as_json)
 
 
 @app.command()
@@ -79,10 +80,10 @@ def times(
     """The diffusion model (drift, boundary, start, non-decision time) fitted to people's own response times."""
     from analysis.predict.fit import times as feature
 
-    asked = feature.Request(paths=logs, lapses=lapses, bias=bias, profiled=profile)
-    found, problems = feature.times(asked, out, tracked, progress)
+    request = feature.TimesRequest(paths=logs, lapses=lapses, bias=bias, profiled=profile)
+    found, problems = feature.times(request, out, tracked, progress)
     missing = [*map(str, problems), *feature.left_out(found)]
     for one in missing:
         say(f"recoil: left out: {one}")
-    show(found, f"{feature.as_text(found)}\nReport: {out / 'report.html'}", as_json)
+    show(found, f"{in_text(feature.in_short(found))}\nReport: {out / 'report.html'}", as_json)
     raise end(exceptions=bool(missing))

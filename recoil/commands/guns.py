@@ -13,102 +13,70 @@ from analysis.report.terminal import (
     FixedSeed,
     GunConfig,
     end,
+    in_text,
     progress,
     say,
     show,
 )
 
+Method = Annotated[str | None, typer.Option(help="Rendering method of the gun.")]
+Changes = Annotated[list[str] | None, typer.Option("--set", metavar="KEY=VALUE", help="Change a parameter.")]
+Fidelity = Annotated[str | None, typer.Option(help="Model to use; full unless given.")]
+SceneName = Annotated[
+    str | None, typer.Option(help="Pick the cheapest model for a use: session, figure, sweep, percept.")
+]
+Needs = Annotated[list[str] | None, typer.Option(metavar="OUTPUT=ERROR", help="The same for a use of your own.")]
+Trace = Annotated[Path | None, typer.Option(help="Write the shot over time as CSV.")]
+Plot = Annotated[Path | None, typer.Option(help="Write Figure 5's panels as PNG and SVG.")]
+Audit = Annotated[bool, typer.Option("--audit", help="Where energy and momentum went.")]
+HandWords = Annotated[
+    str | None, typer.Option(metavar="KEY=VALUE,...", help="The gun in a hand; `assumed` for the usual one.")
+]
+Stiffness = Annotated[float | None, typer.Option(metavar="N/m", help="A stop that gives way.")]
+Vary = Annotated[
+    list[str] | None,
+    typer.Option(metavar="KEY=VALUES", help="FROM:TO:COUNT, log:FROM:TO:COUNT or A,B,C; with --table."),
+]
+TableFile = Annotated[Path | None, typer.Option(metavar="FILE.parquet|.csv", help="Shots over all of --vary.")]
+Yes = Annotated[bool, typer.Option("--yes", help="Also more than ten million of them.")]
+
 
 def simulate(
-    method: Annotated[str | None, typer.Option(help="Rendering method of the gun.")] = None,
+    method: Method = None,
     gun: GunConfig = "gun",
-    changes: Annotated[list[str] | None, typer.Option("--set", metavar="KEY=VALUE", help="Change a parameter.")] = None,
-    fidelity: Annotated[str | None, typer.Option(help="Model to use; full unless given.")] = None,
-    scene: Annotated[
-        str | None, typer.Option(help="Pick the cheapest model for a use: session, figure, sweep, percept.")
-    ] = None,
-    need: Annotated[
-        list[str] | None, typer.Option(metavar="OUTPUT=ERROR", help="The same for a use of your own.")
-    ] = None,
-    trace: Annotated[Path | None, typer.Option(help="Write the shot over time as CSV.")] = None,
-    plot: Annotated[Path | None, typer.Option(help="Write Figure 5's panels as PNG and SVG.")] = None,
-    audit: Annotated[bool, typer.Option("--audit", help="Where energy and momentum went.")] = False,
-    hand: Annotated[
-        str | None, typer.Option(metavar="KEY=VALUE,...", help="The gun in a hand; `assumed` for the usual one.")
-    ] = None,
-    contact_stiffness: Annotated[float | None, typer.Option(metavar="N/m", help="A stop that gives way.")] = None,
-    vary: Annotated[
-        list[str] | None,
-        typer.Option(metavar="KEY=VALUES", help="FROM:TO:COUNT, log:FROM:TO:COUNT or A,B,C; with --table."),
-    ] = None,
-    table: Annotated[Path | None, typer.Option(metavar="FILE.parquet|.csv", help="Shots over all of --vary.")] = None,
-    yes: Annotated[bool, typer.Option("--yes", help="Also more than ten million of them.")] = False,
+    changes: Changes = None,
+    fidelity: Fidelity = None,
+    scene: SceneName = None,
+    need: Needs = None,
+    trace: Trace = None,
+    plot: Plot = None,
+    audit: Audit = False,
+    hand: HandWords = None,
+    contact_stiffness: Stiffness = None,
+    vary: Vary = None,
+    table: TableFile = None,
+    yes: Yes = False,
     as_json: AsJson = False,
 ) -> None:
     """One shot by the model (summary, trace, figure), a table of shots over parameters that vary, or a vibration."""
-    from analysis.predict.simulate import more as shot_more
-    from analysis.predict.simulate import scene as shot_scene
-    from analysis.predict.simulate import shot
-    from experiments.load import find
+    from analysis.predict.simulate import run as feature
 
-    single: dict[str, object] = {"--audit": audit or None, "--hand": hand, "--contact-stiffness": contact_stiffness}
-    models: dict[str, object] = {"--fidelity": fidelity, "--scene": scene, "--need": need, "--set": changes}
-    others = single | models | {"--vary": vary, "--table": table}
-    if _vibration(find(gun), method, trace, plot, _given(others), as_json):
-        return
-    parameters = shot.parameters_of(find(gun), method, changes or [])
-    wanted = shot_scene.ModelRequest(fidelity=fidelity, scene=scene, needs=need or [])
-    model, told = shot_scene.picked(wanted, parameters, vary or [])
-    if vary or table:
-        _sweep(
-            told,
-            as_json,
-            gun=parameters,
-            fidelity=model,
-            vary=vary or [],
-            changes=changes or [],
-            table=table,
-            instead=_given({"--trace": trace, "--plot": plot} | single),
-            yes=yes,
-        )
-        return
-    found = shot.summary_of(parameters, model) | told
-    if told:
-        told["scene"] |= shot_scene.contact_of(wanted, parameters, found["summary"]["impact_speed_m_s"])
-    found |= shot_more.asked_for(parameters, found["summary"], audit, hand, contact_stiffness)
-    if trace:
-        shot.write_trace(parameters, trace)
-    if plot:
-        shot.write_plot(parameters, plot)
-    show(found, shot_scene.with_scene(told, shot.as_text(found)), as_json)
-
-
-def _given(options: dict[str, object]) -> list[str]:
-    return [name for name, value in options.items() if value is not None]
-
-
-def _vibration(
-    gun_file: Path, method: str | None, trace: Path | None, plot: Path | None, others: list[str], as_json: bool
-) -> bool:
-    """Whether the method is a vibration, which is then told of."""
-    from analysis.predict.simulate import vibration as shot_vibration
-
-    parameters = shot_vibration.vibration_of(gun_file, method)
-    if parameters is None:
-        return False
-    found = shot_vibration.tell(parameters, trace, plot, others)
-    show(found, shot_vibration.as_text(found), as_json)
-    return True
-
-
-def _sweep(told: dict[str, Any], as_json: bool, **asked: Any) -> None:
-    from analysis.predict.simulate import scene as shot_scene
-    from analysis.predict.simulate import sweep
-
-    if note := sweep.interpreted_note():
-        say(note)
-    found = sweep.sweep(sweep.SweepRequest(**asked), progress) | told
-    show(found, shot_scene.with_scene(told, sweep.as_text(found)), as_json)
+    request = feature.SimulateRequest(
+        gun=gun,
+        method=method,
+        changes=changes or [],
+        model=feature.ModelRequest(fidelity=fidelity, scene=scene, needs=need or []),
+        trace=trace,
+        plot=plot,
+        audit=audit,
+        hand=hand,
+        contact_stiffness_N_m=contact_stiffness,
+        vary=vary or [],
+        table=table,
+        yes=yes,
+    )
+    found = feature.simulate(request, progress, say)
+    show(found, "\n".join(map(in_text, feature.sections(found))), as_json)
 
 
 def twin(
@@ -167,12 +135,12 @@ def bench(
     as_json: AsJson = False,
 ) -> None:
     """Measure our own methods: error rates of the post-hoc tests, error against time of a simulated shot."""
-    from analysis.predict.bench import run as feature
-    from analysis.predict.bench.physics import BenchRequest
+    from analysis.predict import bench as feature
 
     unknown = set(parts or []) - set(feature.PARTS)
     if unknown:
         raise typer.BadParameter(f"no part {', '.join(sorted(unknown))}; there are {', '.join(feature.PARTS)}")
-    asked = BenchRequest(seed=seed, repeats=repeats, batch=batch, figures=out / "figures", progress=progress)
-    found, lines = feature.bench(out, parts or [], asked)
-    show(found, "\n".join([*lines, f"Report: {out / 'report.html'}"]), as_json)
+    request = feature.BenchRequest(seed=seed, repeats=repeats, batch=batch, progress=progress)
+    found = feature.bench(out, parts or [], request)
+    lines = [line for part in found.parts.values() for line in part.lines]
+    show(found.content, "\n".join([*lines, f"Report: {out / 'report.html'}"]), as_json)

@@ -41,7 +41,7 @@ def reproduce(
     """Both experiments with synthetic participants on the simulated gun: logs, statistics, figures, report."""
     from analysis.predict.reproduction import reproduce as feature
 
-    loaded = feature.load(study, seed, observer.value if observer else None)
+    loaded = feature.prepared(study, seed, observer.value if observer else None)
     with progress("reproduce", len(loaded.runs) + 3) as tell:
         done = feature.reproduce(loaded, out, tell)
     show(done.statistics, f"{feature.as_text(done.comparison)}\n\nReport: {out / 'report.html'}", as_json)

@@ -43,7 +43,7 @@ def power(
     """Simulated power and precision: how many people and trials does it take, and what does it cost?"""
     from analysis.predict.power import run as feature
 
-    request = feature.Request(
+    request = feature.PowerRequest(
         config=config,
         participants=participants,
         trials=trials,

@@ -15,7 +15,7 @@ from matplotlib.colors import BoundaryNorm, ListedColormap
 from matplotlib.figure import Figure
 from matplotlib.patches import Patch
 
-from analysis.predict.design_search.results import DesignSearch, OwnMethod, Plane, Predicted, SweptAxes
+from analysis.predict.design_search.results import DesignSearch, DrivePrediction, OwnMethod, Plane, SweptAxes
 from analysis.report.figures.style import (
     BLACK,
     BLUE,
@@ -140,7 +140,7 @@ AREA_NAMES = {
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class Field:
+class MapField:
     """A plane of designs of one pulse: axes, then arrays (frictions, voltages); NaN where there is no prediction."""
 
     pulse_s: float
@@ -153,7 +153,7 @@ class Field:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class Lines:
+class ContourLines:
     """The contour over the frictions with its band; other contours by name. What is not reached is not finite."""
 
     voltage_V: FloatArray
@@ -163,7 +163,7 @@ class Lines:
 
 
 def figure_maps(
-    field: Field, lines: tuple[float, float], own: Sequence[Mark], best: Mark | None, path_stem: Path
+    field: MapField, lines: tuple[float, float], own: Sequence[Mark], best: Mark | None, path_stem: Path
 ) -> None:
     """Two maps over friction and voltage: the predicted share and the shooting rate, each with its line of `lines`."""
     level, bound_Hz = lines
@@ -187,7 +187,7 @@ def figure_maps(
         save(figure, path_stem)
 
 
-def figure_critical(field: Field, lines: Lines, level: float, own: Sequence[Mark], path_stem: Path) -> None:
+def figure_critical(field: MapField, lines: ContourLines, level: float, own: Sequence[Mark], path_stem: Path) -> None:
     """The contour of `level` over friction and voltage with its band, and the contours under other assumptions."""
     with mpl.rc_context(style()):  # type: ignore[arg-type]
         figure = new_figure(6.6, 5.2)
@@ -215,7 +215,7 @@ def _finite(values: FloatArray) -> FloatArray:
     return np.where(np.isfinite(values), values, np.nan)
 
 
-def _mesh(axes: Axes, field: Field, values: FloatArray, map_name: str, ends: tuple[float, float]) -> Any:
+def _mesh(axes: Axes, field: MapField, values: FloatArray, map_name: str, ends: tuple[float, float]) -> Any:
     """The values as coloured cells between the ends of the scale; gives back what a colour bar needs."""
     _areas(axes, field)
     return axes.pcolormesh(
@@ -230,7 +230,7 @@ def _mesh(axes: Axes, field: Field, values: FloatArray, map_name: str, ends: tup
     )
 
 
-def _areas(axes: Axes, field: Field) -> None:
+def _areas(axes: Axes, field: MapField) -> None:
     number = np.full(field.status.shape, np.nan)
     for n, status in enumerate(AREAS):
         number[field.status == status] = n
@@ -245,7 +245,7 @@ def _areas(axes: Axes, field: Field) -> None:
     )
 
 
-def _level(axes: Axes, field: Field, values: FloatArray, height: float, unit: str) -> None:
+def _level(axes: Axes, field: MapField, values: FloatArray, height: float, unit: str) -> None:
     """A line at a height of the values, if they reach it."""
     known = values[np.isfinite(values)]
     if not known.size or not known.min() < height < known.max():
@@ -256,7 +256,7 @@ def _level(axes: Axes, field: Field, values: FloatArray, height: float, unit: st
     axes.clabel(line, fmt={height: f"{height:g} {unit}"}, fontsize=8.0)
 
 
-def _beyond(axes: Axes, field: Field) -> None:
+def _beyond(axes: Axes, field: MapField) -> None:
     """Hatches over the voltages at which a limit of the device would be broken."""
     volts, half = field.voltage_V, 0.5 * np.diff(field.voltage_V)
     lows, highs = volts - np.append(half[:1], half), volts + np.append(half, half[-1:])
@@ -264,7 +264,7 @@ def _beyond(axes: Axes, field: Field) -> None:
         axes.axhspan(low, high, facecolor="none", edgecolor=INK, hatch="////", linewidth=0.0)
 
 
-def _marks(axes: Axes, field: Field, marks: Sequence[Mark], best: Mark | None) -> None:
+def _marks(axes: Axes, field: MapField, marks: Sequence[Mark], best: Mark | None) -> None:
     """The designs with a name that lie on the plane."""
     for n, mark in enumerate(marks):
         if not _holds(field, mark):
@@ -285,12 +285,12 @@ def _marks(axes: Axes, field: Field, marks: Sequence[Mark], best: Mark | None) -
         )
 
 
-def _holds(field: Field, mark: Mark) -> bool:
+def _holds(field: MapField, mark: Mark) -> bool:
     x, y = field.friction_N, field.voltage_V
     return bool(x[0] <= mark.friction_N <= x[-1] and y[0] <= mark.voltage_V <= y[-1])
 
 
-def _legend(figure: Figure, axes: Axes, field: Field) -> None:
+def _legend(figure: Figure, axes: Axes, field: MapField) -> None:
     handles, names = axes.get_legend_handles_labels()
     patches = [
         Patch(facecolor=colour, label=AREA_NAMES[status])
@@ -311,9 +311,9 @@ def _legend(figure: Figure, axes: Axes, field: Field) -> None:
     )
 
 
-def field_of(axes: SweptAxes, plane: Plane) -> Field:
+def field_of(axes: SweptAxes, plane: Plane) -> MapField:
     """A plane of designs, for a map."""
-    return Field(
+    return MapField(
         pulse_s=plane.pulse_s,
         friction_N=np.array(axes.friction_N),
         voltage_V=np.array(axes.voltage_V),
@@ -341,7 +341,7 @@ def best_mark(found: DesignSearch) -> Mark | None:
     return None if best is None else mark_of(f"best at {found.rate_above_Hz:g} Hz or faster", best)
 
 
-def mark_of(name: str, one: Predicted) -> Mark:
+def mark_of(name: str, one: DrivePrediction) -> Mark:
     """A design under a name; without known limits its prediction stands for them."""
     predicted = math.nan if one.predicted is None else one.predicted
     return Mark(

@@ -10,7 +10,7 @@ import numpy as np
 
 from analysis.predict.design_search.choice import Designs
 from analysis.predict.design_search.figures import (
-    Lines,
+    ContourLines,
     Trade,
     best_mark,
     field_of,
@@ -25,14 +25,14 @@ from analysis.predict.design_search.results import (
     REACHED,
     BestDesign,
     Critical,
-    Design,
     DesignSearch,
+    DrivePrediction,
     PerceptBehind,
     Plane,
-    Predicted,
+    SweptDesign,
 )
 from analysis.report import apa
-from analysis.report.section import Picture, Section, Table
+from analysis.report.section import Picture, Section, Table, origin_table
 
 BOTH = "both directions alike"
 
@@ -41,7 +41,7 @@ def critical_section(found: DesignSearch, figures: Path) -> Section:
     """The section; its figure is written."""
     critical = found.critical
     band = critical.band
-    lines = Lines(
+    lines = ContourLines(
         voltage_V=critical.voltage_V,
         low_V=band.low_V,
         high_V=band.high_V,
@@ -211,7 +211,7 @@ def _none_sentence(found: DesignSearch) -> str:
     )
 
 
-def _share_cell(one: Predicted) -> str:
+def _share_cell(one: DrivePrediction) -> str:
     """A predicted share with its limits, in percent, or why there is none."""
     if one.predicted is None:
         return f"no prediction: {one.status}"
@@ -244,7 +244,7 @@ def _ms(seconds: float) -> str:
 _HEADER = ("Design", "Friction", "Voltage", "Pulse", "Right about a forward shot, predicted [95 % CI]", "Highest rate")
 
 
-def _cells(one: Predicted) -> tuple[str, ...]:
+def _cells(one: DrivePrediction) -> tuple[str, ...]:
     return (
         f"{apa.number(one.friction_N)} N",
         f"{apa.number(one.voltage_V, 1)} V",
@@ -286,7 +286,7 @@ def _trade(found: DesignSearch, designs: Designs, figures: Path) -> Section:
     )
 
 
-def _spread(front: Sequence[Design], fastest_Hz: float) -> list[Design]:
+def _spread(front: Sequence[SweptDesign], fastest_Hz: float) -> list[SweptDesign]:
     """Some designs of the front up to a rate, at about even distances in it."""
     slow_first = [one for one in front[::-1] if one.shooting_rate_Hz <= fastest_Hz]
     if len(slow_first) <= FRONT_ROWS:
@@ -328,11 +328,7 @@ def _rest(found: DesignSearch) -> Section:
         paragraphs=(f"The percept is that of the {percept.route}.{_other_route(percept)}",),
         tables=(
             Table(caption="The fitted numbers of the percept", header=("Number", "Value", "95 % CI"), rows=numbers),
-            Table(
-                caption="Where the numbers come from",
-                header=("What", "Value"),
-                rows=tuple((name, str(value)) for name, value in facts.items()),
-            ),
+            origin_table(facts),
         ),
         items=(*found.assumptions, *percept.unknown),
     )
@@ -349,5 +345,5 @@ def _other_route(percept: PerceptBehind) -> str:
     )
 
 
-def _column(designs: Sequence[Design], key: str) -> Any:
+def _column(designs: Sequence[SweptDesign], key: str) -> Any:
     return np.array([getattr(one, key) for one in designs], dtype=np.float64)

@@ -35,7 +35,7 @@ class SweptAxes:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Counts:
+class DesignCounts:
     """How many designs there are of each kind."""
 
     total: int
@@ -46,7 +46,7 @@ class Counts:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Predicted:
+class DrivePrediction:
     """A gun's drive, how fast it may shoot, and its predicted share of right answers to a forward shot, if any."""
 
     friction_N: float
@@ -61,7 +61,7 @@ class Predicted:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Design(Predicted):
+class SweptDesign(DrivePrediction):
     """One design of the sweep."""
 
     evidence: float
@@ -69,7 +69,7 @@ class Design(Predicted):
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class BestDesign(Design):
+class BestDesign(SweptDesign):
     """The best one; what is predicted of it under other assumptions, and at which ends of the sweep it lies."""
 
     under_other_assumptions: dict[str, float]
@@ -77,7 +77,7 @@ class BestDesign(Design):
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class OwnMethod(Predicted):
+class OwnMethod(DrivePrediction):
     """A method of the gun; `swept`: it differs from the swept gun in friction, voltage and pulse alone."""
 
     name: str
@@ -164,10 +164,10 @@ class DesignSearch:
     seed: int
     rate_above_Hz: float
     axes: SweptAxes
-    designs: Counts
+    designs: DesignCounts
     best: BestDesign | None
     own: tuple[OwnMethod, ...]
-    front: tuple[Design, ...]
+    front: tuple[SweptDesign, ...]
     map: Plane
     critical: Critical
     percept: PerceptBehind
@@ -175,10 +175,10 @@ class DesignSearch:
     provenance: dict[str, str]
 
 
-def counted(designs: Designs, rate_Hz: float) -> Counts:
+def counted(designs: Designs, rate_Hz: float) -> DesignCounts:
     """How many designs there are of each kind."""
     numbers = {status: int((designs.status == n).sum()) for n, status in enumerate(STATUSES)}
-    return Counts(
+    return DesignCounts(
         total=len(designs),
         by_status={status: count for status, count in numbers.items() if count},
         beyond_limits={
@@ -189,11 +189,11 @@ def counted(designs: Designs, rate_Hz: float) -> Counts:
     )
 
 
-def design_of(designs: Designs, place: int, gun: GunParameters, rate_Hz: float) -> Design:
+def design_of(designs: Designs, place: int, gun: GunParameters, rate_Hz: float) -> SweptDesign:
     """One design of the sweep."""
     voltage_V, pulse_s = float(designs.voltage_V[place]), float(designs.pulse_s[place])
     load = load_of(Pulse(voltage_V=voltage_V, pulse_s=pulse_s), gun.resistance_ohm)
-    return Design(
+    return SweptDesign(
         friction_N=float(designs.friction_N[place]),
         voltage_V=voltage_V,
         pulse_s=pulse_s,

@@ -28,9 +28,9 @@ from analysis.predict.design_search.results import (
     plane_of,
 )
 from analysis.predict.design_search.shots import Layer, layers, rows_of, simulate_rows
-from analysis.predict.design_search.space import Request, Space, make_space
+from analysis.predict.design_search.space import DesignRequest, Space, make_space
 from analysis.predict.fit.percept_model import PAPER_RATES, PerceptFit, fit_percept
-from analysis.predict.jobs import Run, cores, on_processes
+from analysis.predict.jobs import RunPieces, cores, on_processes
 from analysis.report.page import write_page
 from analysis.report.serial import as_json
 from analysis.report.terminal import Progress
@@ -43,11 +43,11 @@ from experiments.record.provenance import provenance
 PASSES = 3
 """Closer looks, each around the best of the one before and at half its distances."""
 
-Workers = Callable[[], AbstractContextManager[Run]]
+Workers = Callable[[], AbstractContextManager[RunPieces]]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class Search:
+class Searched:
     """All designs that were looked at, the place of the best one (None: none may be proposed), and whole layers.
 
     `layers` has the swept pulses, the gun's own and that of the best design.
@@ -58,13 +58,13 @@ class Search:
     layers: dict[float, Layer]
 
 
-def search(space: Space, fit: PerceptFit, rate_Hz: float, workers: Workers, progress: Progress) -> Search:
+def search(space: Space, fit: PerceptFit, rate_Hz: float, workers: Workers, progress: Progress) -> Searched:
     """Sweep the space, then look closer around the best design that shoots at `rate_Hz` or faster."""
     by_pulse = _swept(space, workers, progress)
     designs = designs_of(space, by_pulse, fit, rate_Hz)
     chosen = best(designs, rate_Hz)
     if chosen is None:
-        return Search(designs=designs, chosen=None, layers=by_pulse)
+        return Searched(designs=designs, chosen=None, layers=by_pulse)
     for number in range(PASSES):
         around = closer(space, designs, chosen, 0.5**number)
         found = _simulated(around, around.pulse_s, _here, progress, f"closer look {number + 1}")
@@ -73,7 +73,7 @@ def search(space: Space, fit: PerceptFit, rate_Hz: float, workers: Workers, prog
     pulse_s = float(designs.pulse_s[chosen])
     if pulse_s not in by_pulse:
         by_pulse |= _simulated(space, (pulse_s,), workers, progress, "map")
-    return Search(designs=designs, chosen=chosen, layers=by_pulse)
+    return Searched(designs=designs, chosen=chosen, layers=by_pulse)
 
 
 def closer(space: Space, designs: Designs, place: int, share: float) -> Space:
@@ -98,7 +98,7 @@ def around(axis: tuple[float, ...], value: float, share: float) -> tuple[float, 
     return tuple(sorted({value, *(x for x in near if axis[0] <= x <= axis[-1])}))
 
 
-def _here() -> AbstractContextManager[Run]:
+def _here() -> AbstractContextManager[RunPieces]:
     """For work that is too little for processes of its own."""
     return on_processes(1)
 
@@ -117,7 +117,7 @@ def _simulated(
         return layers(space, rows, simulate_rows(rows, run, tell))
 
 
-__all__ = ["Request", "design", "in_short"]
+__all__ = ["DesignRequest", "design", "in_short"]
 
 COLUMNS = (
     *("friction_N", "voltage_V", "pulse_s", "status", "limit", "shooting_rate_Hz"),
@@ -132,12 +132,12 @@ class _Found:
 
     space: Space
     fit: PerceptFit
-    search: Search
+    search: Searched
     contour: Contour
     others: tuple[Alternative, ...]
 
 
-def design(request: Request, workers: int | None, out: Path, progress: Progress) -> DesignSearch:
+def design(request: DesignRequest, workers: int | None, out: Path, progress: Progress) -> DesignSearch:
     """Sweep, choose, write `design.json`, `designs.csv`, report and figures into `out`.
 
     The same request gives the same bytes however many workers there are. `ConfigError`: a request that cannot be met.
@@ -164,7 +164,7 @@ def readings(gun: GunParameters) -> dict[str, Method]:
     return paper_methods(replace(GunParameters(), drive_off=gun.drive_off, emf=gun.emf))
 
 
-def _results(request: Request, found: _Found) -> DesignSearch:
+def _results(request: DesignRequest, found: _Found) -> DesignSearch:
     """The content of `design.json`."""
     space, fit, rate_Hz = found.space, found.fit, request.rate_above_Hz
     designs, chosen = found.search.designs, found.search.chosen

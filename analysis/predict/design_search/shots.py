@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from analysis.predict.design_search.space import Space
-from analysis.predict.jobs import Run
+from analysis.predict.jobs import RunPieces
 from device.parameters import GunParameters
 from device.physics import ShotBatch, ShotSummary, simulate, simulate_batch
 from device.physics.kernel import COIL, FREE, STATUSES, pack
@@ -30,7 +30,7 @@ With four times as many the predicted rates change by less than 0.0005 (`tests/t
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Row:
+class FrictionRow:
     """Shots that differ in their voltage alone, and the leaks under which they are felt; their summaries if known."""
 
     gun: GunParameters
@@ -54,7 +54,7 @@ class Layer:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Shot:
+class ShotPercepts:
     """One shot. `felt` for each leak in their order; nothing is said of what is felt if the magnet is not home."""
 
     status: int
@@ -63,20 +63,20 @@ class Shot:
     by_summary: Percept | None = None
 
 
-def shots(row: Row) -> list[Shot]:
+def shots(row: FrictionRow) -> list[ShotPercepts]:
     """The shots of a row."""
     guns = [replace(row.gun, voltage_V=voltage_V) for voltage_V in row.voltage_V]
     summaries = row.summaries or [simulate(gun) for gun in guns]
     return [shot_of(gun, summary, row.leaks_s) for gun, summary in zip(guns, summaries, strict=True)]
 
 
-def shot_of(gun: GunParameters, summary: ShotSummary, leaks_s: Sequence[float]) -> Shot:
+def shot_of(gun: GunParameters, summary: ShotSummary, leaks_s: Sequence[float]) -> ShotPercepts:
     """One shot from rest and what is felt of it."""
     status = STATUSES.index(summary.status)
     if status != HOME or summary.reset_end_s is None:
-        return Shot(status=status)
-    felt = felt_of(gun, summary, leaks_s)
-    return Shot(
+        return ShotPercepts(status=status)
+    felt = shot_percepts(gun, summary, leaks_s)
+    return ShotPercepts(
         status=status,
         period_s=max(summary.reset_end_s, gun.pulse_s),
         felt=felt,
@@ -84,7 +84,7 @@ def shot_of(gun: GunParameters, summary: ShotSummary, leaks_s: Sequence[float]) 
     )
 
 
-def felt_of(
+def shot_percepts(
     gun: GunParameters,
     summary: ShotSummary,
     leaks_s: Sequence[float],
@@ -110,10 +110,10 @@ def _course(gun: GunParameters, coil_points: int, free_points: int) -> tuple[lis
     return times, forces
 
 
-def rows_of(space: Space, pulses_s: Sequence[float], leaks_s: tuple[float, ...]) -> list[Row]:
+def rows_of(space: Space, pulses_s: Sequence[float], leaks_s: tuple[float, ...]) -> list[FrictionRow]:
     """The work: a row for each pulse and friction. Only the gun's own pulse is felt under more than the first leak."""
     return [
-        Row(
+        FrictionRow(
             gun=replace(space.gun, friction_N=friction_N, pulse_s=pulse_s),
             voltage_V=space.voltage_V,
             leaks_s=leaks_s if pulse_s == space.gun.pulse_s else leaks_s[:1],
@@ -123,7 +123,7 @@ def rows_of(space: Space, pulses_s: Sequence[float], leaks_s: tuple[float, ...])
     ]
 
 
-def summarised(row: Row) -> Row:
+def summarised(row: FrictionRow) -> FrictionRow:
     """The row with its summaries from compiled code; the row as it is without the compiler (extra `fast`)."""
     if find_spec("numba") is None:
         return row
@@ -132,11 +132,11 @@ def summarised(row: Row) -> Row:
     return replace(row, summaries=tuple(summary_of(found) for found in zip(*columns, strict=True)))
 
 
-def simulate_rows(rows: Sequence[Row], run: Run, tell: Callable[[str], None]) -> list[list[Shot]]:
+def simulate_rows(rows: Sequence[FrictionRow], run: RunPieces, tell: Callable[[str], None]) -> list[list[ShotPercepts]]:
     """The shots of each row, in their order, wherever they are worked out; `tell` is told of each row's pulse."""
-    found: dict[int, list[Shot]] = {}
+    found: dict[int, list[ShotPercepts]] = {}
 
-    def done(number: int, what: list[Shot]) -> None:
+    def done(number: int, what: list[ShotPercepts]) -> None:
         found[number] = what
         tell(f"{1e3 * rows[number].gun.pulse_s:.3g} ms, {rows[number].gun.friction_N:.3g} N")
 
@@ -144,7 +144,7 @@ def simulate_rows(rows: Sequence[Row], run: Run, tell: Callable[[str], None]) ->
     return [found[number] for number in range(len(rows))]
 
 
-def layers(space: Space, rows: Sequence[Row], found: Sequence[Sequence[Shot]]) -> dict[float, Layer]:
+def layers(space: Space, rows: Sequence[FrictionRow], found: Sequence[Sequence[ShotPercepts]]) -> dict[float, Layer]:
     """The shots by their pulse."""
     size = len(space.friction_N)
     starts = range(0, len(rows), size)
@@ -153,7 +153,7 @@ def layers(space: Space, rows: Sequence[Row], found: Sequence[Sequence[Shot]]) -
     }
 
 
-def _layer(pulse_s: float, leaks_s: Sequence[float], grid: Sequence[Sequence[Shot]]) -> Layer:
+def _layer(pulse_s: float, leaks_s: Sequence[float], grid: Sequence[Sequence[ShotPercepts]]) -> Layer:
     return Layer(
         pulse_s=pulse_s,
         status=np.array([[shot.status for shot in row] for row in grid], dtype=np.int8),

@@ -25,7 +25,7 @@ _NUMBER = r"(\d+\.?\d*(?:[eE][+-]?\d+)?|\.\d+(?:[eE][+-]?\d+)?)"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Request:
+class DesignRequest:
     """What is asked for; ranges as typed, None for the whole sweep."""
 
     config: str | None = None
@@ -60,7 +60,7 @@ class Space:
         return tuple(sorted({*self.pulse_s, self.gun.pulse_s}))
 
 
-def make_space(request: Request) -> Space:
+def make_space(request: DesignRequest) -> Space:
     """The space of a request. `ConfigError` names the option, its value and the rule."""
     check_rate(request.rate_above_Hz)
     if not LEAST_GRID <= request.grid <= MOST_GRID:
@@ -133,7 +133,7 @@ def axis(low: float, high: float, count: int, through: list[float], *, by_ratio:
     return tuple(values)
 
 
-def _gun(request: Request) -> tuple[Path, GunConfig, tuple[str, ...] | None]:
+def _gun(request: DesignRequest) -> tuple[Path, GunConfig, tuple[str, ...] | None]:
     """The gun's file, its config, and the methods that count (None: all)."""
     if request.config is not None and request.gun is not None:
         raise ConfigError(f"--gun {request.gun}: the config {request.config} names its gun; give one of the two")

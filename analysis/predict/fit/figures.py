@@ -49,7 +49,7 @@ class RateCurve:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Spread:
+class SimulatedSpread:
     """Simulated values of a quantity as histograms (edges, counts) a case, and the published numbers."""
 
     title: str
@@ -101,7 +101,7 @@ def figure_percept(curves: Sequence[RateCurve], points: Sequence[RatePoint], pat
         return save(figure, path_stem)
 
 
-def figure_places(spreads: Sequence[Spread], path_stem: Path) -> tuple[Path, ...]:
+def figure_places(spreads: Sequence[SimulatedSpread], path_stem: Path) -> tuple[Path, ...]:
     """A panel a quantity: the simulated distributions, a line a case, and where the published numbers stand."""
     with mpl.rc_context(style()):  # type: ignore[arg-type]
         figure = new_figure(0.6 + 3.6 * len(spreads), 3.3)
@@ -187,7 +187,7 @@ def _draw_curve(axes: Axes, i: int, curve: RateCurve) -> None:
     axes.plot(curve.friction_N, rate, color=method_colour(i), linestyle=line, linewidth=1.1, label=curve.name)
 
 
-def _draw_spread(axes: Axes, spread: Spread) -> None:
+def _draw_spread(axes: Axes, spread: SimulatedSpread) -> None:
     light_grid(axes)
     for i, (name, (edges, counts)) in enumerate(spread.cases.items()):
         share = _densities(edges, counts)

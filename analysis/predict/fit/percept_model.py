@@ -1,30 +1,153 @@
-"""The percept fitted to forward rates: three numbers from three rates, how sure they are, and what is not told."""
+"""The percept fitted to forward rates: three numbers by maximum likelihood, how sure they are, what is not told."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from functools import partial
 
 import numpy as np
+from numpy.typing import NDArray
 from scipy import optimize, special
 
-from analysis.predict.fit.percept_likelihood import (
-    ASSUMED,
-    FITTED,
-    HIGHEST,
-    LOWEST,
-    Task,
-    information,
-    lowest,
-    slope,
-    task_of,
-)
 from device.methods import Method
 from device.words import Direction
 from experiments.synthetic.diffusion import Floats, People
-from experiments.synthetic.percept import Percept, PerceptParameters, evidence, forward_rates
+from experiments.synthetic.percept import Percept, PerceptParameters, evidence, forward_rates, percepts_of
+
+FITTED = ("sensitivity", "confusion", "start")
+ASSUMED = ("exponent", "leak_s", "boundary")
+"""What the rates bear on as well; the boundary only through its product with the drift, the sensitivity."""
+_LOWEST, _HIGHEST = np.array([-12.0, -9.0, -8.0]), np.array([6.0, 9.0, 8.0])
+"""Ends of log sensitivity, log confusion and logit start: as good as 0 and infinite."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class _Likelihood:
+    """Rates with their trials, what is felt of their methods, the people, and the numbers that are assumed."""
+
+    methods: Mapping[str, Method]
+    percepts: Mapping[str, Percept]
+    rates: Mapping[str, float]
+    trials: Mapping[str, int]
+    people: People
+    base: PerceptParameters
+
+    def at(self, place: Floats) -> PerceptParameters:
+        """The parameters of a place: log sensitivity, log confusion, logit start."""
+        sensitivity, confusion = np.exp(place[:2])
+        start = float(special.expit(place[2]))
+        return replace(self.base, sensitivity=float(sensitivity), confusion=float(confusion), start=start)
+
+    def predicted(self, parameters: PerceptParameters) -> Floats:
+        """The mean forward rates."""
+        return forward_rates(
+            [evidence(self.percepts[name], parameters) for name in self.rates], parameters.start, self.people
+        )
+
+    def residuals(self, place: Floats) -> Floats:
+        """Signed roots of the rates' binomial deviances, whose squares sum to the deviance."""
+        p = np.clip(self.predicted(self.at(place)), 1e-15, 1.0 - 1e-15)
+        r, n = np.array(list(self.rates.values())), np.array([self.trials[name] for name in self.rates])
+        parts = 2.0 * n * (special.rel_entr(r, p) + special.rel_entr(1.0 - r, 1.0 - p))
+        return np.asarray(np.sign(p - r) * np.sqrt(np.maximum(parts, 0.0)))
+
+
+def _likelihood_of(
+    rates: Mapping[str, float],
+    methods: Mapping[str, Method],
+    trials: Mapping[str, int] | int,
+    people: People | None,
+    base: PerceptParameters | None,
+) -> _Likelihood:
+    """The likelihood of these rates. `ValueError`: rates, methods or trials that cannot be used."""
+    counts = dict.fromkeys(rates, trials) if isinstance(trials, int) else dict(trials)
+    _check(rates, methods, counts)
+    base = PerceptParameters() if base is None else base
+    kept = {name: methods[name] for name in rates}
+    return _Likelihood(
+        methods=kept,
+        percepts=percepts_of(kept, base.leak_s),
+        rates=dict(rates),
+        trials=counts,
+        people=People() if people is None else people,
+        base=base,
+    )
+
+
+def _check(rates: Mapping[str, float], methods: Mapping[str, Method], trials: Mapping[str, int]) -> None:
+    if len(rates) < len(FITTED):
+        raise ValueError(f"{len(rates)} rates; at least {len(FITTED)} are needed for {', '.join(FITTED)}")
+    for name, rate in rates.items():
+        if not 0.0 <= rate <= 1.0:
+            raise ValueError(f"the rate of {name} is {rate}; it must be 0 to 1")
+        if name not in methods:
+            raise ValueError(f"there is a rate of {name}, but no such method; there are {', '.join(methods)}")
+        if trials.get(name, 0) < 1:
+            raise ValueError(f"the trials of {name} are {trials.get(name, 0)}; there must be at least 1")
+
+
+_STARTS = np.array([[-1.0, -1.0, 0.0], [-1.0, 1.0, 0.0], [1.0, 3.0, 0.0]])
+
+
+def _lowest(
+    likelihood: _Likelihood, held: tuple[int, float] | None = None, near: Floats | None = None
+) -> tuple[Floats, float]:
+    """The place of lowest deviance, one coordinate held if asked: least squares of the residuals.
+
+    From several starts; `near` a place that is nearly it, from there and one other.
+    """
+    free = np.array([held is None or i != held[0] for i in range(len(FITTED))])
+    starts = _STARTS if near is None else np.vstack([near, _STARTS[1:2]])
+    return min((_descent(likelihood, start, free, held) for start in starts), key=lambda found: found[1])
+
+
+def _descent(
+    likelihood: _Likelihood, start: Floats, free: NDArray[np.bool_], held: tuple[int, float] | None
+) -> tuple[Floats, float]:
+    place = np.array(start)
+    if held is not None:
+        place[held[0]] = held[1]
+
+    def residuals(part: Floats) -> Floats:
+        place[free] = part
+        return likelihood.residuals(place)
+
+    inside = np.clip(place[free], _LOWEST[free] + 1e-6, _HIGHEST[free] - 1e-6)
+    found = optimize.least_squares(residuals, inside, bounds=(_LOWEST[free], _HIGHEST[free]), xtol=1e-12, ftol=1e-12)
+    place[free] = found.x
+    return place, 2.0 * float(found.cost)
+
+
+def _slopes(likelihood: _Likelihood, parameters: PerceptParameters) -> Floats:
+    """Derivatives of the predicted rates by the logarithm of every parameter, (rates, parameters)."""
+    columns = [_slope(partial(_scaled, likelihood, parameters, name)) for name in (*FITTED, *ASSUMED)]
+    return np.column_stack(columns)
+
+
+def _slope(rates: Callable[[float], Floats], step: float = 1e-4) -> Floats:
+    """The derivative by the logarithm of a factor."""
+    return (rates(math.exp(step)) - rates(math.exp(-step))) / (2.0 * step)
+
+
+def _scaled(likelihood: _Likelihood, parameters: PerceptParameters, name: str, factor: float) -> Floats:
+    """The predicted rates with one parameter times `factor`."""
+    if name == "boundary":  # drift = evidence / boundary: the product, and with it every rate, stays
+        return likelihood.predicted(parameters)
+    changed = replace(parameters, **{name: getattr(parameters, name) * factor})
+    if name == "leak_s":
+        likelihood = replace(likelihood, percepts=percepts_of(likelihood.methods, changed.leak_s))
+    return likelihood.predicted(changed)
+
+
+def _information(likelihood: _Likelihood, parameters: PerceptParameters) -> Floats:
+    """Fisher information of the logarithms: sum over methods of n p' p'^T / (p (1 - p))."""
+    p = np.clip(likelihood.predicted(parameters), 1e-12, 1.0 - 1e-12)
+    weights = np.array([likelihood.trials[name] for name in likelihood.rates]) / (p * (1.0 - p))
+    slopes = _slopes(likelihood, parameters)
+    return np.asarray(slopes.T @ (weights[:, None] * slopes))
+
 
 __all__ = [
     "ASSUMED",
@@ -105,19 +228,19 @@ def fit_percept(
     """
     if not 0.0 < confidence < 1.0:
         raise ValueError(f"confidence is {confidence}; it must lie between 0 and 1")
-    task = task_of(rates, methods, trials, people, base)
-    place, deviance = lowest(task)
-    parameters = task.at(place)
-    matrix = information(task, parameters)
+    likelihood = _likelihood_of(rates, methods, trials, people, base)
+    place, deviance = _lowest(likelihood)
+    parameters = likelihood.at(place)
+    matrix = _information(likelihood, parameters)
     values, vectors = np.linalg.eigh(matrix)
     rank = int((values > 1e-8 * values[-1]).sum())
     covariance = _inverse(matrix[: len(FITTED), : len(FITTED)])
-    fitted = _fitted(task, place, deviance, np.sqrt(np.diag(covariance)), confidence)
+    fitted = _fitted(likelihood, place, deviance, np.sqrt(np.diag(covariance)), confidence)
     return PerceptFit(
         parameters=parameters,
         fitted=fitted,
         rates=dict(rates),
-        predicted=dict(zip(rates, map(float, task.predicted(parameters)), strict=True)),
+        predicted=dict(zip(rates, map(float, likelihood.predicted(parameters)), strict=True)),
         deviance=deviance,
         freedom=len(rates) - len(FITTED),
         rank=rank,
@@ -136,10 +259,10 @@ def best_percept(
     base: PerceptParameters | None = None,
 ) -> PerceptPeak:
     """The numbers of `fit_percept` alone, thirty times as fast: the profile takes the time."""
-    task = task_of(rates, methods, trials, people, base)
-    place, deviance = lowest(task)
-    parameters = task.at(place)
-    covariance = _inverse(information(task, parameters)[: len(FITTED), : len(FITTED)])
+    likelihood = _likelihood_of(rates, methods, trials, people, base)
+    place, deviance = _lowest(likelihood)
+    parameters = likelihood.at(place)
+    covariance = _inverse(_information(likelihood, parameters)[: len(FITTED), : len(FITTED)])
     return PerceptPeak(parameters=parameters, deviance=deviance, covariance=tuple(map(tuple, covariance.tolist())))
 
 
@@ -164,7 +287,7 @@ def predicted_rate(
         return sign * special.logit(forward_rates(sign * evidence(percept, changed), changed.start, spread))
 
     with np.errstate(invalid="ignore"):
-        slopes = np.array([slope(partial(logit, name)) for name in FITTED])
+        slopes = np.array([_slope(partial(logit, name)) for name in FITTED])
     centre, se = float(logit("start", 1.0)), float(np.sqrt(slopes @ np.array(fit.covariance) @ slopes))
     reach = -float(special.ndtri((1.0 - confidence) / 2.0)) * se
     rate, low, high = (float(special.expit(x)) for x in (centre, centre - reach, centre + reach))
@@ -177,25 +300,27 @@ def _inverse(matrix: Floats) -> Floats:
     return np.asarray(np.linalg.inv(matrix) if told else np.full_like(matrix, math.nan))
 
 
-def _fitted(task: Task, place: Floats, deviance: float, spread: Floats, confidence: float) -> dict[str, Fitted]:
+def _fitted(
+    likelihood: _Likelihood, place: Floats, deviance: float, spread: Floats, confidence: float
+) -> dict[str, Fitted]:
     wanted = deviance + float(special.chdtri(1, 1.0 - confidence))
-    best, found = task.at(place), {}
+    best, found = likelihood.at(place), {}
     for i, name in enumerate(FITTED):
         value = float(getattr(best, name))
-        low, high = (_limit(task, i, place, wanted, sign) for sign in (-1.0, 1.0))
+        low, high = (_limit(likelihood, i, place, wanted, sign) for sign in (-1.0, 1.0))
         found[name] = Fitted(value=value, se=value * float(spread[i]), ci_low=low, ci_high=high)
     return found
 
 
-def _limit(task: Task, index: int, place: Floats, wanted: float, sign: float) -> float:
+def _limit(likelihood: _Likelihood, index: int, place: Floats, wanted: float, sign: float) -> float:
     """Where the lowest deviance with this number held reaches `wanted`, on one side."""
-    farthest = abs(float((HIGHEST if sign > 0 else LOWEST)[index] - place[index]))
+    farthest = abs(float((_HIGHEST if sign > 0 else _LOWEST)[index] - place[index]))
     forms = (math.exp, math.exp, lambda x: float(special.expit(x)))
 
     last = [place]
 
     def excess(distance: float) -> float:
-        last[0], deviance = lowest(task, (index, float(place[index]) + sign * distance), last[0])
+        last[0], deviance = _lowest(likelihood, (index, float(place[index]) + sign * distance), last[0])
         return deviance - wanted
 
     inner, outer = 0.0, min(0.1, farthest)

@@ -10,16 +10,13 @@ from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
-from analysis.paper.odds import WHOLE_PATTERN, Recurrence, wilson_interval
 from analysis.paper.paper import PublishedDirection
 from analysis.paper.published import rounds_to
+from analysis.paper.recurrence import WHOLE_PATTERN, Recurrence, answers_recur, recurs, share_of, wilson_interval
 from analysis.predict.fit.percept_model import FITTED, PerceptPeak, best_percept
-from analysis.predict.fit.request import ASSUMED_SPREAD, scaled
-from analysis.predict.power.felt import Counts, Felt, Floats, correct_shares
-from analysis.predict.power.grid import PEOPLE_A_CHUNK
-from analysis.predict.power.studies import published_directions
+from analysis.predict.fit.percept_request import ASSUMED_SPREAD, scaled_spread
+from analysis.predict.synthetic_studies import Counts, Felt, Floats, felt_counts, piece_sizes
 from analysis.stats.anova import rm_anova
 from analysis.stats.binomial import binomial_test
 from device.methods import Method
@@ -29,11 +26,11 @@ from experiments.synthetic.diffusion import People
 from experiments.synthetic.percept import Percept, PerceptParameters, evidence, percepts_of
 
 PERCENTILES = (2.5, 25.0, 50.0, 75.0, 97.5)
-BINS = 40
+HISTOGRAM_BINS = 40
 LARGEST_VARIANCE = 2.0
 """Of a fitted number's logarithm: beyond, the normal approximation describes nothing that could be drawn (assumed)."""
 MAIN = "assumed spread"
-KINDS = {"people alike": People(), MAIN: ASSUMED_SPREAD, "twice the spread": scaled(ASSUMED_SPREAD, 2.0)}
+PEOPLE_KINDS = {"people alike": People(), MAIN: ASSUMED_SPREAD, "twice the spread": scaled_spread(ASSUMED_SPREAD, 2.0)}
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -47,7 +44,7 @@ class Case:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Place:
+class PublishedPlace:
     """Where a published number lies among the simulated ones.
 
     `percentile`: share below it plus half of those that print alike, 0 to 1, with its 95 % Monte Carlo interval.
@@ -65,8 +62,8 @@ class Place:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Recurs:
-    """The share of studies in which a published claim holds, with its 95 % Wilson interval."""
+class RecurringClaim:
+    """The share of studies in which a published claim holds, with its 95 % Wilson interval; has the fit seen it?"""
 
     claim: str
     share: float
@@ -77,13 +74,33 @@ class Recurs:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Judged:
-    """What a case's studies say. `histograms`: of each quantity, edges and counts."""
+    """What the studies of a case say: the people and their percept, the published numbers' places, the claims."""
 
-    case: Case
+    name: str
+    people: People
+    parameters: PerceptParameters
+    places: tuple[PublishedPlace, ...]
+    claims: tuple[RecurringClaim, ...]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Judgement:
+    """All cases' studies against what is published; `main` is the place of the case to report."""
+
     studies: int
-    places: tuple[Place, ...]
-    claims: tuple[Recurs, ...]
-    histograms: Mapping[str, tuple[Floats, NDArray[np.int64]]]
+    seed: int
+    main: int
+    percentiles: tuple[float, ...]
+    cases: tuple[Judged, ...]
+
+    @property
+    def main_case(self) -> Judged:
+        """The case to report."""
+        return self.cases[self.main]
+
+
+Histograms = dict[str, tuple[tuple[float, ...], tuple[float, ...]]]
+"""Of each quantity the simulated values: edges and counts."""
 
 
 def cases_of(
@@ -92,7 +109,7 @@ def cases_of(
     """The kinds of people that are judged, the percept fitted anew for each; `assumed` has what is not fitted."""
     cases = [
         Case(name=name, people=people, fit=best_percept(rates, methods, trials=trials, people=people, base=assumed))
-        for name, people in KINDS.items()
+        for name, people in PEOPLE_KINDS.items()
     ]
     if (np.diag(cases[1].fit.covariance) < LARGEST_VARIANCE).all():  # not so if it is NaN
         cases.append(replace(cases[1], name=f"{MAIN}, fit's error drawn", drawn=True))
@@ -107,36 +124,32 @@ def judge(
     studies: int,
     seed: int,
     tell: Callable[[str], None],
-) -> Judged:
+) -> tuple[Judged, Histograms]:
     """Draw the studies of a case at the paper's design, and find the published numbers' places.
 
     They are drawn in pieces, each with a stream of its own; `tell` is told of each.
     """
     percepts = percepts_of({name: methods[name] for name in published.methods}, case.fit.parameters.leak_s)
     pieces = []
-    for number, count in enumerate(_sizes(studies, published.n)):
+    for number, count in enumerate(piece_sizes(studies, published.n)):
         draws = generator(seed, "fit", case.name, str(number))
         pieces.append(_counts(case, percepts, published, count, draws))
         tell(case.name)
     correct = np.concatenate(pieces)
     quantities = _quantities(correct, published)
-    return Judged(
-        case=case,
-        studies=studies,
+    judged = Judged(
+        name=case.name,
+        people=case.people,
+        parameters=case.fit.parameters,
         places=tuple(place_of(*one) for one in quantities),
         claims=tuple(_claims(correct, published)),
-        histograms={name: _histogram(values) for name, _, values, _ in quantities},
     )
+    return judged, {name: _histogram(values) for name, _, values, _ in quantities}
 
 
 def pieces_of(studies: int, published: PublishedDirection) -> int:
     """How many pieces a case's studies are drawn in."""
-    return len(list(_sizes(studies, published.n)))
-
-
-def _sizes(studies: int, n: int) -> Iterator[int]:
-    each = max(1, PEOPLE_A_CHUNK // n)
-    yield from (min(each, studies - first) for first in range(0, studies, each))
+    return len(piece_sizes(studies, published.n))
 
 
 def _counts(
@@ -150,9 +163,8 @@ def _counts(
     fitted = _drawn(case.fit, studies, draws) if case.drawn else [case.fit.parameters]
     log_odds = np.array([[[evidence(percepts[name], one) for name in published.methods]] for one in fitted])
     start = np.array([[one.start] for one in fitted])
-    felt = Felt(log_odds=(), start=0.5, people=case.people)
-    shares = correct_shares(log_odds, start, felt, (studies, published.n), draws)
-    return draws.binomial(_trials(published), shares[..., 0])
+    felt = Felt(log_odds=log_odds, start=start, people=case.people)
+    return felt_counts(felt, _trials(published), published.n, studies, draws)
 
 
 def _drawn(fit: PerceptPeak, studies: int, draws: np.random.Generator) -> list[PerceptParameters]:
@@ -197,7 +209,7 @@ def _printed(text: str) -> tuple[str, float, float]:
     return text, float(text) - half, float(text) + half
 
 
-def place_of(quantity: str, published: tuple[str, float, float], values: Floats, fitted: bool) -> Place:
+def place_of(quantity: str, published: tuple[str, float, float], values: Floats, fitted: bool) -> PublishedPlace:
     """The place of a published number among simulated values; it is text with the bounds of what prints alike.
 
     A value that is undefined or infinite (nothing varies within people) counts as above.
@@ -207,7 +219,7 @@ def place_of(quantity: str, published: tuple[str, float, float], values: Floats,
     below, above = float((known < low).mean()), float((known > high).mean())
     percentile = (below + 1.0 - above) / 2.0
     ci_low, ci_high = wilson_interval(round(percentile * values.size), values.size)
-    return Place(
+    return PublishedPlace(
         quantity=quantity,
         published=text,
         percentile=percentile,
@@ -219,8 +231,8 @@ def place_of(quantity: str, published: tuple[str, float, float], values: Floats,
     )
 
 
-def _claims(correct: Counts, published: PublishedDirection) -> Iterator[Recurs]:
-    held = published_directions(correct, _trials(published), published)
+def _claims(correct: Counts, published: PublishedDirection) -> Iterator[RecurringClaim]:
+    held = answers_recur(correct, _trials(published), published)
     fitted = {name: name.startswith("binomial") and " forward" in name for name in held}
     tukey = {name: flags for name, flags in held.items() if " above " in name}
     yield from (_recurs(name, flags, fitted[name]) for name, flags in held.items())
@@ -235,25 +247,23 @@ def _not_further(correct: Counts, published: PublishedDirection) -> Iterator[Rec
     bounds = sorted({claim.p_below for claim in published.tukey}, key=float)
     for claim in published.tukey:
         if smaller := bounds[: bounds.index(claim.p_below)]:
-            bold = published.model_copy(
-                update={"tukey": [claim.model_copy(update={"p_below": smaller[-1]})], "binomial": []}
-            )
-            held = published_directions(correct, _trials(published), bold)
+            bold = published.model_copy(update={"tukey": [claim.model_copy(update={"p_below": smaller[-1]})]})
+            held = recurs(correct[..., 0] / _trials(published)[0], bold)
             yield from (~flags for name, flags in held.items() if " above " in name)
 
 
-def _recurs(claim: str, held: Recurrence, fitted: bool) -> Recurs:
-    low, high = wilson_interval(int(held.sum()), held.size)
-    return Recurs(claim=claim, share=float(held.mean()), ci_low=low, ci_high=high, fitted=fitted)
+def _recurs(claim: str, held: Recurrence, fitted: bool) -> RecurringClaim:
+    found = share_of(claim, int(held.sum()), held.size)
+    return RecurringClaim(claim=claim, share=found.share, ci_low=found.ci_low, ci_high=found.ci_high, fitted=fitted)
 
 
-def _histogram(values: Floats) -> tuple[Floats, NDArray[np.int64]]:
+def _histogram(values: Floats) -> tuple[tuple[float, ...], tuple[float, ...]]:
     """Of whole numbers one bin each, of others so many between the 0.1 and 99.9 percent points."""
     finite = values[np.isfinite(values)]
     if (finite == np.rint(finite)).all():
         edges = np.arange(finite.min() - 0.5, finite.max() + 1.0)
     else:
         low, high = np.percentile(finite, (0.1, 99.9))
-        edges = np.linspace(low, high, BINS + 1)
+        edges = np.linspace(low, high, HISTOGRAM_BINS + 1)
     counts, edges = np.histogram(finite, edges)
-    return edges, counts
+    return tuple(edges.tolist()), tuple(counts.astype(np.float64).tolist())

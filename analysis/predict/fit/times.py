@@ -2,38 +2,34 @@
 
 from __future__ import annotations
 
-import json
 import math
 import re
 from collections.abc import Callable, Iterable, Iterator, Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
 from analysis.logs.reading import Logs, Problem, Track, read_logs
-from analysis.predict.fit.times_page import Fitted, as_text, left_out, sections
-from analysis.predict.fit.words import NO_TIMES, plain
+from analysis.predict.fit.percept_sections import NO_OWN_TIMES
+from analysis.predict.fit.times_results import FittedTimes, TimesFit, times_fit
+from analysis.predict.fit.times_sections import in_short, left_out, sections
 from analysis.report.page import write_page
+from analysis.report.serial import as_json
 from analysis.report.terminal import Progress
-from analysis.times.ez import ez, ez_people
-from analysis.times.fit import DiffusionFit, fit, profile
+from analysis.times.fit import fit, profile
 from analysis.times.likelihood import Range, Trials
 from analysis.times.own_trials import REFUSALS, OwnTrials, own_trials
-from analysis.times.people import FEWEST_TRIALS, as_trials, fit_people, mean_estimate
+from analysis.times.people import FEWEST_TRIALS, as_trials, fit_people
 from experiments.config.door import ConfigError
 from experiments.record import storage
-from experiments.record.provenance import provenance
 from experiments.study.places import PlaceError
 
-__all__ = ["Request", "as_text", "left_out", "times"]
-
-Facts = dict[str, Any]
+__all__ = ["TimesRequest", "in_short", "left_out", "times"]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Request:
+class TimesRequest:
     """The logs; lapses `none`, over the `data`'s range of times, or over one in s such as `0.2-3`.
 
     `bias`: is the start fitted, or one half? `profiled`: likelihood intervals beside the others.
@@ -45,8 +41,8 @@ class Request:
     profiled: bool = False
 
 
-def times(request: Request, out: Path, track: Track, progress: Progress) -> tuple[Facts, tuple[Problem, ...]]:
-    """Fit, and write `fit.json`, report and figure into `out`; `fit.json` and what was left out are returned.
+def times(request: TimesRequest, out: Path, track: Track, progress: Progress) -> tuple[TimesFit, tuple[Problem, ...]]:
+    """Fit, and write `fit.json`, report and figure into `out`; what was found and the logs left out are returned.
 
     `ConfigError`: a range of lapses that is none. `PlaceError`: no usable log, or none of its times is the
     participant's own; with the reasons.
@@ -57,13 +53,12 @@ def times(request: Request, out: Path, track: Track, progress: Progress) -> tupl
     trials = as_trials(own)
     try:
         with progress("fit", np.unique(trials.person).size) as tell:
-            fitted = _fitted(own, trials, lapses, bias=request.bias, tell=tell)
+            fitted = _fitted(own, trials, lapses, request, tell)
     except ValueError as error:
         raise PlaceError(f"--lapses {request.lapses}: {error}") from error
-    found = _facts(request, fitted, logs)
+    found = times_fit(fitted, logs, request.lapses, bias=request.bias)
     storage.make_folder(out)
-    data = json.dumps(found, indent=1, ensure_ascii=False, allow_nan=False) + "\n"
-    storage.write_whole(out / "fit.json", data.encode())
+    storage.write_whole(out / "fit.json", as_json(found))
     write_page(out, "The diffusion model fitted to response times", sections(found, fitted, out / "figures"))
     return found, logs.problems
 
@@ -96,13 +91,15 @@ def _own(paths: Sequence[Path], logs: Logs) -> OwnTrials:
     own = own_trials(logs.trials, methods)
     if not own.time_s.size:
         reasons = [f"{count} trials: {REFUSALS[name]}" for name, count in own.refused.items()]
-        raise PlaceError("\n".join([f"no response time in {where} is the participant's own", *reasons, NO_TIMES]))
+        raise PlaceError("\n".join([f"no response time in {where} is the participant's own", *reasons, NO_OWN_TIMES]))
     if own.time_s.size < FEWEST_TRIALS:
         raise PlaceError(f"{own.time_s.size} response times in {where}; the fit needs at least {FEWEST_TRIALS}")
     return own
 
 
-def _fitted(own: OwnTrials, trials: Trials, lapses: bool | Range, *, bias: bool, tell: Callable[[str], None]) -> Fitted:
+def _fitted(
+    own: OwnTrials, trials: Trials, lapses: bool | Range, request: TimesRequest, tell: Callable[[str], None]
+) -> FittedTimes:
     names = np.unique(np.array(own.people)[own.person]).tolist()
 
     def told(places: Iterable[int]) -> Iterator[int]:
@@ -110,67 +107,11 @@ def _fitted(own: OwnTrials, trials: Trials, lapses: bool | Range, *, bias: bool,
             yield place
             tell(names[place])
 
-    several = len(names) > 1
+    several, bias = len(names) > 1, request.bias
     range_s = (float(trials.time_s.min()), float(trials.time_s.max())) if lapses is True else lapses or None
-    asked = range_s or False
-    together = fit(trials, bias=bias, lapses=asked, by_person=several)
-    each = fit_people(trials, bias=bias, lapses=asked, track=told, together=together) if several else None
-    return Fitted(own=own, trials=trials, lapse_range_s=range_s, together=together, each=each)
-
-
-def _facts(request: Request, fitted: Fitted, logs: Logs) -> Facts:
-    """The content of `fit.json`."""
-    own, together, each = fitted.own, fitted.together, fitted.each
-    people = sorted({own.people[code] for code in own.person.tolist()})
-    profiles = _profiles(request, fitted) if request.profiled else {}
-    found = {
-        "files": [str(file) for file in logs.files],
-        "people": people,
-        "methods": sorted({own.methods[place] for place in own.method.tolist()}),
-        "instructions": [*fitted.trials.instructions],
-        "trials": int(own.time_s.size),
-        "answered": own.answered,
-        "refused": {name: {"trials": count, "reason": REFUSALS[name]} for name, count in own.refused.items()},
-        "lapses": request.lapses,
-        "bias": request.bias,
-        "together": _of_fit(together) | {"profiles": profiles},
-        "mean_of_people": None if each is None else [asdict(one) for one in each.means],
-        "each": {} if each is None else {who: _of_fit(one) for who, one in zip(people, each.fits, strict=True)},
-        "left_out": [] if each is None else [people[place] for place in each.left_out],
-        "ez": _ez(own),
-        "provenance": provenance(),
-    }
-    return dict(plain(found))
-
-
-def _of_fit(found: DiffusionFit) -> Facts:
-    return {
-        "estimates": [asdict(one) for one in found.estimates],
-        "log_likelihood": found.log_likelihood,
-        "trials": found.trials,
-        "clusters": found.clusters,
-        "unidentified": [*found.unidentified],
-        "reason": found.reason,
-    }
-
-
-def _profiles(request: Request, fitted: Fitted) -> Facts:
-    lapses, names = fitted.lapse_range_s or False, [one.name for one in fitted.together.estimates]
-    return {name: [*profile(fitted.trials, name, bias=request.bias, lapses=lapses)] for name in names}
-
-
-def _ez(own: OwnTrials) -> list[Facts]:
-    """EZ-diffusion in each cell: of each person, as means over those who have one; and of all trials together."""
-    rows = []
-    for instruction in own.instructions:
-        for method in own.methods:
-            cell = own.cell(method, instruction)
-            if not cell.time_s.size:
-                continue
-            found = ez_people(cell.correct, cell.time_s, cell.source, cell.person)
-            measured = {"drift": found.drift, "boundary": found.boundary, "non_decision_s": found.non_decision_s}
-            means = {name: asdict(mean_estimate(name, v[np.isfinite(v)])) for name, v in measured.items()}
-            refused = {name: int(getattr(found, name).sum()) for name in ("few", "flat", "impossible", "corrected")}
-            pooled = asdict(ez(cell.correct, cell.time_s, cell.source))
-            rows.append({"method": method, "instruction": instruction, **means, **refused, "pooled": pooled})
-    return rows
+    with_lapses = range_s or False
+    together = fit(trials, bias=bias, lapses=with_lapses, by_person=several)
+    each = fit_people(trials, bias=bias, lapses=with_lapses, track=told, together=together) if several else None
+    profiled = [one.name for one in together.estimates] if request.profiled else []
+    profiles = {name: profile(trials, name, bias=bias, lapses=with_lapses) for name in profiled}
+    return FittedTimes(own=own, trials=trials, lapse_range_s=range_s, together=together, profiles=profiles, each=each)

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
-from analysis.predict.power.grid import Grid
-from analysis.predict.power.request import FELT
+from analysis.predict.power.grid import FELT, Grid
+from analysis.predict.synthetic_studies import rates_law, ratings_law, spread_sentence
 from experiments.direction.config import DirectionConfig, Rates
 from experiments.preference.config import PreferenceConfig, Ratings
 
@@ -32,12 +32,7 @@ def assumptions(grid: Grid) -> list[str]:
 
 
 def _rates(rates: Rates) -> Iterator[str]:
-    for direction, values in (("forward", rates.forward), ("backward", rates.backward)):
-        yield f"Mean correct rates, {direction}: {', '.join(f'{name} {value:g}' for name, value in values.items())}."
-    yield (
-        f"People differ by an ability of SD {rates.ability_sd:g} and a bias of SD {rates.bias_sd:g} around "
-        f"{rates.bias_mean:g}, in probit units; the same in all methods. Trials are independent given the person."
-    )
+    yield from rates_law(rates)
     yield "The effect is a factor on the probit of each mean correct rate, so on d′: 1 is the config, 0 guessing."
 
 
@@ -58,10 +53,7 @@ def _felt(config: DirectionConfig, *, null: bool) -> Iterator[str]:
         f"{percept.sensitivity:g}, confusion {percept.confusion:g}, start {percept.start:g} (`recoil fit`): a model's "
         "guess, not a measurement."
     )
-    yield (
-        f"They differ by SD {people.drift_factor_sd:g} of the factor on the drift, {people.log_boundary_sd:g} of the "
-        f"log boundary, {people.logit_start_sd:g} of the logit of the start; lapses {lapses.rate:g}."
-    )
+    yield f"{spread_sentence(people.own)} Lapses {lapses.rate:g}."
     if config.design.instructions:
         yield (
             f"Instructions {', '.join(config.design.instructions)}: each takes an equal part of a session's sets and "
@@ -79,12 +71,7 @@ def _felt(config: DirectionConfig, *, null: bool) -> Iterator[str]:
 
 
 def _ratings(law: Ratings) -> Iterator[str]:
-    yield f"Mean ratings: {', '.join(f'{name} {value:g}' for name, value in law.mean.items())}."
-    yield f"SD between people {law.person_sd:g}, within people {law.noise_sd:g}; kept to the scale and its grain."
-    if law.lowest:
-        yield f"{law.lowest} is rated below all others, by everybody at effect 1, by a smaller share below it."
-    if law.same:
-        yield f"A share of {law.same_share:g} rates {' and '.join(law.same)} alike."
+    yield from ratings_law(law, with_effect=True)
     yield "The effect is a factor on the distances of the methods' means from their common mean; 1 is the config."
 
 

@@ -46,7 +46,7 @@ class Panel:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Rate:
+class FalsePositives:
     """A claim's share of false positives, with its interval, under a kind of null participants."""
 
     claim: str
@@ -72,7 +72,7 @@ def figure_power(rows: Sequence[Sequence[Panel]], x_label: str, target: float, p
 
 
 def figure_false_positives(
-    panels: Sequence[tuple[str, Sequence[Rate]]], level: float, path_stem: Path
+    panels: Sequence[tuple[str, Sequence[FalsePositives]]], level: float, path_stem: Path
 ) -> tuple[Path, ...]:
     """A row of panels (title, rates): each claim's share as a point with its interval, the nominal level as a line."""
     with mpl.rc_context(style()):  # type: ignore[arg-type]
@@ -116,7 +116,7 @@ def _draw_curves(axes: Axes, panel: Panel, target: float) -> None:
     axes.set_title(panel.title, loc="left")
 
 
-def _draw_rates(axes: Axes, claims: Sequence[str], rates: Sequence[Rate], level: float) -> None:
+def _draw_rates(axes: Axes, claims: Sequence[str], rates: Sequence[FalsePositives], level: float) -> None:
     axes.grid(visible=True, axis="x", color="#dddddd", linewidth=0.6)
     axes.set_axisbelow(True)
     axes.axvline(100.0 * level, color="#666666", linewidth=0.9, linestyle=(0, (4, 3)), zorder=1.5)

@@ -1,45 +1,164 @@
-"""What `recoil power` is asked for, spelled out as a grid of designs with their costs."""
+"""What `recoil power` is asked for, checked at the door and spelled out as a grid of designs with their costs."""
 
 from __future__ import annotations
 
+import math
+import re
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from typing import Any
 
 from analysis.paper.paper import PublishedExperiment, load_paper
-from analysis.predict.power.felt import Felt, felt_of, null_felt, percepts_of_setup
-from analysis.predict.power.request import (
-    FELT,
-    Request,
-    check_scalars,
-    checked_setup,
-    factors,
-    method_sets_of,
-    numbers,
-    trials_of,
+from analysis.predict.power.studies import Chunk, DrawnConfig, PeopleKind, StudyDesign
+from analysis.predict.synthetic_studies import (
+    Felt,
+    felt_people,
+    null_felt,
+    null_rates,
+    null_ratings,
+    percepts_of_setup,
+    piece_sizes,
 )
-from analysis.predict.power.studies import Chunk, Config, Design, People, null_rates, null_ratings
+from experiments.config.door import ConfigError
+from experiments.config.setup import Setup
 from experiments.direction.config import DirectionConfig
-from experiments.load import find
+from experiments.load import find, load_setup
 from experiments.preference.config import PreferenceConfig
 from experiments.synthetic.percept import Percept
 
-__all__ = ["Cell", "Grid", "Request", "make_grid"]
+_LARGEST_EFFECT = 10.0
+FELT = "felt"
+"""The observer of people who answer from what the gun does."""
+_LAWS = {"direction": ("rates", FELT), "preference": ("ratings",)}
+"""The observers that studies can be drawn from."""
+
+
+class GridError(ConfigError):
+    """A grid that cannot be worked out; the message names option, value and rule."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class PowerRequest:
+    """What the command line asks for. Lists are text, as in `8,10,14-20`."""
+
+    config: str
+    participants: str | None = None
+    trials: str | None = None
+    methods: tuple[str, ...] = ()
+    effects: str | None = None
+    studies: int = 10_000
+    target: float = 0.8
+    null: bool = False
+    seed: int = 1
+    paper: str = "paper"
+
+
+def check_scalars(request: PowerRequest) -> None:
+    """`GridError` for a target that is no share, and for an effect of people who feel none."""
+    if not 0.0 < request.target < 1.0:
+        raise GridError(f"--target {request.target:g}: must lie between 0 and 1, such as 0.8")
+    if request.null and request.effects is not None:
+        raise GridError(f"--null has no effect at all; leave --effect {request.effects} out")
+
+
+def checked_setup(name: str) -> Setup[Any]:
+    """The config with its gun, if its synthetic participants follow a law that studies can be drawn from."""
+    setup = load_setup(name)
+    config = setup.config
+    observer, laws = config.synthetic.observer, _LAWS.get(config.experiment, ())
+    if not isinstance(config, DirectionConfig | PreferenceConfig) or observer not in laws:
+        drawn = " or ".join(f'"{law}"' for law in laws)
+        raise GridError(f'{find(name)}: synthetic.observer = "{observer}" has no power; studies are drawn from {drawn}')
+    if isinstance(config, DirectionConfig) and not config.design.forward_per_session:
+        raise GridError(f"{find(name)}: design.forward_per_session = 0; the planned analysis is of forward trials")
+    return setup
+
+
+def method_sets_of(asked: tuple[str, ...], config: DrawnConfig) -> list[tuple[str, ...]]:
+    """The sets of methods to compare: the config's own unless some are named."""
+    known, sets = config.design.methods, []
+    for text in asked or (",".join(known),):
+        names = [name.strip() for name in text.split(",")]
+        strangers = [name for name in names if name not in known]
+        if strangers or len(set(names)) != len(names) or len(names) < 2:
+            raise GridError(f"--methods {text}: must be two or more different ones of {', '.join(known)}")
+        sets.append(tuple(method for method in known if method in names))
+    return list(dict.fromkeys(sets))
+
+
+def trials_of(asked: str | None, config: DrawnConfig) -> list[int]:
+    """The trials of one method: the config's own unless some are named."""
+    if isinstance(config, PreferenceConfig):
+        if asked is not None:
+            raise GridError(f"--trials {asked}: {config.title!r} has one trial a method; leave the option out")
+        return [1]
+    design = config.design
+    if asked is None:
+        return [design.trials_per_session]
+    whole = design.trials_per_session // math.gcd(design.trials_per_session, design.forward_per_session)
+    step = math.lcm(design.trials_per_set * max(1, len(design.instructions)), whole)
+    found = whole_numbers(asked, "--trials", 1, 10_000)
+    uneven = [trials for trials in found if trials % step]
+    if uneven and "-" not in asked:
+        raise GridError(
+            f"--trials {asked}: {uneven[0]} is no multiple of {step}, so it makes no sets of {design.trials_per_set} "
+            f"with forward and backward trials as the config has them ({design.forward_per_session} to "
+            f"{design.backward_per_session})"
+        )
+    fitting = [trials for trials in found if trials % step == 0]
+    if not fitting:
+        raise GridError(f"--trials {asked}: holds no multiple of {step}")
+    return fitting
+
+
+def whole_numbers(text: str, option: str, low: int, high: int) -> list[int]:
+    """Whole numbers and ranges, in order and once each. `GridError` for others, or outside `low`..`high`.
+
+    >>> numbers("14, 8-10", "--participants", 2, 999)
+    [8, 9, 10, 14]
+    """
+    found = set[int]()
+    for part in text.split(","):
+        match = re.fullmatch(r"\s*([0-9]{1,9})\s*(?:-\s*([0-9]{1,9})\s*)?", part)
+        if not match:
+            raise GridError(f"{option} {text}: {part.strip()!r} is no whole number and no range such as 8-20")
+        first, last = int(match[1]), int(match[2] or match[1])
+        if not low <= first <= last <= high:
+            raise GridError(f"{option} {text}: {part.strip()} must be from {low} to {high}, ranges upwards")
+        found |= set(range(first, last + 1))
+    return sorted(found)
+
+
+def factors(text: str) -> list[float]:
+    """Effect factors, in order and once each. `GridError` for what is not a number from 0 to 10.
+
+    >>> factors("1,0.5")
+    [0.5, 1.0]
+    """
+    found = set[float]()
+    for part in text.split(","):
+        try:
+            value = float(part)
+        except ValueError:
+            value = math.nan
+        if not 0.0 <= value <= _LARGEST_EFFECT:
+            raise GridError(f"--effect {text}: {part.strip()!r} must be a number from 0 (none) to {_LARGEST_EFFECT:g}")
+        found.add(value)
+    return sorted(found)
+
 
 DEFAULT_PARTICIPANTS = "6,8,10,12,14,16,18,20,24,28,32,40"
 NULL_PARTICIPANTS = "8,14,24"
 DEFAULT_EFFECTS = "0.5,0.75,1"
-PEOPLE_A_CHUNK = 70_000
-"""Participants drawn together: 5000 studies of 14. It is part of what a seed means, so it never depends on workers."""
 _MOST_PEOPLE = 999
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Cell:
+class GridCell:
     """A design with the config that it makes, and its cost; `too_long` says why it may not be run, or nothing."""
 
-    design: Design
-    config: Config
+    design: StudyDesign
+    config: DrawnConfig
     duration_s: float
     too_long: str
 
@@ -56,15 +175,15 @@ class Grid:
     `percepts`: what the gun's shots give to feel, by method, if the participants feel it.
     """
 
-    config: Config
-    cells: tuple[Cell, ...]
-    reference: Cell | None
+    config: DrawnConfig
+    cells: tuple[GridCell, ...]
+    reference: GridCell | None
     published: PublishedExperiment | None
-    request: Request
+    request: PowerRequest
     percepts: Mapping[str, Percept] | None = None
 
     @property
-    def all_cells(self) -> tuple[Cell, ...]:
+    def all_cells(self) -> tuple[GridCell, ...]:
         """The cells, and the reference after them if it is none of them."""
         apart = [self.reference] if self.reference and self.reference not in self.cells else []
         return (*self.cells, *apart)
@@ -73,9 +192,8 @@ class Grid:
         """The work, in its order: so many studies of every cell, in pieces."""
         return [chunk for cell in self.all_cells for chunk in self.chunks_of(cell)]
 
-    def chunks_of(self, cell: Cell) -> list[Chunk]:
+    def chunks_of(self, cell: GridCell) -> list[Chunk]:
         """The pieces of a cell."""
-        each = max(1, PEOPLE_A_CHUNK // cell.design.participants)
         published = self.published if _is_of(self.published, cell) else None
         return [
             Chunk(
@@ -84,28 +202,28 @@ class Grid:
                 published=published,
                 seed=self.request.seed,
                 number=number,
-                studies=min(each, self.request.studies - first),
+                studies=studies,
                 felt=self._felt(cell),
             )
-            for number, first in enumerate(range(0, self.request.studies, each))
+            for number, studies in enumerate(piece_sizes(self.request.studies, cell.design.participants))
         ]
 
-    def _felt(self, cell: Cell) -> Felt | None:
+    def _felt(self, cell: GridCell) -> Felt | None:
         if self.percepts is None or not isinstance(cell.config, DirectionConfig):
             return None
-        return felt_of(cell.config, self.percepts, cell.design.methods, cell.design.effect)
+        return felt_people(cell.config, self.percepts, cell.design.methods, cell.design.effect)
 
 
-def make_grid(request: Request) -> Grid:
+def make_grid(request: PowerRequest) -> Grid:
     """The grid of a request. `ConfigError` with a message for people for whatever is wrong with it."""
     check_scalars(request)
     setup = checked_setup(request.config)
-    config: Config = setup.config
+    config: DrawnConfig = setup.config
     people = request.participants or (NULL_PARTICIPANTS if request.null else DEFAULT_PARTICIPANTS)
-    participants = numbers(people, "--participants", 2, _MOST_PEOPLE)
+    participants = whole_numbers(people, "--participants", 2, _MOST_PEOPLE)
     effects = [0.0] if request.null else factors(request.effects or DEFAULT_EFFECTS)
     designs = [
-        (_varied(config, methods, trials), Design(participants=n, trials=trials, methods=methods, effect=effect))
+        (_varied(config, methods, trials), StudyDesign(participants=n, trials=trials, methods=methods, effect=effect))
         for methods in method_sets_of(request.methods, config)
         for trials in trials_of(request.trials, config)
         for effect in effects
@@ -124,7 +242,7 @@ def make_grid(request: Request) -> Grid:
     )
 
 
-def _varied(config: Config, methods: tuple[str, ...], trials: int) -> Config:
+def _varied(config: DrawnConfig, methods: tuple[str, ...], trials: int) -> DrawnConfig:
     """The config with these methods and trials; not checked again, so that what it breaks can be told."""
     changes: dict[str, Any] = {"methods": methods}
     if isinstance(config, DirectionConfig):
@@ -138,19 +256,19 @@ def _varied(config: Config, methods: tuple[str, ...], trials: int) -> Config:
     return config.model_copy(update={"design": config.design.model_copy(update=changes)})
 
 
-def _null_people(config: Config) -> tuple[People, ...]:
+def _null_people(config: DrawnConfig) -> tuple[PeopleKind, ...]:
     if isinstance(config, PreferenceConfig):
         return ("without preference",)
     return ("guessing", "guessing, with the config's bias")
 
 
-def _null(config: Config, design: Design, people: People) -> tuple[Config, Design]:
+def _null(config: DrawnConfig, design: StudyDesign, people: PeopleKind) -> tuple[DrawnConfig, StudyDesign]:
     """The design with null participants."""
     config = config.model_copy(update={"synthetic": _null_synthetic(config, people)})
     return config, replace(design, people=people)
 
 
-def _null_synthetic(config: Config, people: People) -> Any:
+def _null_synthetic(config: DrawnConfig, people: PeopleKind) -> Any:
     if isinstance(config, PreferenceConfig):
         return config.synthetic.model_copy(update={"ratings": null_ratings(config.synthetic.ratings)})
     if config.synthetic.observer == FELT:
@@ -158,14 +276,14 @@ def _null_synthetic(config: Config, people: People) -> Any:
     return config.synthetic.model_copy(update={"rates": null_rates(config.synthetic.rates, biased="bias" in people)})
 
 
-def _cell(config: Config, design: Design) -> Cell:
+def _cell(config: DrawnConfig, design: StudyDesign) -> GridCell:
     longest = config.fatigue.max_planned_s
     longer = config.duration_s > longest
     reason = f"{config.duration_s:g} s a participant exceed fatigue.max_planned_s = {longest:g} s" if longer else ""
-    return Cell(design=design, config=config, duration_s=config.duration_s, too_long=reason)
+    return GridCell(design=design, config=config, duration_s=config.duration_s, too_long=reason)
 
 
-def _published(name: str, config: Config) -> PublishedExperiment | None:
+def _published(name: str, config: DrawnConfig) -> PublishedExperiment | None:
     """The published claims about these methods; `None` if the paper is about others."""
     paper = load_paper(find(name))
     published: PublishedExperiment = getattr(paper, config.experiment)
@@ -173,13 +291,13 @@ def _published(name: str, config: Config) -> PublishedExperiment | None:
     return None if one_way or set(published.methods) != set(config.design.methods) else published
 
 
-def _is_of(published: PublishedExperiment | None, cell: Cell) -> bool:
+def _is_of(published: PublishedExperiment | None, cell: GridCell) -> bool:
     return published is not None and set(published.methods) == set(cell.design.methods)
 
 
-def _reference(config: Config, published: PublishedExperiment | None) -> Cell | None:
+def _reference(config: DrawnConfig, published: PublishedExperiment | None) -> GridCell | None:
     """The paper's own number of people with the config's trials and effects."""
     if published is None:
         return None
     trials = next(iter(trials_of(None, config)))
-    return _cell(config, Design(participants=published.n, trials=trials, methods=config.design.methods))
+    return _cell(config, StudyDesign(participants=published.n, trials=trials, methods=config.design.methods))

@@ -6,14 +6,15 @@ from collections.abc import Callable, Iterable, Iterator, Sequence
 from pathlib import Path
 from typing import Literal, TypeVar
 
-from analysis.predict.power.figures import Curve, Panel, Rate, figure_false_positives, figure_power
-from analysis.predict.power.planned import ALL_PAIRS, ANOVA, ANY_PAIR, Share
+from analysis.paper.recurrence import Share
+from analysis.predict.power.figures import Curve, FalsePositives, Panel, figure_false_positives, figure_power
+from analysis.predict.power.planned import ALL_PAIRS, ANOVA, ANY_PAIR
 from analysis.predict.power.results import PATTERN, DesignPower, Power, PublishedPattern, Reached, Smallest
 from analysis.predict.power.studies import PUBLISHED
 from analysis.report import apa
-from analysis.report.section import Picture, Section, Table
+from analysis.report.section import Picture, Section, Table, origin_table
 
-Axis = Literal["participants", "trials"]
+XAxis = Literal["participants", "trials"]
 One = TypeVar("One")
 
 HEADLINES = (ANOVA, ALL_PAIRS, PATTERN)
@@ -203,7 +204,7 @@ def _pictures(found: Power, figures: Path) -> Iterator[Picture]:
     """A figure for each set of methods."""
     for number, group in enumerate(_grouped(found.designs, lambda one: one.methods), start=1):
         stem = "power" if number == 1 else f"power-{number}"
-        x: Axis = "participants" if len({one.participants for one in group}) > 1 else "trials"
+        x: XAxis = "participants" if len({one.participants for one in group}) > 1 else "trials"
         label = {"participants": "participants", "trials": "trials a method"}[x]
         figure_power(_panels(group, x), label, found.target, figures / stem)
         yield Picture(
@@ -213,7 +214,7 @@ def _pictures(found: Power, figures: Path) -> Iterator[Picture]:
         )
 
 
-def _panels(group: Sequence[DesignPower], x: Axis) -> list[list[Panel]]:
+def _panels(group: Sequence[DesignPower], x: XAxis) -> list[list[Panel]]:
     """A panel an effect, a curve a claim; with several numbers of trials a row a claim, a curve a number of trials."""
     by_effect = _grouped(group, lambda one: one.effect)
     trials = sorted({one.trials for one in group})
@@ -235,11 +236,11 @@ def _panels(group: Sequence[DesignPower], x: Axis) -> list[list[Panel]]:
     ]
 
 
-def _curves(designs: Sequence[DesignPower], claims: Sequence[str], x: Axis) -> list[Curve]:
+def _curves(designs: Sequence[DesignPower], claims: Sequence[str], x: XAxis) -> list[Curve]:
     return [_curve(designs, claim, x, claim_name(claim)) for claim in claims]
 
 
-def _curve(designs: Sequence[DesignPower], claim: str, x: Axis, name: str) -> Curve:
+def _curve(designs: Sequence[DesignPower], claim: str, x: XAxis, name: str) -> Curve:
     points = [(getattr(one, x), share) for one in designs if (share := one.share_of(claim)) is not None]
     return Curve(
         name=name,
@@ -269,9 +270,9 @@ def _false_positives(found: Power, figures: Path) -> Section:
     )
 
 
-def _null_rates(group: Sequence[DesignPower]) -> list[Rate]:
+def _null_rates(group: Sequence[DesignPower]) -> list[FalsePositives]:
     return [
-        Rate(claim=one.claim, people=design.people, share=one.share, low=one.ci_low, high=one.ci_high)
+        FalsePositives(claim=one.claim, people=design.people, share=one.share, low=one.ci_low, high=one.ci_high)
         for design in group
         for one in design.claims
     ]
@@ -292,12 +293,7 @@ def _null_table(group: Sequence[DesignPower]) -> Table:
 
 def _origin(found: Power) -> Section:
     facts = {"seed": found.seed, "studies of each design": found.studies, **found.provenance}
-    rows = tuple((name, str(value)) for name, value in facts.items())
-    return Section(
-        title="What this rests on",
-        tables=(Table(caption="Where the numbers come from", header=("What", "Value"), rows=rows),),
-        items=tuple(found.assumptions),
-    )
+    return Section(title="What this rests on", tables=(origin_table(facts),), items=found.assumptions)
 
 
 def _grouped(some: Iterable[One], key: Callable[[One], object]) -> list[list[One]]:

@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy import special
 
-from analysis.paper.odds import SIGNIFICANT, Recurrence, wilson_interval
+from analysis.paper.recurrence import SIGNIFICANT, Recurrence, Share, share_of
 from analysis.stats.anova import check_scores, rm_anova
 from analysis.stats.arrays import FloatArray
 from analysis.stats.binomial import binomial_test
@@ -143,17 +143,6 @@ class Tally:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Share:
-    """The share of studies in which a claim held, with its 95 % Wilson interval: the Monte Carlo error."""
-
-    claim: str
-    held: int
-    share: float
-    ci_low: float
-    ci_high: float
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
 class Precision:
     """Half the length of a 95 % interval in the mean over studies; `mc_error` is that mean's own standard error."""
 
@@ -196,11 +185,7 @@ def merged(tallies: Sequence[Tally]) -> Tally:
 
 def shares(tally: Tally) -> tuple[Share, ...]:
     """The share of each claim."""
-    rows = []
-    for claim, held in tally.held.items():
-        low, high = wilson_interval(held, tally.studies)
-        rows.append(Share(claim=claim, held=held, share=held / tally.studies, ci_low=low, ci_high=high))
-    return tuple(rows)
+    return tuple(share_of(claim, held, tally.studies) for claim, held in tally.held.items())
 
 
 def precisions(tally: Tally) -> tuple[Precision, ...]:

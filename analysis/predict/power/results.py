@@ -5,9 +5,9 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 
-from analysis.paper.odds import SIGNIFICANT, WHOLE_PATTERN
-from analysis.predict.power.grid import Cell, Grid
-from analysis.predict.power.planned import Option, Precision, Share, Tally, merged, precisions, shares, smallest
+from analysis.paper.recurrence import SIGNIFICANT, WHOLE_PATTERN, Share
+from analysis.predict.power.grid import Grid, GridCell
+from analysis.predict.power.planned import Option, Precision, Tally, merged, precisions, shares, smallest
 from analysis.predict.power.studies import PUBLISHED
 from experiments.record.provenance import provenance
 
@@ -111,7 +111,7 @@ def power_of(grid: Grid, tallies: Iterator[Tally], assumptions: Iterable[str]) -
     )
 
 
-def _design(cell: Cell, tally: Tally) -> DesignPower:
+def _design(cell: GridCell, tally: Tally) -> DesignPower:
     design = cell.design
     return DesignPower(
         participants=design.participants,

@@ -10,9 +10,9 @@ from contextlib import AbstractContextManager
 from dataclasses import asdict, dataclass
 from pathlib import Path
 
-from analysis.predict.jobs import Run, cores, on_cluster, on_processes
+from analysis.predict.jobs import RunPieces, cores, on_cluster, on_processes
 from analysis.predict.power.assumptions import assumptions
-from analysis.predict.power.grid import Grid, Request, make_grid
+from analysis.predict.power.grid import Grid, PowerRequest, make_grid
 from analysis.predict.power.page import in_short, sections
 from analysis.predict.power.planned import Tally
 from analysis.predict.power.results import Power, power_of
@@ -24,7 +24,7 @@ from experiments.config.setup import sha256
 from experiments.record import storage
 from experiments.record.provenance import provenance
 
-__all__ = ["Request", "Where", "in_short", "power"]
+__all__ = ["PowerRequest", "Where", "in_short", "power"]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -35,7 +35,7 @@ class Where:
     scheduler: str | None = None
 
 
-def power(request: Request, where: Where, out: Path, progress: Progress) -> Power:
+def power(request: PowerRequest, where: Where, out: Path, progress: Progress) -> Power:
     """Simulate, analyse, write `power.json`, report and figures into `out`; what was found is returned.
 
     What was done before an interruption is kept there, and the same request goes on with it.
@@ -64,11 +64,11 @@ def job_of(grid: Grid) -> str:
     return sha256([provenance(), grid.request.seed, grid.request.null, config, published, chunks])
 
 
-def _workers(where: Where) -> AbstractContextManager[Run]:
+def _workers(where: Where) -> AbstractContextManager[RunPieces]:
     return on_processes(where.workers or cores()) if where.scheduler is None else on_cluster(where.scheduler)
 
 
-def _tallies(chunks: Sequence[Chunk], run: Run, kept: Path, tell: Callable[[str], None]) -> list[Tally]:
+def _tallies(chunks: Sequence[Chunk], run: RunPieces, kept: Path, tell: Callable[[str], None]) -> list[Tally]:
     """The tally of each chunk, in their order; those that `kept` holds are not worked out again."""
     found = dict(_kept(kept))
     for number in found:

@@ -1,4 +1,4 @@
-"""Participants rebuilt from the published numbers, seated as synthetic ones: setups whose tables answer for them."""
+"""Participants rebuilt from the published numbers, as synthetic ones: setups whose tables answer for them."""
 
 from __future__ import annotations
 
@@ -35,7 +35,7 @@ class ReconstructedPeople:
 
 
 def misfit(study: StudyConfig, setups: Sequence[Setup[Any]], paper: Paper | None) -> str | None:
-    """Why the paper's participants cannot be seated in this study; None if they can."""
+    """Why the paper's participants do not fit this study; None if they can."""
     if paper is None:
         return "the study names no paper"
     for setup in setups:
@@ -62,9 +62,11 @@ def _other_trials(config: DirectionConfig | PreferenceConfig, paper: Paper) -> s
     return None if (config.rating.minimum, config.rating.maximum) == scale else "preference has another scale"
 
 
-def seat(study: StudyConfig, setups: Sequence[Setup[Any]], paper: Paper, seed: int) -> ReconstructedPeople:
+def reconstructed_people(
+    study: StudyConfig, setups: Sequence[Setup[Any]], paper: Paper, seed: int
+) -> ReconstructedPeople:
     """The setups with reconstructed participants. `ConfigError` if no such participants were found."""
-    codes, seated, notes = study.codes(), [], [HONESTY]
+    codes, people, notes = study.codes(), [], [HONESTY]
     for setup in setups:
         try:
             answers, note = _answers(setup.config, paper, codes, seed)
@@ -72,9 +74,9 @@ def seat(study: StudyConfig, setups: Sequence[Setup[Any]], paper: Paper, seed: i
             raise ConfigError(f"{setup.source}: {error}; try another --seed, or --observer rates") from error
         synthetic = setup.config.synthetic.model_copy(update={"observer": "table", "table": table_name(setup)})
         config = setup.config.model_copy(update={"synthetic": synthetic})
-        seated.append(replace(setup, config=config, answers=answers))
+        people.append(replace(setup, config=config, answers=answers))
         notes.append(note)
-    return ReconstructedPeople(setups=tuple(seated), notes=tuple(notes))
+    return ReconstructedPeople(setups=tuple(people), notes=tuple(notes))
 
 
 def table_name(setup: Setup[Any]) -> str:
@@ -82,7 +84,7 @@ def table_name(setup: Setup[Any]) -> str:
     return f"reconstructed_{setup.config.experiment}.csv"
 
 
-def table_bytes(setup: Setup[Any]) -> bytes:
+def answers_table(setup: Setup[Any]) -> bytes:
     """The answers as CSV: a table for `synthetic.table` of a config."""
     text = io.StringIO(newline="")
     writer = csv.DictWriter(text, CATALOGUE[setup.config.experiment].answer_columns)

@@ -12,20 +12,17 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, Literal
 
-import numpy as np
-from numpy.typing import NDArray
-
 from analysis.logs.reading import Logs, read_logs
 from analysis.paper.audit import audit
 from analysis.paper.audit.paper_file import load_paper_file
 from analysis.paper.audit.run import Finding
 from analysis.paper.audit.sentences import ATTENTION, ELSEWHERE, other_rows, predictions
-from analysis.paper.odds import Odds, chance_recurs, odds_of, recurs
-from analysis.paper.paper import Paper, load_paper
+from analysis.paper.paper import Paper, PublishedExperiment, load_paper
 from analysis.paper.published import Row
-from analysis.predict.power import studies as power_studies
-from analysis.predict.reproduction.reconstructed import misfit, seat, table_bytes, table_name
+from analysis.paper.recurrence import PatternOdds
+from analysis.predict.reproduction.reconstructed import answers_table, misfit, reconstructed_people, table_name
 from analysis.predict.simulate.shot import shot_panel
+from analysis.predict.synthetic_studies import pattern_odds
 from analysis.summary.comparison import compare
 from analysis.summary.results import StudyStatistics
 from analysis.summary.sections.data import ReportData
@@ -37,64 +34,13 @@ from experiments.clock import VirtualClock
 from experiments.config.door import ConfigError
 from experiments.config.models import StudyConfig
 from experiments.config.setup import Setup, sha256
-from experiments.design.streams import Stream, generator
-from experiments.direction.config import DirectionConfig
 from experiments.load import load_setup, load_study
-from experiments.preference.config import PreferenceConfig
-from experiments.preference.synthetic import draw_ratings
 from experiments.record import storage
 from experiments.record.journal import begun
 from experiments.record.provenance import git_commit, provenance, recoil_version
 from experiments.run import RunRequest, run
 from experiments.screens.synthetic import synthetic_screen
 from experiments.study import places
-
-Scores = NDArray[np.float64]
-Counts = NDArray[np.int64]
-
-
-def direction_counts(config: DirectionConfig, methods: list[str], n: int, replications: int, seed: int) -> Counts:
-    """Correct answers, (replications, n, methods, 2 directions), of people drawn as `RatesParticipant` draws them."""
-    counts = power_studies.direction_counts(config, n, replications, generator(seed, "odds", config.experiment))
-    return counts[:, :, [config.design.methods.index(method) for method in methods]]
-
-
-def preference_scores(config: PreferenceConfig, methods: list[str], n: int, replications: int, seed: int) -> Scores:
-    """Ratings, (replications, n, methods), of people drawn as `RatingsParticipant` draws them."""
-    stream = Stream(seed, "odds", config.experiment)
-    law, scale = config.synthetic.ratings, config.rating
-    people = (draw_ratings(law, scale, methods, stream) for _ in range(replications * n))
-    ratings = [person[method] for person in people for method in methods]
-    return np.array(ratings).reshape(replications, n, len(methods))
-
-
-def direction_odds(config: DirectionConfig, paper: Paper, replications: int, seed: int) -> Odds:
-    """The odds of experiment 1's claims at the published rates."""
-    published, rates, forward = paper.direction, config.synthetic.rates, config.design.forward_per_session
-    counts = direction_counts(config, published.methods, published.n, replications, seed)
-    claims = recurs(counts[..., 0] / forward, published)
-    return odds_of(
-        config.experiment,
-        claims | chance_recurs(counts.sum(axis=1), published.n * forward, published),
-        f"{published.n} people whose correct rates are, in the mean, the published ones; people differ by an ability "
-        f"of SD {rates.ability_sd:g} and a bias of SD {rates.bias_sd:g} in probit units (assumed); "
-        f"{forward} forward and as many backward trials a method; seed {seed}.",
-    )
-
-
-def preference_odds(config: PreferenceConfig, paper: Paper, replications: int, seed: int) -> Odds:
-    """The odds of experiment 2's claims at the assumed ratings."""
-    published, law = paper.preference, config.synthetic.ratings
-    scores = preference_scores(config, published.methods, published.n, replications, seed)
-    means = ", ".join(f"{method} {law.mean[method]:g}" for method in published.methods)
-    return odds_of(
-        config.experiment,
-        recurs(scores, published),
-        f"{published.n} people; the means and SDs are not published, so these are assumed: {means}; SD between people "
-        f"{law.person_sd:g}, within {law.noise_sd:g}; a share of {law.same_share:g} give "
-        f"{' and '.join(law.same or ())} the same score; seed {seed}.",
-    )
-
 
 MANIFEST = "reproduction.json"
 
@@ -106,15 +52,15 @@ Tell = Callable[[str], None]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Study:
+class ReproducedStudy:
     """A study ready to run: its config, its experiments' setups, the seed and the published numbers.
 
-    `seated`: the setups with the participants who answer; `findings`: the audit of the published numbers.
+    `answering`: the setups with the participants who answer; `findings`: the audit of the published numbers.
     """
 
     config: StudyConfig
     setups: tuple[Setup[Any], ...]
-    seated: tuple[Setup[Any], ...]
+    answering: tuple[Setup[Any], ...]
     seed: int
     paper: Paper | None
     findings: tuple[Finding, ...] = ()
@@ -123,16 +69,16 @@ class Study:
     @property
     def reconstructed(self) -> bool:
         """Are the participants rebuilt from the published numbers?"""
-        return self.seated != self.setups
+        return self.answering != self.setups
 
     @property
     def runs(self) -> list[tuple[Setup[Any], str]]:
         """Each experiment with each participant."""
-        return [(setup, code) for code in self.config.codes() for setup in self.seated]
+        return [(setup, code) for code in self.config.codes() for setup in self.answering]
 
     def manifest(self) -> dict[str, object]:
         """What makes one reproduction the same as another."""
-        setups = sha256([setup.record() for setup in self.seated])
+        setups = sha256([setup.record() for setup in self.answering])
         return {
             "seed": self.seed,
             "participants": self.config.codes(),
@@ -150,7 +96,7 @@ class Reproduced:
     comparison: tuple[Row, ...]
 
 
-def load(name: str, seed: int, observer: Observer | None = None) -> Study:
+def prepared(name: str, seed: int, observer: Observer | None = None) -> ReproducedStudy:
     """A study from its config, with reconstructed participants unless others are asked for or those do not fit it.
 
     `ConfigError` for configs that cannot be used, and if reconstructed participants are asked for and do not fit.
@@ -159,24 +105,24 @@ def load(name: str, seed: int, observer: Observer | None = None) -> Study:
     setups = tuple(load_setup(str(folder / experiment)) for experiment in config.experiments)
     paper = load_paper(folder / config.paper) if config.paper else None
     findings = audit(load_paper_file(folder / config.paper)) if config.paper else ()
-    study = Study(config=config, setups=setups, seated=setups, seed=seed, paper=paper, findings=findings)
+    study = ReproducedStudy(config=config, setups=setups, answering=setups, seed=seed, paper=paper, findings=findings)
     reason = "other participants were asked for" if observer == "rates" else misfit(config, setups, paper)
     if observer == "reconstructed" and reason:
         raise ConfigError(f"{name}: no reconstructed participants: {reason}")
     if paper is None or reason:
         return replace(study, notes=(f"The participants are those of the configs: {reason}.",))
-    seated = seat(config, setups, paper, seed)
-    return replace(study, seated=seated.setups, notes=seated.notes)
+    people = reconstructed_people(config, setups, paper, seed)
+    return replace(study, answering=people.setups, notes=people.notes)
 
 
-def reproduce(study: Study, out: Path, tell: Tell) -> Reproduced:
+def reproduce(study: ReproducedStudy, out: Path, tell: Tell) -> Reproduced:
     """Run, log, analyse and report a study into `out`.
 
     An unfinished reproduction of the same study is gone on with; another one in `out` is set aside.
     """
     _claim(study, out)
     for setup, code in study.runs:
-        _seat(study, setup, code, out / "logs")
+        _take_part(study, setup, code, out / "logs")
         tell(f"{code} {setup.config.experiment}")
     logs = read_logs([out / "logs"])
     statistics = summarize(logs)
@@ -215,14 +161,14 @@ def _remarkable(row: Row) -> bool:
     return bool(row.note) and row.verdict in {"differs", "differs as predicted", *ATTENTION}
 
 
-def _compared(study: Study, statistics: StudyStatistics) -> Iterator[Row]:
+def _compared(study: ReproducedStudy, statistics: StudyStatistics) -> Iterator[Row]:
     """Every published number: those that logs hold beside the obtained, the others with the audit's verdict."""
     if study.paper is not None:
         yield from compare(statistics, study.paper, predictions(study.findings))
         yield from other_rows(study.findings)
 
 
-def _claim(study: Study, out: Path) -> None:
+def _claim(study: ReproducedStudy, out: Path) -> None:
     """Make `out` this study's: go on with the same, set aside another, refuse what is not a reproduction."""
     manifest, wanted = out / MANIFEST, study.manifest()
     if manifest.is_file():
@@ -232,12 +178,12 @@ def _claim(study: Study, out: Path) -> None:
     elif out.exists() and (not out.is_dir() or any(out.iterdir())):
         raise places.PlaceError(f"{out}: exists and is no reproduction of a study; choose another --out")
     storage.make_folder(out)
-    for setup in study.seated if study.reconstructed else ():
-        storage.write_whole(out / table_name(setup), table_bytes(setup))
+    for setup in study.answering if study.reconstructed else ():
+        storage.write_whole(out / table_name(setup), answers_table(setup))
     storage.write_whole(manifest, (json.dumps(wanted, indent=1) + "\n").encode())
 
 
-def _seat(study: Study, setup: Setup[Any], code: str, results: Path) -> None:
+def _take_part(study: ReproducedStudy, setup: Setup[Any], code: str, results: Path) -> None:
     """Have a synthetic participant do an experiment, unless the logs hold it already."""
     where = places.place(results, code, setup.config.experiment)
     if not _finished(where):
@@ -253,18 +199,22 @@ def _finished(where: places.Place) -> bool:
     return before is not None and before.finished
 
 
-def _odds(study: Study) -> Iterator[Odds]:
+def _odds(study: ReproducedStudy) -> Iterator[PatternOdds]:
     if study.paper is None or not study.config.replications:
         return
     for setup in study.setups:
-        if isinstance(setup.config, DirectionConfig) and setup.config.synthetic.observer == "rates":
-            yield direction_odds(setup.config, study.paper, study.config.replications, study.seed)
-        if isinstance(setup.config, PreferenceConfig) and setup.config.synthetic.observer == "ratings":
-            yield preference_odds(setup.config, study.paper, study.config.replications, study.seed)
+        config = setup.config
+        if config.synthetic.observer in ("rates", "ratings"):
+            published: PublishedExperiment = getattr(study.paper, config.experiment)
+            yield pattern_odds(config, published, study.config.replications, study.seed)
 
 
 def _report(
-    study: Study, logs: Logs, statistics: StudyStatistics, odds: tuple[Odds, ...], comparison: tuple[Row, ...]
+    study: ReproducedStudy,
+    logs: Logs,
+    statistics: StudyStatistics,
+    odds: tuple[PatternOdds, ...],
+    comparison: tuple[Row, ...],
 ) -> ReportData:
     people = "synthetic, reconstructed from the published numbers" if study.reconstructed else "synthetic"
     return ReportData(
@@ -288,7 +238,7 @@ def _panels(setup: Setup[Any]) -> Iterator[Any]:
             yield shot_panel(f"{label} (friction {parameters.friction_N:g} N)", parameters)
 
 
-def _notes(study: Study) -> Iterator[str]:
+def _notes(study: ReproducedStudy) -> Iterator[str]:
     """What the numbers rest on beyond the paper."""
     yield from study.notes
     gun = study.setups[0].gun

@@ -3,13 +3,15 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
-from dataclasses import asdict, dataclass
-from typing import Any
+from collections.abc import Mapping, Sequence
+from dataclasses import asdict, dataclass, field, replace
 
-from analysis.predict.simulate.sweep import axis_of
+from numpy.typing import ArrayLike
+
+from analysis.report.section import Section
+from analysis.report.serial import OPTIONAL
 from device.parameters import GunParameters
-from device.physics.scenes import COLLISION, NEEDED, SCENES, Scene, choose, choose_contact
+from device.physics.scenes import COLLISION, NEEDED, SCENES, Choice, Scene, choose, choose_contact
 from experiments.config.door import ConfigError
 
 _OWN = "needs of your own"
@@ -23,43 +25,55 @@ class ModelRequest:
     scene: str | None
     needs: Sequence[str]
 
+    @property
+    def is_of_scene(self) -> bool:
+        """Is the model to be picked for a use of it?"""
+        return self.scene is not None or bool(self.needs)
 
-def picked(asked: ModelRequest, gun: GunParameters, vary: Sequence[str]) -> tuple[str, dict[str, Any]]:
-    """The model's name and, for a scene, what to tell of the pick. `ConfigError`: more than one is asked for.
 
-    `vary` are the parameters of a table: the pick holds for all of its guns.
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ScenePick(Choice):
+    """The model picked for a scene, what the scene needs, and how its collision may be taken if it asks for one."""
+
+    needs: Mapping[str, float]
+    why: str
+    contact_model: str | None = field(default=None, metadata=OPTIONAL)
+    contact_error: float | None = field(default=None, metadata=OPTIONAL)
+
+
+def picked(request: ModelRequest, gun: GunParameters, varied: Mapping[str, ArrayLike]) -> tuple[str, ScenePick | None]:
+    """The model's name and, for a scene, the pick. `ConfigError`: more than one is asked for.
+
+    `varied` are the parameters of a table: the pick holds for all of its guns.
     """
-    scene = _scene(asked)
+    scene = _scene(request)
     if scene is None:
-        return asked.fidelity or "full", {}
-    axes = [axis_of(words, gun) for words in vary]
-    choice = choose(scene, gun, **{axis.key: axis.values for axis in axes})
-    return choice.fidelity, {"scene": {"needs": dict(scene.needs), "why": scene.why} | asdict(choice)}
+        return request.fidelity or "full", None
+    choice = choose(scene, gun, **varied)
+    return choice.fidelity, ScenePick(**asdict(choice), needs=dict(scene.needs), why=scene.why)
 
 
-def contact_of(asked: ModelRequest, gun: GunParameters, impact_speed_m_s: float | None) -> dict[str, Any]:
-    """How the collision may be taken, where the scene asks for one and there is one."""
-    scene = _scene(asked)
+def with_contact(
+    pick: ScenePick, request: ModelRequest, gun: GunParameters, impact_speed_m_s: float | None
+) -> ScenePick:
+    """The pick with how the collision may be taken, where the scene asks for one and there is one."""
+    scene = _scene(request)
     if scene is None or impact_speed_m_s is None or scene.contact_error is None:
-        return {}
+        return pick
     contact, error = choose_contact(scene, gun, impact_speed_m_s)
-    return {"contact_model": contact, "contact_error": error}
+    return replace(pick, contact_model=contact, contact_error=error)
 
 
-def with_scene(told: dict[str, Any], text: str) -> str:
-    """The text after the pick for a person, if there was one."""
-    return f"{_as_text(told['scene'])}\n{text}" if told else text
-
-
-def _as_text(scene: dict[str, Any]) -> str:
-    errors = ", ".join(f"{output} {error:.2g}" for output, error in scene["errors"].items())
-    lines = [f"Scene {scene['scene']}: model {scene['fidelity']}, stated errors {errors}", f"  {scene['reason']}"]
-    if scene["fidelity"] != "full":
-        others = ", ".join(output for output in NEEDED if output not in scene["errors"])
-        lines += [f"  not needed, so not promised: {others}"] if others else []
-    if "contact_model" in scene:
-        lines.append(f"  collision: {_CONTACTS[scene['contact_model']].format(scene['contact_error'])}")
-    return "\n".join(lines)
+def scene_section(pick: ScenePick) -> Section:
+    """The pick in words."""
+    errors = ", ".join(f"{output} {error:.2g}" for output, error in pick.errors.items())
+    lines = [pick.reason]
+    if pick.fidelity != "full":
+        others = ", ".join(output for output in NEEDED if output not in pick.errors)
+        lines += [f"not needed, so not promised: {others}"] if others else []
+    if pick.contact_model is not None:
+        lines.append(f"collision: {_CONTACTS[pick.contact_model].format(pick.contact_error)}")
+    return Section(title=f"Scene {pick.scene}: model {pick.fidelity}, stated errors {errors}", items=tuple(lines))
 
 
 _CONTACTS = {
@@ -68,19 +82,19 @@ _CONTACTS = {
 }
 
 
-def _scene(asked: ModelRequest) -> Scene | None:
+def _scene(request: ModelRequest) -> Scene | None:
     given = [
         name
-        for name, value in (("--fidelity", asked.fidelity), ("--scene", asked.scene), ("--need", asked.needs))
+        for name, value in (("--fidelity", request.fidelity), ("--scene", request.scene), ("--need", request.needs))
         if value
     ]
     if len(given) > 1:
         raise ConfigError(f"{' and '.join(given)}: each of them says which model; give one")
-    if asked.needs:
-        return _own_scene(asked.needs)
-    if asked.scene is not None and asked.scene not in SCENES:
-        raise ConfigError(f"--scene {asked.scene}: must be one of {', '.join(SCENES)}")
-    return None if asked.scene is None else SCENES[asked.scene]
+    if request.needs:
+        return _own_scene(request.needs)
+    if request.scene is not None and request.scene not in SCENES:
+        raise ConfigError(f"--scene {request.scene}: must be one of {', '.join(SCENES)}")
+    return None if request.scene is None else SCENES[request.scene]
 
 
 def _own_scene(needs: Sequence[str]) -> Scene:

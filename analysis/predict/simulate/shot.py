@@ -1,4 +1,4 @@
-"""`recoil simulate`: one shot by the model: summary, trace and figure."""
+"""One shot by the model: summary, trace and figure; where energy went, a hand and a stop that give way; a vibration."""
 
 from __future__ import annotations
 
@@ -6,21 +6,105 @@ import csv
 import io
 import math
 import textwrap
-from collections.abc import Sequence
-from dataclasses import asdict, fields, replace
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import asdict, dataclass, field, fields, replace
 from pathlib import Path
 from typing import Any
 
-from analysis.predict.simulate.more import as_lines, shown
-from analysis.report.figures.shot import ShotPanel, figure_5
+import numpy as np
+
+from analysis.predict.simulate.scene import ScenePick, scene_section
+from analysis.report.figures.shot import ShotPanel, VibrationPanel, figure_5, figure_vibration
+from analysis.report.section import Section
+from analysis.report.serial import OPTIONAL
 from device.parameters import GunParameters
 from device.physics import ShotSummary, simulate, trace
+from device.physics.energy_balance import EnergyBalance
+from device.physics.hand import (
+    Collision,
+    Hand,
+    compliant_collision,
+    rigid_collision,
+    simulate_held,
+)
+from device.vibration import Vibration, VibrationParameters, solved, waveform
 from experiments.config.door import ConfigError
-from experiments.load import load_gun
+from experiments.config.gun import GunConfig
 from experiments.record import storage
 
+USUAL_HAND = "assumed"
+"""The word for the hand of assumed numbers."""
+_BALANCE_WORDS = {
+    "supplied_J": "by the drive",
+    "created_J": "by a back-EMF that is not reciprocal; below 0 what it destroys",
+    "switched_off_J": "what the coil held when the drive opened",
+    "residual_J": "supplied and created less the rest: rounding",
+    "force_impulse_Ns": "of F on the hand",
+    "collision_impulse_Ns": "of the impacts on the stop",
+    "residual_impulse_Ns": "net over the cycle, less the momentum left",
+}
+_AFTER_S = 0.4  # looked at after the pulse: a shot's way home and the hand's rest
 _COARSE_S = 0.0005  # steps above which a curve is drawn with corners
 _MOST_POINTS = 40_000
+_TITLE_WIDTH = 44
+_VIBRATION_POINTS = 2401
+_FINE = 200_001  # samples, of which the largest is the peak to nine digits
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ShotInHand(Hand):
+    """A hand, and the shot of the gun that it holds, looked at until `until_s`; the numbers are those of `HeldShot`."""
+
+    until_s: float
+    peak_hand_force_N: float
+    peak_kick_m: float
+    max_displacement_m: float
+    reset_end_s: float | None
+    impact_speed_m_s: float | None
+    residual_impulse_Ns: float
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class StopCollision:
+    """The collision with a stop of this stiffness beside the rigid one; None where the magnet does not come home."""
+
+    stop_N_m: float
+    rigid: Collision | None
+    compliant: Collision | None
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class SimulatedShot:
+    """The summary of a shot with the parameters it stands for, and what else was asked for."""
+
+    fidelity: str
+    parameters: GunParameters
+    summary: ShotSummary
+    scene: ScenePick | None = field(default=None, metadata=OPTIONAL)
+    audit: EnergyBalance | None = field(default=None, metadata=OPTIONAL)
+    hand: ShotInHand | None = field(default=None, metadata=OPTIONAL)
+    contact: StopCollision | None = field(default=None, metadata=OPTIONAL)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class VibrationSummary:
+    """The largest and the mean acceleration, what is left of it at the end, and the two decays."""
+
+    peak_m_s2: float
+    rms_m_s2: float
+    duration_s: float
+    left_at_end_m_s2: float
+    frequency_Hz: float
+    slow_decay_1_s: float
+    fast_decay_1_s: float
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class SimulatedVibration:
+    """The acceleration that meets a vibration's published numbers."""
+
+    parameters: VibrationParameters
+    summary: VibrationSummary
 
 
 def shot_panel(title: str, parameters: GunParameters) -> ShotPanel:
@@ -50,19 +134,15 @@ def _or_nan(value: float | None) -> float:
     return math.nan if value is None else value
 
 
-KINDS: dict[str, type[float] | type[str]] = {
+PARAMETER_KINDS: dict[str, type[float] | type[str]] = {
     field.name: str if isinstance(field.default, str) else float for field in fields(GunParameters)
 }
 """What each of a gun's parameters is: a number or a word."""
 
 
-_TITLE_WIDTH = 44
-
-
-def parameters_of(gun_file: Path, method: str | None, changes: Sequence[str]) -> GunParameters:
+def parameters_of(gun: GunConfig, method: str | None, changes: Sequence[str]) -> GunParameters:
     """The parameters of a method of a gun, its first one if none is named, with `key=value` changes."""
-    gun = load_gun(gun_file)
-    name = method or _first_force_method(gun.methods)
+    name = method or _first_force_method(gun)
     if name not in gun.methods:
         raise ConfigError(f"--method {name}: the gun has {', '.join(gun.methods)}")
     parameters = gun.rendering(name)
@@ -74,17 +154,18 @@ def parameters_of(gun_file: Path, method: str | None, changes: Sequence[str]) ->
     return _changed(parameters, changes)
 
 
-def _first_force_method(methods: Any) -> str:
-    return next((name for name, method in methods.items() if method.actuator == "voice-coil"), "asymmetric-1")
+def _first_force_method(gun: GunConfig) -> str:
+    methods = gun.methods.items()
+    return next((name for name, method in methods if method.actuator == "voice-coil"), "asymmetric-1")
 
 
 def _changed(parameters: GunParameters, changes: Sequence[str]) -> GunParameters:
     values: dict[str, Any] = {}
     for change in changes:
         key, equals, text = change.partition("=")
-        if not equals or key not in KINDS:
-            raise ConfigError(f"--set {change}: must be key=value with a key of {', '.join(KINDS)}")
-        values[key] = _value(change, text, KINDS[key])
+        if not equals or key not in PARAMETER_KINDS:
+            raise ConfigError(f"--set {change}: must be key=value with a key of {', '.join(PARAMETER_KINDS)}")
+        values[key] = _value(change, text, PARAMETER_KINDS[key])
     try:
         return replace(parameters, **values)
     except ValueError as error:
@@ -98,23 +179,72 @@ def _value(change: str, text: str, kind: type[float] | type[str]) -> object:
         raise ConfigError(f"--set {change}: {text!r} is not a number") from error
 
 
-def summary_of(parameters: GunParameters, fidelity: str) -> dict[str, Any]:
-    """The summary of a shot with the parameters it stands for. `ConfigError` for a fidelity that is not known."""
+def simulated_shot(parameters: GunParameters, fidelity: str) -> SimulatedShot:
+    """A shot by a model. `ConfigError` for a fidelity that is not known."""
     try:
         summary = simulate(parameters, fidelity=fidelity)
     except ValueError as error:
         raise ConfigError(f"--fidelity {fidelity}: {error}") from error
-    return {"fidelity": fidelity, "parameters": asdict(parameters), "summary": asdict(summary)}
+    return SimulatedShot(fidelity=fidelity, parameters=parameters, summary=summary)
+
+
+def in_hand(parameters: GunParameters, words: str) -> ShotInHand:
+    """The shot of a gun in a hand of these words. `ConfigError`: words that are none."""
+    hand = _hand(words)
+    until_s = parameters.pulse_s + _AFTER_S
+    try:
+        shot = simulate_held(parameters, hand, until_s)
+    except (ValueError, RuntimeError) as error:
+        raise ConfigError(f"--hand {words}: {error}") from error
+    return ShotInHand(**asdict(hand), until_s=until_s, **asdict(shot))
+
+
+def _hand(words: str) -> Hand:
+    if words == USUAL_HAND:
+        return Hand()
+    known = [field.name for field in fields(Hand)]
+    numbers: dict[str, float] = {}
+    for word in words.split(","):
+        key, equals, text = word.partition("=")
+        if not equals or key not in known:
+            raise ConfigError(
+                f"--hand {words}: must be `{USUAL_HAND}`, or key=value,... with keys of {', '.join(known)}"
+            )
+        numbers[key] = _number(f"--hand {words}", text)
+    try:
+        return Hand(**numbers)
+    except ValueError as error:
+        raise ConfigError(f"--hand {words}: {error}") from error
+
+
+def collision_with_stop(parameters: GunParameters, impact_speed_m_s: float | None, stop_N_m: float) -> StopCollision:
+    """The collision with a stop of this stiffness. `ConfigError`: a stiffness that is none."""
+    if not 0 < stop_N_m < math.inf:
+        raise ConfigError(f"--contact-stiffness {stop_N_m:g}: must be a finite stiffness in N/m above 0")
+    if impact_speed_m_s is None:
+        return StopCollision(stop_N_m=stop_N_m, rigid=None, compliant=None)
+    return StopCollision(
+        stop_N_m=stop_N_m,
+        rigid=rigid_collision(parameters, impact_speed_m_s),
+        compliant=compliant_collision(parameters, impact_speed_m_s, stop_N_m),
+    )
+
+
+def _number(place: str, text: str) -> float:
+    try:
+        return float(text)
+    except ValueError as error:
+        raise ConfigError(f"{place}: {text!r} is not a number") from error
 
 
 def write_trace(parameters: GunParameters, path: Path) -> None:
     """The shot over time as CSV; units end the names."""
     shot = trace(parameters)
     names = [field.name for field in fields(shot) if field.name != "summary"]
-    write_columns(path, {name: getattr(shot, name).tolist() for name in names})
+    _write_columns(path, {name: getattr(shot, name).tolist() for name in names})
 
 
-def write_columns(path: Path, columns: dict[str, list[float]]) -> None:
+def _write_columns(path: Path, columns: Mapping[str, Sequence[float]]) -> None:
     """Columns of one length as CSV."""
     text = io.StringIO(newline="")
     writer = csv.writer(text, lineterminator="\r\n")
@@ -132,13 +262,96 @@ def write_plot(parameters: GunParameters, path: Path) -> None:
 def _title(parameters: GunParameters) -> str:
     """The friction, and every number that is not the paper's."""
     own = (field.name for field in fields(parameters) if getattr(parameters, field.name) != field.default)
-    others = [f"{name} = {shown(getattr(parameters, name))}" for name in own if name != "friction_N"]
+    others = [f"{name} = {_shown(getattr(parameters, name))}" for name in own if name != "friction_N"]
     return ", ".join([f"friction {parameters.friction_N:g} N", *others])
 
 
-def as_text(found: dict[str, Any]) -> str:
-    """The summary for a person: one number a line, units in the names; then what else was asked for."""
-    keys = ("friction_N", "return_friction_N", "drive_off", "emf")
-    options = ", ".join(f"{key} {found['parameters'][key]}" for key in keys if found["parameters"][key] is not None)
-    lines = [f"  {key:24} {shown(value)}" for key, value in found["summary"].items()]
-    return "\n".join([f"One shot, model {found['fidelity']}, {options}", *lines, *as_lines(found)])
+def sections(found: SimulatedShot) -> tuple[Section, ...]:
+    """The shot in words: one number a line, units in the names; the pick before it, what else was asked for after."""
+    p = found.parameters
+    options = {
+        "friction_N": p.friction_N,
+        "return_friction_N": p.return_friction_N,
+        "drive_off": p.drive_off,
+        "emf": p.emf,
+    }
+    said = ", ".join(f"{key} {value}" for key, value in options.items() if value is not None)
+    scene = () if found.scene is None else (scene_section(found.scene),)
+    shot = Section(title=f"One shot, model {found.fidelity}, {said}", items=_rows(found.summary))
+    return *scene, shot, *_more(found)
+
+
+def _more(found: SimulatedShot) -> Iterator[Section]:
+    if found.audit is not None:
+        rows = (
+            f"{name:24} {_shown(value):12} {_BALANCE_WORDS.get(name, '')}".rstrip()
+            for name, value in asdict(found.audit).items()
+        )
+        yield Section(title="Energy and momentum, full model, until the magnet rests", items=tuple(rows))
+    if found.hand is not None:
+        title = "In a hand: enclosure on a spring and damper (numbers of the hand first)"
+        yield Section(title=title, items=_rows(found.hand))
+    if found.contact is not None and found.contact.rigid is None:
+        yield Section(title="Collision: none, the magnet does not come home")
+    elif found.contact is not None:
+        yield Section(title="Collision with a rigid stop (equation 4)", items=_rows(found.contact.rigid))
+        title = f"Collision with a stop of {found.contact.stop_N_m:g} N/m"
+        yield Section(title=title, items=_rows(found.contact.compliant))
+
+
+def _rows(numbers: Any) -> tuple[str, ...]:
+    """A line for each field."""
+    return tuple(f"{one.name:24} {_shown(getattr(numbers, one.name))}" for one in fields(numbers))
+
+
+def _shown(value: object) -> str:
+    """A value for a person: six digits, and words for what was not reached."""
+    return "not reached" if value is None else f"{value:.6g}" if isinstance(value, float) else str(value)
+
+
+def simulated_vibration(
+    parameters: VibrationParameters, trace_file: Path | None, plot: Path | None
+) -> SimulatedVibration:
+    """What the vibration comes to; its trace and figure are written. `ConfigError`: there is no such one."""
+    try:
+        vibration = solved(parameters)
+    except ValueError as error:
+        raise ConfigError(f"vibration: {error}") from error
+    if trace_file:
+        time_s, acceleration = waveform(parameters, _VIBRATION_POINTS)
+        _write_columns(trace_file, {"time_s": time_s.tolist(), "acceleration_m_s2": acceleration.tolist()})
+    if plot:
+        figure_vibration(_vibration_panel(parameters, vibration), plot.with_suffix(""))
+    return SimulatedVibration(parameters=parameters, summary=_vibration_summary(parameters, vibration))
+
+
+def vibration_section(found: SimulatedVibration) -> Section:
+    """The vibration in words."""
+    return Section(title="One vibration: two decaying sinusoids of one frequency", items=_rows(found.summary))
+
+
+def _vibration_summary(parameters: VibrationParameters, vibration: Vibration) -> VibrationSummary:
+    time_s = np.linspace(0.0, parameters.duration_s, _FINE)
+    slow, fast = sorted({-float(rate) for rate in vibration.poles.real})
+    return VibrationSummary(
+        peak_m_s2=float(np.abs(vibration.acceleration_m_s2(time_s)).max()),
+        rms_m_s2=vibration.rms_m_s2(parameters.duration_s),
+        duration_s=parameters.duration_s,
+        left_at_end_m_s2=vibration.envelope_m_s2(parameters.duration_s),
+        frequency_Hz=parameters.frequency_Hz,
+        slow_decay_1_s=slow,
+        fast_decay_1_s=fast,
+    )
+
+
+def _vibration_panel(parameters: VibrationParameters, vibration: Vibration) -> VibrationPanel:
+    time_s = np.linspace(0.0, 1.25 * parameters.duration_s, _VIBRATION_POINTS)
+    return VibrationPanel(
+        title=f"Vibration, effect {parameters.effect} at {parameters.frequency_Hz:g} Hz",
+        time_s=time_s,
+        acceleration_m_s2=vibration.acceleration_m_s2(time_s),
+        envelope_m_s2=np.array([vibration.envelope_m_s2(time) for time in time_s.tolist()]),
+        peak_m_s2=parameters.peak_m_s2,
+        rms_m_s2=parameters.rms_m_s2,
+        duration_s=parameters.duration_s,
+    )

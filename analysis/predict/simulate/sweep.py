@@ -8,12 +8,11 @@ The last parameter named varies fastest. A block is in memory at a time, so a ta
 
 from __future__ import annotations
 
-import json
 import math
 import os
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
-from dataclasses import asdict, dataclass, replace
+from dataclasses import asdict, dataclass, field, fields, replace
 from importlib.util import find_spec
 from pathlib import Path
 from typing import IO, Any
@@ -24,7 +23,10 @@ import pyarrow.csv
 import pyarrow.parquet
 from numpy.typing import NDArray
 
-from analysis.predict.simulate.shot import KINDS
+from analysis.predict.simulate.scene import ScenePick, scene_section
+from analysis.predict.simulate.shot import PARAMETER_KINDS
+from analysis.report.section import Section
+from analysis.report.serial import OPTIONAL, as_json
 from analysis.report.terminal import Progress
 from device.parameters import GunParameters
 from device.physics import FIDELITIES, ShotBatch, simulate_batch
@@ -42,6 +44,26 @@ _GROUP = 65_536  # rows of a row group
 _WORD = pa.dictionary(pa.int8(), pa.string())
 
 
+@dataclass(frozen=True, slots=True, kw_only=True)
+class SweepOrigin:
+    """Where a table of shots comes from: it can be made again from this. `vary`: the words that asked for each axis."""
+
+    rows: int
+    fidelity: str
+    vary: dict[str, str]
+    parameters: dict[str, float | str | None]
+    provenance: dict[str, str]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Sweep(SweepOrigin):
+    """A table of shots that was written, and how many of them ended how."""
+
+    table: str
+    statuses: dict[str, int]
+    scene: ScenePick | None = field(default=None, metadata=OPTIONAL)
+
+
 def check_place(path: Path) -> None:
     """`ConfigError` for a name that says neither Parquet nor CSV, or that a folder has."""
     if path.suffix not in (".parquet", ".csv"):
@@ -51,11 +73,11 @@ def check_place(path: Path) -> None:
 
 
 @contextmanager
-def opened(path: Path, keys: Mapping[str, type], facts: Mapping[str, Any]) -> Iterator[Write]:
+def opened(path: Path, keys: Mapping[str, type], origin: SweepOrigin) -> Iterator[Write]:
     """A table to write to. It is in its place when this ends; if this is left by an error, nothing is."""
     columns = [pa.field(key, _WORD if kind is str else pa.float64()) for key, kind in keys.items()]
     columns += [pa.field("status", _WORD), *(pa.field(name, pa.float64()) for name in NUMBERS)]
-    about = json.dumps(facts, ensure_ascii=False, indent=1).encode()
+    about = as_json(origin).rstrip()
     is_csv = path.suffix == ".csv"
     with _whole(path) as stream:
         schema = pa.schema(columns, metadata={"recoil": about})
@@ -140,7 +162,7 @@ _FORMS = "FROM:TO:COUNT, log:FROM:TO:COUNT or A,B,C"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Axis:
+class SweepAxis:
     """One parameter's values, and the words that asked for them."""
 
     key: str
@@ -150,7 +172,10 @@ class Axis:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class SweepRequest:
-    """A table as it was asked for. `instead` are options that belong to a single shot, `changes` those of --set."""
+    """A table as it was asked for. `instead` are options that belong to a single shot, `changes` those of --set.
+
+    `scene`: the pick that the model comes from, if it was picked.
+    """
 
     gun: GunParameters
     fidelity: str
@@ -159,28 +184,30 @@ class SweepRequest:
     table: Path | None
     instead: Sequence[str] = ()
     yes: bool = False
+    scene: ScenePick | None = None
 
 
-def sweep(asked: SweepRequest, progress: Progress) -> dict[str, Any]:
+def sweep(request: SweepRequest, progress: Progress) -> Sweep:
     """Shoots all of it and writes the table; what it holds. `ConfigError`: what is asked for makes no table."""
-    if not asked.vary or asked.table is None:
+    if not request.vary or request.table is None:
         raise ConfigError("--vary and --table go together: --vary KEY=FROM:TO:COUNT --table FILE.parquet")
-    axes = _axes(asked)
-    path, rows = asked.table, math.prod(len(axis.values) for axis in axes)
-    _is_sensible(asked, rows)
+    axes = _axes(request)
+    path, rows = request.table, math.prod(len(axis.values) for axis in axes)
+    _is_sensible(request, rows)
     check_place(path)
-    facts = _facts(asked, axes, rows)
+    origin = _origin(request, axes, rows)
     counts = np.zeros(len(STATUSES), dtype=np.int64)
-    with opened(path, {axis.key: KINDS[axis.key] for axis in axes}, facts) as write:
-        for arrays, shots in _shoot(asked, axes, rows, progress):
+    with opened(path, {axis.key: PARAMETER_KINDS[axis.key] for axis in axes}, origin) as write:
+        for arrays, shots in _shoot(request, axes, rows, progress):
             write(arrays, shots)
             counts += np.bincount(shots.status, minlength=len(STATUSES))
     statuses = {name: int(count) for name, count in zip(STATUSES, counts, strict=True) if count}
-    return {"table": str(path), "statuses": statuses} | facts
+    known = {one.name: getattr(origin, one.name) for one in fields(SweepOrigin)}
+    return Sweep(**known, table=str(path), statuses=statuses, scene=request.scene)
 
 
 def _shoot(
-    asked: SweepRequest, axes: Sequence[Axis], rows: int, progress: Progress
+    request: SweepRequest, axes: Sequence[SweepAxis], rows: int, progress: Progress
 ) -> Iterator[tuple[dict[str, NDArray[Any]], ShotBatch]]:
     """Block by block: the parameters that vary, and the shots."""
     block = _BLOCK if find_spec("numba") else _SLOW_BLOCK
@@ -190,7 +217,7 @@ def _shoot(
             end = min(start + block, rows)
             places = np.unravel_index(np.arange(start, end), shape)
             arrays: dict[str, Any] = {axis.key: axis.values[place] for axis, place in zip(axes, places, strict=True)}
-            yield arrays, simulate_batch(asked.gun, fidelity=asked.fidelity, **arrays)
+            yield arrays, simulate_batch(request.gun, fidelity=request.fidelity, **arrays)
             done(f"{end:,} of {rows:,}")
 
 
@@ -201,60 +228,61 @@ def interpreted_note() -> str | None:
     return 'note: interpreted, about a millisecond a shot; install "recoil[fast]" for microseconds'
 
 
-def as_text(found: dict[str, Any]) -> str:
-    """The table for a person."""
-    statuses = ", ".join(f"{name} {count:,}" for name, count in found["statuses"].items())
-    varied = "; ".join(f"{key} {words}" for key, words in found["vary"].items())
-    return f"Table: {found['table']}, {found['rows']:,} shots ({statuses})\n  varied: {varied}"
+def sections(found: Sweep) -> tuple[Section, ...]:
+    """The table in words, the pick of a scene before it."""
+    statuses = ", ".join(f"{name} {count:,}" for name, count in found.statuses.items())
+    varied = "; ".join(f"{key} {words}" for key, words in found.vary.items())
+    table = Section(title=f"Table: {found.table}, {found.rows:,} shots ({statuses})", items=(f"varied: {varied}",))
+    return (table,) if found.scene is None else (scene_section(found.scene), table)
 
 
-def _facts(asked: SweepRequest, axes: Sequence[Axis], rows: int) -> dict[str, Any]:
-    """Where the table comes from: it can be made again from this."""
-    return {
-        "rows": rows,
-        "fidelity": asked.fidelity,
-        "vary": {axis.key: axis.words for axis in axes},
-        "parameters": {key: value for key, value in asdict(asked.gun).items() if key not in {a.key for a in axes}},
-        "provenance": provenance(),
-    }
+def _origin(request: SweepRequest, axes: Sequence[SweepAxis], rows: int) -> SweepOrigin:
+    varied = {axis.key: axis.words for axis in axes}
+    return SweepOrigin(
+        rows=rows,
+        fidelity=request.fidelity,
+        vary=varied,
+        parameters={key: value for key, value in asdict(request.gun).items() if key not in varied},
+        provenance=provenance(),
+    )
 
 
-def _is_sensible(asked: SweepRequest, rows: int) -> None:
-    if asked.instead:
+def _is_sensible(request: SweepRequest, rows: int) -> None:
+    if request.instead:
         raise ConfigError(
-            f"--vary makes a table of shots; {', '.join(asked.instead)} tells of a single one: drop either"
+            f"--vary makes a table of shots; {', '.join(request.instead)} tells of a single one: drop either"
         )
-    if asked.fidelity not in FIDELITIES:
-        raise ConfigError(f"--fidelity {asked.fidelity}: must be one of {', '.join(FIDELITIES)}")
-    if rows > MOST_ROWS and not asked.yes:
+    if request.fidelity not in FIDELITIES:
+        raise ConfigError(f"--fidelity {request.fidelity}: must be one of {', '.join(FIDELITIES)}")
+    if rows > MOST_ROWS and not request.yes:
         raise ConfigError(f"--vary asks for {rows:,} shots; more than {MOST_ROWS:,} need --yes")
 
 
-def _axes(asked: SweepRequest) -> list[Axis]:
-    axes = [axis_of(words, asked.gun) for words in asked.vary]
-    keys = [axis.key for axis in axes] + [change.partition("=")[0] for change in asked.changes]
+def _axes(request: SweepRequest) -> list[SweepAxis]:
+    axes = [axis_of(words, request.gun) for words in request.vary]
+    keys = [axis.key for axis in axes] + [change.partition("=")[0] for change in request.changes]
     twice = sorted({key for key in keys[: len(axes)] if keys.count(key) > 1})
     if twice:
         raise ConfigError(f"--vary {twice[0]}: is set or varied twice; name it once")
     return axes
 
 
-def axis_of(words: str, gun: GunParameters) -> Axis:
+def axis_of(words: str, gun: GunParameters) -> SweepAxis:
     """The values that KEY=FROM:TO:COUNT, KEY=log:FROM:TO:COUNT or KEY=A,B,C asks for. `ConfigError`: none do.
 
     >>> axis_of("friction_N=0.25:0.75:3", GunParameters()).values.tolist()
     [0.25, 0.5, 0.75]
     """
     key, equals, text = words.partition("=")
-    if not equals or key not in KINDS:
-        raise ConfigError(f"--vary {words}: must be KEY={_FORMS} with a key of {', '.join(KINDS)}")
-    values = _range(words, text) if ":" in text else _list(words, text, KINDS[key])
-    for value in values.tolist() if KINDS[key] is str else (values.min().item(), values.max().item()):
+    if not equals or key not in PARAMETER_KINDS:
+        raise ConfigError(f"--vary {words}: must be KEY={_FORMS} with a key of {', '.join(PARAMETER_KINDS)}")
+    values = _range(words, text) if ":" in text else _list(words, text, PARAMETER_KINDS[key])
+    for value in values.tolist() if PARAMETER_KINDS[key] is str else (values.min().item(), values.max().item()):
         try:
             replace(gun, **{key: value})
         except ValueError as error:
             raise ConfigError(f"--vary {words}: {error}") from error
-    return Axis(key=key, words=text, values=values)
+    return SweepAxis(key=key, words=text, values=values)
 
 
 def _list(words: str, text: str, kind: type[float] | type[str]) -> NDArray[Any]:

@@ -7,8 +7,8 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 from analysis.logs.reading import Problem
-from analysis.paper.odds import Odds
 from analysis.paper.published import Row
+from analysis.paper.recurrence import PatternOdds
 from analysis.report.figures.shot import ShotPanel
 from analysis.report.section import Section
 from analysis.summary.results import StudyStatistics
@@ -28,7 +28,7 @@ class ReportData:
     statistics: StudyStatistics
     problems: tuple[Problem, ...] = ()
     comparison: tuple[Row, ...] | None = None
-    odds: tuple[Odds, ...] = ()
+    odds: tuple[PatternOdds, ...] = ()
     panels: tuple[ShotPanel, ...] = ()
     files: tuple[Path, ...] = ()
     provenance: Mapping[str, str] = field(default_factory=dict)

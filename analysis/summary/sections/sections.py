@@ -6,8 +6,8 @@ import os
 from pathlib import Path
 
 from analysis.logs.reading import Problem
-from analysis.paper.odds import Odds
 from analysis.paper.published import AUDITED, Row
+from analysis.paper.recurrence import PatternOdds
 from analysis.report import apa
 from analysis.report.figures.shot import ShotPanel
 from analysis.report.figures.style import named
@@ -164,7 +164,7 @@ def _shot(panels: tuple[ShotPanel, ...]) -> Section:
     return Section(title="The shot", pictures=(shot_picture(panels),))
 
 
-def _odds(odds: tuple[Odds, ...]) -> Section:
+def _odds(odds: tuple[PatternOdds, ...]) -> Section:
     tables = tuple(
         Table(
             caption=f"{EXPERIMENTS.get(one.experiment, one.experiment).capitalize()}: {one.replications} replications",

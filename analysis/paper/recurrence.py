@@ -1,4 +1,4 @@
-"""How often published claims recur over many replications: one replication is luck."""
+"""How often published claims recur over many studies: one study is luck."""
 
 from __future__ import annotations
 
@@ -24,22 +24,23 @@ Recurrence = NDArray[np.bool_]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class OddsRow:
-    """The share of replications in which a claim held, with its 95 % Wilson interval."""
+class Share:
+    """The share of studies in which a claim held, with its 95 % Wilson interval: the Monte Carlo error."""
 
     claim: str
+    held: int
     share: float
     ci_low: float
     ci_high: float
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Odds:
-    """Replicability of an experiment's claims under `assumptions`, a sentence that says what was simulated."""
+class PatternOdds:
+    """How often an experiment's published claims recur under `assumptions`, which say what was simulated."""
 
     experiment: str
     replications: int
-    rows: tuple[OddsRow, ...]
+    rows: tuple[Share, ...]
     assumptions: str
 
 
@@ -63,24 +64,47 @@ def recurs(scores: ArrayLike, published: PublishedExperiment) -> dict[str, Recur
     return claims
 
 
-def chance_recurs(correct: ArrayLike, trials: int, published: PublishedDirection) -> dict[str, Recurrence]:
+def chance_recurs(correct: ArrayLike, trials: tuple[int, int], published: PublishedDirection) -> dict[str, Recurrence]:
     """In which replication the exact binomial test comes out as published: rejecting one half, or not, at 5 %.
 
-    `correct`: (..., k methods, 2 directions), counts of correct answers pooled over participants, of `trials` each;
-    methods in the order of `published.methods`, forward before backward.
+    `correct`: (..., k methods, 2 directions), counts of correct answers pooled over participants, of so many `trials`
+    forward and backward; methods in the order of `published.methods`, forward before backward.
     """
     counts = np.asarray(correct)
     claims = {}
     for claim in published.binomial:
         method, direction = published.methods.index(claim.method), ("forward", "backward").index(claim.direction)
-        rejected = np.asarray(binomial_test(counts[..., method, direction], trials).p) < SIGNIFICANT
+        rejected = np.asarray(binomial_test(counts[..., method, direction], trials[direction]).p) < SIGNIFICANT
         expected = float(claim.p) < SIGNIFICANT
         outcome = "p < .05" if expected else "p not below .05"
         claims[f"binomial, {claim.method} {claim.direction}, {outcome}"] = np.asarray(rejected == expected)
     return claims
 
 
-def odds_of(experiment: str, recurrences: Mapping[str, ArrayLike], assumptions: str) -> Odds:
+def answers_recur(correct: ArrayLike, trials: tuple[int, int], published: PublishedDirection) -> dict[str, Recurrence]:
+    """Which published claims of experiment 1 hold in which study: those of `recurs` and of `chance_recurs`.
+
+    `correct`: (studies, n participants, k methods, 2 directions), counts of correct answers of so many `trials`
+    forward and backward of each person and method; methods in the order of `published.methods`.
+    """
+    counts = np.asarray(correct)
+    n = counts.shape[-3]
+    pooled = n * trials[0], n * trials[1]
+    return recurs(counts[..., 0] / trials[0], published) | chance_recurs(counts.sum(axis=-3), pooled, published)
+
+
+def with_whole_pattern(claims: Mapping[str, Recurrence]) -> dict[str, Recurrence]:
+    """The claims, and all of them together: the paper's whole pattern of significance."""
+    return {**claims, WHOLE_PATTERN: np.logical_and.reduce(list(claims.values()))}
+
+
+def share_of(claim: str, held: int, studies: int) -> Share:
+    """The share of so many studies in which a claim held."""
+    low, high = wilson_interval(held, studies)
+    return Share(claim=claim, held=held, share=held / studies, ci_low=low, ci_high=high)
+
+
+def odds_of(experiment: str, recurrences: Mapping[str, ArrayLike], assumptions: str) -> PatternOdds:
     """The share of replications in which each claim recurred, and all of them together under `whole pattern`.
 
     `ValueError` without any replication.
@@ -89,9 +113,8 @@ def odds_of(experiment: str, recurrences: Mapping[str, ArrayLike], assumptions: 
     sizes = {held.size for held in flags.values()}
     if len(sizes) != 1 or 0 in sizes:
         raise ValueError(f"{experiment}: every claim needs the same number of replications, not {sorted(sizes)}")
-    flags[WHOLE_PATTERN] = np.logical_and.reduce(list(flags.values()))
-    rows = [_row(claim, int(held.sum()), held.size) for claim, held in flags.items()]
-    return Odds(experiment=experiment, replications=sizes.pop(), rows=tuple(rows), assumptions=assumptions)
+    rows = [share_of(claim, int(held.sum()), held.size) for claim, held in with_whole_pattern(flags).items()]
+    return PatternOdds(experiment=experiment, replications=sizes.pop(), rows=tuple(rows), assumptions=assumptions)
 
 
 def wilson_interval(successes: int, trials: int, confidence: float = 0.95) -> tuple[float, float]:
@@ -107,11 +130,6 @@ def wilson_interval(successes: int, trials: int, confidence: float = 0.95) -> tu
     scale = 1.0 + z * z / trials
     low = 0.0 if successes == 0 else (centre - half) / scale
     return low, 1.0 if successes == trials else (centre + half) / scale
-
-
-def _row(claim: str, held: int, replications: int) -> OddsRow:
-    low, high = wilson_interval(held, replications)
-    return OddsRow(claim=claim, share=held / replications, ci_low=low, ci_high=high)
 
 
 def _holds(pairs: PairStatistics, claim: TukeyClaim, methods: list[str]) -> Recurrence:

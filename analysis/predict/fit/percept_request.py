@@ -1,4 +1,4 @@
-"""What `recoil fit percept` is asked for, checked at the door: rates, trials, methods and people."""
+"""What the percept is fitted to, checked at the door: rates, trials, methods and people."""
 
 from __future__ import annotations
 
@@ -19,8 +19,8 @@ _LARGEST_SPREAD = 5.0
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Request:
-    """What the command line asks for. `rates`, such as `vibration=0.557,...`, stand in for the paper's.
+class PerceptRequest:
+    """What is to be fitted. `rates`, such as `vibration=0.557,...`, stand in for the paper's.
 
     `spread`: factor on the assumed differences between people whose mean rates these are.
     """
@@ -35,7 +35,7 @@ class Request:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Task:
+class PerceptTask:
     """A request with all that it names: forward rates, the trials behind each, methods, people, and what is published.
 
     `source` says in words where the rates come from; without a paper there is nothing to judge by.
@@ -49,7 +49,7 @@ class Task:
     published: PublishedDirection | None
 
 
-def read(request: Request) -> Task:
+def read_request(request: PerceptRequest) -> PerceptTask:
     """The task of a request. `ConfigError`: rates, trials, a paper or a gun that cannot be used."""
     if not 0.0 <= request.spread <= _LARGEST_SPREAD:
         raise ConfigError(f"--spread {request.spread:g}: must be a factor from 0 (people alike) to {_LARGEST_SPREAD:g}")
@@ -62,12 +62,12 @@ def read(request: Request) -> Task:
     if len(rates) < len(FITTED):
         option = f"--rates {request.rates}" if request.rates is not None else str(find(request.paper))
         raise ConfigError(f"{option}: {len(rates)} rates; three numbers are fitted, so there must be at least 3")
-    return Task(
+    return PerceptTask(
         source=source,
         rates=rates,
         trials=trials,
         methods=_methods(request.gun, rates),
-        people=scaled(ASSUMED_SPREAD, request.spread),
+        people=scaled_spread(ASSUMED_SPREAD, request.spread),
         published=published,
     )
 
@@ -99,7 +99,7 @@ def published_rates(published: PublishedDirection) -> tuple[dict[str, float], in
     return rates, published.n * published.protocol.forward_trials_per_session
 
 
-def scaled(people: People, factor: float) -> People:
+def scaled_spread(people: People, factor: float) -> People:
     """People who differ so many times as much."""
     return People(
         drift_factor_sd=factor * people.drift_factor_sd,
@@ -109,7 +109,7 @@ def scaled(people: People, factor: float) -> People:
     )
 
 
-def _published(request: Request) -> PublishedDirection:
+def _published(request: PerceptRequest) -> PublishedDirection:
     if request.trials is not None:
         raise ConfigError(f"--trials {request.trials}: the paper has its own; give the option with --rates alone")
     path = find(request.paper)

@@ -1,0 +1,264 @@
+"""Synthetic studies: the answers of many people at once, and how often a published pattern recurs among them.
+
+People are drawn as the synthetic participants of a session are: by rates, by ratings, or from what they feel of the
+gun's shots. The draws come from a generator that the caller names, so a piece of the studies is the same wherever and
+whenever it is worked out.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+from scipy.special import ndtr
+
+from analysis.paper.paper import PublishedDirection, PublishedExperiment
+from analysis.paper.recurrence import PatternOdds, Recurrence, answers_recur, odds_of, recurs
+from device.words import DIRECTIONS
+from experiments.config.setup import Setup
+from experiments.design.streams import generator
+from experiments.direction.config import DirectionConfig, Rates, Synthetic
+from experiments.direction.synthetic import model_parameters, probit_of_forward
+from experiments.preference.config import PreferenceConfig, Ratings, RatingScale
+from experiments.synthetic.diffusion import People, upper_probabilities
+from experiments.synthetic.model_based import NEUTRAL
+from experiments.synthetic.percept import Percept, evidence, own_start, percepts_of
+
+Floats = NDArray[np.float64]
+Counts = NDArray[np.int64]
+
+PEOPLE_A_PIECE = 70_000
+"""Participants drawn together: 5000 studies of 14. It is part of what a seed means, so it never depends on workers."""
+
+
+def piece_sizes(studies: int, participants: int) -> list[int]:
+    """So many studies of so many participants in pieces, each of which has a stream of its own.
+
+    >>> piece_sizes(12_000, 14)
+    [5000, 5000, 2000]
+    """
+    each = max(1, PEOPLE_A_PIECE // participants)
+    return [min(each, studies - first) for first in range(0, studies, each)]
+
+
+def direction_counts(
+    config: DirectionConfig, n: int, studies: int, draws: np.random.Generator, effect: float = 1.0
+) -> Counts:
+    """Correct answers, (studies, n, methods, 2 directions), of people drawn as `RatesParticipant` draws them.
+
+    `effect` is a factor on the probit of each mean correct rate, so on d': at 0 directions are guessed.
+    """
+    rates, design = config.synthetic.rates, config.design
+    ability = rates.ability_sd * draws.standard_normal((studies, n, 1, 1))
+    bias = rates.bias_sd * draws.standard_normal((studies, n, 1, 1))
+    says_forward = [[probit_of_forward(rates, method, way) for way in DIRECTIONS] for method in design.methods]
+    felt = rates.bias_mean + effect * (np.array(says_forward) - rates.bias_mean)
+    towards = np.array([1.0, -1.0])  # a correct answer is "forward" on forward trials, not "forward" on backward ones
+    correct = ndtr(towards * (felt + bias) + ability)
+    return draws.binomial([design.forward_per_session, design.backward_per_session], correct)
+
+
+def preference_scores(
+    config: PreferenceConfig, n: int, studies: int, draws: np.random.Generator, effect: float = 1.0
+) -> Floats:
+    """Ratings, (studies, n, methods), of people drawn as `draw_ratings` draws them.
+
+    `effect` is a factor on the distances of the methods' means from their common mean, and, below 1, on the share of
+    people who keep the lowest method below all others.
+    """
+    law, scale, methods = config.synthetic.ratings, config.rating, config.design.methods
+    person = law.person_sd * draws.standard_normal((studies, n, 1))
+    noise = law.noise_sd * draws.standard_normal((studies, n, len(methods)))
+    ratings = on_scale(scaled_means(law, methods, effect) + person + noise, scale)
+    if law.same and set(law.same) <= set(methods):
+        first, second = (methods.index(name) for name in law.same)
+        alike = draws.random((studies, n)) < law.same_share
+        ratings[..., second] = np.where(alike, ratings[..., first], ratings[..., second])
+    if law.lowest in methods:
+        lowest = methods.index(law.lowest)
+        below = on_scale(np.delete(ratings, lowest, axis=-1).min(axis=-1) - scale.grain, scale)
+        kept = draws.random((studies, n)) < effect
+        ratings[..., lowest] = np.where(kept, np.minimum(ratings[..., lowest], below), ratings[..., lowest])
+    return ratings
+
+
+def scaled_means(law: Ratings, methods: tuple[str, ...], effect: float) -> Floats:
+    """The methods' means, their distances from the common mean times `effect`."""
+    means = np.array([law.mean[method] for method in methods])
+    centre = means.mean()
+    return means if effect == 1.0 else centre + effect * (means - centre)
+
+
+def on_scale(values: Floats, scale: RatingScale) -> Floats:
+    """`experiments.session.steps.on_scale` of many values."""
+    steps = np.rint((np.clip(values, scale.minimum, scale.maximum) - scale.minimum) / scale.grain)
+    decimals = max(0, -int(np.floor(np.log10(scale.grain)))) + 2
+    return np.round(scale.minimum + steps * scale.grain, decimals)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Felt:
+    """What participants who feel the gun are drawn from; all but `people` may differ from study to study.
+
+    `log_odds`: (methods,) or (studies, 1, methods), of "forward" after a forward shot; `start`: one, or (studies, 1).
+    `cautions`: the boundary of each of the design's instructions, in units of the neutral one.
+    """
+
+    log_odds: ArrayLike
+    start: ArrayLike
+    people: People
+    lapse_rate: float = 0.0
+    cautions: tuple[float, ...] = (1.0,)
+
+
+def percepts_of_setup(setup: Setup[DirectionConfig]) -> dict[str, Percept]:
+    """What the gun's shots give to feel, by method."""
+    config = setup.config
+    return percepts_of(setup.gun.renderings(config.design.methods), model_parameters(config).percept.leak_s)
+
+
+def felt_people(
+    config: DirectionConfig, percepts: Mapping[str, Percept], methods: Sequence[str], effect: float = 1.0
+) -> Felt:
+    """The participants of a config; `effect` is a factor on the evidence, at 0 nothing is felt."""
+    mind = model_parameters(config)
+    instructions = config.design.instructions or (NEUTRAL,)
+    return Felt(
+        log_odds=tuple(effect * evidence(percepts[method], mind.percept) for method in methods),
+        start=mind.percept.start,
+        people=mind.people,
+        lapse_rate=mind.lapses.rate,
+        cautions=tuple(mind.boundaries[name] / mind.boundaries[NEUTRAL] for name in instructions),
+    )
+
+
+def felt_counts(felt: Felt, trials: tuple[int, int], n: int, studies: int, draws: np.random.Generator) -> Counts:
+    """Correct answers, (studies, n, methods, 2 directions), of `trials` forward and backward ones a method.
+
+    A person is drawn as `diffusion.person` draws one, and answers "forward" with the diffusion's own probability, so
+    counts are binomial and no times are needed.
+
+    With several instructions a person's trials fall under them as a shuffle of the session lays them: exact for
+    `balance = "session"`, a little more scattered than `balance = "set"` has them.
+    """
+    shares = _correct_shares(felt, (studies, n), draws)
+    if len(felt.cautions) == 1:
+        return draws.binomial(trials, shares[..., 0])
+    each = _under_each(trials, len(felt.cautions), shares.shape[:3], draws)
+    return np.asarray(draws.binomial(each, shares).sum(axis=-1))
+
+
+def _correct_shares(felt: Felt, size: tuple[int, int], draws: np.random.Generator) -> Floats:
+    """Each person's chances of being right, (studies, n, methods, 2 directions, instructions)."""
+    drift, boundary, logit = (draws.standard_normal(size) for _ in range(3))
+    people = felt.people
+    strength = (1.0 + people.drift_factor_sd * drift) * np.exp(people.log_boundary_sd * boundary)
+    product = (strength[..., None] * np.asarray(felt.log_odds))[..., None, None]
+    forward = own_start(felt.start, people.logit_start_sd * logit)[..., None, None, None]
+    towards = np.array([1.0, -1.0])[:, None]
+    # a backward shot seen in a mirror: the same evidence, towards "backward", from the mirrored start
+    upper = upper_probabilities(product * np.array(felt.cautions), 1.0, np.where(towards > 0, forward, 1.0 - forward))
+    return np.asarray((1.0 - felt.lapse_rate) * upper + felt.lapse_rate / 2.0)
+
+
+def _under_each(
+    trials: tuple[int, int], instructions: int, size: tuple[int, ...], draws: np.random.Generator
+) -> Counts:
+    """Trials (*size, 2, instructions): a session's forward trials at random places of equal parts."""
+    part = sum(trials) // instructions
+    forward = draws.multivariate_hypergeometric([part] * instructions, trials[0], size=size)
+    return np.stack([forward, part - forward], axis=-2)
+
+
+# Null participants, in whom there is nothing to be found
+
+
+def null_rates(rates: Rates, *, biased: bool) -> Rates:
+    """People who feel nothing (with effect 0), with the bias that `rates` give them or without any."""
+    bias = {} if biased else {"bias_mean": 0.0, "bias_sd": 0.0}
+    return rates.model_copy(update={"ability_sd": 0.0} | bias)
+
+
+def null_ratings(law: Ratings) -> Ratings:
+    """People who like all methods alike (with effect 0): without the habits, which are differences."""
+    return law.model_copy(update={"lowest": None, "same": None, "same_share": 0.0})
+
+
+def null_felt(synthetic: Synthetic, *, biased: bool) -> Synthetic:
+    """People who feel nothing (with effect 0), with the start that they have, or with one of 0.5 for everybody."""
+    if biased:
+        return synthetic
+    percept = synthetic.percept.model_copy(update={"start": 0.5})
+    people = synthetic.people.model_copy(update={"logit_start_sd": 0.0})
+    return synthetic.model_copy(update={"percept": percept, "people": people})
+
+
+# What is assumed of people, in words
+
+
+def rates_law(rates: Rates) -> Iterator[str]:
+    """People with correct rates of their own."""
+    for direction, values in (("forward", rates.forward), ("backward", rates.backward)):
+        yield f"Mean correct rates, {direction}: {', '.join(f'{name} {value:g}' for name, value in values.items())}."
+    yield (
+        f"People differ by an ability of SD {rates.ability_sd:g} and a bias of SD {rates.bias_sd:g} around "
+        f"{rates.bias_mean:g}, in probit units; the same in all methods. Trials are independent given the person."
+    )
+
+
+def ratings_law(law: Ratings, *, with_effect: bool = False) -> Iterator[str]:
+    """People who rate, also where the distances of the methods are multiplied by an effect."""
+    yield f"Mean ratings: {', '.join(f'{name} {value:g}' for name, value in law.mean.items())}."
+    yield f"SD between people {law.person_sd:g}, within people {law.noise_sd:g}; kept to the scale and its grain."
+    if law.lowest:
+        less = " at effect 1, by a smaller share below it" if with_effect else ""
+        yield f"{law.lowest} is rated below all others, by everybody{less}."
+    if law.same:
+        yield f"A share of {law.same_share:g} rates {' and '.join(law.same)} alike."
+
+
+def spread_sentence(people: People) -> str:
+    """How people who feel the gun differ."""
+    if people == People():
+        return "People are taken to be alike."
+    return (
+        f"People differ (assumed): SD {people.drift_factor_sd:g} of the factor on the drift, "
+        f"{people.log_boundary_sd:g} of the log boundary, {people.logit_start_sd:g} of the logit of the start."
+    )
+
+
+# How often the published pattern recurs
+
+
+def published_claims(
+    answers: ArrayLike, trials: tuple[int, int], methods: Sequence[str], published: PublishedExperiment
+) -> dict[str, Recurrence]:
+    """Which published claims hold in which study, whatever the order of `methods`.
+
+    `answers`: correct answers (studies, n, methods, 2 directions) of experiment 1, of so many `trials` each; ratings
+    (studies, n, methods) of experiment 2, for which `trials` say nothing.
+    """
+    places = [methods.index(method) for method in published.methods]
+    if isinstance(published, PublishedDirection):
+        return answers_recur(np.asarray(answers)[:, :, places], trials, published)
+    return recurs(np.asarray(answers)[:, :, places], published)
+
+
+def pattern_odds(
+    config: DirectionConfig | PreferenceConfig, published: PublishedExperiment, replications: int, seed: int
+) -> PatternOdds:
+    """How often the published claims recur among people of a config, in a study of the paper's size."""
+    draws, n, methods = generator(seed, "odds", config.experiment), published.n, config.design.methods
+    if isinstance(config, DirectionConfig):
+        answers: Counts | Floats = direction_counts(config, n, replications, draws)
+        trials = config.design.forward_per_session, config.design.backward_per_session
+        law, size = rates_law(config.synthetic.rates), f"{trials[0]} forward and {trials[1]} backward trials a method"
+        known = "of their rates only those that the paper prints are its own, all else is assumed"
+    else:
+        answers, trials = preference_scores(config, n, replications, draws), (0, 0)
+        law, size = ratings_law(config.synthetic.ratings), "one rating a method"
+        known = "neither means nor SDs are published, so these are assumed"
+    claims = published_claims(answers, trials, methods, published)
+    return odds_of(config.experiment, claims, f"{n} people, {size}, seed {seed}; {known}. {' '.join(law)}")
