@@ -14,14 +14,8 @@ DriveOff = Literal["shorted", "open"]
 Emf = Literal["printed", "reciprocal"]
 
 
-class _Remembers:
-    """Room for what the physics makes of a gun's numbers, beside its fields: shots are asked for by the million."""
-
-    __slots__ = ("_packed",)
-
-
 @dataclass(frozen=True, slots=True, kw_only=True)
-class GunParameters(_Remembers):
+class GunParameters:
     """The voice-coil gun of equations (1) to (3) and its drive pulse. Defaults: the paper's gun without damper.
 
     `drive_off` is what the coil does after the pulse: `shorted` keeps equation (3) with u = 0 (assumed default),

@@ -7,10 +7,11 @@ from device.parameters import GunParameters
 from device.physics import simulate, trace
 from device.physics.energy_balance import energy_balance
 from device.physics.hand import Hand, compliant_collision, rigid_collision, simulate_held
-from device.physics.trains import highest_rate_Hz, train
+from device.physics.shot import highest_rate_Hz
 from device.simulated import SimulatedGun
 from device.words import Pulse, Shot
 from experiments.config.gun import GunConfig
+from tests.shot_trains import train
 
 BACK = GunParameters(return_friction_N=1.12)
 STRIPS = {"coefficient": 0.7, "stiffness_N_m": 1300.0, "deformation_m": 0.0005}  # 0.91 N, equation (5)

@@ -16,19 +16,7 @@ from itertools import pairwise
 import numpy as np
 
 from device.parameters import GunParameters
-from device.physics.kernel import (
-    BACK_EMF,
-    COIL,
-    FRICTION_BACK,
-    FRICTION_OUT,
-    INDUCTANCE,
-    RECIPROCAL,
-    RESISTANCE,
-    SETTLED,
-    STOP,
-    pack,
-)
-from device.physics.segments import grip
+from device.physics.equations import COIL, SETTLED, STOP, grip, pack
 from device.physics.traces import Segment, segments
 
 _NODES, _WEIGHTS = (row.tolist() for row in np.polynomial.legendre.leggauss(32))
@@ -82,8 +70,8 @@ def energy_balance(gun: GunParameters) -> EnergyBalance:
 
 
 def _friction_work(segment: Segment) -> float:
-    place = FRICTION_BACK if segment.heading < 0 else FRICTION_OUT
-    return segment.packed[place] * abs(segment.end[0] - segment.start[0])
+    p = segment.constants
+    return (p.friction_back if segment.heading < 0 else p.friction_out) * abs(segment.end[0] - segment.start[0])
 
 
 def _integrals(segment: Segment) -> tuple[float, ...]:
@@ -99,9 +87,9 @@ def _integrals(segment: Segment) -> tuple[float, ...]:
 
 def _rates(segment: Segment, state: Motion) -> tuple[float, ...]:
     x, v, i = state
-    p = segment.packed
-    seen = grip(p, x) if p[RECIPROCAL] else 1.0
-    heat, emf = p[RESISTANCE] * i * i, p[BACK_EMF] * seen * v * i
+    p = segment.constants
+    seen = grip(p, x) if p.reciprocal else 1.0
+    heat, emf = p.resistance * i * i, p.back_emf * seen * v * i
     return segment.drive_V * i, heat, segment.motor_force(state) * v, emf, segment.force(state)
 
 
@@ -110,7 +98,7 @@ def _pieces(segment: Segment) -> Iterator[tuple[float, float]]:
     if segment.kind == COIL:
         yield segment.start_s, segment.end_s
         return
-    time_constant_s = segment.packed[INDUCTANCE] / segment.packed[RESISTANCE]
+    time_constant_s = segment.constants.inductance / segment.constants.resistance
     end_s = segment.end_s
     if end_s == math.inf:
         end_s = segment.start_s + (_FADED * time_constant_s if segment.live else 0.0)

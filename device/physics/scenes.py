@@ -23,7 +23,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from device.parameters import DriveOff, Emf, GunParameters
-from device.physics.summary import model_of
+from device.physics.equations import model_of
 
 OUTPUTS = (
     "peak_force_N",

@@ -4,42 +4,27 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from device.parameters import GunParameters
-from device.physics.kernel import (
+from device.physics.equations import (
     BREAK_AWAY,
     COIL,
-    DRIVE,
     DRIVE_CHANGE,
-    END,
     FREE,
     GIVEN_UP,
-    HEADING,
-    HORIZON_S,
-    IS,
-    KIND,
-    LIMIT,
-    LIVE,
-    MASS,
     MAX_SEGMENTS,
-    MOTOR,
     SETTLED,
-    STATE_SIZE,
-    STEP,
-    STIFFNESS,
-    TIME,
-    VS,
-    WORK_SIZE,
-    XS,
-    Floats,
-    I,
-    V,
-    X,
+    Constants,
+    ShotState,
+    StepSeries,
+    friction,
+    motor_force,
     pack,
+    spring_force,
 )
 from device.physics.polynomial import value
 from device.physics.segments import (
@@ -48,14 +33,11 @@ from device.physics.segments import (
     free_current,
     free_position,
     free_velocity,
-    grip,
     pulse_off,
     pulse_on,
     resting_current,
-    spring_force,
 )
-from device.physics.series import friction
-from device.physics.summary import ShotTrace, interpret, summary_of
+from device.physics.shot import ShotSummary, simulate
 
 _DENSE_S = 0.015  # where the current and the force change fast: pulse and recoil stage
 _REST_AFTER_S = 0.010  # shown after the last motion
@@ -65,8 +47,8 @@ _REST_AFTER_S = 0.010  # shown after the last motion
 class Segment:
     """One smooth stretch of a shot. `heading` is 1 away from the stop, -1 towards it, 0 at rest."""
 
-    packed: Floats
-    kind: float
+    constants: Constants
+    kind: int
     heading: float
     drive_V: float
     live: bool
@@ -76,74 +58,87 @@ class Segment:
     end: tuple[float, float, float]  # just before the event: an impact keeps its speed
     ended_by: int
     step_s: float = 1.0
-    series: Floats = ()  # type: ignore[assignment] # the coil's only
+    series: StepSeries | None = None  # the coil's only
 
     def at(self, time_s: float) -> tuple[float, float, float]:
         """Position, velocity and current at a time of the segment."""
         t = time_s - self.start_s
-        if self.kind == COIL:
+        if self.series is not None:
             s = t / self.step_s
-            return value(self.series, XS, s), value(self.series, VS, s), value(self.series, IS, s)
+            return value(self.series.x, s), value(self.series.v, s), value(self.series.i, s)
         x, v, i = self.start
         if self.kind != FREE:
-            return x, 0.0, resting_current(self.packed, self.drive_V, i, t) if self.live else 0.0
-        omega, a = math.sqrt(self.packed[STIFFNESS] / self.packed[MASS]), self.force(self.start) / self.packed[MASS]
-        current = free_current(self.packed, self.drive_V, i, v, a, t) if self.live else 0.0
+            return x, 0.0, resting_current(self.constants, self.drive_V, i, t) if self.live else 0.0
+        p = self.constants
+        omega, a = math.sqrt(p.stiffness / p.mass), self.force(self.start) / p.mass
+        current = free_current(p, self.drive_V, i, v, a, t) if self.live else 0.0
         return free_position(omega, x, v, a, t), free_velocity(omega, v, a, t), current
 
     def motor_force(self, state: tuple[float, float, float]) -> float:
         """The electromagnetic force F_m on the magnet in N (equation 2)."""
-        return self.packed[MOTOR] * grip(self.packed, state[0]) * state[2]
+        return motor_force(self.constants, state[0], state[2])
 
     def force(self, state: tuple[float, float, float]) -> float:
         """The force on the hand F = m d2x/dt2 in N (equation 1): positive in the direction of recoil, 0 at rest."""
         if self.heading == 0.0:
             return 0.0
         motor = self.motor_force(state) if self.kind == COIL else 0.0
-        return motor - spring_force(self.packed, state[0]) + friction(self.packed, self.heading)
+        return motor - spring_force(self.constants, state[0]) + friction(self.constants, self.heading)
 
 
-def segments(packed: Floats) -> Iterator[Segment]:
+def segments(constants: Constants) -> Iterator[Segment]:
     """The segments of one shot from rest, in order; the last one is settled for good, or given up."""
-    s, w = [0.0] * STATE_SIZE, [0.0] * WORK_SIZE
-    s[END] = HORIZON_S
-    pulse_on(packed, s)
-    enter(packed, s, BREAK_AWAY)
+    s, w = ShotState(), StepSeries()
+    pulse_on(constants, s)
+    enter(constants, s, BREAK_AWAY)
     for _ in range(MAX_SEGMENTS):
-        before = list(s)
-        event = advance(packed, s, w)
-        yield _segment(packed, before, s, w, event)
-        if event in (SETTLED, GIVEN_UP) or (event == DRIVE_CHANGE and s[LIMIT] == s[END]):
+        before = replace(s)
+        event = advance(constants, s, w)
+        yield _segment(constants, before, s, w, event)
+        if event in (SETTLED, GIVEN_UP) or (event == DRIVE_CHANGE and s.drive_until == s.until):
             return
         if event == DRIVE_CHANGE:
-            pulse_off(packed, s)
-        enter(packed, s, event)
+            pulse_off(constants, s)
+        enter(constants, s, event)
 
 
-def _segment(packed: Floats, before: list[float], s: list[float], w: list[float], event: int) -> Segment:
-    coil = before[KIND] == COIL
+def _segment(constants: Constants, before: ShotState, s: ShotState, w: StepSeries, event: int) -> Segment:
+    coil = before.kind == COIL
     return Segment(
-        packed=packed,
-        kind=before[KIND],
-        heading=before[HEADING],
-        drive_V=before[DRIVE],
-        live=before[LIVE] != 0.0,
-        start_s=before[TIME],
-        end_s=math.inf if event == SETTLED else s[TIME],
-        start=(before[X], before[V], before[I]),
-        end=(s[X], s[V], s[I]),
+        constants=constants,
+        kind=before.kind,
+        heading=before.heading,
+        drive_V=before.u,
+        live=before.live,
+        start_s=before.time,
+        end_s=math.inf if event == SETTLED else s.time,
+        start=(before.x, before.v, before.i),
+        end=(s.x, s.v, s.i),
         ended_by=event,
-        step_s=s[STEP] if coil else 1.0,
-        series=list(w) if coil else [],
+        step_s=s.span if coil else 1.0,
+        series=StepSeries(x=w.x.copy(), v=w.v.copy(), i=w.i.copy()) if coil else None,
     )
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class ShotTrace:
+    """One shot over time, arrays of one length, and its summary. `force_N` is F, without the collision."""
+
+    time_s: NDArray[np.float64]
+    displacement_m: NDArray[np.float64]
+    velocity_m_s: NDArray[np.float64]
+    current_A: NDArray[np.float64]
+    motor_force_N: NDArray[np.float64]
+    force_N: NDArray[np.float64]
+    drive_V: NDArray[np.float64]
+    summary: ShotSummary
 
 
 def trace(parameters: GunParameters, points: int = 2000) -> ShotTrace:
     """One shot from rest over time, half of the points in its first 15 ms. `ValueError`: fewer than 2 points."""
     if points < 2:
         raise ValueError(f"points is {points}; it must be at least 2")
-    packed = pack(parameters)
-    shot = list(segments(packed))
+    shot = list(segments(pack(parameters)))
     times = _grid(parameters, shot, points)
     places = np.searchsorted([segment.start_s for segment in shot], times, side="right") - 1
     rows = [_row(shot[place], t) for place, t in zip(places.tolist(), times.tolist(), strict=True)]
@@ -156,7 +151,7 @@ def trace(parameters: GunParameters, points: int = 2000) -> ShotTrace:
         motor_force_N=motor,
         force_N=force,
         drive_V=drive,
-        summary=summary_of(interpret(packed)),
+        summary=simulate(parameters),
     )
 
 

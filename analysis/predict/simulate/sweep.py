@@ -28,7 +28,7 @@ from analysis.predict.simulate.shot import KINDS
 from analysis.report.terminal import Progress
 from device.parameters import GunParameters
 from device.physics import FIDELITIES, ShotBatch, simulate_batch
-from device.physics.kernel import STATUSES
+from device.physics.equations import STATUSES
 from experiments.config.door import ConfigError
 from experiments.record import storage
 from experiments.record.provenance import provenance
