@@ -15,7 +15,7 @@ from scipy.optimize import brentq
 from device.limits import TICKS
 from device.parameters import GunParameters
 from device.physics.equations import HORIZON_S, ShotResult, ShotState, StepSeries, pack
-from device.physics.shot import ShotSummary, shoot_on, simulate, summary_of
+from device.physics.shot import ShotSummary, shoot_on, simulate, summary_from
 
 _FRICTIONS = 64  # looked at before the boundary of the allowed ones is solved for
 _CREEP_S = 5.0  # a return slower than this is no shooting
@@ -52,7 +52,7 @@ def train(gun: GunParameters, onset_ticks: Sequence[int], start: State | None = 
         state.until = HORIZON_S if following is None else min((following - onset) / TICKS, HORIZON_S)
         result = ShotResult()
         shoot_on(constants, state, series, result)
-        shots.append(TrainShot(onset_tick=onset, start=begin, summary=summary_of(astuple(result)[:9])))
+        shots.append(TrainShot(onset_tick=onset, start=begin, summary=summary_from(astuple(result)[:9])))
     return tuple(shots)
 
 

@@ -13,7 +13,7 @@ from __future__ import annotations
 from device.parameters import DriveOff, Emf, GunParameters
 from device.physics.batch import ShotBatch, compiled_simulator, simulate_batch
 from device.physics.equations import FIDELITIES, Status
-from device.physics.scenes import SCENES, Scene, choose
+from device.physics.scenes import SCENES, Scene, choose_model
 from device.physics.shot import ShotSummary, simulate
 from device.physics.traces import ShotTrace, trace
 
@@ -28,7 +28,7 @@ __all__ = [
     "ShotSummary",
     "ShotTrace",
     "Status",
-    "choose",
+    "choose_model",
     "compiled_simulator",
     "simulate",
     "simulate_batch",

@@ -31,10 +31,10 @@ from device.physics.equations import (
     ShotResult,
     ShotState,
     StepSeries,
-    model_of,
+    model_number,
     pack,
 )
-from device.physics.shot import ShotSummary, interpret, shoot, summary_of
+from device.physics.shot import ShotSummary, interpret, shoot, summary_from
 from device.words import RecoilError
 
 Records = NDArray[Any]
@@ -143,7 +143,7 @@ class ShotBatch:
     def summaries(self) -> list[ShotSummary]:
         """The shots one by one; none may be invalid."""
         columns = (getattr(self, name).tolist() for name in self.__slots__)
-        return [summary_of(row) for row in zip(*columns, strict=True)]
+        return [summary_from(row) for row in zip(*columns, strict=True)]
 
 
 def simulate_batch(
@@ -183,9 +183,9 @@ def compiled_simulator() -> Callable[..., ShotSummary]:
 
     def simulate(parameters: GunParameters, fidelity: str = "full") -> ShotSummary:
         """As `device.physics.simulate`."""
-        _GUN_BYTES.pack_into(gun, 0, *pack(parameters, model_of(fidelity)))
+        _GUN_BYTES.pack_into(gun, 0, *pack(parameters, model_number(fidelity)))
         shoot_each(guns, results)
-        return summary_of(_RESULT_BYTES.unpack_from(result)[:_SUMMARY])
+        return summary_from(_RESULT_BYTES.unpack_from(result)[:_SUMMARY])
 
     return simulate
 
@@ -203,7 +203,7 @@ def _guns(gun: GunParameters, fidelity: str, arrays: Mapping[str, ArrayLike]) ->
         guns[_FIELDS[name]] = column == _OPTIONS[name][1] if name in _OPTIONS else column.astype(np.float64)
     if gun.return_friction_N is None and "return_friction_N" not in arrays:
         guns["friction_back"] = guns["friction_out"]
-    _reduce(guns, model_of(fidelity))
+    _reduce(guns, model_number(fidelity))
     return guns, valid
 
 

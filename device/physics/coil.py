@@ -38,7 +38,7 @@ from device.physics.equations import (
     StepSeries,
     friction,
 )
-from device.physics.polynomial import first_crossing, lowest, value, value_at_end
+from device.physics.polynomial import first_crossing, lower_bound, value_at, value_at_end
 
 Expand = Callable[[Constants, float, float, float, StepSeries], None]
 
@@ -177,15 +177,17 @@ def radius(p: Constants, u: float, span: float, w: StepSeries) -> float:
     v_size = leading(w.v, 1e-6 * held / p.mass * span)
     x_size = leading(w.x, v_size * span)
     i_size = leading(w.i, 1e-2 * (abs(u) + p.back_emf * abs(w.v[0])) / p.resistance)
-    last = max(ratio(w.x[ORDER], x_size), ratio(w.v[ORDER], v_size), ratio(w.i[ORDER], i_size))
-    other = max(ratio(w.x[ORDER - 1], x_size), ratio(w.v[ORDER - 1], v_size), ratio(w.i[ORDER - 1], i_size))
+    last = max(size_ratio(w.x[ORDER], x_size), size_ratio(w.v[ORDER], v_size), size_ratio(w.i[ORDER], i_size))
+    other = max(
+        size_ratio(w.x[ORDER - 1], x_size), size_ratio(w.v[ORDER - 1], v_size), size_ratio(w.i[ORDER - 1], i_size)
+    )
     last = max(last, other)
     if last <= _NEGLIGIBLE:
         return _LONGEST
     return min(_LONGEST, (TOLERANCE / last) ** (1.0 / ORDER)) if last < math.inf else 0.0
 
 
-def ratio(a: float, b: float) -> float:
+def size_ratio(a: float, b: float) -> float:
     """|a|/b, 0 for 0/0, infinite for what is not a number."""
     if a == 0.0:
         return 0.0
@@ -208,7 +210,7 @@ def rescale(w: StepSeries, factor: float) -> None:
         odd *= square
 
 
-def fit(p: Constants, u: float, span: float, w: StepSeries) -> float:
+def fitted_span(p: Constants, u: float, span: float, w: StepSeries) -> float:
     """The span over which the series hold to the tolerance; they are rescaled to it. 0 if there is none."""
     for _ in range(8):
         factor = radius(p, u, span, w)
@@ -263,7 +265,7 @@ def coil_step(p: Constants, s: ShotState, w: StepSeries) -> int:
         expand_slaved(p, u, s.heading, s.guess, w)
     else:
         expand(p, u, s.heading, s.guess, w)
-    span = fit(p, u, s.guess, w)
+    span = fitted_span(p, u, s.guess, w)
     if not 0.0 < span < math.inf:
         return GIVEN_UP
     s.guess = span
@@ -283,7 +285,7 @@ def finish_step(p: Constants, s: ShotState, w: StepSeries, span: float, event: i
     at = first_arrival(p, w, s.heading)
     if at <= used:
         used, event = at, COIL_EDGE if s.heading > 0.0 else STOP
-    if s.heading > 0.0 and w.i[0] > 0.0 and w.i[0] + lowest(w.i, 1.0) <= 0.0:
+    if s.heading > 0.0 and w.i[0] > 0.0 and w.i[0] + lower_bound(w.i, 1.0) <= 0.0:
         at = first_crossing(w.i, w.bernstein)
         if at < used:
             used, event = at, FORCE_ZERO
@@ -299,7 +301,7 @@ def first_turn(w: StepSeries, heading: float) -> float:
     """Where the velocity first falls to 0, 2 if it does not. From rest v/s is looked at."""
     shift = 1 if w.v[0] == 0.0 else 0
     begins = heading * w.v[shift]
-    if begins + lowest(w.v, heading) - min(shift * begins, 0.0) > 0.0:
+    if begins + lower_bound(w.v, heading) - min(shift * begins, 0.0) > 0.0:
         return 2.0
     for n in range(ORDER + 1 - shift):
         w.other[n] = heading * w.v[n + shift]
@@ -311,7 +313,7 @@ def first_turn(w: StepSeries, heading: float) -> float:
 def first_arrival(p: Constants, w: StepSeries, heading: float) -> float:
     """Where the magnet first meets the coil's edge (outwards) or the stop (homewards), 2 if it does not."""
     ahead = (p.coil_reach if heading > 0.0 else 0.0) - w.x[0]
-    if heading * ahead + lowest(w.x, -heading) > 0.0:
+    if heading * ahead + lower_bound(w.x, -heading) > 0.0:
         return 2.0
     for n in range(1, ORDER + 1):
         w.other[n] = -heading * w.x[n]
@@ -324,7 +326,7 @@ def land(p: Constants, s: ShotState, w: StepSeries, used: float, event: int) -> 
     if event in (CONTINUES, DRIVE_CHANGE):
         s.x, s.v, s.i = value_at_end(w.x), value_at_end(w.v), value_at_end(w.i)
         return
-    s.x, s.v, s.i = value(w.x, used), value(w.v, used), value(w.i, used)
+    s.x, s.v, s.i = value_at(w.x, used), value_at(w.v, used), value_at(w.i, used)
     if event == TURN:
         s.v = 0.0
     elif event == COIL_EDGE:

@@ -183,7 +183,7 @@ def pack(gun: GunParameters, model: int = FULL) -> Constants:
     )
 
 
-def model_of(fidelity: str) -> int:
+def model_number(fidelity: str) -> int:
     """The number of a model. `ValueError`: there is no such one."""
     if fidelity not in MODELS:
         raise ValueError(f"fidelity is {fidelity!r}; it must be one of {', '.join(FIDELITIES)}")

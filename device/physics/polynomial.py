@@ -15,7 +15,7 @@ PER_BINOMIAL = tuple(1.0 / math.comb(ORDER, k) for k in range(ORDER + 1))
 _SMALLEST = 2.0**-46  # of the step: two roots closer than this are one touch, which ends nothing
 
 
-def value(c: Coefficients, s: float) -> float:
+def value_at(c: Coefficients, s: float) -> float:
     """The polynomial of even order at s: Horner's scheme in s^2 for the even and the odd powers side by side."""
     q, even, odd = s * s, c[ORDER], c[ORDER - 1]
     for j in range(ORDER - 2, 0, -2):
@@ -33,7 +33,7 @@ def value_at_end(c: Coefficients) -> float:
     return even + odd + c[0]
 
 
-def lowest(c: Coefficients, sign: float) -> float:
+def lower_bound(c: Coefficients, sign: float) -> float:
     """A bound from below for what the polynomial, times `sign`, adds to its first coefficient on [0, 1]."""
     even, odd = 0.0, 0.0
     for j in range(1, ORDER, 2):

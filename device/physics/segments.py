@@ -196,8 +196,8 @@ def rest(p: Constants, s: ShotState) -> int:
         out, back = math.inf, math.inf
     else:
         lag, steady = p.inductance / p.resistance, u / p.resistance
-        out = scaled(lag, time_constants(1.0, i, outward_threshold(p, x), steady))
-        back = scaled(lag, time_constants(-1.0, i, homeward_threshold(p, x), steady)) if x > 0.0 else math.inf
+        out = in_seconds(lag, time_constants(1.0, i, outward_threshold(p, x), steady))
+        back = in_seconds(lag, time_constants(-1.0, i, homeward_threshold(p, x), steady)) if x > 0.0 else math.inf
     wait = min(out, back)
     if wait < left:
         s.i = outward_threshold(p, x) if out <= back else homeward_threshold(p, x)
@@ -210,7 +210,7 @@ def rest(p: Constants, s: ShotState) -> int:
     return DRIVE_CHANGE
 
 
-def scaled(lag: float, constants: float) -> float:
+def in_seconds(lag: float, constants: float) -> float:
     """So many time constants in seconds; what never happens, never happens without inductance (lag 0) either."""
     return lag * constants if constants < math.inf else math.inf
 

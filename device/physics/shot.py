@@ -43,11 +43,11 @@ from device.physics.equations import (
     Status,
     StepSeries,
     force_on_hand,
-    model_of,
+    model_number,
     pack,
     spring_force,
 )
-from device.physics.polynomial import bracketed_root, changes_between, lowest, value
+from device.physics.polynomial import bracketed_root, changes_between, lower_bound, value_at
 from device.physics.segments import advance, enter, pulse_off, pulse_on
 
 _EQUAL = 1e-14  # relative: forces closer than this are one
@@ -122,7 +122,7 @@ def peak_force(p: Constants, s: ShotState, w: StepSeries, best: float) -> float:
     for n in range(ORDER - 1):
         w.other[n] = (n + 1) * (n + 2) * w.v[n + 2]
     w.other[ORDER - 1], w.other[ORDER] = 0.0, 0.0
-    if abs(w.other[0]) + lowest(w.other, math.copysign(1.0, w.other[0])) > 0.0:
+    if abs(w.other[0]) + lower_bound(w.other, math.copysign(1.0, w.other[0])) > 0.0:
         return best  # the force only rises or only falls
     low, width = 0.0, used
     while low < used:
@@ -133,7 +133,7 @@ def peak_force(p: Constants, s: ShotState, w: StepSeries, best: float) -> float:
             continue
         if changes > 0 or high < used:
             top = bracketed_root(w.other, w.bernstein, low, high) if changes == 1 else high
-            best = max(best, force_on_hand(p, s.heading, value(w.x, top), value(w.i, top)))
+            best = max(best, force_on_hand(p, s.heading, value_at(w.x, top), value_at(w.i, top)))
         low, width = high, 2.0 * width
     return best
 
@@ -208,7 +208,7 @@ class ShotSummary:
     collision_force_N: float | None  # equation (4): m v^2 / x_k
 
 
-def summary_of(row: Sequence[Any]) -> ShotSummary:
+def summary_from(row: Sequence[Any]) -> ShotSummary:
     """A summary from its numbers in their order; NaN, which equals nothing, is what was not reached.
 
     The slots are filled one by one: the frozen dataclass's own constructor, or a loop, takes a third of the time of a
@@ -250,7 +250,7 @@ def simulate(parameters: GunParameters, fidelity: str = "full") -> ShotSummary:
     >>> shot.status, round(shot.peak_force_N, 2), round(shot.reset_end_s, 3)
     ('home', 35.14, 0.211)
     """
-    return summary_of(_numbers(interpret(pack(parameters, model_of(fidelity)))))
+    return summary_from(_numbers(interpret(pack(parameters, model_number(fidelity)))))
 
 
 def interpret(constants: Constants) -> ShotResult:

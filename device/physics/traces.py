@@ -26,7 +26,7 @@ from device.physics.equations import (
     pack,
     spring_force,
 )
-from device.physics.polynomial import value
+from device.physics.polynomial import value_at
 from device.physics.segments import (
     advance,
     enter,
@@ -65,7 +65,7 @@ class Segment:
         t = time_s - self.start_s
         if self.series is not None:
             s = t / self.step_s
-            return value(self.series.x, s), value(self.series.v, s), value(self.series.i, s)
+            return value_at(self.series.x, s), value_at(self.series.v, s), value_at(self.series.i, s)
         x, v, i = self.start
         if self.kind != FREE:
             return x, 0.0, resting_current(self.constants, self.drive_V, i, t) if self.live else 0.0

@@ -8,7 +8,7 @@ from collections.abc import Callable
 from typing import TypeVar
 
 from device.serial_gun.checks import check_standing
-from device.serial_gun.commands import CalledOff, Contradiction, Disconnected, Refused, Reply, TimedOut
+from device.serial_gun.commands import CalledOff, CommandRefused, Contradiction, Disconnected, Reply, TimedOut
 from device.serial_gun.link import Link
 from device.wire.frame import Garbled
 from device.wire.records import ShotRecord, StatusRecord
@@ -21,7 +21,7 @@ RECONNECT_S = 5.0
 _T = TypeVar("_T")
 
 
-def ask(link: Link, body: str, allowed: Callable[[], bool] = lambda: True) -> Reply:
+def ask_again(link: Link, body: str, allowed: Callable[[], bool] = lambda: True) -> Reply:
     """Ask what may be asked again, until there is an answer; the last trouble if there is none."""
     trouble: LinkError = TimedOut("no answer")
     for _ in range(TRIES):
@@ -52,7 +52,7 @@ def _read(link: Link, question: str, parse: Callable[[str], _T]) -> tuple[Reply,
     """An answer as the record that it is. One that cannot be read is asked for again."""
     trouble = Garbled()
     for _ in range(TRIES):
-        reply = ask(link, question)
+        reply = ask_again(link, question)
         try:
             return reply, parse(reply.body)
         except Garbled as error:
@@ -89,8 +89,8 @@ class Arming:
     def arm(self, disarms: int) -> None:
         """Arm, unless it was disarmed since. `LinkError`: it was, or the gun does not answer, or has a fault."""
         try:
-            session = ask(self._link, "ARM", lambda: self.disarms == disarms).session
-        except (Refused, CalledOff):
+            session = ask_again(self._link, "ARM", lambda: self.disarms == disarms).session
+        except (CommandRefused, CalledOff):
             raise
         except LinkError:  # it may be armed, and its answer lost
             self.disarm()

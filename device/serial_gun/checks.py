@@ -9,7 +9,7 @@ from __future__ import annotations
 from typing import Final
 
 from device.serial_gun.commands import Contradiction, CutShort
-from device.serial_gun.reports import Order, Told
+from device.serial_gun.reports import BelievedShot, ShotOrder
 from device.wire.records import ShotRecord, StatusRecord
 
 MAX_UNCERTAINTY_S: Final = 0.05
@@ -22,7 +22,7 @@ ROUNDING_S: Final = 2e-6
 """Times on the wire are whole microseconds, rounded down."""
 
 
-def check_record(record: ShotRecord, order: Order) -> None:
+def check_record(record: ShotRecord, order: ShotOrder) -> None:
     """Nothing, if the record tells of just the shot that was asked for, once, driven to its end.
 
     `Contradiction` names the broken rule and its values; `CutShort`: it was switched off early.
@@ -43,7 +43,7 @@ def check_record(record: ShotRecord, order: Order) -> None:
         raise Contradiction(f"{record.ending}, driven for {driven_us} microseconds; it must be DONE, {length_us}")
 
 
-def _check_shot(record: ShotRecord, order: Order) -> None:
+def _check_shot(record: ShotRecord, order: ShotOrder) -> None:
     """Whether the record is of this shot, and of no more than this one since the count before it."""
     setting = order.wanted.setting
     if record.mark != order.mark or record.setting != setting:
@@ -53,7 +53,7 @@ def _check_shot(record: ShotRecord, order: Order) -> None:
         raise Contradiction(f"COUNT is {record.count}; it must be {order.count + 1}, one more than before the shot")
 
 
-def check_not_fired(record: ShotRecord, order: Order) -> None:
+def check_not_fired(record: ShotRecord, order: ShotOrder) -> None:
     """Nothing, if a record that tells of no such shot leaves the count as it was. `Contradiction`: it does not."""
     fired = record.mark == order.mark and record.ending != "NONE"
     if not fired and record.count != order.count:
@@ -63,7 +63,7 @@ def check_not_fired(record: ShotRecord, order: Order) -> None:
         )
 
 
-def check_times(told: Told, order: Order, speed: float) -> None:
+def check_times(told: BelievedShot, order: ShotOrder, speed: float) -> None:
     """Nothing, if the shot lies between its trigger and its record on the host's clock. `Contradiction`: it does not.
 
     `speed`: how many times faster than the world's both clocks are.

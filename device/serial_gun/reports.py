@@ -11,7 +11,7 @@ from device.methods import Method, Rendering, rendering_of
 from device.parameters import GunParameters
 from device.serial_gun.clocks import MAX_DRIFT, HostTime
 from device.serial_gun.commands import Reply
-from device.wire.records import METHOD, Setting, ShotRecord, StatusRecord, Way
+from device.wire.records import METHOD_NAME, Setting, ShotRecord, StatusRecord, Way
 from device.words import Direction, Drive, Effect, LimitError, Pulse, Shot, ShotReport, ShotTiming
 
 FLOORS_US: Final = {"PULS": 50_000, "EFF": 10_000}
@@ -36,7 +36,7 @@ class ShotRequest:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Order:
+class ShotOrder:
     """A shot that was asked for, once: the mark that names it on the wire, and what the gun's word is held against.
 
     `written_s`: when its trigger was first written; `at_us`: its tick on the gun's clock, 0 if it is to fire at once;
@@ -60,7 +60,7 @@ def asked(shot: Shot, methods: Mapping[str, Method]) -> ShotRequest:
     """A shot as it can be said. `LimitError`: no such method, a drive of another kind, or no way home by the model."""
     if shot.method not in methods:
         raise LimitError(f"method is {shot.method!r}; this gun renders {', '.join(methods)}")
-    if METHOD.fullmatch(shot.method) is None:
+    if METHOD_NAME.fullmatch(shot.method) is None:
         raise LimitError(f"method is {shot.method!r}; on the wire it must be 1 to 24 of a-z, 0-9 and -")
     method = methods[shot.method]
     drive = _sayable(shot.drive)
@@ -96,7 +96,7 @@ def _setting(shot: Shot, drive: Drive, rendering: Rendering) -> Setting:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Told:
+class BelievedShot:
     """A reply, the record that it holds, how often the shot was triggered until then; its times by the host's clock."""
 
     reply: Reply
@@ -107,7 +107,7 @@ class Told:
     end: HostTime
 
 
-def report(order: Order, told: Told) -> ShotReport:
+def report(order: ShotOrder, told: BelievedShot) -> ShotReport:
     """The report of a shot, from the gun's record of it."""
     record = told.record
     return ShotReport(

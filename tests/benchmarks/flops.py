@@ -14,7 +14,7 @@ from collections.abc import Callable
 from typing import Any
 
 from device.parameters import DriveOff
-from device.physics.equations import Constants, model_of, pack
+from device.physics.equations import Constants, model_number, pack
 from device.physics.shot import interpret
 from tests.benchmarks.problem import guns
 
@@ -41,7 +41,7 @@ def operations(drive_off: DriveOff, fidelity: str = "full") -> dict[str, float]:
     number, tally = counting_floats()
     asked = guns(drive_off)
     for gun in asked:
-        constants = pack(gun, model_of(fidelity))
+        constants = pack(gun, model_number(fidelity))
         interpret(Constants(*(number(value) if type(value) is float else value for value in constants)))
     return {kind: tally[kind] / len(asked) for kind in dict.fromkeys(_KINDS.values())}
 

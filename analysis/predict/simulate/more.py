@@ -8,7 +8,7 @@ from typing import Any
 
 from device.parameters import GunParameters
 from device.physics.energy_balance import energy_balance
-from device.physics.hand import Hand, compliant_collision, rigid_collision, simulate_held
+from device.physics.hand import HandMechanics, compliant_collision, rigid_collision, simulate_held
 from experiments.config.door import ConfigError
 
 ASSUMED = "assumed"
@@ -55,10 +55,10 @@ def held(parameters: GunParameters, words: str) -> dict[str, Any]:
     return asdict(hand) | {"until_s": until_s} | asdict(shot)
 
 
-def _hand(words: str) -> Hand:
+def _hand(words: str) -> HandMechanics:
     if words == ASSUMED:
-        return Hand()
-    known = [field.name for field in fields(Hand)]
+        return HandMechanics()
+    known = [field.name for field in fields(HandMechanics)]
     numbers: dict[str, float] = {}
     for word in words.split(","):
         key, equals, text = word.partition("=")
@@ -66,7 +66,7 @@ def _hand(words: str) -> Hand:
             raise ConfigError(f"--hand {words}: must be `{ASSUMED}`, or key=value,... with keys of {', '.join(known)}")
         numbers[key] = _number(f"--hand {words}", text)
     try:
-        return Hand(**numbers)
+        return HandMechanics(**numbers)
     except ValueError as error:
         raise ConfigError(f"--hand {words}: {error}") from error
 

@@ -9,7 +9,7 @@ from typing import Any
 
 from analysis.predict.simulate.sweep import axis_of
 from device.parameters import GunParameters
-from device.physics.scenes import COLLISION, NEEDED, SCENES, Scene, choose, choose_contact
+from device.physics.scenes import COLLISION, NEEDED, SCENES, Scene, choose_contact, choose_model
 from experiments.config.door import ConfigError
 
 _OWN = "needs of your own"
@@ -33,7 +33,7 @@ def picked(asked: ModelRequest, gun: GunParameters, vary: Sequence[str]) -> tupl
     if scene is None:
         return asked.fidelity or "full", {}
     axes = [axis_of(words, gun) for words in vary]
-    choice = choose(scene, gun, **{axis.key: axis.values for axis in axes})
+    choice = choose_model(scene, gun, **{axis.key: axis.values for axis in axes})
     return choice.fidelity, {"scene": {"needs": dict(scene.needs), "why": scene.why} | asdict(choice)}
 
 
