@@ -5,9 +5,9 @@ import pytest
 from device.methods import rendering_of, settle_s
 from device.parameters import GunParameters
 from device.physics import simulate, trace
-from device.physics.energy_balance import energy_balance
 from device.physics.hand import HandMechanics, compliant_collision, rigid_collision, simulate_held
 from device.physics.shot import highest_rate_Hz
+from device.physics.traces import energy_balance
 from device.simulated import SimulatedGun
 from device.words import Pulse, Shot
 from experiments.config.gun import GunConfig

@@ -10,10 +10,18 @@ import pytest
 from device import LinkError
 from device.limits import DriveHistory
 from device.methods import paper_methods
-from device.serial_gun.checks import MAX_UNCERTAINTY_S, check_record, check_standing, check_times
 from device.serial_gun.clocks import HostTime
 from device.serial_gun.commands import Contradiction, CutShort, Reply
-from device.serial_gun.reports import BelievedShot, ShotOrder, asked, ready_s
+from device.serial_gun.reports import (
+    MAX_UNCERTAINTY_S,
+    BelievedShot,
+    ShotOrder,
+    asked,
+    check_record,
+    check_standing,
+    check_times,
+    ready_s,
+)
 from device.wire.records import ShotRecord, StatusRecord
 from experiments.record.journal import read
 from experiments.study.places import place

@@ -5,8 +5,8 @@ import json
 import pytest
 
 from device.physics import GunParameters, simulate
-from device.physics.energy_balance import energy_balance
 from device.physics.hand import HandMechanics, compliant_collision, simulate_held
+from device.physics.traces import energy_balance
 
 
 def test_audit_hand_and_stop_are_those_of_the_physics(recoil):

@@ -23,8 +23,8 @@ from device.physics import (
     simulate,
     simulate_batch,
 )
-from device.physics.energy_balance import energy_balance
 from device.physics.shot import highest_rate_Hz
+from device.physics.traces import energy_balance
 from tests.conftest import Soak
 from tests.extreme_guns import BREAK_AWAY_V, EXTREMES, defects, gun_of, numbers, pair, shoot
 from tests.golden_shots import SHOTS

@@ -7,8 +7,8 @@ from dataclasses import asdict, fields
 from typing import Any
 
 from device.parameters import GunParameters
-from device.physics.energy_balance import energy_balance
 from device.physics.hand import HandMechanics, compliant_collision, rigid_collision, simulate_held
+from device.physics.traces import energy_balance
 from experiments.config.door import ConfigError
 
 ASSUMED = "assumed"
