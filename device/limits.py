@@ -11,7 +11,17 @@ import math
 from dataclasses import dataclass
 from itertools import chain
 
-from device.words import Drive, Effect, LimitError, Pulse, is_finite, is_whole_number, shown
+from device.words import (
+    MAX_PULSE_S,
+    MAX_VOLTAGE_V,
+    Drive,
+    Effect,
+    LimitError,
+    Pulse,
+    is_finite,
+    is_whole_number,
+    shown,
+)
 
 MAX_DUTY = 0.10
 """Of any second: the paper's drive, 10 ms in 100 ms."""
@@ -28,8 +38,9 @@ HEAT_CAPACITY_J_K = 20.0
 THERMAL_RESISTANCE_K_W = 10.0
 """From the coil to the room, assumed."""
 
-_TICKS = 1_000_000  # per second
-_SECOND, _MINUTE = _TICKS, 60 * _TICKS
+TICKS = 1_000_000
+"""A second: all times are counted in whole microseconds."""
+_SECOND, _MINUTE = TICKS, 60 * TICKS
 _DUTY_TICKS = round(MAX_DUTY * _SECOND)
 _TIME_CONSTANT_S = HEAT_CAPACITY_J_K * THERMAL_RESISTANCE_K_W
 
@@ -99,7 +110,7 @@ class DriveHistory:
 
     def check(self, load: Load, at_s: float) -> None:
         """Nothing if `load` may start at `at_s`. `LimitError` names the limit and the earliest allowed time."""
-        at = _tick("at_s", at_s) / _TICKS
+        at = _tick("at_s", at_s) / TICKS
         broken = [(time, limit) for time, limit in self._earliest(load) if at < time]
         if not broken:
             return
@@ -123,7 +134,7 @@ class DriveHistory:
     @property
     def ready_s(self) -> float:
         """When the magnet is home; -inf if nothing was fired yet."""
-        return -math.inf if self.ready_tick is None else self.ready_tick / _TICKS
+        return -math.inf if self.ready_tick is None else self.ready_tick / TICKS
 
     def is_ready(self, at_s: float) -> bool:
         """Whether the magnet is home at `at_s`, to the microsecond."""
@@ -134,7 +145,7 @@ class DriveHistory:
         return AMBIENT_C + self._warmth(_tick("at_s", at_s))
 
     def _warmth(self, tick: int) -> float:
-        return self.warmth_K * math.exp(-max(0, tick - self.warmth_tick) / _TICKS / _TIME_CONSTANT_S)
+        return self.warmth_K * math.exp(-max(0, tick - self.warmth_tick) / TICKS / _TIME_CONSTANT_S)
 
     def _earliest(self, load: Load) -> list[tuple[float, str]]:
         """The earliest time that each limit allows, and the limit's name."""
@@ -150,7 +161,7 @@ class DriveHistory:
     def _by_count(self) -> float:
         if len(self.pulses) < MAX_SHOTS_PER_MINUTE:
             return -math.inf
-        return (self.pulses[-MAX_SHOTS_PER_MINUTE][0] + _MINUTE) / _TICKS
+        return (self.pulses[-MAX_SHOTS_PER_MINUTE][0] + _MINUTE) / TICKS
 
     def _by_duty(self, on: int) -> float:
         """A second is fullest when it ends with the new pulse; it must not begin before the budget is used up."""
@@ -159,7 +170,7 @@ class DriveHistory:
             return math.inf
         for start, end in reversed(self.pulses):
             if end - start > budget:
-                return (end - budget + _SECOND - on) / _TICKS
+                return (end - budget + _SECOND - on) / TICKS
             budget -= end - start
         return -math.inf
 
@@ -170,15 +181,48 @@ class DriveHistory:
         if room_K <= 0:
             return math.inf
         cooling_s = _TIME_CONSTANT_S * math.log(self.warmth_K / room_K)
-        return (self.warmth_tick + math.ceil(cooling_s * _TICKS)) / _TICKS
+        return (self.warmth_tick + math.ceil(cooling_s * TICKS)) / TICKS
 
 
 def _tick(name: str, time_s: float) -> int:
     if not is_finite(time_s):
         raise LimitError(f"{name} is {shown(time_s)}; it must be a finite time in seconds")
-    return round(time_s * _TICKS)
+    return round(time_s * TICKS)
 
 
 def _on_ticks(load: Load) -> int:
     """The driven time, rounded up; a rounding error of the product does not count as a tick."""
-    return math.ceil(load.on_s * _TICKS - 1e-6)
+    return math.ceil(load.on_s * TICKS - 1e-6)
+
+
+BEYOND_VOLTAGE = f"voltage above {MAX_VOLTAGE_V:g} V"
+BEYOND_PULSE = f"pulse above {1e3 * MAX_PULSE_S:g} ms"
+BEYOND_DUTY = f"driven for more than {100 * MAX_DUTY:g} % of a second"
+BEYOND_HEAT = f"coil above {MAX_COIL_C:g} °C in the end"
+TRAIN_LIMITS = (BEYOND_VOLTAGE, BEYOND_PULSE, BEYOND_DUTY, BEYOND_HEAT)
+"""What a steady train may break, in the order in which it is judged."""
+
+
+def broken_limit(voltage_V: float, pulse_s: float, resistance_ohm: float, rate_Hz: float) -> str | None:
+    """The first of `TRAIN_LIMITS` that a steady train of such pulses would break; None if it may go on for ever."""
+    if voltage_V > MAX_VOLTAGE_V:
+        return BEYOND_VOLTAGE
+    if pulse_s > MAX_PULSE_S:
+        return BEYOND_PULSE
+    load = load_of(Pulse(voltage_V=voltage_V, pulse_s=pulse_s), resistance_ohm)
+    if _fullest_second(load, rate_Hz) > _DUTY_TICKS:
+        return BEYOND_DUTY
+    return BEYOND_HEAT if steady_coil_C(load, rate_Hz) > MAX_COIL_C else None
+
+
+def steady_coil_C(load: Load, rate_Hz: float) -> float:  # noqa: N802 - the unit ends the name
+    """The coil's temperature just after a shot of an endless train: T_room + (Q/C) / (1 - exp(-1/(f R C)))."""
+    fall = -math.expm1(-1.0 / (rate_Hz * THERMAL_RESISTANCE_K_W * HEAT_CAPACITY_J_K))
+    return AMBIENT_C + load.heat_J / HEAT_CAPACITY_J_K / fall
+
+
+def _fullest_second(load: Load, rate_Hz: float) -> int:
+    """The ticks driven in the fullest second of a steady train: one that begins with a pulse."""
+    on, period = _on_ticks(load), round(TICKS / rate_Hz)
+    whole, rest = divmod(_SECOND, period)
+    return whole * on + min(on, rest)

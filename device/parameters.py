@@ -5,6 +5,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, fields
 from typing import Literal, get_args
 
@@ -14,14 +15,8 @@ DriveOff = Literal["shorted", "open"]
 Emf = Literal["printed", "reciprocal"]
 
 
-class _Remembers:
-    """Room for what the physics makes of a gun's numbers, beside its fields: shots are asked for by the million."""
-
-    __slots__ = ("_packed",)
-
-
 @dataclass(frozen=True, slots=True, kw_only=True)
-class GunParameters(_Remembers):
+class GunParameters:
     """The voice-coil gun of equations (1) to (3) and its drive pulse. Defaults: the paper's gun without damper.
 
     `drive_off` is what the coil does after the pulse: `shorted` keeps equation (3) with u = 0 (assumed default),
@@ -111,3 +106,24 @@ def _take_numbers(
 def _is_one_of(name: str, value: str, options: tuple[str, ...]) -> None:
     if value not in options:
         raise ValueError(f"{name} is {value!r}; it must be one of {', '.join(options)}")
+
+
+def damper_friction(bare_N: float, coefficient: float, stiffness_N_m: float, deformation_m: float) -> float:
+    """F_f = F_f0 + 2 mu eps dV in N, for two rubber strips pressed on the magnet (equation 5).
+
+    The paper calls eps the elastic modulus and dV the deformation of one strip; the product must be a force, so eps
+    is read as the strip's stiffness in N/m. `ValueError`: a number that is not finite or below 0.
+
+    >>> round(damper_friction(0.21, 0.7, 1300.0, 0.0005), 2)
+    1.12
+    """
+    values = {
+        "bare_N": bare_N,
+        "coefficient": coefficient,
+        "stiffness_N_m": stiffness_N_m,
+        "deformation_m": deformation_m,
+    }
+    for name, value in values.items():
+        if not 0 <= value < math.inf:
+            raise ValueError(f"{name} is {value}; it must be a finite number of at least 0")
+    return bare_N + 2 * coefficient * stiffness_N_m * deformation_m

@@ -7,7 +7,7 @@ import numpy as np
 
 from device.parameters import DriveOff, Emf
 from device.physics import GunParameters, simulate
-from device.physics.kernel import CONTINUES, pack
+from device.physics.equations import CONTINUES, pack
 from device.physics.traces import segments
 
 EXTREMES = {
@@ -56,7 +56,7 @@ def order_of(gun):
     return tuple((s.ended_by, s.heading) for s in segments(pack(gun)) if s.ended_by != CONTINUES)
 
 
-def outcome(gun):
+def outcome(gun, simulate):
     summary = simulate(gun)
     return summary.status, [v for v in dataclasses.astuple(summary)[1:] if v is not None]
 
@@ -78,13 +78,13 @@ def distance(a, b):
     return max(abs(x - y) / max(abs(x), abs(y), 1e-12) for x, y in zip(a, b, strict=True)) if a else 0.0
 
 
-def jump_of(rng):
+def jump_of(rng, simulate):
     """What is left of the difference after 20 halvings, as a multiple of what smoothness allows; 0 if it is smooth.
 
     The pair is bisected towards the larger part of the difference, so that a jump is not halved away.
     """
     options, here, there = pair(rng)
-    ends = [(values, *outcome(gun_of(options, values))) for values in (here, there)]
+    ends = [(values, *outcome(gun_of(options, values), simulate)) for values in (here, there)]
     for halving in range(HALVINGS):
         if ends[0][1] != ends[1][1] or len(ends[0][2]) != len(ends[1][2]):
             return 0.0  # another status: the numbers may jump
@@ -92,7 +92,7 @@ def jump_of(rng):
         if whole < NOISE:
             return 0.0
         middle = (ends[0][0] + ends[1][0]) / 2
-        centre = (middle, *outcome(gun_of(options, middle)))
+        centre = (middle, *outcome(gun_of(options, middle), simulate))
         if centre[1] != ends[0][1] or len(centre[2]) != len(ends[0][2]):
             return 0.0
         halves = [distance(end[2], centre[2]) for end in ends]
@@ -104,12 +104,12 @@ def jump_of(rng):
     return whole if order_of(guns[0]) == order_of(guns[1]) else 0.0
 
 
-def defects(seed, count):
+def defects(seed, count, simulate=simulate):
     rng = np.random.default_rng(seed)
     found = []
     for n in range(count):
         state = rng.bit_generator.state
-        jump = jump_of(rng)
+        jump = jump_of(rng, simulate)
         if jump > 0.0:
             found.append((n, jump, state["state"]))
     return found
@@ -131,7 +131,7 @@ def numbers(summary):
     return {k: v for k, v in dataclasses.asdict(summary).items() if k != "status" and v is not None}
 
 
-def shoot(**changes):
+def shoot(simulate=simulate, **changes):
     summary = simulate(GunParameters(**changes))
     assert all(math.isfinite(value) for value in numbers(summary).values())
     return summary

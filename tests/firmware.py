@@ -25,12 +25,12 @@ import serial
 from device.serial_gun.reports import WAYS
 from device.twin.core import IDENTITY
 from device.twin.machine import LATE_PULSE_US
-from device.twin.scripts import random_script, transcript
 from device.wire.frame import LAST_NUMBER, Frame, encode
 from device.wire.records import ShotRecord, StatusRecord
 from experiments.record.journal import read
 from tests.conftest import Recoil
 from tests.serial_runs import rows, timings_of
+from tests.twin_scripts import random_script, transcript
 from tests.waiting import PATIENCE_S, wait_for
 
 ROOT = Path(__file__).parent.parent

@@ -22,7 +22,7 @@ from analysis.report.serial import plain
 from analysis.report.terminal import in_text
 from device.limits import DriveHistory, load_of
 from device.parameters import GunParameters
-from device.physics.trains import highest_rate_Hz
+from device.physics.shot import highest_rate_Hz
 from device.words import Pulse
 from experiments.config.door import ConfigError
 from experiments.synthetic.percept import PerceptParameters

@@ -12,7 +12,6 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from analysis.predict.design_search import shots as design_shots
-from analysis.predict.design_search.choice import DUTY, HEAT, PULSE, VOLTAGE, broken_limit, steady_coil_C
 from analysis.predict.design_search.critical import both_ways
 from analysis.predict.design_search.rates import evidences, logits, predict, rates
 from analysis.predict.design_search.shots import (
@@ -25,7 +24,17 @@ from analysis.predict.design_search.shots import (
     summarised,
 )
 from analysis.predict.fit.percept_model import PAPER_RATES, fit_percept, predicted_rate
-from device.limits import DriveHistory, Load, load_of
+from device.limits import (
+    BEYOND_DUTY,
+    BEYOND_HEAT,
+    BEYOND_PULSE,
+    BEYOND_VOLTAGE,
+    DriveHistory,
+    Load,
+    broken_limit,
+    load_of,
+    steady_coil_C,
+)
 from device.methods import paper_methods
 from device.parameters import GunParameters
 from device.physics import simulate, trace
@@ -147,20 +156,20 @@ def test_a_grids_intervals_are_those_of_a_single_prediction() -> None:
     ("voltage", "pulse", "rate", "limit"),
     [
         (16.0, 0.010, 5.0, None),
-        (24.5, 0.001, 1.0, VOLTAGE),
-        (1.0, 0.021, 1.0, PULSE),
+        (24.5, 0.001, 1.0, BEYOND_VOLTAGE),
+        (1.0, 0.021, 1.0, BEYOND_PULSE),
         (1.0, 0.020, 5.0, None),  # a tenth of a second exactly
-        (24.0, 0.010, 5.0, HEAT),
+        (24.0, 0.010, 5.0, BEYOND_HEAT),
         (24.0, 0.010, 2.0, None),
         (17.8, 0.010, 5.0, None),
-        (17.9, 0.010, 5.0, HEAT),
+        (17.9, 0.010, 5.0, BEYOND_HEAT),
     ],
 )
 def test_a_steady_train_is_judged_as_the_device_judges_it(
     voltage: float, pulse: float, rate: float, limit: str | None
 ) -> None:
     assert broken_limit(voltage, pulse, GUN.resistance_ohm, rate) == limit
-    if limit in (VOLTAGE, PULSE):
+    if limit in (BEYOND_VOLTAGE, BEYOND_PULSE):
         with pytest.raises(LimitError):
             Pulse(voltage_V=voltage, pulse_s=pulse)
         return
@@ -172,7 +181,7 @@ def test_a_steady_train_is_judged_as_the_device_judges_it(
 
 def test_the_limit_on_duty_is_the_devices_too() -> None:
     """No pulse that is allowed breaks it at 5 Hz; at 5.2 Hz 6 pulses of 20 ms would fall in the fullest second."""
-    assert broken_limit(1.0, 0.02, GUN.resistance_ohm, 5.2) == DUTY
+    assert broken_limit(1.0, 0.02, GUN.resistance_ohm, 5.2) == BEYOND_DUTY
     load = load_of(Pulse(voltage_V=1.0, pulse_s=0.02), GUN.resistance_ohm)
     with pytest.raises(LimitError, match="10% of a second"):
         fired(load, 5.2, 12)

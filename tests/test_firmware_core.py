@@ -1,6 +1,6 @@
 """The firmware's core in C says and does what the twin does: compiled for this machine, and for the emulated chip.
 
-Scripts and transcripts are those of `device.twin.scripts`; the times are the scripts', so nothing needs to be masked.
+Scripts and transcripts are those of `tests.twin_scripts`; the times are the scripts', so nothing needs to be masked.
 """
 
 from __future__ import annotations
@@ -14,11 +14,11 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from device.twin.scripts import transcript
 from device.wire import errors
 from device.wire.errors import TEXTS, message
 from device.wire.frame import Frame, encode
 from tests.firmware import CORES, built, one_after_the_other, told
+from tests.twin_scripts import transcript
 
 
 def differences(core: str, script: list[str]) -> list[tuple[str, str]]:

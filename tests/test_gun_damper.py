@@ -5,12 +5,13 @@ import pytest
 from device.methods import rendering_of, settle_s
 from device.parameters import GunParameters
 from device.physics import simulate, trace
-from device.physics.energy_balance import energy_balance
-from device.physics.hand import Hand, compliant_collision, rigid_collision, simulate_held
-from device.physics.trains import highest_rate_Hz, train
+from device.physics.hand import HandMechanics, compliant_collision, rigid_collision, simulate_held
+from device.physics.shot import highest_rate_Hz
+from device.physics.traces import energy_balance
 from device.simulated import SimulatedGun
 from device.words import Pulse, Shot
 from experiments.config.gun import GunConfig
+from tests.shot_trains import train
 
 BACK = GunParameters(return_friction_N=1.12)
 STRIPS = {"coefficient": 0.7, "stiffness_N_m": 1300.0, "deformation_m": 0.0005}  # 0.91 N, equation (5)
@@ -85,7 +86,10 @@ def test_trace_and_audit_know_the_braked_return():
 
 
 def test_a_gun_too_heavy_to_move_is_the_fixed_gun_with_its_braked_return():
-    held, fixed = simulate_held(BACK, Hand(enclosure_mass_kg=1e7)), simulate(GunParameters(return_friction_N=1.12))
+    held, fixed = (
+        simulate_held(BACK, HandMechanics(enclosure_mass_kg=1e7)),
+        simulate(GunParameters(return_friction_N=1.12)),
+    )
     assert held.reset_end_s == pytest.approx(fixed.reset_end_s, rel=2e-7)
     assert held.impact_speed_m_s == pytest.approx(fixed.impact_speed_m_s, rel=2e-7)
 

@@ -4,6 +4,7 @@ import numpy as np
 import pingouin
 import pytest
 from scipy import stats
+from statsmodels.stats.multitest import multipletests
 
 from analysis.stats.anova import rm_anova
 from analysis.stats.paired import CONSTANT, EQUAL, holm, paired_t_tests
@@ -23,11 +24,14 @@ def test_t_p_and_interval_equal_r() -> None:
         assert (pair.t, pair.p, pair.ci_low, pair.ci_high) == pytest.approx(numbers, rel=1e-12)
 
 
-def test_holm_equals_r_and_pingouin() -> None:
+def test_holm_equals_r_pingouin_and_statsmodels() -> None:
     p = [1.31e-3, 1e-5, 0.02, 0.03]
     assert holm(p).tolist() == pytest.approx([0.00393, 0.00004, 0.04, 0.04])  # R 4.2.2: p.adjust(p, "holm")
     many = np.random.default_rng(1).uniform(size=50) ** 3
     assert holm(many).tolist() == pytest.approx(pingouin.multicomp(many, method="holm")[1].tolist())
+    for size in (1, 2, 3, 7):
+        few = np.random.default_rng(size).uniform(size=size)
+        assert holm(few).tolist() == multipletests(few, method="holm")[1].tolist()
     assert holm([]).size == 0
 
 

@@ -8,8 +8,8 @@ import sys
 import numpy as np
 import pytest
 
-from device.physics import GunParameters, ShotBatch, batch, simulate, simulate_batch, summary, warm
-from device.physics.kernel import kernel
+from device.physics import FIDELITIES, GunParameters, ShotBatch, batch, compiled_simulator, simulate, simulate_batch
+from device.words import RecoilError
 
 NUMBERS = [field.name for field in dataclasses.fields(ShotBatch) if field.name != "status"]
 
@@ -65,23 +65,42 @@ def test_arrays_are_broadcast_and_progress_is_told():
         simulate_batch(fidelity="best")
 
 
-def test_a_warm_process_gives_the_digits_of_a_cold_one(monkeypatch):
+@pytest.mark.parametrize("fidelity", FIDELITIES)
+def test_a_compiled_shot_has_the_digits_of_an_interpreted_one(fidelity):
     pytest.importorskip("numba")
     guns = [GunParameters(friction_N=f, drive_off=off) for f in (0.21, 1.12, 1.7) for off in ("open", "shorted")]
-    cold = [simulate(gun) for gun in guns]
-    monkeypatch.setattr(summary, "_engine", dataclasses.replace(summary._engine))
-    assert warm()
-    for gun, expected in zip(guns, cold, strict=True):
-        found = simulate(gun)
+    guns += [GunParameters(emf="reciprocal", return_friction_N=1.12)]
+    compiled = compiled_simulator()
+    for gun in guns:
+        expected, found = simulate(gun, fidelity), compiled(gun, fidelity)
         assert found.status == expected.status
         for name in NUMBERS:
             ours, theirs = (getattr(summary, name) for summary in (found, expected))
             assert (ours is None and theirs is None) or ours == pytest.approx(theirs, rel=1e-13)
 
 
-def test_without_the_compiler_nothing_is_warm(monkeypatch):
+def test_a_compiled_shot_changes_nothing_for_the_next_interpreted_one():
+    code = (
+        "import sys; from device.physics import *; gun = GunParameters(); first = simulate(gun);"
+        "compiled_simulator()(gun); run = []; sys.setprofile(lambda frame, *_: run.append(frame.f_code.co_name));"
+        "second = simulate(gun); sys.setprofile(None); sys.exit(first != second or 'shoot' not in run)"
+    )
+    pytest.importorskip("numba")
+    assert subprocess.run([sys.executable, "-c", code], check=False).returncode == 0
+
+
+def test_without_the_compiler_a_compiled_shot_is_refused(monkeypatch):
     monkeypatch.setattr(batch, "find_spec", lambda _name: None)
-    assert not warm()
+    batch.machine_code.cache_clear()
+    with pytest.raises(RecoilError, match=r"recoil\[fast\]"):
+        compiled_simulator()
+
+
+def test_a_batch_as_summaries_is_its_single_shots():
+    found = simulate_batch(friction_N=[0.21, 1.12, 1.7]).summaries()
+    assert [shot.status for shot in found] == ["home", "home", "stuck"]
+    assert found[2].reset_end_s is None
+    assert found[0].reset_end_s == pytest.approx(simulate(GunParameters()).reset_end_s, rel=1e-13)
 
 
 def test_a_session_never_loads_the_compiler():
@@ -91,14 +110,9 @@ def test_a_session_never_loads_the_compiler():
 
 def test_what_one_process_compiled_is_found_by_the_next():
     pytest.importorskip("numba")
-    code = "import sys; from device.physics.batch import _digest; sys.stdout.write(_digest())"
+    code = "import sys; from device.physics.batch import machine_code; sys.stdout.write(machine_code().__qualname__)"
     names = {subprocess.run([sys.executable, "-c", code], check=True, capture_output=True).stdout for _ in range(2)}
     assert len(names) == 1
-
-
-def test_a_name_of_the_kernel_stands_for_one_function():
-    with pytest.raises(ValueError, match="shoot already"):
-        kernel(summary.shoot)
 
 
 def test_a_return_friction_of_its_own_is_the_guns_and_an_arrays():

@@ -5,8 +5,8 @@ import math
 import pytest
 
 from device.physics import GunParameters, simulate
-from device.physics.trains import repeated
 from tests.extreme_guns import BREAK_AWAY_V, numbers, shoot
+from tests.shot_trains import repeated
 
 OFF = ["shorted", "open"]
 

@@ -3,7 +3,7 @@
 import pytest
 
 from device.physics import GunParameters, simulate
-from device.physics.trains import highest_rate_Hz
+from device.physics.shot import highest_rate_Hz
 from tests.physics_claims import BARE, DAMPED, VARIANTS, motor_peak_N, share_after_turn, slide_mm
 
 

@@ -12,7 +12,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from device.parameters import DriveOff
-from device.physics import FIDELITIES, SCENES, GunParameters, Scene, choose, simulate
+from device.physics import FIDELITIES, SCENES, GunParameters, Scene, choose_model, simulate
 from device.physics.hand import compliant_collision, rigid_collision
 from device.physics.scenes import COSTS, FRICTION_N, NEAR, NEEDED, choose_contact, stated_error
 from tests.benchmarks.flops import operations
@@ -39,7 +39,7 @@ def scenes() -> st.SearchStrategy[Scene]:
 def test_the_picked_model_is_as_near_to_full_as_was_promised_and_as_the_scene_bears(
     gun: GunParameters, scene: Scene
 ) -> None:
-    choice = choose(scene, gun)
+    choice = choose_model(scene, gun)
     full, found = simulate(gun), simulate(gun, choice.fidelity)
     assert found.status == full.status
     for output, borne in scene.needs.items():
@@ -50,7 +50,7 @@ def test_the_picked_model_is_as_near_to_full_as_was_promised_and_as_the_scene_be
 @settings(max_examples=150)
 @given(guns_near_the_paper(), scenes())
 def test_every_cheaper_model_would_be_beyond_what_the_scene_bears(gun: GunParameters, scene: Scene) -> None:
-    choice = choose(scene, gun)
+    choice = choose_model(scene, gun)
     if scene.curves:
         assert choice.fidelity == "full"
         return
@@ -74,22 +74,22 @@ def test_far_from_the_papers_gun_the_pick_is_full_and_says_which_number_is_far(
     if name == "friction_N" and factor == 1.2:
         far = 1.12 * factor
     change: dict[str, Any] = {name: far}
-    choice = choose(SCENES[scene], dataclasses.replace(PAPER, **change))
+    choice = choose_model(SCENES[scene], dataclasses.replace(PAPER, **change))
     assert choice.fidelity == "full"
     assert name in choice.reason
 
 
 def test_a_damper_that_brakes_one_way_more_gets_the_full_model() -> None:
     gun = GunParameters(friction_N=0.21, return_friction_N=1.12)
-    assert choose(SCENES["sweep"], gun).fidelity == "full"
-    assert choose(SCENES["sweep"], dataclasses.replace(gun, return_friction_N=0.21)).fidelity == "ballistic"
+    assert choose_model(SCENES["sweep"], gun).fidelity == "full"
+    assert choose_model(SCENES["sweep"], dataclasses.replace(gun, return_friction_N=0.21)).fidelity == "ballistic"
 
 
 def test_a_table_of_guns_gets_a_model_that_serves_the_worst_of_them() -> None:
     percept = SCENES["percept"]
-    assert choose(percept, drive_off=["open"]).fidelity == "no-inductance"
-    assert choose(percept, drive_off=["open", "shorted"]).fidelity == "full"
-    assert "friction_N is 2" in choose(percept, drive_off=["open"], friction_N=np.array([0.5, 2.0])).reason
+    assert choose_model(percept, drive_off=["open"]).fidelity == "no-inductance"
+    assert choose_model(percept, drive_off=["open", "shorted"]).fidelity == "full"
+    assert "friction_N is 2" in choose_model(percept, drive_off=["open"], friction_N=np.array([0.5, 2.0])).reason
 
 
 @pytest.mark.parametrize(("needs", "named"), [({"colour": 0.1}, "colour"), ({"reset_end_s": 0.0}, "reset_end_s")])

@@ -5,7 +5,8 @@ import math
 import pytest
 
 from device.physics import GunParameters, simulate
-from device.physics.trains import State, gentlest_friction_N, highest_rate_Hz, repeated, train
+from device.physics.shot import highest_rate_Hz
+from tests.shot_trains import State, gentlest_friction_N, repeated, train
 
 OPEN, DAMPED = GunParameters(drive_off="open"), GunParameters(friction_N=1.12)
 

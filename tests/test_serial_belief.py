@@ -10,10 +10,18 @@ import pytest
 from device import LinkError
 from device.limits import DriveHistory
 from device.methods import paper_methods
-from device.serial_gun.checks import MAX_UNCERTAINTY_S, check_record, check_standing, check_times
 from device.serial_gun.clocks import HostTime
 from device.serial_gun.commands import Contradiction, CutShort, Reply
-from device.serial_gun.reports import Order, Told, asked, ready_s
+from device.serial_gun.reports import (
+    MAX_UNCERTAINTY_S,
+    BelievedShot,
+    ShotOrder,
+    asked,
+    check_record,
+    check_standing,
+    check_times,
+    ready_s,
+)
 from device.wire.records import ShotRecord, StatusRecord
 from experiments.record.journal import read
 from experiments.study.places import place
@@ -228,7 +236,7 @@ def test_after_a_reset_the_gun_is_counted_from_its_new_base(tmp_path):
 
 
 WANTED = asked(a_shot(), paper_methods())
-ORDER = Order(
+ORDER = ShotOrder(
     mark=7,
     wanted=WANTED,
     requested_s=9.9,
@@ -255,7 +263,7 @@ RECORD = ShotRecord(
 def told(accepted_s=10.001, end_s=10.011, uncertainty_s=0.001, received_s=10.012):
     reply = Reply(body="", written_s=10.0, received_s=received_s, session=1)
     times = {"uncertainty_s": uncertainty_s}
-    return Told(
+    return BelievedShot(
         reply=reply,
         record=RECORD,
         tries=1,

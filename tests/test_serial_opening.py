@@ -9,7 +9,7 @@ from dataclasses import replace
 import pytest
 
 from device import LinkError, open_gun
-from device.serial_gun.opening import find, parse
+from device.serial_gun.opening import find_gun, parse
 from device.twin.core import IDENTITY
 from tests.twins import a_twin
 
@@ -30,14 +30,14 @@ def test_a_gun_is_found_by_what_answers_not_by_the_order_of_ports(tmp_path, monk
     other = replace(IDENTITY, serial="TWIN-2")
     with a_twin(tmp_path / "a") as (_, one), a_twin(tmp_path / "b", identity=other) as (_, two):
         for order in ([*ports, one.address], [one.address, *ports]):
-            assert find(order) == one.address
-        assert find([one.address, two.address], serial="TWIN-2") == two.address
+            assert find_gun(order) == one.address
+        assert find_gun([one.address, two.address], serial="TWIN-2") == two.address
         with pytest.raises(LinkError, match=r"more than one.*TWIN-1 at .*TWIN-2 at "):
-            find([one.address, two.address])
+            find_gun([one.address, two.address])
     with pytest.raises(LinkError, match="no gun answers; looked at /dev/pts"):
-        find(ports)
+        find_gun(ports)
     with pytest.raises(LinkError, match="the system shows none"):
-        find([])
+        find_gun([])
     os.close(silent)
     os.close(deaf)
 

@@ -5,8 +5,8 @@ import json
 import pytest
 
 from device.physics import GunParameters, simulate
-from device.physics.energy_balance import energy_balance
-from device.physics.hand import Hand, compliant_collision, simulate_held
+from device.physics.hand import HandMechanics, compliant_collision, simulate_held
+from device.physics.traces import energy_balance
 
 
 def test_audit_hand_and_stop_are_those_of_the_physics(recoil):
@@ -14,7 +14,7 @@ def test_audit_hand_and_stop_are_those_of_the_physics(recoil):
     found = json.loads(recoil("simulate", *words, "--json").stdout)
     gun = GunParameters(friction_N=0.5)
     assert found["audit"]["created_J"] == energy_balance(gun).created_J
-    held = simulate_held(gun, Hand(stiffness_N_m=800.0), gun.pulse_s + 0.4)
+    held = simulate_held(gun, HandMechanics(stiffness_N_m=800.0), gun.pulse_s + 0.4)
     assert found["hand"]["peak_hand_force_N"] == pytest.approx(held.peak_hand_force_N)
     assert found["hand"]["stiffness_N_m"] == 800.0
     stop = compliant_collision(gun, simulate(gun).impact_speed_m_s, 2e5)

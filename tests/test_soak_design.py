@@ -16,7 +16,7 @@ import pytest
 from analysis.predict.design_search.critical import LEVEL, rate_at
 from analysis.predict.jobs import cores
 from device.parameters import GunParameters
-from device.physics.trains import highest_rate_Hz
+from device.physics.shot import highest_rate_Hz
 from experiments.synthetic.percept import PerceptParameters
 from tests.conftest import RECOIL, Soak
 from tests.power_files import files

@@ -8,7 +8,6 @@ from itertools import zip_longest
 
 import pytest
 
-from device.twin.scripts import transcript
 from tests.firmware import (
     BUSES,
     CORES,
@@ -25,6 +24,7 @@ from tests.firmware import (
     told,
 )
 from tests.serial_runs import hasty
+from tests.twin_scripts import transcript
 
 pytestmark = pytest.mark.soak
 

@@ -14,33 +14,36 @@ import numpy as np
 import pytest
 
 from analysis.predict.jobs import cores
-from device.physics import FIDELITIES, GunParameters, coil, simulate, simulate_batch, summary, warm
-from device.physics.energy_balance import energy_balance
-from device.physics.trains import highest_rate_Hz, repeated
+from device.physics import (
+    FIDELITIES,
+    GunParameters,
+    ShotSummary,
+    coil,
+    compiled_simulator,
+    simulate,
+    simulate_batch,
+)
+from device.physics.shot import highest_rate_Hz
+from device.physics.traces import energy_balance
 from tests.conftest import Soak
 from tests.extreme_guns import BREAK_AWAY_V, EXTREMES, defects, gun_of, numbers, pair, shoot
 from tests.golden_shots import SHOTS
 from tests.physics_claims import BARE, DAMPED, VARIANTS, motor_peak_N, share_after_turn, slide_mm
+from tests.shot_trains import repeated
 
 pytestmark = pytest.mark.soak
 
 PAIRS, RANDOM_GUNS, BATCH, REPEATS = 100_000, 500, 200_000, 3
 
 
-@pytest.fixture
-def compiled(monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
-    """`simulate` in machine code for one test."""
-    pytest.importorskip("numba")
-    monkeypatch.setattr(summary, "_engine", dataclasses.replace(summary._engine))
-    assert warm()
-    return
+Simulate = Callable[[GunParameters], ShotSummary]
 
 
 def of_options(gun: GunParameters, drive_off: str, emf: str) -> GunParameters:
     return dataclasses.replace(gun, drive_off=drive_off, emf=emf)
 
 
-def largest_error(drive_off: str, emf: str) -> float:
+def largest_error(drive_off: str, emf: str, simulate: Simulate) -> float:
     shots = [shot for shot in SHOTS if (shot["drive_off"], shot["emf"]) == (drive_off, emf)]
     assert len(shots) == 2
     errors = []
@@ -52,16 +55,16 @@ def largest_error(drive_off: str, emf: str) -> float:
 
 @pytest.mark.parametrize(("drive_off", "emf"), VARIANTS)
 def test_digits(drive_off: str, emf: str, soak: Soak) -> None:
-    error = largest_error(drive_off, emf)
+    error = largest_error(drive_off, emf, simulate)
     how = "interpreted; 2 frictions, 8 numbers each, of a 50-digit integration by another method"
     soak(f"largest relative error, coil {drive_off}, EMF {emf}", f"{error:.1e}", "1e-12", how)
     assert error <= 1e-12
 
 
-@pytest.mark.usefixtures("compiled")
 @pytest.mark.parametrize(("drive_off", "emf"), VARIANTS)
 def test_digits_compiled(drive_off: str, emf: str, soak: Soak) -> None:
-    error = largest_error(drive_off, emf)
+    pytest.importorskip("numba")
+    error = largest_error(drive_off, emf, compiled_simulator())
     soak(f"largest relative error, coil {drive_off}, EMF {emf}", f"{error:.1e}", "1e-12", "compiled; the same")
     assert error <= 1e-12
 
@@ -111,10 +114,10 @@ def test_the_papers_claims(claim: Claim, soak: Soak) -> None:
     assert low <= found["shorted", "printed"] <= high
 
 
-@pytest.mark.usefixtures("compiled")
 def test_continuity(soak: Soak) -> None:
+    pytest.importorskip("numba")
     begun = time.perf_counter()
-    found = defects(2, PAIRS)
+    found = defects(2, PAIRS, compiled_simulator())
     how = f"every number halves with the distance; bisected 20 times; {time.perf_counter() - begun:.0f} s"
     soak("jumps within one status and one order of events", f"{len(found)} of {PAIRS:,} pairs", "0", how)
     assert not found
@@ -142,12 +145,12 @@ def extreme_guns() -> Iterator[dict[str, object]]:
         yield change | {"drive_off": off, "emf": emf}
 
 
-@pytest.mark.usefixtures("compiled")
 def test_extremes(soak: Soak) -> None:
-    counts, slowest = Counter[str](), 0.0
+    pytest.importorskip("numba")
+    counts, slowest, simulate = Counter[str](), 0.0, compiled_simulator()
     for change in extreme_guns():
         begun = time.process_time()
-        counts[shoot(**change).status] += 1
+        counts[shoot(simulate, **change).status] += 1
         slowest = max(slowest, time.process_time() - begun)
     each = ", ".join(f"{count} {name}" for name, count in counts.most_common())
     how = f"{counts.total()} shots: each extreme, and pairs of them, in all options; slowest {slowest:.2f} s"
@@ -228,9 +231,11 @@ def test_times(fidelity: str, drive_off: str, soak: Soak) -> None:
     assert alone < 20_000
 
 
-@pytest.mark.usefixtures("compiled")
 @pytest.mark.parametrize("drive_off", ["open", "shorted"])
 def test_times_of_one_compiled_shot(drive_off: str, soak: Soak) -> None:
+    pytest.importorskip("numba")
     gun = of_options(BARE, drive_off, "printed")
+    simulate = compiled_simulator()
+    simulate(gun)  # the compiler's time apart
     alone = median_us(2000, lambda: [simulate(gun) for _ in range(2000)])
-    soak(f"full, coil {drive_off}: `simulate` once warm", f"{alone:.1f} us", "stated", f"median of {REPEATS} x 2000")
+    soak(f"full, coil {drive_off}: one shot compiled", f"{alone:.1f} us", "stated", f"median of {REPEATS} x 2000")

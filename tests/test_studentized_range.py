@@ -9,6 +9,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy import special, stats
+from scipy.optimize import elementwise
 
 from analysis import studentized_range_isf, studentized_range_logsf, studentized_range_sf
 from analysis.stats.studentized_tail import TABLE_PAYS
@@ -144,6 +145,19 @@ def test_impossible_parameters_are_refused(k: float, df: float, reason: str) -> 
     for function in (studentized_range_sf, studentized_range_logsf, studentized_range_isf):
         with pytest.raises(ValueError, match=reason):
             function(0.5, k, df)
+
+
+def test_quantiles_are_those_of_scipys_root_finder() -> None:
+    p = np.array([0.9, 0.5, 0.05, 1e-3, 1e-12, 1e-200])
+    k, df = np.array([2.0, 3.0, 3.0, 4.0, 10.0, 20.0]), np.array([2.0, 12.0, 26.0, np.inf, 100.0, 5.0])
+    found = studentized_range_isf(p, k, df)
+    tails = elementwise.find_root(
+        lambda x, k, df, log_p: studentized_range_logsf(np.exp(x), k, df) - log_p,
+        (np.log(0.5 * found), np.log(2.0 * found)),
+        args=(k, df, np.log(p)),
+    )
+    assert tails.success.all()
+    assert np.exp(tails.x) == pytest.approx(found, rel=1e-12)
 
 
 def test_a_probability_outside_its_range_is_refused() -> None:

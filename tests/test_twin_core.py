@@ -3,7 +3,7 @@
 import pytest
 
 from device.twin.core import Core
-from device.twin.machine import REFUSED, Drive
+from device.twin.machine import REFUSED, DriveEvent
 from device.wire.frame import Frame, decode, encode, following
 from device.wire.records import ShotRecord, refusal
 from tests.twin_hosts import PULSE, READY, Hand, Strict
@@ -36,8 +36,8 @@ def test_a_shot_by_hand_is_driven_to_the_microsecond_and_kept(hand):
     assert hand.say("", 50_000) == []
     start = READY + 17
     assert hand.drives == [
-        Drive(time_us=start, kind="PULS", amount=16_000, end_us=start + 10_000),
-        Drive(time_us=start + 10_000, kind="OFF", end_us=start + 10_000),
+        DriveEvent(time_us=start, kind="PULS", amount=16_000, end_us=start + 10_000),
+        DriveEvent(time_us=start + 10_000, kind="OFF", end_us=start + 10_000),
     ]
     assert hand.say("SHOT?") == [
         f"SHOT 1,5,DONE,{start},{start},{start + 10_000},{start + 211_000},asymmetric-1,FORW,PULS,16000,10000,211000"
@@ -87,7 +87,7 @@ def test_abort_cuts_a_pulse_and_disarms(strict):
     shot, done = strict.say("ABOR", 4_000)
     found = ShotRecord.parse(shot)
     assert (done, found.ending, found.end_us - found.start_us) == ("OK", "CUT", 4_000)
-    assert strict.drives[-1] == Drive(time_us=READY + 4_000, kind="OFF", end_us=READY + 4_000)
+    assert strict.drives[-1] == DriveEvent(time_us=READY + 4_000, kind="OFF", end_us=READY + 4_000)
     assert strict.standing().state == "DISARMED"
 
 
@@ -174,7 +174,7 @@ def test_a_driver_fault_cuts_and_stays_until_reset(strict):
     strict.say("TRIG 1")
     out, drives = strict.core.fail(3, strict.now_us + 2_000)
     strict.now_us += 2_000
-    assert drives == [Drive(time_us=READY + 2_000, kind="OFF", end_us=READY + 2_000)]
+    assert drives == [DriveEvent(time_us=READY + 2_000, kind="OFF", end_us=READY + 2_000)]
     assert ShotRecord.parse(decode(out.strip(), "gun").body).ending == "CUT"
     assert (strict.standing().state, strict.standing().fault) == ("FAULT", 3)
     for text in ("ARM", "TRIG"):

@@ -7,10 +7,10 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from device.twin.machine import LATE_EFFECT_US
-from device.twin.scripts import MAX_LATE_US, random_script, transcript
 from device.wire import errors
 from device.wire.frame import MAX_LINE
 from tests.twin_hosts import Hand, Strict
+from tests.twin_scripts import MAX_LATE_US, random_script, transcript
 
 
 def test_the_error_queue_is_bounded_and_says_so():

@@ -11,10 +11,11 @@ recoil; the collision with the stop is apart from it.
 from __future__ import annotations
 
 from device.parameters import DriveOff, Emf, GunParameters
-from device.physics.batch import ShotBatch, simulate_batch, warm
-from device.physics.scenes import SCENES, Scene, choose
-from device.physics.summary import FIDELITIES, ShotSummary, ShotTrace, Status, simulate
-from device.physics.traces import trace
+from device.physics.batch import ShotBatch, compiled_simulator, simulate_batch
+from device.physics.equations import FIDELITIES, Status
+from device.physics.scenes import SCENES, Scene, choose_model
+from device.physics.shot import ShotSummary, simulate
+from device.physics.traces import ShotTrace, trace
 
 __all__ = [
     "FIDELITIES",
@@ -27,9 +28,9 @@ __all__ = [
     "ShotSummary",
     "ShotTrace",
     "Status",
-    "choose",
+    "choose_model",
+    "compiled_simulator",
     "simulate",
     "simulate_batch",
     "trace",
-    "warm",
 ]

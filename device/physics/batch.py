@@ -1,4 +1,4 @@
-"""The kernel in machine code. The one module that knows the compiler (extra `fast`).
+"""Shots in machine code (extra `fast`), many at once or one: the one module that knows the compiler.
 
 The first use compiles for half a minute and keeps the result beside this file, or in the user's cache; later
 processes load it in about a second. No session calls this.
@@ -7,96 +7,116 @@ processes load it in about a second. No session calls this.
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Callable
+import struct
+from collections.abc import Callable, Mapping
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, fields
 from functools import lru_cache
 from importlib.util import find_spec
+from operator import attrgetter
 from types import CodeType, FunctionType
-from typing import Any, cast
+from typing import Any, cast, get_type_hints
 
-import numba
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from device.parameters import ABOVE_ZERO, GunParameters
-from device.physics.kernel import (
-    BACK_EMF,
+from device.physics.equations import (
     CLOSED_FORM,
-    FRICTION_BACK,
-    FRICTION_OUT,
-    INDUCTANCE,
     INVALID,
-    KERNEL,
-    MODEL,
     NO_INDUCTANCE,
-    OPEN,
-    RESULT_SIZE,
-    STATE_SIZE,
+    ORDER,
     STATUSES,
-    WORK_SIZE,
+    Constants,
+    ShotResult,
+    ShotState,
+    StepSeries,
+    model_number,
     pack,
 )
-from device.physics.shot import shoot
-from device.physics.summary import interpret, model_of, use
+from device.physics.shot import ShotSummary, interpret, shoot, summary_from
+from device.words import RecoilError
 
-Rows = NDArray[np.float64]
+Records = NDArray[Any]
+"""Arrays whose fields are those of `Constants`, or of `ShotResult`."""
+
+_KINDS: dict[object, tuple[Any, ...]] = {float: ("f8",), int: ("i8",), bool: ("?",), list[float]: ("f8", (ORDER + 1,))}
 
 
-def _many(rows: Rows, state: Rows, work: Rows, found: Rows) -> None:
-    """The results of each row of parameters."""
-    for n in range(len(rows)):
-        shoot(rows[n], state, work, found[n])
+def _record_of(kind: type) -> np.dtype[Any]:
+    return np.dtype([(name, *_KINDS[hint]) for name, hint in get_type_hints(kind).items()], align=True)
+
+
+_GUN, _STATE, _SERIES, _RESULT = map(_record_of, (Constants, ShotState, StepSeries, ShotResult))
+_LETTERS = {float: "d", int: "q", bool: "?"}
+_GUN_BYTES, _RESULT_BYTES = (
+    struct.Struct("@" + "".join(_LETTERS[hint] for hint in get_type_hints(kind).values()))
+    for kind in (Constants, ShotResult)
+)
+
+
+def _shoot_each(guns: Records, results: Records) -> None:
+    """The result of each gun's shot."""
+    state, series = np.empty(1, _STATE), np.empty(1, _SERIES)
+    for n in range(len(guns)):
+        shoot(guns[n], state[0], series[0], results[n])
+
+
+Functions = dict[FunctionType, Mapping[str, FunctionType]]
+"""Functions, each after those that it calls; with these by the names that it calls them."""
+
+
+def _callees_first(function: FunctionType) -> Functions:
+    """A function and all that it needs, as written in its code."""
+    names = function.__code__.co_names
+    called = {name: other for name in names if isinstance(other := function.__globals__.get(name), FunctionType)}
+    found: Functions = {}
+    for other in called.values():
+        found = _callees_first(other) | found
+    return found | {function: called}
 
 
 @lru_cache(maxsize=1)
-def compiled() -> tuple[Callable[..., None], Callable[..., None]]:
-    """`shoot` for one shot, and for rows of them."""
-    digest = _digest()
-    twins: dict[str, Any] = {}
-    spaces: list[dict[str, Any]] = []
-    for name, function in (*KERNEL.items(), ("_many", _many)):
-        twin, space = _twin(function, f"{name}_{digest}")
-        entry = name in ("shoot", "_many")
-        # all that is called is copied in: half the time, since a call counts the references to each row;
-        # a single shot keeps Python's lock, as all of them share one desk
-        twins[name] = numba.njit(error_model="numpy", cache=entry, nogil=name == "_many", forceinline=not entry)(twin)
-        spaces.append(space)
-    for space in spaces:
-        space.update({name: twin for name, twin in twins.items() if name in space})
-    return twins["shoot"], twins["_many"]
+def machine_code() -> Callable[[Records, Records], None]:
+    """`_shoot_each` in machine code. `RecoilError`: there is no compiler."""
+    if find_spec("numba") is None:
+        raise RecoilError('compiled shots need numba, which is not installed: install "recoil[fast]"')
+    import numba  # noqa: PLC0415 - the compiler waits until it is asked for
+
+    each = cast("FunctionType", _shoot_each)
+    functions = _callees_first(each)
+    twins: dict[FunctionType, Any] = {}
+    for function, called in functions.items():
+        entry = function is each
+        space = function.__globals__ | {name: twins[one] for name, one in called.items()}
+        twin = FunctionType(function.__code__, space)
+        twin.__qualname__ = f"{function.__name__}_{_digest(functions)}"  # the compiler's cache goes by it
+        # all that is called is copied in: half the time, since a call counts the references to each array
+        twins[function] = numba.njit(error_model="numpy", cache=entry, nogil=entry, forceinline=not entry)(twin)
+    return twins[each]  # type: ignore[no-any-return]
 
 
-def _twin(function: Callable[..., object], name: str) -> tuple[FunctionType, dict[str, Any]]:
-    """A copy of the function with a name and globals of its own."""
-    plain = cast("FunctionType", function)
-    space = dict(plain.__globals__)
-    twin = FunctionType(plain.__code__, space)
-    twin.__qualname__ = name  # the compiler's cache goes by it
-    return twin, space
+def _digest(functions: Functions) -> str:
+    """Of what the functions do, and of what they name: the compiler's own cache looks at one file only."""
+    parts = [_text(function.__code__) for function in (*functions, cast("FunctionType", machine_code.__wrapped__))]
+    for function in functions:
+        values = (function.__globals__.get(name) for name in function.__code__.co_names)
+        parts += [repr(value) for value in values if isinstance(value, int | float | tuple | np.dtype)]
+    parts.append(repr(_GUN) + repr(_RESULT))
+    return hashlib.sha256("".join(parts).encode()).hexdigest()[:16]
 
 
-def _digest() -> str:
-    """Of the kernel's code and of how it is compiled: the compiler's own cache looks at one file only."""
-    codes = (cast("FunctionType", function).__code__ for function in (*KERNEL.values(), compiled.__wrapped__))
-    text = "".join(map(_told, codes))
-    sizes = f"{RESULT_SIZE} {STATE_SIZE} {WORK_SIZE}"
-    return hashlib.sha256((text + sizes).encode()).hexdigest()[:16]
-
-
-def _told(code: CodeType) -> str:
-    """What a piece of code does, as text. Code within it by the same text: as a constant it is told by its address."""
-    constants = [_told(one) if isinstance(one, CodeType) else repr(one) for one in code.co_consts]
+def _text(code: CodeType) -> str:
+    """What a piece of code does. Code within it by the same text: its own text would be its address."""
+    constants = [_text(one) if isinstance(one, CodeType) else repr(one) for one in code.co_consts]
     return f"{code.co_code.hex()}{constants}{code.co_names}"
 
 
+_SUMMARY = len(fields(ShotSummary))  # so many of a result's numbers stand in a summary, in its order
 _CHUNK = 4096  # shots between two words of progress
-_FIELDS = tuple(field.name for field in fields(GunParameters))
-_OPTIONS = {"drive_off": ("shorted", "open"), "emf": ("printed", "reciprocal")}  # 0 and 1 in the kernel's row
-_PLACES = {name: place + (place > FRICTION_OUT) for place, name in enumerate(_FIELDS)} | {
-    "return_friction_N": FRICTION_BACK
-}
-"""Where the kernel's row holds each parameter."""
+_FIELDS = dict(zip((one.name for one in fields(GunParameters)), Constants._fields, strict=False))
+_OPTIONS = {"drive_off": ("shorted", "open"), "emf": ("printed", "reciprocal")}  # false and true among the constants
+_result_values = attrgetter(*(one.name for one in fields(ShotResult)))
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -120,22 +140,10 @@ class ShotBatch:
         """The statuses in words."""
         return np.array(STATUSES)[self.status]
 
-
-def warm() -> bool:
-    """Compiles the kernel or loads it, half a minute or one second, for `simulate` too. False without the compiler."""
-    if find_spec("numba") is None:
-        return False
-    from device.physics.batch import compiled  # noqa: PLC0415 - only here is the compiler wanted
-
-    one, _ = compiled()
-    state, work, found = np.empty(STATE_SIZE), np.empty(WORK_SIZE), np.empty(RESULT_SIZE)
-
-    def run(row: NDArray[np.float64]) -> list[float]:
-        one(row, state, work, found)
-        return found.tolist()
-
-    use(run, np.array, np.ndarray)
-    return True
+    def summaries(self) -> list[ShotSummary]:
+        """The shots one by one; none may be invalid."""
+        columns = (getattr(self, name).tolist() for name in self.__slots__)
+        return [summary_from(row) for row in zip(*columns, strict=True)]
 
 
 def simulate_batch(
@@ -148,44 +156,55 @@ def simulate_batch(
 ) -> ShotBatch:
     """The shots of `gun` with the parameters in `arrays` in place of its own, broadcast against each other.
 
-    `progress` is told after every few thousand shots how many they were. `ValueError`: no such parameter or fidelity.
-    Numbers that physics has not make their shot `invalid` and no other one.
+    Compiled where numba is installed, else interpreted. `progress` is called after every few thousand shots with
+    their number. `ValueError`: no such parameter or fidelity. Numbers that physics has not make their shot `invalid`
+    and no other one.
 
     >>> simulate_batch(friction_N=[0.21, -1.0, 1.70]).names().tolist()
     ['home', 'invalid', 'stuck']
     """
-    rows, valid = _rows(gun or GunParameters(), fidelity, arrays)
-    found = np.empty((len(rows), RESULT_SIZE))
-    progress = progress or (lambda _count: None)
-    if valid.all():
-        _run(rows, found, cores, progress)
-    else:
-        found[:], found[:, 0] = np.nan, INVALID
-        among = np.empty((int(valid.sum()), RESULT_SIZE))
-        _run(rows[valid], among, cores, progress)
-        found[valid] = among
-    numbers = {name: np.ascontiguousarray(found[:, n]) for n, name in enumerate(ShotBatch.__slots__[1:], start=1)}
-    return ShotBatch(status=found[:, 0].astype(np.int8), **numbers)
+    guns, valid = _guns(gun or GunParameters(), fidelity, arrays)
+    results = np.zeros(len(guns), _RESULT)
+    among = results if valid.all() else np.empty(int(valid.sum()), _RESULT)
+    _run(guns if valid.all() else guns[valid], among, cores, progress or (lambda _count: None))
+    if among is not results:
+        results[valid] = among
+    numbers = {name: np.where(valid, results[name], np.nan) for name in ShotBatch.__slots__[1:]}
+    return ShotBatch(status=np.where(valid, results["status"], INVALID).astype(np.int8), **numbers)
 
 
-def _rows(
-    gun: GunParameters, fidelity: str, arrays: dict[str, ArrayLike]
-) -> tuple[NDArray[np.float64], NDArray[np.bool_]]:
-    """The kernel's rows, and which of them are guns."""
+def compiled_simulator() -> Callable[..., ShotSummary]:
+    """`simulate` in machine code: microseconds a shot, once the compiler has had its half a minute or its second.
+
+    It holds room for one shot, so each thread needs one of its own. `RecoilError`: there is no compiler.
+    """
+    shoot_each, gun, result = machine_code(), bytearray(_GUN.itemsize), bytearray(_RESULT.itemsize)
+    guns, results = np.frombuffer(gun, _GUN), np.frombuffer(result, _RESULT)
+
+    def simulate(parameters: GunParameters, fidelity: str = "full") -> ShotSummary:
+        """As `device.physics.simulate`."""
+        _GUN_BYTES.pack_into(gun, 0, *pack(parameters, model_number(fidelity)))
+        shoot_each(guns, results)
+        return summary_from(_RESULT_BYTES.unpack_from(result)[:_SUMMARY])
+
+    return simulate
+
+
+def _guns(gun: GunParameters, fidelity: str, arrays: Mapping[str, ArrayLike]) -> tuple[Records, NDArray[np.bool_]]:
+    """The constants of each gun, and which of them are guns."""
     unknown = sorted(set(arrays) - set(_FIELDS))
     if unknown:
         raise ValueError(f"no such parameter: {', '.join(unknown)}; known are {', '.join(_FIELDS)}")
     columns = [np.ravel(column) for column in np.broadcast_arrays(*map(np.asarray, arrays.values()))]
-    rows = np.tile(np.array(pack(gun)), (columns[0].size if columns else 1, 1))
-    valid = np.ones(len(rows), dtype=np.bool_)
+    guns = np.repeat(np.array([tuple(pack(gun))], _GUN), columns[0].size if columns else 1)
+    valid = np.ones(len(guns), dtype=np.bool_)
     for name, column in zip(arrays, columns, strict=True):
         valid &= _is_allowed(name, column)
-        numbers = column == _OPTIONS[name][1] if name in _OPTIONS else column
-        rows[:, _PLACES[name]] = numbers.astype(np.float64)
+        guns[_FIELDS[name]] = column == _OPTIONS[name][1] if name in _OPTIONS else column.astype(np.float64)
     if gun.return_friction_N is None and "return_friction_N" not in arrays:
-        rows[:, FRICTION_BACK] = rows[:, FRICTION_OUT]
-    _reduce(rows, model_of(fidelity))
-    return rows, valid
+        guns["friction_back"] = guns["friction_out"]
+    _reduce(guns, model_number(fidelity))
+    return guns, valid
 
 
 def _is_allowed(name: str, column: NDArray[Any]) -> NDArray[np.bool_]:
@@ -196,37 +215,28 @@ def _is_allowed(name: str, column: NDArray[Any]) -> NDArray[np.bool_]:
     return np.asarray(np.isfinite(column) & above)
 
 
-def _reduce(rows: NDArray[np.float64], model: float) -> None:
-    """What a reduced model leaves out of the rows, as `pack` does."""
-    rows[:, MODEL] = model
+def _reduce(guns: Records, model: int) -> None:
+    """What a reduced model leaves out of the constants, as `pack` does."""
+    guns["model"] = model
     if model in (NO_INDUCTANCE, CLOSED_FORM):
-        rows[:, INDUCTANCE] = 0.0
+        guns["inductance"] = 0.0
     if model == CLOSED_FORM:
-        rows[:, BACK_EMF], rows[:, OPEN] = 0.0, 1.0
+        guns["back_emf"], guns["opens"] = 0.0, True
 
 
-def _run(
-    rows: NDArray[np.float64], found: NDArray[np.float64], cores: int | None, progress: Callable[[int], object]
-) -> None:
-    run = _compiled_chunk() if find_spec("numba") else _interpreted_chunk
+def _run(guns: Records, results: Records, cores: int | None, progress: Callable[[int], object]) -> None:
+    run = machine_code() if find_spec("numba") else _interpret_each
 
     def one(start: int) -> int:
         chunk = slice(start, start + _CHUNK)
-        run(rows[chunk], found[chunk])
-        return len(rows[chunk])
+        run(guns[chunk], results[chunk])
+        return len(guns[chunk])
 
-    with ThreadPoolExecutor(cores) as pool:  # the compiled kernel holds no lock
-        for count in pool.map(one, range(0, len(rows), _CHUNK)):
+    with ThreadPoolExecutor(cores) as pool:  # the compiled code holds no lock
+        for count in pool.map(one, range(0, len(guns), _CHUNK)):
             progress(count)
 
 
-def _compiled_chunk() -> Callable[[NDArray[np.float64], NDArray[np.float64]], None]:
-    from device.physics.batch import compiled  # noqa: PLC0415 - the compiler waits until a batch is asked for
-
-    _, many = compiled()
-    return lambda rows, found: many(rows, np.empty(STATE_SIZE), np.empty(WORK_SIZE), found)
-
-
-def _interpreted_chunk(rows: NDArray[np.float64], found: NDArray[np.float64]) -> None:
-    for n, row in enumerate(rows.tolist()):
-        found[n] = interpret(row)
+def _interpret_each(guns: Records, results: Records) -> None:
+    for n, constants in enumerate(guns.tolist()):
+        results[n] = _result_values(interpret(Constants(*constants)))

@@ -29,7 +29,7 @@ Vector = NDArray[np.float64]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Hand:
+class HandMechanics:
     """The enclosure and what holds it. The whole gun weighs 340.2 g (paper); the hand's numbers are assumed."""
 
     enclosure_mass_kg: float = 0.3402 - 0.114
@@ -57,7 +57,7 @@ class HeldShot:
 @dataclass(frozen=True, slots=True, kw_only=True)
 class _Phase:
     gun: GunParameters
-    hand: Hand
+    hand: HandMechanics
     way: int
     drive_V: float
     live: bool
@@ -100,14 +100,14 @@ class _Phase:
         return float(free - share * held_N)
 
 
-def simulate_held(gun: GunParameters, hand: Hand | None = None, until_s: float = 0.4) -> HeldShot:
+def simulate_held(gun: GunParameters, hand: HandMechanics | None = None, until_s: float = 0.4) -> HeldShot:
     """One shot from rest of a gun in a hand, to `until_s`. `ValueError`: a time that is not above 0.
 
     `RuntimeError`: the integration did not get there, or not in 200 stretches.
     """
     if not 0 < until_s < math.inf:
         raise ValueError(f"until_s is {until_s}; it must be a finite time above 0")
-    hand = hand or Hand()
+    hand = hand or HandMechanics()
     t, y, paths, landing, broke = 0.0, np.zeros(6), [], None, 0
     for _ in range(_MAX_PHASES):
         phase = _phase(gun, hand, t, y, broke)
@@ -133,7 +133,7 @@ def _method(gun: GunParameters) -> Literal["DOP853", "Radau"]:
     return "DOP853" if gun.inductance_H / gun.resistance_ohm > _STIFF_S else "Radau"
 
 
-def _phase(gun: GunParameters, hand: Hand, t: float, y: Vector, broke: int) -> _Phase:
+def _phase(gun: GunParameters, hand: HandMechanics, t: float, y: Vector, broke: int) -> _Phase:
     """The stretch from here on; a magnet that just broke away goes the way of `broke`."""
     live = gun.drive_off == "shorted" or t < gun.pulse_s
     drive_V = gun.voltage_V if t < gun.pulse_s else 0.0
@@ -180,7 +180,7 @@ def _settle(phase: _Phase, found: Any, t: float, y: Vector) -> None:
         y[2] = 0.0
 
 
-def _held(gun: GunParameters, hand: Hand, path: Vector, landing: tuple[float, float] | None) -> HeldShot:
+def _held(gun: GunParameters, hand: HandMechanics, path: Vector, landing: tuple[float, float] | None) -> HeldShot:
     x, v, _, X, V, impulse = path
     felt = hand.stiffness_N_m * X + hand.damping_N_s_m * V
     momentum = (gun.magnet_mass_kg + hand.enclosure_mass_kg) * V[-1] - gun.magnet_mass_kg * v[-1]

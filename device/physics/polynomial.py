@@ -9,102 +9,94 @@ from __future__ import annotations
 
 import math
 
-from device.physics.kernel import BS, ORDER, Floats, kernel
+from device.physics.equations import ORDER, Coefficients
 
 PER_BINOMIAL = tuple(1.0 / math.comb(ORDER, k) for k in range(ORDER + 1))
 _SMALLEST = 2.0**-46  # of the step: two roots closer than this are one touch, which ends nothing
 
 
-@kernel
-def value(w: Floats, c: int, s: float) -> float:
+def value_at(c: Coefficients, s: float) -> float:
     """The polynomial of even order at s: Horner's scheme in s^2 for the even and the odd powers side by side."""
-    q, even, odd = s * s, w[c + ORDER], w[c + ORDER - 1]
+    q, even, odd = s * s, c[ORDER], c[ORDER - 1]
     for j in range(ORDER - 2, 0, -2):
-        even = even * q + w[c + j]
-        odd = odd * q + w[c + j - 1]
-    return (even * q + odd * s) + w[c]
+        even = even * q + c[j]
+        odd = odd * q + c[j - 1]
+    return (even * q + odd * s) + c[0]
 
 
-@kernel
-def value_at_end(w: Floats, c: int) -> float:
+def value_at_end(c: Coefficients) -> float:
     """The polynomial of even order at s = 1, the small coefficients first."""
     even, odd = 0.0, 0.0
     for j in range(ORDER, 0, -2):
-        even += w[c + j]
-        odd += w[c + j - 1]
-    return even + odd + w[c]
+        even += c[j]
+        odd += c[j - 1]
+    return even + odd + c[0]
 
 
-@kernel
-def lowest(w: Floats, c: int, sign: float) -> float:
+def lower_bound(c: Coefficients, sign: float) -> float:
     """A bound from below for what the polynomial, times `sign`, adds to its first coefficient on [0, 1]."""
     even, odd = 0.0, 0.0
     for j in range(1, ORDER, 2):
-        even += min(sign * w[c + j], 0.0)
-        odd += min(sign * w[c + j + 1], 0.0)
+        even += min(sign * c[j], 0.0)
+        odd += min(sign * c[j + 1], 0.0)
     return even + odd
 
 
-@kernel
-def to_bernstein(w: Floats, c: int) -> None:
+def to_bernstein(c: Coefficients, b: list[float]) -> None:
     """The Bernstein coefficients over [0, 1]: b_j = sum over k <= j of C(j, k)/C(n, k) c_k."""
     for k in range(ORDER + 1):
-        w[BS + k] = w[c + k] * PER_BINOMIAL[k]
+        b[k] = c[k] * PER_BINOMIAL[k]
     for low in range(1, ORDER + 1):
         for j in range(ORDER, low - 1, -1):
-            w[BS + j] += w[BS + j - 1]
+            b[j] += b[j - 1]
 
 
-@kernel
-def restrict(w: Floats, low: float, high: float) -> None:
+def restrict(b: list[float], low: float, high: float) -> None:
     """The Bernstein coefficients over [low, high] in place of those over [0, 1] (de Casteljau, twice)."""
     for r in range(1, ORDER + 1):
         for j in range(ORDER, r - 1, -1):
-            w[BS + j] = (1.0 - high) * w[BS + j - 1] + high * w[BS + j]
+            b[j] = (1.0 - high) * b[j - 1] + high * b[j]
     t = low / high
     for r in range(1, ORDER + 1):
         for j in range(ORDER + 1 - r):
-            w[BS + j] = (1.0 - t) * w[BS + j] + t * w[BS + j + 1]
+            b[j] = (1.0 - t) * b[j] + t * b[j + 1]
 
 
-@kernel
-def sign_changes(w: Floats) -> int:
+def sign_changes(b: Coefficients) -> int:
     """How often the coefficients change sign, zeros left out."""
     changes, last = 0, 0.0
     for j in range(ORDER + 1):
-        if w[BS + j] * last < 0.0:
+        if b[j] * last < 0.0:
             changes += 1
-        if w[BS + j] != 0.0:
-            last = math.copysign(1.0, w[BS + j])
+        if b[j] != 0.0:
+            last = math.copysign(1.0, b[j])
     return changes
 
 
-@kernel
-def changes_between(w: Floats, c: int, low: float, high: float) -> int:
+def changes_between(c: Coefficients, b: list[float], low: float, high: float) -> int:
     """The changes of sign over [low, high]: an upper bound for the number of roots there, and exact for 0 and 1."""
-    to_bernstein(w, c)
+    to_bernstein(c, b)
     if low > 0.0 or high < 1.0:
-        restrict(w, low, high)
-    return sign_changes(w)
+        restrict(b, low, high)
+    return sign_changes(b)
 
 
-@kernel
-def bracketed_root(w: Floats, c: int, low: float, high: float) -> float:
+def bracketed_root(c: Coefficients, b: Coefficients, low: float, high: float) -> float:
     """The one root between `low` and `high`: Newton's method, kept inside the bracket by halving it.
 
     `b` holds the Bernstein coefficients over the bracket: the polygon of them crosses 0 near the root.
     """
-    sign = 1.0 if w[BS] > 0.0 or (w[BS] == 0.0 and w[BS + ORDER] < 0.0) else -1.0
-    s = low + (high - low) * polygon_root(w)
+    sign = 1.0 if b[0] > 0.0 or (b[0] == 0.0 and b[ORDER] < 0.0) else -1.0
+    s = low + (high - low) * polygon_root(b)
     for _ in range(80):
-        q, even, odd, even_slope, odd_slope = s * s, w[c + ORDER], w[c + ORDER - 1], 0.0, 0.0
+        q, even, odd, even_slope, odd_slope = s * s, c[ORDER], c[ORDER - 1], 0.0, 0.0
         for j in range(ORDER - 2, 0, -2):
             even_slope = even_slope * q + even
             odd_slope = odd_slope * q + odd
-            even = even * q + w[c + j]
-            odd = odd * q + w[c + j - 1]
+            even = even * q + c[j]
+            odd = odd * q + c[j - 1]
         even_slope = even_slope * q + even
-        y = (even * q + odd * s) + w[c]
+        y = (even * q + odd * s) + c[0]
         slope = odd + 2.0 * (s * even_slope + q * odd_slope)
         if y == 0.0:
             return s
@@ -122,24 +114,22 @@ def bracketed_root(w: Floats, c: int, low: float, high: float) -> float:
     return s
 
 
-@kernel
-def polygon_root(w: Floats) -> float:
+def polygon_root(b: Coefficients) -> float:
     """Where the control polygon first changes sign, between 0 and 1."""
     for j in range(ORDER):
-        if (w[BS + j] > 0.0) != (w[BS + j + 1] > 0.0) and w[BS + j] != w[BS + j + 1]:
-            return (j + w[BS + j] / (w[BS + j] - w[BS + j + 1])) / ORDER
+        if (b[j] > 0.0) != (b[j + 1] > 0.0) and b[j] != b[j + 1]:
+            return (j + b[j] / (b[j] - b[j + 1])) / ORDER
     return 0.5
 
 
-@kernel
-def first_crossing(w: Floats, c: int) -> float:
+def first_crossing(c: Coefficients, b: list[float]) -> float:
     """The first s in (0, 1] where a polynomial that is above 0 just after s = 0 falls below it; 2 if none."""
     low, width = 0.0, 1.0
     while low < 1.0:
         high = min(low + width, 1.0)
-        changes = changes_between(w, c, low, high)
-        if changes == 1 or (changes > 1 and width <= _SMALLEST and w[BS + ORDER] < 0.0):
-            return bracketed_root(w, c, low, high)
+        changes = changes_between(c, b, low, high)
+        if changes == 1 or (changes > 1 and width <= _SMALLEST and b[ORDER] < 0.0):
+            return bracketed_root(c, b, low, high)
         if changes == 0 or width <= _SMALLEST:
             low, width = high, 2.0 * width
         else:

@@ -1,6 +1,6 @@
 """What each reduced model costs in accuracy, stated and tested, and the cheapest that a use can bear.
 
-A scene names outputs and errors, `choose` picks a model and says what it stands for.
+A scene names outputs and errors, `choose_model` picks a model and says what it stands for.
 
 The errors are relative to `full` and hold for guns near the paper's: every number within 10 % of it, but friction, the
 same on both ways, from 0.1 to 1.12 N, and any contact depth. They are the largest of 500,000 random guns and of all
@@ -23,7 +23,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from device.parameters import DriveOff, Emf, GunParameters
-from device.physics.summary import model_of
+from device.physics.equations import model_number
 
 OUTPUTS = (
     "peak_force_N",
@@ -62,7 +62,7 @@ def stated_error(fidelity: str, output: str, drive_off: DriveOff, emf: Emf) -> f
     >>> stated_error("no-inductance", "peak_force_N", "shorted", "printed")
     0.23
     """
-    model_of(fidelity)
+    model_number(fidelity)
     if output not in OUTPUTS:
         raise ValueError(f"output is {output!r}; errors are stated for {', '.join(OUTPUTS)}")
     if fidelity == "full":
@@ -138,7 +138,7 @@ SCENES = {
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Choice:
+class ModelChoice:
     """The model picked for a scene, the largest error it stands for in each output that is needed, and why."""
 
     scene: str
@@ -147,7 +147,7 @@ class Choice:
     reason: str = ""
 
 
-def choose(scene: Scene, gun: GunParameters = _PAPER, **arrays: ArrayLike) -> Choice:
+def choose_model(scene: Scene, gun: GunParameters = _PAPER, **arrays: ArrayLike) -> ModelChoice:
     """The cheapest model within what the scene bears, for a gun, or for guns whose numbers are in `arrays`.
 
     >>> choose(SCENES["sweep"]).fidelity, choose(SCENES["sweep"], GunParameters(voltage_V=5.0)).fidelity
@@ -158,10 +158,10 @@ def choose(scene: Scene, gun: GunParameters = _PAPER, **arrays: ArrayLike) -> Ch
         errors = _errors(fidelity, scene, gun, arrays)
         beyond = next((output for output, error in errors.items() if error > scene.needs[output]), None)
         if beyond is None:
-            return Choice(scene=scene.name, fidelity=fidelity, errors=errors, reason=_reason(refused))
+            return ModelChoice(scene=scene.name, fidelity=fidelity, errors=errors, reason=_reason(refused))
         refused.append(_refusal(fidelity, beyond, errors[beyond], scene.needs[beyond]))
     errors = _errors("full", scene, gun, arrays)
-    return Choice(scene=scene.name, fidelity="full", errors=errors, reason=_reason(refused))
+    return ModelChoice(scene=scene.name, fidelity="full", errors=errors, reason=_reason(refused))
 
 
 def _reason(refused: list[str]) -> str:

@@ -12,94 +12,51 @@ from __future__ import annotations
 import math
 
 from device.physics.coil import begin_coil, coil_step
-from device.physics.kernel import (
-    BACK_EMF,
-    BEGAN,
+from device.physics.equations import (
     BREAK_AWAY,
     CLOSED_FORM,
     COIL,
     COIL_EDGE,
     CONTINUES,
-    DRIVE,
     DRIVE_CHANGE,
-    END,
     FREE,
-    FRICTION_BACK,
-    FRICTION_OUT,
     GIVEN_UP,
-    HEADING,
-    INDUCTANCE,
-    IS,
-    KIND,
-    LIMIT,
-    LIVE,
-    MASS,
-    MODEL,
-    MOTOR,
-    OPEN,
-    PRELOAD,
-    PULSE,
-    REACH,
-    RECIPROCAL,
-    RESISTANCE,
+    ORDER,
     REST,
     SETTLED,
-    STEP,
-    STIFFNESS,
     STOP,
-    TIME,
     TURN,
-    USED,
-    VOLTAGE,
-    WORK_SIZE,
-    XS,
-    Floats,
-    I,
-    V,
-    X,
-    clear,
-    kernel,
+    Constants,
+    ShotState,
+    StepSeries,
+    friction,
+    grip,
+    motor_force,
+    spring_force,
 )
-from device.physics.series import friction
 
 _SLACK = 1e-12  # relative: the magnet breaks away this far beyond the threshold, so that it does accelerate
 _SLACK_FLOOR_N = 1e-15  # the same for a gun with neither spring nor friction
 
 
-@kernel
-def spring_force(p: Floats, x: float) -> float:
-    """The spring's push towards the stop in N, k (x + x_0)."""
-    return p[STIFFNESS] * (x + p[PRELOAD])
-
-
-@kernel
-def grip(p: Floats, x: float) -> float:
-    """The coil's hold on the magnet, (x_c - x)/x_c inside the coil and 0 outside (equation 2)."""
-    return max(0.0, (p[REACH] - x) / p[REACH])
-
-
-@kernel
-def slack(p: Floats, x: float) -> float:
+def slack(p: Constants, x: float) -> float:
     """How far beyond friction, in N, a force must go before the model lets the magnet move (rounding only)."""
-    return _SLACK * (spring_force(p, x) + max(p[FRICTION_OUT], p[FRICTION_BACK])) + _SLACK_FLOOR_N
+    return _SLACK * (spring_force(p, x) + max(p.friction_out, p.friction_back)) + _SLACK_FLOOR_N
 
 
-@kernel
-def resting_current(p: Floats, u: float, i: float, t: float) -> float:
+def resting_current(p: Constants, u: float, i: float, t: float) -> float:
     """The current at rest after t seconds."""
-    if p[INDUCTANCE] == 0.0:
-        return u / p[RESISTANCE]
-    return i + (i - u / p[RESISTANCE]) * math.expm1(-p[RESISTANCE] / p[INDUCTANCE] * t)
+    if p.inductance == 0.0:
+        return u / p.resistance
+    return i + (i - u / p.resistance) * math.expm1(-p.resistance / p.inductance * t)
 
 
-@kernel
-def instant_current(p: Floats, u: float, x: float, v: float) -> float:
+def instant_current(p: Constants, u: float, x: float, v: float) -> float:
     """The current without inductance, (u - emf)/R."""
-    seen = grip(p, x) if p[RECIPROCAL] != 0.0 else 1.0
-    return (u - p[BACK_EMF] * seen * v) / p[RESISTANCE]
+    seen = grip(p, x) if p.reciprocal else 1.0
+    return (u - p.back_emf * seen * v) / p.resistance
 
 
-@kernel
 def time_constants(way: float, start: float, threshold: float, steady: float) -> float:
     """How long an exponential from `start` to `steady` takes past the threshold, upwards (1) or downwards (-1).
 
@@ -111,38 +68,32 @@ def time_constants(way: float, start: float, threshold: float, steady: float) ->
     return math.log1p(ahead / (way * (steady - threshold))) if ahead > 0.0 else 0.0
 
 
-@kernel
-def outward_threshold(p: Floats, x: float) -> float:
+def outward_threshold(p: Constants, x: float) -> float:
     """The current in A beyond which the coil pushes the resting magnet out."""
-    return (spring_force(p, x) + p[FRICTION_OUT] + slack(p, x)) / (p[MOTOR] * grip(p, x))
+    return (spring_force(p, x) + p.friction_out + slack(p, x)) / (p.motor_constant * grip(p, x))
 
 
-@kernel
-def homeward_threshold(p: Floats, x: float) -> float:
+def homeward_threshold(p: Constants, x: float) -> float:
     """The current in A below which the spring pushes the resting magnet home."""
-    return (spring_force(p, x) - p[FRICTION_BACK] - slack(p, x)) / (p[MOTOR] * grip(p, x))
+    return (spring_force(p, x) - p.friction_back - slack(p, x)) / (p.motor_constant * grip(p, x))
 
 
-@kernel
 def sine(omega: float, t: float) -> float:
     """The integral of cos(wt): sin(wt)/w, or t without a spring."""
     return math.sin(omega * t) / omega if omega > 0.0 else t
 
 
-@kernel
 def free_position(omega: float, x: float, v: float, a: float, t: float) -> float:
     """The position, x + v sin(wt)/w + a (1 - cos wt)/w^2."""
     half = sine(omega, 0.5 * t)
     return x + v * sine(omega, t) + 2.0 * a * half * half
 
 
-@kernel
 def free_velocity(omega: float, v: float, a: float, t: float) -> float:
     """The velocity, v cos(wt) + a sin(wt)/w."""
     return v * math.cos(omega * t) + a * sine(omega, t)
 
 
-@kernel
 def turn_time(omega: float, v: float, a: float, heading: float) -> float:
     """When the velocity v cos(wt) + a sin(wt)/w falls to 0; infinite if it never does."""
     braking = -heading * a
@@ -151,7 +102,6 @@ def turn_time(omega: float, v: float, a: float, heading: float) -> float:
     return abs(v) / braking if braking > 0.0 else math.inf
 
 
-@kernel
 def fall_time(omega: float, v: float, a: float, distance: float) -> float:
     """When the magnet has moved by `distance` (at most 0); infinite if it turns before.
 
@@ -164,51 +114,46 @@ def fall_time(omega: float, v: float, a: float, distance: float) -> float:
     return 2.0 * math.atan(omega * part) / omega if omega > 0.0 else 2.0 * part
 
 
-@kernel
-def free_current(p: Floats, u: float, i: float, v: float, a: float, t: float) -> float:
+def free_current(p: Constants, u: float, i: float, v: float, a: float, t: float) -> float:
     """The current of equation (3) under the free motion's back-EMF (none if reciprocal: the magnet is outside).
 
     i(t) = u/R + P cos(wt) + Q sin(wt)/w + (i_0 - u/R - P) exp(-rt), with r = R/L.
     """
-    R, L = p[RESISTANCE], p[INDUCTANCE]
+    R, L = p.resistance, p.inductance
     if L == 0.0:
-        return instant_current(p, u, p[REACH], free_velocity(math.sqrt(p[STIFFNESS] / p[MASS]), v, a, t))
-    omega, rate = math.sqrt(p[STIFFNESS] / p[MASS]), R / L
-    emf = 0.0 if p[RECIPROCAL] != 0.0 else p[BACK_EMF]
+        return instant_current(p, u, p.coil_reach, free_velocity(math.sqrt(p.stiffness / p.mass), v, a, t))
+    omega, rate = math.sqrt(p.stiffness / p.mass), R / L
+    emf = 0.0 if p.reciprocal else p.back_emf
     coupling = emf / (R + L * omega * omega / rate)
     cosine, sines = -coupling * (v - a / rate), -coupling * (a + omega * omega / rate * v)
     fading = (i - u / R - cosine) * math.exp(-rate * t)
     return u / R + cosine * math.cos(omega * t) + sines * sine(omega, t) + fading
 
 
-@kernel
-def pulse_on(p: Floats, s: Floats) -> None:
+def pulse_on(p: Constants, s: ShotState) -> None:
     """The drive from the onset of a pulse at time 0 on."""
-    s[TIME], s[DRIVE], s[LIVE], s[LIMIT] = 0.0, p[VOLTAGE], 1.0, min(p[PULSE], s[END])
-    if p[PULSE] <= 0.0:
+    s.time, s.u, s.live, s.drive_until = 0.0, p.voltage, True, min(p.pulse_s, s.until)
+    if p.pulse_s <= 0.0:
         pulse_off(p, s)
 
 
-@kernel
-def pulse_off(p: Floats, s: Floats) -> None:
+def pulse_off(p: Constants, s: ShotState) -> None:
     """The drive after the pulse: u = 0 through a shorted coil, or no current at all."""
-    s[DRIVE], s[LIVE], s[LIMIT] = 0.0, 0.0 if p[OPEN] != 0.0 else 1.0, s[END]
+    s.u, s.live, s.drive_until = 0.0, not p.opens, s.until
 
 
-@kernel
-def heading_of(p: Floats, s: Floats) -> float:
+def heading_of(p: Constants, s: ShotState) -> float:
     """Which way the magnet goes on; at v = 0 the forces decide, and friction or the stop may hold it."""
-    if s[V] != 0.0:
-        return math.copysign(1.0, s[V])
-    motor = p[MOTOR] * grip(p, s[X]) * s[I] if s[LIVE] != 0.0 else 0.0
-    net, spare = motor - spring_force(p, s[X]), 0.5 * slack(p, s[X])
-    if net > p[FRICTION_OUT] + spare:
+    if s.v != 0.0:
+        return math.copysign(1.0, s.v)
+    motor = motor_force(p, s.x, s.i) if s.live else 0.0
+    net, spare = motor - spring_force(p, s.x), 0.5 * slack(p, s.x)
+    if net > p.friction_out + spare:
         return 1.0
-    return -1.0 if net < -p[FRICTION_BACK] - spare and s[X] > 0.0 else 0.0
+    return -1.0 if net < -p.friction_back - spare and s.x > 0.0 else 0.0
 
 
-@kernel
-def enter(p: Floats, s: Floats, event: int) -> None:
+def enter(p: Constants, s: ShotState, event: int) -> None:
     """What the last event does to the state, and the segment that follows.
 
     The inelastic stop takes the velocity, an open drive the current. A magnet that set out and got nowhere, a hop
@@ -216,112 +161,107 @@ def enter(p: Floats, s: Floats, event: int) -> None:
     """
     if event == CONTINUES:
         return
-    halted = s[HEADING] != 0.0 and s[TIME] == s[BEGAN]
+    halted = s.heading != 0.0 and s.time == s.began
     if event == STOP:
-        s[V] = 0.0
-    if s[LIVE] == 0.0:
-        s[I] = 0.0
-    elif p[INDUCTANCE] == 0.0:
-        s[I] = instant_current(p, s[DRIVE], s[X], s[V])
-    s[BEGAN] = s[TIME]
-    s[HEADING] = 0.0 if halted and s[V] == 0.0 else heading_of(p, s)
-    inside = s[X] < p[REACH] or (s[X] == p[REACH] and s[HEADING] < 0.0)
-    if s[HEADING] == 0.0:
-        s[KIND] = REST
-    elif inside and s[LIVE] != 0.0:
-        s[KIND] = COIL
+        s.v = 0.0
+    if not s.live:
+        s.i = 0.0
+    elif p.inductance == 0.0:
+        s.i = instant_current(p, s.u, s.x, s.v)
+    s.began = s.time
+    s.heading = 0.0 if halted and s.v == 0.0 else heading_of(p, s)
+    inside = s.x < p.coil_reach or (s.x == p.coil_reach and s.heading < 0.0)
+    if s.heading == 0.0:
+        s.kind = REST
+    elif inside and s.live:
+        s.kind = COIL
         begin_coil(p, s)
     else:
-        s[KIND] = FREE
+        s.kind = FREE
 
 
-@kernel
-def advance(p: Floats, s: Floats, w: Floats) -> int:
+def advance(p: Constants, s: ShotState, w: StepSeries) -> int:
     """The segment that begins at `s`: moves `s` on to its end and says what ended it."""
-    if s[KIND] == COIL:
-        return powered_arc(p, s, w) if p[MODEL] == CLOSED_FORM else coil_step(p, s, w)
-    if s[KIND] == FREE:
+    if s.kind == COIL:
+        return powered_arc(p, s, w) if p.model == CLOSED_FORM else coil_step(p, s, w)
+    if s.kind == FREE:
         return free_arc(p, s)
     return rest(p, s)
 
 
-@kernel
-def rest(p: Floats, s: Floats) -> int:
+def rest(p: Constants, s: ShotState) -> int:
     """At rest until the current breaks the magnet away, the drive changes, or for good."""
-    u, x, i, left = s[DRIVE], s[X], s[I], s[LIMIT] - s[TIME]
-    if s[LIVE] == 0.0 or p[MOTOR] * grip(p, x) == 0.0:
+    u, x, i, left = s.u, s.x, s.i, s.drive_until - s.time
+    if not s.live or p.motor_constant * grip(p, x) == 0.0:
         out, back = math.inf, math.inf
     else:
-        lag, steady = p[INDUCTANCE] / p[RESISTANCE], u / p[RESISTANCE]
-        out = scaled(lag, time_constants(1.0, i, outward_threshold(p, x), steady))
-        back = scaled(lag, time_constants(-1.0, i, homeward_threshold(p, x), steady)) if x > 0.0 else math.inf
+        lag, steady = p.inductance / p.resistance, u / p.resistance
+        out = in_seconds(lag, time_constants(1.0, i, outward_threshold(p, x), steady))
+        back = in_seconds(lag, time_constants(-1.0, i, homeward_threshold(p, x), steady)) if x > 0.0 else math.inf
     wait = min(out, back)
     if wait < left:
-        s[I] = outward_threshold(p, x) if out <= back else homeward_threshold(p, x)
-        s[TIME] += wait
+        s.i = outward_threshold(p, x) if out <= back else homeward_threshold(p, x)
+        s.time += wait
         return BREAK_AWAY
-    s[I] = resting_current(p, u, i, left)
+    s.i = resting_current(p, u, i, left)
     if wait == math.inf and u == 0.0:
         return SETTLED
-    s[TIME] = s[LIMIT]
+    s.time = s.drive_until
     return DRIVE_CHANGE
 
 
-@kernel
-def scaled(lag: float, constants: float) -> float:
-    """So many time constants in seconds; never is never, also without inductance."""
+def in_seconds(lag: float, constants: float) -> float:
+    """So many time constants in seconds; what never happens, never happens without inductance (lag 0) either."""
     return lag * constants if constants < math.inf else math.inf
 
 
-@kernel
-def powered_arc(p: Floats, s: Floats, w: Floats) -> int:
+def powered_arc(p: Constants, s: ShotState, w: StepSeries) -> int:
     """Inside the coil at a constant current, whose force fades along x as a spring's: k' = k + k_m i/x_c."""
-    x, v, heading, left = s[X], s[V], s[HEADING], s[LIMIT] - s[TIME]
-    clear(w, WORK_SIZE, 0.0)
-    w[XS], w[IS] = x, s[I]
-    omega = math.sqrt((p[STIFFNESS] + p[MOTOR] * s[I] / p[REACH]) / p[MASS])
-    a = (p[MOTOR] * grip(p, x) * s[I] + friction(p, heading) - spring_force(p, x)) / p[MASS]
+    x, v, heading, left = s.x, s.v, s.heading, s.drive_until - s.time
+    for n in range(ORDER + 1):
+        w.x[n], w.v[n], w.i[n] = 0.0, 0.0, 0.0
+    w.x[0], w.i[0] = x, s.i
+    omega = math.sqrt((p.stiffness + p.motor_constant * s.i / p.coil_reach) / p.mass)
+    a = (motor_force(p, x, s.i) + friction(p, heading) - spring_force(p, x)) / p.mass
     t, event = turn_time(omega, v, a, heading), TURN
-    way = (p[REACH] if heading > 0.0 else 0.0) - x
+    way = (p.coil_reach if heading > 0.0 else 0.0) - x
     arrival = fall_time(omega, -heading * v, -heading * a, -heading * way)
     if arrival <= t:
         t, event = arrival, COIL_EDGE if heading > 0.0 else STOP
     if not t < left:
         t, event = left, DRIVE_CHANGE
-    s[TIME] = s[LIMIT] if event == DRIVE_CHANGE else s[TIME] + t
-    s[X], s[V] = free_position(omega, x, v, a, t), free_velocity(omega, v, a, t)
-    s[STEP], s[USED] = t, 1.0
+    s.time = s.drive_until if event == DRIVE_CHANGE else s.time + t
+    s.x, s.v = free_position(omega, x, v, a, t), free_velocity(omega, v, a, t)
+    s.span, s.used = t, 1.0
     return exact_arc(p, s, event)
 
 
-@kernel
-def free_arc(p: Floats, s: Floats) -> int:
+def free_arc(p: Constants, s: ShotState) -> int:
     """Beyond the coil, or with a dead coil, until the magnet turns, meets the coil again or hits the stop."""
-    x, v, heading, left = s[X], s[V], s[HEADING], s[LIMIT] - s[TIME]
-    omega = math.sqrt(p[STIFFNESS] / p[MASS])
-    a = (friction(p, heading) - spring_force(p, x)) / p[MASS]
+    x, v, heading, left = s.x, s.v, s.heading, s.drive_until - s.time
+    omega = math.sqrt(p.stiffness / p.mass)
+    a = (friction(p, heading) - spring_force(p, x)) / p.mass
     t, event = turn_time(omega, v, a, heading), TURN
     if heading < 0.0:
-        target = p[REACH] if s[LIVE] != 0.0 else 0.0
+        target = p.coil_reach if s.live else 0.0
         fall = fall_time(omega, v, a, target - x)
         if fall < math.inf:
-            t, event = fall, COIL_EDGE if s[LIVE] != 0.0 else STOP
+            t, event = fall, COIL_EDGE if s.live else STOP
     if not t < left:
         t, event = left, DRIVE_CHANGE
-    s[TIME] = s[LIMIT] if event == DRIVE_CHANGE else s[TIME] + t
-    if s[LIVE] != 0.0:
-        s[I] = free_current(p, s[DRIVE], s[I], v, a, t)
-    s[X], s[V] = free_position(omega, x, v, a, t), free_velocity(omega, v, a, t)
+    s.time = s.drive_until if event == DRIVE_CHANGE else s.time + t
+    if s.live:
+        s.i = free_current(p, s.u, s.i, v, a, t)
+    s.x, s.v = free_position(omega, x, v, a, t), free_velocity(omega, v, a, t)
     return exact_arc(p, s, event)
 
 
-@kernel
-def exact_arc(p: Floats, s: Floats, event: int) -> int:
+def exact_arc(p: Constants, s: ShotState, event: int) -> int:
     """The quantity that defines the event is exact; what left the range of floats is given up."""
     if event == TURN:
-        s[V] = 0.0
+        s.v = 0.0
     elif event == COIL_EDGE:
-        s[X] = p[REACH]
+        s.x = p.coil_reach
     elif event == STOP:
-        s[X] = 0.0
-    return event if math.isfinite(s[X] + s[V] + s[I]) else GIVEN_UP
+        s.x = 0.0
+    return event if math.isfinite(s.x + s.v + s.i) else GIVEN_UP

@@ -12,7 +12,7 @@ from device.wire.frame import Garbled
 from device.wire.records import refusal
 from device.words import LinkError
 
-Outcome = Literal["done", "refused", "timed out", "garbled", "disconnected"]
+CommandOutcome = Literal["done", "refused", "timed out", "garbled", "disconnected"]
 
 
 class TimedOut(LinkError):  # noqa: N818 - outcomes, as they are named in the log
@@ -51,7 +51,7 @@ class WrongVersion(LinkError):  # noqa: N818
     """A gun that speaks another version of the wire."""
 
 
-class Refused(LinkError):  # noqa: N818
+class CommandRefused(LinkError):  # noqa: N818
     """The gun said no: nothing was done. `code` is the number of its error."""
 
     def __init__(self, code: int, message: str) -> None:
@@ -59,8 +59,8 @@ class Refused(LinkError):  # noqa: N818
         self.code = code
 
 
-OUTCOMES: dict[type[LinkError], Outcome] = {
-    Refused: "refused",
+OUTCOMES: dict[type[LinkError], CommandOutcome] = {
+    CommandRefused: "refused",
     TimedOut: "timed out",
     Garbled: "garbled",
     Disconnected: "disconnected",
@@ -68,14 +68,14 @@ OUTCOMES: dict[type[LinkError], Outcome] = {
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Command:
+class PendingCommand:
     """One command as it went: its number, when it was written and when it ended, on the host's clock, and how."""
 
     number: int
     body: str
     written_s: float
     ended_s: float
-    outcome: Outcome
+    outcome: CommandOutcome
 
 
 KEPT_COMMANDS = 10_000
@@ -114,7 +114,7 @@ class Pending:
     """Commands on their way, for one thread that writes at a time, one that reads, and any that wait."""
 
     def __init__(self, clock: Callable[[], float]) -> None:
-        self.log: deque[Command] = deque(maxlen=KEPT_COMMANDS)
+        self.log: deque[PendingCommand] = deque(maxlen=KEPT_COMMANDS)
         self._clock = clock
         self._waiting: dict[int, Waiting] = {}
         self._lock = threading.Lock()
@@ -152,7 +152,7 @@ class Pending:
         found = _outcome(waiting)
         reply = waiting.reply
         self.log.append(
-            Command(
+            PendingCommand(
                 number=waiting.number,
                 body=waiting.body,
                 written_s=waiting.written_s,
@@ -171,4 +171,4 @@ def _outcome(waiting: Waiting) -> Reply | LinkError:
     if reply is None:
         return waiting.trouble or TimedOut(f"no answer to {waiting.header} within its time")
     no = refusal(reply.body)
-    return reply if no is None else Refused(no.code, f"the gun refused {waiting.header}: {no.reason}")
+    return reply if no is None else CommandRefused(no.code, f"the gun refused {waiting.header}: {no.reason}")

@@ -8,12 +8,10 @@ from collections.abc import Callable, Mapping
 
 from device.limits import DriveHistory, planned_start_s
 from device.methods import Method
-from device.serial_gun.arming import TRIES, Arming, ask, standing
-from device.serial_gun.checks import MAX_UNCERTAINTY_S
-from device.serial_gun.commands import Disconnected, Refused, TimedOut, Unsure
+from device.serial_gun.commands import CommandRefused, Disconnected, TimedOut, Unsure
 from device.serial_gun.link import Link
-from device.serial_gun.reports import Order, ShotRequest, asked, ready_s, report
-from device.serial_gun.triggering import Triggering
+from device.serial_gun.reports import MAX_UNCERTAINTY_S, ShotOrder, ShotRequest, asked, ready_s, report
+from device.serial_gun.triggering import TRIES, Arming, Triggering, ask_again, standing
 from device.wire.records import StatusRecord
 from device.words import GunState, GunStatus, Identity, LimitError, Shot, ShotReport
 
@@ -85,7 +83,7 @@ class SerialGun:
             boot, count = self._count()
             self._configure(wanted)
             self._mark = self._mark % (2**32 - 1) + 1
-            order = Order(
+            order = ShotOrder(
                 mark=self._mark,
                 wanted=wanted,
                 requested_s=now_s,
@@ -145,7 +143,7 @@ class SerialGun:
             (now,) = self.link.host(self.link.gun_us(self._clock()))
             if now.uncertainty_s <= MAX_UNCERTAINTY_S * self._speed:
                 return
-            ask(self.link, "TIME?")
+            ask_again(self.link, "TIME?")
         raise TimedOut(
             f"not fired: the gun's clock is known to {now.uncertainty_s / self._speed:.3g} s only, and it must be "
             f"{MAX_UNCERTAINTY_S:g} s or less for a shot's time to count; the line is too slow (see recoil doctor)"
@@ -163,8 +161,8 @@ class SerialGun:
         if self._set != (self.link.session, text):
             self._set = (0, "")
             try:
-                self._set = (ask(self.link, f"CONF {text}").session, text)
-            except Refused as error:
+                self._set = (ask_again(self.link, f"CONF {text}").session, text)
+            except CommandRefused as error:
                 raise LimitError(f"{error}; nothing was fired") from error
 
     def _tick(self, at_s: float) -> int:
@@ -174,7 +172,7 @@ class SerialGun:
         first_us, first_s = self._first
         return max(0, first_us + round((at_s - first_s) * 1e6))
 
-    def _fire(self, order: Order) -> ShotReport:
+    def _fire(self, order: ShotOrder) -> ShotReport:
         """Have it fired. A shot of unknown time is taken into account as if it had begun now: nothing begins later.
 
         Its own word on the time is not asked, and the gun's count is read anew before the next.

@@ -14,10 +14,10 @@ from contextlib import suppress
 from device.serial_gun.clocks import Clocks, Exchange, HostTime
 from device.serial_gun.commands import (
     CalledOff,
-    Command,
     Disconnected,
     Forgotten,
     Pending,
+    PendingCommand,
     Reply,
     TimedOut,
     Waiting,
@@ -89,7 +89,7 @@ class Link:
                 raise trouble
 
     @property
-    def commands(self) -> deque[Command]:
+    def commands(self) -> deque[PendingCommand]:
         """The last commands as they went, but for the questions that nobody waits for."""
         return self._pending.log
 

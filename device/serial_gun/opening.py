@@ -64,7 +64,7 @@ def system_ports() -> list[str]:
     return sorted(port.device for port in list_ports.comports())
 
 
-def find(ports: Iterable[str], serial: str | None = None, open_port: OpenPort = SerialPort) -> str:
+def find_gun(ports: Iterable[str], serial: str | None = None, open_port: OpenPort = SerialPort) -> str:
     """The port at which a gun answers, the one with this serial number if it is given.
 
     `LinkError` names what was found if that is no gun or more than one. Each port is sent `*IDN?` and nothing else.
@@ -112,7 +112,7 @@ def open_serial(address: str, methods: Mapping[str, Method], clock: Callable[[],
     known: list[str] = []  # the serial number, once a gun was found
 
     def look() -> str:
-        return where.port or find(system_ports(), known[0] if known else None)
+        return where.port or find_gun(system_ports(), known[0] if known else None)
 
     link = Link(look, clock, where.speed)
     try:

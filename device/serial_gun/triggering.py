@@ -1,28 +1,144 @@
-"""One shot from its order to its outcome: fired once, its record checked; what was lost on the way is looked for."""
+"""Arming the gun, and firing a shot from its order to its outcome: fired once, its record checked.
+
+Questions whose answers only tell are asked again until there is an answer; what was lost on the way is looked for.
+"""
 
 from __future__ import annotations
 
+import threading
 import time
 from collections.abc import Callable
+from typing import TypeVar
 
-from device.serial_gun.arming import TRIES, Arming, ask, last_shot, standing
-from device.serial_gun.checks import check_not_fired, check_record, check_times
 from device.serial_gun.commands import (
     CalledOff,
+    CommandRefused,
     Contradiction,
     CutShort,
     Disconnected,
-    Refused,
     Reply,
     TimedOut,
     Unsure,
 )
 from device.serial_gun.link import PATIENCE_S, Link
-from device.serial_gun.reports import Order, Told
+from device.serial_gun.reports import (
+    BelievedShot,
+    ShotOrder,
+    check_not_fired,
+    check_record,
+    check_standing,
+    check_times,
+)
 from device.wire import errors
 from device.wire.frame import Garbled
-from device.wire.records import ShotRecord
+from device.wire.records import ShotRecord, StatusRecord
 from device.words import LimitError, LinkError
+
+TRIES = 4
+RECONNECT_S = 5.0
+"""So long a command waits for a gun that was unplugged."""
+
+_T = TypeVar("_T")
+
+
+def ask_again(link: Link, body: str, allowed: Callable[[], bool] = lambda: True) -> Reply:
+    """Ask what may be asked again, until there is an answer; the last trouble if there is none."""
+    trouble: LinkError = TimedOut("no answer")
+    for _ in range(TRIES):
+        link.wait_up(RECONNECT_S)
+        try:
+            return link.ask(body, allowed=allowed)
+        except (TimedOut, Garbled, Disconnected) as error:
+            trouble = error
+    raise trouble
+
+
+def standing(link: Link) -> tuple[Reply, StatusRecord]:
+    """How the gun stands. `Contradiction`: as it cannot stand."""
+    reply, found = _read(link, "STAT?", StatusRecord.parse)
+    try:
+        check_standing(found)
+    except Contradiction as error:
+        raise Contradiction(f"the gun's answer to STAT? is not believed: {error}") from error
+    return reply, found
+
+
+def last_shot(link: Link) -> tuple[Reply, ShotRecord]:
+    """What the gun says of the last shot that it accepted."""
+    return _read(link, "SHOT?", ShotRecord.parse)
+
+
+def _read(link: Link, question: str, parse: Callable[[str], _T]) -> tuple[Reply, _T]:
+    """An answer as the record that it is. One that cannot be read is asked for again."""
+    trouble = Garbled()
+    for _ in range(TRIES):
+        reply = ask_again(link, question)
+        try:
+            return reply, parse(reply.body)
+        except Garbled as error:
+            trouble = error
+    raise Garbled(f"the gun's answer to {question} cannot be read: {trouble}")
+
+
+MARGIN_S = 0.1
+"""Beyond the watchdog's time, until a gun that says nothing is taken for disarmed."""
+
+
+class Arming:
+    """The arming of the gun on a link, from any thread.
+
+    `disarms` counts the disarmings. Who wants to arm or fire notes it first: once it has changed, no more is written
+    for them. The link asks while nobody else can write, so that what was written before is followed by `ABOR`.
+    """
+
+    def __init__(self, link: Link) -> None:
+        self.disarms = 0
+        self.session = 0  # the link's, in which the gun was armed; 0 if it is disarmed
+        self._link = link
+        self._lock = threading.Lock()
+
+    @property
+    def lapsed(self) -> bool:
+        """Whether the gun was armed, and has disarmed itself since, as it does when the line is lost."""
+        return self.session not in {0, self._link.session}
+
+    def stands(self, disarms: int, session: int) -> bool:
+        """Whether the gun is still armed for what was asked for after so many disarmings, in this session."""
+        return (self.disarms, self._link.session) == (disarms, session)
+
+    def arm(self, disarms: int) -> None:
+        """Arm, unless it was disarmed since. `LinkError`: it was, or the gun does not answer, or has a fault."""
+        try:
+            session = ask_again(self._link, "ARM", lambda: self.disarms == disarms).session
+        except (CommandRefused, CalledOff):
+            raise
+        except LinkError:  # it may be armed, and its answer lost
+            self.disarm()
+            raise
+        with self._lock:
+            if self.disarms != disarms:
+                raise CalledOff("ARM was called off: the gun was disarmed meanwhile")
+            self.session = session
+
+    def disarm(self) -> None:
+        """Forbid shots. If the gun cannot be told, wait until its watchdog has done it."""
+        with self._lock:
+            self.disarms += 1
+            self.session = 0
+        session = self._link.session
+        for _ in range(TRIES):
+            try:
+                self._link.ask("ABOR")
+            except (TimedOut, Garbled):
+                continue
+            except LinkError:
+                break
+            return
+        self._link.drop("the gun did not say that it is disarmed")
+        end_s = time.monotonic() + self._link.watchdog_s + MARGIN_S - self._link.silent_for_s
+        while self._link.session == session and time.monotonic() < end_s:
+            time.sleep(0.005)
+
 
 LATEST_S = 0.15
 """A trigger that is so late does not fire any more."""
@@ -41,7 +157,7 @@ class Triggering:
     def __init__(self, link: Link, arming: Arming, clock: Callable[[], float], speed: float) -> None:
         self._link, self._arming, self._clock, self._speed = link, arming, clock, speed
 
-    def fire(self, order: Order) -> Told:
+    def fire(self, order: ShotOrder) -> BelievedShot:
         """The shot as it was told of and is believed. Only one that was surely not fired is triggered again.
 
         `LimitError`, `LinkError`: it was not fired. `Unsure`: it was, or may have been.
@@ -53,9 +169,9 @@ class Triggering:
                 record = ShotRecord.parse(reply.body)
             except CalledOff as error:
                 raise Disconnected(f"not fired: {self._why_not(order)}") from error
-            except Refused as error:
+            except CommandRefused as error:
                 trouble = self._refused(error, order)
-                ask(self._link, "TIME?")  # too late by a clock that may have been misread
+                ask_again(self._link, "TIME?")  # too late by a clock that may have been misread
             except (TimedOut, Garbled, Disconnected) as error:
                 trouble = error
                 found = self._look(order, error)
@@ -66,19 +182,19 @@ class Triggering:
         self._arming.disarm()
         raise TimedOut(f"not fired: {trouble}, {TRIES} times")
 
-    def _trigger(self, order: Order) -> Reply:
+    def _trigger(self, order: ShotOrder) -> Reply:
         before_us = max(order.at_us, self._link.gun_us(self._clock())) + round(LATEST_S * self._speed * 1e6)
         trigger = f"TRIG {order.mark},{order.at_us},{before_us}"
         return self._link.ask(
             trigger, self._patience_s(order), lambda: self._arming.stands(order.disarms, order.session)
         )
 
-    def _patience_s(self, order: Order) -> float:
+    def _patience_s(self, order: ShotOrder) -> float:
         """How long from now on a shot may take to end, in seconds of the real world."""
         ahead_s = 0.0 if order.at_s is None else max(order.at_s - self._clock(), 0.0)
         return PATIENCE_S + (ahead_s + order.wanted.setting.length_us / 1e6) / self._speed
 
-    def _look(self, order: Order, trouble: LinkError) -> tuple[Reply, ShotRecord] | None:
+    def _look(self, order: ShotOrder, trouble: LinkError) -> tuple[Reply, ShotRecord] | None:
         """The record of a shot whose answer was lost, when it has ended; None if it was surely not fired."""
         end_s, stopped = time.monotonic() + self._patience_s(order), False
         while True:
@@ -91,7 +207,7 @@ class Triggering:
                 self._arming.disarm()
                 stopped = True
 
-    def _last_shot(self, order: Order, trouble: LinkError) -> tuple[Reply, ShotRecord]:
+    def _last_shot(self, order: ShotOrder, trouble: LinkError) -> tuple[Reply, ShotRecord]:
         """What the gun says of its last shot, if it still knows. `Unsure`: it does not, or it contradicts itself."""
         try:
             reply, record = last_shot(self._link)
@@ -104,7 +220,7 @@ class Triggering:
             trouble = error
         raise self._lost(order, trouble)
 
-    def _refused(self, error: Refused, order: Order) -> LinkError:
+    def _refused(self, error: CommandRefused, order: ShotOrder) -> LinkError:
         """A trigger that came too late, and may be written again. Raises what any other refusal means."""
         if error.code == errors.TOO_LATE:
             return error
@@ -116,7 +232,7 @@ class Triggering:
             raise LimitError(f"{error}; not fired") from error
         raise self._too_soon(error) from error
 
-    def _too_soon(self, error: Refused) -> LinkError | LimitError:
+    def _too_soon(self, error: CommandRefused) -> LinkError | LimitError:
         """A gun that was switched on just now fires nothing in its first second, and none before its magnet is home."""
         found = standing(self._link)[1]
         left_s = (found.ready_us - found.clock_us) / 1e6
@@ -131,7 +247,7 @@ class Triggering:
             )
         return Disconnected(f"not fired: {error}")
 
-    def _why_not(self, order: Order) -> str:
+    def _why_not(self, order: ShotOrder) -> str:
         """Why a shot was called off, or cut short: a disarming, a fault of the driver, the line, or the watchdog."""
         if self._arming.disarms != order.disarms:
             return "the gun was disarmed meanwhile"
@@ -143,7 +259,7 @@ class Triggering:
             return self._link.why_lost
         return f"the driver reports fault {found.fault}" if found.fault else "the gun does not say why"
 
-    def _believed(self, reply: Reply, record: ShotRecord, order: Order, tries: int) -> Told:
+    def _believed(self, reply: Reply, record: ShotRecord, order: ShotOrder, tries: int) -> BelievedShot:
         """What is told of a shot, if it is believed."""
         try:
             check_record(record, order)
@@ -155,28 +271,28 @@ class Triggering:
         except LinkError as error:
             raise self._lost(order, error) from error
 
-    def _told(self, reply: Reply, record: ShotRecord, order: Order, tries: int) -> Told:
+    def _told(self, reply: Reply, record: ShotRecord, order: ShotOrder, tries: int) -> BelievedShot:
         """A record's times on the host's clock. A clock that was misread is learnt anew before they are disbelieved."""
         trouble = Contradiction()
         for _ in range(CLOCK_TRIES):
             accepted, start, end = self._link.host(record.accepted_us, record.start_us, record.end_us)
-            told = Told(reply=reply, record=record, tries=tries, accepted=accepted, start=start, end=end)
+            told = BelievedShot(reply=reply, record=record, tries=tries, accepted=accepted, start=start, end=end)
             try:
                 check_times(told, order, self._speed)
             except Contradiction as error:
                 trouble = error
-                ask(self._link, "TIME?")
+                ask_again(self._link, "TIME?")
             else:
                 return told
         raise trouble
 
-    def _disbelieved(self, order: Order, why: Contradiction) -> Unsure:
+    def _disbelieved(self, order: ShotOrder, why: Contradiction) -> Unsure:
         return self._unsure(order, f"the shot may have been fired, and the gun's record is not believed: {why}")
 
-    def _lost(self, order: Order, why: LinkError) -> Unsure:
+    def _lost(self, order: ShotOrder, why: LinkError) -> Unsure:
         return self._unsure(order, f"the shot may have been fired: {why}, and the gun cannot tell any more")
 
-    def _unsure(self, order: Order, what: str) -> Unsure:
+    def _unsure(self, order: ShotOrder, what: str) -> Unsure:
         """The error of a shot that was, or may have been, fired. The gun is disarmed, lest it still be."""
         self._arming.disarm()
         return Unsure(f"{what}; the gun's COUNT was {order.count} before it")

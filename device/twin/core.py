@@ -8,7 +8,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Final
 
-from device.twin.machine import Carried, Drive, Machine
+from device.twin.machine import Carried, DriveEvent, StateMachine
 from device.wire import errors
 from device.wire.errors import message
 from device.wire.frame import Frame, Garbled, Splitter, decode, encode, is_newer
@@ -29,9 +29,9 @@ class Core:
     """One gun from its boot at `now_us` on. Calls come with times that never run back; `board` carries drives out."""
 
     def __init__(
-        self, identity: Named = IDENTITY, now_us: int = 0, board: Callable[[Drive], Carried] | None = None
+        self, identity: Named = IDENTITY, now_us: int = 0, board: Callable[[DriveEvent], Carried] | None = None
     ) -> None:
-        self.machine = Machine(now_us, board)
+        self.machine = StateMachine(now_us, board)
         self.strict = False
         self._identity = identity
         self._splitter = Splitter()
@@ -48,7 +48,7 @@ class Core:
         times = [self.machine.due_us(), self._watchdog_due_us()]
         return min((time for time in times if time is not None), default=None)
 
-    def step(self, data: bytes, now_us: int) -> tuple[bytes, list[Drive]]:
+    def step(self, data: bytes, now_us: int) -> tuple[bytes, list[DriveEvent]]:
         """What is due by now happens, each at its own time; then the bytes are taken. Bytes to send; drive events."""
         self._run_due(now_us)
         for line in self._splitter.feed(data):
@@ -56,7 +56,7 @@ class Core:
             self._run_due(now_us)
         return self._taken()
 
-    def fail(self, fault: int, now_us: int) -> tuple[bytes, list[Drive]]:
+    def fail(self, fault: int, now_us: int) -> tuple[bytes, list[DriveEvent]]:
         """The board's driver reports a fault, by its number above 0."""
         self._run_due(now_us)
         if self.machine.fail(fault, now_us):
@@ -64,7 +64,7 @@ class Core:
         self._queue(errors.FAULT)
         return self._taken()
 
-    def _taken(self) -> tuple[bytes, list[Drive]]:
+    def _taken(self) -> tuple[bytes, list[DriveEvent]]:
         out, drives = bytes(self._out), self.machine.drives
         self._out.clear()
         self.machine.drives = []

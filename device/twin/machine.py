@@ -13,7 +13,7 @@ from dataclasses import dataclass, replace
 from typing import Final, Literal
 
 from device.wire import errors
-from device.wire.records import Setting, ShotRecord, State, StatusRecord
+from device.wire.records import Setting, ShotRecord, StatusRecord, WireState
 
 MAX_MILLIVOLTS: Final = 24_000
 MAX_PULSE_US: Final = 20_000
@@ -114,7 +114,7 @@ MAX_AHEAD_US: Final = 2_000_000
 MAX_MARK: Final = 0xFFFF_FFFF
 
 Guarded = Literal["CONF", "ARM", "TRIG"]
-REFUSED: Final[dict[tuple[Guarded, State], int]] = {
+REFUSED: Final[dict[tuple[Guarded, WireState], int]] = {
     ("CONF", "WAITING"): errors.BUSY,
     ("CONF", "FIRING"): errors.BUSY,
     ("ARM", "WAITING"): errors.BUSY,
@@ -142,7 +142,7 @@ LATE_EFFECT_US: Final = 1_000
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Drive:
+class DriveEvent:
     """What the board is told, and when: a pulse of so many mV, an effect by its number, or off.
 
     `end_us`: when a pulse or an effect is to be over; of an OFF its own time.
@@ -173,7 +173,7 @@ class Board:
     late_us: int = 0
     dead: bool = False
 
-    def __call__(self, drive: Drive) -> Carried:
+    def __call__(self, drive: DriveEvent) -> Carried:
         """What becomes of a drive."""
         at_us = drive.time_us + self.late_us
         if self.dead:
@@ -181,18 +181,18 @@ class Board:
         return Carried(at_us=at_us, error=errors.TOO_LATE if drive.is_over(at_us) else errors.NONE)
 
 
-class Machine:
+class StateMachine:
     """One gun from its boot on. Times never run back.
 
     `drives` is what the board has carried out, and when, as far as nobody has taken it yet; `never` is the error for
     which the last shot was never begun, if it was not.
     """
 
-    def __init__(self, boot_us: int = 0, board: Callable[[Drive], Carried] | None = None) -> None:
-        self.state: State = "DISARMED"
+    def __init__(self, boot_us: int = 0, board: Callable[[DriveEvent], Carried] | None = None) -> None:
+        self.state: WireState = "DISARMED"
         self.setting: Setting | None = None
         self.shot: ShotRecord = NO_SHOT
-        self.drives: list[Drive] = []
+        self.drives: list[DriveEvent] = []
         self.never = errors.NONE
         self._board = board or Board()
         self._fault = 0
@@ -299,7 +299,7 @@ class Machine:
     def _begin(self) -> bool:
         """Whether the board could begin the shot; how late it was is told by START, if that is too late."""
         setting, start_us = self.shot.setting, self.shot.start_us
-        drive = Drive(time_us=start_us, kind=setting.kind, amount=setting.amount, end_us=self.shot.end_us)
+        drive = DriveEvent(time_us=start_us, kind=setting.kind, amount=setting.amount, end_us=self.shot.end_us)
         carried = self._tell(drive)
         if carried.error:
             self._call_off(carried.error)
@@ -322,7 +322,7 @@ class Machine:
     def _end(self, time_us: int) -> None:
         """It is over, whole or cut short. Off is told by END, if that is too late; a pulse never outlasts its END."""
         shot = self.shot
-        carried = self._tell(Drive(time_us=time_us, kind="OFF", end_us=time_us))
+        carried = self._tell(DriveEvent(time_us=time_us, kind="OFF", end_us=time_us))
         off_us = time_us if carried.error else carried.at_us
         if shot.setting.kind == "PULS":
             off_us = min(off_us, shot.end_us)
@@ -337,7 +337,7 @@ class Machine:
         self.never = error
         self.shot = replace(self.shot, ending="NONE")
 
-    def _tell(self, drive: Drive) -> Carried:
+    def _tell(self, drive: DriveEvent) -> Carried:
         carried = self._board(drive)
         if not carried.error:
             self.drives.append(replace(drive, time_us=carried.at_us))

@@ -13,7 +13,7 @@ from typing import Self
 
 from device.methods import Method, rendering_of
 from device.twin.core import IDENTITY, Core
-from device.twin.machine import Board, Carried, Drive
+from device.twin.machine import Board, Carried, DriveEvent
 from device.twin.ports import Socket, Troubles
 from device.wire.records import Named, ShotRecord
 from device.words import Effect, LimitError, Pulse
@@ -47,7 +47,7 @@ class Body:
             with suppress(LimitError):
                 rendering_of(method)
 
-    def drive(self, event: Drive, shot: ShotRecord, time_s: float) -> None:
+    def drive(self, event: DriveEvent, shot: ShotRecord, time_s: float) -> None:
         """The board was told to drive, or to stop."""
         if event.kind == "OFF":
             self.stop(time_s)
@@ -189,7 +189,7 @@ class Twin:
     def _booted(self) -> Core:
         return Core(self._make.identity, board=self._carry)
 
-    def _carry(self, drive: Drive) -> Carried:
+    def _carry(self, drive: DriveEvent) -> Carried:
         """What the board makes of a drive."""
         late = drive.kind != "OFF" and self._happens(self._make.troubles.late)
         if late:
@@ -219,7 +219,7 @@ class Twin:
             self._post(self._going, out)
             self._pull_out()
 
-    def _mishap(self, drive: Drive) -> None:
+    def _mishap(self, drive: DriveEvent) -> None:
         """What befalls a shot."""
         troubles, shot = self._make.troubles, self._core.machine.shot
         middle_s = self.world_of(drive.time_us + int(shot.setting.length_us * self._draw.random()))

@@ -16,12 +16,12 @@ WIRE_VERSION: Final = 1
 """Counts up whenever a host of the version before would be misunderstood."""
 
 Way = Literal["FORW", "BACK"]
-Kind = Literal["PULS", "EFF"]
+SettingKind = Literal["PULS", "EFF"]
 Ending = Literal["NONE", "WAIT", "DRIV", "DONE", "CUT"]
 """No shot yet; accepted and waiting; being driven; driven to its end; cut short."""
-State = Literal["DISARMED", "ARMED", "RESETTING", "WAITING", "FIRING", "FAULT"]
+WireState = Literal["DISARMED", "ARMED", "RESETTING", "WAITING", "FIRING", "FAULT"]
 
-METHOD: Final = re.compile(r"[a-z0-9-]{1,24}")
+METHOD_NAME: Final = re.compile(r"[a-z0-9-]{1,24}")
 _NUMBER: Final = re.compile(r"0|[1-9][0-9]{0,15}")
 _NAME: Final = re.compile(r"[A-Za-z0-9._-]{1,24}")
 _VERSION: Final = re.compile(r"wire ([0-9]{1,4}) firmware ([A-Za-z0-9._-]{1,24})")
@@ -61,7 +61,7 @@ class Setting:
 
     method: str
     way: Way
-    kind: Kind
+    kind: SettingKind
     amount: int
     length_us: int
     rest_us: int
@@ -74,13 +74,13 @@ class Setting:
     def parse(cls, text: str) -> Self:
         """From the parameters of `CONF`; their ranges are the gun's to judge."""
         fields = _fields(text, 6, "setting, METHOD,WAY,KIND,AMOUNT,LENGTH,REST")
-        if METHOD.fullmatch(fields[0]) is None:
+        if METHOD_NAME.fullmatch(fields[0]) is None:
             raise Garbled(f"not the name of a method: {fields[0][:40]!r}")
         amount, length_us, rest_us = _numbers(fields[3:])
         return cls(
             method=fields[0],
             way=cast("Way", _one_of(fields[1], get_args(Way))),
-            kind=cast("Kind", _one_of(fields[2], get_args(Kind))),
+            kind=cast("SettingKind", _one_of(fields[2], get_args(SettingKind))),
             amount=amount,
             length_us=length_us,
             rest_us=rest_us,
@@ -127,7 +127,7 @@ class ShotRecord:
 class StatusRecord:
     """How the gun stands. `fault` is 0, or the number that the driver's fault was given."""
 
-    state: State
+    state: WireState
     count: int
     clock_us: int
     ready_us: int
@@ -144,7 +144,7 @@ class StatusRecord:
         fields = _fields(_behind(text, "STAT"), 6, "standing of a gun")
         count, clock_us, ready_us, coil_mC, fault = _numbers(fields[1:])
         return cls(
-            state=cast("State", _one_of(fields[0], get_args(State))),
+            state=cast("WireState", _one_of(fields[0], get_args(WireState))),
             count=count,
             clock_us=clock_us,
             ready_us=ready_us,

@@ -9,7 +9,7 @@ from typing import Literal, Self, TypeVar
 from pydantic import Field, PrivateAttr, model_validator
 
 from device.methods import Method
-from device.parameters import GunParameters, VibrationParameters
+from device.parameters import GunParameters, VibrationParameters, damper_friction
 from experiments.config.door import Model
 from experiments.config.models import Text
 
@@ -135,8 +135,6 @@ def _kind_of(field: DataclassField[object]) -> type:
 
 def _damped(gun: GunParameters, strips: StripsConfig, own: Numbers, method: str) -> GunParameters:
     """The gun with its method's strips. `ValueError`: numbers out of range, or a friction named beside them."""
-    from device.physics.damper import damper_friction  # noqa: PLC0415 - the physics waits until a config has strips
-
     named = [key for key in ("friction_N", "return_friction_N") if key in own]
     if named:
         raise ValueError(

@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Literal, get_args
+
+import numpy as np
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -30,7 +31,7 @@ def percentile(values: Sequence[float], percent: float) -> float:
     """
     if not values or not 0 < percent <= 100:
         raise ValueError(f"percentile {percent} of {len(values)} values: needs a value, and 0 < percentile <= 100")
-    return sorted(values)[math.ceil(len(values) * percent / 100) - 1]
+    return float(np.percentile(values, percent, method="inverted_cdf"))
 
 
 def spread(values: Sequence[float]) -> Spread:

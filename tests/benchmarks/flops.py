@@ -14,8 +14,8 @@ from collections.abc import Callable
 from typing import Any
 
 from device.parameters import DriveOff
-from device.physics.kernel import pack
-from device.physics.summary import interpret, model_of
+from device.physics.equations import Constants, model_number, pack
+from device.physics.shot import interpret
 from tests.benchmarks.problem import guns
 
 _KINDS = {"add": "additions", "sub": "additions", "mul": "multiplications", "truediv": "divisions"}
@@ -41,7 +41,8 @@ def operations(drive_off: DriveOff, fidelity: str = "full") -> dict[str, float]:
     number, tally = counting_floats()
     asked = guns(drive_off)
     for gun in asked:
-        interpret([number(value) for value in pack(gun, model_of(fidelity))])
+        constants = pack(gun, model_number(fidelity))
+        interpret(Constants(*(number(value) if type(value) is float else value for value in constants)))
     return {kind: tally[kind] / len(asked) for kind in dict.fromkeys(_KINDS.values())}
 
 

@@ -10,10 +10,8 @@ import numpy as np
 
 from analysis.predict.jobs import cores
 from device.parameters import DriveOff, GunParameters
-from device.physics import FIDELITIES, ShotSummary, simulate, simulate_batch, warm
-from device.physics.kernel import pack
+from device.physics import FIDELITIES, ShotSummary, compiled_simulator, simulate, simulate_batch
 from device.physics.scenes import FRICTION_N, NEAR, OUTPUTS
-from device.physics.summary import interpret, model_of, summary_of
 from tests.benchmarks.problem import Outputs, Peer, guns
 
 SINGLE, INTERPRETED, BATCH = "Recoil, one at a time", "Recoil, interpreted", "Recoil, batch"
@@ -42,15 +40,13 @@ class Contender:
 
 
 def one_at_a_time(drive_off: DriveOff) -> Ready:
-    """`simulate` on ready parameters, as a program calls it: compiled where the compiler is."""
-    warm()
-    asked = guns(drive_off)
+    """`compiled_simulator`, as a program calls it."""
+    asked, simulate = guns(drive_off), compiled_simulator()
 
-    def run() -> None:
-        for gun in asked:
-            simulate(gun)
+    def run() -> list[ShotSummary]:
+        return [simulate(gun) for gun in asked]
 
-    return Ready(run=run, shots=len(asked), found=lambda: [_outputs(simulate(gun)) for gun in asked])
+    return Ready(run=run, shots=len(asked), found=lambda: [_outputs(shot) for shot in run()])
 
 
 def contenders(batch: int, seed: int) -> Iterator[Contender]:
@@ -96,12 +92,12 @@ def contender_of(peer: Peer) -> Contender:
 
 
 def _interpreted(drive_off: DriveOff, fidelity: str) -> Ready:
-    rows = [pack(gun, model_of(fidelity)) for gun in guns(drive_off)]
+    asked = guns(drive_off)
 
     def run() -> list[ShotSummary]:
-        return [summary_of(interpret(row)) for row in rows]
+        return [simulate(gun, fidelity) for gun in asked]
 
-    return Ready(run=run, shots=len(rows), found=lambda: [_outputs(shot) for shot in run()])
+    return Ready(run=run, shots=len(asked), found=lambda: [_outputs(shot) for shot in run()])
 
 
 def _batch(drive_off: DriveOff, fidelity: str, used: int, count: int, seed: int) -> Ready:

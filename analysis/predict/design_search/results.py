@@ -7,17 +7,25 @@ from dataclasses import dataclass, fields, replace
 
 import numpy as np
 
-from analysis.predict.design_search.choice import LIMITS, Designs, broken_limit, shooting_rates, steady_coil_C
+from analysis.predict.design_search.choice import Designs
 from analysis.predict.design_search.critical import DRAWS, INSIDE, LEVEL, Alternative, Contour, unbiased, under
 from analysis.predict.design_search.rates import Floats, predict
 from analysis.predict.design_search.shots import Layer
 from analysis.predict.design_search.space import Space
 from analysis.predict.fit.percept_model import PAPER_TRIALS, Fitted, PerceptFit, predicted_rate
-from device.limits import MAX_COIL_C, MAX_DUTY, MAX_SHOTS_PER_MINUTE, load_of
+from device.limits import (
+    MAX_COIL_C,
+    MAX_DUTY,
+    MAX_SHOTS_PER_MINUTE,
+    TRAIN_LIMITS,
+    broken_limit,
+    load_of,
+    steady_coil_C,
+)
 from device.parameters import GunParameters
 from device.physics import simulate
-from device.physics.kernel import STATUSES
-from device.physics.trains import highest_rate_Hz
+from device.physics.equations import STATUSES
+from device.physics.shot import highest_rate_Hz, rates_of_periods_Hz
 from device.words import MAX_PULSE_S, MAX_VOLTAGE_V, Pulse
 from experiments.synthetic.percept import PerceptParameters, percept_of
 
@@ -182,7 +190,7 @@ def counted(designs: Designs, rate_Hz: float) -> DesignCounts:
         total=len(designs),
         by_status={status: count for status, count in numbers.items() if count},
         beyond_limits={
-            words: int((designs.limit == n).sum()) for n, words in enumerate(LIMITS) if (designs.limit == n).any()
+            words: int((designs.limit == n).sum()) for n, words in enumerate(TRAIN_LIMITS) if (designs.limit == n).any()
         },
         proposable=int(designs.proposable.sum()),
         fast_enough=int((designs.proposable & (designs.shooting_rate_Hz >= rate_Hz)).sum()),
@@ -203,7 +211,7 @@ def design_of(designs: Designs, place: int, gun: GunParameters, rate_Hz: float) 
         ci_low=_known(designs.ci_low[place]),
         ci_high=_known(designs.ci_high[place]),
         evidence=float(designs.evidence[place]),
-        limit=None if designs.limit[place] < 0 else LIMITS[int(designs.limit[place])],
+        limit=None if designs.limit[place] < 0 else TRAIN_LIMITS[int(designs.limit[place])],
         coil_C_at_bound=steady_coil_C(load, rate_Hz),
     )
 
@@ -256,7 +264,7 @@ def plane_of(space: Space, layer: Layer, fit: PerceptFit, rate_Hz: float) -> Pla
         predicted=found.rate,
         ci_low=found.ci_low,
         ci_high=found.ci_high,
-        shooting_rate_Hz=shooting_rates(layer.period_s),
+        shooting_rate_Hz=rates_of_periods_Hz(layer.period_s),
         limit_of_voltage=tuple(
             broken_limit(v, layer.pulse_s, space.gun.resistance_ohm, rate_Hz) for v in space.voltage_V
         ),

@@ -12,7 +12,7 @@ from pathlib import Path
 
 import numpy as np
 
-from analysis.predict.design_search.choice import LIMITS, Designs, best, designs_of, front, joined, summary_error
+from analysis.predict.design_search.choice import Designs, best, designs_of, front, joined, summary_error
 from analysis.predict.design_search.critical import LEAKS, Alternative, Contour, alternatives, contour_of
 from analysis.predict.design_search.page import in_short, sections
 from analysis.predict.design_search.results import (
@@ -34,9 +34,10 @@ from analysis.predict.jobs import RunPieces, cores, on_processes
 from analysis.report.page import write_page
 from analysis.report.serial import as_json
 from analysis.report.terminal import Progress
+from device.limits import TRAIN_LIMITS
 from device.methods import Method, paper_methods
 from device.parameters import GunParameters
-from device.physics.kernel import STATUSES
+from device.physics.equations import STATUSES
 from experiments.record import storage
 from experiments.record.provenance import provenance
 
@@ -208,6 +209,6 @@ def _cells(designs: Designs, place: int) -> Sequence[object]:
     return (
         *(float(axis[place]) for axis in (designs.friction_N, designs.voltage_V, designs.pulse_s)),
         STATUSES[int(designs.status[place])],
-        LIMITS[limit] if limit >= 0 else "",
+        TRAIN_LIMITS[limit] if limit >= 0 else "",
         *("" if np.isnan(array[place]) else float(array[place]) for array in (*numbers, designs.by_summary)),
     )

@@ -13,9 +13,8 @@ from numpy.typing import NDArray
 from analysis.predict.design_search.space import Space
 from analysis.predict.jobs import RunPieces
 from device.parameters import GunParameters
-from device.physics import ShotBatch, ShotSummary, simulate, simulate_batch
-from device.physics.kernel import COIL, FREE, STATUSES, pack
-from device.physics.summary import summary_of
+from device.physics import ShotSummary, simulate, simulate_batch
+from device.physics.equations import COIL, FREE, STATUSES, pack
 from device.physics.traces import segments
 from experiments.synthetic.percept import Percept, percept_of_course, percept_of_summary
 
@@ -127,9 +126,7 @@ def summarised(row: FrictionRow) -> FrictionRow:
     """The row with its summaries from compiled code; the row as it is without the compiler (extra `fast`)."""
     if find_spec("numba") is None:
         return row
-    batch = simulate_batch(row.gun, voltage_V=row.voltage_V)
-    columns = (getattr(batch, name).tolist() for name in ShotBatch.__slots__)
-    return replace(row, summaries=tuple(summary_of(found) for found in zip(*columns, strict=True)))
+    return replace(row, summaries=tuple(simulate_batch(row.gun, voltage_V=row.voltage_V).summaries()))
 
 
 def simulate_rows(rows: Sequence[FrictionRow], run: RunPieces, tell: Callable[[str], None]) -> list[list[ShotPercepts]]:

@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike
 from analysis.report.section import Section
 from analysis.report.serial import OPTIONAL
 from device.parameters import GunParameters
-from device.physics.scenes import COLLISION, NEEDED, SCENES, Choice, Scene, choose, choose_contact
+from device.physics.scenes import COLLISION, NEEDED, SCENES, ModelChoice, Scene, choose_contact, choose_model
 from experiments.config.door import ConfigError
 
 _OWN = "needs of your own"
@@ -32,7 +32,7 @@ class ModelRequest:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class ScenePick(Choice):
+class ScenePick(ModelChoice):
     """The model picked for a scene, what the scene needs, and how its collision may be taken if it asks for one."""
 
     needs: Mapping[str, float]
@@ -49,7 +49,7 @@ def picked(request: ModelRequest, gun: GunParameters, varied: Mapping[str, Array
     scene = _scene(request)
     if scene is None:
         return request.fidelity or "full", None
-    choice = choose(scene, gun, **varied)
+    choice = choose_model(scene, gun, **varied)
     return choice.fidelity, ScenePick(**asdict(choice), needs=dict(scene.needs), why=scene.why)
 
 

@@ -19,14 +19,14 @@ from analysis.report.section import Section
 from analysis.report.serial import OPTIONAL
 from device.parameters import GunParameters
 from device.physics import ShotSummary, simulate, trace
-from device.physics.energy_balance import EnergyBalance
 from device.physics.hand import (
     Collision,
-    Hand,
+    HandMechanics,
     compliant_collision,
     rigid_collision,
     simulate_held,
 )
+from device.physics.traces import EnergyBalance
 from device.vibration import Vibration, VibrationParameters, solved, waveform
 from experiments.config.door import ConfigError
 from experiments.config.gun import GunConfig
@@ -52,7 +52,7 @@ _FINE = 200_001  # samples, of which the largest is the peak to nine digits
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class ShotInHand(Hand):
+class ShotInHand(HandMechanics):
     """A hand, and the shot of the gun that it holds, looked at until `until_s`; the numbers are those of `HeldShot`."""
 
     until_s: float
@@ -199,10 +199,10 @@ def in_hand(parameters: GunParameters, words: str) -> ShotInHand:
     return ShotInHand(**asdict(hand), until_s=until_s, **asdict(shot))
 
 
-def _hand(words: str) -> Hand:
+def _hand(words: str) -> HandMechanics:
     if words == USUAL_HAND:
-        return Hand()
-    known = [field.name for field in fields(Hand)]
+        return HandMechanics()
+    known = [field.name for field in fields(HandMechanics)]
     numbers: dict[str, float] = {}
     for word in words.split(","):
         key, equals, text = word.partition("=")
@@ -212,7 +212,7 @@ def _hand(words: str) -> Hand:
             )
         numbers[key] = _number(f"--hand {words}", text)
     try:
-        return Hand(**numbers)
+        return HandMechanics(**numbers)
     except ValueError as error:
         raise ConfigError(f"--hand {words}: {error}") from error
 

@@ -30,7 +30,7 @@ from analysis.report.serial import OPTIONAL, as_json
 from analysis.report.terminal import Progress
 from device.parameters import GunParameters
 from device.physics import FIDELITIES, ShotBatch, simulate_batch
-from device.physics.kernel import STATUSES
+from device.physics.equations import STATUSES, Status
 from experiments.config.door import ConfigError
 from experiments.record import storage
 from experiments.record.provenance import provenance
@@ -60,7 +60,7 @@ class Sweep(SweepOrigin):
     """A table of shots that was written, and how many of them ended how."""
 
     table: str
-    statuses: dict[str, int]
+    statuses: Mapping[Status, int]
     scene: ScenePick | None = field(default=None, metadata=OPTIONAL)
 
 

@@ -1,7 +1,7 @@
 /* The emulated board: QEMU's netduinoplus2, an STM32F405 with USARTs and timers but no pins, no I2C, no watchdog.
  *
  * USART1 is the host's port. In place of a coil USART2 writes a record: every call of the core in the language of
- * device/twin/scripts.py, and every drive with the times it was carried out and written down. A byte on USART3 is a
+ * tests/twin_scripts.py, and every drive with the times it was carried out and written down. A byte on USART3 is a
  * driver's fault or, from 128 on, makes the board late: by so many milliseconds as it is more.
  *
  * RECOIL_SPEED, a divisor of 1000, is how many times faster than the world this gun lives: for tests in a hurry.

@@ -1,4 +1,4 @@
-/* A filter: a script of calls comes in, the core's transcript goes out (device/twin/scripts.py is the language).
+/* A filter: a script of calls comes in, the core's transcript goes out (tests/twin_scripts.py is the language).
  *
  * It exits with 0, or with 1 where a line is no call.
  */

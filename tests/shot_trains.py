@@ -1,4 +1,4 @@
-"""Trains of shots, each from the state that the last one left, and how fast a gun may shoot.
+"""Trains of shots, each from the state that the last one left, and the damper that lands most gently at a rate.
 
 Onsets are whole microseconds, as the limits count them: a float time would drop a shot here and there.
 """
@@ -7,28 +7,15 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import astuple, dataclass, replace
 from itertools import pairwise
 
 from scipy.optimize import brentq
 
+from device.limits import TICKS
 from device.parameters import GunParameters
-from device.physics.kernel import (
-    END,
-    HORIZON_S,
-    RESULT_SIZE,
-    STATE_SIZE,
-    WORK_SIZE,
-    I,
-    V,
-    X,
-    pack,
-)
-from device.physics.shot import shoot_on
-from device.physics.summary import ShotSummary, simulate, summary_of
-
-TICKS = 1_000_000
-"""A second in ticks."""
+from device.physics.equations import HORIZON_S, ShotResult, ShotState, StepSeries, pack
+from device.physics.shot import ShotSummary, shoot_on, simulate, summary_from
 
 _FRICTIONS = 64  # looked at before the boundary of the allowed ones is solved for
 _CREEP_S = 5.0  # a return slower than this is no shooting
@@ -59,25 +46,21 @@ def train(gun: GunParameters, onset_ticks: Sequence[int], start: State | None = 
     """
     if any(b <= a for a, b in pairwise(onset_ticks)):
         raise ValueError(f"onset_ticks are {list(onset_ticks)}; they must rise")
-    packed = pack(gun)
-    state, shots = _row_of(start or State()), list[TrainShot]()
-    work = [0.0] * WORK_SIZE
+    constants, state, series, shots = pack(gun), _begun(start or State()), StepSeries(), list[TrainShot]()
     for onset, following in zip(onset_ticks, (*onset_ticks[1:], None), strict=True):
-        begin = State(displacement_m=state[X], velocity_m_s=state[V], current_A=state[I])
-        state[END] = HORIZON_S if following is None else min((following - onset) / TICKS, HORIZON_S)
-        found = [0.0] * RESULT_SIZE
-        shoot_on(packed, state, work, found)
-        shots.append(TrainShot(onset_tick=onset, start=begin, summary=summary_of(found)))
+        begin = State(displacement_m=state.x, velocity_m_s=state.v, current_A=state.i)
+        state.until = HORIZON_S if following is None else min((following - onset) / TICKS, HORIZON_S)
+        result = ShotResult()
+        shoot_on(constants, state, series, result)
+        shots.append(TrainShot(onset_tick=onset, start=begin, summary=summary_from(astuple(result)[:9])))
     return tuple(shots)
 
 
-def _row_of(start: State) -> list[float]:
+def _begun(start: State) -> ShotState:
     values = (start.displacement_m, start.velocity_m_s, start.current_A)
     if not all(map(math.isfinite, values)) or start.displacement_m < 0:
         raise ValueError(f"start is {start}; it must be finite, and displacement_m at least 0")
-    row = [0.0] * STATE_SIZE
-    row[X], row[V], row[I] = values
-    return row
+    return ShotState(x=start.displacement_m, v=start.velocity_m_s, i=start.current_A)
 
 
 def repeated(gun: GunParameters, rate_Hz: float, shots: int) -> tuple[TrainShot, ...]:
@@ -88,21 +71,7 @@ def repeated(gun: GunParameters, rate_Hz: float, shots: int) -> tuple[TrainShot,
     return train(gun, range(0, period * shots, period))
 
 
-def shortest_period_ticks(gun: GunParameters) -> int | None:
-    """The shortest period that lets the magnet home before the next pulse; None if it does not come home."""
-    summary = simulate(gun)
-    if summary.status != "home" or summary.reset_end_s is None:
-        return None
-    return math.ceil(max(summary.reset_end_s, gun.pulse_s) * TICKS)
-
-
-def highest_rate_Hz(gun: GunParameters) -> float:  # noqa: N802 - the unit ends the name
-    """The highest rate at which every shot starts from home; 0 if the magnet does not come home."""
-    period = shortest_period_ticks(gun)
-    return TICKS / period if period else 0.0
-
-
-def gentlest_friction_N(gun: GunParameters, rate_Hz: float) -> float | None:  # noqa: N802 - the unit
+def gentlest_friction_N(gun: GunParameters, rate_Hz: float) -> float | None:
     """The damper's friction at which the magnet lands most gently while the gun can shoot at `rate_Hz`.
 
     More friction lands more gently and, beyond an optimum, later: the answer is where the rate is just met. None if

@@ -23,7 +23,7 @@ from random import Random
 from typing import Final
 
 from device.twin.core import Core
-from device.twin.machine import Board, Drive
+from device.twin.machine import Board, DriveEvent
 from device.wire.frame import Frame, encode, following
 
 
@@ -45,7 +45,7 @@ def transcript(script: Iterable[str]) -> Iterator[str]:
             yield f"out {time} {out.hex().upper()}"
 
 
-def _called(core: Core, word: str, rest: list[str], time_us: int) -> tuple[bytes, list[Drive]]:
+def _called(core: Core, word: str, rest: list[str], time_us: int) -> tuple[bytes, list[DriveEvent]]:
     if word == "fault":
         return core.fail(int(rest[0]), time_us)
     return core.step(bytes.fromhex("".join(rest)) if word == "in" else b"", time_us)
@@ -58,7 +58,7 @@ def _change(board: Board, word: str, number: int) -> None:
         board.dead = number == 1
 
 
-def _drive(drive: Drive) -> str:
+def _drive(drive: DriveEvent) -> str:
     return f"drive {drive.time_us} {drive.kind}" + ("" if drive.kind == "OFF" else f" {drive.amount}")
 
 
@@ -85,7 +85,7 @@ class _Writer:
     """Writes one script. Trains and pauses are as long as the limits of a second and a minute need."""
 
     def __init__(self, seed: int) -> None:
-        self._draw = Random(seed)  # noqa: S311 - to test with, not to hide
+        self._draw = Random(seed)
         self._time_us = 0
         self._number = self._draw.randrange(0xFFFF)
         self._strict = self._draw.random() < 0.7
