@@ -30,7 +30,7 @@ from analysis.report.serial import OPTIONAL, as_json
 from analysis.report.terminal import Progress
 from device.parameters import GunParameters
 from device.physics import FIDELITIES, ShotBatch, simulate_batch
-from device.physics.equations import STATUSES, Status
+from device.physics.equations import STATUSES
 from experiments.config.door import ConfigError
 from experiments.record import storage
 from experiments.record.provenance import provenance
@@ -60,7 +60,7 @@ class Sweep(SweepOrigin):
     """A table of shots that was written, and how many of them ended how."""
 
     table: str
-    statuses: Mapping[Status, int]
+    statuses: Mapping[str, int]
     scene: ScenePick | None = field(default=None, metadata=OPTIONAL)
 
 
@@ -201,7 +201,7 @@ def sweep(request: SweepRequest, progress: Progress) -> Sweep:
         for arrays, shots in _shoot(request, axes, rows, progress):
             write(arrays, shots)
             counts += np.bincount(shots.status, minlength=len(STATUSES))
-    statuses = {name: int(count) for name, count in zip(STATUSES, counts, strict=True) if count}
+    statuses: dict[str, int] = {name: int(count) for name, count in zip(STATUSES, counts, strict=True) if count}
     known = {one.name: getattr(origin, one.name) for one in fields(SweepOrigin)}
     return Sweep(**known, table=str(path), statuses=statuses, scene=request.scene)
 
