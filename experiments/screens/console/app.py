@@ -265,7 +265,7 @@ def run_console(
         console.finish()
     keep()
     let_go(wake)
-    tone.finish()
+    tone.finish_tone()
     if console.error is not None:
         raise console.error
     if console.result is None:

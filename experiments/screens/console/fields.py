@@ -138,7 +138,7 @@ class LineEdit(QLineEdit):
         return QSize(40, super().minimumSizeHint().height())
 
 
-def sheet() -> str:
+def start_sheet() -> str:
     """What these widgets, and the windows made of them, add to the style of all."""
     moods = "\n".join(
         f'QTextEdit[mood="{mood}"], QLabel#gun[mood="{mood}"], QLabel#count[mood="{mood}"] '

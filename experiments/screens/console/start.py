@@ -21,7 +21,7 @@ from experiments.config.setup import Setup
 from experiments.record.journal import JournalError
 from experiments.run import Again
 from experiments.screens.console import parts, people
-from experiments.screens.console.fields import WHY, Answer, Lines, Question, sheet, unfit
+from experiments.screens.console.fields import WHY, Answer, Lines, Question, start_sheet, unfit
 from experiments.screens.console.form import Choice, Form, Opening
 from experiments.screens.console.keyboard import FreshShortcuts
 from experiments.screens.console.people import PeopleTable
@@ -166,7 +166,7 @@ class StartWindow(QWidget):
         scale = type_scale(self.width(), self.height())
         if scale != self._scale:
             self._scale = scale
-            self.setStyleSheet(scaled(parts.sheet("dark") + sheet(), scale))
+            self.setStyleSheet(scaled(parts.sheet("dark") + start_sheet(), scale))
 
     def closeEvent(self, event: QCloseEvent | None) -> None:  # noqa: N802 - Qt's name
         """Let whoever waits for a choice go on, once no test shot is under way."""

@@ -12,10 +12,10 @@ LENGTH_S = 0.35
 LOUDNESS = 0.4
 MOST_S = 3.0
 """How long a sound system that hangs is waited for."""
-_THREAD = "tone"
+_TONE = "tone"
 
 
-def samples() -> array[float]:
+def tone() -> array[float]:
     """The tone, faded in and out so that it does not click: 32-bit samples from -1 to 1."""
     count = int(RATE_Hz * LENGTH_S)
     fade = RATE_Hz // 50
@@ -28,23 +28,23 @@ def samples() -> array[float]:
     )
 
 
-def play() -> None:
+def play_tone() -> None:
     """Play the tone beside everything else; silence is no error."""
-    threading.Thread(target=_play, daemon=True, name=_THREAD).start()
+    threading.Thread(target=_play_tone, daemon=True, name=_TONE).start()
 
 
-def finish() -> None:
+def finish_tone() -> None:
     """Wait until no tone is played: as the sound system opens it swallows what the program says on the terminal."""
     for thread in threading.enumerate():
-        if thread.name == _THREAD:
+        if thread.name == _TONE:
             thread.join(MOST_S)
 
 
-def _play() -> None:
+def _play_tone() -> None:
     try:
         import sounddevice  # noqa: PLC0415 - opens the sound system
 
         with sounddevice.RawOutputStream(samplerate=RATE_Hz, channels=1, dtype="float32") as stream:
-            stream.write(samples().tobytes())
+            stream.write(tone().tobytes())
     except Exception:  # noqa: BLE001, S110 - no library, no device: `recoil doctor` says so
         pass

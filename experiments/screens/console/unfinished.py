@@ -14,7 +14,7 @@ from PyQt6.QtWidgets import QDialog, QLabel, QPushButton, QVBoxLayout
 from experiments.record.journal import JournalError
 from experiments.run import Again, Request
 from experiments.screens.console import parts, people
-from experiments.screens.console.fields import WHY, Answer, Lines, Question, sheet, unfit
+from experiments.screens.console.fields import WHY, Answer, Lines, Question, start_sheet, unfit
 from experiments.screens.console.keyboard import FreshShortcuts
 from experiments.screens.console.windows import let_go, signals_to
 from experiments.study.places import place
@@ -32,7 +32,7 @@ class Unfinished(QDialog):
         self._request = request
         self.decided: Request | None = None
         self.setWindowTitle("Recoil – unfinished run")
-        self.setStyleSheet(parts.sheet("dark") + sheet())
+        self.setStyleSheet(parts.sheet("dark") + start_sheet())
         answers = (
             Answer(text="Go on with it", key="Ctrl+G", do=lambda _: self._decide("resume", "")),
             Answer(text="Set it aside, start anew", key="Ctrl+N", do=self._fresh),

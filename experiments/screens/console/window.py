@@ -174,7 +174,7 @@ class ConsoleWindow(QMainWindow):
         if self.controls is not None:
             self.controls.ended = True
         self.close_line()
-        tone.play()
+        tone.play_tone()
 
     def _arrive(self) -> None:
         """Draw the newest position: its field, and where the cursor goes; a line that is being typed keeps it."""
@@ -200,7 +200,7 @@ class ConsoleWindow(QMainWindow):
         elif text:
             self._last(text, "bad" if isinstance(message.word, Failed | Halted) else "good")
         if isinstance(message.word, Rested):
-            tone.play()
+            tone.play_tone()
 
     def say(self, text: str, mood: str) -> None:
         """Show a line of answer, for a few seconds."""
