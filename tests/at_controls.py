@@ -28,11 +28,10 @@ from experiments.record import storage
 from experiments.record.journal import Contents, read
 from experiments.record.replay import told
 from experiments.run import Finished, Request, run
-from experiments.screens.console import overview, parts, view
+from experiments.screens.console import progress, view, widgets
 from experiments.screens.console.controls import Controls
 from experiments.screens.console.keys import Name, Presses
-from experiments.screens.console.messages import Ended, Field, GunSeen
-from experiments.screens.console.view import About, Seen
+from experiments.screens.console.view import About, Ended, Field, GunSeen, Seen
 from experiments.session import events
 from experiments.session.events import Press
 from experiments.session.remarks import AnswerCorrected, Remark
@@ -350,7 +349,7 @@ class PaperWindow:
         seen = Seen(about=self.about, position=drawn, told=self.live.told, gun=self.gun)
         shown = view.instruction(seen, self._clock.now())
         self.heard += [shown.title, shown.damper, shown.detail, view.place_text(seen)]
-        self.heard += [*overview.coming(seen), *overview.answers(seen), *self.controls.help_lines()]
+        self.heard += [*progress.coming(seen), *progress.answers(seen), *self.controls.help_lines()]
 
     def down(self, key: str, *, ctrl: bool = False, repeated: bool = False) -> None:
         """A key goes down, or is repeated by the system."""
@@ -407,7 +406,7 @@ class PaperWindow:
     # View
 
     def say(self, text: str, mood: str) -> None:
-        assert mood in parts.MOODS
+        assert mood in widgets.MOODS
         self.heard.append(text)
 
     def open_line(self, question: str) -> None:

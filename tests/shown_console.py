@@ -23,7 +23,7 @@ from experiments.clock import RealClock
 from experiments.live_run import RunStopped
 from experiments.run import Request
 from experiments.screens.console import app
-from experiments.screens.console.messages import Ended, ParticipantSeen
+from experiments.screens.console.view import Ended, ParticipantSeen
 from experiments.session import events
 from experiments.session.states import State
 from tests.at_controls import changed, short_direction

@@ -30,7 +30,7 @@ from experiments.record import storage
 from experiments.record.journal import Contents, read
 from experiments.record.replay import told
 from experiments.run import Request
-from experiments.screens.console import parts
+from experiments.screens.console import widgets
 from experiments.session.states import State
 from experiments.session.steps import Answered, Ask, Failed, Fire, Fired
 from experiments.study.places import place
@@ -221,7 +221,7 @@ def window_alone() -> dict[str, Any]:
     window.say("bad news", "bad")
     app.processEvents()
     bad = window.saved.palette().color(window.saved.foregroundRole()).name()
-    return {"bad": bad, "wanted": parts.colour("dark", "bad")}
+    return {"bad": bad, "wanted": widgets.colour("dark", "bad")}
 
 
 # the tests

@@ -23,7 +23,7 @@ from experiments.load import load_setup, shipped_folder
 from experiments.record.journal import read
 from experiments.record.replay import told
 from experiments.run import Request, run
-from experiments.screens.console.overview import coming
+from experiments.screens.console.progress import coming
 from experiments.screens.console.view import About, Seen, instruction
 from experiments.screens.synthetic import synthetic_screen
 from experiments.screens.terminal import TerminalScreen

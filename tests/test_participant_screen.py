@@ -12,7 +12,7 @@ from dataclasses import replace
 import pytest
 
 from experiments.screens.participant.link import ParticipantError, ParticipantLink
-from experiments.screens.participant.words import AskDescription, AskDirection, AskRating, Look
+from experiments.screens.participant.messages import AskDescription, AskDirection, AskRating, Look
 from tests.waiting import PATIENCE_S, wait_for
 
 pytestmark = [

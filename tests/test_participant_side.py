@@ -13,9 +13,9 @@ import pytest
 
 from experiments.design.plan import Trial
 from experiments.load import load_setup
-from experiments.screens.console.beside import PAUSED, ParticipantSide
+from experiments.screens.console.participant_link import PAUSED, ParticipantSide
 from experiments.screens.participant.link import ParticipantLink
-from experiments.screens.participant.words import BETWEEN, Focused, line
+from experiments.screens.participant.messages import BETWEEN, Focused, line
 from experiments.session.states import Position, State
 from experiments.session.steps import Describe, Rate
 from tests.waiting import PATIENCE_S, wait_for

@@ -6,8 +6,7 @@ from hypothesis import strategies as st
 from pydantic import ValidationError
 
 from experiments.screens.participant.link import ClockMap, RoundTrip, clock_map
-from experiments.screens.participant.rating_page import move, put
-from experiments.screens.participant.words import (
+from experiments.screens.participant.messages import (
     AskDescription,
     AskDirection,
     AskRating,
@@ -29,6 +28,7 @@ from experiments.screens.participant.words import (
     look_from,
     to_participant_from,
 )
+from experiments.screens.participant.pages import move, put
 
 TEXT = st.text()
 NUMBER = st.floats(allow_nan=False, allow_infinity=False)

@@ -25,7 +25,7 @@ from experiments.clock import RealClock, VirtualClock
 from experiments.load import load_setup
 from experiments.record.journal import hold
 from experiments.run import Request, run
-from experiments.screens.console import parts
+from experiments.screens.console import widgets
 from experiments.screens.console.app import application
 from experiments.screens.console.form import Beside, Opening
 from experiments.screens.console.live import _study
@@ -680,10 +680,10 @@ def test_where_there_are_several_monitors_the_participants_is_chosen_by_its_numb
 
 def test_a_ticked_box_shows_a_tick(opened: Open) -> None:
     box = opened().form.noise
-    tick = parts.colour("dark", "ground")  # of a box that is ticked, on a ground of another colour
+    tick = widgets.colour("dark", "ground")  # of a box that is ticked, on a ground of another colour
     assert tick not in colours_of_box(box)
     box.setChecked(True)
-    assert {tick, parts.colour("dark", "act")} <= colours_of_box(box)
+    assert {tick, widgets.colour("dark", "act")} <= colours_of_box(box)
 
 
 # test shots

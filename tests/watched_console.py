@@ -152,7 +152,7 @@ def _run(window: Any) -> dict[str, Any]:
 
 
 def _places(window: Any) -> dict[str, list[int]]:
-    from experiments.screens.console.buttons import CommandButton
+    from experiments.screens.console.panels import CommandButton
 
     found = {}
     for button in window.findChildren(CommandButton):
@@ -251,7 +251,7 @@ def watch_guns(watch: Watch) -> None:
 def watch_participants(watch: Watch) -> None:
     """From now on every participant's screen that is started is watched."""
     from experiments.screens.participant.link import ParticipantLink
-    from experiments.screens.participant.words import Look, arguments
+    from experiments.screens.participant.messages import Look, arguments
 
     start, left = ParticipantLink.start, watch.participants
 

@@ -6,7 +6,7 @@ import time
 from typing import Any
 
 from experiments.doctor.figures import Stage, percentile
-from experiments.screens.participant.toolkit import load, writable_home
+from experiments.screens.participant.stage import load, writable_home
 
 FRAMES = 60
 

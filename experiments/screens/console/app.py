@@ -21,10 +21,9 @@ from experiments.design.plan import Plan
 from experiments.live_run import LiveRun, RunStopped, Screen
 from experiments.record.journal import JournalError
 from experiments.run import Finished, Request, run
-from experiments.screens.console import tone, windows
-from experiments.screens.console.beside import ParticipantSide
-from experiments.screens.console.messages import Began, Ended, GunSeen, Message, Saved, Shown, Trouble
-from experiments.screens.console.view import About
+from experiments.screens.console import windows
+from experiments.screens.console.participant_link import ParticipantSide
+from experiments.screens.console.view import About, Began, Ended, GunSeen, Message, Saved, Shown, Trouble
 from experiments.screens.console.window import Bridge, ConsoleWindow
 from experiments.screens.console.windows import let_go, open_as_left, signals_to
 from experiments.screens.synthetic import synthetic_participant_of
@@ -265,7 +264,7 @@ def run_console(
         console.finish()
     keep()
     let_go(wake)
-    tone.finish_tone()
+    windows.finish_tone()
     if console.error is not None:
         raise console.error
     if console.result is None:

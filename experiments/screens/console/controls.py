@@ -13,23 +13,14 @@ from experiments.clock import Clock
 from experiments.design.plan import Trial
 from experiments.live_run import LiveRun, Verdict
 from experiments.preference.config import RatingScale
-from experiments.screens.console import lines
-from experiments.screens.console.keys import (
-    BY_NAME,
-    COMMANDS,
-    Name,
-    Typing,
-    command_for,
-    field_of,
-    shown_key,
-    why_not,
-)
-from experiments.screens.console.messages import Beside, View
-from experiments.screens.texts import FLAG_RULE, one_line, typed_number
+from experiments.screens.console.keys import BY_NAME, COMMANDS, Name, Typing, command_for, field_of, shown_key, why_not
+from experiments.screens.console.view import Beside, View
+from experiments.screens.texts import FLAG_RULE, one_line, short_place, typed_number
 from experiments.session import events
 from experiments.session.events import Event, Hand, Press
-from experiments.session.history import value
+from experiments.session.history import trial_at, value
 from experiments.session.judging import REARM_HELD_S
+from experiments.session.remarks import flag_word
 from experiments.session.states import EMERGENCY, Position, State
 from experiments.session.steps import Ask
 
@@ -161,7 +152,7 @@ class Controls:
 
     def _run(self, name: Name, press: Press) -> None:
         self.uncover()
-        if name in lines.NAMES:
+        if name in NAMES:
             self._ask_for(name)
         elif name in ("forward", "backward"):
             self._answer(name, press)
@@ -283,7 +274,7 @@ class Controls:
         else:
             trial = (self._live.repeated() if name == "repeat" else None) or self._live.trial
             self._enter = lambda line, press: self._line(name, trial, line, press)
-            self._view.open_line(f"{lines.question(name, trial, self._live)}  (Enter saves, Esc leaves it)")
+            self._view.open_line(f"{question(name, trial, self._live)}  (Enter saves, Esc leaves it)")
 
     def ask_why_it_stops(self) -> None:
         """Somebody wants to close the window of a live run."""
@@ -302,7 +293,7 @@ class Controls:
 
     def _line(self, name: Name, trial: Trial, text: str, press: Press) -> bool:
         """Do what a line was typed for; what comes too late is kept as a note. Whether the line is done with."""
-        event = lines.event_of(name, trial, text)
+        event = event_of(name, trial, text)
         if event is None:
             self._view.say(FLAG_RULE, "bad")
             return False
@@ -310,7 +301,7 @@ class Controls:
         if verdict.taken:
             self._say(verdict)
             return True
-        kept = self._live.offer(lines.as_note(name, trial, text))
+        kept = self._live.offer(as_note(name, trial, text))
         self._view.say(f"{verdict.text} What you typed is kept as a note." if kept else verdict.text, "wait")
         return bool(kept)
 
@@ -370,3 +361,46 @@ _WINDOWS: dict[Name, Callable[[Controls, Press], None]] = {
     "leave": Controls._leave,
     "enter": Controls._entered,
 }
+
+NAMES: tuple[Name, ...] = ("end break", "repeat", "flag", "note", "reason", "stop")
+
+
+def question(name: Name, trial: Trial, live: LiveRun) -> str:
+    """What is asked for."""
+    place = short_place(trial, trial_at(live.plan, live.told, live.position.step))
+    match name:
+        case "end break":
+            return "Why does the break end early?"
+        case "repeat":
+            return f"Why is trial {trial.trial} to be presented again?"
+        case "flag":
+            return f"Flag {place} as (a word such as noise or late)"
+        case "note":
+            return f"Note on {place}"
+        case "reason":
+            return "Why was there an emergency stop?"
+        case _:
+            return "Why does the run stop here? It can be resumed."
+
+
+def event_of(name: Name, trial: Trial, text: str) -> Event | None:
+    """What a typed text comes to; `None` if it is to be a flag and is none."""
+    match name:
+        case "end break":
+            return events.EndBreak(reason=text)
+        case "repeat":
+            return events.Repeat(reason=text, trial=trial)
+        case "flag":
+            flag = flag_word(text)
+            return None if flag is None else events.Flag(flag=flag, trial=trial)
+        case "note":
+            return events.Note(text=text, trial=trial)
+        case "reason":
+            return events.Reason(text=text)
+        case _:
+            return events.Stop(reason=text)
+
+
+def as_note(name: Name, trial: Trial, text: str) -> events.Note:
+    """What was typed for something that is not done any more."""
+    return events.Note(text=f"{'break' if name == 'end break' else name}: {text}", trial=trial)

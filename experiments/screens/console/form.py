@@ -1,4 +1,4 @@
-"""The form of the start window: who, which experiment, what is asked of them, and what they have beside the console."""
+"""The start window's form, and its table of the participants: who, which experiment, and what is asked of them."""
 
 from __future__ import annotations
 
@@ -8,13 +8,25 @@ from typing import Any, get_args
 
 from PyQt6.QtCore import Qt, pyqtSignal
 from PyQt6.QtGui import QGuiApplication, QScreen
-from PyQt6.QtWidgets import QFormLayout, QFrame, QLabel, QScrollArea, QSizePolicy, QVBoxLayout, QWidget
+from PyQt6.QtWidgets import (
+    QFormLayout,
+    QFrame,
+    QHeaderView,
+    QLabel,
+    QScrollArea,
+    QSizePolicy,
+    QTableWidget,
+    QTableWidgetItem,
+    QVBoxLayout,
+    QWidget,
+)
 
 from experiments.config.models import Fact, Handedness, Sex
 from experiments.config.setup import Setup
 from experiments.run import Again
-from experiments.screens.console import parts
-from experiments.screens.console.fields import LineEdit, Lines, ListBox, TickBox
+from experiments.screens.console import widgets
+from experiments.screens.console.people import cell_text, note_text
+from experiments.screens.console.widgets import LineEdit, Lines, ListBox, TickBox
 from experiments.study.enrolment import Entered, typed_facts
 from experiments.study.study import Participant
 
@@ -69,7 +81,7 @@ class Form(QFrame):
         scroll.setFocusPolicy(Qt.FocusPolicy.NoFocus)
         scroll.setHorizontalScrollBarPolicy(Qt.ScrollBarPolicy.ScrollBarAlwaysOff)
         down = QVBoxLayout(self)
-        for part in (parts.label("quiet", _HOW_TO_START), self.remark):
+        for part in (widgets.label("quiet", _HOW_TO_START), self.remark):
             down.addWidget(part)
         down.addWidget(scroll, 1)
 
@@ -142,7 +154,7 @@ class Form(QFrame):
 
 def _beside_its_field(name: str) -> QLabel:
     """The name of a field, at half its height."""
-    made = parts.label("", name, wrap=False)
+    made = widgets.label("", name, wrap=False)
     made.setAlignment(Qt.AlignmentFlag.AlignVCenter)
     made.setSizePolicy(QSizePolicy.Policy.Preferred, QSizePolicy.Policy.Expanding)
     return made
@@ -198,3 +210,43 @@ class Opening:
     beside: Beside = field(default_factory=Beside)
     participant_id: str = ""
     said: str = ""
+
+
+class PeopleTable(QTableWidget):
+    """A row a participant, a column an experiment. `person_chosen` with the code of a row that somebody chose."""
+
+    person_chosen = pyqtSignal(str)
+
+    def __init__(self, experiments: Sequence[str]) -> None:
+        super().__init__()
+        columns = ["code", *experiments, "note"]
+        self.setColumnCount(len(columns))
+        self.setHorizontalHeaderLabels(columns)
+        self.setEditTriggers(QTableWidget.EditTrigger.NoEditTriggers)
+        self.setSelectionBehavior(QTableWidget.SelectionBehavior.SelectRows)
+        self.setSelectionMode(QTableWidget.SelectionMode.SingleSelection)
+        self.setTabKeyNavigation(False)
+        self.setMinimumSize(120, 60)
+        across, down = self.horizontalHeader(), self.verticalHeader()
+        if across is not None and down is not None:
+            across.setSectionResizeMode(QHeaderView.ResizeMode.ResizeToContents)
+            across.setStretchLastSection(True)
+            down.setVisible(False)  # numbers beside codes are no codes
+            down.setSectionResizeMode(QHeaderView.ResizeMode.ResizeToContents)
+        self.itemSelectionChanged.connect(self._chosen)
+        self.cellClicked.connect(self._chosen)  # also the row that was chosen before
+
+    def show_people(self, seen: Sequence[Participant]) -> None:
+        """Show how the participants stand."""
+        self.blockSignals(True)
+        self.setRowCount(len(seen))
+        for line, person in enumerate(seen):
+            cells = [person.participant_id, *map(cell_text, person.runs), note_text(person)]
+            for column, text in enumerate(cells):
+                self.setItem(line, column, QTableWidgetItem(text))
+        self.blockSignals(False)
+
+    def _chosen(self) -> None:
+        code = self.item(self.currentRow(), 0)
+        if code is not None:
+            self.person_chosen.emit(code.text())

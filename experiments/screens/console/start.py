@@ -20,13 +20,19 @@ from experiments.clock import Clock
 from experiments.config.setup import Setup
 from experiments.record.journal import JournalError
 from experiments.run import Again
-from experiments.screens.console import parts, people
-from experiments.screens.console.fields import WHY, Answer, Lines, Question, start_sheet, unfit
-from experiments.screens.console.form import Choice, Form, Opening
-from experiments.screens.console.keyboard import FreshShortcuts
-from experiments.screens.console.people import PeopleTable
-from experiments.screens.console.shot_page import ShotPage
-from experiments.screens.console.windows import let_go, open_as_left, remember, scaled, signals_to, type_scale
+from experiments.screens.console import people, widgets
+from experiments.screens.console.form import Choice, Form, Opening, PeopleTable
+from experiments.screens.console.shot_check import ShotPage
+from experiments.screens.console.widgets import WHY, Answer, Lines, Question, start_sheet, unfit
+from experiments.screens.console.windows import (
+    FreshShortcuts,
+    let_go,
+    open_as_left,
+    remember,
+    scaled,
+    signals_to,
+    type_scale,
+)
 from experiments.study import enrolment
 from experiments.study.places import PlaceError
 from experiments.study.progress import Overview, StudyFolder, overview
@@ -89,13 +95,13 @@ class StartWindow(QWidget):
 
     def _gun(self) -> QWidget:
         simulated = self._opening.gun == SIMULATED
-        made = parts.label("gun", "SIMULATED GUN" if simulated else f"Gun: {self._opening.gun}", wrap=False)
-        parts.set_mood(made, "ask" if simulated else "wait")
+        made = widgets.label("gun", "SIMULATED GUN" if simulated else f"Gun: {self._opening.gun}", wrap=False)
+        widgets.set_mood(made, "ask" if simulated else "wait")
         return made
 
     def _buttons(self, page: QWidget) -> QGridLayout:
         def button(text: str, key: str, slot: Callable[[], object], name: str = "") -> QPushButton:
-            return parts.button(page, text, key, slot, name=name)
+            return widgets.button(page, text, key, slot, name=name)
 
         self.test_button = button("Test shot", "Ctrl+T", self._test_shot)
         self.exclude_button = button("Exclude…", "Alt+E", self._ask_exclusion)
@@ -154,7 +160,7 @@ class StartWindow(QWidget):
     def _show_choice(self) -> None:
         code, experiment = self.form.participant_id, self.form.experiment.currentText()
         person = self._person(code)
-        self.form.remark.say(*people.remark(code, person, experiment, self._study.experiments))
+        self.people.remark.say(*people.remark(code, person, experiment, self._study.experiments))
         out = person is not None and person.excluded is not None
         self.exclude_button.setText(f"{'Readmit…' if out else 'Exclude…'}  [Alt+E]")
         self.shots.choose(self._setup())
@@ -166,7 +172,7 @@ class StartWindow(QWidget):
         scale = type_scale(self.width(), self.height())
         if scale != self._scale:
             self._scale = scale
-            self.setStyleSheet(scaled(parts.sheet("dark") + start_sheet(), scale))
+            self.setStyleSheet(scaled(widgets.sheet("dark") + start_sheet(), scale))
 
     def closeEvent(self, event: QCloseEvent | None) -> None:  # noqa: N802 - Qt's name
         """Let whoever waits for a choice go on, once no test shot is under way."""

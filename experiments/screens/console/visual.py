@@ -11,9 +11,9 @@ from PyQt6.QtTest import QTest
 
 from experiments.clock import Clock
 from experiments.screens.console.app import Console
-from experiments.screens.console.beside import ParticipantSide
+from experiments.screens.console.participant_link import ParticipantSide
 from experiments.screens.console.window import ConsoleWindow
-from experiments.screens.participant.rating_page import spot_px
+from experiments.screens.participant.pages import spot_px
 from experiments.screens.participant.stage import TITLE
 from experiments.session.states import Position, State
 from experiments.session.steps import Ask, Rate, on_scale

@@ -19,14 +19,14 @@ from PyQt6.QtWidgets import (
 
 from experiments.clock import Clock
 from experiments.live_run import LiveRun
-from experiments.screens.console import overview, parts, tone, view
-from experiments.screens.console.beside import ParticipantSide
-from experiments.screens.console.buttons import Buttons
+from experiments.screens.console import view, widgets, windows
 from experiments.screens.console.controls import Controls
-from experiments.screens.console.instruction import FITS, Notice, TextFields, TextPage
-from experiments.screens.console.keyboard import Keyboard
 from experiments.screens.console.keys import Name, Typing
-from experiments.screens.console.messages import (
+from experiments.screens.console.panels import FITS, Bars, Buttons, Notice, Side, TextFields, TextPage
+from experiments.screens.console.participant_link import ParticipantSide
+from experiments.screens.console.progress import Progress, marks
+from experiments.screens.console.view import (
+    About,
     Began,
     Ended,
     Field,
@@ -34,13 +34,11 @@ from experiments.screens.console.messages import (
     Message,
     ParticipantSeen,
     Saved,
+    Seen,
     Shown,
     Trouble,
 )
-from experiments.screens.console.overview import Pace
-from experiments.screens.console.side import Bars, Side
-from experiments.screens.console.view import About, Seen
-from experiments.screens.console.windows import remember, scaled
+from experiments.screens.console.windows import Keyboard, remember, scaled
 from experiments.screens.texts import saved_text
 from experiments.session.events import Hand, Press
 from experiments.session.remarks import Halted
@@ -86,11 +84,11 @@ class ConsoleWindow(QMainWindow):
         self.gun: GunSeen | None = None
         self.participant: ParticipantSeen | None = None
         self.ended: Ended | None = None
-        self._pace = Pace()
+        self._progress = Progress()
         self._brief_until_s: float | None = None
         self._brief_for = -1
         self._lasting = ("", "good")
-        self.theme: parts.Theme = "dark"
+        self.theme: widgets.Theme = "dark"
         self._scale = 0.0
         self._build()
         self._keyboard = Keyboard(self, clock.now)
@@ -104,8 +102,8 @@ class ConsoleWindow(QMainWindow):
     def _build(self) -> None:
         what = self.about.band or self.about.plan.experiment
         self.setWindowTitle(f"Recoil – {self.about.plan.participant_id}, {what}")
-        self.bands = [parts.label("band", wrap=False) for _ in range(2)]
-        self.place, self.saved = parts.label("place"), parts.label("saved")
+        self.bands = [widgets.label("band", wrap=False) for _ in range(2)]
+        self.place, self.saved = widgets.label("place"), widgets.label("saved")
         self.notice, self.fields, self.side, self.buttons = Notice(), TextFields(), Side(self.about), Buttons(self)
         self.bars = Bars(self.about)
         self._main = QWidget()
@@ -129,7 +127,7 @@ class ConsoleWindow(QMainWindow):
         self.pages.addWidget(self.page)
         outer = QVBoxLayout(central := QWidget())
         outer.setContentsMargins(0, 0, 0, 4)
-        outer.addWidget(parts.row(*self.bands))
+        outer.addWidget(widgets.row(*self.bands))
         outer.addWidget(self.pages, 1)
         outer.addWidget(self.buttons.row)
         self.setCentralWidget(central)
@@ -174,7 +172,7 @@ class ConsoleWindow(QMainWindow):
         if self.controls is not None:
             self.controls.ended = True
         self.close_line()
-        tone.play_tone()
+        windows.play_tone()
 
     def _arrive(self) -> None:
         """Draw the newest position: its field, and where the cursor goes; a line that is being typed keeps it."""
@@ -187,20 +185,20 @@ class ConsoleWindow(QMainWindow):
             self.controls.draw(self.drawn)
             if self.drawn.serial != self._brief_for:
                 self._unbrief()
-        self._pace.at(self.drawn, self._clock.now())
+        self._progress.at(self.drawn, self._clock.now())
         self.fields.at(self.drawn, self.controls.entered_so_far() if self.controls is not None else "")
         self.fields.focus(self.drawn, self)
 
     def _acknowledge(self, message: Saved) -> None:
         """Say that it is safe; a tone at the end of a break."""
-        self._pace.saved(message.word, self._clock.now())
+        self._progress.saved(message.word, self._clock.now())
         text = saved_text(self.about.plan, message.step, message.word)
         if isinstance(message.word, Rested):
             self.say(text, "good")
         elif text:
             self._last(text, "bad" if isinstance(message.word, Failed | Halted) else "good")
         if isinstance(message.word, Rested):
-            tone.play_tone()
+            windows.play_tone()
 
     def say(self, text: str, mood: str) -> None:
         """Show a line of answer, for a few seconds."""
@@ -222,7 +220,7 @@ class ConsoleWindow(QMainWindow):
     def _show_line(self, text: str, mood: str) -> None:
         for label in (self.saved, self.page.said):
             label.setText(text)
-            parts.set_mood(label, mood)
+            widgets.set_mood(label, mood)
 
     # showing
 
@@ -250,7 +248,7 @@ class ConsoleWindow(QMainWindow):
         self.place.setText(view.place_text(seen))
         self._show_bands(seen)
         self.bars.put(seen)
-        self.side.put(seen, self._pace, now_s)
+        self.side.put(seen, self._progress, now_s)
         self.buttons.put(self.drawn, over=self.ended is not None, letters=self._typing.letters, idle=self._idle)
         if self._brief_until_s is not None and now_s > self._brief_until_s:
             self._unbrief()
@@ -261,7 +259,7 @@ class ConsoleWindow(QMainWindow):
         for label, (text, name) in zip(self.bands, [*found, *[("", "")] * (2 - len(found))], strict=True):
             label.setVisible(bool(text))
             label.setText(text)
-            parts.set_mood(label, name)
+            widgets.set_mood(label, name)
 
     def _idle(self, name: Name) -> bool:
         """Whether a command does nothing now."""
@@ -288,7 +286,7 @@ class ConsoleWindow(QMainWindow):
             self._restyle()
 
     def _restyle(self) -> None:
-        self.setStyleSheet(scaled(parts.sheet(self.theme), self._scale))
+        self.setStyleSheet(scaled(widgets.sheet(self.theme), self._scale))
 
     def showEvent(self, event: QShowEvent | None) -> None:  # noqa: N802 - Qt's name
         """Hear the keys before any widget does."""
@@ -366,9 +364,7 @@ class ConsoleWindow(QMainWindow):
 
     def show_list(self) -> None:
         """Cover the run with the marks of the set."""
-        self.show_page(
-            "Flags, notes, corrections and repeats of this set. Esc leaves this page.", overview.marks(self.seen)
-        )
+        self.show_page("Flags, notes, corrections and repeats of this set. Esc leaves this page.", marks(self.seen))
 
     def other_theme(self) -> None:
         """Change the colours."""

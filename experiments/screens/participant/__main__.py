@@ -9,8 +9,8 @@ import os
 import signal
 import sys
 
-from experiments.screens.participant.toolkit import writable_home
-from experiments.screens.participant.words import look_from
+from experiments.screens.participant.messages import look_from
+from experiments.screens.participant.stage import writable_home
 
 
 def main() -> int:

@@ -13,11 +13,7 @@ from typing import BinaryIO
 
 from pydantic import ValidationError
 
-from experiments.screens.participant.pages import DirectionPage, Drafts, MessagePage
-from experiments.screens.participant.rating_page import DescriptionPage, RatingPage
-from experiments.screens.participant.stage import Stage
-from experiments.screens.participant.toolkit import Keys, MaskingNoise, load
-from experiments.screens.participant.words import (
+from experiments.screens.participant.messages import (
     BETWEEN,
     AskDescription,
     AskDirection,
@@ -36,6 +32,8 @@ from experiments.screens.participant.words import (
     line,
     to_participant_from,
 )
+from experiments.screens.participant.pages import DescriptionPage, DirectionPage, Drafts, MessagePage, RatingPage
+from experiments.screens.participant.stage import Keys, MaskingNoise, Stage, load
 
 
 class Wire:

@@ -10,8 +10,7 @@ from device import GunStatus
 from experiments.config.models import ExperimentConfig
 from experiments.design.plan import Plan, Trial
 from experiments.screens import texts
-from experiments.screens.console.messages import GunSeen
-from experiments.screens.console.view import About, Seen
+from experiments.screens.console.view import About, GunSeen, Seen
 from experiments.session.history import Told, done, entries, together
 from experiments.session.remarks import AnswerCorrected, DescriptionCorrected, Flagged, Noted, RatingCorrected, Remark
 from experiments.session.states import Position, State
@@ -39,7 +38,7 @@ ROUGH_S = 1200.0
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Progress:
+class Count:
     """How many trials are done of those planned, and of what."""
 
     what: str
@@ -47,26 +46,26 @@ class Progress:
     planned: int
 
 
-def progress(plan: Plan, told: Told, current: Trial, *, rated_last: bool) -> list[Progress]:
+def counts(plan: Plan, told: Told, current: Trial, *, rated_last: bool) -> list[Count]:
     """How far the run is, seen from the current trial.
 
     Trials of the set, of the session and of the experiment; where all are rated after all were felt, felt and rated.
     """
     felt, rated = done(told), {trial_of(step) for step, word in told if isinstance(word, Rated)}
     if rated_last:
-        return [_progress("felt", plan.trials, felt), _progress("rated", plan.trials, rated)]
+        return [_count("felt", plan.trials, felt), _count("rated", plan.trials, rated)]
     session = [trial for trial in plan.trials if trial.session == current.session]
     here = [trial for trial in session if together(trial, current)]
     parts = {"set": here, "session": session, "experiment": plan.trials}
-    return [_progress(what, trials, felt) for what, trials in parts.items()]
+    return [_count(what, trials, felt) for what, trials in parts.items()]
 
 
-def _progress(what: str, trials: Sequence[Trial], finished: Collection[Trial | None]) -> Progress:
-    return Progress(what=what, count=sum(trial in finished for trial in trials), planned=len(trials))
+def _count(what: str, trials: Sequence[Trial], finished: Collection[Trial | None]) -> Count:
+    return Count(what=what, count=sum(trial in finished for trial in trials), planned=len(trials))
 
 
 @dataclass(slots=True)
-class Pace:
+class Progress:
     """Measures how long trials take, without the time of pauses."""
 
     began_s: float | None = None
@@ -104,13 +103,13 @@ class Pace:
 
 
 def remaining_s(  # noqa: PLR0917 - each is looked at
-    config: ExperimentConfig, plan: Plan, told: Told, pace: Pace, position: Position, now_s: float
+    config: ExperimentConfig, plan: Plan, told: Told, progress: Progress, position: Position, now_s: float
 ) -> float:
     """Seconds still to go: trials left, breaks left, what is left of this one, and the ratings still to come."""
     left = len(plan.trials) - len(done(told))
     rated = sum(isinstance(word, Rated) for _, word in told)
     ratings_s = max(0, len(plan.trials) - rated) * config.rating_s
-    return left * pace.trial_s(config.trial_s) + _breaks_left_s(config, told, position, now_s) + ratings_s
+    return left * progress.trial_s(config.trial_s) + _breaks_left_s(config, told, position, now_s) + ratings_s
 
 
 def _breaks_left_s(config: ExperimentConfig, told: Told, position: Position, now_s: float) -> float:

@@ -13,10 +13,9 @@ from typing import Any
 from device.words import Direction
 from experiments.config.setup import Setup
 from experiments.live_run import LiveRun
-from experiments.screens.console.messages import Message, ParticipantSeen, Trouble
-from experiments.screens.participant.link import ParticipantLink
-from experiments.screens.participant.process import ParticipantError
-from experiments.screens.participant.words import (
+from experiments.screens.console.view import Message, ParticipantSeen, Trouble
+from experiments.screens.participant.link import ParticipantError, ParticipantLink
+from experiments.screens.participant.messages import (
     BETWEEN,
     AskDescription,
     AskDirection,
