@@ -160,7 +160,7 @@ class StartWindow(QWidget):
     def _show_choice(self) -> None:
         code, experiment = self.form.participant_id, self.form.experiment.currentText()
         person = self._person(code)
-        self.people.remark.say(*people.remark(code, person, experiment, self._study.experiments))
+        self.form.remark.say(*people.remark(code, person, experiment, self._study.experiments))
         out = person is not None and person.excluded is not None
         self.exclude_button.setText(f"{'Readmit…' if out else 'Exclude…'}  [Alt+E]")
         self.shots.choose(self._setup())
