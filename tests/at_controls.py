@@ -29,9 +29,9 @@ from experiments.record.journal import Contents, read
 from experiments.record.replay import told
 from experiments.run import Finished, Request, run
 from experiments.screens.console import progress, view, widgets
-from experiments.screens.console.controls import Controls
+from experiments.screens.console.controls import Controls, TextField
 from experiments.screens.console.keys import Name, Presses
-from experiments.screens.console.view import About, Ended, Field, GunSeen, Seen
+from experiments.screens.console.view import About, Ended, GunSeen, Seen
 from experiments.session import events
 from experiments.session.events import Press
 from experiments.session.remarks import AnswerCorrected, Remark
@@ -283,7 +283,7 @@ class PaperWindow:
         self.live: LiveRun | None = None
         self.controls: Controls | None = None
         self.heard: list[str] = []
-        self.fields: dict[Field, str] = {"line": "", "number": "", "words": ""}
+        self.fields: dict[TextField, str] = {"line": "", "number": "", "words": ""}
         self.painted_s: dict[int, float] = {}
         self.offered: list[Offered] = []
         self.saved: list[tuple[Step | None, Any]] = []
@@ -346,8 +346,8 @@ class PaperWindow:
     def _look(self, drawn: Position) -> None:
         assert self.live is not None
         assert self.controls is not None
-        seen = Seen(about=self.about, position=drawn, told=self.live.told, gun=self.gun)
-        shown = view.instruction(seen, self._clock.now())
+        seen = Seen(about=self.about, position=drawn, told=self.live.told, gun=self.gun, now_s=self._clock.now())
+        shown = view.instruction(seen)
         self.heard += [shown.title, shown.damper, shown.detail, view.place_text(seen)]
         self.heard += [*progress.coming(seen), *progress.answers(seen), *self.controls.help_lines()]
 
@@ -416,7 +416,7 @@ class PaperWindow:
     def close_line(self) -> None:
         self.fields["line"] = ""
 
-    def typed(self, field: Field) -> str:
+    def typed(self, field: TextField) -> str:
         return self.fields[field]
 
     def show_page(self, title: str, lines: list[str]) -> None:

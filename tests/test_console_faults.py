@@ -172,27 +172,26 @@ class Watcher:
 
 def program(case: str, folder: Path) -> dict[str, Any]:
     """One run at a console worked by a synthetic participant: the longest stall, and what happened."""
-    from experiments.screens.console.app import run_console
+    from experiments.screens.console.app import Console
     from experiments.screens.console.visual import VisualParticipant
 
-    guns, watchers, drivers, stopped = faulty_guns(case), [], [], None
+    guns, stopped = faulty_guns(case), None
     syncs = threading.Event()
     if case == "slow-disk":
         slow_disk(syncs)
 
-    def watch(console: Any) -> None:
-        watchers.append(Watcher(console, guns, case, syncs))
-        drivers.append(VisualParticipant(console, clock))
-
-    setup, clock = short_direction(sets=1, trials=3, set_break_s=0.0), RealClock()
+    setup = short_direction(sets=1, trials=3, set_break_s=0.0)
     request = Request(setup=setup, participant_id="P01", results=folder, seed=1)
+    console = Console(request, RealClock(), hand="synthetic")
+    watcher = Watcher(console, guns, case, syncs)
     try:
-        run_console(request, clock, hand="synthetic", watch=watch)
+        with VisualParticipant(console):
+            console.run()
     except RunStopped as stop:
         stopped = str(stop)
     gun = guns[0]
     told = {"disarmed_s": gun.disarmed_s, "hung_until_s": gun.hung_until_s, "shots": gun.shots}
-    return watchers[0].seen | told | {"stopped": stopped}
+    return watcher.seen | told | {"stopped": stopped}
 
 
 def faulty_guns(case: str) -> list[FaultyGun]:
@@ -212,11 +211,11 @@ def window_alone() -> dict[str, Any]:
     """A console's window without a run: in which colour it says bad news."""
     from experiments.screens.console.app import application
     from experiments.screens.console.view import About
-    from experiments.screens.console.window import Bridge, ConsoleWindow
+    from experiments.screens.console.window import ConsoleWindow
 
     app, setup = application(), load_setup("preference")
     plan = catalogue.experiment(setup).make_plan(setup.config, "P01", 1, None)
-    window = ConsoleWindow(About(setup=setup, plan=plan), Bridge(), RealClock())
+    window = ConsoleWindow(About(setup=setup, plan=plan), RealClock())
     window.show()
     window.say("bad news", "bad")
     app.processEvents()

@@ -15,7 +15,7 @@ from experiments import catalogue
 from experiments.config.setup import Setup
 from experiments.design.plan import Plan, Trial
 from experiments.screens.console import progress, view, widgets
-from experiments.screens.console.progress import Progress, clock_text, counts, end_text, remaining_s
+from experiments.screens.console.progress import Progress, clock_text, end_text, remaining_s, trials_done
 from experiments.screens.console.view import About, Ended, GunSeen, ParticipantSeen, Seen
 from experiments.session.remarks import AnswerCorrected, Flagged, Noted
 from experiments.session.states import Position, State
@@ -51,7 +51,7 @@ def seen(setup: Setup[Any], position: Position, *told: Any, **more: Any) -> Seen
 
 
 def shown_texts(here: Seen) -> list[str]:
-    shown = view.instruction(here, 10.0)
+    shown = view.instruction(replace(here, now_s=10.0))
     texts = [shown.title, shown.damper, shown.detail, view.place_text(here), *progress.coming(here)]
     return [*texts, *progress.answers(here), *progress.marks(here), progress.gun_text(here.gun)[0]]
 
@@ -79,7 +79,7 @@ def test_every_state_says_what_to_do_and_none_says_anything_of_how_good_the_part
 ) -> None:
     with sat_at(state, tmp_path) as sitting:
         sitting.window.paint()
-        assert view.instruction(Seen(about=sitting.window.about, position=sitting.position), 0.0).title
+        assert view.instruction(Seen(about=sitting.window.about, position=sitting.position)).title
         assert not [text for text in sitting.window.heard if tells_correctness(text)]
 
 
@@ -106,9 +106,9 @@ def test_whoever_looks_finds_the_word_they_need_in_each_state(tmp_path: Path) ->
 
 def test_the_gun_is_shown_as_it_says_itself_and_never_as_safe_when_it_says_nothing() -> None:
     halted = Position(states=(State.HALTED,))
-    silent = view.instruction(seen(DIRECTION, halted, gun=GunSeen(status=None, fault="no answer")), 0.0)
+    silent = view.instruction(seen(DIRECTION, halted, gun=GunSeen(status=None, fault="no answer")))
     assert "SWITCH OFF ITS POWER" in silent.damper
-    assert "SWITCH OFF ITS POWER" in view.instruction(seen(DIRECTION, halted), 0.0).damper
+    assert "SWITCH OFF ITS POWER" in view.instruction(seen(DIRECTION, halted)).damper
     assert progress.gun_text(GunSeen(status=None, fault="no answer"))[1] == "bad"
 
 
@@ -121,8 +121,8 @@ def test_rating_and_description_are_awaited_from_the_participants_screen_where_t
         here = seen(PREFERENCE, Position(states=(state,), step=step))
         there = replace(here, about=replace(here.about, participant_rates=True))
         awaited = f"Awaited: the participant's {what} on their own screen, or type it here."
-        assert view.instruction(here, 0.0).detail == "?"
-        assert view.instruction(there, 0.0).detail == f"?\n{awaited}"
+        assert view.instruction(here).detail == "?"
+        assert view.instruction(there).detail == f"?\n{awaited}"
 
 
 def test_a_participants_screen_that_is_gone_is_awaited_no_more() -> None:
@@ -132,7 +132,7 @@ def test_a_participants_screen_that_is_gone_is_awaited_no_more() -> None:
         (DIRECTION, ask, State.ASKING, {"participant_keys": True}),
     ):
         here = seen(setup, Position(states=(state,), step=step(plan_of(setup).trials[0])), participant=gone)
-        detail = view.instruction(replace(here, about=replace(here.about, **does)), 0.0).detail
+        detail = view.instruction(replace(here, about=replace(here.about, **does))).detail
         assert "Awaited" not in detail
         assert "Their screen is gone." in detail
 
@@ -155,7 +155,7 @@ def test_the_participants_screen_has_the_keys_from_one_rating_or_description_to_
 
 def test_a_run_that_stopped_says_what_is_safe_only_if_it_was_read_back() -> None:
     def end(**how: Any) -> str:
-        return view.instruction(seen(DIRECTION, Position(), ended=Ended(**how)), 0.0).detail
+        return view.instruction(seen(DIRECTION, Position(), ended=Ended(**how))).detail
 
     assert "1 answer," in end(reason="lunch", saved=1)
     assert "2 answers," in end(reason="lunch", saved=2)
@@ -210,25 +210,36 @@ def test_the_strip_shows_the_own_hands_times_of_the_session_alone() -> None:
 # colours
 
 
+def contrast(one: str, other: str) -> float:
+    """The contrast ratio of two colours (WCAG 2): 1 to 21."""
+    light, dark = sorted((_luminance(one), _luminance(other)), reverse=True)
+    return (light + 0.05) / (dark + 0.05)
+
+
+def _luminance(hex_colour: str) -> float:
+    parts = [int(hex_colour[start : start + 2], 16) / 255 for start in (1, 3, 5)]
+    linear = [part / 12.92 if part <= 0.04045 else ((part + 0.055) / 1.055) ** 2.4 for part in parts]
+    return 0.2126 * linear[0] + 0.7152 * linear[1] + 0.0722 * linear[2]
+
+
 @pytest.mark.parametrize("name", ["dark", "light"])
 def test_text_of_every_mood_stands_out_on_ground_and_panel_seven_to_one(name: widgets.Theme) -> None:
     for ground in ("ground", "panel"):
-        for colour in (*widgets.MOODS, "text", "quiet"):
-            assert widgets.contrast(name, colour, ground) >= 7, (colour, ground)
+        for text in (*widgets.MOODS, "text", "quiet"):
+            assert contrast(widgets.colour(name, text), widgets.colour(name, ground)) >= 7, (text, ground)
 
 
 @pytest.mark.parametrize("name", ["dark", "light"])
-@pytest.mark.parametrize("ground", ["stop", *widgets.BANDS])
+@pytest.mark.parametrize("ground", ["stop", "practice", "simulated"])
 def test_the_text_of_stop_button_and_bands_stands_out(name: widgets.Theme, ground: str) -> None:
-    assert widgets.contrast(name, f"{ground}_text", ground) >= 4.5  # WCAG 2 AA; it is large and bold
+    text = widgets.colour(name, f"{ground}_text")
+    assert contrast(text, widgets.colour(name, ground)) >= 4.5  # WCAG 2 AA; it is large and bold
 
 
-def test_contrast_is_that_of_the_published_definition(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setitem(widgets._COLOURS["light"], "grey", "#767676")
-    assert widgets.contrast("light", "grey") == pytest.approx(4.54, abs=0.005)
+def test_contrast_is_that_of_the_published_definition() -> None:
     # WCAG 2: a colour on itself is 1 to 1; #767676 is the lightest grey with 4.5 to 1 on white
-    assert widgets.contrast("light", "ground", "ground") == 1
-    assert widgets.contrast("light", "stop_text", "ground") == 1
+    assert contrast("#767676", "#ffffff") == pytest.approx(4.54, abs=0.005)
+    assert contrast("#ffffff", "#ffffff") == 1
 
 
 # the time to go
@@ -258,7 +269,8 @@ class Day:
 
     @property
     def left_s(self) -> float:
-        return remaining_s(self.setup.config, self.plan, self.told, self.so_far, self.position, self.now_s)
+        about = About(setup=self.setup, plan=self.plan)
+        return remaining_s(Seen(about=about, position=self.position, told=self.told, now_s=self.now_s), self.so_far)
 
 
 @given(durations=st.lists(st.floats(1, 300), min_size=1, max_size=6))
@@ -310,16 +322,21 @@ def test_ratings_still_to_come_are_counted() -> None:
 
 
 def test_how_far_the_run_is_counts_what_was_felt_and_what_was_rated_where_all_is_rated_last() -> None:
-    plan = plan_of(PREFERENCE)
-    first, second, *_ = plan.trials
+    first, second, *_ = plan_of(PREFERENCE).trials
     felt = [(present(trial), SHOWN) for trial in (first, second)]
     told = (*felt, (rate(first), Rated(rating=None, rating_by="experimenter")))
-    counted = [(one.what, one.count, one.planned) for one in counts(plan, told, first, rated_last=True)]
-    assert counted == [("felt", 2, 3), ("rated", 1, 3)]
-    plan = plan_of(DIRECTION)
-    answers = tuple((ask(trial), SAID) for trial in plan.trials[:4])
-    counted = [(one.what, one.count, one.planned) for one in counts(plan, answers, plan.trials[4], rated_last=False)]
-    assert counted == [("set", 1, 3), ("session", 4, 6), ("experiment", 4, 12)]
+    assert counted(seen(PREFERENCE, Position(step=rate(first)), *told)) == [("felt", 2, 3), ("rated", 1, 3)]
+    trials = plan_of(DIRECTION).trials
+    answers = tuple((ask(trial), SAID) for trial in trials[:4])
+    assert counted(seen(DIRECTION, Position(step=ask(trials[4])), *answers)) == [
+        ("set", 1, 3),
+        ("session", 4, 6),
+        ("experiment", 4, 12),
+    ]
+
+
+def counted(here: Seen) -> list[tuple[str, int, int]]:
+    return [(one.what, one.count, one.planned) for one in trials_done(here)]
 
 
 def test_the_end_is_a_time_of_day_also_over_midnight() -> None:

@@ -27,8 +27,8 @@ from experiments.record.journal import hold
 from experiments.run import Request, run
 from experiments.screens.console import widgets
 from experiments.screens.console.app import application
-from experiments.screens.console.form import Beside, Opening
-from experiments.screens.console.live import _study
+from experiments.screens.console.form import Opening, Sides
+from experiments.screens.console.live import study_of
 from experiments.screens.console.start import StartWindow
 from experiments.screens.synthetic import synthetic_screen
 from experiments.study import enrolment, register
@@ -239,11 +239,11 @@ def test_a_config_that_the_study_does_not_name_is_run_alone_by_the_rules_of_the_
     folder = study.source.parent
     shutil.copy(folder / "direction.toml", folder / "mine.toml")
     asked = Request(setup=load_setup(str(folder / "mine.toml")), participant_id="", results=study.results)
-    found = _study(asked)
+    found = study_of(asked)
     assert [one.source.name for one in found.setups] == ["mine.toml"]
     assert found.config == study.config
     named = Request(setup=load_setup(str(folder / "preference.toml")), participant_id="", results=study.results)
-    assert [one.source.name for one in _study(named).setups] == ["direction.toml", "preference.toml"]
+    assert [one.source.name for one in study_of(named).setups] == ["direction.toml", "preference.toml"]
 
 
 def test_what_cannot_be_read_is_said_when_the_window_opens_below_what_there_is_to_say(
@@ -267,12 +267,7 @@ def test_start_chooses_who_was_entered_and_has_their_facts_on_record(study: Stud
     choice = window.choice
     assert choice is not None
     assert (choice.participant_id, choice.setup.config.experiment, choice.again) == ("P01", "direction", "ask")
-    assert (choice.participant_screen, choice.participant_keys, choice.noise, choice.practice) == (
-        True,
-        False,
-        False,
-        False,
-    )
+    assert (choice.sides, choice.practice) == (Sides(screen=True), False)
     assert not window.isVisible()
     assert read(study.results).members["P01"].facts == FACTS
 
@@ -651,10 +646,10 @@ def test_which_gun_it_is_stands_in_the_window(gun: str, text: str, opened: Open)
 
 
 def test_what_was_asked_for_on_the_command_line_is_ticked(opened: Open) -> None:
-    beside = Beside(participant_screen=True, participant_keys=True, noise=True)
-    window = opened(beside=beside)
-    assert window.form.beside() == beside
-    assert opened().form.beside() == Beside()
+    sides = Sides(screen=True, own_keys=True, noise=True)
+    window = opened(sides=sides)
+    assert window.form.sides() == sides
+    assert opened().form.sides() == Sides()
 
 
 def colours_of_box(box: QWidget) -> set[str]:
@@ -665,11 +660,11 @@ def colours_of_box(box: QWidget) -> set[str]:
 def test_where_there_are_several_monitors_the_participants_is_chosen_by_its_number(
     opened: Open, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    assert opened().form.beside().monitor is None
+    assert opened().form.sides().monitor is None
     screens = ["0: eDP-1, 1920 × 1080", "1: HDMI-1, 1280 × 800", "2: DP-1, 1280 × 800"]
     monkeypatch.setattr("experiments.screens.console.form.monitors", lambda: screens)
-    assert opened().form.beside().monitor == 2
-    window = opened(beside=Beside(monitor=1))
+    assert opened().form.sides().monitor == 2
+    window = opened(sides=Sides(monitor=1))
     assert window.form.monitor.currentText() == "1: HDMI-1, 1280 × 800"
     fill(window, "P01")
     window.form.monitor.setCurrentIndex(0)

@@ -133,7 +133,7 @@ def _run(window: Any) -> dict[str, Any]:
 
     if window.live is None:
         return {"ended": window.ended is not None}
-    drawn, live, now_s = window.drawn, window.live, window._clock.now()
+    drawn, live, now_s = window.drawn, window.live, window.clock.now()
     not_before_s = live.position.not_before_s
     in_time = not_before_s is None or now_s >= not_before_s
     return {

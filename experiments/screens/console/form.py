@@ -37,13 +37,19 @@ _AGE_DIGITS = 3
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Beside:
-    """What the participant has beside the console; `monitor` is the index of their screen, `None` for the last one."""
+class Sides:
+    """Who works the console, and what the participant has beside it; `monitor` is theirs, the last one if `None`."""
 
-    participant_screen: bool = False
-    participant_keys: bool = False
+    visual: bool = False
+    screen: bool = False
+    own_keys: bool = False
     noise: bool = False
     monitor: int | None = None
+
+    @property
+    def participant_process(self) -> bool:
+        """Whether the participant's own process runs at all."""
+        return self.screen or self.own_keys or self.noise
 
 
 class Form(QFrame):
@@ -53,7 +59,7 @@ class Form(QFrame):
     code_edited = pyqtSignal()
     experiment_edited = pyqtSignal()
 
-    def __init__(self, experiments: Sequence[str], asked: Sequence[Fact], beside: Beside) -> None:
+    def __init__(self, experiments: Sequence[str], asked: Sequence[Fact], sides: Sides) -> None:
         super().__init__()
         self.setObjectName("panel")
         self.experiment, self.code, self.code_again = ListBox(experiments), LineEdit(), LineEdit()
@@ -62,7 +68,7 @@ class Form(QFrame):
         self.noise, self.monitor = TickBox("hears masking noise"), ListBox(monitors())
         self.remark = Lines("remark")
         self._typed: dict[str, str] | None = None
-        self._tick(beside)
+        self._tick(sides)
         self._lay_out()
         self._connect()
 
@@ -73,7 +79,7 @@ class Form(QFrame):
         form.setFieldGrowthPolicy(QFormLayout.FieldGrowthPolicy.ExpandingFieldsGrow)
         for name, widget in self._rows():
             widget.setAccessibleName(name)
-            form.addRow(_beside_its_field(name), widget)
+            form.addRow(_field_name(name), widget)
         scroll = QScrollArea()
         scroll.setWidget(fields)
         scroll.setWidgetResizable(True)
@@ -104,12 +110,12 @@ class Form(QFrame):
         self.code.textChanged.connect(self.code_edited)
         self.experiment.currentIndexChanged.connect(self.experiment_edited)
 
-    def _tick(self, beside: Beside) -> None:
-        self.own_screen.setChecked(beside.participant_screen)
-        self.own_keys.setChecked(beside.participant_keys)
-        self.noise.setChecked(beside.noise)
+    def _tick(self, sides: Sides) -> None:
+        self.own_screen.setChecked(sides.screen)
+        self.own_keys.setChecked(sides.own_keys)
+        self.noise.setChecked(sides.noise)
         last = self.monitor.count() - 1
-        self.monitor.setCurrentIndex(last if beside.monitor is None else beside.monitor)
+        self.monitor.setCurrentIndex(last if sides.monitor is None else sides.monitor)
 
     @property
     def participant_id(self) -> str:
@@ -125,11 +131,11 @@ class Form(QFrame):
             facts={fact: _text(field) for fact, widget in self.facts.items()},
         )
 
-    def beside(self) -> Beside:
+    def sides(self) -> Sides:
         """What is ticked."""
-        return Beside(
-            participant_screen=self.own_screen.isChecked(),
-            participant_keys=self.own_keys.isChecked(),
+        return Sides(
+            screen=self.own_screen.isChecked(),
+            own_keys=self.own_keys.isChecked(),
             noise=self.noise.isChecked(),
             monitor=self.monitor.currentIndex() if self.monitor.count() > 1 else None,
         )
@@ -152,7 +158,7 @@ class Form(QFrame):
                 widget.setCurrentText(values[fact])
 
 
-def _beside_its_field(name: str) -> QLabel:
+def _field_name(name: str) -> QLabel:
     """The name of a field, at half its height."""
     made = widgets.label("", name, wrap=False)
     made.setAlignment(Qt.AlignmentFlag.AlignVCenter)
@@ -192,10 +198,7 @@ class Choice:
     anew_reason: str = ""
     practice: bool = False
     training: bool = False
-    participant_screen: bool = False
-    participant_keys: bool = False
-    noise: bool = False
-    monitor: int | None = None
+    sides: Sides = field(default_factory=Sides)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -207,7 +210,7 @@ class Opening:
 
     gun: str
     named: str = ""
-    beside: Beside = field(default_factory=Beside)
+    sides: Sides = field(default_factory=Sides)
     participant_id: str = ""
     said: str = ""
 

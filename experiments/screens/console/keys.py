@@ -11,7 +11,6 @@ from typing import Literal
 
 from experiments.session import events
 from experiments.session.events import Event
-from experiments.session.history import What
 from experiments.session.states import No, Position, State, change_of
 
 BOUNCE_S = 0.02
@@ -85,12 +84,7 @@ COMMANDS: tuple[Command, ...] = (
     _C(name="note", key="N", text="Note…", does="writes a note on the trial", kind=events.Note),
     _C(name="reason", key="Y", text="Say why…", does="says why there was an emergency stop", kind=events.Reason),
     _C(name="stop", key="Q", text="Stop…", does="stops the run, which can be resumed", kind=events.Stop),
-    _C(
-        name="restart",
-        key="S",
-        text="Start it again",
-        does="starts the participant's screen again",
-    ),
+    _C(name="restart", key="S", text="Start it again", does="starts the participant's screen again"),
     _C(name="list", key="L", text="List", does="lists flags, notes and corrections of the set"),
     _C(name="help", key="F1", text="Keys", does="shows this page"),
     _C(name="theme", key="F2", text="Dark/light", does="changes the colours"),
@@ -116,10 +110,8 @@ def command_for(key: str, *, ctrl: bool, typing: Typing, position: Position) -> 
 
     Where letters are text, a letter is a command with Ctrl held; elsewhere Ctrl changes nothing, but answers take none.
     """
-    if key in ("F12", "F1", "F2", "Esc"):
-        return {"F12": "emergency", "F1": "help", "F2": "theme", "Esc": "leave"}[key]  # type: ignore[return-value]
-    if key == "Enter":
-        return "enter"
+    if key in _ALWAYS:
+        return _ALWAYS[key]
     if ctrl and key == "Space":
         return None  # it changes the input method: nobody fires by that
     if ctrl and key == "X":
@@ -130,6 +122,7 @@ def command_for(key: str, *, ctrl: bool, typing: Typing, position: Position) -> 
     return None if ctrl and not typing.letters and name in _ANSWERS else name
 
 
+_ALWAYS: dict[str, Name] = {"F12": "emergency", "F1": "help", "F2": "theme", "Esc": "leave", "Enter": "enter"}
 _ANSWERS: tuple[Name, ...] = ("forward", "backward")
 
 
@@ -150,14 +143,14 @@ _LETTERS: dict[str, Name] = {
 
 def field_of(position: Position) -> Literal["number", "words"] | None:
     """What is typed at a position, apart from a line that was asked for."""
-    what: What | None = None
-    if position.state is State.CORRECTING and position.correcting is not None:
-        what = position.correcting.what
-    elif position.state is State.RATING:
-        what = "rating"
-    elif position.state is State.DESCRIBING:
-        what = "description"
-    return {"rating": "number", "description": "words"}.get(what or "")  # type: ignore[return-value]
+    entry = position.correcting if position.state is State.CORRECTING else None
+    match entry.what if entry is not None else position.state:
+        case "rating" | State.RATING:
+            return "number"
+        case "description" | State.DESCRIBING:
+            return "words"
+        case _:
+            return None
 
 
 def shown_key(name: Name, *, letters: bool) -> str:
@@ -175,7 +168,7 @@ def shown_key(name: Name, *, letters: bool) -> str:
 def why_not(name: Name, position: Position) -> str:
     """Why a command does nothing at a position; empty if it does something."""
     kind = BY_NAME[name].kind
-    if name in ("forward", "backward") and position.state is State.CORRECTING:
+    if name in _ANSWERS and position.state is State.CORRECTING:
         kind = events.Correct if field_of(position) is None else kind
     if name == "no answer" and position.state is State.CORRECTING:
         kind = events.Correct

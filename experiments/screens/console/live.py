@@ -6,8 +6,9 @@ import tempfile
 import threading
 import time
 from collections.abc import Callable
+from concurrent.futures import Future
 from contextlib import ExitStack
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from pathlib import Path
 from typing import Any, TypeVar
 
@@ -15,19 +16,19 @@ from PyQt6.QtCore import QEventLoop, Qt, QTimer
 from PyQt6.QtGui import QGuiApplication
 from PyQt6.QtWidgets import QDialog, QLabel, QPushButton, QVBoxLayout
 
-from device import DeviceError
+from device.words import RecoilError
 from experiments.clock import RealClock
-from experiments.config.door import ConfigError
 from experiments.config.setup import Setup
 from experiments.live_run import RunStopped
 from experiments.load import load_setup, load_study
 from experiments.record.journal import JournalError
 from experiments.run import Again, Finished, Request, UnfinishedRun
 from experiments.screens.console import people, widgets
-from experiments.screens.console.app import Console, application, run_console
-from experiments.screens.console.form import Beside, Choice, Opening, monitors
+from experiments.screens.console.app import Console, application
+from experiments.screens.console.form import Choice, Opening, Sides, monitors
 from experiments.screens.console.participant_link import WAIT, ParticipantSide
 from experiments.screens.console.start import choose
+from experiments.screens.console.view import THANKS
 from experiments.screens.console.visual import Rater, VisualParticipant
 from experiments.screens.console.widgets import WHY, Answer, Lines, Question, start_sheet, unfit
 from experiments.screens.console.windows import FreshShortcuts, let_go, signals_to
@@ -37,63 +38,34 @@ from experiments.session.events import Hand
 from experiments.study.places import PlaceError, place
 from experiments.study.progress import StudyFolder, run_standing
 
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Words:
-    """What the window says of a run: the band of a practice or a training, and the last sentence."""
-
-    band: str = ""
-    last: str = "Thank the participant."
-
-
 _NO_HANDS = "--visual --participant-screen rates by synthetic events, which only an X display takes"
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Sides:
-    """Who works the console, and what the participant has beside it; `monitor` is theirs, the last one if `None`."""
-
-    visual: bool = False
-    screen: bool = False
-    own_keys: bool = False
-    noise: bool = False
-    monitor: int | None = None
-
-    @property
-    def beside(self) -> bool:
-        """Whether the participant's own process runs at all."""
-        return self.screen or self.own_keys or self.noise
-
-
-def run_live(request: Request, sides: Sides, words: Words | None = None) -> Finished:
+def run_live(request: Request, sides: Sides, *, band: str = "", last: str = THANKS) -> Finished:
     """Carry out a run at the console. An unfinished one is shown and asked about, but for a synthetic participant.
 
-    `PlaceError` without a display, or if the participant's screen does not open.
+    `band` and `last` as of a `Console`. `PlaceError` without a display, or if the participant's screen does not open.
     """
     application()
     try:
-        return _carry_out(request, sides, words or Words())
+        return _carry_out(request, sides, band, last)
     except UnfinishedRun:
         decided = None if sides.visual else ask(request)
         if decided is None:
             raise
-        return _carry_out(decided, sides, words or Words())
+        return _carry_out(decided, sides, band, last)
 
 
-def _carry_out(request: Request, sides: Sides, words: Words) -> Finished:
-    driver: list[VisualParticipant] = []
+def _carry_out(request: Request, sides: Sides, band: str, last: str) -> Finished:
     clock = RealClock()
-
+    hand: Hand = "synthetic" if sides.visual else "experimenter"
     with ExitStack() as stack:
         rater = _rater(stack) if sides.visual and sides.screen else None
-        beside = _participant(stack, request, sides) if sides.beside else None
-
-        def watch(console: Console) -> None:
-            if sides.visual:
-                driver.append(VisualParticipant(console, clock, rater, beside))
-
-        hand: Hand = "synthetic" if sides.visual else "experimenter"
-        return run_console(request, clock, hand=hand, beside=beside, band=words.band, last=words.last, watch=watch)
+        participant = _participant(stack, request, sides) if sides.participant_process else None
+        console = Console(request, clock, hand=hand, participant=participant, band=band, last=last)
+        if sides.visual:
+            stack.enter_context(VisualParticipant(console, rater))
+        return console.run()
 
 
 def lab_day(request: Request, sides: Sides) -> None:
@@ -103,14 +75,13 @@ def lab_day(request: Request, sides: Sides) -> None:
     """
     application()
     check_monitor(sides.monitor)
-    study, named = _study(request), request.setup.config.experiment
-    opening = Opening(gun=request.gun, named=named, beside=_ticked(sides))
+    study, named = study_of(request), request.setup.config.experiment
+    opening = Opening(gun=request.gun, named=named, sides=sides)
     with signals_to() as signalled:
         while not signalled and (choice := choose(study, opening, RealClock())) is not None:
             said = _of_the_day(request, study, choice)
-            opening = Opening(
-                gun=request.gun, beside=_ticked(_sides(choice)), participant_id=_seated(choice), said=said
-            )
+            code = "" if choice.training else choice.participant_id
+            opening = Opening(gun=request.gun, sides=choice.sides, participant_id=code, said=said)
     if signalled:
         raise KeyboardInterrupt(signalled[0])
 
@@ -122,26 +93,15 @@ def check_monitor(monitor: int | None) -> None:
         raise PlaceError(f"--participant-monitor {monitor}: there is no such screen; known are {'; '.join(known)}")
 
 
-def _ticked(sides: Sides) -> Beside:
-    return Beside(
-        participant_screen=sides.screen, participant_keys=sides.own_keys, noise=sides.noise, monitor=sides.monitor
-    )
-
-
-def _seated(choice: Choice) -> str:
-    """Who was there; nobody in a training."""
-    return "" if choice.training else choice.participant_id
-
-
-def _words(study: StudyFolder, choice: Choice) -> Words:
-    """What the window of a chosen run is to say of it."""
+def _band_and_last(study: StudyFolder, choice: Choice) -> tuple[str, str]:
+    """What the window of a chosen run says of it: its band, and the last sentence."""
     if choice.training:
-        return Words(band="TRAINING – nothing of it is kept", last="The training is over.")
+        return "TRAINING – nothing of it is kept", "The training is over."
     if choice.practice:
-        return Words(band="PRACTICE – never analysed", last="The practice is over: the run itself comes next.")
-    names = [setup.config.experiment for setup in study.setups]
+        return "PRACTICE – never analysed", "The practice is over: the run itself comes next."
+    names = study.experiments
     later = names[names.index(choice.setup.config.experiment) + 1 :]
-    return Words(last=f"Next: {later[0]}.") if later else Words()
+    return "", f"Next: {later[0]}." if later else THANKS
 
 
 def _of_the_day(request: Request, study: StudyFolder, choice: Choice) -> str:
@@ -149,10 +109,11 @@ def _of_the_day(request: Request, study: StudyFolder, choice: Choice) -> str:
     with ExitStack() as stack:
         results = Path(stack.enter_context(tempfile.TemporaryDirectory())) if choice.training else request.results
         try:
-            run_live(_chosen(request, choice, results), _sides(choice), _words(study, choice))
+            band, last = _band_and_last(study, choice)
+            run_live(_chosen(request, choice, results), choice.sides, band=band, last=last)
         except RunStopped as stop:
             return _stopped(choice, str(stop))
-        except (PlaceError, JournalError, ConfigError, DeviceError) as error:
+        except RecoilError as error:
             return str(error)
     return ""
 
@@ -165,7 +126,7 @@ def _stopped(choice: Choice, reason: str) -> str:
     return f"{choice.participant_id} stopped: {reason}. Start asks whether to go on there or to start anew."
 
 
-def _study(request: Request) -> StudyFolder:
+def study_of(request: Request) -> StudyFolder:
     """The study that the config lies in, if the study names it; else this experiment alone, by the rules of that study.
 
     Where there is no study beside the config, they are those of the shipped one.
@@ -189,15 +150,6 @@ def _chosen(request: Request, choice: Choice, results: Path) -> Request:
         again=choice.again,
         anew_reason=choice.anew_reason,
         practice=choice.practice,
-    )
-
-
-def _sides(choice: Choice) -> Sides:
-    return Sides(
-        screen=choice.participant_screen,
-        own_keys=choice.participant_keys,
-        noise=choice.noise,
-        monitor=choice.monitor,
     )
 
 
@@ -266,7 +218,7 @@ class Unfinished(QDialog):
         self._request = request
         self.decided: Request | None = None
         self.setWindowTitle("Recoil – unfinished run")
-        self.setStyleSheet(widgets.sheet("dark") + start_sheet())
+        self.setStyleSheet(start_sheet())
         answers = (
             Answer(text="Go on with it", key="Ctrl+G", do=lambda _: self._decide("resume", "")),
             Answer(text="Set it aside, start anew", key="Ctrl+N", do=self._fresh),
@@ -328,22 +280,19 @@ def while_shown(text: str, make: Callable[[], Made]) -> Made:
     shown.setWindowTitle("Recoil – please wait")
     shown.setStyleSheet(f"{widgets.sheet('dark')} QLabel {{ font-size: 26px; padding: 40px; }}")
     shown.setAlignment(Qt.AlignmentFlag.AlignCenter)
-    made: list[Made] = []
-    errors: list[BaseException] = []
+    made: Future[Made] = Future()
 
     def work() -> None:
         try:
-            made.append(make())
+            made.set_result(make())
         except BaseException as error:  # noqa: BLE001 - raised again where it is waited for
-            errors.append(error)
+            made.set_exception(error)
 
-    loop, look, thread = QEventLoop(), QTimer(), threading.Thread(target=work, daemon=True, name="waiting")
-    look.timeout.connect(lambda: None if thread.is_alive() else loop.quit())
+    loop, look = QEventLoop(), QTimer()
+    look.timeout.connect(lambda: loop.quit() if made.done() else None)
     shown.show()
-    thread.start()
+    threading.Thread(target=work, daemon=True, name="waiting").start()
     look.start(LOOK_MS)
     loop.exec()
     shown.close()
-    if errors:
-        raise errors[0]
-    return made[0]
+    return made.result()

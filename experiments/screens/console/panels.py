@@ -24,20 +24,21 @@ from PyQt6.QtWidgets import (
 )
 
 from experiments.screens.console import widgets
+from experiments.screens.console.controls import TextField
 from experiments.screens.console.keys import BY_NAME, Name, field_of, shown_key
 from experiments.screens.console.progress import (
     Progress,
     answers,
     clock_text,
     coming,
-    counts,
     end_text,
     focus_text,
     gun_text,
     remaining_s,
     response_times,
+    trials_done,
 )
-from experiments.screens.console.view import About, Field, Instruction, Seen
+from experiments.screens.console.view import About, Instruction, Seen
 from experiments.session.events import Press
 from experiments.session.history import Entry
 from experiments.session.states import Position, State
@@ -108,7 +109,7 @@ class TextPage(QWidget):
             text, view = self._text.document(), self._text.viewport()
             if text is None or view is None:
                 return
-            rows = text.size().height()  # of such a widget's document, which counts in lines
+            rows = text.size().height()  # of such a widget's document, which trials_done in lines
             if rows * self._text.fontMetrics().lineSpacing() + 2 * text.documentMargin() < view.height():
                 return
 
@@ -120,7 +121,7 @@ def _size(label: QLabel, size_px: int, *, bold: bool) -> None:
         label.setStyleSheet(style)
 
 
-_Belongs = tuple[str | None, int, Entry | None]
+_Belongs = tuple[TextField | None, int, Entry | None]
 """What a field is for: its kind, the number of the step, and the entry that is corrected."""
 
 
@@ -129,6 +130,7 @@ class TextFields:
 
     def __init__(self) -> None:
         self.rating, self.words, self.line = QLineEdit(), QLineEdit(), QLineEdit()
+        self._fields: dict[TextField, QLineEdit] = {"number": self.rating, "words": self.words, "line": self.line}
         self._ends, self._question = widgets.label("quiet"), widgets.label("quiet")
         for field, name, how in (
             (self.rating, "rating", "type a number, Enter saves"),
@@ -163,13 +165,12 @@ class TextFields:
     def _keep(self, belongs: _Belongs) -> None:
         """Keep what is half typed in the field that is left; of other steps nothing is kept any more."""
         name, number, _ = belongs
-        typed = {"number": self.rating.text(), "words": self.words.text()}.get(name or "", "")
+        typed = "" if name is None else self.typed(name)
         self._drafts = {one: text for one, text in self._drafts.items() if one[1] == number} | {belongs: typed}
 
     def focus(self, position: Position, otherwise: QWidget) -> None:
         """Show the field of a position, and put the cursor into it; an open line keeps the cursor."""
-        name = field_of(position) or ""
-        self.pages.setCurrentIndex({"number": 1, "words": 2}.get(name, 0))
+        self.pages.setCurrentIndex((None, "number", "words").index(field_of(position)))
         if self.bar.isHidden():
             self._field(position, otherwise).setFocus()
 
@@ -179,7 +180,8 @@ class TextFields:
         self.bar.hide()
 
     def _field(self, position: Position, otherwise: QWidget) -> QWidget:
-        return {"number": self.rating, "words": self.words}.get(field_of(position) or "", otherwise)
+        name = field_of(position)
+        return otherwise if name is None else self._fields[name]
 
     def open_line(self, question: str) -> None:
         """Let a line be typed."""
@@ -188,32 +190,47 @@ class TextFields:
         self.bar.show()
         self.line.setFocus()
 
-    def typed(self, field: Field) -> str:
+    def typed(self, field: TextField) -> str:
         """What is typed in a field."""
-        return {"line": self.line, "number": self.rating, "words": self.words}[field].text()
+        return self._fields[field].text()
 
 
-Pressed = Callable[[], Press]
-Act = Callable[[Name, Press], None]
+class Mouse(Protocol):
+    """What a mouse does with buttons."""
+
+    def press(self) -> Press:
+        """A press that begins now."""
+
+    def do(self, name: Name, press: Press) -> None:
+        """A button was clicked."""
+
+    def hold(self, press: Press) -> None:
+        """The button that has to be held went down."""
+
+    def let_go(self) -> None:
+        """It was let go."""
 
 
 class CommandButton(QPushButton):
     """A button of a command. It never takes the keys, and the second press of a double click is none."""
 
-    def __init__(self, name: Name, pressed: Pressed, act: Act, style: str = "") -> None:
+    def __init__(self, name: Name, mouse: Mouse, style: str = "") -> None:
         super().__init__()
-        self.name, self._press = name, Press(at_s=0.0, serial=-1)
-        self._pressed, self._act = pressed, act
+        self.name, self._press, self._mouse = name, Press(at_s=0.0, serial=-1), mouse
         self.setObjectName(style)
         self.setAccessibleName(BY_NAME[name].text)
         self.setFocusPolicy(Qt.FocusPolicy.NoFocus)
         self.setSizePolicy(QSizePolicy.Policy.Ignored, QSizePolicy.Policy.Preferred)
         self.pressed.connect(self._keep)
-        self.clicked.connect(lambda _: self._act(self.name, self._press))
+        if name == "rearm":  # it has to be held
+            self.pressed.connect(lambda: mouse.hold(self._press))
+            self.released.connect(mouse.let_go)
+        else:
+            self.clicked.connect(lambda _: mouse.do(self.name, self._press))
         self.label()
 
     def _keep(self) -> None:
-        self._press = self._pressed()
+        self._press = self._mouse.press()
 
     def label(self, text: str = "", *, letters: bool = False) -> None:
         """Show what it does, and its key below."""
@@ -225,15 +242,6 @@ class CommandButton(QPushButton):
         """The second press of a double click is the same intent as the first."""
         if event is not None:
             event.accept()
-
-
-class HeldButton(CommandButton):
-    """A button that does something by being held: `down` and `up` tell when."""
-
-    def __init__(self, name: Name, pressed: Pressed, down: Callable[[Press], None], up: Callable[[], None]) -> None:
-        super().__init__(name, pressed, lambda _name, _press: None, "large")
-        self.pressed.connect(lambda: down(pressed()))
-        self.released.connect(up)
 
 
 class Slots(QWidget):
@@ -282,40 +290,19 @@ _OF_STATE: dict[State, tuple[Name, ...]] = {
 _OF_CORRECTION: dict[str | None, tuple[Name, ...]] = {None: ("forward", "backward"), "number": ("no answer",)}
 
 
-class Mouse(Protocol):
-    """What a mouse does with buttons."""
-
-    def press(self) -> Press:
-        """A press that begins now."""
-
-    def do(self, name: Name, press: Press) -> None:
-        """A button was clicked."""
-
-    def hold(self, press: Press) -> None:
-        """The button that has to be held went down."""
-
-    def let_go(self) -> None:
-        """It was let go."""
-
-
 class Buttons:
     """`slots` is the place of the large buttons, `row` that of the others and of the emergency stop."""
 
     def __init__(self, mouse: Mouse) -> None:
-        def large(name: Name) -> CommandButton:
-            if name == "rearm":
-                return HeldButton(name, mouse.press, mouse.hold, mouse.let_go)
-            return CommandButton(name, mouse.press, mouse.do, "large")
-
-        self._large = {name: large(name) for name in (*_LEFT, *_MIDDLE, *_RIGHT)}
+        self._large = {name: CommandButton(name, mouse, "large") for name in (*_LEFT, *_MIDDLE, *_RIGHT)}
         self.slots = Slots(*([self._large[name] for name in names] for names in (_LEFT, _MIDDLE, _RIGHT)))
-        self._row = {name: CommandButton(name, mouse.press, mouse.do) for name in _ROW}
+        self._row = {name: CommandButton(name, mouse) for name in _ROW}
         self.row = QWidget()
         across = QHBoxLayout(self.row)
         across.setContentsMargins(10, 0, 10, 2)
         for button in self._row.values():
             across.addWidget(button, 2)
-        across.addWidget(CommandButton("emergency", mouse.press, mouse.do, "stop"), 5)
+        across.addWidget(CommandButton("emergency", mouse, "stop"), 5)
 
     def put(self, position: Position, *, over: bool, letters: bool, idle: Callable[[Name], bool]) -> None:
         """Show what can be done now, and which of the keys below do nothing.
@@ -411,7 +398,7 @@ class Side(QWidget):
         for lines in (self._coming, self._answers):
             lines.setMinimumHeight(1)
 
-    def put(self, seen: Seen, progress: Progress, now_s: float) -> None:
+    def put(self, seen: Seen, progress: Progress) -> None:
         """Show what is so now."""
         for label, (text, mood) in (
             (self._gun, gun_text(seen.gun)),
@@ -420,7 +407,7 @@ class Side(QWidget):
             label.setText(text)
             label.setVisible(bool(text))
             widgets.set_mood(label, mood)
-        self._times.setText(_times(seen, progress, now_s))
+        self._times.setText(_times(seen, progress))
         _fill(self._coming, coming(seen))
         _fill(self._answers, answers(seen))
         if self._strip.isVisibleTo(self):
@@ -432,8 +419,7 @@ class Bars(QWidget):
 
     def __init__(self, about: About) -> None:
         super().__init__()
-        self._rated_last = about.setup.config.rating_s > 0
-        self._bars = [QProgressBar() for _ in range(2 if self._rated_last else 3)]
+        self._bars = [QProgressBar() for _ in range(2 if about.rated_last else 3)]
         across = QHBoxLayout(self)
         across.setContentsMargins(0, 0, 0, 0)
         for bar in self._bars:
@@ -441,20 +427,18 @@ class Bars(QWidget):
 
     def put(self, seen: Seen) -> None:
         """Show what is so now."""
-        found = counts(seen.about.plan, seen.told, seen.here, rated_last=self._rated_last)
-        for bar, one in zip(self._bars, found, strict=True):
+        for bar, one in zip(self._bars, trials_done(seen), strict=True):
             bar.setAccessibleName(one.what)
             bar.setFormat(f"{one.what}: %v of %m")
             bar.setMaximum(one.planned)
             bar.setValue(one.count)
 
 
-def _times(seen: Seen, progress: Progress, now_s: float) -> str:
-    elapsed = f"Elapsed {clock_text(progress.elapsed_s(now_s))}"
+def _times(seen: Seen, progress: Progress) -> str:
+    elapsed = f"Elapsed {clock_text(progress.elapsed_s(seen.now_s))}"
     if seen.ended is not None or seen.position.base is State.HALTED:
         return elapsed
-    left_s = remaining_s(seen.about.setup.config, seen.about.plan, seen.told, progress, seen.position, now_s)
-    return f"{elapsed}\nEnds {end_text(left_s, datetime.now())}"
+    return f"{elapsed}\nEnds {end_text(remaining_s(seen, progress), datetime.now())}"
 
 
 def _fill(shown: QListWidget, lines: list[str]) -> None:

@@ -7,11 +7,10 @@ from dataclasses import dataclass, field
 from datetime import datetime, timedelta
 
 from device import GunStatus
-from experiments.config.models import ExperimentConfig
-from experiments.design.plan import Plan, Trial
+from experiments.design.plan import Trial
 from experiments.screens import texts
 from experiments.screens.console.view import About, GunSeen, Seen
-from experiments.session.history import Told, done, entries, together
+from experiments.session.history import done, entries, together
 from experiments.session.remarks import AnswerCorrected, DescriptionCorrected, Flagged, Noted, RatingCorrected, Remark
 from experiments.session.states import Position, State
 from experiments.session.steps import (
@@ -46,18 +45,21 @@ class Count:
     planned: int
 
 
-def counts(plan: Plan, told: Told, current: Trial, *, rated_last: bool) -> list[Count]:
+def trials_done(seen: Seen) -> list[Count]:
     """How far the run is, seen from the current trial.
 
     Trials of the set, of the session and of the experiment; where all are rated after all were felt, felt and rated.
     """
-    felt, rated = done(told), {trial_of(step) for step, word in told if isinstance(word, Rated)}
-    if rated_last:
-        return [_count("felt", plan.trials, felt), _count("rated", plan.trials, rated)]
-    session = [trial for trial in plan.trials if trial.session == current.session]
-    here = [trial for trial in session if together(trial, current)]
-    parts = {"set": here, "session": session, "experiment": plan.trials}
+    felt, trials, here = done(seen.told), seen.about.plan.trials, seen.here
+    if seen.about.rated_last:
+        return [_count("felt", trials, felt), _count("rated", trials, _rated(seen))]
+    session = [trial for trial in trials if trial.session == here.session]
+    parts = {"set": [trial for trial in session if together(trial, here)], "session": session, "experiment": trials}
     return [_count(what, trials, felt) for what, trials in parts.items()]
+
+
+def _rated(seen: Seen) -> set[Trial | None]:
+    return {trial_of(step) for step, word in seen.told if isinstance(word, Rated)}
 
 
 def _count(what: str, trials: Sequence[Trial], finished: Collection[Trial | None]) -> Count:
@@ -102,21 +104,21 @@ class Progress:
         return (PRIOR_TRIALS * planned_s + sum(self.measured_s)) / (PRIOR_TRIALS + len(self.measured_s))
 
 
-def remaining_s(  # noqa: PLR0917 - each is looked at
-    config: ExperimentConfig, plan: Plan, told: Told, progress: Progress, position: Position, now_s: float
-) -> float:
+def remaining_s(seen: Seen, progress: Progress) -> float:
     """Seconds still to go: trials left, breaks left, what is left of this one, and the ratings still to come."""
-    left = len(plan.trials) - len(done(told))
-    rated = sum(isinstance(word, Rated) for _, word in told)
-    ratings_s = max(0, len(plan.trials) - rated) * config.rating_s
-    return left * progress.trial_s(config.trial_s) + _breaks_left_s(config, told, position, now_s) + ratings_s
+    config, planned = seen.about.setup.config, len(seen.about.plan.trials)
+    left = planned - len(done(seen.told))
+    rated = sum(isinstance(word, Rated) for _, word in seen.told)
+    ratings_s = max(0, planned - rated) * config.rating_s
+    return float(left * progress.trial_s(config.trial_s) + _breaks_left_s(seen) + ratings_s)
 
 
-def _breaks_left_s(config: ExperimentConfig, told: Told, position: Position, now_s: float) -> float:
-    taken: list[Step | None] = [step for step, word in told if isinstance(step, Rest) and isinstance(word, Rested)]
-    left_s = config.break_s - sum(step.duration_s for step in taken if isinstance(step, Rest))
+def _breaks_left_s(seen: Seen) -> float:
+    position = seen.position
+    taken_s = sum(step.duration_s for step, word in seen.told if isinstance(step, Rest) and isinstance(word, Rested))
+    left_s: float = seen.about.setup.config.break_s - taken_s
     if position.base is State.RESTING and position.until_s is not None and isinstance(position.step, Rest):
-        since_s = now_s if position.paused_s is None else position.paused_s
+        since_s = seen.now_s if position.paused_s is None else position.paused_s
         left_s -= position.step.duration_s - max(0.0, position.until_s - since_s)
     return max(0.0, left_s)
 

@@ -65,7 +65,7 @@ class StartWindow(QWidget):
 
     def _build(self) -> None:
         self.setWindowTitle("Recoil – start")
-        self.form = Form(self._study.experiments, self._study.config.eligibility.ask, self._opening.beside)
+        self.form = Form(self._study.experiments, self._study.config.eligibility.ask, self._opening.sides)
         self.shots = ShotPage(self._opening.gun, self._clock)
         self.table = PeopleTable(self._study.experiments)
         self.next, self.saved = Lines("detail"), Lines("saved", most_lines=5)
@@ -172,7 +172,7 @@ class StartWindow(QWidget):
         scale = type_scale(self.width(), self.height())
         if scale != self._scale:
             self._scale = scale
-            self.setStyleSheet(scaled(widgets.sheet("dark") + start_sheet(), scale))
+            self.setStyleSheet(scaled(start_sheet(), scale))
 
     def closeEvent(self, event: QCloseEvent | None) -> None:  # noqa: N802 - Qt's name
         """Let whoever waits for a choice go on, once no test shot is under way."""
@@ -293,22 +293,17 @@ class StartWindow(QWidget):
     def _leave(
         self, code: str, *, again: Again = "ask", reason: str = "", practice: bool = False, training: bool = False
     ) -> None:
-        if self.choice is not None:
-            return
-        beside = self.form.beside()
-        self.choice = Choice(
-            setup=self._setup(),
-            participant_id=code,
-            again=again,
-            anew_reason=reason,
-            practice=practice,
-            training=training,
-            participant_screen=beside.participant_screen,
-            participant_keys=beside.participant_keys,
-            noise=beside.noise,
-            monitor=beside.monitor,
-        )
-        self.close()
+        if self.choice is None:
+            self.choice = Choice(
+                setup=self._setup(),
+                participant_id=code,
+                again=again,
+                anew_reason=reason,
+                practice=practice,
+                training=training,
+                sides=self.form.sides(),
+            )
+            self.close()
 
     def _setup(self) -> Setup[Any]:
         return next(s for s in self._study.setups if s.config.experiment == self.form.experiment.currentText())

@@ -8,6 +8,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from math import ceil
+from string import Template
 from typing import Literal
 
 from PyQt6.QtCore import QEvent, QPointF, QRectF, QSize, Qt
@@ -25,6 +26,7 @@ from PyQt6.QtGui import (
     QWheelEvent,
 )
 from PyQt6.QtWidgets import (
+    QBoxLayout,
     QCheckBox,
     QComboBox,
     QFrame,
@@ -45,7 +47,6 @@ from experiments.study.register import MAX_REASON, RegisterError, check_reason
 
 Theme = Literal["dark", "light"]
 MOODS = ("act", "ask", "rest", "wait", "good", "bad")
-BANDS = ("practice", "simulated")
 """What a line is about, which chooses its colour; the words say it as well."""
 
 _COLOURS: dict[Theme, dict[str, str]] = {
@@ -99,76 +100,72 @@ def colour(theme: Theme, name: str) -> str:
     return _COLOURS[theme][name]
 
 
-def contrast(theme: Theme, name: str, ground: str = "ground") -> float:
-    """The contrast ratio of a colour against a ground (WCAG 2): 1 to 21."""
-    light, dark = sorted((_luminance(colour(theme, name)), _luminance(colour(theme, ground))), reverse=True)
-    return (light + 0.05) / (dark + 0.05)
-
-
-def _luminance(hex_colour: str) -> float:
-    parts = [int(hex_colour[start : start + 2], 16) / 255 for start in (1, 3, 5)]
-    linear = [part / 12.92 if part <= 0.04045 else ((part + 0.055) / 1.055) ** 2.4 for part in parts]
-    return 0.2126 * linear[0] + 0.7152 * linear[1] + 0.0722 * linear[2]
-
-
-def _with_mood(mood: str) -> str:
-    """The labels of a mood. Those that have a colour by their name are named, or that colour would win."""
-    return ", ".join(f'QLabel{name}[mood="{mood}"]' for name in ("", "#saved", "#quiet", "#title", "#damper"))
+_SHEET = Template("""
+    QWidget { background: $ground; color: $text; font-size: 17px; font-family: "DejaVu Sans", "Noto Sans"; }
+    $moods
+    QLabel#band[mood="practice"] { background: $practice; color: $practice_text; }
+    QLabel#band[mood="simulated"] { background: $simulated; color: $simulated_text; }
+    QFrame#panel { background: $panel; border: 1px solid $line; border-radius: 8px; }
+    QFrame#panel QLabel, QFrame#panel QCheckBox, QWidget#form { background: transparent; }
+    QLabel#place { font-size: 22px; color: $quiet; }
+    QLabel#band { font-size: 20px; font-weight: bold; padding: 4px 10px; border-radius: 4px; }
+    QLabel#quiet { font-size: 18px; color: $quiet; }
+    QLabel#saved { font-size: 22px; color: $good; }
+    QPushButton { background: $panel; border: 2px solid $line; border-radius: 8px; padding: 6px 4px; font-size: 16px; }
+    QPushButton:focus { border: 3px solid $act; }
+    QPushButton:hover { border-color: $act; }
+    QPushButton:disabled, QPushButton[dim="yes"] { color: $dim; border-style: dashed; }
+    QPushButton#large { font-size: 26px; font-weight: bold; padding: 8px 4px; }
+    QPushButton#stop { background: $stop; color: $stop_text; font-weight: bold; font-size: 22px; padding: 14px 6px; }
+    QLineEdit, QDoubleSpinBox, QSpinBox, QComboBox { background: $panel; border: 2px solid $line; border-radius: 6px;
+        padding: 8px; font-size: 24px; }
+    QLineEdit:focus, QDoubleSpinBox:focus, QSpinBox:focus, QComboBox:focus { border: 3px solid $act; }
+    QProgressBar { border: 1px solid $line; border-radius: 6px; text-align: center; background: $panel; color: $text;
+        min-height: 24px; }
+    QProgressBar::chunk { background: $filled; }
+    QCheckBox::indicator { width: 22px; height: 22px; border: 2px solid $line; border-radius: 4px; }
+    QCheckBox::indicator:checked { background: $act; }
+    QCheckBox:focus { color: $act; }
+    QListWidget, QTableWidget, QPlainTextEdit { background: $panel; border: 1px solid $line; font-size: 19px; }
+    QPlainTextEdit { font-family: "DejaVu Sans Mono", monospace; }
+    QListWidget::item:selected, QTableWidget::item:selected { background: $act; color: $ground; }
+    QHeaderView::section { background: $ground; color: $quiet; border: none; padding: 6px; }
+""")
+_START_SHEET = Template("""
+    QTextEdit { background: transparent; border: none; font-size: 19px; }
+    QTextEdit#place { font-size: 22px; color: $quiet; }
+    QLabel#title { font-size: 56px; font-weight: bold; }
+    QTextEdit#detail { font-size: 26px; }
+    QTextEdit#saved, QTextEdit#question { font-size: 22px; }
+    QLabel#gun { font-size: 22px; font-weight: bold; }
+    QLabel#count { font-size: 160px; font-weight: bold; color: $ask; }
+    QPushButton#stop { font-size: 34px; padding: 26px; }
+    QScrollArea { background: transparent; }
+    QTableWidget::item { padding: 3px 8px; }
+    QScrollBar { background: transparent; border: none; width: 14px; height: 14px; }
+    QScrollBar::handle { background: $line; border-radius: 5px; min-height: 30px; }
+    QScrollBar::add-line, QScrollBar::sub-line { width: 0px; height: 0px; }
+    $moods
+""")
 
 
 def sheet(theme: Theme) -> str:
     """The Qt style sheet of a theme, in the sizes of the window that it was designed for."""
-    c = _COLOURS[theme]
-    moods = "\n".join(f"{_with_mood(mood)} {{ color: {c[mood]}; }}" for mood in MOODS)
-    bands = "\n".join(
-        f'QLabel#band[mood="{band}"] {{ background: {c[band]}; color: {c[f"{band}_text"]}; }}' for band in BANDS
-    )
-    return f"""
-    QWidget {{ background: {c["ground"]}; color: {c["text"]}; font-size: 17px;
-        font-family: "DejaVu Sans", "Noto Sans"; }}
-    {moods}
-    {bands}
-    {_labels_and_buttons(c)}
-    {_fields_and_lists(c)}
-    """
+    # labels that have a colour by their name are named, or that colour would win over the mood's
+    moods = _moods(theme, [f"QLabel{name}" for name in ("", "#saved", "#quiet", "#title", "#damper")])
+    return _SHEET.substitute(_COLOURS[theme], moods=moods)
 
 
-def _labels_and_buttons(c: dict[str, str]) -> str:
-    return f"""
-    QFrame#panel {{ background: {c["panel"]}; border: 1px solid {c["line"]}; border-radius: 8px; }}
-    QFrame#panel QLabel, QFrame#panel QCheckBox, QWidget#form {{ background: transparent; }}
-    QLabel#place {{ font-size: 22px; color: {c["quiet"]}; }}
-    QLabel#band {{ font-size: 20px; font-weight: bold; padding: 4px 10px; border-radius: 4px; }}
-    QLabel#quiet {{ font-size: 18px; color: {c["quiet"]}; }}
-    QLabel#saved {{ font-size: 22px; color: {c["good"]}; }}
-    QPushButton {{ background: {c["panel"]}; border: 2px solid {c["line"]}; border-radius: 8px;
-        padding: 6px 4px; font-size: 16px; }}
-    QPushButton:focus {{ border: 3px solid {c["act"]}; }}
-    QPushButton:hover {{ border-color: {c["act"]}; }}
-    QPushButton:disabled, QPushButton[dim="yes"] {{ color: {c["dim"]}; border-style: dashed; }}
-    QPushButton#large {{ font-size: 26px; font-weight: bold; padding: 8px 4px; }}
-    QPushButton#stop {{ background: {c["stop"]}; color: {c["stop_text"]}; font-weight: bold; font-size: 22px;
-        padding: 14px 6px; }}
-    """
+def start_sheet() -> str:
+    """The same of the windows before a run, which are dark."""
+    moods = _moods("dark", ["QTextEdit", "QLabel#gun", "QLabel#count"])
+    return sheet("dark") + _START_SHEET.substitute(_COLOURS["dark"], moods=moods)
 
 
-def _fields_and_lists(c: dict[str, str]) -> str:
-    return f"""
-    QLineEdit, QDoubleSpinBox, QSpinBox, QComboBox {{ background: {c["panel"]}; border: 2px solid {c["line"]};
-        border-radius: 6px; padding: 8px; font-size: 24px; }}
-    QLineEdit:focus, QDoubleSpinBox:focus, QSpinBox:focus, QComboBox:focus {{ border: 3px solid {c["act"]}; }}
-    QProgressBar {{ border: 1px solid {c["line"]}; border-radius: 6px; text-align: center; background: {c["panel"]};
-        color: {c["text"]}; min-height: 24px; }}
-    QProgressBar::chunk {{ background: {c["filled"]}; }}
-    QCheckBox::indicator {{ width: 22px; height: 22px; border: 2px solid {c["line"]}; border-radius: 4px; }}
-    QCheckBox::indicator:checked {{ background: {c["act"]}; }}
-    QCheckBox:focus {{ color: {c["act"]}; }}
-    QListWidget, QTableWidget, QPlainTextEdit {{ background: {c["panel"]}; border: 1px solid {c["line"]};
-        font-size: 19px; }}
-    QPlainTextEdit {{ font-family: "DejaVu Sans Mono", monospace; }}
-    QListWidget::item:selected, QTableWidget::item:selected {{ background: {c["act"]}; color: {c["ground"]}; }}
-    QHeaderView::section {{ background: {c["ground"]}; color: {c["quiet"]}; border: none; padding: 6px; }}
-    """
+def _moods(theme: Theme, kinds: Sequence[str]) -> str:
+    """Some kinds of widgets in the colour of each mood."""
+    selectors = {mood: ", ".join(f'{kind}[mood="{mood}"]' for kind in kinds) for mood in MOODS}
+    return "\n".join(f"{selector} {{ color: {colour(theme, mood)}; }}" for mood, selector in selectors.items())
 
 
 Slot = Callable[[], object]
@@ -226,30 +223,31 @@ def panel(*widgets: QWidget) -> QFrame:
     """A framed column."""
     frame = QFrame()
     frame.setObjectName("panel")
-    column = QVBoxLayout(frame)
-    for widget in widgets:
-        column.addWidget(widget)
+    _fill(QVBoxLayout(frame), widgets)
     return frame
 
 
 def row(*widgets: QWidget) -> QWidget:
     """Widgets side by side."""
-    made = QWidget()
-    across = QHBoxLayout(made)
-    across.setContentsMargins(0, 0, 0, 0)
-    for widget in widgets:
-        across.addWidget(widget)
-    return made
+    return _plain(QHBoxLayout(), widgets)
 
 
 def column(*widgets: QWidget) -> QWidget:
     """Widgets below each other."""
+    return _plain(QVBoxLayout(), widgets)
+
+
+def _plain(layout: QBoxLayout, widgets: Sequence[QWidget]) -> QWidget:
     made = QWidget()
-    down = QVBoxLayout(made)
-    down.setContentsMargins(0, 0, 0, 0)
-    for widget in widgets:
-        down.addWidget(widget)
+    made.setLayout(layout)
+    layout.setContentsMargins(0, 0, 0, 0)
+    _fill(layout, widgets)
     return made
+
+
+def _fill(layout: QBoxLayout, widgets: Sequence[QWidget]) -> None:
+    for widget in widgets:
+        layout.addWidget(widget)
 
 
 def quiet_list() -> QListWidget:
@@ -362,31 +360,6 @@ class LineEdit(QLineEdit):
     def minimumSizeHint(self) -> QSize:  # noqa: N802 - Qt's name
         """Narrow windows squeeze the line, not what stands beside it."""
         return QSize(40, super().minimumSizeHint().height())
-
-
-def start_sheet() -> str:
-    """What these widgets, and the windows made of them, add to the style of all."""
-    moods = "\n".join(
-        f'QTextEdit[mood="{mood}"], QLabel#gun[mood="{mood}"], QLabel#count[mood="{mood}"] '
-        f"{{ color: {colour('dark', mood)}; }}"
-        for mood in MOODS
-    )
-    return f"""
-    QTextEdit {{ background: transparent; border: none; font-size: 19px; }}
-    QTextEdit#place {{ font-size: 22px; color: {colour("dark", "quiet")}; }}
-    QLabel#title {{ font-size: 56px; font-weight: bold; }}
-    QTextEdit#detail {{ font-size: 26px; }}
-    QTextEdit#saved, QTextEdit#question {{ font-size: 22px; }}
-    QLabel#gun {{ font-size: 22px; font-weight: bold; }}
-    QLabel#count {{ font-size: 160px; font-weight: bold; color: {colour("dark", "ask")}; }}
-    QPushButton#stop {{ font-size: 34px; padding: 26px; }}
-    QScrollArea {{ background: transparent; }}
-    QTableWidget::item {{ padding: 3px 8px; }}
-    QScrollBar {{ background: transparent; border: none; width: 14px; height: 14px; }}
-    QScrollBar::handle {{ background: {colour("dark", "line")}; border-radius: 5px; min-height: 30px; }}
-    QScrollBar::add-line, QScrollBar::sub-line {{ width: 0px; height: 0px; }}
-    {moods}
-    """
 
 
 WHY = "why? (never a name)"

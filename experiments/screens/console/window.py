@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from typing import Any
 
-from PyQt6.QtCore import QObject, QTimer, pyqtSignal
+from PyQt6.QtCore import QTimer, pyqtSignal
 from PyQt6.QtGui import QCloseEvent, QResizeEvent, QShowEvent
 from PyQt6.QtWidgets import (
     QHBoxLayout,
@@ -20,7 +20,7 @@ from PyQt6.QtWidgets import (
 from experiments.clock import Clock
 from experiments.live_run import LiveRun
 from experiments.screens.console import view, widgets, windows
-from experiments.screens.console.controls import Controls
+from experiments.screens.console.controls import Controls, TextField
 from experiments.screens.console.keys import Name, Typing
 from experiments.screens.console.panels import FITS, Bars, Buttons, Notice, Side, TextFields, TextPage
 from experiments.screens.console.participant_link import ParticipantSide
@@ -29,7 +29,6 @@ from experiments.screens.console.view import (
     About,
     Began,
     Ended,
-    Field,
     GunSeen,
     Message,
     ParticipantSeen,
@@ -54,12 +53,6 @@ SMALLEST, LARGEST = 0.55, 2.2
 """How far type shrinks and grows with the window."""
 
 
-class Bridge(QObject):
-    """Takes messages from any thread to the window's."""
-
-    message = pyqtSignal(object)
-
-
 class ConsoleWindow(QMainWindow):
     """What to do now, the keys that do it, and what an experimenter looks for: progress, gun, what comes next."""
 
@@ -68,16 +61,15 @@ class ConsoleWindow(QMainWindow):
     def __init__(
         self,
         about: About,
-        bridge: Bridge,
         clock: Clock,
         *,
         hand: Hand = "experimenter",
-        beside: ParticipantSide | None = None,
+        participant: ParticipantSide | None = None,
         observer: Any = None,
     ) -> None:
         super().__init__()
-        self.about, self._clock = about, clock
-        self._hand, self._beside, self._observer = hand, beside, observer
+        self.about, self.clock = about, clock
+        self._hand, self._participant_side, self._observer = hand, participant, observer
         self.live: LiveRun | None = None
         self.controls: Controls | None = None
         self.drawn = Position()
@@ -92,7 +84,6 @@ class ConsoleWindow(QMainWindow):
         self._scale = 0.0
         self._build()
         self._keyboard = Keyboard(self, clock.now)
-        bridge.message.connect(self.take)
         self._timer = QTimer(self)
         self._timer.timeout.connect(self.refresh)
         self._timer.start(REFRESH_MS)
@@ -157,13 +148,19 @@ class ConsoleWindow(QMainWindow):
         self.refresh()
         if isinstance(message, Shown | Began) and self.live is not None:
             self.repaint()
-            self.live.painted(self.drawn.serial, self._clock.now())
+            self.live.painted(self.drawn.serial, self.clock.now())
 
     def _begin(self, live: LiveRun) -> None:
         self.live = live
         scale = getattr(self.about.setup.config, "rating", None)
         self.controls = Controls(
-            live, self._clock, self, scale=scale, hand=self._hand, beside=self._beside, observer=self._observer
+            live,
+            self.clock,
+            self,
+            scale=scale,
+            hand=self._hand,
+            participant=self._participant_side,
+            observer=self._observer,
         )
         self._arrive()
 
@@ -185,13 +182,13 @@ class ConsoleWindow(QMainWindow):
             self.controls.draw(self.drawn)
             if self.drawn.serial != self._brief_for:
                 self._unbrief()
-        self._progress.at(self.drawn, self._clock.now())
+        self._progress.at(self.drawn, self.clock.now())
         self.fields.at(self.drawn, self.controls.entered_so_far() if self.controls is not None else "")
         self.fields.focus(self.drawn, self)
 
     def _acknowledge(self, message: Saved) -> None:
         """Say that it is safe; a tone at the end of a break."""
-        self._progress.saved(message.word, self._clock.now())
+        self._progress.saved(message.word, self.clock.now())
         text = saved_text(self.about.plan, message.step, message.word)
         if isinstance(message.word, Rested):
             self.say(text, "good")
@@ -202,7 +199,7 @@ class ConsoleWindow(QMainWindow):
 
     def say(self, text: str, mood: str) -> None:
         """Show a line of answer, for a few seconds."""
-        self._brief_until_s, self._brief_for = self._clock.now() + BRIEF_S, self.drawn.serial
+        self._brief_until_s, self._brief_for = self.clock.now() + BRIEF_S, self.drawn.serial
         self._show_line(text, mood)
 
     def _unbrief(self) -> None:
@@ -235,22 +232,23 @@ class ConsoleWindow(QMainWindow):
             participant=self.participant,
             ended=self.ended,
             letters=self._typing.letters,
+            now_s=self.clock.now(),
         )
 
     def refresh(self) -> None:
         """Show what is so now."""
         if self.controls is not None:
             self.controls.tick()
-            if self._beside is not None:
-                self._beside.covered = self.controls.covered and self.isActiveWindow()
-        now_s, seen = self._clock.now(), self.seen
-        self.notice.put(view.instruction(seen, now_s))
+            if self._participant_side is not None:
+                self._participant_side.covered = self.controls.covered and self.isActiveWindow()
+        seen = self.seen
+        self.notice.put(view.instruction(seen))
         self.place.setText(view.place_text(seen))
         self._show_bands(seen)
         self.bars.put(seen)
-        self.side.put(seen, self._progress, now_s)
+        self.side.put(seen, self._progress)
         self.buttons.put(self.drawn, over=self.ended is not None, letters=self._typing.letters, idle=self._idle)
-        if self._brief_until_s is not None and now_s > self._brief_until_s:
+        if self._brief_until_s is not None and seen.now_s > self._brief_until_s:
             self._unbrief()
         self._fit()
 
@@ -304,7 +302,7 @@ class ConsoleWindow(QMainWindow):
 
     def press(self) -> Press:
         """A press of a button that begins now."""
-        return Press(at_s=self._clock.now(), serial=self.drawn.serial)
+        return Press(at_s=self.clock.now(), serial=self.drawn.serial)
 
     def command(self, key: str, *, ctrl: bool) -> Name | None:
         """The command that a key is now."""
@@ -349,7 +347,7 @@ class ConsoleWindow(QMainWindow):
         """Take the line away."""
         self.fields.close_line(self.drawn, self)
 
-    def typed(self, field: Field) -> str:
+    def typed(self, field: TextField) -> str:
         """What is typed in a field."""
         return self.fields.typed(field)
 

@@ -91,18 +91,20 @@ def scaled(sheet: str, scale: float) -> str:
 
 
 _SIGNS = ("connection broke", "X connection", "XIO:", "Did the X11 server die", "compositor die")
-LOST = "the display was lost"
-
 _on_loss: list[Callable[[], None]] = []
 
 
-def on_loss(act: Callable[[], None]) -> Callable[[], None]:
-    """Have something done when the display is lost; gives back what takes it back."""
+@contextmanager
+def on_loss(act: Callable[[], None]) -> Iterator[None]:
+    """Have something done when the display is lost meanwhile."""
     _on_loss.append(act)
-    return lambda: _on_loss.remove(act)
+    try:
+        yield
+    finally:
+        _on_loss.remove(act)
 
 
-def listen() -> None:
+def hear_of_loss() -> None:
     """Hear Qt's messages from now on; they still go where they went."""
     qInstallMessageHandler(_heard)
 
@@ -111,14 +113,14 @@ def _heard(kind: QtMsgType, context: QMessageLogContext, text: str | None) -> No
     del kind, context
     sys.stderr.write(f"{text}\n")
     if text and any(sign in text for sign in _SIGNS):
-        lost()
+        _end_all()
 
 
-def lost() -> None:
+def _end_all() -> None:
     """End everything that is under way, then the process."""
     for act in _on_loss:
         act()
-    sys.stderr.write(f"recoil: stopped: {LOST}. Every window is gone; go on with --resume.\n")
+    sys.stderr.write("recoil: stopped: the display was lost. Every window is gone; go on with --resume.\n")
     sys.stderr.flush()
     os._exit(1)
 
