@@ -128,7 +128,7 @@ class Form(QFrame):
             participant_id=self.participant_id,
             read_back=self.code_again.text().strip(),
             experiment=self.experiment.currentText(),
-            facts={fact: _text(field) for fact, widget in self.facts.items()},
+            facts={fact: _text(widget) for fact, widget in self.facts.items()},
         )
 
     def sides(self) -> Sides:
