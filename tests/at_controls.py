@@ -348,8 +348,8 @@ class PaperWindow:
         assert self.controls is not None
         seen = Seen(about=self.about, position=drawn, told=self.live.told, gun=self.gun, now_s=self._clock.now())
         shown = view.instruction(seen)
-        self.heard += [shown.title, shown.damper, shown.detail, view.place_text(seen)]
-        self.heard += [*progress.coming(seen), *progress.answers(seen), *self.controls.help_lines()]
+        self.heard += [shown.title, shown.damper, shown.detail, view.where_text(seen)]
+        self.heard += [*progress.coming(seen), *progress.answer_lines(seen), *self.controls.help_lines()]
 
     def down(self, key: str, *, ctrl: bool = False, repeated: bool = False) -> None:
         """A key goes down, or is repeated by the system."""

@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 from experiments.design.plan import Trial
 from experiments.screens.console.keys import (
     BOUNCE_S,
-    COMMANDS,
+    KEY_COMMANDS,
     STRANGE_S,
     EventClock,
     Name,
@@ -26,7 +26,7 @@ from experiments.session.history import Entry, What
 from experiments.session.states import TABLE, No, Position, State
 
 S = State
-LETTERS = sorted({command.key for command in COMMANDS if len(command.key) == 1})
+LETTERS = sorted({command.key for command in KEY_COMMANDS if len(command.key) == 1})
 TRIAL = Trial(session=1, method="vibration", set=1, trial=1, direction="forward")
 CORRECTED: tuple[What, ...] = ("answer", "rating", "description")
 
@@ -125,7 +125,7 @@ def test_a_key_that_stands_on_no_button_is_no_command(position: Position) -> Non
 
 
 def test_every_command_that_does_something_somewhere_is_had_by_its_key_there() -> None:
-    for one in COMMANDS:
+    for one in KEY_COMMANDS:
         ctrl = one.key.startswith("Ctrl+")
         for position in POSITIONS:
             letters = field_of(position) is not None and len(one.key) == 1
@@ -140,7 +140,7 @@ def does_more(name: Name, position: Position) -> bool:
 
 
 def test_why_a_command_does_nothing_is_what_the_table_says() -> None:
-    for one in COMMANDS:
+    for one in KEY_COMMANDS:
         for position in POSITIONS:
             corrects = position.state is S.CORRECTING and (
                 one.name == "no answer" or (one.name in ("forward", "backward") and field_of(position) is None)

@@ -15,7 +15,7 @@ from experiments import catalogue
 from experiments.config.setup import Setup
 from experiments.design.plan import Plan, Trial
 from experiments.screens.console import progress, view, widgets
-from experiments.screens.console.progress import Progress, clock_text, end_text, remaining_s, trials_done
+from experiments.screens.console.progress import RunProgress, clock_text, end_text, remaining_s, trials_done
 from experiments.screens.console.view import About, Ended, GunSeen, ParticipantSeen, Seen
 from experiments.session.remarks import AnswerCorrected, Flagged, Noted
 from experiments.session.states import Position, State
@@ -52,8 +52,8 @@ def seen(setup: Setup[Any], position: Position, *told: Any, **more: Any) -> Seen
 
 def shown_texts(here: Seen) -> list[str]:
     shown = view.instruction(replace(here, now_s=10.0))
-    texts = [shown.title, shown.damper, shown.detail, view.place_text(here), *progress.coming(here)]
-    return [*texts, *progress.answers(here), *progress.marks(here), progress.gun_text(here.gun)[0]]
+    texts = [shown.title, shown.damper, shown.detail, view.where_text(here), *progress.coming(here)]
+    return [*texts, *progress.answer_lines(here), *progress.marks(here), progress.gun_text(here.gun)[0]]
 
 
 # what is never told
@@ -191,8 +191,10 @@ def test_the_list_of_marks_has_those_of_this_set_and_an_answer_that_was_given_ag
         f"Trial {first.trial}: to be presented again (noise)",
         f"Trial {first.trial}: “a dog”",
     ]
-    assert progress.answers(seen(DIRECTION, here, given, corrected)) != progress.answers(seen(DIRECTION, here, given))
-    assert progress.answers(seen(DIRECTION, here, given, corrected, spoiled, given)) == progress.answers(
+    assert progress.answer_lines(seen(DIRECTION, here, given, corrected)) != progress.answer_lines(
+        seen(DIRECTION, here, given)
+    )
+    assert progress.answer_lines(seen(DIRECTION, here, given, corrected, spoiled, given)) == progress.answer_lines(
         seen(DIRECTION, here, given)
     )
 
@@ -202,9 +204,9 @@ def test_the_strip_shows_the_own_hands_times_of_the_session_alone() -> None:
     own = Answered(response="forward", response_time_s=0.7, response_source="participant", response_time_valid=True)
     told = ((ask(first), own), (ask(second), SAID))
     here = Position(states=(State.ASKING,), step=ask(trials[2]))
-    assert progress.response_times(seen(DIRECTION, here, *told)) == [0.7]
+    assert progress.own_times_s(seen(DIRECTION, here, *told)) == [0.7]
     later = next(trial for trial in trials if trial.session != first.session)
-    assert progress.response_times(seen(DIRECTION, Position(states=(State.ASKING,), step=ask(later)), *told)) == []
+    assert progress.own_times_s(seen(DIRECTION, Position(states=(State.ASKING,), step=ask(later)), *told)) == []
 
 
 # colours
@@ -249,7 +251,7 @@ class Day:
     """A run whose trials take what they are told to."""
 
     def __init__(self, setup: Setup[Any]) -> None:
-        self.setup, self.plan, self.so_far = setup, plan_of(setup), Progress()
+        self.setup, self.plan, self.so_far = setup, plan_of(setup), RunProgress()
         self.told: list[Any] = []
         self.now_s = 100.0
         self.position = Position()
@@ -346,7 +348,7 @@ def test_the_end_is_a_time_of_day_also_over_midnight() -> None:
 
 
 def test_no_time_has_gone_by_before_the_run_begins() -> None:
-    so_far = Progress()
+    so_far = RunProgress()
     assert so_far.elapsed_s(5_000.0) == 0.0
     so_far.began_s = 5_000.0
     assert so_far.elapsed_s(5_030.0) == 30.0

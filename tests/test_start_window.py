@@ -670,7 +670,7 @@ def test_where_there_are_several_monitors_the_participants_is_chosen_by_its_numb
     window.form.monitor.setCurrentIndex(0)
     key(window, "Return", CTRL)
     assert window.choice is not None
-    assert window.choice.monitor == 0
+    assert window.choice.sides.monitor == 0
 
 
 def test_a_ticked_box_shows_a_tick(opened: Open) -> None:

@@ -19,7 +19,17 @@ from experiments.design.plan import Plan
 from experiments.live_run import LiveRun, RunStopped, Screen
 from experiments.run import Finished, Request, run
 from experiments.screens.console.participant_link import ParticipantSide
-from experiments.screens.console.view import THANKS, About, Began, Ended, GunSeen, Message, Saved, Shown, Trouble
+from experiments.screens.console.view import (
+    THANK_PARTICIPANT,
+    About,
+    Began,
+    Ended,
+    GunSeen,
+    Message,
+    Saved,
+    Shown,
+    Trouble,
+)
 from experiments.screens.console.window import ConsoleWindow
 from experiments.screens.console.windows import finish_tone, hear_of_loss, on_loss, open_as_left, signals_to
 from experiments.screens.synthetic import synthetic_participant_of
@@ -75,7 +85,7 @@ class Console:
         hand: Hand = "experimenter",
         participant: ParticipantSide | None = None,
         band: str = "",
-        last: str = THANKS,
+        last: str = THANK_PARTICIPANT,
     ) -> None:
         application()
         self.clock, self._request = clock, request

@@ -13,7 +13,16 @@ from experiments.clock import Clock
 from experiments.design.plan import Trial
 from experiments.live_run import LiveRun, Verdict
 from experiments.preference.config import RatingScale
-from experiments.screens.console.keys import BY_NAME, COMMANDS, Name, Typing, command_for, field_of, shown_key, why_not
+from experiments.screens.console.keys import (
+    BY_NAME,
+    KEY_COMMANDS,
+    Name,
+    Typing,
+    command_for,
+    field_of,
+    shown_key,
+    why_not,
+)
 from experiments.screens.console.participant_link import ParticipantSide
 from experiments.screens.texts import FLAG_RULE, one_line, short_place, typed_number
 from experiments.session import events
@@ -373,7 +382,7 @@ class Controls:
 
     def help_lines(self) -> list[str]:
         """Every key, what it does, and why it does nothing now."""
-        return [self._help_line(command.name) for command in COMMANDS]
+        return [self._help_line(command.name) for command in KEY_COMMANDS]
 
     def _help_line(self, name: Name) -> str:
         not_now = self.idle(name)

@@ -26,7 +26,7 @@ from experiments.config.setup import Setup
 from experiments.run import Again
 from experiments.screens.console import widgets
 from experiments.screens.console.people import cell_text, note_text
-from experiments.screens.console.widgets import LineEdit, Lines, ListBox, TickBox
+from experiments.screens.console.widgets import LineEdit, ListBox, TextLines, TickBox
 from experiments.study.enrolment import Entered, typed_facts
 from experiments.study.study import Participant
 
@@ -66,7 +66,7 @@ class Form(QFrame):
         self.facts: dict[str, LineEdit | ListBox] = {fact: _fact(fact) for fact in asked}
         self.own_screen, self.own_keys = TickBox("rates on their own screen"), TickBox("answers with own keys")
         self.noise, self.monitor = TickBox("hears masking noise"), ListBox(monitors())
-        self.remark = Lines("remark")
+        self.remark = TextLines("remark")
         self._typed: dict[str, str] | None = None
         self._tick(sides)
         self._lay_out()
@@ -189,7 +189,7 @@ def _monitor(number: int, screen: QScreen) -> str:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Choice:
+class RunChoice:
     """What was chosen: who does which experiment, and how. `anew_reason`: why an unfinished run is set aside."""
 
     setup: Setup[Any]

@@ -47,7 +47,7 @@ Name = Literal[
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Command:
+class KeyCommand:
     """Something that a key does. `kind` is the event that it offers, if it offers one."""
 
     name: Name
@@ -57,8 +57,8 @@ class Command:
     kind: type[Event] | None = None
 
 
-_C = Command
-COMMANDS: tuple[Command, ...] = (
+_C = KeyCommand
+KEY_COMMANDS: tuple[KeyCommand, ...] = (
     _C(name="emergency", key="F12", text="EMERGENCY STOP", does="disarms; fires no more", kind=events.EmergencyStop),
     _C(name="fire", key="Space", text="Fire", does="fires, when the gun is handed over", kind=events.Fire),
     _C(name="next", key="Space", text="“Next” was said", does="ends the train", kind=events.Next),
@@ -89,7 +89,7 @@ COMMANDS: tuple[Command, ...] = (
     _C(name="help", key="F1", text="Keys", does="shows this page"),
     _C(name="theme", key="F2", text="Dark/light", does="changes the colours"),
 )
-BY_NAME: dict[Name, Command] = {command.name: command for command in COMMANDS}
+BY_NAME: dict[Name, KeyCommand] = {command.name: command for command in KEY_COMMANDS}
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -137,7 +137,7 @@ def _letter(key: str, position: Position) -> Name | None:
 
 
 _LETTERS: dict[str, Name] = {
-    command.key: command.name for command in COMMANDS if len(command.key) == 1 and command.key != "P"
+    command.key: command.name for command in KEY_COMMANDS if len(command.key) == 1 and command.key != "P"
 }
 
 

@@ -25,12 +25,12 @@ from experiments.record.journal import JournalError
 from experiments.run import Again, Finished, Request, UnfinishedRun
 from experiments.screens.console import people, widgets
 from experiments.screens.console.app import Console, application
-from experiments.screens.console.form import Choice, Opening, Sides, monitors
+from experiments.screens.console.form import Opening, RunChoice, Sides, monitors
 from experiments.screens.console.participant_link import WAIT, ParticipantSide
-from experiments.screens.console.start import choose
-from experiments.screens.console.view import THANKS
+from experiments.screens.console.start import choose_run
+from experiments.screens.console.view import THANK_PARTICIPANT
 from experiments.screens.console.visual import Rater, VisualParticipant
-from experiments.screens.console.widgets import WHY, Answer, Lines, Question, start_sheet, unfit
+from experiments.screens.console.widgets import WHY, QuestionBox, Reply, TextLines, start_sheet, unfit
 from experiments.screens.console.windows import FreshShortcuts, let_go, signals_to
 from experiments.screens.participant.link import ParticipantError, ParticipantLink
 from experiments.screens.participant.messages import Look, NoiseIs
@@ -41,7 +41,7 @@ from experiments.study.progress import StudyFolder, run_standing
 _NO_HANDS = "--visual --participant-screen rates by synthetic events, which only an X display takes"
 
 
-def run_live(request: Request, sides: Sides, *, band: str = "", last: str = THANKS) -> Finished:
+def run_live(request: Request, sides: Sides, *, band: str = "", last: str = THANK_PARTICIPANT) -> Finished:
     """Carry out a run at the console. An unfinished one is shown and asked about, but for a synthetic participant.
 
     `band` and `last` as of a `Console`. `PlaceError` without a display, or if the participant's screen does not open.
@@ -50,7 +50,7 @@ def run_live(request: Request, sides: Sides, *, band: str = "", last: str = THAN
     try:
         return _carry_out(request, sides, band, last)
     except UnfinishedRun:
-        decided = None if sides.visual else ask(request)
+        decided = None if sides.visual else ask_about(request)
         if decided is None:
             raise
         return _carry_out(decided, sides, band, last)
@@ -78,7 +78,7 @@ def lab_day(request: Request, sides: Sides) -> None:
     study, named = study_of(request), request.setup.config.experiment
     opening = Opening(gun=request.gun, named=named, sides=sides)
     with signals_to() as signalled:
-        while not signalled and (choice := choose(study, opening, RealClock())) is not None:
+        while not signalled and (choice := choose_run(study, opening, RealClock())) is not None:
             said = _of_the_day(request, study, choice)
             code = "" if choice.training else choice.participant_id
             opening = Opening(gun=request.gun, sides=choice.sides, participant_id=code, said=said)
@@ -93,7 +93,7 @@ def check_monitor(monitor: int | None) -> None:
         raise PlaceError(f"--participant-monitor {monitor}: there is no such screen; known are {'; '.join(known)}")
 
 
-def _band_and_last(study: StudyFolder, choice: Choice) -> tuple[str, str]:
+def _band_and_last(study: StudyFolder, choice: RunChoice) -> tuple[str, str]:
     """What the window of a chosen run says of it: its band, and the last sentence."""
     if choice.training:
         return "TRAINING – nothing of it is kept", "The training is over."
@@ -101,10 +101,10 @@ def _band_and_last(study: StudyFolder, choice: Choice) -> tuple[str, str]:
         return "PRACTICE – never analysed", "The practice is over: the run itself comes next."
     names = study.experiments
     later = names[names.index(choice.setup.config.experiment) + 1 :]
-    return "", f"Next: {later[0]}." if later else THANKS
+    return "", f"Next: {later[0]}." if later else THANK_PARTICIPANT
 
 
-def _of_the_day(request: Request, study: StudyFolder, choice: Choice) -> str:
+def _of_the_day(request: Request, study: StudyFolder, choice: RunChoice) -> str:
     """Carry out what was chosen; what went wrong, for the start window, which it must not end."""
     with ExitStack() as stack:
         results = Path(stack.enter_context(tempfile.TemporaryDirectory())) if choice.training else request.results
@@ -118,7 +118,7 @@ def _of_the_day(request: Request, study: StudyFolder, choice: Choice) -> str:
     return ""
 
 
-def _stopped(choice: Choice, reason: str) -> str:
+def _stopped(choice: RunChoice, reason: str) -> str:
     if choice.training:
         return f"The training stopped: {reason}."
     if choice.practice:
@@ -139,7 +139,7 @@ def study_of(request: Request) -> StudyFolder:
     return StudyFolder(config=config, source=folder / "study.toml", setups=setups, results=request.results)
 
 
-def _chosen(request: Request, choice: Choice, results: Path) -> Request:
+def _chosen(request: Request, choice: RunChoice, results: Path) -> Request:
     gun = "simulated" if choice.training else request.gun
     return replace(
         request,
@@ -220,12 +220,12 @@ class Unfinished(QDialog):
         self.setWindowTitle("Recoil – unfinished run")
         self.setStyleSheet(start_sheet())
         answers = (
-            Answer(text="Go on with it", key="Ctrl+G", do=lambda _: self._decide("resume", "")),
-            Answer(text="Set it aside, start anew", key="Ctrl+N", do=self._fresh),
-            Answer(text="Leave it", key="Esc", do=lambda _: self.reject()),
+            Reply(text="Go on with it", key="Ctrl+G", do=lambda _: self._decide("resume", "")),
+            Reply(text="Set it aside, start anew", key="Ctrl+N", do=self._fresh),
+            Reply(text="Leave it", key="Esc", do=lambda _: self.reject()),
         )
-        self.question = Question(_text(request), answers, reason=f"to start anew: {WHY}")
-        self.said = Lines("saved")
+        self.question = QuestionBox(_text(request), answers, reason=f"to start anew: {WHY}")
+        self.said = TextLines("saved")
         down = QVBoxLayout(self)
         down.addWidget(self.question)
         down.addWidget(self.said)
@@ -254,7 +254,7 @@ def _text(request: Request) -> str:
         return str(error)
 
 
-def ask(request: Request) -> Request | None:
+def ask_about(request: Request) -> Request | None:
     """The request with the decision of the person at the console; `None` if they leave the run as it is.
 
     `KeyboardInterrupt` if a signal ended the question.
@@ -270,7 +270,7 @@ def ask(request: Request) -> Request | None:
     return decided
 
 
-LOOK_MS = 30
+_LOOK_MS = 30
 Made = TypeVar("Made")
 
 
@@ -292,7 +292,7 @@ def while_shown(text: str, make: Callable[[], Made]) -> Made:
     look.timeout.connect(lambda: loop.quit() if made.done() else None)
     shown.show()
     threading.Thread(target=work, daemon=True, name="waiting").start()
-    look.start(LOOK_MS)
+    look.start(_LOOK_MS)
     loop.exec()
     shown.close()
     return made.result()

@@ -27,15 +27,15 @@ from experiments.screens.console import widgets
 from experiments.screens.console.controls import TextField
 from experiments.screens.console.keys import BY_NAME, Name, field_of, shown_key
 from experiments.screens.console.progress import (
-    Progress,
-    answers,
+    RunProgress,
+    answer_lines,
     clock_text,
     coming,
     end_text,
     focus_text,
     gun_text,
+    own_times_s,
     remaining_s,
-    response_times,
     trials_done,
 )
 from experiments.screens.console.view import About, Instruction, Seen
@@ -374,7 +374,7 @@ class Strip(QWidget):
         painter.end()
 
 
-class Side(QWidget):
+class SidePanel(QWidget):
     """The gun, whose the keys are, the time, what comes next, and the answers of the set."""
 
     def __init__(self, about: About) -> None:
@@ -398,7 +398,7 @@ class Side(QWidget):
         for lines in (self._coming, self._answers):
             lines.setMinimumHeight(1)
 
-    def put(self, seen: Seen, progress: Progress) -> None:
+    def put(self, seen: Seen, progress: RunProgress) -> None:
         """Show what is so now."""
         for label, (text, mood) in (
             (self._gun, gun_text(seen.gun)),
@@ -409,9 +409,9 @@ class Side(QWidget):
             widgets.set_mood(label, mood)
         self._times.setText(_times(seen, progress))
         _fill(self._coming, coming(seen))
-        _fill(self._answers, answers(seen))
+        _fill(self._answers, answer_lines(seen))
         if self._strip.isVisibleTo(self):
-            self._strip.put(response_times(seen))
+            self._strip.put(own_times_s(seen))
 
 
 class Bars(QWidget):
@@ -434,7 +434,7 @@ class Bars(QWidget):
             bar.setValue(one.count)
 
 
-def _times(seen: Seen, progress: Progress) -> str:
+def _times(seen: Seen, progress: RunProgress) -> str:
     elapsed = f"Elapsed {clock_text(progress.elapsed_s(seen.now_s))}"
     if seen.ended is not None or seen.position.base is State.HALTED:
         return elapsed

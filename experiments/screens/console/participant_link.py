@@ -30,12 +30,10 @@ from experiments.session.events import OwnHand
 from experiments.session.states import Position, State
 from experiments.session.steps import Ask, Describe, Rate
 
-KEYS: dict[str, Direction] = {"up": "forward", "down": "backward"}
+_KEYS: dict[str, Direction] = {"up": "forward", "down": "backward"}
 """The participant's keys, by PsychoPy's names, and what they say."""
 WAIT, PAUSED, THANKS = "Please wait.", "Paused. Please wait.", "Thank you."
 
-Desire = tuple[Any, ...]
-"""What is to stand on the participant's screen: a text, or a question by the number of its step."""
 Wanted = Callable[[], bool]
 """Whether a question is still to be asked."""
 
@@ -63,7 +61,8 @@ class ParticipantSide:
         self._lock = threading.RLock()
         self._live: LiveRun | None = None
         self._tell: Callable[[Message], None] = lambda _: None
-        self._shows: Desire = (WAIT,)
+        self._shows: str | int = WAIT
+        """What is to stand there: a text, or a question by the number of its step."""
         self._serial = -1
         self._closed = self._starting = False
         self.covered = False
@@ -92,47 +91,43 @@ class ParticipantSide:
             if position.serial < self._serial:
                 return
             self._serial = position.serial
-            desire = self._desire(position)
-            if desire == self._shows or self._closed:
+            shows = self._to_be_shown(position)
+            if shows == self._shows or self._closed:
                 return
-            self._shows = desire
-            target = self._asks(desire, position)
-            if target is None:
-                told = tuple(KEYS) if self.own_keys and desire == (PAUSED,) else ()
-                self._link.show(str(desire[0]), tell=told, keep_keys=desire == (BETWEEN,))
+            self._shows = shows
+            if isinstance(shows, str):
+                told = tuple(_KEYS) if self.own_keys and shows == PAUSED else ()
+                self._link.show(shows, tell=told, keep_keys=shows == BETWEEN)
             else:
                 self._link.cancel()
-                threading.Thread(target=target, daemon=True, name="participant").start()
+                threading.Thread(target=self._ask, args=(position,), daemon=True, name="participant").start()
 
-    def _desire(self, position: Position) -> Desire:
-        if position.state is State.PAUSED or State.PAUSED in position.states:
-            return (PAUSED,)
-        if position.base is State.ASKING and self.own_keys:
-            return ("direction", position.number)
-        if position.base is State.RATING and self.rates:
-            return ("rating", position.number)
-        if position.base is State.DESCRIBING and self.rates:
-            return ("description", position.number)
-        if position.base is State.SAVING and self.rates and isinstance(position.step, Rate | Describe):
-            return (BETWEEN,)
-        return (THANKS,) if position.base in (State.CLOSING, State.STOPPED) else (WAIT,)
+    def _to_be_shown(self, position: Position) -> str | int:
+        base, by_screen = position.base, self.rates and isinstance(position.step, Rate | Describe)
+        if State.PAUSED in position.states:
+            return PAUSED
+        if (base is State.ASKING and self.own_keys) or (base in (State.RATING, State.DESCRIBING) and by_screen):
+            return position.number
+        if base is State.SAVING and by_screen:
+            return BETWEEN
+        return THANKS if base in (State.CLOSING, State.STOPPED) else WAIT
 
-    def _asks(self, desire: Desire, position: Position) -> Callable[[], None] | None:
-        step = position.step
-        if desire[0] == "direction" and isinstance(step, Ask):
-            return lambda: self._carefully(desire, lambda wanted: self._judged(step, position, wanted))
-        if desire[0] == "rating" and isinstance(step, Rate):
-            return lambda: self._carefully(desire, lambda wanted: self._rated(step, position, wanted))
-        if desire[0] == "description" and isinstance(step, Describe):
-            return lambda: self._carefully(desire, lambda wanted: self._described(step, position, wanted))
-        return None
-
-    def _carefully(self, desire: Desire, ask: Callable[[Wanted], None]) -> None:
+    def _ask(self, position: Position) -> None:
         """Ask; a question that was called off is over, one that fails otherwise leaves the answer to the console."""
+
+        def wanted() -> bool:
+            return self._shows == position.number
+
         try:
-            ask(lambda: self._shows == desire)
+            match position.step:
+                case Ask() as step:
+                    self._judged(step, position, wanted)
+                case Rate() as step:
+                    self._rated(step, position, wanted)
+                case Describe() as step:
+                    self._described(step, position, wanted)
         except ParticipantError as error:
-            if self._shows == desire and self._link.failure is None:
+            if wanted() and self._link.failure is None:
                 self._tell(Trouble(text=f"Enter the answer here: {error}."))
 
     def _judged(self, step: Ask, position: Position, wanted: Wanted) -> None:
@@ -196,9 +191,9 @@ class ParticipantSide:
                 self._offer(events.EmergencyStop(by="participant"))
             case Focused():
                 self._tell(ParticipantSeen(focused=word.on))
-            case KeyPressed() if self._live is not None and word.name in KEYS:
+            case KeyPressed() if self._live is not None and word.name in _KEYS:
                 number, now_s = self._live.position.number, self._live.clock.now()
-                self._offer(events.ParticipantKey(response=KEYS[word.name], at_s=now_s, step=number))
+                self._offer(events.ParticipantKey(response=_KEYS[word.name], at_s=now_s, step=number))
 
     def _gone(self, cause: str) -> None:
         """The program has ended, and was not told to."""
@@ -227,7 +222,7 @@ class ParticipantSide:
             self._offer(events.Stop(reason=f"the participant's screen did not start again: {error}"))
             return
         with self._lock:
-            self._link, self._shows, self._starting = link, ("",), False
+            self._link, self._shows, self._starting = link, "", False
         self._tell(ParticipantSeen())
         link.listen(self._heard, self._gone)
         self._tell(Trouble(text="The participant's screen is there again.", mood="good"))

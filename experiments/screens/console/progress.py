@@ -37,7 +37,7 @@ ROUGH_S = 1200.0
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Count:
+class TrialCount:
     """How many trials are done of those planned, and of what."""
 
     what: str
@@ -45,7 +45,7 @@ class Count:
     planned: int
 
 
-def trials_done(seen: Seen) -> list[Count]:
+def trials_done(seen: Seen) -> list[TrialCount]:
     """How far the run is, seen from the current trial.
 
     Trials of the set, of the session and of the experiment; where all are rated after all were felt, felt and rated.
@@ -62,12 +62,12 @@ def _rated(seen: Seen) -> set[Trial | None]:
     return {trial_of(step) for step, word in seen.told if isinstance(word, Rated)}
 
 
-def _count(what: str, trials: Sequence[Trial], finished: Collection[Trial | None]) -> Count:
-    return Count(what=what, count=sum(trial in finished for trial in trials), planned=len(trials))
+def _count(what: str, trials: Sequence[Trial], finished: Collection[Trial | None]) -> TrialCount:
+    return TrialCount(what=what, count=sum(trial in finished for trial in trials), planned=len(trials))
 
 
 @dataclass(slots=True)
-class Progress:
+class RunProgress:
     """Measures how long trials take, without the time of pauses."""
 
     began_s: float | None = None
@@ -104,7 +104,7 @@ class Progress:
         return (PRIOR_TRIALS * planned_s + sum(self.measured_s)) / (PRIOR_TRIALS + len(self.measured_s))
 
 
-def remaining_s(seen: Seen, progress: Progress) -> float:
+def remaining_s(seen: Seen, progress: RunProgress) -> float:
     """Seconds still to go: trials left, breaks left, what is left of this one, and the ratings still to come."""
     config, planned = seen.about.setup.config, len(seen.about.plan.trials)
     left = planned - len(done(seen.told))
@@ -195,7 +195,7 @@ def _break_between(about: About, before: Trial, trial: Trial) -> list[str]:
     return [f"break of {texts.duration_text(seconds)}"] if seconds else []
 
 
-def answers(seen: Seen) -> list[str]:
+def answer_lines(seen: Seen) -> list[str]:
     """What was entered in the set at hand, as it counts now."""
     return [texts.entry_text(seen.about.plan, seen.told, entry) for entry in entries(seen.told, seen.here)]
 
@@ -253,7 +253,7 @@ def focus_text(seen: Seen, *, here: bool) -> tuple[str, str]:
     return "Keys: ANOTHER WINDOW – click here", "bad"
 
 
-def response_times(seen: Seen) -> list[float]:
+def own_times_s(seen: Seen) -> list[float]:
     """The participant's own response times of this session, in order: by their own hand alone."""
     times = [
         (step.trial, word.response_time_s)

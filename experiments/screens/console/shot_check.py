@@ -21,14 +21,14 @@ from experiments.clock import Clock
 from experiments.config.setup import Setup
 from experiments.limits import drives
 from experiments.screens.console import widgets
-from experiments.screens.console.widgets import Lines
+from experiments.screens.console.widgets import TextLines
 
 COUNTDOWN_S = 3
 SWITCH_OFF = "SWITCH OFF ITS POWER."
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Told:
+class ShotProgress:
     """What a test shot has to tell: how far it is, the seconds until the shot, and at the end what came of it."""
 
     phase: Literal["opening", "counting", "firing", "over"]
@@ -47,7 +47,7 @@ class ShotCheck:
         method: str,
         address: str,
         clock: Clock,
-        tell: Callable[[Told], None],
+        tell: Callable[[ShotProgress], None],
     ) -> None:
         self._setup, self._method, self._address = setup, method, address
         self._clock, self._tell = clock, tell
@@ -86,7 +86,7 @@ class ShotCheck:
         except (DeviceError, ValueError) as error:
             text = f"Test shot of {self._label}: {error}"
         finally:
-            self._tell(Told(phase="over", fired=self._report is not None, text=text, mood=mood))
+            self._tell(ShotProgress(phase="over", fired=self._report is not None, text=text, mood=mood))
 
     @property
     def _label(self) -> str:
@@ -94,7 +94,7 @@ class ShotCheck:
 
     def _with_gun(self) -> tuple[str, str]:
         """Open, fire, disarm, read back, close; what came of it, and a word for the colour."""
-        self._tell(Told(phase="opening"))
+        self._tell(ShotProgress(phase="opening"))
         methods = self._setup.gun.renderings(self._setup.config.design.methods)
         drive = drives(self._setup)[self._method]
         with closing(open_gun(self._address, methods, clock=self._clock.now)) as gun:
@@ -108,7 +108,7 @@ class ShotCheck:
 
     def _fire(self, gun: Gun, drive: Drive) -> str:
         for seconds in range(COUNTDOWN_S, 0, -1):
-            self._tell(Told(phase="counting", seconds=seconds))
+            self._tell(ShotProgress(phase="counting", seconds=seconds))
             if self._off.wait(1.0):
                 break
         if not self._off.is_set():
@@ -117,7 +117,7 @@ class ShotCheck:
 
     def _armed_shot(self, gun: Gun, drive: Drive) -> ShotReport | None:
         """As the runner fires the first shot of a stimulus: armed for it alone, as soon as the magnet is home."""
-        self._tell(Told(phase="firing"))
+        self._tell(ShotProgress(phase="firing"))
         gun.arm()
         if self._off.wait(max(0.0, gun.status().ready_at_s - self._clock.now())):
             return None
@@ -197,7 +197,7 @@ class ShotPage(QWidget):
         self.title, self.count, self.detail = (
             widgets.label("title"),
             widgets.label("count"),
-            Lines("detail", most_lines=9),
+            TextLines("detail", most_lines=9),
         )
         self.count.setAlignment(Qt.AlignmentFlag.AlignHCenter)
         self.call_off_button = widgets.button(self, "Call it off", "Esc", self._escape)
@@ -271,7 +271,7 @@ class ShotPage(QWidget):
         else:
             self.call_off()
 
-    def _take(self, told: Told) -> None:
+    def _take(self, told: ShotProgress) -> None:
         """Show how far the test shot is."""
         if told.phase == "over":
             self._end(told)
@@ -283,7 +283,7 @@ class ShotPage(QWidget):
         elif told.phase == "firing":
             self._show("Firing", self._shown, "wait")
 
-    def _end(self, told: Told) -> None:
+    def _end(self, told: ShotProgress) -> None:
         self._check = None
         if told.fired:
             self._method_at += 1

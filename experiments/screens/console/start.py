@@ -21,15 +21,15 @@ from experiments.config.setup import Setup
 from experiments.record.journal import JournalError
 from experiments.run import Again
 from experiments.screens.console import people, widgets
-from experiments.screens.console.form import Choice, Form, Opening, PeopleTable
+from experiments.screens.console.form import Form, Opening, PeopleTable, RunChoice
 from experiments.screens.console.shot_check import ShotPage
-from experiments.screens.console.widgets import WHY, Answer, Lines, Question, start_sheet, unfit
+from experiments.screens.console.widgets import WHY, QuestionBox, Reply, TextLines, start_sheet, unfit
 from experiments.screens.console.windows import (
     FreshShortcuts,
     let_go,
     open_as_left,
     remember,
-    scaled,
+    scaled_sheet,
     signals_to,
     type_scale,
 )
@@ -38,7 +38,7 @@ from experiments.study.places import PlaceError
 from experiments.study.progress import Overview, StudyFolder, overview
 from experiments.study.study import Participant, RunStanding
 
-NAME = "start"
+_NAME = "start"
 SIMULATED = "simulated"
 STOPPED = "The last test shot ended by an emergency stop."
 
@@ -51,8 +51,8 @@ class StartWindow(QWidget):
     def __init__(self, study: StudyFolder, opening: Opening, clock: Clock) -> None:
         super().__init__()
         self._study, self._opening, self._clock = study, opening, clock
-        self.choice: Choice | None = None
-        self.question: Question | None = None
+        self.choice: RunChoice | None = None
+        self.question: QuestionBox | None = None
         self._simulation_is_known = False
         self._closing = False
         self._scale = 0.0
@@ -68,12 +68,14 @@ class StartWindow(QWidget):
         self.form = Form(self._study.experiments, self._study.config.eligibility.ask, self._opening.sides)
         self.shots = ShotPage(self._opening.gun, self._clock)
         self.table = PeopleTable(self._study.experiments)
-        self.next, self.saved = Lines("detail"), Lines("saved", most_lines=5)
+        self.next, self.saved = TextLines("detail"), TextLines("saved", most_lines=5)
         self.pages = QStackedWidget()
         for page in (self._page(), self.shots):
             self.pages.addWidget(page)
         down, top = QVBoxLayout(self), QHBoxLayout()
-        top.addWidget(Lines("place", f"{self._study.config.title} · {self._study.results.resolve()}", most_lines=3), 1)
+        top.addWidget(
+            TextLines("place", f"{self._study.config.title} · {self._study.results.resolve()}", most_lines=3), 1
+        )
         top.addWidget(self._gun())
         down.addLayout(top)
         down.addWidget(self.pages, 1)
@@ -172,7 +174,7 @@ class StartWindow(QWidget):
         scale = type_scale(self.width(), self.height())
         if scale != self._scale:
             self._scale = scale
-            self.setStyleSheet(scaled(start_sheet(), scale))
+            self.setStyleSheet(scaled_sheet(start_sheet(), scale))
 
     def closeEvent(self, event: QCloseEvent | None) -> None:  # noqa: N802 - Qt's name
         """Let whoever waits for a choice go on, once no test shot is under way."""
@@ -182,7 +184,7 @@ class StartWindow(QWidget):
             event.ignore()
             return
         super().closeEvent(event)
-        remember(self, NAME)
+        remember(self, _NAME)
         self.closed.emit()
 
     def leave_for(self, signal: str) -> None:
@@ -196,7 +198,7 @@ class StartWindow(QWidget):
 
     # questions
 
-    def _ask(self, question: Question) -> None:
+    def _ask(self, question: QuestionBox) -> None:
         self._take_back()
         self.question = question
         self._foot.addWidget(question)
@@ -210,8 +212,8 @@ class StartWindow(QWidget):
             self.question.deleteLater()
             self.question = None
 
-    def _leave_it(self) -> Answer:
-        return Answer(text="Leave it", key="Esc", do=lambda _: self._take_back())
+    def _leave_it(self) -> Reply:
+        return Reply(text="Leave it", key="Esc", do=lambda _: self._take_back())
 
     # choosing
 
@@ -260,16 +262,16 @@ class StartWindow(QWidget):
             self._start()
 
         text = f"The gun is SIMULATED: {self.form.participant_id} will feel nothing. Start all the same?"
-        self._ask(Question(text, (Answer(text="Start, simulated", key="Ctrl+S", do=known), self._leave_it())))
+        self._ask(QuestionBox(text, (Reply(text="Start, simulated", key="Ctrl+S", do=known), self._leave_it())))
 
     def _ask_resume(self, run: RunStanding) -> None:
         answers = (
-            Answer(text="Go on with it", key="Ctrl+G", do=lambda _: self._begin_again("resume", "")),
-            Answer(text="Set it aside, start anew", key="Ctrl+N", do=lambda why: self._begin_again("fresh", why)),
+            Reply(text="Go on with it", key="Ctrl+G", do=lambda _: self._begin_again("resume", "")),
+            Reply(text="Set it aside, start anew", key="Ctrl+N", do=lambda why: self._begin_again("fresh", why)),
             self._leave_it(),
         )
         text = f"{people.stopped_text(self.form.participant_id, run)} Go on there, or set it aside and start anew?"
-        self._ask(Question(text, answers, reason=f"to start anew: {WHY}"))
+        self._ask(QuestionBox(text, answers, reason=f"to start anew: {WHY}"))
 
     def _begin_again(self, again: Again, reason: str) -> None:
         """Check everything once more, as Start does: the study may have gone on at another console meanwhile."""
@@ -294,7 +296,7 @@ class StartWindow(QWidget):
         self, code: str, *, again: Again = "ask", reason: str = "", practice: bool = False, training: bool = False
     ) -> None:
         if self.choice is None:
-            self.choice = Choice(
+            self.choice = RunChoice(
                 setup=self._setup(),
                 participant_id=code,
                 again=again,
@@ -327,8 +329,8 @@ class StartWindow(QWidget):
             if self._is_reason(reason):
                 self._change(lambda: act(self._study.results, person.participant_id, reason, self._clock))
 
-        answers = (Answer(text=f"{verb} {person.participant_id}", key="Ctrl+D", do=carry_out), self._leave_it())
-        self._ask(question := Question(text, answers, reason=WHY))
+        answers = (Reply(text=f"{verb} {person.participant_id}", key="Ctrl+D", do=carry_out), self._leave_it())
+        self._ask(question := QuestionBox(text, answers, reason=WHY))
         question.reason.setFocus()
 
     def _change(self, act: Callable[[], None]) -> None:
@@ -349,8 +351,8 @@ class StartWindow(QWidget):
     def _test_shot(self) -> None:
         self._take_back()
         if self.shots.stopped:
-            sure = Answer(text="It is: test shot", key="Ctrl+S", do=lambda _: self._enter_shots())
-            self._ask(Question(f"{STOPPED} Is the gun where it hurts nobody?", (sure, self._leave_it())))
+            sure = Reply(text="It is: test shot", key="Ctrl+S", do=lambda _: self._enter_shots())
+            self._ask(QuestionBox(f"{STOPPED} Is the gun where it hurts nobody?", (sure, self._leave_it())))
         else:
             self._enter_shots()
 
@@ -371,13 +373,13 @@ class StartWindow(QWidget):
         self.form.code_again.setFocus()
 
 
-def choose(study: StudyFolder, opening: Opening, clock: Clock) -> Choice | None:
+def choose_run(study: StudyFolder, opening: Opening, clock: Clock) -> RunChoice | None:
     """Show the start window until something is chosen; `None` if it was closed, or a signal ended it."""
     window = StartWindow(study, opening, clock)
     loop = QEventLoop()
     window.closed.connect(loop.quit)
     with signals_to(window.leave_for):
-        open_as_left(window, NAME)
+        open_as_left(window, _NAME)
         FreshShortcuts(window, clock.now)
         window.activateWindow()
         loop.exec()

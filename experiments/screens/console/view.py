@@ -20,7 +20,7 @@ from experiments.session.remarks import Remark
 from experiments.session.states import Position, State
 from experiments.session.steps import Ask, Describe, Outcome, Prepare, Present, Rate, Rest, Step
 
-THANKS = "Thank the participant."
+THANK_PARTICIPANT = "Thank the participant."
 """The last sentence, where nothing else comes next."""
 
 
@@ -97,7 +97,7 @@ class About:
     setup: Setup[Any]
     plan: Plan
     band: str = ""
-    last: str = THANKS
+    last: str = THANK_PARTICIPANT
     simulated: bool = False
     participant_rates: bool = False
     participant_keys: bool = False
@@ -167,7 +167,7 @@ def method_text(about: About, trial: Trial) -> str:
     return method.label if method.damper else code(about.plan, trial)
 
 
-def place_text(seen: Seen) -> str:
+def where_text(seen: Seen) -> str:
     """Where the run stands: trial, set, session; nowhere, if it ended before it began."""
     if seen.ended is not None and seen.position.step is None:
         return ""

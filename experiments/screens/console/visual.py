@@ -12,14 +12,14 @@ from PyQt6.QtTest import QTest
 from experiments.screens.console.app import Console
 from experiments.screens.console.window import ConsoleWindow
 from experiments.screens.participant.pages import spot_px
-from experiments.screens.participant.stage import TITLE
+from experiments.screens.participant.stage import WINDOW_TITLE
 from experiments.session.states import Position, State
 from experiments.session.steps import Ask, Rate, on_scale
 
 if TYPE_CHECKING:
     from experiments.screens.xkeys import Hands  # Linux alone has it
 
-LOOK_MS = 10
+_LOOK_MS = 10
 AGAIN_S = 0.5
 """A key that was refused, because it came too soon, is pressed again after so long."""
 BREAK_REASON = "synthetic participant"
@@ -36,7 +36,7 @@ class VisualParticipant:
         self._timer.timeout.connect(self._look)
 
     def __enter__(self) -> Self:
-        self._timer.start(LOOK_MS)
+        self._timer.start(_LOOK_MS)
         return self
 
     def __exit__(self, *_: object) -> None:
@@ -158,7 +158,7 @@ class Rater:
         if time.monotonic() - self._at_s < RATE_AGAIN_S:
             return None
         self._at_s = time.monotonic()
-        return self._hands.focus_on(TITLE)
+        return self._hands.focus_on(WINDOW_TITLE)
 
     def _confirm(self) -> None:
         """With Ctrl, as Enter alone begins a new line of a description."""

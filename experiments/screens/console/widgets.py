@@ -260,7 +260,7 @@ def quiet_list() -> QListWidget:
     return made
 
 
-class Lines(QTextEdit):
+class TextLines(QTextEdit):
     """Text to read and to copy. A word that is too long, such as a path, is broken; a text that is too long scrolls."""
 
     def __init__(self, name: str, text: str = "", most_lines: int = 4) -> None:
@@ -366,7 +366,7 @@ WHY = "why? (never a name)"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Answer:
+class Reply:
     """An answer: what its button says, its key, and what it does with the reason that was typed."""
 
     text: str
@@ -374,14 +374,14 @@ class Answer:
     do: Callable[[str], None]
 
 
-class Question(QFrame):
+class QuestionBox(QFrame):
     """Asks one thing, until it is answered or taken back."""
 
-    def __init__(self, text: str, answers: tuple[Answer, ...], *, reason: str = "") -> None:
+    def __init__(self, text: str, answers: tuple[Reply, ...], *, reason: str = "") -> None:
         super().__init__()
         self.setObjectName("panel")
         down = QVBoxLayout(self)
-        self.text = Lines("question")
+        self.text = TextLines("question")
         self.text.say(text, "ask")
         down.addWidget(self.text)
         self.reason = LineEdit()
@@ -395,7 +395,7 @@ class Question(QFrame):
             across.addWidget(self._button(answer))
         down.addLayout(across)
 
-    def _button(self, answer: Answer) -> QWidget:
+    def _button(self, answer: Reply) -> QWidget:
         return button(self, answer.text, answer.key, lambda: answer.do(self.reason.text().strip()))
 
 

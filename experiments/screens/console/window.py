@@ -22,9 +22,9 @@ from experiments.live_run import LiveRun
 from experiments.screens.console import view, widgets, windows
 from experiments.screens.console.controls import Controls, TextField
 from experiments.screens.console.keys import Name, Typing
-from experiments.screens.console.panels import FITS, Bars, Buttons, Notice, Side, TextFields, TextPage
+from experiments.screens.console.panels import FITS, Bars, Buttons, Notice, SidePanel, TextFields, TextPage
 from experiments.screens.console.participant_link import ParticipantSide
-from experiments.screens.console.progress import Progress, marks
+from experiments.screens.console.progress import RunProgress, marks
 from experiments.screens.console.view import (
     About,
     Began,
@@ -37,7 +37,7 @@ from experiments.screens.console.view import (
     Shown,
     Trouble,
 )
-from experiments.screens.console.windows import Keyboard, remember, scaled
+from experiments.screens.console.windows import Keyboard, remember, scaled_sheet
 from experiments.screens.texts import saved_text
 from experiments.session.events import Hand, Press
 from experiments.session.remarks import Halted
@@ -76,7 +76,7 @@ class ConsoleWindow(QMainWindow):
         self.gun: GunSeen | None = None
         self.participant: ParticipantSeen | None = None
         self.ended: Ended | None = None
-        self._progress = Progress()
+        self._progress = RunProgress()
         self._brief_until_s: float | None = None
         self._brief_for = -1
         self._lasting = ("", "good")
@@ -95,7 +95,7 @@ class ConsoleWindow(QMainWindow):
         self.setWindowTitle(f"Recoil – {self.about.plan.participant_id}, {what}")
         self.bands = [widgets.label("band", wrap=False) for _ in range(2)]
         self.place, self.saved = widgets.label("place"), widgets.label("saved")
-        self.notice, self.fields, self.side, self.buttons = Notice(), TextFields(), Side(self.about), Buttons(self)
+        self.notice, self.fields, self.side, self.buttons = Notice(), TextFields(), SidePanel(self.about), Buttons(self)
         self.bars = Bars(self.about)
         self._main = QWidget()
         left = QVBoxLayout(self._main)
@@ -243,7 +243,7 @@ class ConsoleWindow(QMainWindow):
                 self._participant_side.covered = self.controls.covered and self.isActiveWindow()
         seen = self.seen
         self.notice.put(view.instruction(seen))
-        self.place.setText(view.place_text(seen))
+        self.place.setText(view.where_text(seen))
         self._show_bands(seen)
         self.bars.put(seen)
         self.side.put(seen, self._progress)
@@ -284,7 +284,7 @@ class ConsoleWindow(QMainWindow):
             self._restyle()
 
     def _restyle(self) -> None:
-        self.setStyleSheet(scaled(widgets.sheet(self.theme), self._scale))
+        self.setStyleSheet(scaled_sheet(widgets.sheet(self.theme), self._scale))
 
     def showEvent(self, event: QShowEvent | None) -> None:  # noqa: N802 - Qt's name
         """Hear the keys before any widget does."""

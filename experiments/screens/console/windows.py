@@ -81,10 +81,10 @@ def type_scale(width_px: int, height_px: int) -> float:
     return round(_GRAIN * int(min(max(fitting, _SMALLEST), _LARGEST) / _GRAIN + 1e-9), 2)
 
 
-def scaled(sheet: str, scale: float) -> str:
+def scaled_sheet(sheet: str, scale: float) -> str:
     """A style sheet with all its sizes in pixels scaled.
 
-    >>> scaled("font-size: 20px; border: 1px", 1.5)
+    >>> scaled_sheet("font-size: 20px; border: 1px", 1.5)
     'font-size: 30px; border: 2px'
     """
     return re.sub(r"\b(\d+)px", lambda size: f"{max(1, round(int(size[1]) * scale))}px", sheet)

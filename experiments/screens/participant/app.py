@@ -18,8 +18,7 @@ from experiments.screens.participant.messages import (
     AskDescription,
     AskDirection,
     AskRating,
-    Close,
-    Failed,
+    CloseScreen,
     FromParticipant,
     KeyPressed,
     Look,
@@ -27,13 +26,14 @@ from experiments.screens.participant.messages import (
     Ping,
     Pong,
     Ready,
+    ScreenFailed,
     Show,
     ToParticipant,
     line,
     to_participant_from,
 )
 from experiments.screens.participant.pages import DescriptionPage, DirectionPage, Drafts, MessagePage, RatingPage
-from experiments.screens.participant.stage import Keys, MaskingNoise, Stage, load
+from experiments.screens.participant.stage import KeyPresses, MaskingNoise, Stage, load_toolkit
 
 
 class Wire:
@@ -55,7 +55,7 @@ class Wire:
             self._said.flush()
 
     def word(self) -> ToParticipant | None:
-        """The next word that was heard, if there is one. A console that is gone said `Close`."""
+        """The next word that was heard, if there is one. A console that is gone said `CloseScreen`."""
         with suppress(queue.Empty):
             return self._words.get_nowait()
         return None
@@ -66,13 +66,13 @@ class Wire:
             try:
                 word = to_participant_from(wire)
             except ValidationError:
-                self.say(Failed(message=f"the console said what is no word: {wire[:200]!r}"))
+                self.say(ScreenFailed(message=f"the console said what is no word: {wire[:200]!r}"))
                 break
             if isinstance(word, Ping):
                 self.say(Pong(sent_s=word.sent_s, there_s=there_s))
             else:
                 self._words.put(word)
-        self._words.put(Close())
+        self._words.put(CloseScreen())
 
 
 _STEP_S = 0.004
@@ -80,23 +80,23 @@ _STEP_S = 0.004
 
 
 def run(look: Look, heard: BinaryIO, said: BinaryIO) -> int:
-    """Run the program; whatever ends it but the console is said as `Failed`. Gives back the exit code."""
+    """Run the program; whatever ends it but the console is said as `ScreenFailed`. Gives back the exit code."""
     wire = Wire(heard, said, time.monotonic)
     try:
-        toolkit = load()
+        toolkit = load_toolkit()
         wire = Wire(heard, said, toolkit.now)
         app = App(Stage(toolkit, look), wire)
         app.begin()
         app.serve()
     except KeyboardInterrupt:
-        wire.say(Failed(message="it was interrupted from the keyboard (Ctrl-C)"))
+        wire.say(ScreenFailed(message="it was interrupted from the keyboard (Ctrl-C)"))
         return 130
     except SystemExit as error:  # PsychoPy ends the program where others raise
-        wire.say(Failed(message=f"PsychoPy ended the program ({error.code})"))
+        wire.say(ScreenFailed(message=f"PsychoPy ended the program ({error.code})"))
         return 1
     except BaseException as error:  # noqa: BLE001 - some of PsychoPy's errors derive from BaseException alone
         traceback.print_exc()
-        wire.say(Failed(message=f"{type(error).__name__}: {error}"))
+        wire.say(ScreenFailed(message=f"{type(error).__name__}: {error}"))
         return 1
     return 0
 
@@ -106,7 +106,7 @@ class App:
 
     def __init__(self, stage: Stage, wire: Wire) -> None:
         self._stage, self._wire = stage, wire
-        self._keys = Keys(stage.toolkit)
+        self._keys = KeyPresses(stage.toolkit)
         self._noise = MaskingNoise()
         self._told: tuple[str, ...] = ()
         self._told_s = 0.0
@@ -125,7 +125,7 @@ class App:
 
     def serve(self) -> None:
         """Do as the words say until they say close."""
-        while not isinstance(word := self._wire.word(), Close):
+        while not isinstance(word := self._wire.word(), CloseScreen):
             if word is not None:
                 self._obey(word)
             self._stage.step()

@@ -26,10 +26,9 @@ from experiments.screens.participant.messages import (
     AskDescription,
     AskDirection,
     AskRating,
-    Close,
+    CloseScreen,
     DescriptionGiven,
     DirectionGiven,
-    Failed,
     Focused,
     FromParticipant,
     Look,
@@ -39,6 +38,7 @@ from experiments.screens.participant.messages import (
     Pong,
     RatingGiven,
     Ready,
+    ScreenFailed,
     Show,
     Unasked,
     arguments,
@@ -104,10 +104,8 @@ NOISE_S = 15.0
 MAX_CLOCK_STEP_S = 0.02
 """How far the clocks may move against each other while a direction is asked; a clock that was set moves further."""
 
-Question = AskRating | AskDescription | AskDirection | Noise
-Answer = TypeVar("Answer", RatingGiven, DescriptionGiven, DirectionGiven, NoiseIs)
-
-__all__ = ["ParticipantError", "ParticipantLink"]
+_Asked = AskRating | AskDescription | AskDirection | Noise
+_Given = TypeVar("_Given", RatingGiven, DescriptionGiven, DirectionGiven, NoiseIs)
 
 
 class ParticipantLink:
@@ -196,16 +194,14 @@ class ParticipantLink:
         `wanted` is looked at just before the question is put on the screen; if it is not, it counts as called off.
         """
         with self._alone():
-            asked = replace(question, ask=self._mail.open_ask())
-            return self._answer(asked, RatingGiven, timeout_s, wanted)
+            return self._answer(replace(question, ask=self._mail.open_ask()), RatingGiven, timeout_s, wanted)
 
     def ask_description(
         self, question: AskDescription, timeout_s: float | None = None, *, wanted: Callable[[], bool] = lambda: True
     ) -> DescriptionGiven:
         """Have a stimulus described. Waits for the participant. `wanted` as of a rating."""
         with self._alone():
-            asked = replace(question, ask=self._mail.open_ask())
-            return self._answer(asked, DescriptionGiven, timeout_s, wanted)
+            return self._answer(replace(question, ask=self._mail.open_ask()), DescriptionGiven, timeout_s, wanted)
 
     def ask_direction(
         self, question: AskDirection, timeout_s: float | None = None, *, wanted: Callable[[], bool] = lambda: True
@@ -238,7 +234,7 @@ class ParticipantLink:
     def close(self) -> None:
         """End the program: by asking, then by force. Who still waits for it is told."""
         self._gone = lambda _: None
-        self._process.write(line(Close()))
+        self._process.write(line(CloseScreen()))
         self._mail.fail("the participant's screen was closed by the console")
         self._process.end()
 
@@ -258,9 +254,7 @@ class ParticipantLink:
         finally:
             self._asking.release()
 
-    def _answer(
-        self, asked: Question, kind: type[Answer], timeout_s: float | None, wanted: Callable[[], bool]
-    ) -> Answer:
+    def _answer(self, asked: _Asked, kind: type[_Given], timeout_s: float | None, wanted: Callable[[], bool]) -> _Given:
         """Ask and wait; a question that gets no answer is taken off the screen, if it still stands there."""
         try:
             self._put(asked, wanted)
@@ -271,14 +265,14 @@ class ParticipantLink:
         finally:
             self._mail.call_off()
 
-    def _put(self, asked: Question, wanted: Callable[[], bool]) -> None:
+    def _put(self, asked: _Asked, wanted: Callable[[], bool]) -> None:
         with self._page:
             if not wanted():
                 raise ParticipantError("the question was called off")
             self._stands = asked.ask
             self._process.write(line(asked))
 
-    def _take_off(self, asked: Question) -> None:
+    def _take_off(self, asked: _Asked) -> None:
         with self._page:
             if self._stands == asked.ask:
                 self._process.write(line(Show(text="")))
@@ -296,7 +290,7 @@ class ParticipantLink:
         except ValidationError:
             self._failed(f"the participant's screen said what is no word: {wire[:200]!r}")
             return
-        if isinstance(word, Failed):
+        if isinstance(word, ScreenFailed):
             self._failed(f"the participant's screen failed: {word.message}")
         elif isinstance(word, Unasked):
             self._focused = word if isinstance(word, Focused) else self._focused
@@ -398,7 +392,7 @@ def _ending(code: int | None) -> str:
     return f"was killed by signal {-code}" if code < 0 else f"ended with exit code {code}"
 
 
-Word = TypeVar("Word", bound=FromParticipant)
+_Kind = TypeVar("_Kind", bound=FromParticipant)
 
 
 class ParticipantError(RecoilError):
@@ -446,10 +440,10 @@ class Mailbox:
             self._news.notify_all()
             return was_open
 
-    def wait(self, kind: type[Word], fits: Callable[[Word], bool], timeout_s: float | None, ask: int | None) -> Word:
+    def wait(self, kind: type[_Kind], fits: Callable[[_Kind], bool], timeout_s: float | None, ask: int | None) -> _Kind:
         """The word of a kind that fits, once it is here. `ParticipantError` if it does not come."""
 
-        def here() -> Word | None:
+        def here() -> _Kind | None:
             word = self._last.get(kind)
             return word if isinstance(word, kind) and fits(word) else None
 

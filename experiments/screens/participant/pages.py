@@ -15,52 +15,16 @@ from experiments.screens.participant.messages import (
     AskRating,
     DescriptionGiven,
     DirectionGiven,
-    FromParticipant,
     RatingGiven,
 )
-from experiments.screens.participant.stage import Box, Keys, Stage, half_width
+from experiments.screens.participant.stage import Box, KeyPresses, Page, Stage, half_width
 from experiments.session.steps import on_scale
-
-STILL_S = 0.1
-"""How often a page is drawn on which nothing moves."""
 
 Drafts = dict[int, float | str]
 """What was set or written on a page that was taken off before it was given, by the question's `draft`."""
 
 
-class QuietPage:
-    """A page that hears nothing; the others hear what concerns them."""
-
-    redraw_s = STILL_S
-    pointer = False
-    typed = False
-
-    def pressed(self, x: float, y: float) -> None:
-        """Nothing."""
-
-    def dragged(self, x: float) -> None:
-        """Nothing."""
-
-    def released(self) -> None:
-        """Nothing."""
-
-    def key(self, name: str, ctrl: bool) -> bool:
-        """Nothing, and nothing for PsychoPy."""
-        del name, ctrl
-        return True
-
-    def motion(self, name: str) -> None:
-        """Nothing."""
-
-    def outcome(self) -> FromParticipant | None:
-        """Nothing."""
-        return None
-
-    def leave(self) -> None:
-        """Nothing."""
-
-
-class MessagePage(QuietPage):
+class MessagePage(Page):
     """A plain message in the middle."""
 
     def __init__(self, stage: Stage, text: str) -> None:
@@ -72,13 +36,13 @@ class MessagePage(QuietPage):
         self._text.draw()
 
 
-class DirectionPage(QuietPage):
+class DirectionPage(Page):
     """Two answers, each with its key. Keys count from the onset on, even those that went down before the page stood.
 
     After a pause, or where a key was refused, only those that go down once it stands there again.
     """
 
-    def __init__(self, stage: Stage, asked: AskDirection, keys: Keys) -> None:
+    def __init__(self, stage: Stage, asked: AskDirection, keys: KeyPresses) -> None:
         self._asked, self._keys, self._now = asked, keys, stage.toolkit.now
         self._since_s = math.inf if asked.once_seen else asked.onset_s
         width, ink = stage.half_width, stage.palette.ink
@@ -174,21 +138,17 @@ _STEPS: dict[Move, Callable[[AskRating, float], float]] = {
 }
 
 
-def _kept(scale: AskRating, rating: float) -> float:
-    return on_scale(rating, scale)
-
-
 def put(scale: AskRating, part: float) -> float:
     """The rating where the marker is put by hand; beyond an end it is that end."""
-    return _kept(scale, scale.minimum + part * (scale.maximum - scale.minimum))
+    return on_scale(scale.minimum + part * (scale.maximum - scale.minimum), scale)
 
 
 def move(scale: AskRating, rating: float | None, step: Move) -> float:
     """The rating after a key; from nowhere the first key puts the marker in the middle, or at the end it names."""
-    middle = _kept(scale, (scale.minimum + scale.maximum) / 2)
+    middle = on_scale((scale.minimum + scale.maximum) / 2, scale)
     if rating is None and step not in ("first", "last"):
         return middle
-    return _kept(scale, _STEPS[step](scale, middle if rating is None else rating))
+    return on_scale(_STEPS[step](scale, middle if rating is None else rating), scale)
 
 
 _HINT = "Click on the line or use the arrow keys, then Confirm or Enter"
@@ -220,7 +180,7 @@ def spot_px(part: float, width_px: int, height_px: int) -> tuple[int, int]:
     return round(width_px / 2 + (2 * part - 1) * half * height_px), round((0.5 - _SCALE_Y) * height_px)
 
 
-class RatingPage(QuietPage):
+class RatingPage(Page):
     """The scale. No marker stands on it until the participant puts one there, and nothing is confirmed before.
 
     `drafts` holds where it stood when the page was taken off: it stands there again.
@@ -309,21 +269,14 @@ class RatingPage(QuietPage):
 
     def _ends(self) -> list[Any]:
         """Number and words under each end, the words no wider than twice the way to the window's edge."""
-        width = 2 * (self._stage.half_width - self._half)
-        ends = (
+        width, ink = 2 * (self._stage.half_width - self._half), self._stage.palette.ink
+        drawn = []
+        for x, number, words in (
             (-self._half, self._asked.minimum, self._asked.minimum_text),
             (self._half, self._asked.maximum, self._asked.maximum_text),
-        )
-        drawn = []
-        for x, number, words in ends:
-            drawn.append(
-                self._stage.text(
-                    f"{number:g}", Box(x=x, y=-0.105, width=width, height=0.06), 0.04, self._stage.palette.ink
-                )
-            )
-            drawn.append(
-                self._stage.text(words, Box(x=x, y=-0.155, width=width, height=0.12), 0.04, self._stage.palette.ink)
-            )
+        ):
+            drawn.append(self._stage.text(f"{number:g}", Box(x=x, y=-0.105, width=width, height=0.06), 0.04, ink))
+            drawn.append(self._stage.text(words, Box(x=x, y=-0.155, width=width, height=0.12), 0.04, ink))
         return drawn
 
 
@@ -340,7 +293,7 @@ _HOW = "Enter begins a new line. When you are done: the button, or Ctrl and Ente
 _FULL = "There is no more room. When you are done: the button, or Ctrl and Enter"
 
 
-class DescriptionPage(QuietPage):
+class DescriptionPage(Page):
     """A box to type in. Letters get smaller as it fills; a key that finds no room is not taken, and that is said.
 
     `drafts` holds what was written so far: it stands there at first, and is kept at last.

@@ -19,7 +19,7 @@ from contextlib import contextmanager
 from ctypes import byref, c_int, c_ulong
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, Protocol
+from typing import Any
 
 from experiments.screens.participant.messages import (
     PALETTES,
@@ -80,7 +80,7 @@ def _xlib() -> Any:
 _SMALLEST = 0.018
 _SHRINK = 0.92
 _MARGIN = 0.94
-TITLE = "Recoil: participant"
+WINDOW_TITLE = "Recoil: participant"
 EMERGENCY_KEY = "F12"
 _STEADY_FLIPS, _MOST_FLIPS = 10, 60
 
@@ -89,12 +89,16 @@ class WindowClosed(Exception):  # noqa: N818 - somebody closed it; that is no er
     """The participant's window was closed."""
 
 
-class Page(Protocol):
-    """What fills the window, and hears what happens on it. A handler that returns true keeps it from PsychoPy."""
+STILL_S = 0.1
+"""How often a page is drawn on which nothing moves."""
 
-    redraw_s: float
-    pointer: bool
-    typed: bool
+
+class Page:
+    """What fills the window, and hears what happens on it: nothing, but for what a page says of itself."""
+
+    redraw_s = STILL_S
+    pointer = False
+    typed = False
 
     def draw(self) -> None:
         """Draw one frame."""
@@ -109,13 +113,16 @@ class Page(Protocol):
         """The mouse was let go."""
 
     def key(self, name: str, ctrl: bool) -> bool:
-        """A key went down while the window had the focus; `name` as pyglet names it."""
+        """A key went down while the window had the focus; `name` as pyglet names it. True keeps it from PsychoPy."""
+        del name, ctrl
+        return True
 
     def motion(self, name: str) -> None:
         """A key that moves something went down, or is held."""
 
     def outcome(self) -> FromParticipant | None:
-        """What it comes to: a word to say, or nothing yet."""
+        """What it comes to: a message to say, or nothing yet."""
+        return None
 
     def leave(self) -> None:
         """It is taken off the window."""
@@ -250,7 +257,7 @@ def _open(toolkit: Toolkit, look: Look, ground: str) -> Any:
         checkTiming=False,
         monitor=None,
     )
-    window.winHandle.set_caption(TITLE)
+    window.winHandle.set_caption(WINDOW_TITLE)
     return window
 
 
@@ -331,7 +338,7 @@ def _takes_files(folder: Path) -> bool:
         return False
 
 
-def load() -> Toolkit:
+def load_toolkit() -> Toolkit:
     """Import PsychoPy. What it raises without a display or without a part of itself passes through."""
     # imported when used: see above
     import psychopy  # noqa: PLC0415
@@ -356,22 +363,22 @@ _KEPT = 256
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Press:
+class KeyDown:
     """A key by PsychoPy's name, and when it went down on the clock of this process."""
 
     name: str
     pressed_s: float
 
 
-class Keys:
+class KeyPresses:
     """The last keys that went down, oldest first."""
 
     def __init__(self, toolkit: Toolkit) -> None:
         self._board = toolkit.keyboard.Keyboard()
         self._epoch_s = toolkit.key_epoch_s
-        self._presses: deque[Press] = deque(maxlen=_KEPT)
+        self._presses: deque[KeyDown] = deque(maxlen=_KEPT)
 
-    def since(self, onset_s: float) -> Iterator[Press]:
+    def since(self, onset_s: float) -> Iterator[KeyDown]:
         """The keys that went down from a moment on."""
         self.poll()
         return (
@@ -382,7 +389,7 @@ class Keys:
         """Take what PsychoPy holds. It gives keys still down and keys let go apart, a key that was both twice."""
         for released in (False, True):
             for found in self._board.getKeys(waitRelease=released):
-                press = Press(name=str(found.name), pressed_s=float(found.tDown) + self._epoch_s)
+                press = KeyDown(name=str(found.name), pressed_s=float(found.tDown) + self._epoch_s)
                 if press not in self._presses:
                     self._presses.append(press)
 
