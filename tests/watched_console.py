@@ -129,7 +129,7 @@ def _read(label: Any) -> bool:
 
 def _run(window: Any) -> dict[str, Any]:
     """Where the run of a console's window is, as far as it is drawn."""
-    from experiments.screens.console.keys import field_of
+    from experiments.screens.console.keys import field_at
 
     if window.live is None:
         return {"ended": window.ended is not None}
@@ -144,7 +144,7 @@ def _run(window: Any) -> dict[str, Any]:
         "ready": drawn.serial == live.position.serial and live.ready_at_s(now_s) and in_time,
         "ended": window.ended is not None,
         "line": window.controls.typing.line,
-        "typed": window.typed("line" if window.controls.typing.line else field_of(drawn) or "number"),
+        "typed": window.typed("line" if window.controls.typing.line else field_at(drawn) or "number"),
         "page": window.controls.page,
         "theme": window.theme,
         "places": _places(window),

@@ -171,10 +171,10 @@ def duration_text(seconds: float) -> str:
     return " ".join(parts)
 
 
-def one_line(text: str) -> str:
+def typed_line(text: str) -> str:
     r"""What was typed or pasted into a line, without what no line holds: control characters become blanks.
 
-    >>> one_line("a\x00b\nc  ")
+    >>> typed_line("a\x00b\nc  ")
     'a b c'
     """
     return "".join(" " if unicodedata.category(letter) == "Cc" else letter for letter in text).strip()

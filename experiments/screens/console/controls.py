@@ -19,12 +19,12 @@ from experiments.screens.console.keys import (
     Name,
     Typing,
     command_for,
-    field_of,
+    field_at,
     shown_key,
     why_not,
 )
 from experiments.screens.console.participant_link import ParticipantSide
-from experiments.screens.texts import FLAG_RULE, one_line, short_place, typed_number
+from experiments.screens.texts import FLAG_RULE, short_place, typed_line, typed_number
 from experiments.session import events
 from experiments.session.events import Event, Hand, Press
 from experiments.session.history import Value, trial_at, value
@@ -121,7 +121,7 @@ class Controls:
     @property
     def typing(self) -> Typing:
         """What is being typed."""
-        return Typing(line=self._enter is not None, field=field_of(self.drawn) is not None)
+        return Typing(line=self._enter is not None, field=field_at(self.drawn) is not None)
 
     @property
     def covered(self) -> bool:
@@ -279,11 +279,11 @@ class Controls:
         if self._enter is not None:
             self._enter_line(press)
             return
-        match field_of(self.drawn):
+        match field_at(self.drawn):
             case "number":
                 self._number(self._view.typed("number"), press)
             case "words":
-                text = one_line(self._view.typed("words"))  # none is an answer as well
+                text = typed_line(self._view.typed("words"))  # none is an answer as well
                 self._give(events.Description(text=text), text, press)
             case None if self.drawn.state is State.CLOSING:
                 self._offer(events.Finish(), press)
@@ -328,7 +328,7 @@ class Controls:
         self._ask_for("stop")
 
     def _enter_line(self, press: Press) -> None:
-        text, enter = one_line(self._view.typed("line")), self._enter
+        text, enter = typed_line(self._view.typed("line")), self._enter
         if not text:
             self._view.say("Type a word or two, or leave it with Esc.", "bad")
         elif enter is not None and enter(text, press):

@@ -87,7 +87,7 @@ class Form(QFrame):
         scroll.setFocusPolicy(Qt.FocusPolicy.NoFocus)
         scroll.setHorizontalScrollBarPolicy(Qt.ScrollBarPolicy.ScrollBarAlwaysOff)
         down = QVBoxLayout(self)
-        for part in (widgets.label("quiet", _HOW_TO_START), self.remark):
+        for part in (widgets.text_label("quiet", _HOW_TO_START), self.remark):
             down.addWidget(part)
         down.addWidget(scroll, 1)
 
@@ -160,7 +160,7 @@ class Form(QFrame):
 
 def _field_name(name: str) -> QLabel:
     """The name of a field, at half its height."""
-    made = widgets.label("", name, wrap=False)
+    made = widgets.text_label("", name, wrap=False)
     made.setAlignment(Qt.AlignmentFlag.AlignVCenter)
     made.setSizePolicy(QSizePolicy.Policy.Preferred, QSizePolicy.Policy.Expanding)
     return made

@@ -115,7 +115,7 @@ def command_for(key: str, *, ctrl: bool, typing: Typing, position: Position) -> 
     if ctrl and key == "Space":
         return None  # it changes the input method: nobody fires by that
     if ctrl and key == "X":
-        return "no answer" if field_of(position) == "number" and not typing.line else None
+        return "no answer" if field_at(position) == "number" and not typing.line else None
     if typing.letters and not ctrl:
         return None
     name = _letter(key, position)
@@ -141,7 +141,7 @@ _LETTERS: dict[str, Name] = {
 }
 
 
-def field_of(position: Position) -> Literal["number", "words"] | None:
+def field_at(position: Position) -> Literal["number", "words"] | None:
     """What is typed at a position, apart from a line that was asked for."""
     entry = position.correcting if position.state is State.CORRECTING else None
     match entry.what if entry is not None else position.state:
@@ -169,7 +169,7 @@ def why_not(name: Name, position: Position) -> str:
     """Why a command does nothing at a position; empty if it does something."""
     kind = BY_NAME[name].kind
     if name in _ANSWERS and position.state is State.CORRECTING:
-        kind = events.Correct if field_of(position) is None else kind
+        kind = events.Correct if field_at(position) is None else kind
     if name == "no answer" and position.state is State.CORRECTING:
         kind = events.Correct
     if kind is None:

@@ -30,7 +30,7 @@ from experiments.screens.console.participant_link import WAIT, ParticipantSide
 from experiments.screens.console.start import choose_run
 from experiments.screens.console.view import THANK_PARTICIPANT
 from experiments.screens.console.visual import Rater, VisualParticipant
-from experiments.screens.console.widgets import WHY, QuestionBox, Reply, TextLines, start_sheet, unfit
+from experiments.screens.console.widgets import WHY, Option, QuestionBox, TextLines, start_sheet, unfit
 from experiments.screens.console.windows import FreshShortcuts, let_go, signals_to
 from experiments.screens.participant.link import ParticipantError, ParticipantLink
 from experiments.screens.participant.messages import Look, NoiseIs
@@ -220,9 +220,9 @@ class Unfinished(QDialog):
         self.setWindowTitle("Recoil – unfinished run")
         self.setStyleSheet(start_sheet())
         answers = (
-            Reply(text="Go on with it", key="Ctrl+G", do=lambda _: self._decide("resume", "")),
-            Reply(text="Set it aside, start anew", key="Ctrl+N", do=self._fresh),
-            Reply(text="Leave it", key="Esc", do=lambda _: self.reject()),
+            Option(text="Go on with it", key="Ctrl+G", do=lambda _: self._decide("resume", "")),
+            Option(text="Set it aside, start anew", key="Ctrl+N", do=self._fresh),
+            Option(text="Leave it", key="Esc", do=lambda _: self.reject()),
         )
         self.question = QuestionBox(_text(request), answers, reason=f"to start anew: {WHY}")
         self.said = TextLines("saved")

@@ -25,7 +25,7 @@ from PyQt6.QtWidgets import (
 
 from experiments.screens.console import widgets
 from experiments.screens.console.controls import TextField
-from experiments.screens.console.keys import BY_NAME, Name, field_of, shown_key
+from experiments.screens.console.keys import BY_NAME, Name, field_at, shown_key
 from experiments.screens.console.progress import (
     RunProgress,
     answer_lines,
@@ -54,7 +54,7 @@ class Notice:
     """What to do now, the damper, and what belongs to it: three labels."""
 
     def __init__(self) -> None:
-        self.title, self.damper, self.detail = self.labels = [widgets.label(name) for name in SIZES_PX]
+        self.title, self.damper, self.detail = self.labels = [widgets.text_label(name) for name in SIZES_PX]
 
     def put(self, shown: Instruction) -> None:
         """Show an instruction."""
@@ -76,7 +76,7 @@ class TextPage(QWidget):
 
     def __init__(self) -> None:
         super().__init__()
-        self._title, self.said = widgets.label("place"), widgets.label("saved")
+        self._title, self.said = widgets.text_label("place"), widgets.text_label("saved")
         self._text = QPlainTextEdit()
         self._text.setReadOnly(True)
         self._text.setFocusPolicy(widgets.NO_FOCUS)
@@ -131,7 +131,7 @@ class TextFields:
     def __init__(self) -> None:
         self.rating, self.words, self.line = QLineEdit(), QLineEdit(), QLineEdit()
         self._fields: dict[TextField, QLineEdit] = {"number": self.rating, "words": self.words, "line": self.line}
-        self._ends, self._question = widgets.label("quiet"), widgets.label("quiet")
+        self._ends, self._question = widgets.text_label("quiet"), widgets.text_label("quiet")
         for field, name, how in (
             (self.rating, "rating", "type a number, Enter saves"),
             (self.words, "description", "type the participant's words, Enter saves"),
@@ -149,7 +149,7 @@ class TextFields:
 
     def at(self, position: Position, said: str) -> None:
         """Take a position: a new field begins with what was half typed there before, else with what was said so far."""
-        belongs = (field_of(position), position.number, position.correcting)
+        belongs = (field_at(position), position.number, position.correcting)
         if belongs == self._belongs:
             return
         self._keep(self._belongs)
@@ -170,7 +170,7 @@ class TextFields:
 
     def focus(self, position: Position, otherwise: QWidget) -> None:
         """Show the field of a position, and put the cursor into it; an open line keeps the cursor."""
-        self.pages.setCurrentIndex((None, "number", "words").index(field_of(position)))
+        self.pages.setCurrentIndex((None, "number", "words").index(field_at(position)))
         if self.bar.isHidden():
             self._field(position, otherwise).setFocus()
 
@@ -180,7 +180,7 @@ class TextFields:
         self.bar.hide()
 
     def _field(self, position: Position, otherwise: QWidget) -> QWidget:
-        name = field_of(position)
+        name = field_at(position)
         return otherwise if name is None else self._fields[name]
 
     def open_line(self, question: str) -> None:
@@ -326,7 +326,7 @@ class Buttons:
 
 def _shown(position: Position, *, screen_lost: bool) -> tuple[Name, ...]:
     if position.state is State.CORRECTING:
-        return _OF_CORRECTION.get(field_of(position), ())
+        return _OF_CORRECTION.get(field_at(position), ())
     return (*_OF_STATE.get(position.state, ()), *(("restart",) if screen_lost else ()))
 
 
@@ -379,7 +379,7 @@ class SidePanel(QWidget):
 
     def __init__(self, about: About) -> None:
         super().__init__()
-        self._gun, self._times, self._focus = widgets.label("quiet"), widgets.label("quiet"), widgets.label("quiet")
+        self._gun, self._times, self._focus = (widgets.text_label("quiet") for _ in range(3))
         self._coming, self._answers = widgets.quiet_list(), widgets.quiet_list()
         self._strip = Strip()
         self._strip.setVisible(about.setup.config.console.response_times)
@@ -388,9 +388,9 @@ class SidePanel(QWidget):
         for widget in (
             widgets.panel(self._gun, self._focus),
             widgets.panel(self._times),
-            widgets.label("quiet", "Coming next"),
+            widgets.text_label("quiet", "Coming next"),
             self._coming,
-            widgets.label("quiet", "Answers of this set"),
+            widgets.text_label("quiet", "Answers of this set"),
             self._answers,
             self._strip,
         ):

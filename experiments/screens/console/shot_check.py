@@ -195,8 +195,8 @@ class ShotPage(QWidget):
 
     def _build(self) -> None:
         self.title, self.count, self.detail = (
-            widgets.label("title"),
-            widgets.label("count"),
+            widgets.text_label("title"),
+            widgets.text_label("count"),
             TextLines("detail", most_lines=9),
         )
         self.count.setAlignment(Qt.AlignmentFlag.AlignHCenter)

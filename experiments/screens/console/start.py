@@ -23,7 +23,7 @@ from experiments.run import Again
 from experiments.screens.console import people, widgets
 from experiments.screens.console.form import Form, Opening, PeopleTable, RunChoice
 from experiments.screens.console.shot_check import ShotPage
-from experiments.screens.console.widgets import WHY, QuestionBox, Reply, TextLines, start_sheet, unfit
+from experiments.screens.console.widgets import WHY, Option, QuestionBox, TextLines, start_sheet, unfit
 from experiments.screens.console.windows import (
     FreshShortcuts,
     let_go,
@@ -97,7 +97,7 @@ class StartWindow(QWidget):
 
     def _gun(self) -> QWidget:
         simulated = self._opening.gun == SIMULATED
-        made = widgets.label("gun", "SIMULATED GUN" if simulated else f"Gun: {self._opening.gun}", wrap=False)
+        made = widgets.text_label("gun", "SIMULATED GUN" if simulated else f"Gun: {self._opening.gun}", wrap=False)
         widgets.set_mood(made, "ask" if simulated else "wait")
         return made
 
@@ -212,8 +212,8 @@ class StartWindow(QWidget):
             self.question.deleteLater()
             self.question = None
 
-    def _leave_it(self) -> Reply:
-        return Reply(text="Leave it", key="Esc", do=lambda _: self._take_back())
+    def _leave_it(self) -> Option:
+        return Option(text="Leave it", key="Esc", do=lambda _: self._take_back())
 
     # choosing
 
@@ -262,12 +262,12 @@ class StartWindow(QWidget):
             self._start()
 
         text = f"The gun is SIMULATED: {self.form.participant_id} will feel nothing. Start all the same?"
-        self._ask(QuestionBox(text, (Reply(text="Start, simulated", key="Ctrl+S", do=known), self._leave_it())))
+        self._ask(QuestionBox(text, (Option(text="Start, simulated", key="Ctrl+S", do=known), self._leave_it())))
 
     def _ask_resume(self, run: RunStanding) -> None:
         answers = (
-            Reply(text="Go on with it", key="Ctrl+G", do=lambda _: self._begin_again("resume", "")),
-            Reply(text="Set it aside, start anew", key="Ctrl+N", do=lambda why: self._begin_again("fresh", why)),
+            Option(text="Go on with it", key="Ctrl+G", do=lambda _: self._begin_again("resume", "")),
+            Option(text="Set it aside, start anew", key="Ctrl+N", do=lambda why: self._begin_again("fresh", why)),
             self._leave_it(),
         )
         text = f"{people.stopped_text(self.form.participant_id, run)} Go on there, or set it aside and start anew?"
@@ -329,7 +329,7 @@ class StartWindow(QWidget):
             if self._is_reason(reason):
                 self._change(lambda: act(self._study.results, person.participant_id, reason, self._clock))
 
-        answers = (Reply(text=f"{verb} {person.participant_id}", key="Ctrl+D", do=carry_out), self._leave_it())
+        answers = (Option(text=f"{verb} {person.participant_id}", key="Ctrl+D", do=carry_out), self._leave_it())
         self._ask(question := QuestionBox(text, answers, reason=WHY))
         question.reason.setFocus()
 
@@ -351,7 +351,7 @@ class StartWindow(QWidget):
     def _test_shot(self) -> None:
         self._take_back()
         if self.shots.stopped:
-            sure = Reply(text="It is: test shot", key="Ctrl+S", do=lambda _: self._enter_shots())
+            sure = Option(text="It is: test shot", key="Ctrl+S", do=lambda _: self._enter_shots())
             self._ask(QuestionBox(f"{STOPPED} Is the gun where it hurts nobody?", (sure, self._leave_it())))
         else:
             self._enter_shots()

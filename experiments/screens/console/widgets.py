@@ -9,7 +9,6 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from math import ceil
 from string import Template
-from typing import Literal
 
 from PyQt6.QtCore import QEvent, QPointF, QRectF, QSize, Qt
 from PyQt6.QtGui import (
@@ -43,14 +42,23 @@ from PyQt6.QtWidgets import (
     QWidget,
 )
 
+from experiments.screens.participant.messages import Theme
 from experiments.study.register import MAX_REASON, RegisterError, check_reason
 
-Theme = Literal["dark", "light"]
 MOODS = ("act", "ask", "rest", "wait", "good", "bad")
 """What a line is about, which chooses its colour; the words say it as well."""
 
+_SHARED = {
+    "stop": "#b3261e",
+    "stop_text": "#ffffff",
+    "practice": "#5b2a86",
+    "practice_text": "#ffffff",
+    "simulated": "#ffb000",
+    "simulated_text": "#000000",
+}
 _COLOURS: dict[Theme, dict[str, str]] = {
-    "dark": {
+    "dark": _SHARED
+    | {
         "ground": "#101418",
         "panel": "#1b2229",
         "line": "#4a5764",
@@ -64,14 +72,9 @@ _COLOURS: dict[Theme, dict[str, str]] = {
         "wait": "#c8d0d8",
         "good": "#9fe0b5",
         "bad": "#ffb3a7",
-        "stop": "#b3261e",
-        "stop_text": "#ffffff",
-        "practice": "#5b2a86",
-        "practice_text": "#ffffff",
-        "simulated": "#ffb000",
-        "simulated_text": "#000000",
     },
-    "light": {
+    "light": _SHARED
+    | {
         "ground": "#ffffff",
         "panel": "#f0f3f6",
         "line": "#7a8794",
@@ -85,12 +88,6 @@ _COLOURS: dict[Theme, dict[str, str]] = {
         "wait": "#3c4852",
         "good": "#0b5028",
         "bad": "#8c1d18",
-        "stop": "#b3261e",
-        "stop_text": "#ffffff",
-        "practice": "#5b2a86",
-        "practice_text": "#ffffff",
-        "simulated": "#ffb000",
-        "simulated_text": "#000000",
     },
 }
 
@@ -172,7 +169,7 @@ Slot = Callable[[], object]
 NO_FOCUS = Qt.FocusPolicy.NoFocus
 
 
-def label(name: str, text: str = "", *, wrap: bool = True) -> QLabel:
+def text_label(name: str, text: str = "", *, wrap: bool = True) -> QLabel:
     """A label in the style of its name."""
     made = QLabel(text)
     made.setObjectName(name)
@@ -366,7 +363,7 @@ WHY = "why? (never a name)"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Reply:
+class Option:
     """An answer: what its button says, its key, and what it does with the reason that was typed."""
 
     text: str
@@ -377,7 +374,7 @@ class Reply:
 class QuestionBox(QFrame):
     """Asks one thing, until it is answered or taken back."""
 
-    def __init__(self, text: str, answers: tuple[Reply, ...], *, reason: str = "") -> None:
+    def __init__(self, text: str, answers: tuple[Option, ...], *, reason: str = "") -> None:
         super().__init__()
         self.setObjectName("panel")
         down = QVBoxLayout(self)
@@ -395,7 +392,7 @@ class QuestionBox(QFrame):
             across.addWidget(self._button(answer))
         down.addLayout(across)
 
-    def _button(self, answer: Reply) -> QWidget:
+    def _button(self, answer: Option) -> QWidget:
         return button(self, answer.text, answer.key, lambda: answer.do(self.reason.text().strip()))
 
 

@@ -38,6 +38,7 @@ from experiments.screens.console.view import (
     Trouble,
 )
 from experiments.screens.console.windows import Keyboard, remember, scaled_sheet
+from experiments.screens.participant.messages import Theme
 from experiments.screens.texts import saved_text
 from experiments.session.events import Hand, Press
 from experiments.session.remarks import Halted
@@ -80,7 +81,7 @@ class ConsoleWindow(QMainWindow):
         self._brief_until_s: float | None = None
         self._brief_for = -1
         self._lasting = ("", "good")
-        self.theme: widgets.Theme = "dark"
+        self.theme: Theme = "dark"
         self._scale = 0.0
         self._build()
         self._keyboard = Keyboard(self, clock.now)
@@ -93,8 +94,8 @@ class ConsoleWindow(QMainWindow):
     def _build(self) -> None:
         what = self.about.band or self.about.plan.experiment
         self.setWindowTitle(f"Recoil – {self.about.plan.participant_id}, {what}")
-        self.bands = [widgets.label("band", wrap=False) for _ in range(2)]
-        self.place, self.saved = widgets.label("place"), widgets.label("saved")
+        self.bands = [widgets.text_label("band", wrap=False) for _ in range(2)]
+        self.place, self.saved = widgets.text_label("place"), widgets.text_label("saved")
         self.notice, self.fields, self.side, self.buttons = Notice(), TextFields(), SidePanel(self.about), Buttons(self)
         self.bars = Bars(self.about)
         self._main = QWidget()

@@ -79,7 +79,7 @@ _STEP_S = 0.004
 """How long the program rests between two looks at words, mouse and keys."""
 
 
-def run(look: Look, heard: BinaryIO, said: BinaryIO) -> int:
+def run_program(look: Look, heard: BinaryIO, said: BinaryIO) -> int:
     """Run the program; whatever ends it but the console is said as `ScreenFailed`. Gives back the exit code."""
     wire = Wire(heard, said, time.monotonic)
     try:

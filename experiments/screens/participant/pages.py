@@ -17,7 +17,7 @@ from experiments.screens.participant.messages import (
     DirectionGiven,
     RatingGiven,
 )
-from experiments.screens.participant.stage import Box, KeyPresses, Page, Stage, half_width
+from experiments.screens.participant.stage import KeyPresses, Page, Stage, TextBox, half_width
 from experiments.session.steps import on_scale
 
 Drafts = dict[int, float | str]
@@ -28,7 +28,7 @@ class MessagePage(Page):
     """A plain message in the middle."""
 
     def __init__(self, stage: Stage, text: str) -> None:
-        box = Box(y=0, width=2 * stage.half_width, height=0.9, anchor="center")
+        box = TextBox(y=0, width=2 * stage.half_width, height=0.9, anchor="center")
         self._text = stage.text(text, box, 0.06, stage.palette.ink)
 
     def draw(self) -> None:
@@ -46,16 +46,16 @@ class DirectionPage(Page):
         self._asked, self._keys, self._now = asked, keys, stage.toolkit.now
         self._since_s = math.inf if asked.once_seen else asked.onset_s
         width, ink = stage.half_width, stage.palette.ink
-        question = Box(y=0.4, width=2 * width, height=0.25)
+        question = TextBox(y=0.4, width=2 * width, height=0.25)
         self._drawn = [stage.text(asked.question, question, 0.06, ink)]
         for x, key, answer in (
             (-width / 2, asked.forward_key, asked.forward),
             (width / 2, asked.backward_key, asked.backward),
         ):
-            self._drawn.append(stage.panel(Box(x=x, y=-0.12, width=0.9 * width, height=0.4), stage.palette.panel))
-            letter = Box(x=x, y=-0.06, width=0.8 * width, height=0.16, anchor="center")
+            self._drawn.append(stage.panel(TextBox(x=x, y=-0.12, width=0.9 * width, height=0.4), stage.palette.panel))
+            letter = TextBox(x=x, y=-0.06, width=0.8 * width, height=0.16, anchor="center")
             self._drawn.append(stage.text(_key_text(key), letter, 0.12, stage.palette.accent))
-            words = Box(x=x, y=-0.22, width=0.8 * width, height=0.12, anchor="center")
+            words = TextBox(x=x, y=-0.22, width=0.8 * width, height=0.12, anchor="center")
             self._drawn.append(stage.text(answer, words, 0.055, ink))
 
     def draw(self) -> None:
@@ -92,8 +92,8 @@ class Button:
     """A button that can be pressed once there is something to confirm."""
 
     def __init__(self, stage: Stage, text: str) -> None:
-        self._box = Box(y=-0.34, width=0.36, height=0.1, anchor="center")
-        inner = Box(y=self._box.y, width=0.32, height=0.08, anchor="center")
+        self._box = TextBox(y=-0.34, width=0.36, height=0.1, anchor="center")
+        inner = TextBox(y=self._box.y, width=0.32, height=0.08, anchor="center")
         colors = stage.palette
         self._off = [stage.panel(self._box, colors.panel), stage.text(text, inner, 0.045, colors.muted)]
         self._on = [stage.panel(self._box, colors.accent), stage.text(text, inner, 0.045, colors.on_accent)]
@@ -113,14 +113,14 @@ def heading(stage: Stage, asked: AskRating | AskDescription) -> list[Any]:
     width = 2 * stage.half_width
     which = f"Feedback {asked.number} of {asked.of}"
     return [
-        stage.text(which, Box(y=0.46, width=width, height=0.07), 0.05, stage.palette.accent),
-        stage.text(asked.question, Box(y=0.37, width=width, height=0.3), 0.045, stage.palette.ink),
+        stage.text(which, TextBox(y=0.46, width=width, height=0.07), 0.05, stage.palette.accent),
+        stage.text(asked.question, TextBox(y=0.37, width=width, height=0.3), 0.045, stage.palette.ink),
     ]
 
 
 def hint(stage: Stage, text: str) -> Any:
     """How to answer, small, at the foot."""
-    return stage.text(text, Box(y=-0.425, width=2 * stage.half_width, height=0.05), 0.034, stage.palette.muted)
+    return stage.text(text, TextBox(y=-0.425, width=2 * stage.half_width, height=0.05), 0.034, stage.palette.muted)
 
 
 Move = Literal["left", "right", "far left", "far right", "first", "last"]
@@ -275,8 +275,8 @@ class RatingPage(Page):
             (-self._half, self._asked.minimum, self._asked.minimum_text),
             (self._half, self._asked.maximum, self._asked.maximum_text),
         ):
-            drawn.append(self._stage.text(f"{number:g}", Box(x=x, y=-0.105, width=width, height=0.06), 0.04, ink))
-            drawn.append(self._stage.text(words, Box(x=x, y=-0.155, width=width, height=0.12), 0.04, ink))
+            drawn.append(self._stage.text(f"{number:g}", TextBox(x=x, y=-0.105, width=width, height=0.06), 0.04, ink))
+            drawn.append(self._stage.text(words, TextBox(x=x, y=-0.155, width=width, height=0.12), 0.04, ink))
         return drawn
 
 
@@ -307,7 +307,7 @@ class DescriptionPage(Page):
         self._asked, self._drafts = asked, drafts
         self._now, self._drawn_s = stage.toolkit.now, math.inf
         self._done = self._full = False
-        place = Box(y=-0.03, width=2 * stage.half_width, height=0.44)
+        place = TextBox(y=-0.03, width=2 * stage.half_width, height=0.44)
         self._size = 0
         self._height_px = stage.height_px
         self._room_px = (place.height - 2 * _PADDING) * stage.height_px
@@ -364,7 +364,7 @@ class DescriptionPage(Page):
         self._box.text = self._box.text
 
 
-def _text_box(stage: Stage, place: Box, text: str) -> Any:
+def _text_box(stage: Stage, place: TextBox, text: str) -> Any:
     return stage.toolkit.visual.TextBox2(
         stage.window,
         text=text,

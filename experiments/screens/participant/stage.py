@@ -129,7 +129,7 @@ class Page:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Box:
+class TextBox:
     """Where text goes: its anchor point, how large it may be, and what of it stands at the anchor."""
 
     x: float = 0.0
@@ -203,7 +203,7 @@ class Stage:
         """A place in pixels from the lower left, as a place of this window."""
         return (x_px - self.width_px / 2) / self.height_px, y_px / self.height_px - 0.5
 
-    def text(self, text: str, box: Box, size: float, color: str) -> Any:
+    def text(self, text: str, box: TextBox, size: float, color: str) -> Any:
         """Text that fits its box: smaller than asked if it must."""
         while True:
             stimulus = self._text(text, box, size, color)
@@ -213,7 +213,7 @@ class Stage:
                 return stimulus
             size *= _SHRINK
 
-    def _text(self, text: str, box: Box, size: float, color: str) -> Any:
+    def _text(self, text: str, box: TextBox, size: float, color: str) -> Any:
         return self.toolkit.visual.TextStim(
             self.window,
             text=text or " ",  # PsychoPy cannot measure no text
@@ -228,7 +228,7 @@ class Stage:
             color=color,
         )
 
-    def panel(self, box: Box, fill: str, line: str | None = None) -> Any:
+    def panel(self, box: TextBox, fill: str, line: str | None = None) -> Any:
         """A filled rectangle; its box's place is its middle."""
         return self.toolkit.visual.Rect(
             self.window,
