@@ -15,8 +15,6 @@ LOOK_S = 0.05
 _SMALLEST_PX = 400
 """Qt keeps small windows of its own; what people work at is wider."""
 
-_NAMES = {" ": "space", "\n": "Return", ".": "period", "-": "minus", ",": "comma", "?": "question"}
-
 
 class NoDisplay(Exception):  # noqa: N818 - a machine may well have none
     """There is no X display that takes synthetic events."""
@@ -63,12 +61,6 @@ class Hands:
         for key in (name, *reversed(held)):
             self.key_up(key)
         return pressed_s
-
-    def type(self, text: str) -> None:
-        """Type text of letters, digits and blanks, and what stands in `_NAMES`."""
-        for letter in text:
-            shifted = letter.isupper() or letter == "?"
-            self.press(_NAMES.get(letter, letter.lower()), *(["Shift_L"] if shifted else []))
 
     def move(self, x_px: int, y_px: int) -> None:
         """Move the pointer to a place of the display, in pixels from its upper left."""

@@ -18,6 +18,7 @@ from experiments.config.setup import Setup
 from experiments.design.plan import Plan
 from experiments.live_run import LiveRun, RunStopped, Screen
 from experiments.run import Finished, Request, run
+from experiments.screens.console.controls import Controls
 from experiments.screens.console.participant_link import ParticipantSide
 from experiments.screens.console.view import (
     THANK_PARTICIPANT,
@@ -123,21 +124,32 @@ class Console:
     # in Qt's own thread
 
     def _open(self, about: About) -> None:
-        self.window = ConsoleWindow(
-            about, self.clock, hand=self._hand, participant=self.participant, observer=self.observer
-        )
+        self.window = ConsoleWindow(about, self.clock)
         self.window.closed.connect(self._loop.quit)
         open_as_left(self.window, "run")
         self.window.activateWindow()
         self._opened.set()
 
     def _take(self, message: Message) -> None:
+        if self.window is not None and isinstance(message, Began):
+            self.window.begin(message.live, self._controls(self.window, message.live))
         if self.window is not None:
             self.window.take(message)
         if isinstance(message, Ended) and self.window is None:
             self._loop.quit()
         elif isinstance(message, Ended) and self._closes and self.window is not None:
             self.window.close()
+
+    def _controls(self, window: ConsoleWindow, live: LiveRun) -> Controls:
+        return Controls(
+            live,
+            self.clock,
+            window,
+            scale=getattr(window.about.setup.config, "rating", None),
+            hand=self._hand,
+            participant=self.participant,
+            observer=self.observer,
+        )
 
     def _leave(self, reason: str) -> None:
         """Stop the run, and close the window when it has ended."""

@@ -163,8 +163,10 @@ class Controls:
             self._held = None
             self._view.say(f"Let go too soon: hold it for {REARM_HELD_S:g} s.", "wait")
 
-    def tick(self) -> None:
-        """Look whether it was held for long enough."""
+    def tick(self, *, here: bool = True) -> None:
+        """Look whether it was held for long enough, and whether a line or a page takes what is typed `here`."""
+        if self._participant is not None:
+            self._participant.covered = here and self.covered
         press = self._held
         if press is not None and (held_s := self._clock.now() - press.at_s) >= REARM_HELD_S:
             self._held = None

@@ -14,17 +14,8 @@ from device.words import Direction
 from experiments.config.setup import Setup
 from experiments.live_run import LiveRun
 from experiments.screens.console.view import Message, ParticipantSeen, Trouble
+from experiments.screens.participant import messages
 from experiments.screens.participant.link import ParticipantError, ParticipantLink
-from experiments.screens.participant.messages import (
-    BETWEEN,
-    AskDescription,
-    AskDirection,
-    AskRating,
-    EmergencyPressed,
-    Focused,
-    KeyPressed,
-    NoiseIs,
-)
 from experiments.session import events
 from experiments.session.events import OwnHand
 from experiments.session.states import Position, State
@@ -52,7 +43,7 @@ class ParticipantSide:
         *,
         rates: bool,
         own_keys: bool,
-        noise: NoiseIs | None = None,
+        noise: messages.NoiseIs | None = None,
         hand: OwnHand = "participant",
     ) -> None:
         self._link, self._open_link, self._setup = link, open_link, setup
@@ -97,7 +88,7 @@ class ParticipantSide:
             self._shows = shows
             if isinstance(shows, str):
                 told = tuple(_KEYS) if self.own_keys and shows == PAUSED else ()
-                self._link.show(shows, tell=told, keep_keys=shows == BETWEEN)
+                self._link.show(shows, tell=told, keep_keys=shows == messages.BETWEEN)
             else:
                 self._link.cancel()
                 threading.Thread(target=self._ask, args=(position,), daemon=True, name="participant").start()
@@ -109,7 +100,7 @@ class ParticipantSide:
         if (base is State.ASKING and self.own_keys) or (base in (State.RATING, State.DESCRIBING) and by_screen):
             return position.number
         if base is State.SAVING and by_screen:
-            return BETWEEN
+            return messages.BETWEEN
         return THANKS if base in (State.CLOSING, State.STOPPED) else WAIT
 
     def _ask(self, position: Position) -> None:
@@ -133,7 +124,7 @@ class ParticipantSide:
     def _judged(self, step: Ask, position: Position, wanted: Wanted) -> None:
         onset_s = position.since_s if position.onset_s is None else position.onset_s
         paused = self._live is not None and self._live.paused_between(onset_s, position.since_s)
-        question = AskDirection(
+        question = messages.AskDirection(
             question=step.question,
             forward=step.forward,
             backward=step.backward,
@@ -145,7 +136,7 @@ class ParticipantSide:
         while wanted() and not self._keyed(question, position, wanted):
             question = replace(question, once_seen=True)  # it was refused: the next key counts
 
-    def _keyed(self, question: AskDirection, position: Position, wanted: Wanted) -> bool:
+    def _keyed(self, question: messages.AskDirection, position: Position, wanted: Wanted) -> bool:
         """Have the participant press a key; whether it was taken for the answer."""
         given = self._link.ask_direction(question, wanted=wanted)
         key = events.ParticipantKey(
@@ -158,7 +149,7 @@ class ParticipantSide:
 
     def _rated(self, step: Rate, position: Position, wanted: Wanted) -> None:
         given = self._link.ask_rating(
-            AskRating(
+            messages.AskRating(
                 number=step.trial.trial,
                 of=self._setup.config.design.trials,
                 question=step.question,
@@ -176,7 +167,8 @@ class ParticipantSide:
     def _described(self, step: Describe, position: Position, wanted: Wanted) -> None:
         of = self._setup.config.design.trials
         given = self._link.ask_description(
-            AskDescription(number=step.trial.trial, of=of, question=step.question, draft=position.number), wanted=wanted
+            messages.AskDescription(number=step.trial.trial, of=of, question=step.question, draft=position.number),
+            wanted=wanted,
         )
         self._offer(events.ParticipantDescribed(text=given.comment, step=position.number, by=self._hand))
 
@@ -184,14 +176,14 @@ class ParticipantSide:
         if self._live is not None:
             self._live.offer(event)
 
-    def _heard(self, word: EmergencyPressed | Focused | KeyPressed) -> None:
+    def _heard(self, word: messages.EmergencyPressed | messages.Focused | messages.KeyPressed) -> None:
         """What comes from there without a question: the emergency stop, whose the keys are, keys in a pause."""
         match word:
-            case EmergencyPressed():
+            case messages.EmergencyPressed():
                 self._offer(events.EmergencyStop(by="participant"))
-            case Focused():
+            case messages.Focused():
                 self._tell(ParticipantSeen(focused=word.on))
-            case KeyPressed() if self._live is not None and word.name in _KEYS:
+            case messages.KeyPressed() if self._live is not None and word.name in _KEYS:
                 number, now_s = self._live.position.number, self._live.clock.now()
                 self._offer(events.ParticipantKey(response=_KEYS[word.name], at_s=now_s, step=number))
 

@@ -5,8 +5,6 @@ It decides nothing: keys and buttons become events, and the table of states judg
 
 from __future__ import annotations
 
-from typing import Any
-
 from PyQt6.QtCore import QTimer, pyqtSignal
 from PyQt6.QtGui import QCloseEvent, QResizeEvent, QShowEvent
 from PyQt6.QtWidgets import (
@@ -23,7 +21,6 @@ from experiments.screens.console import view, widgets, windows
 from experiments.screens.console.controls import Controls, TextField
 from experiments.screens.console.keys import Name, Typing
 from experiments.screens.console.panels import FITS, Bars, Buttons, Notice, SidePanel, TextFields, TextPage
-from experiments.screens.console.participant_link import ParticipantSide
 from experiments.screens.console.progress import RunProgress, marks
 from experiments.screens.console.view import (
     About,
@@ -40,7 +37,7 @@ from experiments.screens.console.view import (
 from experiments.screens.console.windows import Keyboard, remember, scaled_sheet
 from experiments.screens.participant.messages import Theme
 from experiments.screens.texts import saved_text
-from experiments.session.events import Hand, Press
+from experiments.session.events import Press
 from experiments.session.remarks import Halted
 from experiments.session.states import Position
 from experiments.session.steps import Failed, Rested
@@ -59,18 +56,9 @@ class ConsoleWindow(QMainWindow):
 
     closed = pyqtSignal()
 
-    def __init__(
-        self,
-        about: About,
-        clock: Clock,
-        *,
-        hand: Hand = "experimenter",
-        participant: ParticipantSide | None = None,
-        observer: Any = None,
-    ) -> None:
+    def __init__(self, about: About, clock: Clock) -> None:
         super().__init__()
         self.about, self.clock = about, clock
-        self._hand, self._participant_side, self._observer = hand, participant, observer
         self.live: LiveRun | None = None
         self.controls: Controls | None = None
         self.drawn = Position()
@@ -129,11 +117,15 @@ class ConsoleWindow(QMainWindow):
 
     # messages
 
+    def begin(self, live: LiveRun, controls: Controls) -> None:
+        """A live run is there, and who works it."""
+        self.live, self.controls = live, controls
+
     def take(self, message: Message) -> None:  # noqa: C901 - one case a message
         """Take a message from the run, show it, and say when it was painted."""
         match message:
             case Began():
-                self._begin(message.live)
+                self._arrive()
             case Saved():
                 self._acknowledge(message)
             case GunSeen():
@@ -150,20 +142,6 @@ class ConsoleWindow(QMainWindow):
         if isinstance(message, Shown | Began) and self.live is not None:
             self.repaint()
             self.live.painted(self.drawn.serial, self.clock.now())
-
-    def _begin(self, live: LiveRun) -> None:
-        self.live = live
-        scale = getattr(self.about.setup.config, "rating", None)
-        self.controls = Controls(
-            live,
-            self.clock,
-            self,
-            scale=scale,
-            hand=self._hand,
-            participant=self._participant_side,
-            observer=self._observer,
-        )
-        self._arrive()
 
     def _end(self, message: Ended) -> None:
         self.ended = message
@@ -239,9 +217,7 @@ class ConsoleWindow(QMainWindow):
     def refresh(self) -> None:
         """Show what is so now."""
         if self.controls is not None:
-            self.controls.tick()
-            if self._participant_side is not None:
-                self._participant_side.covered = self.controls.covered and self.isActiveWindow()
+            self.controls.tick(here=self.isActiveWindow())
         seen = self.seen
         self.notice.put(view.instruction(seen))
         self.place.setText(view.where_text(seen))

@@ -22,29 +22,8 @@ from pydantic import ValidationError
 
 from device.words import RecoilError
 from experiments.clock import Clock, RealClock
-from experiments.screens.participant.messages import (
-    AskDescription,
-    AskDirection,
-    AskRating,
-    CloseScreen,
-    DescriptionGiven,
-    DirectionGiven,
-    Focused,
-    FromParticipant,
-    Look,
-    Noise,
-    NoiseIs,
-    Ping,
-    Pong,
-    RatingGiven,
-    Ready,
-    ScreenFailed,
-    Show,
-    Unasked,
-    arguments,
-    from_participant_from,
-    line,
-)
+from experiments.screens.participant import messages
+from experiments.screens.participant.messages import line
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -104,8 +83,8 @@ NOISE_S = 15.0
 MAX_CLOCK_STEP_S = 0.02
 """How far the clocks may move against each other while a direction is asked; a clock that was set moves further."""
 
-_Asked = AskRating | AskDescription | AskDirection | Noise
-_Given = TypeVar("_Given", RatingGiven, DescriptionGiven, DirectionGiven, NoiseIs)
+_Asked = messages.AskRating | messages.AskDescription | messages.AskDirection | messages.Noise
+_Given = TypeVar("_Given", messages.RatingGiven, messages.DescriptionGiven, messages.DirectionGiven, messages.NoiseIs)
 
 
 class ParticipantLink:
@@ -116,12 +95,11 @@ class ParticipantLink:
         self._mail = Mailbox()
         self._asking = threading.RLock()
         self._page = threading.Lock()
-        self._focused: Focused | None = None
+        self._focused: messages.Focused | None = None
         """Whose the keys are, as far as it was said."""
         self._stands = 0
         """The question that was put on the screen last; 0 when something else was."""
-        self._clocks: ClockMap | None = None
-        self._heard: Callable[[Unasked], None] = lambda _: None
+        self._heard: Callable[[messages.Unasked], None] = lambda _: None
         self._gone: Callable[[str], None] = lambda _: None
         try:
             self._process = ParticipantProcess(command, self._said, self._failed)
@@ -130,10 +108,15 @@ class ParticipantLink:
 
     @classmethod
     def start(
-        cls, look: Look | None = None, *, clock: Clock | None = None, command: Sequence[str] | None = None
+        cls, look: messages.Look | None = None, *, clock: Clock | None = None, command: Sequence[str] | None = None
     ) -> Self:
         """Start the program and return at once; its window takes seconds to open. `command` is another program."""
-        program = command or (sys.executable, "-m", "experiments.screens.participant", *arguments(look or Look()))
+        program = command or (
+            sys.executable,
+            "-m",
+            "experiments.screens.participant",
+            *messages.arguments(look or messages.Look()),
+        )
         return cls(program, clock or RealClock())
 
     @property
@@ -147,22 +130,17 @@ class ParticipantLink:
         return self._mail.asking
 
     @property
-    def clocks(self) -> ClockMap | None:
-        """The last mapping of the clocks, with its uncertainty; `None` before the first."""
-        return self._clocks
-
-    @property
     def pid(self) -> int:
         """The process id of the program."""
         return self._process.pid
 
-    def wait_ready(self, timeout_s: float = 60.0) -> Ready:
+    def wait_ready(self, timeout_s: float = 60.0) -> messages.Ready:
         """Wait until the window is open, and map the clocks."""
-        ready = self._mail.wait(Ready, lambda _: True, timeout_s, None)
+        ready = self._mail.wait(messages.Ready, lambda _: True, timeout_s, None)
         self.map_clocks()
         return ready
 
-    def listen(self, heard: Callable[[Unasked], None], gone: Callable[[str], None]) -> None:
+    def listen(self, heard: Callable[[messages.Unasked], None], gone: Callable[[str], None]) -> None:
         """Have somebody told what is said without a question, and why the screen is gone if it goes."""
         self._heard, self._gone = heard, gone
         if self._focused is not None:
@@ -178,34 +156,43 @@ class ParticipantLink:
         with self._page:
             self._mail.call_off()
             self._stands = 0
-            self._process.write(line(Show(text=text, tell=tell, keep_keys=keep_keys)))
+            self._process.write(line(messages.Show(text=text, tell=tell, keep_keys=keep_keys)))
 
     def map_clocks(self, pings: int = PINGS) -> ClockMap:
         """Map the clocks anew."""
         with self._alone():
-            self._clocks = clock_map([self._trip() for _ in range(pings)])
-            return self._clocks
+            return clock_map([self._trip() for _ in range(pings)])
 
     def ask_rating(
-        self, question: AskRating, timeout_s: float | None = None, *, wanted: Callable[[], bool] = lambda: True
-    ) -> RatingGiven:
+        self, question: messages.AskRating, timeout_s: float | None = None, *, wanted: Callable[[], bool] = lambda: True
+    ) -> messages.RatingGiven:
         """Have a stimulus rated. Waits for the participant.
 
         `wanted` is looked at just before the question is put on the screen; if it is not, it counts as called off.
         """
         with self._alone():
-            return self._answer(replace(question, ask=self._mail.open_ask()), RatingGiven, timeout_s, wanted)
+            return self._answer(replace(question, ask=self._mail.open_ask()), messages.RatingGiven, timeout_s, wanted)
 
     def ask_description(
-        self, question: AskDescription, timeout_s: float | None = None, *, wanted: Callable[[], bool] = lambda: True
-    ) -> DescriptionGiven:
+        self,
+        question: messages.AskDescription,
+        timeout_s: float | None = None,
+        *,
+        wanted: Callable[[], bool] = lambda: True,
+    ) -> messages.DescriptionGiven:
         """Have a stimulus described. Waits for the participant. `wanted` as of a rating."""
         with self._alone():
-            return self._answer(replace(question, ask=self._mail.open_ask()), DescriptionGiven, timeout_s, wanted)
+            return self._answer(
+                replace(question, ask=self._mail.open_ask()), messages.DescriptionGiven, timeout_s, wanted
+            )
 
     def ask_direction(
-        self, question: AskDirection, timeout_s: float | None = None, *, wanted: Callable[[], bool] = lambda: True
-    ) -> DirectionGiven:
+        self,
+        question: messages.AskDirection,
+        timeout_s: float | None = None,
+        *,
+        wanted: Callable[[], bool] = lambda: True,
+    ) -> messages.DirectionGiven:
         """Have a direction judged. Waits for the participant. `onset_s` and `pressed_s` are on this side's clock.
 
         `wanted` as of a rating.
@@ -213,7 +200,7 @@ class ParticipantLink:
         with self._alone():
             ask, clocks = self._mail.open_ask(), self.map_clocks()
             asked = replace(question, ask=ask, onset_s=clocks.there(question.onset_s))
-            given = self._answer(asked, DirectionGiven, timeout_s, wanted)
+            given = self._answer(asked, messages.DirectionGiven, timeout_s, wanted)
             after = self.map_clocks()
         if surely_moved_s(clocks, after) > MAX_CLOCK_STEP_S:
             moved_s = after.offset_s - clocks.offset_s
@@ -222,10 +209,12 @@ class ParticipantLink:
             )
         return replace(given, pressed_s=clocks.here(given.pressed_s))
 
-    def noise(self, on: bool, level: float = 0.3) -> NoiseIs:
+    def noise(self, on: bool, level: float = 0.3) -> messages.NoiseIs:
         """Turn the masking noise on or off; the answer says whether it plays, and if it cannot, why."""
         with self._alone():
-            return self._answer(Noise(on=on, level=level, ask=self._mail.open_ask()), NoiseIs, NOISE_S, lambda: True)
+            return self._answer(
+                messages.Noise(on=on, level=level, ask=self._mail.open_ask()), messages.NoiseIs, NOISE_S, lambda: True
+            )
 
     def cancel(self) -> bool:
         """Call off the question that is being asked, from another thread; true if there was one."""
@@ -234,7 +223,7 @@ class ParticipantLink:
     def close(self) -> None:
         """End the program: by asking, then by force. Who still waits for it is told."""
         self._gone = lambda _: None
-        self._process.write(line(CloseScreen()))
+        self._process.write(line(messages.CloseScreen()))
         self._mail.fail("the participant's screen was closed by the console")
         self._process.end()
 
@@ -275,25 +264,25 @@ class ParticipantLink:
     def _take_off(self, asked: _Asked) -> None:
         with self._page:
             if self._stands == asked.ask:
-                self._process.write(line(Show(text="")))
+                self._process.write(line(messages.Show(text="")))
 
     def _trip(self) -> RoundTrip:
         """One ping, waited for where its return is stamped."""
         sent_s = self._clock.now()
-        self._process.write(line(Ping(sent_s=sent_s)))
-        pong = self._mail.wait(Pong, lambda pong: pong.sent_s == sent_s, REPLY_S, None)
+        self._process.write(line(messages.Ping(sent_s=sent_s)))
+        pong = self._mail.wait(messages.Pong, lambda pong: pong.sent_s == sent_s, REPLY_S, None)
         return RoundTrip(sent_s=sent_s, there_s=pong.there_s, back_s=self._clock.now())
 
     def _said(self, wire: bytes) -> None:
         try:
-            word = from_participant_from(wire)
+            word = messages.from_participant_from(wire)
         except ValidationError:
             self._failed(f"the participant's screen said what is no word: {wire[:200]!r}")
             return
-        if isinstance(word, ScreenFailed):
+        if isinstance(word, messages.ScreenFailed):
             self._failed(f"the participant's screen failed: {word.message}")
-        elif isinstance(word, Unasked):
-            self._focused = word if isinstance(word, Focused) else self._focused
+        elif isinstance(word, messages.Unasked):
+            self._focused = word if isinstance(word, messages.Focused) else self._focused
             self._heard(word)
         else:
             self._mail.put(word)
@@ -392,7 +381,7 @@ def _ending(code: int | None) -> str:
     return f"was killed by signal {-code}" if code < 0 else f"ended with exit code {code}"
 
 
-_Kind = TypeVar("_Kind", bound=FromParticipant)
+_Kind = TypeVar("_Kind", bound=messages.FromParticipant)
 
 
 class ParticipantError(RecoilError):
@@ -404,12 +393,12 @@ class Mailbox:
 
     def __init__(self) -> None:
         self._news = threading.Condition()
-        self._last: dict[type, FromParticipant] = {}
+        self._last: dict[type, messages.FromParticipant] = {}
         self._asked = 0
         self._open: int | None = None
         self.failure: str | None = None
 
-    def put(self, word: FromParticipant) -> None:
+    def put(self, word: messages.FromParticipant) -> None:
         """Keep a word for who waits for it."""
         with self._news:
             self._last[type(word)] = word

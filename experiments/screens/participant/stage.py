@@ -310,7 +310,6 @@ class Toolkit:
 
     version: str
     visual: Any
-    event: Any
     keyboard: Any
     key_epoch_s: float
     key: Any
@@ -342,7 +341,7 @@ def load_toolkit() -> Toolkit:
     """Import PsychoPy. What it raises without a display or without a part of itself passes through."""
     # imported when used: see above
     import psychopy  # noqa: PLC0415
-    from psychopy import clock, event, logging, visual  # noqa: PLC0415
+    from psychopy import clock, logging, visual  # noqa: PLC0415
     from psychopy.hardware import keyboard  # noqa: PLC0415
     from pyglet.window import key  # noqa: PLC0415
 
@@ -350,7 +349,6 @@ def load_toolkit() -> Toolkit:
     return Toolkit(
         version=psychopy.__version__,
         visual=visual,
-        event=event,
         keyboard=keyboard,
         key_epoch_s=logging.defaultClock.getLastResetTime(),
         key=key,
