@@ -5,9 +5,9 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 
 from device.limits import DriveHistory, Load, load_of, planned_start_s
-from device.methods import Method, rendering_of
+from device.methods import Method, Rendering, rendering_of
 from device.parameters import GunParameters
-from device.words import GunState, GunStatus, Identity, LimitError, LinkError, Shot, ShotReport
+from device.words import Drive, GunState, GunStatus, Identity, LimitError, LinkError, Shot, ShotReport
 
 MODEL_VERSION = "1"
 """Counts up whenever the same shot would be predicted otherwise."""
@@ -18,6 +18,7 @@ class SimulatedGun:
 
     def __init__(self, methods: Mapping[str, Method], clock: Callable[[], float]) -> None:
         self._methods = dict(methods)
+        self._rendered: dict[tuple[str, Drive], tuple[Rendering, Load]] = {}
         self._clock = clock
         self._history = DriveHistory()
         self._born_s = clock()
@@ -46,9 +47,7 @@ class SimulatedGun:
             raise LimitError("the gun is disarmed; arm it before it may fire")
         if not isinstance(shot, Shot):
             raise LimitError(f"shot is {shot!r}; it must be a Shot")
-        method = self._method(shot.method)
-        rendering = rendering_of(method, shot.drive)
-        load = _load(method, shot)
+        rendering, load = self._render(shot)
         now_s = self._clock()
         onset_s = planned_start_s(now_s, at_s)
         self._history = self._history.record(load, onset_s, onset_s + rendering.settle_s)
@@ -86,10 +85,15 @@ class SimulatedGun:
             return "disarmed"
         return "armed" if self._history.is_ready(now_s) else "resetting"
 
-    def _method(self, name: str) -> Method:
-        if name not in self._methods:
-            raise LimitError(f"method is {name!r}; this gun renders {', '.join(self._methods)}")
-        return self._methods[name]
+    def _render(self, shot: Shot) -> tuple[Rendering, Load]:
+        """What the model says of a shot, and what it costs: the same for every shot of a method and drive."""
+        if shot.method not in self._methods:
+            raise LimitError(f"method is {shot.method!r}; this gun renders {', '.join(self._methods)}")
+        kind = (shot.method, shot.drive)
+        if kind not in self._rendered:
+            method = self._methods[shot.method]
+            self._rendered[kind] = rendering_of(method, shot.drive), _load(method, shot)
+        return self._rendered[kind]
 
     def _is_open(self) -> None:
         if self._closed:

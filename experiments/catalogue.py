@@ -1,9 +1,13 @@
-"""The experiments that Recoil knows. A new one is a folder beside `direction/` and a line in `CATALOGUE`."""
+"""The experiments that Recoil knows, and the table that each makes of a journal.
+
+A new experiment is a folder beside `direction/` and a line in `CATALOGUE`.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Any
 
 from experiments.config.models import ExperimentConfig
@@ -20,8 +24,11 @@ from experiments.preference.config import PreferenceConfig
 from experiments.preference.session import make_plan as preference_plan
 from experiments.preference.session import rows as preference_rows
 from experiments.preference.session import session as preference_session
-from experiments.record.tables import Row
-from experiments.session.history import Told
+from experiments.record import replay
+from experiments.record.columns import FILE_SUFFIX
+from experiments.record.journal import Contents, JournalError, read
+from experiments.record.tables import Row, table_bytes
+from experiments.session.history import History
 from experiments.session.steps import Session
 
 
@@ -33,8 +40,8 @@ class Experiment:
     make_plan: Callable[[Any, str, int, int | None], Plan]
     make_practice: Callable[[Any, str, int], Plan | None]
     session: Callable[[Plan, Setup[Any]], Session]
-    rows: Callable[[Plan, Told], list[Row]]
-    observer: Callable[[Setup[Any], Plan], Any]
+    rows: Callable[[Plan, History], list[Row]]
+    synthetic_participant: Callable[[Setup[Any], Plan], Any]
     answer_columns: tuple[str, ...]
 
 
@@ -45,7 +52,7 @@ CATALOGUE: dict[str, Experiment] = {
         make_practice=direction_practice,
         session=direction_session,
         rows=direction_rows,
-        observer=direction_synthetic.synthetic_participant,
+        synthetic_participant=direction_synthetic.synthetic_participant,
         answer_columns=direction_synthetic.TABLE_COLUMNS,
     ),
     "preference": Experiment(
@@ -54,7 +61,7 @@ CATALOGUE: dict[str, Experiment] = {
         make_practice=lambda *_: None,
         session=preference_session,
         rows=preference_rows,
-        observer=preference_synthetic.synthetic_participant,
+        synthetic_participant=preference_synthetic.synthetic_participant,
         answer_columns=preference_synthetic.TABLE_COLUMNS,
     ),
 }
@@ -63,3 +70,21 @@ CATALOGUE: dict[str, Experiment] = {
 def experiment(setup: Setup[Any]) -> Experiment:
     """The experiment that a setup is of."""
     return CATALOGUE[setup.config.experiment]
+
+
+def table(contents: Contents) -> bytes:
+    """The CSV that a journal makes. `JournalError` if this version does not know its plan."""
+    plan = contents.plan
+    if plan.experiment not in CATALOGUE:
+        raise JournalError(
+            f"{contents.path}: line 1: experiment {plan.experiment!r} is not known to this version of Recoil"
+        )
+    return table_bytes(plan.experiment, CATALOGUE[plan.experiment].rows(plan, replay.history(contents)))
+
+
+def rebuild(path: Path) -> tuple[Path, bytes, Contents]:
+    """The table of a journal: where it belongs, its bytes, and what the journal holds."""
+    contents = read(path)
+    data = table(contents)
+    name = path.name.replace("_journal", f"_{FILE_SUFFIX[contents.plan.experiment]}")
+    return path.with_name(name).with_suffix(".csv"), data, contents

@@ -11,7 +11,7 @@ from device import LimitError
 from device.limits import MAX_SHOTS_PER_MINUTE, DriveHistory, Load, load_of
 from device.methods import drive_of, rendering_of
 from device.parameters import GunParameters
-from device.words import Drive, Pulse
+from device.words import Drive
 from experiments.config.door import ConfigError
 from experiments.config.gun import GunConfig
 from experiments.config.setup import Setup
@@ -25,17 +25,6 @@ class MethodLimits:
     method: str
     drive: Drive
     settle_s: float
-
-    @property
-    def duty(self) -> float:
-        """Largest share of time that the coil is driven: shots as fast as the model allows."""
-        return self.drive.pulse_s / self.settle_s if isinstance(self.drive, Pulse) else 0.0
-
-
-def drives(setup: Setup[Any]) -> dict[str, Drive]:
-    """How each method of a setup is driven."""
-    methods = setup.gun.renderings(setup.config.design.methods)
-    return {name: drive_of(method) for name, method in methods.items()}
 
 
 def check_limits(setup: Setup[Any]) -> list[MethodLimits]:

@@ -9,7 +9,6 @@ from __future__ import annotations
 import math
 import threading
 from collections import deque
-from collections.abc import Sequence
 from concurrent.futures import Future
 from dataclasses import dataclass, replace
 from typing import Protocol
@@ -21,7 +20,7 @@ from experiments.design.plan import Plan, Trial
 from experiments.record.journal import Journal, JournalGone
 from experiments.session import events, judging
 from experiments.session.events import DISARMS, TYPED, Event, Press
-from experiments.session.history import Told
+from experiments.session.history import History
 from experiments.session.judging import Moment, refused, remark_of
 from experiments.session.remarks import Remark, record
 from experiments.session.states import ARMED, Position, State, entered
@@ -81,14 +80,22 @@ class Screen(Protocol):
 
 
 class LiveRun:
-    """Where a run is, and what was told so far. Every method but `enter`, `wait` and `sleep` from any thread."""
+    """Where a run is, and what was done so far. Every method but `enter`, `wait` and `sleep` from any thread."""
 
     def __init__(
-        self, *, plan: Plan, gun: Gun, journal: Journal, clock: Clock, screen: Screen, guard_s: float, told: Told = ()
+        self,
+        *,
+        plan: Plan,
+        gun: Gun,
+        journal: Journal,
+        clock: Clock,
+        screen: Screen,
+        guard_s: float,
+        history: History = (),
     ) -> None:
         self.plan, self.clock, self.guard_s = plan, clock, guard_s
         self.gun, self._journal, self._screen = gun, journal, screen
-        self._told = list(told)
+        self._history = list(history)
         self._position = Position(since_s=clock.now())
         self._painted_s: float | None = None
         self._pauses: list[tuple[float, float]] = []
@@ -105,10 +112,10 @@ class LiveRun:
         return self._position
 
     @property
-    def told(self) -> Sequence[tuple[Step | None, Outcome | Remark]]:
-        """What was told so far: steps with their outcomes, and remarks."""
+    def history(self) -> History:
+        """What was done so far: steps with their outcomes, and remarks."""
         with self._news:
-            return tuple(self._told)
+            return tuple(self._history)
 
     @property
     def trial(self) -> Trial:
@@ -184,7 +191,7 @@ class LiveRun:
             position = self._position
         self._screen.show(position)
 
-    def felt(self, onset_s: float | None, *, least_s: float = 0.0) -> None:
+    def stimulus_begins(self, onset_s: float | None, *, least_s: float = 0.0) -> None:
         """A stimulus began, or is about to (`None`): what carries a train on is not taken before the least exposure."""
         not_before_s = math.inf if onset_s is None else onset_s + least_s
         with self._news:
@@ -253,7 +260,7 @@ class LiveRun:
     def keep(self, step: Step, outcome: Outcome) -> None:
         """Take an outcome that is on the disk, and show that it is."""
         with self._news:
-            self._told.append((step, outcome))
+            self._history.append((step, outcome))
         self._screen.acknowledge(step, outcome)
 
     def remark(self, remark: Remark) -> None:
@@ -269,7 +276,7 @@ class LiveRun:
             written = self._journal.submit("remark", body=record(remark))
         except RuntimeError:
             return None
-        self._told.append((None, remark))
+        self._history.append((None, remark))
         return written
 
     # judging
@@ -279,7 +286,7 @@ class LiveRun:
         began_s = self._position.paused_s
         return Moment(
             plan=self.plan,
-            told=self._told,
+            history=self._history,
             position=self._position,
             now_s=self.clock.now(),
             painted_s=self._painted_s,

@@ -2,47 +2,75 @@
 
 from __future__ import annotations
 
+import hashlib
 import os
 import shlex
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from contextlib import closing
 from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import Any, Literal
 
 from device import Gun, open_gun
-from experiments import catalogue, limits
+from experiments.catalogue import experiment, table
 from experiments.clock import Clock, date_text
 from experiments.config.setup import Setup
 from experiments.design.plan import Plan
 from experiments.design.streams import draw_seed
+from experiments.limits import check_limits
 from experiments.live_run import LiveRun, RunStopped, Screen
-from experiments.rebuild import plan_of, sha256, table
 from experiments.record import replay, storage
-from experiments.record.journal import Contents, Journal, JournalError, hold, is_empty
-from experiments.record.journal import read as read_journal
+from experiments.record.journal import Contents, Journal, JournalError, begun, hold, read
 from experiments.record.provenance import provenance
 from experiments.record.replay import RunPosition
-from experiments.runner import carry_out, gun_name
+from experiments.runner import Desk, carry_out, gun_name
 from experiments.session.steps import Answered, Rated, Session
-from experiments.stimulus import Desk
 from experiments.study import places, register
 from experiments.study.places import Place, PlaceError
+from experiments.study.register import Register
 
 Again = Literal["ask", "resume", "fresh"]
 """What to do with an unfinished run: refuse and say what is there, go on with it, or set it aside."""
+ScreenName = Literal["terminal", "synthetic", "console"]
+"""Where a run is shown and worked."""
 
 
 class UnfinishedRun(PlaceError):  # noqa: N818 - what is there, not what went wrong
     """An unfinished run is there; the message says when it stopped, and that it takes a decision."""
 
+    def __init__(self, where: Place, contents: Contents) -> None:
+        last = contents.records[-1]
+        super().__init__(
+            f"participant {where.participant_id} has an unfinished run of {where.experiment}, stopped at "
+            f"{date_text(last.utc)} after record {last.n}: {where.journal}; "
+            "--resume goes on with it, --fresh sets it aside and starts anew"
+        )
+        self.where, self.contents = where, contents
+
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Request:
-    """Who does what, where, with which gun and seed; `seed` is `None` where the config or the system gives it.
+class ParticipantOptions:
+    """What the participant has beside the console; `monitor` is the index of their screen, `None` for the last one."""
 
-    A `practice` is not analysed: it has files of its own and can be done again. `anew_reason` is why an unfinished run
-    is set aside for a fresh one: for the register and the head of the new journal.
+    screen: bool = False
+    keys: bool = False
+    noise: bool = False
+    monitor: int | None = None
+
+    @property
+    def any(self) -> bool:
+        """Whether the participant's own process runs at all."""
+        return self.screen or self.keys or self.noise
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class RunRequest:
+    """Who does what, where, at which screen, with which gun and seed.
+
+    `seed` is `None` where the config or the system gives it. A `practice` is not analysed: it has files of its own and
+    can be done again; nothing of a `training` is kept. `anew_reason` is why an unfinished run is set aside for a fresh
+    one: for the register and the head of the new journal. At the console the participant may have `options` of their
+    own, and a `visual` run is worked by a synthetic one.
     """
 
     setup: Setup[Any]
@@ -53,6 +81,10 @@ class Request:
     again: Again = "ask"
     anew_reason: str = ""
     practice: bool = False
+    training: bool = False
+    screen: ScreenName = "synthetic"
+    visual: bool = False
+    options: ParticipantOptions = ParticipantOptions()
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -67,7 +99,7 @@ class Finished:
 MakeScreen = Callable[[Setup[Any], Plan, Clock], Screen]
 
 
-def resolve_seed(request: Request) -> int:
+def resolve_seed(request: RunRequest) -> int:
     """The seed of a new run: asked for, else the config's, else drawn from the system."""
     for seed in (request.seed, request.setup.config.seed):
         if seed is not None:
@@ -75,37 +107,45 @@ def resolve_seed(request: Request) -> int:
     return draw_seed()
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class _Job:
-    """A run about to begin: what was asked for, where, by which clock, and the unfinished run to go on with, if any."""
-
-    request: Request
-    place: Place
-    clock: Clock
-    before: Contents | None
-    anew_reason: str = ""
-
-    @property
-    def experiment(self) -> catalogue.Experiment:
-        return catalogue.experiment(self.request.setup)
-
-
-def run(request: Request, make_screen: MakeScreen, clock: Clock) -> Finished:
+def run(request: RunRequest, make_screen: MakeScreen, clock: Clock) -> Finished:
     """Carry out a run. `PlaceError`, `JournalError`, `ConfigError`, `RunStopped`: nothing acknowledged is ever lost."""
-    limits.check_limits(request.setup)
-    place = places.place(request.results, request.participant_id, request.setup.config.experiment)
+    setup = request.setup
+    drives = {one.method: one.drive for one in check_limits(setup)}
+    registered = register.read(request.results)
+    place = places.place(request.results, request.participant_id, setup.config.experiment, registered)
     place = replace(place, practice=request.practice)
-    anew_reason = request.anew_reason if place.journal.exists() else ""
+    if not place.journal.exists():
+        request = replace(request, anew_reason="")
     before = _before(place, request, clock)
     if before is None:
-        _refuse_excluded(place)
-    job = _Job(request=request, place=place, clock=clock, before=before, anew_reason=anew_reason)
+        _refuse_excluded(place, registered)
     with closing(_open_gun(request, clock)) as gun:
-        return _carry_out(job, gun, make_screen)
+        plan = _new_plan(request, place, registered) if before is None else _plan_of(before, request)
+        session, screen = experiment(setup).session(plan, setup), make_screen(setup, plan, clock)
+        with _open(place, before, clock) as journal:
+            head = _circumstances(setup, gun, clock)
+            if before is None:
+                position = _begin(session, journal, request, plan, head)
+            else:
+                position = _resume(session, journal, before, head)
+            live = LiveRun(
+                plan=plan,
+                gun=gun,
+                journal=journal,
+                clock=clock,
+                screen=screen,
+                guard_s=setup.config.console.guard_s,
+                history=position.history,
+            )
+            desk = Desk(
+                gun=gun, gun_name=gun_name(gun.identify()), drives=drives, journal=journal, clock=clock, live=live
+            )
+            screen.begin(live)
+            return Finished(plan=plan, place=place, saved=_to_the_end(session, desk, position, place))
 
 
-def _refuse_excluded(place: Place) -> None:
-    reason = register.excluded(place.results).get(place.participant_id)
+def _refuse_excluded(place: Place, registered: Register) -> None:
+    reason = registered.excluded().get(place.participant_id)
     if reason is not None:
         raise PlaceError(
             f"participant {place.participant_id} is excluded ({reason}); "
@@ -113,7 +153,7 @@ def _refuse_excluded(place: Place) -> None:
         )
 
 
-def _open_gun(request: Request, clock: Clock) -> Gun:
+def _open_gun(request: RunRequest, clock: Clock) -> Gun:
     methods = request.setup.gun.renderings(request.setup.config.design.methods)
     try:
         return open_gun(request.gun, methods, clock=clock.now)
@@ -121,21 +161,26 @@ def _open_gun(request: Request, clock: Clock) -> Gun:
         raise PlaceError(f"--gun {request.gun}: {error}") from error
 
 
-def _before(where: Place, request: Request, clock: Clock) -> Contents | None:
-    """The unfinished run to go on with, if there is one and it is wanted."""
+def _before(where: Place, request: RunRequest, clock: Clock) -> Contents | None:
+    """The unfinished run to go on with; `None` if there is none, or if it was set aside."""
     if not where.journal.exists():
         return None
-    if request.again == "fresh" or request.practice or is_empty(where.journal):
-        _refuse_finished(where, _readable(where))
-        os.close(hold(where.journal))  # refused while another run is at it
-        _record_reason(where, request.anew_reason, clock)
-        places.set_aside(where)
-        return None
-    contents = read_journal(where.journal)
+    anew = request.again == "fresh" or request.practice
+    try:
+        contents = begun(where.journal)
+    except JournalError:
+        if not anew:
+            raise
+        contents = None
     _refuse_finished(where, contents)
-    if request.again == "ask":
-        raise UnfinishedRun(_unfinished(where, contents))
-    return contents
+    if contents is not None and not anew:
+        if request.again == "ask":
+            raise UnfinishedRun(where, contents)
+        return contents
+    os.close(hold(where.journal))  # refused while another run is at it
+    _record_reason(where, request.anew_reason, clock)
+    places.set_aside(where)
+    return None
 
 
 def _record_reason(where: Place, reason: str, clock: Clock) -> None:
@@ -153,130 +198,85 @@ def _refuse_finished(where: Place, contents: Contents | None) -> None:
         )
 
 
-def _readable(where: Place) -> Contents | None:
-    try:
-        return read_journal(where.journal)
-    except JournalError:
-        return None
-
-
-def _unfinished(where: Place, contents: Contents) -> str:
-    last = contents.records[-1]
-    return (
-        f"participant {where.participant_id} has an unfinished run of {where.experiment}, stopped at "
-        f"{date_text(str(last['utc']))} after record {last['n']}: {where.journal}; "
-        "--resume goes on with it, --fresh sets it aside and starts anew"
-    )
-
-
-def _carry_out(job: _Job, gun: Gun, make_screen: MakeScreen) -> Finished:
-    setup, plan = job.request.setup, _plan(job)
-    session, screen = job.experiment.session(plan, setup), make_screen(setup, plan, job.clock)
-    with _open(job) as journal:
-        standing = _begin(job, plan, session, journal, gun)
-        live = LiveRun(
-            plan=plan,
-            gun=gun,
-            journal=journal,
-            clock=job.clock,
-            screen=screen,
-            guard_s=setup.config.console.guard_s,
-            told=standing.told,
-        )
-        desk = Desk(
-            gun=gun,
-            gun_name=gun_name(gun.identify()),
-            drives=limits.drives(setup),
-            journal=journal,
-            clock=job.clock,
-            live=live,
-        )
-        screen.begin(live)
-        saved = _to_the_end(session, desk, standing, job.place)
-    return Finished(plan=plan, place=job.place, saved=saved)
-
-
-def _plan(job: _Job) -> Plan:
-    if job.before is not None:
-        _refuse_changes(job.request, job.before)
-        return plan_of(job.before)
-    if job.place.practice:
-        return _practice(job)
-    config = job.request.setup.config
-    row = places.next_row(job.request.setup, job.place.results)
-    return job.experiment.make_plan(config, job.place.participant_id, resolve_seed(job.request), row)
-
-
-def _practice(job: _Job) -> Plan:
-    config = job.request.setup.config
-    plan = job.experiment.make_practice(config, job.place.participant_id, resolve_seed(job.request))
+def _new_plan(request: RunRequest, place: Place, registered: Register) -> Plan:
+    setup, seed = request.setup, resolve_seed(request)
+    if not request.practice:
+        row = places.next_row(setup, place.results, registered)
+        return experiment(setup).make_plan(setup.config, place.participant_id, seed, row)
+    plan = experiment(setup).make_practice(setup.config, place.participant_id, seed)
     if plan is None:
-        raise PlaceError(f"{job.request.setup.source}: there is no practice (practice.trials_per_method)")
+        raise PlaceError(f"{setup.source}: there is no practice (practice.trials_per_method)")
     return plan
 
 
-def _refuse_changes(request: Request, before: Contents) -> None:
-    began, now = before.header["setup_sha256"], request.setup.sha256()
+def _plan_of(before: Contents, request: RunRequest) -> Plan:
+    """The plan of the run to go on with. `PlaceError` if the files or the seed are not those it began with."""
+    began, now = before.head.setup_sha256, request.setup.sha256()
     if began != now:
         given_back = f"`recoil configs --from {shlex.quote(str(before.path))} --copy DIR`"
         raise PlaceError(
             f"{before.path}: the run began with another config or gun file (setup {began[:12]}, now {now[:12]}); "
             f"resume with the files it began with, which {given_back} gives back, or start anew (--fresh)"
         )
-    seed = before.header["plan"]["seed"]
-    if request.seed is not None and request.seed != seed:
-        raise PlaceError(f"{before.path}: the run began with seed {seed}, not {request.seed}; leave out --seed")
+    plan = before.plan
+    if request.seed is not None and request.seed != plan.seed:
+        raise PlaceError(f"{before.path}: the run began with seed {plan.seed}, not {request.seed}; leave out --seed")
+    return plan
 
 
-def _open(job: _Job) -> Journal:
-    if job.before is not None:
-        return Journal.reopen(job.before, job.clock)
+def _open(place: Place, before: Contents | None, clock: Clock) -> Journal:
+    if before is not None:
+        return Journal.reopen(before, clock)
     try:
-        storage.make_folder(job.place.folder)
+        storage.make_folder(place.folder)
     except OSError as error:
-        raise PlaceError(f"{job.place.folder}: cannot be made ({error.strerror}); choose another --results") from error
-    return Journal.create(job.place.journal, job.clock)
+        raise PlaceError(f"{place.folder}: cannot be made ({error.strerror}); choose another --results") from error
+    return Journal.create(place.journal, clock)
 
 
-def _begin(job: _Job, plan: Plan, session: Session, journal: Journal, gun: Gun) -> RunPosition:
-    """Write the head of a new journal, or stand where a resumed one broke off."""
-    now = {
+def _circumstances(setup: Setup[Any], gun: Gun, clock: Clock) -> dict[str, object]:
+    """What a journal says of how a run began, or went on.
+
+    The experimenter cannot be kept from knowing the direction, as they turn the gun, and dampers, set by hand.
+    """
+    by_hand = [name for name in setup.config.design.methods if setup.gun.methods[name].damper]
+    return {
         "provenance": provenance(),
         "gun": asdict(gun.identify()),
-        "clock": job.clock.name,
-        "experimenter_knows": _experimenter_knows(job.request.setup),
+        "clock": clock.name,
+        "experimenter_knows": ["direction", *(f"method {name}" for name in by_hand)],
     }
-    if job.before is not None:
-        standing = replay.replay(session, job.before)
-        stopped_utc = job.before.records[-1]["utc"]
-        journal.append("resumed", cut_bytes=job.before.cut_bytes, stopped_utc=stopped_utc, **now)
-        return replay.go_on(session, job.before, standing, journal.append)
-    setup = job.request.setup
-    plan_head = {"plan": plan.record(), "plan_sha256": plan.sha256()}
-    if job.anew_reason:
-        plan_head["set_aside_reason"] = job.anew_reason
-    journal.append("run", **plan_head, setup=setup.record(), setup_sha256=setup.sha256(), **now)
+
+
+def _begin(
+    session: Session, journal: Journal, request: RunRequest, plan: Plan, head: Mapping[str, object]
+) -> RunPosition:
+    """Write the head of a new journal."""
+    setup, why = request.setup, {"set_aside_reason": request.anew_reason} if request.anew_reason else {}
+    plan_head = {"plan": plan.record(), "plan_sha256": plan.sha256(), **why}
+    journal.append("run", **plan_head, setup=setup.record(), setup_sha256=setup.sha256(), **head)
     return RunPosition(step=next(session))
 
 
-def _experimenter_knows(setup: Setup[Any]) -> list[str]:
-    """What the experimenter cannot be kept from knowing: they turn the gun, and set a damper by hand."""
-    by_hand = [name for name in setup.config.design.methods if setup.gun.methods[name].damper]
-    return ["direction", *(f"method {name}" for name in by_hand)]
+def _resume(session: Session, journal: Journal, before: Contents, head: Mapping[str, object]) -> RunPosition:
+    """Stand where a run broke off, and write that it goes on."""
+    position = replay.replay(session, before)
+    journal.append("resumed", cut_bytes=before.cut_bytes, stopped_utc=before.records[-1].utc, **head)
+    return replay.go_on(session, before, position, journal.append)
 
 
-def _to_the_end(session: Session, desk: Desk, standing: RunPosition, place: Place) -> int:
+def _to_the_end(session: Session, desk: Desk, position: RunPosition, place: Place) -> int:
     """Carry out what is left. If it is stopped, the journal says why and the table holds what was answered.
 
     Gives back the number of answers, read back from the disk.
     """
     try:
-        carry_out(session, desk, standing)
+        carry_out(session, desk, position)
     except (KeyboardInterrupt, RunStopped) as stop:
         why = str(stop) or "interrupted"
         desk.live.end(why)
         desk.journal.append("stopped", reason=why)
-        saved = _write_table(place)
+        saved = _write_table(place, read(place.journal))
         if isinstance(stop, RunStopped):
             stop.saved = saved
         raise
@@ -284,13 +284,12 @@ def _to_the_end(session: Session, desk: Desk, standing: RunPosition, place: Plac
         desk.live.end(str(error))
         raise
     desk.live.end("")
-    data = table(read_journal(place.journal))
-    desk.journal.append("finished", table_sha256=sha256(data))
-    return _write_table(place)
+    contents = read(place.journal)
+    desk.journal.append("finished", table_sha256=hashlib.sha256(table(contents)).hexdigest())
+    return _write_table(place, contents)
 
 
-def _write_table(place: Place) -> int:
-    """Write the table from the journal as it is read back from the disk; the answers in it."""
-    contents = read_journal(place.journal)
+def _write_table(place: Place, contents: Contents) -> int:
+    """Write the table from the journal as it was read back from the disk; the answers in it."""
     storage.write_whole(place.table, table(contents))
-    return sum(isinstance(word, Answered | Rated) for _, word in replay.told(contents))
+    return sum(isinstance(word, Answered | Rated) for _, word in replay.history(contents))

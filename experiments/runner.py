@@ -1,20 +1,29 @@
 """The one loop that carries steps out: it tells the journal, waits for what the live run takes, and drives the gun.
 
 Console, terminal and synthetic participant differ only in the `Screen` that is shown the run and offers events to it.
-A train's shots are asked for a little ahead, each for its own tick, and the gun waits for it by its own clock: neither
+The gun is armed for a stimulus alone, and disarmed behind it. Whether a shot may be fired is looked at after the gun
+was armed, and again just before it fires: what halts or holds the run is set before the gun is told to disarm. A
+train's shots are asked for a little ahead, each for its own tick, and the gun waits for it by its own clock: neither
 the line nor this machine delays them. Each is in the journal before the next is asked for.
 """
 
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
+from dataclasses import dataclass, fields
+from typing import Any, Literal
 
-from device.words import Identity
+from device import DeviceError, Gun, LimitError, Shot, ShotReport
+from device.words import Drive, Identity
+from experiments.clock import Clock
 from experiments.design.plan import Trial
-from experiments.live_run import RunStopped
+from experiments.live_run import Held, LiveRun, RunStopped
+from experiments.record.journal import Journal
 from experiments.record.replay import RunPosition
 from experiments.session import events
 from experiments.session.history import trial_at
+from experiments.session.remarks import TestShot
 from experiments.session.states import State
 from experiments.session.steps import (
     Answered,
@@ -31,6 +40,7 @@ from experiments.session.steps import (
     Prepare,
     Prepared,
     Present,
+    Presented,
     Rate,
     Rated,
     Repeat,
@@ -38,10 +48,10 @@ from experiments.session.steps import (
     Rested,
     Session,
     Step,
+    TrainShot,
     on_scale,
     record,
 )
-from experiments.stimulus import Desk, Stimulus, disarm
 
 MAX_FAILURES = 3
 """Failures of the gun in a row after which a run stops and can be resumed."""
@@ -56,14 +66,14 @@ def gun_name(identity: Identity) -> str:
     return identity.model if identity.model == identity.serial else f"{identity.model}:{identity.serial}"
 
 
-def carry_out(session: Session, desk: Desk, standing: RunPosition) -> None:
+def carry_out(session: Session, desk: Desk, position: RunPosition) -> None:
     """Carry out a session from where it stands to its end.
 
     `RunStopped`, `JournalError` and interrupts pass through; whatever happens, the gun is disarmed. After an emergency
     stop the run stays where it is until it is closed, also if the gun does not answer.
     """
     try:
-        _Runner(session, desk).carry_out(standing)
+        _Runner(session, desk).carry_out(position)
     except RunStopped as stop:
         if desk.live.position.base is not State.HALTED:
             raise
@@ -84,10 +94,10 @@ class _Runner:
         self._damper = ""
         """As it was set in this sitting; unknown at its beginning."""
 
-    def carry_out(self, standing: RunPosition) -> None:
-        step = standing.step
-        if standing.halted:
-            self._rearm(trial_at(self._live.plan, standing.told, step))
+    def carry_out(self, position: RunPosition) -> None:
+        step = position.step
+        if position.halted:
+            self._rearm(trial_at(self._live.plan, position.history, step))
         while step is not None:
             self._desk.journal.append("step", body=record(step))
             outcome = self._do(step)
@@ -252,3 +262,174 @@ class _Runner:
 
 def _kept(rating: float, step: Rate) -> float:
     return on_scale(rating, step)
+
+
+LEAD_S = 0.03
+"""How long before its tick a shot of a train is asked for; a `next` within that time comes too late for it.
+
+Assumed: twice what the doctor lets pass, 5 ms that a sleep overruns and 10 ms to the gun and back.
+"""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Desk:
+    """All that carries steps out: gun and how each method drives it, journal, clock, and the live run."""
+
+    gun: Gun
+    gun_name: str
+    drives: Mapping[str, Drive]
+    journal: Journal
+    clock: Clock
+    live: LiveRun
+
+
+def disarm(gun: Gun) -> None:
+    """Disarm, or stop the run: nobody is to hold a gun that may fire. `RunStopped` says what to do."""
+    try:
+        gun.disarm()
+    except DeviceError as error:
+        raise RunStopped(f"the gun cannot be disarmed ({error}): switch off its power") from error
+
+
+class Stimulus:
+    """The gun at a desk, as a run uses it."""
+
+    def __init__(self, desk: Desk) -> None:
+        self._desk, self._live = desk, desk.live
+
+    def fire(self, step: Fire) -> Fired | Failed | Interrupted:
+        """One shot, armed for it alone."""
+        asked = False
+        try:
+            self._get_ready(State.FIRING, step)
+            asked = True
+            onset_utc, report = self._first(step.trial)
+        except Held:
+            return Interrupted(presented=False, cause="pause")
+        except DeviceError as error:
+            return self._failed(error, felt=asked and not isinstance(error, LimitError))
+        finally:
+            disarm(self._desk.gun)
+        self._live.stimulus_begins(report.pulse_start_s)
+        return Fired(gun=self._desk.gun_name, onset_utc=onset_utc, **_times(report))
+
+    def present(self, step: Present) -> Presented | Failed | Interrupted:
+        """Shots at whole multiples of the interval since the first, until next is said."""
+        train, asked = _Train(step, self._desk), False
+        try:
+            self._get_ready(State.TRAIN, step)
+            asked = True
+            train.began(*self._first(step.trial))
+            while (event := self._live.wait((at_s := train.due_s()) - LEAD_S)) is None:
+                if train.shots == step.max_shots:
+                    return train.presented("limit")
+                self._live.allow_shot()
+                train.fired(self._shoot(step.trial, at_s))
+        except Held:
+            return train.interrupted()
+        except DeviceError as error:
+            return self._failed(error, felt=train.shots > 0 or (asked and not isinstance(error, LimitError)))
+        finally:
+            disarm(self._desk.gun)
+        return train.presented("next") if isinstance(event, events.Next) else train.interrupted()
+
+    def _get_ready(self, state: State, step: Fire | Present) -> None:
+        """Enter a state in which the gun fires, and arm it. Raises as `allow_shot`.
+
+        If the run ends before the shot, it is on the disk that nothing was felt.
+        """
+        try:
+            self._live.enter(state, step)
+            if state is State.TRAIN:
+                self._live.stimulus_begins(None)
+            self._arm()
+        except RunStopped:
+            self._desk.journal.append("outcome", body=record(Interrupted(presented=False)))
+            raise
+
+    def _arm(self) -> None:
+        """Arm the gun, and wait until its magnet is home. Raises as `allow_shot`."""
+        self._live.settle()
+        self._live.allow_shot()
+        self._desk.gun.arm()
+        self._live.sleep(self._desk.gun.status().ready_at_s)
+
+    def _first(self, trial: Trial) -> tuple[str, ShotReport]:
+        """The first shot of a stimulus, and its date and time."""
+        return self._desk.clock.utc(), self._shoot(trial)
+
+    def _shoot(self, trial: Trial, at_s: float | None = None) -> ShotReport:
+        shot = Shot(method=trial.method, direction=trial.direction, drive=self._desk.drives[trial.method])
+        return self._desk.gun.fire(shot, at_s)
+
+    def _failed(self, error: DeviceError, *, felt: bool) -> Failed | Interrupted:
+        """What became of a stimulus at which the gun failed; a pause that disarmed it is no fault of the gun's."""
+        if isinstance(self._live.taken(), events.Pause | events.ParticipantLost):
+            return Interrupted(presented=felt, cause="pause")
+        lost = events.GunFault if isinstance(error, LimitError) else events.LinkLost
+        self._live.offer(lost(cause=str(error)))
+        return Failed(cause=str(error), presented=felt)
+
+    def test_shot(self, trial: Trial, held_s: float | None) -> bool:
+        """Fire a shot that nobody judges; whether it was fired."""
+        try:
+            self._arm()
+            _, report = self._first(trial)
+        except (Held, DeviceError) as error:
+            cause = str(error) or "paused"
+            self._live.remark(TestShot(method=trial.method, held_s=held_s, cause=cause))
+            return False
+        finally:
+            disarm(self._desk.gun)
+        fired = TestShot(method=trial.method, held_s=held_s, pulse_start_s=report.pulse_start_s, motion=report.motion)
+        self._live.remark(fired)
+        return True
+
+
+class _Train:
+    """A stimulus of several shots: each in the journal before the next is asked for."""
+
+    def __init__(self, step: Present, desk: Desk) -> None:
+        self._step, self._desk = step, desk
+        self._onset_utc, self._onset_s = "", math.nan
+        self.shots = 0
+
+    def began(self, onset_utc: str, first: ShotReport) -> None:
+        """Take the first shot; `next` counts after the least exposure."""
+        self._onset_utc, self._onset_s = onset_utc, first.pulse_start_s
+        self._desk.live.stimulus_begins(first.pulse_start_s, least_s=self._step.least_exposure_s)
+        self.fired(first)
+
+    def fired(self, report: ShotReport) -> None:
+        """Have a shot on the disk."""
+        self.shots += 1
+        self._desk.journal.append("shot", body=record(TrainShot(shot=self.shots, **_times(report))))
+
+    def due_s(self) -> float:
+        """The next shot's tick, whole microseconds after the first; later if the magnet is not home by then."""
+        tick_s = self._onset_s + self.shots * round(self._step.repeat_every_s * 1e6) / 1e6
+        return max(tick_s, self._desk.gun.status().ready_at_s)
+
+    def presented(self, ended_by: Literal["next", "limit"]) -> Presented:
+        """The stimulus as it was felt to its end."""
+        return Presented(
+            gun=self._desk.gun_name,
+            onset_utc=self._onset_utc,
+            shots=self.shots,
+            exposure_s=self._exposure_s(),
+            ended_by=ended_by,
+        )
+
+    def interrupted(self) -> Interrupted:
+        """The stimulus as it was felt until a pause ended it."""
+        if not self.shots:
+            return Interrupted(presented=False, cause="pause")
+        return Interrupted(presented=True, cause="pause", shots=self.shots, exposure_s=self._exposure_s())
+
+    def _exposure_s(self) -> float:
+        return self._desk.clock.now() - self._onset_s
+
+
+def _times(report: ShotReport) -> dict[str, Any]:
+    """What the journal keeps of a shot's report, beside what was asked for."""
+    return {field.name: getattr(report, field.name) for field in fields(report) if field.name != "shot"}

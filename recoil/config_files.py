@@ -33,17 +33,17 @@ def copy_began_with(path: Path, folder: Path) -> list[Path]:
     if head is None:
         raise JournalError(f"{path}: line 1: no whole record, so nothing says what the run began with")
     try:
-        files = _files(path, head["setup"], folder)
+        files = _files(path, head.setup_json, folder)
     except (KeyError, TypeError, AttributeError) as error:
         raise JournalError(f"{path}: line 1: no setup of this version of Recoil ({error!r})") from error
     there = [str(file) for file in files if file.exists()]
     if there:
         raise PlaceError(f"{', '.join(there)}: already there; nothing is overwritten, so copy to another folder")
-    _write(files, lambda: _check(path, next(iter(files)), head["setup_sha256"]))
+    _write(files, lambda: _check(path, next(iter(files)), head.setup_sha256))
     return list(files)
 
 
-def _files(path: Path, setup: Mapping[str, Any], folder: Path) -> dict[Path, bytes]:
+def _files(path: Path, setup: Any, folder: Path) -> dict[Path, bytes]:
     """The files by their places. Names in the config stay as they are, since the hash is over them too."""
     config = setup["experiment"]
     kind = config.get("experiment")

@@ -2,19 +2,13 @@
 
 from __future__ import annotations
 
-import io
-import json
-import shutil
-from collections.abc import Callable
-from contextlib import AbstractContextManager
-from dataclasses import asdict
+from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Literal
 
-from rich.console import Console
-from rich.table import Table
-from rich.text import Text
-
+from analysis.report.section import Section, Table
+from analysis.report.serial import as_json
+from analysis.report.terminal import Progress, with_tables
 from experiments.clock import RealClock
 from experiments.doctor.checks import carry_out, checks
 from experiments.doctor.figures import Finding
@@ -22,16 +16,18 @@ from experiments.doctor.verdicts import overall
 from experiments.load import find, load_gun
 from experiments.record import storage
 
-_WIDTH = 160
-"""Columns of the table where it does not go to a terminal."""
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Examination:
+    """What every check found, when, and the worst verdict."""
+
+    utc: str
+    verdict: Literal["good", "warning", "fails"]
+    checks: tuple[Finding, ...]
 
 
-Progress = Callable[[str, int], AbstractContextManager[Callable[[str], None]]]
-"""Given what is done and in how many parts, takes the name of each part that is done."""
-
-
-def examine(results: Path, gun: str, config: str, progress: Progress) -> list[Finding]:
-    """What every check found; `config` is the gun's, with the limit of its line.
+def examine(results: Path, gun: str, config: str, progress: Progress) -> Examination:
+    """Carry out every check; `config` is the gun's, with the limit of its line.
 
     `PlaceError`: the gun's address has no such form; `ConfigError`: the config cannot be used.
     """
@@ -40,44 +36,23 @@ def examine(results: Path, gun: str, config: str, progress: Progress) -> list[Fi
         for check in planned:
             findings += carry_out(check)
             tell(check.name)
-    return findings
+    verdict = overall([finding.verdict for finding in findings])
+    return Examination(utc=RealClock().utc(), verdict=verdict, checks=tuple(findings))
 
 
-def fails(findings: list[Finding]) -> bool:
-    """Whether a check fails."""
-    return _verdict(findings) == "fails"
-
-
-def as_json(findings: list[Finding]) -> dict[str, Any]:
-    """The findings as plain JSON values, with when they were found and the worst verdict."""
-    return {"utc": RealClock().utc(), "verdict": _verdict(findings), "checks": [asdict(one) for one in findings]}
-
-
-def _verdict(findings: list[Finding]) -> str:
-    return overall([finding.verdict for finding in findings])
-
-
-def keep(found: dict[str, Any], path: Path) -> None:
+def keep(found: Examination, path: Path) -> None:
     """Put the machine-readable result into a file, in place of an older one."""
     storage.make_folder(path.parent)
-    storage.write_whole(path, (json.dumps(found, indent=1, ensure_ascii=False) + "\n").encode())
+    storage.write_whole(path, as_json(found))
 
 
-def as_text(findings: list[Finding]) -> str:
-    """The findings as a table for people."""
-    text = io.StringIO()
-    console = Console(file=text, width=shutil.get_terminal_size((_WIDTH, 24)).columns, highlight=False, markup=False)
-    console.print(_table(findings))
-    return text.getvalue().rstrip("\n")
+def section(findings: tuple[Finding, ...]) -> Section:
+    """The findings as a table."""
+    rows = tuple((one.check, str(one.verdict), one.measured, one.advice) for one in findings)
+    header = ("check", "verdict", "measured", "what to do")
+    return Section(title="", tables=(Table(caption="", header=header, rows=rows),))
 
 
-def _table(findings: list[Finding]) -> Table:
-    table = Table(show_lines=True)
-    table.add_column("check", no_wrap=True)
-    table.add_column("verdict", no_wrap=True)
-    for heading in ("measured", "what to do"):
-        table.add_column(heading, overflow="fold")
-    for finding in findings:
-        cells = (finding.check, finding.verdict, finding.measured, finding.advice)
-        table.add_row(*map(Text, cells))  # as text: a name in brackets is no mark-up
-    return table
+def as_text(findings: tuple[Finding, ...]) -> str:
+    """The table for people at a terminal."""
+    return with_tables(section(findings), ruled=True, unfolded=2)

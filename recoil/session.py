@@ -3,70 +3,41 @@
 from __future__ import annotations
 
 import sys
-from contextlib import suppress
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 from device.serial_gun.opening import speed_of
+from experiments.catalogue import rebuild
 from experiments.clock import Clock, RealClock, VirtualClock
 from experiments.config.setup import Setup
 from experiments.design.plan import Plan
 from experiments.live_run import RunStopped, Screen
-from experiments.load import load_setup
-from experiments.rebuild import rebuild
 from experiments.record import storage
-from experiments.run import Again, Finished, Request, run
+from experiments.run import Again, Finished, ParticipantOptions, RunRequest, ScreenName, run
 from experiments.screens.synthetic import synthetic_screen
 from experiments.screens.terminal import TerminalScreen
 from experiments.study.places import Place, PlaceError, check_code, place, set_aside_file
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class SessionRequest:
-    """What was asked for on the command line."""
-
-    config: str
-    participant_id: str
-    gun: str
-    screen: str
-    results: Path
-    seed: int | None
-    resume: bool
-    fresh: bool
-    reason: str = ""
-    visual: bool = False
-    participant_screen: bool = False
-    participant_keys: bool = False
-    noise: bool = False
-    monitor: int | None = None
-
-
-def run_session(asked: SessionRequest) -> Place:
-    """Carry out what was asked for. `PlaceError` for what cannot be done here; a stop raises `KeyboardInterrupt`."""
-    check_code(asked.participant_id)
-    _check_screen(asked)
-    check_pace(asked.screen, asked.gun)
-    request = Request(
-        setup=load_setup(asked.config),
-        participant_id=asked.participant_id,
-        results=asked.results,
-        gun=asked.gun,
-        seed=asked.seed,
-        again=_again(asked),
-        anew_reason=asked.reason,
-    )
-    if asked.resume:
+def run_session(request: RunRequest) -> Place:
+    """Carry out a run. `PlaceError` for what cannot be done here; a stop raises `KeyboardInterrupt`."""
+    check_code(request.participant_id)
+    _check_screen(request)
+    check_pace(request.screen, request.gun)
+    if request.again == "resume":
         _check_resumable(request)
     try:
-        return _SCREENS[asked.screen](request, asked).place
+        return _SCREENS[request.screen](request).place
     except RunStopped as stop:
         with suppress(OSError):  # where the terminal is gone, nobody reads it
             sys.stderr.write(f"recoil: stopped: {stop}. Go on with --resume.\n")
         raise KeyboardInterrupt from stop
 
 
-def _check_resumable(request: Request) -> None:
+def _check_resumable(request: RunRequest) -> None:
     """`PlaceError` if there is nothing to go on with: a mistyped code is not to begin a run."""
     where = place(request.results, request.participant_id, request.setup.config.experiment)
     if not where.journal.exists():
@@ -76,11 +47,10 @@ def _check_resumable(request: Request) -> None:
         )
 
 
-def _check_screen(asked: SessionRequest) -> None:
-    if asked.screen == "terminal" and not (sys.stdin.isatty() and sys.stdout.isatty()):
+def _check_screen(request: RunRequest) -> None:
+    if request.screen == "terminal" and not (sys.stdin.isatty() and sys.stdout.isatty()):
         raise PlaceError("--screen terminal: standard input and output are no terminal; use --screen synthetic")
-    sides = (asked.visual, asked.participant_screen, asked.participant_keys, asked.noise, asked.monitor is not None)
-    if asked.screen != "console" and any(sides):
+    if request.screen != "console" and (request.visual or request.options != ParticipantOptions()):
         raise PlaceError(
             "--visual, --participant-screen, --participant-keys, --participant-monitor and --noise go with "
             "--screen console"
@@ -96,17 +66,15 @@ def check_pace(screen: str, gun: str) -> None:
         )
 
 
-def _at_terminal(request: Request, asked: SessionRequest) -> Finished:
-    def screen(setup: Setup[Any], plan: Plan, clock: Clock) -> Screen:
-        del setup
-        return TerminalScreen(plan, clock, simulated=asked.gun == "simulated")
+def _at_terminal(request: RunRequest) -> Finished:
+    def screen(_: Setup[Any], plan: Plan, clock: Clock) -> Screen:
+        return TerminalScreen(plan, clock, simulated=request.gun == "simulated")
 
     return run(request, screen, RealClock())
 
 
-def _synthetic(request: Request, asked: SessionRequest) -> Finished:
+def _synthetic(request: RunRequest) -> Finished:
     """On a virtual clock; with a gun on a line, whose shots take their time, on the real one."""
-    del asked
     speed = _speed(request.gun)
     return run(request, synthetic_screen, VirtualClock() if speed is None else RealClock(speed))
 
@@ -118,60 +86,55 @@ def _speed(gun: str) -> float | None:
         raise PlaceError(f"--gun {gun}: {error}") from error
 
 
-def _at_console(request: Request, asked: SessionRequest) -> Finished:
-    live = _console()
-    finished: Finished = live.run_live(request, _sides(live, asked))
-    return finished
+def _at_console(request: RunRequest) -> Finished:
+    with _needs_gui():
+        from experiments.screens.console import live  # noqa: PLC0415 - Qt is an extra, and slow
+    return live.run_live(request)
 
 
-def _sides(live: Any, asked: SessionRequest) -> Any:
-    return live.Sides(
-        visual=asked.visual,
-        screen=asked.participant_screen,
-        own_keys=asked.participant_keys,
-        noise=asked.noise,
-        monitor=asked.monitor,
-    )
+_SCREENS: dict[ScreenName, Callable[[RunRequest], Finished]] = {
+    "terminal": _at_terminal,
+    "synthetic": _synthetic,
+    "console": _at_console,
+}
 
 
-def run_lab_day(asked: SessionRequest) -> None:
-    """The start window at the console, and one run after the other from it."""
-    if asked.screen != "console":
+def run_lab_day(request: RunRequest) -> None:
+    """The start window at the console, and one run after the other from it; `request` is without a participant."""
+    if request.screen != "console":
         raise PlaceError("give --participant CODE, or --screen console for its start window")
-    if asked.resume or asked.fresh or asked.visual:
+    if request.again != "ask" or request.visual:
         raise PlaceError("--resume, --fresh and --visual go with --participant CODE; the start window asks by itself")
-    check_pace("console", asked.gun)
-    setup = load_setup(asked.config)
-    request = Request(setup=setup, participant_id="", results=asked.results, gun=asked.gun, seed=asked.seed)
-    live = _console()
+    check_pace("console", request.gun)
+    with _needs_gui():
+        from experiments.screens.console import live  # noqa: PLC0415 - Qt is an extra, and slow
     try:
-        live.lab_day(request, _sides(live, asked))
+        live.lab_day(request)
     except KeyboardInterrupt as signalled:
         with suppress(OSError):  # where the terminal is gone, nobody reads it
             sys.stderr.write(f"recoil: ended by {signalled}\n")
         raise
 
 
-def _console() -> Any:
+@contextmanager
+def _needs_gui() -> Iterator[None]:
+    """`PlaceError`, with what to install, where the import of the console fails."""
     try:
-        from experiments.screens.console import live  # noqa: PLC0415 - Qt is an extra, and slow
+        yield
     except ModuleNotFoundError as error:
         raise PlaceError(
             f"--screen console needs the extra `gui` ({error.name} is missing): uv pip sync --python .venv "
             "--require-hashes requirements/full.txt, or use --screen terminal"
         ) from error
-    return live
 
 
-_SCREENS = {"terminal": _at_terminal, "synthetic": _synthetic, "console": _at_console}
-
-
-def _again(asked: SessionRequest) -> Again:
-    if asked.resume and asked.fresh:
+def again(*, resume: bool, fresh: bool, reason: str) -> Again:
+    """What to do with an unfinished run. `PlaceError` for options that do not go together."""
+    if resume and fresh:
         raise PlaceError("--resume and --fresh: give one of them; the first goes on with a run, the second starts anew")
-    if asked.reason and not asked.fresh:
+    if reason and not fresh:
         raise PlaceError("--reason: goes with --fresh, and says why the unfinished run is set aside")
-    return "resume" if asked.resume else "fresh" if asked.fresh else "ask"
+    return "resume" if resume else "fresh" if fresh else "ask"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -2,28 +2,22 @@
 
 from __future__ import annotations
 
-import io
-import shutil
 from collections.abc import Iterator, Mapping
 from dataclasses import asdict, dataclass
 from pathlib import Path
-from typing import Any
 
 from pydantic import ValidationError
-from rich.console import Console
-from rich.table import Table
-from rich.text import Text
 
+from analysis.report.section import Section, Table
+from analysis.report.terminal import with_tables
 from experiments.clock import RealClock, date_text
 from experiments.study import enrolment
 from experiments.study.places import PlaceError
 from experiments.study.progress import Overview, StudyFolder, open_study, overview
-from experiments.study.study import Facts, Participant, RunStanding, eligible
+from experiments.study.study import Facts, Participant, RunProgress, eligible
 
 _OPTIONS = {"age_years": "--age", "sex": "--sex", "handedness": "--handedness"}
 _UNDER_WAY = ("in progress", "open elsewhere")
-_WIDTH = 160
-"""Columns of the table where it does not go to a terminal."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -44,12 +38,12 @@ class Found:
     overview: Overview
 
 
-def change(asked: Mapping[str, str | None], facts: Mapping[str, object], reason: str | None) -> Change | None:
+def change(options: Mapping[str, str | None], facts: Mapping[str, object], reason: str | None) -> Change | None:
     """What is to be changed; `None` for a look alone. `PlaceError` for options that do not go together."""
-    wanted = [(action, code) for action, code in asked.items() if code is not None]
-    if len(wanted) > 1:
-        raise PlaceError(f"{' and '.join(f'--{action}' for action, _ in wanted)}: give one of them at a time")
-    action, code = wanted[0] if wanted else ("", "")
+    given = [(action, code) for action, code in options.items() if code is not None]
+    if len(given) > 1:
+        raise PlaceError(f"{' and '.join(f'--{action}' for action, _ in given)}: give one of them at a time")
+    action, code = given[0] if given else ("", "")
     _refuse_stray(action, facts, reason)
     if not action:
         return None
@@ -74,24 +68,24 @@ def _facts(values: Mapping[str, object]) -> Facts:
         raise PlaceError(f"{_OPTIONS[str(first['loc'][0])]} {first['input']!r}: {first['msg']}") from error
 
 
-def study(folder: Path, wanted: Change | None) -> tuple[Found, tuple[str, ...]]:
+def study(folder: Path, change: Change | None) -> tuple[Found, tuple[str, ...]]:
     """How a folder's study stands after a change, and what there is to say of the change. Errors name what to do."""
     where = open_study(folder)
-    notes = _carry_out(where, wanted) if wanted else ()
+    notes = _carry_out(where, change) if change else ()
     return Found(study=where, overview=overview(where)), notes
 
 
-def _carry_out(where: StudyFolder, wanted: Change) -> tuple[str, ...]:
-    clock, code = RealClock(), wanted.participant_id
-    if wanted.action == "join":
-        reasons = enrolment.join(where, code, wanted.facts, clock)
+def _carry_out(where: StudyFolder, change: Change) -> tuple[str, ...]:
+    clock, code = RealClock(), change.participant_id
+    if change.action == "join":
+        reasons = enrolment.join(where, code, change.facts, clock)
         return tuple(f"participant {code} is not eligible: {reason}; recorded, exclude?" for reason in reasons)
-    act = enrolment.exclude if wanted.action == "exclude" else enrolment.readmit
-    act(where.results, code, wanted.reason, clock)
+    act = enrolment.exclude if change.action == "exclude" else enrolment.readmit
+    act(where.results, code, change.reason, clock)
     return ()
 
 
-def as_json(found: Found) -> dict[str, Any]:
+def as_json(found: Found) -> dict[str, object]:
     """The study as plain JSON values."""
     coming = found.overview.next
     return {
@@ -104,7 +98,7 @@ def as_json(found: Found) -> dict[str, Any]:
     }
 
 
-def _participant(found: Found, one: Participant) -> dict[str, Any]:
+def _participant(found: Found, one: Participant) -> dict[str, object]:
     return {
         "participant_id": one.participant_id,
         "facts": one.facts and one.facts.model_dump(mode="json"),
@@ -115,7 +109,7 @@ def _participant(found: Found, one: Participant) -> dict[str, Any]:
     }
 
 
-def _run(run: RunStanding) -> dict[str, Any]:
+def _run(run: RunProgress) -> dict[str, object]:
     return {key: value for key, value in asdict(run).items() if key != "experiment"}
 
 
@@ -123,24 +117,20 @@ def _not_eligible(found: Found, one: Participant) -> tuple[str, ...]:
     return eligible(one.facts, found.study.config.eligibility) if one.facts else ()
 
 
-def as_text(found: Found) -> str:
+def section(found: Found) -> Section:
     """The study for people: a table, then who comes next."""
-    text = io.StringIO()
-    console = Console(file=text, width=shutil.get_terminal_size((_WIDTH, 24)).columns, highlight=False, markup=False)
-    console.print(found.study.config.title, soft_wrap=True)
-    console.print(_table(found))
-    for line in (*_count_lines(found), *_next_lines(found)):
-        console.print(line, soft_wrap=True)
-    return text.getvalue().rstrip("\n")
+    header = ("code", "age", "sex", "hand", *found.study.experiments, "remark")
+    rows = tuple(tuple(_cells(found, one)) for one in found.overview.participants)
+    return Section(
+        title=found.study.config.title,
+        tables=(Table(caption="", header=header, rows=rows),),
+        items=(*_count_lines(found), *_next_lines(found)),
+    )
 
 
-def _table(found: Found) -> Table:
-    table = Table()
-    for heading in ("code", "age", "sex", "hand", *found.study.experiments, "remark"):
-        table.add_column(heading, overflow="fold")
-    for one in found.overview.participants:
-        table.add_row(*map(Text, _cells(found, one)))  # as text: a reason in brackets is no mark-up
-    return table
+def as_text(found: Found) -> str:
+    """The study for people at a terminal."""
+    return with_tables(section(found))
 
 
 def _cells(found: Found, one: Participant) -> Iterator[str]:
@@ -154,7 +144,7 @@ def _cells(found: Found, one: Participant) -> Iterator[str]:
     yield "\n".join([*excluded, *(f"not eligible: {reason}" for reason in _not_eligible(found, one))])
 
 
-def _state(run: RunStanding) -> str:
+def _state(run: RunProgress) -> str:
     counts = f", {run.answered} of {run.planned} trials, last record {date_text(run.last_utc)}"
     lines = [f"{run.state}{counts if run.state in _UNDER_WAY and run.planned else ''}", " > ".join(run.methods)]
     return "\n".join(filter(None, [*lines, "practice done" if run.practised else ""]))

@@ -19,15 +19,15 @@ from typing import Any, Literal
 from device import Gun, GunStatus, LimitError, LinkError, Shot, ShotReport
 from device.words import Direction
 from experiments import run as runs
+from experiments.catalogue import table
 from experiments.config.setup import Setup
 from experiments.design.plan import Plan, Trial
 from experiments.live_run import LiveRun, Screen
 from experiments.load import load_setup
-from experiments.rebuild import table
 from experiments.record import storage
 from experiments.record.journal import Contents, read
-from experiments.record.replay import told
-from experiments.run import Finished, Request, run
+from experiments.record.replay import history
+from experiments.run import Finished, RunRequest, run
 from experiments.screens.console import progress, view, widgets
 from experiments.screens.console.controls import Controls, TextField
 from experiments.screens.console.keys import Name, Presses
@@ -346,7 +346,7 @@ class PaperWindow:
     def _look(self, drawn: Position) -> None:
         assert self.live is not None
         assert self.controls is not None
-        seen = Seen(about=self.about, position=drawn, told=self.live.told, gun=self.gun, now_s=self._clock.now())
+        seen = Seen(about=self.about, position=drawn, told=self.live.history, gun=self.gun, now_s=self._clock.now())
         shown = view.instruction(seen)
         self.heard += [shown.title, shown.damper, shown.detail, view.where_text(seen)]
         self.heard += [*progress.coming(seen), *progress.answer_lines(seen), *self.controls.help_lines()]
@@ -447,7 +447,7 @@ class Sitting:
 
     def __post_init__(self) -> None:
         again = "resume" if self.resumed else "ask"
-        self._request = Request(setup=self.setup, participant_id="P01", results=self.results, seed=1, again=again)
+        self._request = RunRequest(setup=self.setup, participant_id="P01", results=self.results, seed=1, again=again)
         self.error: BaseException | None = None
         self.result: Finished | None = None
         self.ended = threading.Event()
@@ -662,13 +662,13 @@ def kept(results: Path, experiment: str) -> tuple[Place, Contents, list[dict[str
 
 
 def remarks(contents: Contents, *kinds: type) -> list[Remark]:
-    return [word for step, word in told(contents) if step is None and isinstance(word, kinds)]
+    return [word for step, word in history(contents) if step is None and isinstance(word, kinds)]
 
 
 def raw_answers(contents: Contents) -> list[tuple[str, Trial, Direction]]:
     """Every answer and correction in the order of the journal."""
     found = []
-    for step, word in told(contents):
+    for step, word in history(contents):
         if isinstance(word, AnswerCorrected):
             found.append((word.kind, word.trial, word.response))
         elif isinstance(word, Answered):

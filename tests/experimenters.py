@@ -15,10 +15,10 @@ from hypothesis import strategies as st
 
 from device import LimitError, LinkError
 from experiments.config.setup import Setup
-from experiments.design.plan import Plan, Trial
+from experiments.design.plan import Trial
 from experiments.live_run import RunStopped
 from experiments.record.journal import Contents
-from experiments.record.replay import told
+from experiments.record.replay import history
 from experiments.screens.console.keys import KEY_COMMANDS, Name
 from experiments.session import events
 from experiments.session.events import ACTS
@@ -397,7 +397,7 @@ def taken(offered: list[Offered]) -> Iterator[tuple[str, Trial, Any]]:
 
 def written(contents: Contents) -> Iterator[tuple[str, Trial, Any]]:
     """Everything that the participant said, as it is in the journal."""
-    for step, word in told(contents):
+    for step, word in history(contents):
         match word:
             case Answered():
                 yield "answered", step.trial, word.response
@@ -424,7 +424,7 @@ def refused(offered: list[Offered]) -> list[tuple[str, str]]:
 
 def check_rows(rows: list[dict[str, str]], contents: Contents) -> None:
     """One valid row a planned trial, with the last word on it; no time of another hand or of what was corrected."""
-    trials = Plan.from_record(contents.header["plan"]).trials
+    trials = contents.plan.trials
     assert [row["trial"] for row in rows] == [str(trial.trial) for trial in trials]
     last: dict[Trial, Any] = {}
     for kind, trial, value in written(contents):
@@ -441,17 +441,13 @@ def check_rows(rows: list[dict[str, str]], contents: Contents) -> None:
 
 def _belongs(value: Any, contents: Contents) -> bool:
     """Whether a correction was of an answer or a rating, not of words."""
-    return (
-        value in ("forward", "backward")
-        if contents.header["plan"]["experiment"] == "direction"
-        else not isinstance(value, str)
-    )
+    return value in ("forward", "backward") if contents.plan.experiment == "direction" else not isinstance(value, str)
 
 
 def check_attempts(rows: list[dict[str, str]], contents: Contents, felt: list[Trial]) -> None:
     """`attempts` counts what was felt, or may have been: by the gun's own book where a shot is a trial."""
-    told_felt = Counter(step.trial for step, word in told(contents) if step is not None and is_attempt(step, word))
-    trials = Plan.from_record(contents.header["plan"]).trials
+    told_felt = Counter(step.trial for step, word in history(contents) if step is not None and is_attempt(step, word))
+    trials = contents.plan.trials
     assert [row["attempts"] for row in rows] == [str(told_felt[trial]) for trial in trials]
     if "response" in rows[0]:
         assert told_felt == Counter(felt)

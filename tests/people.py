@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from typing import Any
 
-from experiments.study.study import Participant, RunStanding, State
+from experiments.study.study import Participant, RunProgress, State
 
 ORDER = ("direction", "preference")
 
 
 def someone(*states: State, **more: Any) -> Participant:
-    runs = tuple(RunStanding(experiment=name, state=state) for name, state in zip(ORDER, states, strict=True))
+    runs = tuple(RunProgress(experiment=name, state=state) for name, state in zip(ORDER, states, strict=True))
     return Participant(participant_id="P01", runs=runs, **more)

@@ -18,7 +18,7 @@ from experiments.clock import VirtualClock
 from experiments.config.models import participant_codes
 from experiments.config.setup import Setup
 from experiments.load import load_setup
-from experiments.run import Request, run
+from experiments.run import RunRequest, run
 from experiments.screens.synthetic import synthetic_screen
 
 EQUAL = [0.0, 0.0, 0.0]
@@ -43,7 +43,7 @@ def null_setup(experiment: str) -> Setup[Any]:
 def through_the_chain(setup: Setup[Any], participants: int, seed: int, folder: Path) -> dict[str, Any]:
     """The statistics of a study whose every answer went through a session, a journal and a table."""
     for code in participant_codes(participants):
-        asked = Request(setup=setup, participant_id=code, results=folder, seed=seed, again="resume")
+        asked = RunRequest(setup=setup, participant_id=code, results=folder, seed=seed, again="resume")
         run(asked, synthetic_screen, VirtualClock())
     logs = read_logs([folder])
     assert not logs.problems

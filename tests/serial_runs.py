@@ -19,11 +19,12 @@ from experiments.clock import RealClock
 from experiments.live_run import RunStopped
 from experiments.load import load_setup
 from experiments.record.journal import Contents, read
-from experiments.record.replay import told
-from experiments.run import Request
+from experiments.record.replay import history
+from experiments.run import RunRequest
 from experiments.screens.synthetic import synthetic_screen
 from experiments.session.steps import Answered, Failed, Fired
 from experiments.study.places import Place, place
+from tests.journals import raw
 from tests.twins import Troubles
 
 UNSURE = re.compile("fired and cut short|may have been fired|was fired, and its answer was lost|the gun rendered")
@@ -51,7 +52,7 @@ def one_run(config: Path, results: Path, gun: str, code: str, again: Any) -> Pla
     """A person's run, on a clock as fast as the twin lives."""
     setup = load_setup(str(config))
     seed = int(code.removeprefix("P"))
-    request = Request(setup=setup, participant_id=code, results=results, gun=gun, seed=seed, again=again)
+    request = RunRequest(setup=setup, participant_id=code, results=results, gun=gun, seed=seed, again=again)
     return runs.run(request, synthetic_screen, RealClock(speed_of(gun) or 1.0)).place
 
 
@@ -82,14 +83,14 @@ def _count(tally: Tally, results: Path, code: str) -> None:
     contents = read(place(results, code, "direction").journal)
     assert contents.finished
     answered = set()
-    for step, outcome in told(contents):
+    for step, outcome in history(contents):
         if isinstance(outcome, Fired):
             tally.done.append((step.trial, outcome))
         elif isinstance(outcome, Failed):
             tally.causes[outcome.cause] += 1
         elif isinstance(outcome, Answered):
             answered.add(step.trial)
-    planned = contents.header["plan"]["trials"]
+    planned = contents.plan.trials
     assert len(answered) == len(planned)
     tally.trials += len(answered)
 
@@ -139,7 +140,7 @@ def _nearest(ledger: list[Rendered], time_s: float) -> Rendered:
 def of_trains(contents: Contents) -> Iterator[tuple[list[dict[str, Any]], dict[str, Any] | None]]:
     """The shots of each presentation, and its outcome if it has one."""
     shots: list[dict[str, Any]] | None = None
-    for entry in contents.records:
+    for entry in raw(contents.path):
         if entry["kind"] == "step":
             if shots is not None:
                 yield shots, None
@@ -155,7 +156,7 @@ def of_trains(contents: Contents) -> Iterator[tuple[list[dict[str, Any]], dict[s
 
 def timings_of(contents: Contents) -> list[dict[str, Any]]:
     """How every shot in a journal came about that was done, in order."""
-    bodies = [entry["body"] for entry in contents.records if entry["kind"] in ("outcome", "shot")]
+    bodies = [entry["body"] for entry in raw(contents.path) if entry["kind"] in ("outcome", "shot")]
     return sorted((body["timing"] for body in bodies if "timing" in body), key=lambda one: one["requested_s"])
 
 

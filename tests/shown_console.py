@@ -22,7 +22,7 @@ from device import LinkError
 from experiments import run as runs
 from experiments.clock import RealClock
 from experiments.live_run import RunStopped
-from experiments.run import Request
+from experiments.run import RunRequest
 from experiments.screens.console import app
 from experiments.screens.console.view import Ended, ParticipantSeen
 from experiments.session import events
@@ -354,7 +354,7 @@ def one_run(  # noqa: PLR0917 - each is needed once
     look: Callable[[str, Any], None],
 ) -> None:
     setup = _setup(experiment)
-    request = Request(setup=setup, participant_id="P" * 8, results=results, seed=1, again=again)
+    request = RunRequest(setup=setup, participant_id="P" * 8, results=results, seed=1, again=again)
     console = app.Console(request, RealClock(), band="PRACTICE – nothing of it is analysed")
     turns.console = console
     shown = Shown(console, states(turns), look)

@@ -8,22 +8,21 @@ from typing import Any, NamedTuple
 from device import Identity, Shot, ShotReport, open_gun
 from device.words import GunStatus
 from experiments import catalogue, limits
+from experiments.catalogue import table
 from experiments.clock import Clock, VirtualClock
 from experiments.config.setup import Setup
 from experiments.design.plan import Plan
 from experiments.live_run import LiveRun
 from experiments.load import load_setup
-from experiments.rebuild import table
 from experiments.record import replay, storage
 from experiments.record.journal import Journal, read
 from experiments.record.replay import RunPosition
-from experiments.run import Request, run
-from experiments.runner import carry_out
+from experiments.run import RunRequest, run
+from experiments.runner import Desk, carry_out
 from experiments.screens.synthetic import SyntheticScreen, synthetic_screen
 from experiments.session.remarks import Remark
 from experiments.session.states import Position, State
-from experiments.session.steps import History, Outcome, Step, record
-from experiments.stimulus import Desk
+from experiments.session.steps import Outcome, Step, record
 from experiments.study.places import Place, place
 
 SETUPS = {name: load_setup(name) for name in ("direction", "preference")}
@@ -92,9 +91,9 @@ class WatchingScreen(SyntheticScreen):
         assert step is not None
         assert not isinstance(outcome, Remark)
         lines = self._journal.read_bytes().splitlines(keepends=True)
-        told, done = [one for line in lines if (one := json.loads(line))["kind"] != "shot"][-2:]
+        announced, done = [one for line in lines if (one := json.loads(line))["kind"] != "shot"][-2:]
         assert lines[-1].endswith(b"\n")
-        assert (told["kind"], told["body"]) == ("step", json.loads(json.dumps(record(step))))
+        assert (announced["kind"], announced["body"]) == ("step", json.loads(json.dumps(record(step))))
         assert (done["kind"], done["body"]) == ("outcome", record(outcome))
         self.acknowledged += 1
         if trouble := self.trouble.get(self.acknowledged):
@@ -112,7 +111,7 @@ class Sitting(NamedTuple):
     clock: VirtualClock
     journal: Journal
 
-    def carry_out(self) -> History:
+    def carry_out(self) -> list[tuple[Step, Outcome]]:
         going = catalogue.CATALOGUE[self.plan.experiment].session(self.plan, self.setup)
         live = LiveRun(
             plan=self.plan, gun=self.gun, journal=self.journal, clock=self.clock, screen=self.screen, guard_s=0.25
@@ -120,7 +119,7 @@ class Sitting(NamedTuple):
         desk = Desk(
             gun=self.gun,
             gun_name="simulated",
-            drives=limits.drives(self.setup),
+            drives={one.method: one.drive for one in limits.check_limits(self.setup)},
             journal=self.journal,
             clock=self.clock,
             live=live,
@@ -128,7 +127,7 @@ class Sitting(NamedTuple):
         self.screen.begin(live)
         with self.journal:
             carry_out(going, desk, RunPosition(step=next(going)))
-        return replay.history(read(self.where.journal))
+        return replay.outcomes(replay.history(read(self.where.journal)))
 
     def rows(self) -> list[dict[str, str]]:
         data = table(read(self.where.journal))
@@ -146,13 +145,13 @@ def sitting(
     heads = {"plan": plan.record(), "plan_sha256": plan.sha256()}
     journal.append("run", **heads, setup=setup.record(), setup_sha256=setup.sha256())
     gun = TroubledGun(setup, clock, troubles or {})
-    observer = catalogue.CATALOGUE[name].observer(setup, plan)
+    observer = catalogue.CATALOGUE[name].synthetic_participant(setup, plan)
     screen = WatchingScreen(setup.config, observer, clock, gun, where.journal)
     return Sitting(plan, setup, where, gun, screen, clock, journal)
 
 
 def resumed_rows(desk: Sitting) -> list[dict[str, str]]:
-    request = Request(setup=desk.setup, participant_id="P01", results=desk.where.results, seed=None, again="resume")
+    request = RunRequest(setup=desk.setup, participant_id="P01", results=desk.where.results, seed=None, again="resume")
     done = run(request, synthetic_screen, VirtualClock())
     with done.place.table.open(newline="") as file:
         return list(csv.DictReader(file))

@@ -15,7 +15,7 @@ from experiments.config.door import ConfigError
 from experiments.config.setup import canonical_json, sha256
 from experiments.load import load_setup, shipped_folder
 from experiments.record.journal import JournalError, read
-from experiments.run import Request, run
+from experiments.run import RunRequest, run
 from experiments.screens.synthetic import synthetic_screen
 from experiments.study.places import PlaceError
 from recoil.config_files import copy_began_with
@@ -43,7 +43,7 @@ def edited(path: Path, *edits: tuple[str, str]) -> Path:
 
 def journal_of(config: Path, results: Path) -> Path:
     setup = load_setup(str(config))
-    done = run(Request(setup=setup, participant_id="P01", results=results, seed=1), synthetic_screen, VirtualClock())
+    done = run(RunRequest(setup=setup, participant_id="P01", results=results, seed=1), synthetic_screen, VirtualClock())
     return done.place.journal
 
 
@@ -101,7 +101,7 @@ def test_the_files_that_a_run_began_with_load_to_the_same_setup(case: str, tmp_p
     journal = journal_of(config, tmp_path / "results")
     copied = copy_began_with(journal, tmp_path / "back")
     assert load_setup(str(copied[0])).record() == load_setup(str(config)).record()
-    assert load_setup(str(copied[0])).sha256() == read(journal).header["setup_sha256"]
+    assert load_setup(str(copied[0])).sha256() == read(journal).head.setup_sha256
     assert all(path.is_relative_to(tmp_path / "back") for path in copied)
 
 

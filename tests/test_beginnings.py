@@ -14,7 +14,7 @@ from hypothesis import strategies as st
 from experiments.clock import VirtualClock
 from experiments.config.models import EligibilityConfig
 from experiments.record.journal import JournalError, hold
-from experiments.run import Request, run
+from experiments.run import RunRequest, run
 from experiments.screens.synthetic import synthetic_screen
 from experiments.study import register
 from experiments.study.enrolment import (
@@ -180,7 +180,7 @@ def study(tmp_path: Path) -> StudyFolder:
 def broken_off(study: StudyFolder, code: str = "P01") -> Path:
     """A run of experiment 1 that was broken off; its journal."""
     journal = run(
-        Request(setup=study.setups[0], participant_id=code, results=study.results), synthetic_screen, VirtualClock()
+        RunRequest(setup=study.setups[0], participant_id=code, results=study.results), synthetic_screen, VirtualClock()
     ).place.journal
     journal.write_bytes(b"".join(journal.read_bytes().splitlines(keepends=True)[:40]))
     return journal

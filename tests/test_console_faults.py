@@ -28,8 +28,8 @@ from experiments.live_run import RunStopped
 from experiments.load import load_setup
 from experiments.record import storage
 from experiments.record.journal import Contents, read
-from experiments.record.replay import told
-from experiments.run import Request
+from experiments.record.replay import history
+from experiments.run import RunRequest
 from experiments.screens.console import widgets
 from experiments.session.states import State
 from experiments.session.steps import Answered, Ask, Failed, Fire, Fired
@@ -181,8 +181,8 @@ def program(case: str, folder: Path) -> dict[str, Any]:
         slow_disk(syncs)
 
     setup = short_direction(sets=1, trials=3, set_break_s=0.0)
-    request = Request(setup=setup, participant_id="P01", results=folder, seed=1)
-    console = Console(request, RealClock(), hand="synthetic")
+    request = RunRequest(setup=setup, participant_id="P01", results=folder, seed=1, screen="console", visual=True)
+    console = Console(request, RealClock())
     watcher = Watcher(console, guns, case, syncs)
     try:
         with VisualParticipant(console):
@@ -264,7 +264,7 @@ def check_awake(seen: dict[str, Any]) -> None:
 
 def check_answers(contents: Contents) -> None:
     """Every answer belongs to a shot that was fired just before it, and none to one that failed."""
-    told_so_far = told(contents)
+    told_so_far = history(contents)
     for place_, (step, word) in enumerate(told_so_far):
         if isinstance(step, Ask) and isinstance(word, Answered):
             before, shot = told_so_far[place_ - 1]
@@ -281,7 +281,7 @@ def test_a_shot_that_fails_is_marked_said_and_presented_again_while_the_window_s
     if fault == "hangs":
         check_awake(seen)
     check_answers(contents)
-    failed = [(step, word) for step, word in told(contents) if isinstance(word, Failed)]
+    failed = [(step, word) for step, word in history(contents) if isinstance(word, Failed)]
     assert [(step.trial.trial, word.cause) for step, word in failed] == [(2, cause)]
     assert [(row["attempts"], row["flags"]) for row in rows] == [("1", ""), ("2", "device-error"), *[("1", "")] * 4]
     assert all(row["response"] for row in rows)
@@ -301,7 +301,7 @@ def test_a_gun_that_vanishes_stops_the_run_with_nothing_answered_for_it(case: Ca
     seen, contents, rows = case("vanishes")
     check_answers(contents)
     assert "switch off its power" in seen["stopped"]
-    assert contents.records[-1]["kind"] == "stopped"
+    assert contents.records[-1].kind == "stopped"
     assert [bool(row["response"]) for row in rows] == [True] + [False] * 5
     assert "Stopped" in seen["titles"]
 
@@ -314,7 +314,7 @@ def test_what_was_fired_when_the_gun_vanished_is_marked_and_presented_again_on_r
 
     case("vanishes")
     setup = short_direction(sets=1, trials=3, set_break_s=0.0)
-    request = Request(setup=setup, participant_id="P01", results=tmp_path, again="resume")
+    request = RunRequest(setup=setup, participant_id="P01", results=tmp_path, again="resume")
     done = runs.run(request, synthetic_screen, VirtualClock())
     with done.place.table.open(newline="", encoding="utf-8") as file:
         rows = list(csv.DictReader(file))
@@ -331,14 +331,14 @@ def test_the_emergency_stop_disarms_at_once_while_a_shot_hangs_and_stops_the_run
     assert seen["shots"] == 2
     assert seen["stopped"] == "emergency stop"
     assert [bool(row["response"]) for row in rows] == [True] + [False] * 5
-    assert contents.records[-1]["reason"] == "emergency stop"
+    assert contents.records[-1].reason == "emergency stop"
 
 
 def test_a_disk_whose_sync_takes_200_ms_keeps_no_window_waiting(case: Case) -> None:
     seen, contents, rows = case("slow-disk")
     check_awake(seen)
     check_answers(contents)
-    times = [record["monotonic_s"] for record in contents.records]
+    times = [record.monotonic_s for record in contents.records]
     assert times[-1] - times[0] > SLOW_SYNC_S * (len(times) - 1)
     assert [(row["attempts"], row["flags"]) for row in rows] == [("1", "")] * 6
 

@@ -15,7 +15,7 @@ from experiments import catalogue
 from experiments.config.setup import Setup
 from experiments.design.plan import Plan, Trial
 from experiments.screens.console import progress, view, widgets
-from experiments.screens.console.progress import RunProgress, clock_text, end_text, remaining_s, trials_done
+from experiments.screens.console.progress import RunTiming, clock_text, end_text, remaining_s, trials_done
 from experiments.screens.console.view import About, Ended, GunSeen, ParticipantSeen, Seen
 from experiments.session.remarks import AnswerCorrected, Flagged, Noted
 from experiments.session.states import Position, State
@@ -251,7 +251,7 @@ class Day:
     """A run whose trials take what they are told to."""
 
     def __init__(self, setup: Setup[Any]) -> None:
-        self.setup, self.plan, self.so_far = setup, plan_of(setup), RunProgress()
+        self.setup, self.plan, self.so_far = setup, plan_of(setup), RunTiming()
         self.told: list[Any] = []
         self.now_s = 100.0
         self.position = Position()
@@ -348,7 +348,7 @@ def test_the_end_is_a_time_of_day_also_over_midnight() -> None:
 
 
 def test_no_time_has_gone_by_before_the_run_begins() -> None:
-    so_far = RunProgress()
+    so_far = RunTiming()
     assert so_far.elapsed_s(5_000.0) == 0.0
     so_far.began_s = 5_000.0
     assert so_far.elapsed_s(5_030.0) == 30.0

@@ -20,13 +20,14 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from analysis.report.serial import plain
 from device import LinkError
 from experiments.clock import VirtualClock
 from experiments.config.door import ConfigError
 from experiments.config.setup import sha256
-from experiments.doctor import children, verdicts
-from experiments.doctor.checks import Check, carry_out, checks, no_display
-from experiments.doctor.children import within
+from experiments.design.plan import Trial
+from experiments.doctor import verdicts
+from experiments.doctor.checks import Check, Reply, carry_out, cause, checks, no_display, run_child, within
 from experiments.doctor.figures import (
     VERDICTS,
     Adapter,
@@ -46,7 +47,20 @@ from experiments.doctor.figures import (
 from experiments.doctor.measures import APPENDS, adapters, appends, ticks
 from experiments.doctor.verdicts import Latencies, latencies, together
 from experiments.load import find, load_gun
-from experiments.record.journal import Journal
+from experiments.record.journal import Journal, Record
+from experiments.session.steps import (
+    Answered,
+    Ask,
+    Fire,
+    Fired,
+    Outcome,
+    Prepare,
+    Prepared,
+    Present,
+    Presented,
+    Step,
+    record,
+)
 from experiments.study.places import PlaceError
 from recoil.doctor import as_text
 from tests.conftest import RECOIL, Recoil
@@ -84,25 +98,38 @@ def test_no_percentile_of_nothing_and_none_beyond_a_hundred(values: list[float],
 # console latencies
 
 
-def told(trials: list[tuple[float, float]]) -> list[dict[str, Any]]:
+TRIAL = Trial(session=1, method="vibration", set=1, trial=1, direction="forward")
+FIRED = Fired(
+    gun="a", onset_utc="", requested_s=0.0, pulse_start_s=0.0, pulse_end_s=0.0, home_predicted_s=0.0, motion="home"
+)
+ANSWERED = Answered(response="forward", response_time_s=1.5, response_source="experimenter", response_time_valid=False)
+ASK = Ask(trial=TRIAL, attempt=1, question="", forward="", backward="")
+HEAD = Record(n=0, kind="run", utc="", monotonic_s=0.0, clock="real")
+
+
+def line(kind: Any, word: Step | Outcome | None = None, *, at_s: float = 0.0, **more: Any) -> Record:
+    return Record(n=1, kind=kind, utc="", monotonic_s=at_s, body=word and record(word), **more)
+
+
+def recorded(trials: list[tuple[float, float]]) -> list[Record]:
     """The records of trials at a console, one every 10 s: how long a paint took, and how long a key to the disk."""
-    records: list[dict[str, Any]] = [{"kind": "run", "clock": "real", "monotonic_s": 0.0, "synced_s": None}]
+    records = [HEAD]
     for number, (paint_ms, key_ms) in enumerate(trials):
         start_s = 10.0 * number
-        fired = {"kind": "fired", "pulse_start_s": start_s + 2}
-        answered = {"kind": "answered", "response_time_s": 1.5}
-        times_s = {"prepare": start_s, "fire": start_s + 1.9, "ask": start_s + 2.1}
-        shown_s = {kind: at_s + paint_ms / 1000 for kind, at_s in times_s.items()} | {"fire": start_s + 0.02}
-        for kind, body in (("prepare", {"kind": "prepared"}), ("fire", fired), ("ask", answered)):
-            records.append({"kind": "step", "body": {"kind": kind}, "monotonic_s": times_s[kind], "synced_s": None})
-            records.append({"kind": "outcome", "body": body, "shown_s": shown_s[kind], "synced_s": None})
-        records.append({"kind": "remark", "body": {"kind": "noted"}, "synced_s": start_s + 3.5 + key_ms / 1000})
+        done: list[tuple[Step, Outcome, float, float]] = [
+            (Prepare(trial=TRIAL, attempt=1, damper=""), Prepared(), start_s, start_s + paint_ms / 1000),
+            (Fire(trial=TRIAL, attempt=1), replace(FIRED, pulse_start_s=start_s + 2), start_s + 1.9, start_s + 0.02),
+            (ASK, ANSWERED, start_s + 2.1, start_s + 2.1 + paint_ms / 1000),
+        ]
+        for step, outcome, at_s, shown_s in done:
+            records += [line("step", step, at_s=at_s), line("outcome", outcome, shown_s=shown_s)]
+        records.append(line("remark", synced_s=start_s + 3.5 + key_ms / 1000))
     return records
 
 
 @given(st.lists(st.tuples(milliseconds, milliseconds), max_size=20))
 def test_what_the_console_took_is_read_back_from_the_records(trials: list[tuple[float, float]]) -> None:
-    found = latencies(told(trials))
+    found = latencies(recorded(trials))
     paints = [paint for paint, _ in trials for _ in ("prepare", "ask")]
     assert found.trials == len(trials)
     assert found.step_to_screen_ms == pytest.approx(paints, abs=1e-6)
@@ -111,18 +138,18 @@ def test_what_the_console_took_is_read_back_from_the_records(trials: list[tuple[
 
 @pytest.mark.parametrize("left_out", ["shown_s", "clock"])
 def test_a_run_without_a_console_or_on_a_virtual_clock_tells_nothing(left_out: str) -> None:
-    records = told([(20, 3)])
+    records = recorded([(20, 3)])
     if left_out == "shown_s":
-        records = [{key: value for key, value in record.items() if key != "shown_s"} for record in records]
+        records = [replace(one, shown_s=None) for one in records]
     else:
-        records[0]["clock"] = "virtual"
+        records[0] = replace(HEAD, clock="virtual")
     assert latencies(records) == Latencies()
     assert latencies([]) == Latencies()
 
 
 def test_a_step_or_shot_before_a_crash_is_not_paired_with_an_outcome_after_it() -> None:
-    resumed = {"kind": "resumed", "clock": "real", "monotonic_s": 1e6, "synced_s": None}
-    records = told([(20, 3)])
+    resumed = line("resumed", at_s=1e6, clock="real")
+    records = recorded([(20, 3)])
     for place in (2, 6):  # between a step and its outcome; between shot and answer
         assert latencies([*records[:place], resumed, *records[place:]]).trials == 1
     assert len(latencies([*records[:2], resumed, *records[2:]]).step_to_screen_ms) == 1
@@ -130,16 +157,14 @@ def test_a_step_or_shot_before_a_crash_is_not_paired_with_an_outcome_after_it() 
 
 
 def test_a_presentation_is_left_out_since_every_shot_paints_it_anew() -> None:
-    records: list[dict[str, Any]] = [
-        {"kind": "run", "clock": "real"},
-        {"kind": "step", "body": {"kind": "present"}, "monotonic_s": 1.0, "synced_s": None},
-        {"kind": "outcome", "body": {"kind": "presented"}, "shown_s": 9.0, "synced_s": 1.1},
-    ]
+    presented = Presented(gun="a", onset_utc="", shots=1, exposure_s=1.0, ended_by="next")
+    present = Present(trial=TRIAL, attempt=1, repeat_every_s=1.0, max_shots=9, least_exposure_s=1.0)
+    records = [HEAD, line("step", present, at_s=1.0), line("outcome", presented, shown_s=9.0, synced_s=1.1)]
     assert latencies(records) == Latencies()
 
 
 def test_latencies_of_several_journals_are_counted_together() -> None:
-    found = together(latencies(told([(paint, 1.0)])) for paint in (10.0, 20.0))
+    found = together(latencies(recorded([(paint, 1.0)])) for paint in (10.0, 20.0))
     assert (found.trials, len(found.step_to_screen_ms), len(found.key_to_disk_ms)) == (2, 4, 2)
     assert together([]) == Latencies()
 
@@ -206,7 +231,7 @@ def test_every_figure_has_its_verdict_and_all_but_good_ones_advice(finding: Find
     assert finding.verdict == verdict
     assert advice in finding.advice
     assert bool(finding.advice) == (verdict != "good")
-    json.dumps(dict(finding.figures), allow_nan=False)
+    json.dumps(plain(finding.figures), allow_nan=False)
 
 
 @pytest.mark.parametrize(("slowest", "verdict"), [(50.0, "good"), (50.1, "warning")])
@@ -245,13 +270,13 @@ def test_a_display_is_asked_for_on_linux_before_a_window_is_tried(
 def test_a_dead_child_is_explained_by_the_library_it_missed_or_by_its_first_words() -> None:
     search = 'qt.core.plugin.factoryloader: looking at "libqxcb.so"\n'
     lacking = f"{search}cannot load: libxcb-icccm.so.4: cannot open shared object file: No such file\nqt.qpa: sorry\n"
-    assert children.cause(lacking) == "libxcb-icccm.so.4: cannot open shared object file"
-    assert children.cause(f"{search}\nqt.qpa.xcb: could not connect to display :9\nmore\n").endswith("display :9")
-    assert children.cause("") == "it said nothing"
+    assert cause(lacking) == "libxcb-icccm.so.4: cannot open shared object file"
+    assert cause(f"{search}\nqt.qpa.xcb: could not connect to display :9\nmore\n").endswith("display :9")
+    assert cause("") == "it said nothing"
 
 
 def test_the_table_shows_names_in_brackets_as_they_are() -> None:
-    text = as_text([Finding(check="sound", verdict="good", measured="[red]Headphones[/red]")])
+    text = as_text((Finding(check="sound", verdict="good", measured="[red]Headphones[/red]"),))
     assert "[red]Headphones[/red]" in text
 
 
@@ -294,16 +319,16 @@ def test_work_that_is_interrupted_may_put_away_what_it_holds(tmp_path: Path) -> 
     program = (
         "import os, signal, threading\n"
         "from pathlib import Path\n"
-        "from experiments.doctor import deadline\n"
+        "from experiments.doctor import checks\n"
         "interrupted = threading.Event()\n"
         "def interrupt(*_):\n    interrupted.set()\n    raise KeyboardInterrupt\n"
         "signal.signal(signal.SIGINT, interrupt)\n"
         "def work():\n    os.kill(os.getpid(), signal.SIGINT)\n    interrupted.wait()\n    Path({!r}).touch()\n"
-        "deadline._PUT_AWAY_S = {}\n"
-        "deadline.within({}, work)"
+        "checks.PUT_AWAY_S = {}\n"
+        "checks.within({}, work)"
     )
     program = program.format(str(tmp_path / "put away"), PATIENCE_S, PATIENCE_S)
-    answer = children.run([sys.executable, "-c", program], PATIENCE_S)
+    answer = run_child([sys.executable, "-c", program], PATIENCE_S)
     assert "signal 2" in answer.error
     assert (tmp_path / "put away").exists()
 
@@ -325,22 +350,22 @@ def lose_the_gun() -> NoReturn:
     ],
 )
 def test_a_child_that_hangs_or_dies_is_an_answer(program: str, seconds: float, error: str) -> None:
-    assert children.run([sys.executable, "-S", "-c", program], seconds).error == error
+    assert run_child([sys.executable, "-S", "-c", program], seconds).error == error
 
 
 def test_what_the_libraries_of_a_child_print_and_raise_does_not_spoil_its_answer() -> None:
     program = (
-        "from experiments.doctor.programs.answer import answer, Absent\n"
+        "from experiments.doctor.programs import answer, Absent\n"
         "def look():\n    print('noise')\n    raise {}\n"
         "answer(look)"
     )
     for error, said in (
-        ("SystemExit(0)", children.Answer(error="SystemExit: 0")),
-        ("Absent('no screen')", children.Answer(absent="no screen")),
-        ("ModuleNotFoundError(name='Xlib')", children.Answer(absent="Xlib is not installed")),
-        ("ModuleNotFoundError('no wx', name='wx')", children.Answer(error="ModuleNotFoundError: no wx")),
+        ("SystemExit(0)", Reply(error="SystemExit: 0")),
+        ("Absent('no screen')", Reply(absent="no screen")),
+        ("ModuleNotFoundError(name='Xlib')", Reply(absent="Xlib is not installed")),
+        ("ModuleNotFoundError('no wx', name='wx')", Reply(error="ModuleNotFoundError: no wx")),
     ):
-        assert children.run([sys.executable, "-c", program.format(error)], PATIENCE_S) == said
+        assert run_child([sys.executable, "-c", program.format(error)], PATIENCE_S) == said
 
 
 def test_a_check_that_breaks_off_is_a_finding_and_an_impossible_wish_is_refused() -> None:
@@ -449,13 +474,13 @@ def console_run(results: Path) -> None:
     with Journal.create(folder / "sub-P01_task-direction_journal.jsonl", clock) as journal:
         journal.append("run", **parts, **hashes, clock="real")
         for _ in range(25):
-            journal.append("step", body={"kind": "fire"})
+            journal.append("step", body=record(Fire(trial=TRIAL, attempt=1)))
             fired_s = clock.now()
-            journal.append("outcome", body={"kind": "fired", "pulse_start_s": fired_s})
-            journal.append("step", body={"kind": "ask"})
+            journal.append("outcome", body=record(replace(FIRED, pulse_start_s=fired_s)))
+            journal.append("step", body=record(ASK))
             clock.sleep(1)
-            answered = {"kind": "answered", "response_time_s": 1 - 0.004}
-            journal.append("outcome", body=answered, shown_s=fired_s + 0.020)
+            answered = replace(ANSWERED, response_time_s=1 - 0.004)
+            journal.append("outcome", body=record(answered), shown_s=fired_s + 0.020)
         journal.append("finished")
 
 

@@ -21,7 +21,7 @@ from analysis.logs.reading import read_logs
 from experiments.clock import RealClock, VirtualClock
 from experiments.load import load_setup, shipped_folder
 from experiments.record import columns
-from experiments.run import Request, run
+from experiments.run import RunRequest, run
 from experiments.screens.synthetic import synthetic_screen
 from experiments.study.places import PlaceError
 from experiments.study.register import append, entry
@@ -91,7 +91,7 @@ def real(tmp_path_factory: pytest.TempPathFactory) -> Path:
     for name in ("direction", "preference"):
         setup = load_setup(str(shipped_folder() / f"{name}.toml"))
         for code in ("P01", "P02"):
-            run(Request(setup=setup, participant_id=code, results=results), synthetic_screen, VirtualClock())
+            run(RunRequest(setup=setup, participant_id=code, results=results), synthetic_screen, VirtualClock())
     trials = [row | {"response_source": "participant", "flags": "late"} for row in trial_rows("Z9")]
     trials[0] |= {"response": "", "correct": "", "response_time_s": "", "response_source": "", "attempts": ""}
     trials[1] |= {"note": NASTY, "onset_utc": "2026-03-01T09:30:00.250000Z"}

@@ -21,15 +21,15 @@ from experiments.direction.config import DirectionConfig
 from experiments.direction.session import make_plan, make_practice, session
 from experiments.load import load_setup, shipped_folder
 from experiments.record.journal import read
-from experiments.record.replay import told
-from experiments.run import Request, run
+from experiments.record.replay import history
+from experiments.run import RunRequest, run
 from experiments.screens.console.progress import coming
 from experiments.screens.console.view import About, Seen, instruction
 from experiments.screens.synthetic import synthetic_screen
 from experiments.screens.terminal import TerminalScreen
 from experiments.screens.texts import read_out_text
 from experiments.session.states import Position, State
-from experiments.session.steps import Prepare, outcome_from, record, step_from
+from experiments.session.steps import OUTCOME, STEP, Prepare, record
 
 HURRY = load_setup(str(shipped_folder() / "examples" / "hurry.toml"))
 PLAIN = load_setup("direction")
@@ -117,7 +117,7 @@ def prepares(setup: Setup[Any]) -> list[Prepare]:
 def test_a_hand_over_carries_the_text_of_its_sets_instruction() -> None:
     for step in prepares(HURRY):
         assert step.instruction == HURRY.config.instructions[step.trial.instruction].text
-        assert step_from(record(step)) == step
+        assert STEP.validate_python(record(step)) == step
 
 
 def test_a_hand_over_without_an_instruction_is_recorded_as_before_there_were_any() -> None:
@@ -161,19 +161,19 @@ def typed(plan: Plan, step: Prepare) -> str:
 @pytest.fixture(scope="module")
 def done(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, Path]:
     """A run of the example: its journal and its table."""
-    request = Request(setup=HURRY, participant_id="P01", results=tmp_path_factory.mktemp("results"), seed=1)
+    request = RunRequest(setup=HURRY, participant_id="P01", results=tmp_path_factory.mktemp("results"), seed=1)
     finished = run(request, synthetic_screen, VirtualClock())
     return finished.place.journal, finished.place.table
 
 
 def test_the_first_record_and_the_table_hold_each_trials_instruction(done: tuple[Path, Path]) -> None:
     contents = read(done[0])
-    planned = [trial["instruction"] for trial in contents.header["plan"]["trials"]]
+    planned = [trial.instruction for trial in contents.plan.trials]
     with done[1].open(newline="", encoding="utf-8") as file:
         rows = list(csv.DictReader(file))
     assert [row["instruction"] for row in rows] == planned
     assert Counter(planned) == {"speed": 30, "neutral": 30, "accuracy": 30}
-    read_out = [step.instruction for step, _ in told(contents) if isinstance(step, Prepare)]
+    read_out = [step.instruction for step, _ in history(contents) if isinstance(step, Prepare)]
     assert read_out == [HURRY.config.instructions[name].text for name in planned]
 
 
@@ -193,7 +193,7 @@ def test_the_time_of_a_key_is_in_the_record_only_where_there_is_one() -> None:
         "kind": "answered", "response": "forward", "response_time_s": 0.5, "response_source": "synthetic",
         "response_time_valid": True,
     }  # fmt: skip
-    answered = outcome_from(body)
+    answered = OUTCOME.validate_python(body)
     assert record(answered) == body
     assert record(replace(answered, key_time_s=0.0))["key_time_s"] == 0.0
-    assert math.isclose(outcome_from(body | {"key_time_s": 0.51}).key_time_s, 0.51)
+    assert math.isclose(OUTCOME.validate_python(body | {"key_time_s": 0.51}).key_time_s, 0.51)

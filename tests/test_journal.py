@@ -4,6 +4,7 @@ import stat
 import subprocess
 import sys
 from contextlib import suppress
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -12,7 +13,7 @@ import pytest
 from experiments.clock import VirtualClock
 from experiments.config.setup import sha256
 from experiments.record import storage
-from experiments.record.journal import Contents, Journal, JournalError, head, read
+from experiments.record.journal import Journal, JournalError, head, read
 
 PARTS = {"plan": {"trials": [1, 2]}, "setup": {"title": "é – 20 °C"}}
 HEAD = PARTS | {f"{name}_sha256": sha256(part) for name, part in PARTS.items()}
@@ -44,24 +45,26 @@ def lines_of(path: Path) -> list[bytes]:
 
 def test_every_record_has_number_kind_and_times(path: Path) -> None:
     records = read(path).records
-    assert [entry["n"] for entry in records] == list(range(RECORDS))
-    assert [entry["kind"] for entry in records] == ["run", *["step", "outcome"] * 3, "step"]
-    assert [entry["monotonic_s"] for entry in records] == [0.5 * number for number in range(RECORDS)]
-    assert all(entry["utc"].endswith("Z") for entry in records)
-    assert records[3]["body"] == {"number": 3, "text": "“next”\n"}
+    assert [entry.n for entry in records] == list(range(RECORDS))
+    assert [entry.kind for entry in records] == ["run", *["step", "outcome"] * 3, "step"]
+    assert [entry.monotonic_s for entry in records] == [0.5 * number for number in range(RECORDS)]
+    assert all(entry.utc.endswith("Z") for entry in records)
+    assert records[3].body == {"number": 3, "text": "“next”\n"}
 
 
 def test_the_first_record_is_the_head(path: Path) -> None:
     contents = read(path)
-    assert {key: contents.header[key] for key in HEAD} == HEAD
-    assert head(path) == contents.header == contents.records[0]
+    parts = {"plan": contents.head.plan_json, "setup": contents.head.setup_json}
+    hashes = {"plan_sha256": contents.head.plan_sha256, "setup_sha256": contents.head.setup_sha256}
+    assert parts | hashes == HEAD
+    assert head(path) == contents.head == contents.records[0]
 
 
 def test_every_record_tells_when_the_one_before_it_was_on_the_disk(path: Path) -> None:
     first, *others = read(path).records
-    assert first["synced_s"] is None
+    assert first.synced_s is None
     # on the virtual clock writing takes no time: synced at the time of the record itself, half a second ago
-    assert [entry["synced_s"] for entry in others] == [entry["monotonic_s"] - 0.5 for entry in others]
+    assert [entry.synced_s for entry in others] == [entry.monotonic_s - 0.5 for entry in others]
 
 
 def test_a_record_is_on_the_disk_when_append_returns(tmp_path: Path) -> None:
@@ -120,9 +123,10 @@ def test_what_a_terminal_may_take_for_text_is_written_or_refused_as_a_journal_er
 
 
 @pytest.mark.skipif(not Path("/dev/full").exists(), reason="no /dev/full")
-def test_a_full_disk_is_told_with_what_is_safe() -> None:
+def test_a_full_disk_is_told_with_what_is_safe(path: Path) -> None:
     descriptor = os.open("/dev/full", os.O_RDWR | os.O_APPEND)
-    before = Contents(path=Path("/dev/full"), records=({},) * 7, whole_bytes=0, cut_bytes=0, link="")
+    whole = read(path)
+    before = replace(whole, path=Path("/dev/full"), records=whole.records[:7], whole_bytes=0)
     journal = Journal(Path("/dev/full"), descriptor, VirtualClock(), before)
     with journal, pytest.raises(JournalError, match=r"record 7 cannot be written \(No space left .*record 6 is safe"):
         journal.append("step", body={})
@@ -169,7 +173,7 @@ def test_a_journal_cut_at_any_byte_is_read_to_its_last_whole_record(path: Path) 
         assert len(contents.records) == whole
         assert contents.whole_bytes == ends[whole - 1]
         assert contents.cut_bytes == length - ends[whole - 1]
-        assert head(cut) == contents.header
+        assert head(cut) == contents.head
         if contents.cut_bytes == 0:
             assert contents.cut_message is None
         else:
@@ -194,9 +198,9 @@ def test_reopening_takes_away_what_was_cut_off_and_goes_on_numbering(path: Path,
         journal.append("resumed", cut_bytes=cut_bytes)
         journal.append("step", body=1)
     contents = read(path)
-    assert [entry["n"] for entry in contents.records] == list(range(7))
-    assert [entry["kind"] for entry in contents.records[5:]] == ["resumed", "step"]
-    assert contents.records[5]["synced_s"] is None
+    assert [entry.n for entry in contents.records] == list(range(7))
+    assert [entry.kind for entry in contents.records[5:]] == ["resumed", "step"]
+    assert contents.records[5].synced_s is None
     assert lines_of(path)[:5] == lines[:5]
 
 

@@ -14,7 +14,7 @@ from device import LimitError, LinkError
 from experiments.design.plan import Trial
 from experiments.live_run import RunStopped, Verdict
 from experiments.record import storage
-from experiments.record.replay import told
+from experiments.record.replay import history
 from experiments.screens.texts import again_text
 from experiments.session import events
 from experiments.session import remarks as words
@@ -168,7 +168,7 @@ def test_next_is_taken_from_the_least_exposure_on_and_not_before_the_first_shot(
         sitting.clock.skip(0.0011)
         assert sitting.live.offer(events.Next())
         contents = of_journal(sitting)
-    presented = next(word for _, word in told(contents) if isinstance(word, Presented))
+    presented = next(word for _, word in history(contents) if isinstance(word, Presented))
     assert presented.ended_by == "next"
     assert presented.exposure_s >= LEAST_S
 
@@ -346,7 +346,7 @@ def test_what_ends_the_run_before_the_description_keeps_the_rating_and_the_words
         sitting.settle()
         assert not own_words(sitting)
         contents = of_journal(sitting)
-    assert [word.rating for _, word in told(contents) if isinstance(word, Rated)] == [3.0]
+    assert [word.rating for _, word in history(contents) if isinstance(word, Rated)] == [3.0]
     assert isinstance(sitting.error, RunStopped)
     assert sitting.error.saved == 1
     with sat(PREFERENCE, tmp_path, resumed=True) as sitting:
@@ -487,7 +487,7 @@ def test_a_repeat_that_was_asked_for_one_trial_is_not_taken_for_the_next(tmp_pat
         said = "Trial 1 cannot be presented again any more. What you typed is kept as a note."
         assert sitting.window.heard.count(said) == 1
         contents = of_journal(sitting)
-    assert not [word for _, word in told(contents) if isinstance(word, Repeat)]
+    assert not [word for _, word in history(contents) if isinstance(word, Repeat)]
 
 
 # the emergency stop
@@ -577,7 +577,7 @@ def test_a_halt_between_the_key_and_the_shot_fires_nothing(passed: int, tmp_path
         sitting.finish()
         with sat(DIRECTION, tmp_path, resumed=True) as again:
             again.to(S.PREPARING)
-            assert again_text(again.live.told, prepare(again)) == ""
+            assert again_text(again.live.history, prepare(again)) == ""
             _, rows = to_the_end(again)
     assert (rows[0]["attempts"], rows[0]["flags"]) == ("1", "")
 
@@ -613,9 +613,9 @@ def test_a_pause_between_the_key_and_the_shot_takes_the_shot_back_also_if_it_is_
         sitting.settle()
         assert "fire" not in sitting.gun.words
         assert sitting.position.base in (S.SETTING, S.PREPARING)
-        assert again_text(sitting.live.told, prepare(sitting)) == ""
+        assert again_text(sitting.live.history, prepare(sitting)) == ""
         contents, rows = to_the_end(sitting)
-    given_up = next(word for step, word in told(contents) if isinstance(step, Fire))
+    given_up = next(word for step, word in history(contents) if isinstance(step, Fire))
     assert given_up == Interrupted(presented=False, cause="pause")
     assert (rows[0]["attempts"], rows[0]["flags"]) == ("1", "")
 
@@ -674,7 +674,7 @@ def test_a_pause_while_a_shot_hangs_in_the_gun_takes_it_back(tmp_path: Path) -> 
         assert "rendered" not in sitting.gun.words
         assert sitting.position.states[-1] is S.PAUSED
         contents, rows = to_the_end(sitting)
-    assert Interrupted(presented=False, cause="pause") in [word for _, word in told(contents)]
+    assert Interrupted(presented=False, cause="pause") in [word for _, word in history(contents)]
     assert (rows[0]["attempts"], rows[0]["flags"]) == ("1", "")
 
 
@@ -691,7 +691,7 @@ def test_a_pause_ends_a_train_and_its_trial_is_presented_again_with_both_exposur
         assert sitting.gun.words.count("rendered") == shots
         assert sitting.gun.status().state == "disarmed"
         contents, rows = to_the_end(sitting)
-    ended = next(word for _, word in told(contents) if isinstance(word, Interrupted))
+    ended = next(word for _, word in history(contents) if isinstance(word, Interrupted))
     assert (ended.presented, ended.cause, ended.shots) == (True, "pause", 2)
     assert ended.exposure_s == pytest.approx(1.5 + 2 * 0.03 + GUARD_S + 0.01, abs=0.05)
     assert (rows[0]["attempts"], rows[0]["flags"]) == ("2", "paused")
@@ -750,11 +750,11 @@ def test_a_shot_that_was_refused_was_not_felt_and_one_of_unknown_outcome_may_hav
         sitting.gun.fails = [error]
         sitting.press("Space")
         sitting.to(S.PREPARING)
-        again = again_text(sitting.live.told, prepare(sitting))
+        again = again_text(sitting.live.history, prepare(sitting))
         contents, rows = to_the_end(sitting)
     assert again == ("Presented again, for the second time." if attempts == "2" else "")
     assert (rows[0]["attempts"], rows[0]["flags"]) == (attempts, "device-error")
-    assert [word.cause for _, word in told(contents) if isinstance(word, Failed)] == [str(error)]
+    assert [word.cause for _, word in history(contents) if isinstance(word, Failed)] == [str(error)]
 
 
 # after the emergency stop
@@ -857,7 +857,7 @@ def test_the_last_set_can_be_corrected_and_repeated_until_the_run_is_ended(tmp_p
         assert sitting.state is S.CLOSING
         assert by_hand(sitting, events.Repeat(reason="a noise"))
         assert sitting.position.base in (S.SETTING, S.PREPARING)
-        assert again_text(sitting.live.told, prepare(sitting)) == "Presented again, for the second time."
+        assert again_text(sitting.live.history, prepare(sitting)) == "Presented again, for the second time."
         sitting.to(S.CLOSING)
         contents, rows = to_the_end(sitting)
     assert (rows[-2]["response"], rows[-2]["flags"]) == ("backward", "corrected")
@@ -868,7 +868,7 @@ def test_the_last_set_can_be_corrected_and_repeated_until_the_run_is_ended(tmp_p
 def test_a_trial_can_be_repeated_in_the_break_after_it_which_then_begins_anew(tmp_path: Path) -> None:
     with sat(DIRECTION, tmp_path) as sitting:
         sitting.to(S.RESTING)
-        last = trial_of(sitting.live.told[-1][0])
+        last = trial_of(sitting.live.history[-1][0])
         sitting.clock.skip(10.0)
         assert by_hand(sitting, events.Repeat(reason="a noise"))
         assert prepare(sitting).trial == last
@@ -891,7 +891,7 @@ def test_a_presented_trial_can_be_repeated_until_its_rating_is_in(tmp_path: Path
         contents, rows = to_the_end(sitting)
     assert [row["attempts"] for row in rows] == ["2", "1", "1"]
     assert rows[0]["flags"] == "repeated"
-    assert [word.rating for _, word in told(contents) if isinstance(word, Rated)] == [5.0] * 3
+    assert [word.rating for _, word in history(contents) if isinstance(word, Rated)] == [5.0] * 3
 
 
 def test_a_rating_corrected_at_the_very_end_counts(tmp_path: Path) -> None:
@@ -910,7 +910,7 @@ def test_how_often_a_trial_was_presented_is_told_as_the_table_counts_it(tmp_path
 
     def note(sitting: Sitting) -> None:
         sitting.to(S.PREPARING)
-        told_by_trial[prepare(sitting).trial] = again_text(sitting.live.told, prepare(sitting))
+        told_by_trial[prepare(sitting).trial] = again_text(sitting.live.history, prepare(sitting))
 
     def on(sitting: Sitting) -> None:
         while not sitting.ended.is_set():

@@ -11,10 +11,10 @@ import pytest
 from experiments.clock import date_text, time_text
 from experiments.screens.console.people import cell_text, coming_text, note_text, remark, stopped_text
 from experiments.study.progress import Overview
-from experiments.study.study import Next, Participant, RunStanding, State
+from experiments.study.study import Next, Participant, RunProgress, State
 from tests.people import ORDER, someone
 
-STOPPED = RunStanding(
+STOPPED = RunProgress(
     experiment="direction", state="in progress", answered=12, planned=60, last_utc="2026-11-22T01:09:58.895306Z"
 )
 
@@ -52,14 +52,14 @@ def test_a_time_of_day_has_hours_and_minutes() -> None:
 @pytest.mark.parametrize(
     ("run", "shown"),
     [
-        (RunStanding(experiment="direction", state="not begun"), "–"),
-        (RunStanding(experiment="direction", state="not begun", practised=True), "–\npractice done"),
-        (RunStanding(experiment="direction", state="done", answered=60, planned=60, last_utc="x"), "done"),
-        (RunStanding(experiment="direction", state="unreadable"), "cannot be read"),
-        (RunStanding(experiment="direction", state="open elsewhere"), "open elsewhere"),
+        (RunProgress(experiment="direction", state="not begun"), "–"),
+        (RunProgress(experiment="direction", state="not begun", practised=True), "–\npractice done"),
+        (RunProgress(experiment="direction", state="done", answered=60, planned=60, last_utc="x"), "done"),
+        (RunProgress(experiment="direction", state="unreadable"), "cannot be read"),
+        (RunProgress(experiment="direction", state="open elsewhere"), "open elsewhere"),
     ],
 )
-def test_a_cell_says_how_a_run_stands(run: RunStanding, shown: str) -> None:
+def test_a_cell_says_how_a_run_stands(run: RunProgress, shown: str) -> None:
     assert cell_text(run) == shown
 
 

@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from experiments.config.setup import canonical_json, sha256
+from experiments.design.plan import Plan
 from experiments.study.places import (
     Place,
     PlaceError,
@@ -16,6 +16,8 @@ from experiments.study.places import (
     set_aside_file,
     used_rows,
 )
+from experiments.study.register import read
+from tests.journals import write_head
 
 RESULTS = Path("/nowhere/results")
 EXPERIMENTS = ("direction", "preference")
@@ -83,11 +85,11 @@ def test_a_collision_is_found_beside_the_code_itself(tmp_path: Path) -> None:
 
 
 def test_known_codes_are_those_of_folders(tmp_path: Path) -> None:
-    assert known_codes(tmp_path / "none") == []
+    assert known_codes(tmp_path / "none", read(tmp_path / "none")) == []
     for name in ("sub-P02", "sub-P01", "other"):
         (tmp_path / name).mkdir()
     (tmp_path / "sub-P03").touch()
-    assert known_codes(tmp_path) == ["P01", "P02"]
+    assert known_codes(tmp_path, read(tmp_path)) == ["P01", "P02"]
 
 
 # setting aside
@@ -143,10 +145,9 @@ def test_a_folder_is_set_aside_as_a_whole(tmp_path: Path) -> None:
 def a_head(results: Path, code: str, row: int | None, experiment: str = "direction") -> Place:
     where = place(results, code, experiment)
     where.folder.mkdir(parents=True, exist_ok=True)
-    parts: dict[str, dict[str, int | None]] = {"plan": {"order_row": row}, "setup": {}}
-    hashes = {f"{name}_sha256": sha256(part) for name, part in parts.items()}
-    head = canonical_json({"n": 0, "kind": "run", "link": "", **parts, **hashes})
-    where.journal.write_bytes(head + b'\n{"n":1,"ki')
+    write_head(where.journal, Plan(experiment=experiment, participant_id=code, seed=1, order_row=row, trials=()))
+    with where.journal.open("ab") as file:
+        file.write(b'{"n":1,"ki')
     return where
 
 
@@ -154,14 +155,14 @@ def test_rows_are_taken_by_runs_that_began_even_if_their_journal_is_cut(tmp_path
     for code, row in (("P01", 0), ("P02", 3), ("P03", None)):
         a_head(tmp_path, code, row)
     a_head(tmp_path, "P01", 5, "preference")
-    assert used_rows(tmp_path, "direction") == [0, 3]
-    assert used_rows(tmp_path, "preference") == [5]
-    assert used_rows(tmp_path / "none", "direction") == []
+    assert used_rows(tmp_path, "direction", read(tmp_path)) == [0, 3]
+    assert used_rows(tmp_path, "preference", read(tmp_path)) == [5]
+    assert used_rows(tmp_path / "none", "direction", read(tmp_path / "none")) == []
 
 
 def test_a_run_that_was_set_aside_gives_its_row_back(tmp_path: Path) -> None:
     where = a_head(tmp_path, "P01", 0)
     a_head(tmp_path, "P02", 1)
     set_aside(where)
-    assert used_rows(tmp_path, "direction") == [1]
+    assert used_rows(tmp_path, "direction", read(tmp_path)) == [1]
     assert [file.parent.name for file in journals(tmp_path, "direction")] == ["sub-P02"]

@@ -9,7 +9,7 @@ from analysis.logs.reading import read_logs
 from experiments.clock import VirtualClock
 from experiments.direction.session import make_practice
 from experiments.load import load_setup
-from experiments.run import Request, run
+from experiments.run import RunRequest, run
 from experiments.screens.synthetic import synthetic_screen
 from experiments.study.places import PlaceError
 
@@ -17,7 +17,7 @@ DIRECTION, PREFERENCE = load_setup("direction"), load_setup("preference")
 
 
 def practise(results: Path, setup: object = DIRECTION) -> Path:
-    request = Request(setup=setup, participant_id="P01", results=results, seed=1, practice=True)
+    request = RunRequest(setup=setup, participant_id="P01", results=results, seed=1, practice=True)
     return run(request, synthetic_screen, VirtualClock()).place.table
 
 
@@ -45,7 +45,7 @@ def test_a_practice_can_be_done_again_and_leaves_the_run_itself_open(tmp_path: P
         "sub-P01_task-direction_practice_journal.aside-1.jsonl",
         "sub-P01_task-direction_practice_journal.jsonl",
     ]
-    request = Request(setup=DIRECTION, participant_id="P01", results=tmp_path, seed=1)
+    request = RunRequest(setup=DIRECTION, participant_id="P01", results=tmp_path, seed=1)
     assert run(request, synthetic_screen, VirtualClock()).place.table.name == "sub-P01_task-direction_trials.csv"
 
 

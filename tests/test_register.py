@@ -17,7 +17,7 @@ from experiments.clock import VirtualClock
 from experiments.record import storage
 from experiments.study import register
 from experiments.study.places import PlaceError, known_codes, place
-from experiments.study.register import NAME, Entry, RegisterError, append, entry, excluded, members, read
+from experiments.study.register import NAME, Entry, Register, RegisterError, append, entry, read
 from tests.waiting import PATIENCE_S
 
 ROOT = Path(__file__).parent.parent
@@ -60,7 +60,7 @@ def test_what_was_appended_is_read_in_its_order(results: Path) -> None:
 
 def test_a_folder_without_a_register_has_nobody(tmp_path: Path) -> None:
     assert read(tmp_path).members == {}
-    assert excluded(tmp_path) == {}
+    assert read(tmp_path).excluded() == {}
     assert not list(tmp_path.iterdir())
 
 
@@ -76,9 +76,9 @@ def test_a_later_joined_record_corrects_the_facts_and_keeps_the_day(results: Pat
 
 
 def test_the_last_exclusion_or_readmission_counts(results: Path) -> None:
-    assert excluded(results) == {}
+    assert read(results).excluded() == {}
     append(results, entry("excluded", "P02", reason="left for good"), VirtualClock())
-    assert excluded(results) == {"P02": "left for good"}
+    assert read(results).excluded() == {"P02": "left for good"}
 
 
 codes = st.sampled_from(["P01", "P02", "P03"])
@@ -92,7 +92,7 @@ any_entry = st.one_of(
 
 @given(st.lists(any_entry))
 def test_the_state_of_a_code_is_what_its_own_last_records_say(entries: list[Entry]) -> None:
-    found = members(("2026-01-01T00:00:00Z", one) for one in entries)
+    found = Register(path=Path(NAME), entries=tuple(("2026-01-01T00:00:00Z", one) for one in entries)).members
     assert set(found) == {one.participant_id for one in entries}
     for code, member in found.items():
         facts = [one.facts for one in entries if one.participant_id == code and isinstance(one, register.Joined)]
@@ -139,7 +139,7 @@ def test_a_code_that_differs_from_a_registered_one_in_case_alone_is_refused(resu
     with pytest.raises(RegisterError, match=r"'p01' differs from 'P01' .* in case alone"):
         append(results, joined("p01"), VirtualClock())
     assert lines_of(results) == before
-    assert known_codes(results) == ["P01", "P02"]
+    assert known_codes(results, read(results)) == ["P01", "P02"]
     with pytest.raises(PlaceError, match="in case alone"):
         place(results, "p02", "direction")
 
@@ -173,7 +173,7 @@ def test_a_byte_changed_before_the_last_record_is_noticed_and_named(data: st.Dat
         assert f"{NAME}: line " in found.problem
         assert len(found.entries) < len(ENTRIES)
         with pytest.raises(RegisterError, match="restore it from a copy"):
-            excluded(Path(folder))
+            read(Path(folder)).excluded()
         with pytest.raises(RegisterError, match="restore it from a copy"):
             append(Path(folder), joined("P09"), VirtualClock())
         assert file.read_bytes() == content
@@ -187,7 +187,7 @@ def test_a_line_that_is_no_record_is_a_problem_with_its_place(tmp_path: Path, li
 
 def test_a_damaged_register_still_gives_the_codes_before_the_damage(results: Path) -> None:
     (results / NAME).write_bytes(b"".join([*lines_of(results)[:2], b"damage\n"]))
-    assert known_codes(results) == ["P01", "P02"]
+    assert known_codes(results, read(results)) == ["P01", "P02"]
 
 
 # the disk and other programs

@@ -12,19 +12,20 @@ from typing import Any, NamedTuple
 import pytest
 
 from experiments import catalogue
+from experiments.catalogue import rebuild
 from experiments.clock import VirtualClock
 from experiments.config.setup import Setup, canonical_json
 from experiments.design.plan import Plan
 from experiments.load import load_setup
-from experiments.rebuild import plan_of, rebuild
 from experiments.record.journal import Journal, JournalError, link, read
 from experiments.record.replay import go_on, history, replay
-from experiments.run import Again, Request, run
+from experiments.run import Again, RunRequest, run
 from experiments.screens.synthetic import synthetic_screen
 from experiments.session.states import EMERGENCY
 from experiments.study import register
 from experiments.study.places import PlaceError, place
 from experiments.study.register import RegisterError
+from tests.journals import raw
 
 SETUPS = {name: load_setup(name) for name in ("direction", "preference")}
 EVERY = {"direction": 7, "preference": 1}
@@ -35,9 +36,9 @@ ANSWERS = {
 LAST_ANSWER = {"direction": "ask", "preference": "describe"}
 
 
-def request(name: str, results: Path, again: Again = "ask", seed: int | None = 1, **changes: Any) -> Request:
+def request(name: str, results: Path, again: Again = "ask", seed: int | None = 1, **changes: Any) -> RunRequest:
     setup = changes.pop("setup", SETUPS[name])
-    return Request(setup=setup, participant_id="P01", results=results, seed=seed, again=again)
+    return RunRequest(setup=setup, participant_id="P01", results=results, seed=seed, again=again)
 
 
 class Unbroken(NamedTuple):
@@ -110,10 +111,10 @@ def check_resumed(whole: Unbroken, journal: Path, records: int) -> None:
     assert contents.finished
     # nothing that was on the disk changed
     assert b"".join(journal.read_bytes().splitlines(keepends=True)[:records]) == b"".join(whole.lines[:records])
-    assert contents.records[records]["kind"] == "resumed"
+    assert contents.records[records].kind == "resumed"
     # what is left is done in the order of the plan
     planned = [trial_key(trial) for trial in whole.plan.record()["trials"]]
-    assert list(done_trials(list(contents.records), name)) == planned
+    assert list(done_trials(raw(journal), name)) == planned
     # one row a trial, each with the answers of the unbroken run
     rows = rows_of(done.place.table)
     assert len(rows) == len(planned)
@@ -132,7 +133,7 @@ def check_resumed(whole: Unbroken, journal: Path, records: int) -> None:
     for key, row, other in zip(planned, rows, whole.rows, strict=True):
         assert key not in complete or row == other
     assert rebuild(journal)[1] == done.place.table.read_bytes()
-    assert contents.records[-1]["table_sha256"] == hashlib.sha256(done.place.table.read_bytes()).hexdigest()
+    assert raw(contents.path)[-1]["table_sha256"] == hashlib.sha256(done.place.table.read_bytes()).hexdigest()
 
 
 def cuts(name: str, whole: Unbroken) -> range:
@@ -164,7 +165,7 @@ def test_a_run_broken_off_within_a_record_goes_on_from_the_last_whole_one(
         rest = whole.lines[records][: len(whole.lines[records]) // 2]
         journal = broken_off(whole, tmp_path / str(records), records, rest)
         check_resumed(whole, journal, records)
-        assert read(journal).records[records]["cut_bytes"] == len(rest)
+        assert raw(journal)[records]["cut_bytes"] == len(rest)
 
 
 @pytest.mark.parametrize("name", SETUPS)
@@ -179,7 +180,7 @@ def test_a_run_may_be_broken_off_and_gone_on_with_many_times(
         resumed = max(number for number, line in enumerate(lines) if json.loads(line)["kind"] == "resumed")
         journal.write_bytes(b"".join(lines[: resumed + 6]))
     run(request(name, tmp_path, "resume"), synthetic_screen, VirtualClock())
-    assert [entry["kind"] for entry in read(journal).records].count("resumed") == 5
+    assert [entry.kind for entry in read(journal).records].count("resumed") == 5
     rows = rows_of(place(tmp_path, "P01", name).table)
     for column in ANSWERS[name]:
         assert [row[column] for row in rows] == [row[column] for row in whole.rows]
@@ -192,11 +193,11 @@ def test_the_head_of_a_resumption_says_what_it_goes_on_with(
     whole = unbroken[name]
     journal = broken_off(whole, tmp_path, 5)
     run(request(name, tmp_path, "resume"), synthetic_screen, VirtualClock())
-    told = read(journal).records[5]
-    assert told["stopped_utc"] == whole.records[4]["utc"]
-    assert told["clock"] == "virtual"
-    assert told["gun"]["model"] == "simulated"
-    assert "git_commit" in told["provenance"]
+    resumed = raw(journal)[5]
+    assert resumed["stopped_utc"] == whole.records[4]["utc"]
+    assert resumed["clock"] == "virtual"
+    assert resumed["gun"]["model"] == "simulated"
+    assert "git_commit" in resumed["provenance"]
 
 
 # refused
@@ -319,7 +320,7 @@ def test_an_emergency_stop_that_the_disk_did_not_take_is_known_from_the_reason_o
     journal = broken_off(whole, tmp_path, 1)
     for reason, halted in ((EMERGENCY, True), ("lunch", False)):
         journal.write_bytes(forged([*(whole.records[number] for number in (0, 1, 2)), stopped | {"reason": reason}]))
-        session = catalogue.CATALOGUE["direction"].session(plan_of(read(journal)), SETUPS["direction"])
+        session = catalogue.CATALOGUE["direction"].session(read(journal).plan, SETUPS["direction"])
         assert replay(session, read(journal)).halted == halted
 
 
@@ -342,7 +343,7 @@ def test_a_fresh_run_sets_the_unfinished_one_aside_with_every_byte(
     before = journal.read_bytes()
     run(request(name, tmp_path, "fresh", seed=5), synthetic_screen, VirtualClock())
     assert journal.with_name(f"{journal.stem}.aside-1.jsonl").read_bytes() == before
-    assert read(journal).header["plan"]["seed"] == 5
+    assert read(journal).plan.seed == 5
 
 
 def test_why_a_run_was_set_aside_stands_in_the_register_and_in_the_new_journals_head(
@@ -359,14 +360,14 @@ def test_why_a_run_was_set_aside_stands_in_the_register_and_in_the_new_journals_
         "experiment": "preference",
         "reason": "the gun came loose",
     }
-    assert read(journal).header["set_aside_reason"] == "the gun came loose"
+    assert raw(journal)[0]["set_aside_reason"] == "the gun came loose"
 
 
 def test_where_there_was_nothing_to_set_aside_no_reason_is_recorded(tmp_path: Path) -> None:
     asked = replace(request("preference", tmp_path, "fresh"), anew_reason="the gun came loose")
     done = run(asked, synthetic_screen, VirtualClock())
     assert not register.read(tmp_path).entries
-    assert "set_aside_reason" not in read(done.place.journal).header
+    assert "set_aside_reason" not in raw(done.place.journal)[0]
 
 
 def test_a_reason_that_cannot_be_recorded_leaves_the_run_where_it_is(

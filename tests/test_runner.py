@@ -13,12 +13,13 @@ from experiments.config.setup import Setup
 from experiments.design.plan import Plan
 from experiments.live_run import RunStopped
 from experiments.record.journal import Journal, read
-from experiments.run import Request, run
+from experiments.run import RunRequest, run
 from experiments.runner import MAX_FAILURES
 from experiments.screens.synthetic import SyntheticScreen, synthetic_screen
 from experiments.session.remarks import Remark
 from experiments.session.steps import Outcome, Step
 from experiments.study.places import place
+from tests.journals import raw
 from tests.sittings import SETUPS, TroubledGun, resumed_rows, sitting
 
 BOTH = pytest.mark.parametrize("name", SETUPS)
@@ -54,7 +55,7 @@ def test_each_stimulus_is_armed_for_itself_and_disarmed_behind_it(name: str, tmp
 def test_the_journal_says_which_damper_was_asked_for_and_which_was_confirmed(tmp_path: Path) -> None:
     desk = sitting("direction", tmp_path)
     desk.carry_out()
-    records = read(desk.where.journal).records
+    records = raw(desk.where.journal)
     asked = [one["body"]["damper"] for one in records if one.get("body", {}).get("kind") == "prepare"]
     confirmed = [one["body"].get("damper", "") for one in records if one.get("body", {}).get("kind") == "prepared"]
     methods = [trial.method for trial in desk.plan.trials]
@@ -202,7 +203,7 @@ def test_the_gun_is_disarmed_after_any_exception_of_its_own(
         desk.carry_out()
     assert not desk.gun.armed
     assert desk.gun.asked[-1] == "disarm"
-    assert [one["kind"] for one in read(desk.where.journal).records if one["kind"] != "shot"][-1] == "step"
+    assert [one["kind"] for one in raw(desk.where.journal) if one["kind"] != "shot"][-1] == "step"
 
 
 @BOTH
@@ -226,7 +227,7 @@ def test_what_was_acknowledged_before_an_interrupt_is_there_when_resumed(name: s
     with suppress(KeyboardInterrupt):
         desk.carry_out()
     before = read(desk.where.journal).records
-    assert before[-1]["kind"] == "outcome"
+    assert before[-1].kind == "outcome"
     rows = resumed_rows(desk)
     assert read(desk.where.journal).records[: len(before)] == before
     assert {row["flags"] for row in rows} == {""}
@@ -240,14 +241,14 @@ def test_an_interrupted_run_leaves_a_reason_and_a_table_of_what_was_answered(tmp
                 raise KeyboardInterrupt
 
     def impatient(setup: Setup[Any], plan: Plan, clock: Clock) -> SyntheticScreen:
-        return Impatient(setup.config, catalogue.experiment(setup).observer(setup, plan), clock)
+        return Impatient(setup.config, catalogue.experiment(setup).synthetic_participant(setup, plan), clock)
 
-    request = Request(setup=SETUPS["direction"], participant_id="P01", results=tmp_path, seed=1)
+    request = RunRequest(setup=SETUPS["direction"], participant_id="P01", results=tmp_path, seed=1)
     with pytest.raises(KeyboardInterrupt):
         run(request, impatient, VirtualClock())
     where = place(tmp_path, "P01", "direction")
     last = read(where.journal).records[-1]
-    assert (last["kind"], last["reason"]) == ("stopped", "interrupted")
+    assert (last.kind, last.reason) == ("stopped", "interrupted")
     with where.table.open(newline="") as file:
         rows = list(csv.DictReader(file))
     assert len(rows) == 60
@@ -255,7 +256,7 @@ def test_an_interrupted_run_leaves_a_reason_and_a_table_of_what_was_answered(tmp
 
 
 def test_the_gun_is_closed_and_the_journal_let_go_after_a_run(tmp_path: Path) -> None:
-    request = Request(setup=SETUPS["preference"], participant_id="P01", results=tmp_path, seed=1)
+    request = RunRequest(setup=SETUPS["preference"], participant_id="P01", results=tmp_path, seed=1)
     done = run(request, synthetic_screen, VirtualClock())
     with closing(Journal.reopen(read(done.place.journal), VirtualClock())) as journal:
         assert journal.path == done.place.journal

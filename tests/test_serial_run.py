@@ -10,7 +10,7 @@ import pytest
 
 from device.wire import errors
 from experiments.record.journal import read
-from experiments.record.replay import told
+from experiments.record.replay import history
 from experiments.session.steps import Failed
 from experiments.study.places import PlaceError
 from recoil.session import check_pace
@@ -90,12 +90,12 @@ def test_a_run_on_the_twin_logs_what_one_on_the_simulated_gun_does_but_for_times
     simulated, twin = (rows(log["table"]) for log in logs)
     assert twin == simulated
     contents = read(logs[1]["journal"])
-    causes = [outcome.cause for _, outcome in told(contents) if isinstance(outcome, Failed)]
+    causes = [outcome.cause for _, outcome in history(contents) if isinstance(outcome, Failed)]
     assert [cause for cause in causes if "watchdog" not in cause] == []
     timings = timings_of(contents)
     assert len(timings) == sum(int(row.get("shots", 1)) for row in twin) or causes
     assert all(one["requested_s"] <= one["written_s"] <= one["acknowledged_s"] for one in timings)
-    assert all("timing" not in str(record["body"]) for record in read(logs[0]["journal"]).records if "body" in record)
+    assert all("timing" not in str(record.body) for record in read(logs[0]["journal"]).records)
 
 
 @pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGKILL])

@@ -10,11 +10,11 @@ from typing import Any
 import pytest
 
 from device import Gun, GunStatus, LinkError, Pulse, Shot, ShotReport, ShotTiming, open_gun
+from device.methods import drive_of
 from device.words import Effect
 from experiments.clock import RealClock, VirtualClock
-from experiments.limits import drives
 from experiments.load import load_setup
-from experiments.run import Request, run
+from experiments.run import RunRequest, run
 from experiments.screens.console import shot_check
 from experiments.screens.console.shot_check import ShotCheck, ShotProgress, report_text, state_text
 from experiments.screens.synthetic import synthetic_screen
@@ -122,10 +122,10 @@ def test_a_method_is_driven_as_the_run_drives_it(method: str, monkeypatch: pytes
         return spied[0]
 
     monkeypatch.setattr("experiments.run.open_gun", for_the_run)
-    request = Request(setup=SETUP, participant_id="P01", results=tmp_path, seed=1)
+    request = RunRequest(setup=SETUP, participant_id="P01", results=tmp_path, seed=1)
     run(request, synthetic_screen, VirtualClock())
     assert shot in spied[0].shots
-    assert shot.drive == drives(SETUP)[method]
+    assert shot.drive == drive_of(SETUP.gun.rendering(method))
 
 
 def test_the_gun_is_armed_for_the_shot_alone_and_its_state_is_read_back_before_it_is_closed(bench: Bench) -> None:

@@ -16,7 +16,7 @@ import pytest
 
 from experiments.clock import VirtualClock
 from experiments.load import load_setup
-from experiments.run import Request, run
+from experiments.run import RunRequest, run
 from experiments.screens.synthetic import synthetic_screen
 from experiments.study.register import read
 from recoil.config_files import new_study
@@ -63,7 +63,7 @@ def pilot(tmp_path: Path) -> Path:
     """A study in which P01 stopped, in a folder with a long name."""
     new_study(tmp_path / "pilot")
     setup = load_setup(str(tmp_path / "pilot" / "direction.toml"))
-    where = Request(setup=setup, participant_id="P01", results=tmp_path / LONG, seed=1)
+    where = RunRequest(setup=setup, participant_id="P01", results=tmp_path / LONG, seed=1)
     journal = run(where, synthetic_screen, VirtualClock()).place.journal
     journal.write_bytes(b"".join(journal.read_bytes().splitlines(keepends=True)[:40]))
     return tmp_path

@@ -24,10 +24,10 @@ from PyQt6.QtWidgets import QApplication, QPushButton, QWidget
 from experiments.clock import RealClock, VirtualClock
 from experiments.load import load_setup
 from experiments.record.journal import hold
-from experiments.run import Request, run
+from experiments.run import ParticipantOptions, RunRequest, run
 from experiments.screens.console import widgets
 from experiments.screens.console.app import application
-from experiments.screens.console.form import Opening, Sides
+from experiments.screens.console.form import Opening
 from experiments.screens.console.live import study_of
 from experiments.screens.console.start import StartWindow
 from experiments.screens.synthetic import synthetic_screen
@@ -90,7 +90,7 @@ def do(study: StudyFolder, code: str, experiment: str = "direction", records: in
 def whole_run(code: str, experiment: str) -> list[bytes]:
     """The lines of the journal of a run with the shipped configs."""
     with tempfile.TemporaryDirectory() as results:
-        request = Request(setup=load_setup(experiment), participant_id=code, results=Path(results))
+        request = RunRequest(setup=load_setup(experiment), participant_id=code, results=Path(results))
         return run(request, synthetic_screen, VirtualClock()).place.journal.read_bytes().splitlines(keepends=True)
 
 
@@ -238,11 +238,11 @@ def test_an_experiment_that_was_named_too_early_is_not_chosen(opened: Open) -> N
 def test_a_config_that_the_study_does_not_name_is_run_alone_by_the_rules_of_the_study(study: StudyFolder) -> None:
     folder = study.source.parent
     shutil.copy(folder / "direction.toml", folder / "mine.toml")
-    asked = Request(setup=load_setup(str(folder / "mine.toml")), participant_id="", results=study.results)
+    asked = RunRequest(setup=load_setup(str(folder / "mine.toml")), participant_id="", results=study.results)
     found = study_of(asked)
     assert [one.source.name for one in found.setups] == ["mine.toml"]
     assert found.config == study.config
-    named = Request(setup=load_setup(str(folder / "preference.toml")), participant_id="", results=study.results)
+    named = RunRequest(setup=load_setup(str(folder / "preference.toml")), participant_id="", results=study.results)
     assert [one.source.name for one in study_of(named).setups] == ["direction.toml", "preference.toml"]
 
 
@@ -267,7 +267,8 @@ def test_start_chooses_who_was_entered_and_has_their_facts_on_record(study: Stud
     choice = window.choice
     assert choice is not None
     assert (choice.participant_id, choice.setup.config.experiment, choice.again) == ("P01", "direction", "ask")
-    assert (choice.sides, choice.practice) == (Sides(screen=True), False)
+    assert (choice.options, choice.practice) == (ParticipantOptions(screen=True), False)
+    assert (choice.screen, choice.gun, choice.results) == ("console", SERIAL, study.results)
     assert not window.isVisible()
     assert read(study.results).members["P01"].facts == FACTS
 
@@ -559,13 +560,13 @@ def test_somebody_is_excluded_for_a_reason_and_readmitted(study: StudyFolder, op
     assert said(window) == "Type why, first."
     QTest.keyClicks(QApplication.focusWidget(), "fell ill")
     key(window, "D", CTRL)
-    assert register.excluded(study.results) == {"P01": "fell ill"}
+    assert register.read(study.results).excluded() == {"P01": "fell ill"}
     assert (table(window)["P01"][-1], remark(window)) == ("excluded: fell ill", "P01 is excluded: fell ill.")
     assert window.exclude_button.text().startswith("Readmit")
     key(window, "E", ALT)
     QTest.keyClicks(QApplication.focusWidget(), "well again")
     key(window, "D", CTRL)
-    assert register.excluded(study.results) == {}
+    assert register.read(study.results).excluded() == {}
     assert entries(study) == [("excluded", "P01"), ("readmitted", "P01")]
 
 
@@ -587,7 +588,7 @@ def test_the_exclusion_is_of_the_code_it_was_asked_for(study: StudyFolder, opene
     window.question.reason.setText("fell ill")
     window.form.code.setText("P02")
     key(window, "D", CTRL)
-    assert register.excluded(study.results) == {}
+    assert register.read(study.results).excluded() == {}
 
 
 # the simulated gun
@@ -646,10 +647,10 @@ def test_which_gun_it_is_stands_in_the_window(gun: str, text: str, opened: Open)
 
 
 def test_what_was_asked_for_on_the_command_line_is_ticked(opened: Open) -> None:
-    sides = Sides(screen=True, own_keys=True, noise=True)
-    window = opened(sides=sides)
-    assert window.form.sides() == sides
-    assert opened().form.sides() == Sides()
+    options = ParticipantOptions(screen=True, keys=True, noise=True)
+    window = opened(options=options)
+    assert window.form.options() == options
+    assert opened().form.options() == ParticipantOptions()
 
 
 def colours_of_box(box: QWidget) -> set[str]:
@@ -660,17 +661,17 @@ def colours_of_box(box: QWidget) -> set[str]:
 def test_where_there_are_several_monitors_the_participants_is_chosen_by_its_number(
     opened: Open, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    assert opened().form.sides().monitor is None
+    assert opened().form.options().monitor is None
     screens = ["0: eDP-1, 1920 × 1080", "1: HDMI-1, 1280 × 800", "2: DP-1, 1280 × 800"]
     monkeypatch.setattr("experiments.screens.console.form.monitors", lambda: screens)
-    assert opened().form.sides().monitor == 2
-    window = opened(sides=Sides(monitor=1))
+    assert opened().form.options().monitor == 2
+    window = opened(options=ParticipantOptions(monitor=1))
     assert window.form.monitor.currentText() == "1: HDMI-1, 1280 × 800"
     fill(window, "P01")
     window.form.monitor.setCurrentIndex(0)
     key(window, "Return", CTRL)
     assert window.choice is not None
-    assert window.choice.sides.monitor == 0
+    assert window.choice.options.monitor == 0
 
 
 def test_a_ticked_box_shows_a_tick(opened: Open) -> None:
@@ -788,7 +789,7 @@ def test_a_window_that_is_closed_in_a_test_shot_stops_it_first(opened: Open) -> 
 def test_the_table_shows_practice_and_no_numbers_of_its_own(study: StudyFolder, opened: Open) -> None:
     setup = study.setups[0]
     run(
-        Request(setup=setup, participant_id="P01", results=study.results, practice=True),
+        RunRequest(setup=setup, participant_id="P01", results=study.results, practice=True),
         synthetic_screen,
         VirtualClock(),
     )

@@ -12,19 +12,18 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from experiments import catalogue
 from experiments.clock import VirtualClock
 from experiments.config.door import ConfigError
 from experiments.config.models import EligibilityConfig, Handedness, Sex, StudyConfig
-from experiments.config.setup import Setup, canonical_json, sha256
+from experiments.config.setup import Setup
+from experiments.design.plan import Plan
 from experiments.load import load_setup, load_study, shipped_folder
 from experiments.study.places import next_row, place, used_rows
-from experiments.study.progress import ANSWERED_BY
-from experiments.study.register import append, entry
+from experiments.study.register import append, entry, read
 from experiments.study.study import (
     Facts,
     Participant,
-    RunStanding,
+    RunProgress,
     State,
     by_code,
     eligible,
@@ -33,6 +32,7 @@ from experiments.study.study import (
     unasked,
     who_is_next,
 )
+from tests.journals import write_head
 
 PAPER = load_study("study")[0].eligibility
 STUDY = StudyConfig(title="T", participants=3, experiments=("direction.toml", "preference.toml"))
@@ -145,7 +145,7 @@ def test_a_contradiction_is_refused_with_file_line_key_value_and_rule(
 
 
 def someone(code: str, *states: State, excluded: str | None = None) -> Participant:
-    runs = tuple(RunStanding(experiment=name, state=state) for name, state in zip(EXPERIMENTS, states, strict=True))
+    runs = tuple(RunProgress(experiment=name, state=state) for name, state in zip(EXPERIMENTS, states, strict=True))
     return Participant(participant_id=code, runs=runs, excluded=excluded)
 
 
@@ -248,9 +248,9 @@ def begin(results: Path, code: str, setup: Setup[Any]) -> None:
     """The head of a run that takes the next row, as the program would write it."""
     where = place(results, code, setup.config.experiment)
     where.folder.mkdir(parents=True)
-    parts: dict[str, Any] = {"plan": {"order_row": next_row(setup, results)}, "setup": {}}
-    hashes = {f"{name}_sha256": sha256(part) for name, part in parts.items()}
-    where.journal.write_bytes(canonical_json({"n": 0, "kind": "run", "link": "", **parts, **hashes}) + b"\n")
+    row = next_row(setup, results, read(results))
+    plan = Plan(experiment=where.experiment, participant_id=code, seed=1, order_row=row, trials=())
+    write_head(where.journal, plan)
 
 
 @settings(max_examples=40)
@@ -270,7 +270,7 @@ def test_rows_differ_by_one_at_most_once_drop_outs_are_replaced(
                 begun += 1
                 taking_part.append(f"P{begun:02d}")
                 begin(results, taking_part[-1], setup)
-            counts = Counter(used_rows(results, setup.config.experiment))
+            counts = Counter(used_rows(results, setup.config.experiment, read(results)))
             assert counts.total() == len(taking_part)
             full = len(taking_part) == planned or begun == len(taking_part)
             assert not full or max(counts[row] for row in range(rows)) - min(counts[row] for row in range(rows)) <= 1
@@ -280,20 +280,16 @@ def test_a_drop_out_gives_the_row_back_and_a_readmitted_one_takes_it_again(tmp_p
     setup, _ = SQUARES[0]
     for code in ("P01", "P02", "P03"):
         begin(tmp_path, code, setup)
-    assert next_row(setup, tmp_path) == 0
+    assert next_row(setup, tmp_path, read(tmp_path)) == 0
     append(tmp_path, entry("excluded", "P02", reason="left"), VirtualClock())
-    assert used_rows(tmp_path, "preference") == [0, 2]
-    assert next_row(setup, tmp_path) == 1
+    assert used_rows(tmp_path, "preference", read(tmp_path)) == [0, 2]
+    assert next_row(setup, tmp_path, read(tmp_path)) == 1
     append(tmp_path, entry("readmitted", "P02", reason="came back"), VirtualClock())
-    assert used_rows(tmp_path, "preference") == [0, 1, 2]
+    assert used_rows(tmp_path, "preference", read(tmp_path)) == [0, 1, 2]
 
 
 def test_a_random_order_has_no_rows(tmp_path: Path) -> None:
-    assert next_row(load_setup("direction"), tmp_path) is None
-
-
-def test_of_every_experiment_it_is_known_which_column_tells_of_an_answer() -> None:
-    assert set(ANSWERED_BY) == set(catalogue.CATALOGUE)
+    assert next_row(load_setup("direction"), tmp_path, read(tmp_path)) is None
 
 
 def test_facts_and_standings_cannot_be_changed() -> None:

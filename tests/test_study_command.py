@@ -14,7 +14,7 @@ import pytest
 from experiments.clock import VirtualClock
 from experiments.load import load_setup
 from experiments.record.journal import hold
-from experiments.run import Request, run
+from experiments.run import RunRequest, run
 from experiments.screens.synthetic import synthetic_screen
 from experiments.study.register import append, entry
 from recoil.config_files import new_study
@@ -38,7 +38,7 @@ def pilot(tmp_path: Path) -> Path:
 def do(pilot: Path, code: str, experiment: str = "direction", results: Path | None = None) -> None:
     """A run with a synthetic participant, as `recoil run --screen synthetic` does it."""
     setup, where = load_setup(str(pilot / f"{experiment}.toml")), results or pilot / "results"
-    run(Request(setup=setup, participant_id=code, results=where), synthetic_screen, VirtualClock())
+    run(RunRequest(setup=setup, participant_id=code, results=where), synthetic_screen, VirtualClock())
 
 
 def told(recoil: Recoil, *more: object, folder: str = "pilot", code: int = 0) -> Any:
@@ -191,7 +191,7 @@ def test_results_that_may_only_be_read_are_shown(recoil: Recoil, pilot: Path) ->
 
 def test_a_practice_is_told_once_it_was_done_to_its_end(recoil: Recoil, pilot: Path) -> None:
     setup = load_setup(str(pilot / "direction.toml"))
-    request = Request(setup=setup, participant_id="P01", results=pilot / "results", practice=True)
+    request = RunRequest(setup=setup, participant_id="P01", results=pilot / "results", practice=True)
     practice = run(request, synthetic_screen, VirtualClock()).place.journal
     whole = practice.read_bytes()
     assert told(recoil)["participants"][0]["experiments"]["direction"]["practised"]

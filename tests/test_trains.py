@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import math
 from contextlib import suppress
 from itertools import pairwise
@@ -13,10 +12,8 @@ import pytest
 
 from device import LimitError, LinkError, Pulse, Shot, ShotReport, ShotTiming
 from device.words import GunStatus
-from experiments.clock import VirtualClock
-from experiments.rebuild import table
-from experiments.record.journal import Journal, read
-from experiments.stimulus import LEAD_S
+from experiments.record.journal import read
+from experiments.runner import LEAD_S
 from tests.serial_runs import of_trains
 from tests.sittings import Sitting, TroubledGun, resumed_rows, sitting
 
@@ -125,22 +122,6 @@ def test_a_train_that_is_stopped_keeps_them_as_well_and_is_presented_again(tmp_p
     assert outcome is None
     rows = resumed_rows(desk)
     assert (rows[0]["attempts"], rows[0]["flags"]) == ("2", "interrupted")
-
-
-def test_a_journal_from_before_with_all_times_in_its_outcomes_makes_the_same_table(tmp_path: Path) -> None:
-    desk, _ = listening(tmp_path / "now")
-    desk.carry_out()
-    now = read(desk.where.journal)
-    timings = [tuple(shot["timing"] for shot in train) for train, _ in of_trains(now)]
-    path = tmp_path / "before.jsonl"
-    with Journal.create(path, VirtualClock()) as before:
-        for entry in (one for one in now.records if one["kind"] != "shot"):
-            kept = {key: entry[key] for key in entry.keys() - {"kind", "n", "link", "synced_s", "monotonic_s", "utc"}}
-            if entry["kind"] == "outcome" and entry["body"]["kind"] == "presented":
-                kept["body"] = entry["body"] | {"timings": timings.pop(0)}
-            before.append(entry["kind"], **kept)
-    assert "timings" in json.dumps(read(path).records)
-    assert table(read(path)) == table(now)
 
 
 def test_a_shot_too_far_ahead_is_refused_by_the_gun_that_is_none(tmp_path: Path) -> None:

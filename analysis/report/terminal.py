@@ -2,18 +2,26 @@
 
 from __future__ import annotations
 
+import io
+import shutil
 import sys
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import AbstractContextManager, contextmanager
 from pathlib import Path
-from typing import Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from analysis.report.section import Section
+from analysis.report.section import Section, Table
 from analysis.report.serial import as_json as in_json
 
+if TYPE_CHECKING:
+    from rich.table import Table as RichTable
+
 DONE, EXCEPTIONS, UNUSABLE, INTERRUPTED = 0, 1, 2, 130
+
+WIDTH = 160
+"""Columns of a table where it does not go to a terminal."""
 
 AsJson = Annotated[bool, typer.Option("--json", help="Print the machine-readable result.")]
 Seed = Annotated[int | None, typer.Option(min=0, max=2**63 - 1, help="Seed of the random streams.")]
@@ -34,6 +42,33 @@ def say(text: str) -> None:
 def in_text(section: Section) -> str:
     """A section's words for a terminal: its title, then what it says, set in."""
     return "\n".join([section.title, *(f"  {line}" for line in (*section.paragraphs, *section.items))])
+
+
+def with_tables(section: Section, *, ruled: bool = False, unfolded: int = 0) -> str:
+    """A section as it stands on a terminal, as wide as that: its title, its tables, then what it says, line by line.
+
+    `ruled`: a line between rows; so many columns from the left are `unfolded`. Nothing in it is taken for mark-up.
+    """
+    from rich.console import Console
+
+    text = io.StringIO()
+    console = Console(file=text, width=shutil.get_terminal_size((WIDTH, 24)).columns, highlight=False, markup=False)
+    for table in section.tables:
+        console.print(_drawn(table, ruled=ruled, unfolded=unfolded))
+    lines = [text.getvalue().rstrip("\n"), *section.paragraphs, *section.items]
+    return "\n".join([section.title, *lines] if section.title else lines)
+
+
+def _drawn(table: Table, *, ruled: bool, unfolded: int) -> RichTable:
+    from rich.table import Table as RichTable
+    from rich.text import Text
+
+    drawn = RichTable(show_lines=ruled)
+    for place, heading in enumerate(table.header):
+        drawn.add_column(heading, overflow="fold", no_wrap=place < unfolded)
+    for row in table.rows:
+        drawn.add_row(*map(Text, row))
+    return drawn
 
 
 def show(result: Any, text: str, as_json: bool) -> None:

@@ -4,16 +4,16 @@ from __future__ import annotations
 
 from dataclasses import Field as DataclassField
 from dataclasses import fields, replace
-from typing import Any, Literal, Self, TypeVar
+from typing import Literal, Self, TypeVar
 
-from pydantic import Field, model_validator
+from pydantic import Field, PrivateAttr, model_validator
 
 from device.methods import Method
 from device.parameters import GunParameters, VibrationParameters
 from experiments.config.door import Model
 from experiments.config.models import Text
 
-Numbers = dict[str, Any]
+Numbers = dict[str, object]
 """A table for one of the device's parameter types, which say what may stand in it."""
 
 
@@ -62,14 +62,25 @@ class GunConfig(Model):
     methods: dict[str, MethodConfig] = Field(min_length=1)
     serial: SerialConfig = Field(default_factory=SerialConfig, exclude=True)
 
+    _rendered: dict[str, Method] = PrivateAttr(default_factory=dict)
+    """The methods as the device takes them, made once, when the gun is."""
+
     @model_validator(mode="after")
-    def _renderable(self) -> Self:
-        for name in self.methods:
-            self.rendering(name)
+    def _render(self) -> Self:
+        self._rendered.update((name, self._made(name)) for name in self.methods)
         return self
 
+    @property
+    def coil(self) -> GunParameters:
+        """The voice coil by itself, without what methods change of it."""
+        return _build(GunParameters, self.voice_coil, {}, "", "voice_coil")
+
     def rendering(self, method: str) -> Method:
-        """The device's parameters of one method. `ValueError`: unknown key or a value out of range."""
+        """The device's parameters of one method."""
+        return self._rendered[method]
+
+    def _made(self, method: str) -> Method:
+        """What a method's tables make. `ValueError`: unknown key or a value out of range."""
         own = self.methods[method]
         if own.actuator == "vibration":
             if own.strips:
@@ -117,7 +128,7 @@ def _build(parameters: type[_Parameters], shared: Numbers, own: Numbers, method:
         raise ValueError(f"{method if key in own else ''}{table}.{error}") from error
 
 
-def _kind_of(field: DataclassField[Any]) -> type:
+def _kind_of(field: DataclassField[object]) -> type:
     """What a key takes; None as the default stands for a number that may be left out."""
     return float if field.default is None else type(field.default)
 

@@ -4,9 +4,10 @@ from __future__ import annotations
 
 import hashlib
 import json
+from collections.abc import Iterable
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any, Generic, TypeVar
+from typing import Generic, TypeVar
 
 from experiments.config.gun import GunConfig
 from experiments.config.models import ExperimentConfig
@@ -26,6 +27,15 @@ def sha256(value: object) -> str:
     return hashlib.sha256(canonical_json(value)).hexdigest()
 
 
+def without_blank_instruction(pairs: Iterable[tuple[str, object]]) -> dict[str, object]:
+    """A `dict_factory` for what has an instruction: where there is none, its record has no such key.
+
+    >>> without_blank_instruction([("set", 1), ("instruction", "")])
+    {'set': 1}
+    """
+    return {key: value for key, value in pairs if key != "instruction" or value}
+
+
 Config_co = TypeVar("Config_co", bound=ExperimentConfig, covariant=True)
 
 
@@ -38,7 +48,7 @@ class Setup(Generic[Config_co]):
     source: Path
     answers: tuple[dict[str, str], ...] = field(default=())
 
-    def record(self) -> dict[str, Any]:
+    def record(self) -> dict[str, object]:
         """All of it as plain JSON values."""
         return {
             "experiment": self.config.model_dump(mode="json"),

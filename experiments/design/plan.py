@@ -4,13 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import asdict, dataclass
-from typing import Any
 
 from pydantic import TypeAdapter
 
 from device.words import Direction
 from experiments.config.models import Order
-from experiments.config.setup import sha256
+from experiments.config.setup import sha256, without_blank_instruction
 from experiments.design.streams import Stream
 
 
@@ -74,15 +73,6 @@ class Trial:
     """The name of what the participant was told for this set; empty if nothing."""
 
 
-def where_given(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
-    """A `dict_factory` that leaves out an instruction where there is none: a plan without any keeps its old hash.
-
-    >>> where_given([("set", 1), ("instruction", "")]), where_given([("instruction", "speed")])
-    ({'set': 1}, {'instruction': 'speed'})
-    """
-    return {key: value for key, value in pairs if key != "instruction" or value}
-
-
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Plan:
     """All trials of one participant in one experiment, and the seed they came from.
@@ -106,9 +96,9 @@ class Plan:
         """Whether a trial is the first of its set."""
         return trial == next(t for t in self.trials if (t.session, t.set) == (trial.session, trial.set))
 
-    def record(self) -> dict[str, Any]:
+    def record(self) -> dict[str, object]:
         """The plan as plain JSON values, without instructions where there are none."""
-        return asdict(self, dict_factory=where_given)
+        return asdict(self, dict_factory=without_blank_instruction)
 
     @classmethod
     def from_record(cls, record: object) -> Plan:

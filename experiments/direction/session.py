@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from functools import partial
 from itertools import pairwise
 
@@ -11,7 +12,7 @@ from experiments.design.plan import Plan, Trial, method_order
 from experiments.design.streams import Stream
 from experiments.direction.config import Breaks, Design, DirectionConfig
 from experiments.record.tables import Row, presentation
-from experiments.session.history import Told, TrialHistory, stories
+from experiments.session.history import History, TrialHistory, by_trial
 from experiments.session.remarks import AnswerCorrected
 from experiments.session.steps import Answered, Ask, Fire, Fired, Prepare, Presenter, Rest, Session, Step
 
@@ -28,7 +29,7 @@ def make_plan(config: DirectionConfig, participant_id: str, seed: int, order_row
             session,
             method,
             ways=_directions(design, Stream(seed, "directions", *who, str(session))),
-            told=_instructions(design, seed, (*who, str(session))),
+            instructed=_instructions(design, seed, (*who, str(session))),
         )
     ]
     return Plan(
@@ -60,8 +61,8 @@ def make_practice(config: DirectionConfig, participant_id: str, seed: int) -> Pl
     )
 
 
-def _session(design: Design, session: int, method: str, *, ways: list[Direction], told: list[str]) -> list[Trial]:
-    """The trials of a session; `ways` has one direction a trial, `told` one instruction a set."""
+def _session(design: Design, session: int, method: str, *, ways: list[Direction], instructed: list[str]) -> list[Trial]:
+    """The trials of a session; `ways` has one direction a trial, `instructed` one instruction a set."""
     return [
         Trial(
             session=session,
@@ -69,7 +70,7 @@ def _session(design: Design, session: int, method: str, *, ways: list[Direction]
             set=1 + place // design.trials_per_set,
             trial=1 + place,
             direction=way,
-            instruction=told[place // design.trials_per_set],
+            instruction=instructed[place // design.trials_per_set],
         )
         for place, way in enumerate(ways)
     ]
@@ -106,7 +107,8 @@ def _ways(forward: int, backward: int) -> list[Direction]:
 
 def session(plan: Plan, setup: Setup[DirectionConfig]) -> Session:
     """The steps of a run, from the first hand-over to its end."""
-    presenter = Presenter(partial(_steps, setup))
+    texts = {name: setup.config.instruction_text(name) for name in ("", *setup.config.design.instructions)}
+    presenter = Presenter(partial(_steps, setup, texts))
     yield from presenter.present(plan.trials[0])
     for before, trial in pairwise(plan.trials):
         yield from _rest(presenter, before, trial, setup.config.breaks)
@@ -121,14 +123,14 @@ def _rest(presenter: Presenter, before: Trial, trial: Trial, breaks: Breaks) -> 
         yield from presenter.until_done(Rest(between="sets", duration_s=breaks.between_sets_s))
 
 
-def _steps(setup: Setup[DirectionConfig], trial: Trial, attempt: int) -> tuple[Step, ...]:
+def _steps(setup: Setup[DirectionConfig], texts: Mapping[str, str], trial: Trial, attempt: int) -> tuple[Step, ...]:
     question = setup.config.question
     return (
         Prepare(
             trial=trial,
             attempt=attempt,
             damper=setup.gun.methods[trial.method].damper,
-            instruction=setup.config.instruction_text(trial.instruction),
+            instruction=texts[trial.instruction],
         ),
         Fire(trial=trial, attempt=attempt),
         Ask(
@@ -145,7 +147,7 @@ ANTICIPATION_S = 0.1
 """A key that comes sooner was not pressed for what was felt: simple reactions to touch take longer (assumed)."""
 
 
-def rows(plan: Plan, told: Told) -> list[Row]:
+def rows(plan: Plan, history: History) -> list[Row]:
     """One row a planned trial, in order; what was not reached is empty."""
     return [
         {
@@ -156,20 +158,20 @@ def rows(plan: Plan, told: Told) -> list[Row]:
             "set": trial.set,
             "trial": trial.trial,
             "direction": trial.direction,
-            **_answer(trial, story),
-            **_marked(presentation(story, Fired), story),
+            **_answer(trial, events),
+            **_marked(presentation(events, Fired), events),
             "instruction": trial.instruction,
         }
-        for trial, story in stories(plan.trials, told).items()
+        for trial, events in by_trial(plan.trials, history).items()
     ]
 
 
-def _answer(trial: Trial, story: TrialHistory) -> Row:
+def _answer(trial: Trial, events: TrialHistory) -> Row:
     """The answer that counts: the last one given, or what it was corrected to, whose time is not the participant's."""
-    given = story.last(Answered)
+    given = events.last(Answered)
     if given is None:
         return {}
-    counts = [word for word in story.words if isinstance(word, Answered | AnswerCorrected)][-1]
+    counts = [word for word in events.words if isinstance(word, Answered | AnswerCorrected)][-1]
     as_given = counts is given
     return {
         "response": counts.response,
@@ -180,9 +182,9 @@ def _answer(trial: Trial, story: TrialHistory) -> Row:
     }
 
 
-def _marked(row: Row, story: TrialHistory) -> Row:
+def _marked(row: Row, events: TrialHistory) -> Row:
     """A presentation whose answer came sooner than anybody reacts is marked: it was kept, and it was guessed."""
-    given = story.last(Answered)
+    given = events.last(Answered)
     if given is None or given.response_source != "participant" or given.response_time_s >= ANTICIPATION_S:
         return row
     return row | {"flags": " ".join(filter(None, (str(row["flags"]), "anticipation")))}

@@ -44,9 +44,9 @@ def synthetic_participant(
     if kind == "table":
         return TableParticipant(setup.config, plan, setup.answers)
     if kind == "felt":
-        mind = model_parameters(setup.config)
+        model = model_parameters(setup.config)
         methods = setup.gun.renderings(setup.config.design.methods)
-        return ModelParticipant(mind, percepts_of(methods, mind.percept.leak_s), plan)
+        return ModelParticipant(model, percepts_of(methods, model.percept.leak_s), plan)
     return RatesParticipant(setup.config, plan)
 
 
@@ -124,8 +124,8 @@ class ModelParticipant:
     Raises as `ModelBasedParticipant` does.
     """
 
-    def __init__(self, mind: ModelParameters, percepts: Mapping[str, Percept], plan: Plan) -> None:
-        self._participant = ModelBasedParticipant(mind, percepts, plan)
+    def __init__(self, model: ModelParameters, percepts: Mapping[str, Percept], plan: Plan) -> None:
+        self._participant = ModelBasedParticipant(model, percepts, plan)
 
     def answer(self, trial: Trial) -> Answer:
         """The answer to a shot of this trial's method and direction."""

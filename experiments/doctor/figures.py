@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
-from typing import Any, Literal, get_args
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Literal, get_args
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -128,6 +128,31 @@ class Keys:
     to_painted_ms: list[float]
 
 
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Adapters:
+    """The USB serial adapters that have a latency timer."""
+
+    adapters: tuple[Adapter, ...]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ConsoleLatency:
+    """What a way through the console took, in so many trials, against its bound."""
+
+    ms: Spread
+    bound_ms: float
+    trials: int
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class NoFigures:
+    """Nothing was measured."""
+
+
+Seen = Display | Stage | Sound | Keys
+"""What a program of its own looks at."""
+Figures = Machine | Ticks | Appends | Link | Adapters | Seen | ConsoleLatency | NoFigures
+
 Verdict = Literal["good", "warning", "fails", "not there"]
 """`warning`: works, but not as it should; `fails`: a run would suffer; `not there`: this machine has no such thing."""
 
@@ -136,10 +161,10 @@ VERDICTS: tuple[Verdict, ...] = get_args(Verdict)
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Finding:
-    """One row of the table. `figures` are the raw ones, plain JSON values; the unit ends the name of each."""
+    """One row of the table. `figures` are the raw ones; the unit ends the name of each."""
 
     check: str
     verdict: Verdict
     measured: str
     advice: str = ""
-    figures: Mapping[str, Any] = field(default_factory=dict)
+    figures: Figures = NoFigures()

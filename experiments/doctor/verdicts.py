@@ -7,19 +7,23 @@ where that is another), to the `synced_s` of the answer's record, which stands i
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Mapping, Sequence
-from dataclasses import asdict, dataclass
+from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import dataclass
 from itertools import pairwise
-from typing import Any, Literal
+from typing import Literal
 
 from experiments.doctor.figures import (
     Adapter,
+    Adapters,
     Appends,
+    ConsoleLatency,
     Display,
+    Figures,
     Finding,
     Keys,
     Link,
     Machine,
+    Seen,
     Sound,
     Spread,
     Stage,
@@ -27,8 +31,8 @@ from experiments.doctor.figures import (
     Verdict,
     spread,
 )
-
-Record = Mapping[str, Any]
+from experiments.record.journal import Record, read_as
+from experiments.session.steps import OUTCOME, STEP, Answered, Fired, Outcome, Present
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -51,56 +55,55 @@ def together(some: Iterable[Latencies]) -> Latencies:
 
 
 def latencies(records: Sequence[Record]) -> Latencies:
-    """What the console took in one journal; nothing in a journal of a run without one, or on a virtual clock."""
-    if not records or records[0].get("clock") == "virtual":
+    """What the console took in one journal; nothing in a journal of a run without one, or on a virtual clock.
+
+    `JournalError`: a record holds no step or outcome of this version of Recoil.
+    """
+    if not records or records[0].clock == "virtual":
         return Latencies()
     return Latencies(
         step_to_screen_ms=tuple(_step_to_screen_ms(records)),
         key_to_disk_ms=tuple(_key_to_disk_ms(records)),
-        trials=sum(_shown(record) and _kind(record) == "answered" for record in records),
+        trials=sum(record.shown_s is not None and isinstance(_outcome(record), Answered) for record in records),
     )
 
 
 def _step_to_screen_ms(records: Sequence[Record]) -> Iterator[float]:
     step: Record | None = None
     for record in records:
-        if record["kind"] in ("step", "resumed"):
-            step = record if record["kind"] == "step" else None  # another process has another clock
-        elif record["kind"] == "outcome" and step is not None:
-            if _shown(record) and _painted_once(step, record):
-                yield 1000 * (record["shown_s"] - step["monotonic_s"])
+        if record.kind in ("step", "resumed"):
+            step = record if record.kind == "step" else None  # another process has another clock
+        elif record.kind == "outcome" and step is not None:
+            if record.shown_s is not None and _painted_once(step, record.shown_s):
+                yield 1000 * (record.shown_s - step.monotonic_s)
             step = None
 
 
-def _painted_once(step: Record, outcome: Record) -> bool:
+def _painted_once(step: Record, shown_s: float) -> bool:
     """Whether the stamp is the step's own first paint.
 
     A step that asks nothing of anybody keeps the stamp of the one before it, and a presentation is painted again with
     every shot.
     """
-    return bool(outcome["shown_s"] >= step["monotonic_s"]) and _kind(step) != "present"
+    return shown_s >= step.monotonic_s and not isinstance(read_as(STEP, step.body, f"record {step.n}"), Present)
 
 
 def _key_to_disk_ms(records: Sequence[Record]) -> Iterator[float]:
     pulse_start_s: float | None = None
     for record, following in pairwise(records):
-        if record["kind"] == "resumed":
-            pulse_start_s = None
-        elif _kind(record) == "fired":
-            pulse_start_s = record["body"]["pulse_start_s"]
-        elif _shown(record) and _kind(record) == "answered" and None not in (pulse_start_s, following["synced_s"]):
-            body = record["body"]
-            key_s = pulse_start_s + body.get("key_time_s", body["response_time_s"])
-            yield 1000 * (following["synced_s"] - key_s)
+        match _outcome(record):
+            case Fired() as fired:
+                pulse_start_s = fired.pulse_start_s
+            case Answered() as answered if record.shown_s is not None and following.synced_s is not None:
+                if pulse_start_s is not None:
+                    key_s = answered.response_time_s if answered.key_time_s is None else answered.key_time_s
+                    yield 1000 * (following.synced_s - pulse_start_s - key_s)
+            case None if record.kind == "resumed":
+                pulse_start_s = None
 
 
-def _shown(record: Record) -> bool:
-    """Whether a console showed the step of this outcome."""
-    return record["kind"] == "outcome" and record.get("shown_s") is not None
-
-
-def _kind(record: Record) -> str:
-    return str(record.get("body", {}).get("kind", ""))
+def _outcome(record: Record) -> Outcome | None:
+    return read_as(OUTCOME, record.body, f"record {record.n}") if record.kind == "outcome" else None
 
 
 MAX_STEP_TO_SCREEN_MS = 50.0
@@ -176,7 +179,7 @@ def of_link(found: Link, limit_s: float) -> Finding:
             verdict="fails",
             measured=measured if found.fault is None else f"{measured}; fault: {found.fault}",
             advice="switch off the gun's power, remove the cause, and look again before anybody holds it",
-            figures=asdict(found),
+            figures=found,
         )
     advice = (
         f"95th percentile above the limit of {1000 * limit_s:g} ms (the gun's serial.round_trip_limit_s): set the USB "
@@ -207,8 +210,21 @@ def of_adapters(found: Sequence[Adapter]) -> Finding:
         verdict="warning" if slow else "good",
         measured=", ".join(f"{adapter.name}: latency timer {adapter.latency_ms} ms" for adapter in found),
         advice="; ".join(f"echo {MAX_ADAPTER_MS} | sudo tee {adapter.setting}" for adapter in slow),
-        figures={"adapters": [asdict(adapter) for adapter in found]},
+        figures=Adapters(adapters=tuple(found)),
     )
+
+
+def of_seen(found: Seen) -> Finding:
+    """What a program of its own saw."""
+    match found:
+        case Display():
+            return of_display(found)
+        case Stage():
+            return of_stage(found)
+        case Sound():
+            return of_sound(found)
+        case Keys():
+            return of_keys(found)
 
 
 def of_display(found: Display) -> Finding:
@@ -216,9 +232,8 @@ def of_display(found: Display) -> Finding:
     size = f"{found.width_px} x {found.height_px} at {found.refresh_Hz:.0f} Hz ({found.platform})"
     if found.opened_ms is None:
         advice = "see that the desktop shows windows, then look again"
-        figures = asdict(found)
         return Finding(
-            check="display", verdict="fails", measured=f"{size}; no window was seen", advice=advice, figures=figures
+            check="display", verdict="fails", measured=f"{size}; no window was seen", advice=advice, figures=found
         )
     advice = ""
     if found.platform in ("offscreen", "minimal"):
@@ -261,7 +276,7 @@ def of_keys(found: Keys) -> Finding:
     if came == 0:
         measured = f"none of {found.injected} injected keys came to the window"
         advice = "leave the doctor's window in front, keep your hands off, and look again"
-        return Finding(check="keyboard", verdict="warning", measured=measured, advice=advice, figures=asdict(found))
+        return Finding(check="keyboard", verdict="warning", measured=measured, advice=advice, figures=found)
     event, painted = spread(found.to_event_ms), spread(found.to_painted_ms)
     measured = f"{came} of {found.injected} keys; to the event {_short(event)}; until painted {_short(painted)}"
     advice = "" if came == found.injected else "some keys went elsewhere: leave the doctor's window in front"
@@ -294,7 +309,7 @@ def _latency(check: str, values: Sequence[float], bound: float, what: str, trial
         verdict="warning" if slow else "good",
         measured=measured,
         advice=f"more than {bound:g} ms: close other programs; see the disk and display above" if slow else "",
-        figures={"ms": asdict(found), "bound_ms": bound, "trials": trials},
+        figures=ConsoleLatency(ms=found, bound_ms=bound, trials=trials),
     )
 
 
@@ -332,12 +347,10 @@ def overall(verdicts: Sequence[Verdict]) -> Literal["good", "warning", "fails"]:
     return "fails" if "fails" in verdicts else "warning" if "warning" in verdicts else "good"
 
 
-def _judged(
-    check: str, measured: str, advice: str, figures: Machine | Ticks | Appends | Link | Display | Stage | Sound | Keys
-) -> Finding:
+def _judged(check: str, measured: str, advice: str, figures: Figures) -> Finding:
     """Good if there is nothing to advise, else a warning."""
     verdict: Verdict = "warning" if advice else "good"
-    return Finding(check=check, verdict=verdict, measured=measured, advice=advice, figures=asdict(figures))
+    return Finding(check=check, verdict=verdict, measured=measured, advice=advice, figures=figures)
 
 
 def _tail(of: Spread) -> str:

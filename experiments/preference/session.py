@@ -9,7 +9,7 @@ from experiments.design.plan import Plan, Trial, method_order
 from experiments.design.streams import Stream
 from experiments.preference.config import PreferenceConfig
 from experiments.record.tables import Row, presentation
-from experiments.session.history import Told, TrialHistory, stories
+from experiments.session.history import History, TrialHistory, by_trial
 from experiments.session.remarks import DescriptionCorrected, RatingCorrected
 from experiments.session.steps import (
     Describe,
@@ -80,7 +80,7 @@ def _rate(trial: Trial, config: PreferenceConfig) -> Rate:
     )
 
 
-def rows(plan: Plan, told: Told) -> list[Row]:
+def rows(plan: Plan, history: History) -> list[Row]:
     """One row a planned trial, in order of presentation; what was not reached is empty."""
     return [
         {
@@ -88,28 +88,28 @@ def rows(plan: Plan, told: Told) -> list[Row]:
             "experiment": plan.experiment,
             "trial": trial.trial,
             "method": trial.method,
-            **_exposure(story),
-            **_rating(story),
-            **presentation(story, Presented),
+            **_exposure(events),
+            **_rating(events),
+            **presentation(events, Presented),
         }
-        for trial, story in stories(plan.trials, told).items()
+        for trial, events in by_trial(plan.trials, history).items()
     ]
 
 
-def _exposure(story: TrialHistory) -> Row:
+def _exposure(events: TrialHistory) -> Row:
     """The last exposure, and how long earlier ones of the same trial were felt before it."""
-    felt = [word.exposure_s for word in story.words if isinstance(word, Presented | Interrupted) and word.exposure_s]
-    shown = story.last(Presented)
+    felt = [word.exposure_s for word in events.words if isinstance(word, Presented | Interrupted) and word.exposure_s]
+    shown = events.last(Presented)
     if shown is None:
         return {"earlier_exposure_s": sum(felt)} if felt else {}
     row: Row = {"shots": shown.shots, "exposure_s": shown.exposure_s}
     return row | ({"earlier_exposure_s": sum(felt[:-1])} if felt[:-1] else {})
 
 
-def _rating(story: TrialHistory) -> Row:
+def _rating(events: TrialHistory) -> Row:
     """The rating that counts, the participant's words, and whose hand entered them."""
-    entered = [word for word in story.words if isinstance(word, Rated | RatingCorrected)]
-    described = [word for word in story.words if isinstance(word, Described | DescriptionCorrected)]
+    entered = [word for word in events.words if isinstance(word, Rated | RatingCorrected)]
+    described = [word for word in events.words if isinstance(word, Described | DescriptionCorrected)]
     row: Row = {"comment": described[-1].comment} if described else {}
     if not entered:
         return row

@@ -14,11 +14,14 @@ from concurrent.futures import Future, ThreadPoolExecutor
 from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, Literal, Self, get_args
+from typing import Literal, Self, TypeVar, get_args
+
+from pydantic import TypeAdapter, ValidationError
 
 from device.words import RecoilError
 from experiments.clock import Clock
 from experiments.config.setup import canonical_json, sha256
+from experiments.design.plan import Plan
 from experiments.record import storage
 
 Kind = Literal["run", "step", "outcome", "shot", "remark", "resumed", "stopped", "finished"]
@@ -36,24 +39,63 @@ class JournalGone(JournalError):  # noqa: N818 - what is so, not what went wrong
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
+class Record:
+    """A line of a journal after its first: when it was written, and what it holds.
+
+    `body` is a step, outcome, shot or remark as JSON, which their own types read. `shown_s` of an outcome is when the
+    console had painted its step, `reason` of a stop is why, `clock` of a resumption is which; else they are empty.
+    """
+
+    n: int
+    kind: Kind
+    utc: str
+    monotonic_s: float
+    synced_s: float | None = None
+    body: object = None
+    shown_s: float | None = None
+    reason: str = ""
+    clock: str = ""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Head(Record):
+    """The first line of a journal: the frozen plan, and the resolved setup as JSON, with their hashes."""
+
+    path: Path
+    plan_json: object
+    plan_sha256: str
+    setup_json: object
+    setup_sha256: str
+
+    @property
+    def plan(self) -> Plan:
+        """The plan. `JournalError` if this version of Recoil knows no such plan."""
+        try:
+            return Plan.from_record(self.plan_json)
+        except ValidationError as error:
+            raise JournalError(f"{self.path}: line 1: no plan of this version of Recoil") from error
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
 class Contents:
     """What a journal holds: its whole records, their length in bytes, and what stands behind them cut off."""
 
     path: Path
-    records: tuple[dict[str, Any], ...]
+    head: Head
+    records: tuple[Record, ...]
     whole_bytes: int
     cut_bytes: int
     link: str
 
     @property
-    def header(self) -> dict[str, Any]:
-        """The first record: plan, setup, provenance."""
-        return self.records[0]
+    def plan(self) -> Plan:
+        """The plan of the run. `JournalError` if this version of Recoil knows no such plan."""
+        return self.head.plan
 
     @property
     def finished(self) -> bool:
         """Whether the run came to its end."""
-        return bool(self.records[-1]["kind"] == "finished")
+        return self.records[-1].kind == "finished"
 
     @property
     def cut_message(self) -> str | None:
@@ -62,7 +104,7 @@ class Contents:
             return None
         return (
             f"{self.path}: line {len(self.records) + 1} is cut off after {self.cut_bytes} bytes and was never "
-            f"acknowledged; everything up to record {self.records[-1]['n']} is read"
+            f"acknowledged; everything up to record {self.records[-1].n} is read"
         )
 
 
@@ -207,7 +249,7 @@ def link(line: bytes) -> str:
     return hashlib.sha256(line.rstrip(b"\r\n")).hexdigest()[:16]
 
 
-def parsed(line: bytes) -> dict[str, Any]:
+def parsed(line: bytes) -> dict[str, object]:
     """The JSON object on a line; else `JournalError`."""
     try:
         value = json.loads(line)
@@ -218,7 +260,7 @@ def parsed(line: bytes) -> dict[str, Any]:
     return value
 
 
-def check_chain(value: dict[str, Any], number: int, before: str) -> None:
+def check_chain(value: dict[str, object], number: int, before: str) -> None:
     """`JournalError` unless the record's number `n` and its `link` follow from the line before."""
     if value.get("n") != number:
         raise JournalError(f"record number is {value.get('n')!r}, must be {number}; a line was lost or added")
@@ -231,47 +273,83 @@ def read(path: Path) -> Contents:
 
     `JournalError` names file, line and rule if there is no whole record, or if one was changed by hand.
     """
-    data = _bytes(path)
-    whole_bytes = data.rfind(b"\n") + 1
-    lines = data[:whole_bytes].split(b"\n")[:-1]
-    _check_head(path, lines)
-    links = ["", *map(link, lines)]
-    records = tuple(_record(path, number, line, links[number]) for number, line in enumerate(lines))
-    cut_bytes = len(data) - whole_bytes
-    return Contents(path=path, records=records, whole_bytes=whole_bytes, cut_bytes=cut_bytes, link=links[-1])
+    contents = begun(path)
+    if contents is None:
+        raise JournalError(f"{path}: line 1: no whole record, so nothing was acknowledged")
+    return contents
 
 
-def head(path: Path) -> dict[str, Any] | None:
-    """The first record of a journal: plan, setup, provenance. `None` if the run was killed before it was whole."""
-    lines = _bytes(path).split(b"\n", 1)[:-1]
-    return _check_head(path, lines) if lines else None
+def begun(path: Path) -> Contents | None:
+    """What a journal holds; `None` if the run was killed before anything was acknowledged. Raises as `read`."""
+    return contents_of(path, load(path))
 
 
-def is_empty(path: Path) -> bool:
-    """Whether a journal holds no whole record: the run was killed before anything was acknowledged."""
-    return b"\n" not in _bytes(path)
+def head(path: Path) -> Head | None:
+    """The first record of a journal; `None` if the run was killed before it was whole. Raises as `read`."""
+    return head_of(path, load(path))
 
 
-def _bytes(path: Path) -> bytes:
+def load(path: Path) -> bytes:
+    """The bytes of a journal. `JournalError` if there are none to be had."""
     try:
         return path.read_bytes()
     except OSError as error:
         raise JournalError(f"{path}: cannot be read ({error.strerror})") from error
 
 
-def _check_head(path: Path, lines: list[bytes]) -> dict[str, Any]:
-    if not lines:
-        raise JournalError(f"{path}: line 1: no whole record, so nothing was acknowledged")
-    first = _record(path, 0, lines[0], "")
-    if first["kind"] != "run" or not {"plan", "setup"} <= first.keys():
+def contents_of(path: Path, data: bytes) -> Contents | None:
+    """What the bytes of a journal hold; `None` if there is no whole record. Raises as `read`."""
+    whole_bytes = data.rfind(b"\n") + 1
+    lines = data[:whole_bytes].split(b"\n")[:-1]
+    first = head_of(path, data)
+    if first is None:
+        return None
+    links = [*map(link, lines)]
+    others = (_record(path, number, line, links[number - 1]) for number, line in enumerate(lines[1:], start=1))
+    return Contents(
+        path=path,
+        head=first,
+        records=(first, *others),
+        whole_bytes=whole_bytes,
+        cut_bytes=len(data) - whole_bytes,
+        link=links[-1],
+    )
+
+
+def head_of(path: Path, data: bytes) -> Head | None:
+    """The first record in the bytes of a journal; `None` if it is not whole. `JournalError` if it is none."""
+    line, end, _ = data.partition(b"\n")
+    if not end:
+        return None
+    value = _values(path, 0, line, "")
+    if value["kind"] != "run" or not {"plan", "setup"} <= value.keys():
         raise JournalError(f"{path}: line 1: not the head of a journal (kind `run` with `plan` and `setup`)")
     for part in ("plan", "setup"):
-        if sha256(first[part]) != first.get(f"{part}_sha256"):
+        if sha256(value[part]) != value.get(f"{part}_sha256"):
             raise JournalError(f"{path}: line 1: {part} does not have the hash {part}_sha256; it was changed")
-    return first
+    of_head = {"path": path, "plan_json": value["plan"], "setup_json": value["setup"]}
+    return read_as(_HEAD, value | of_head, f"{path}: line 1")
 
 
-def _record(path: Path, number: int, line: bytes, before: str) -> dict[str, Any]:
+def _record(path: Path, number: int, line: bytes, before: str) -> Record:
+    return read_as(_RECORD, _values(path, number, line, before), f"{path}: line {number + 1}")
+
+
+_HEAD, _RECORD = TypeAdapter(Head), TypeAdapter(Record)
+Typed = TypeVar("Typed")
+
+
+def read_as(kind: TypeAdapter[Typed], value: object, place: str) -> Typed:
+    """JSON of a journal as the type that it was written from. `JournalError` names the place and what is wrong."""
+    try:
+        return kind.validate_python(value)
+    except ValidationError as error:
+        first = error.errors()[0]
+        where = ".".join(str(part) for part in first["loc"])
+        raise JournalError(f"{place}: {where}: {first['msg']}; the record was changed") from error
+
+
+def _values(path: Path, number: int, line: bytes, before: str) -> dict[str, object]:
     try:
         value = parsed(line)
         if value.get("kind") not in _KINDS:

@@ -4,106 +4,101 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
-from typing import Any
 
-from pydantic import ValidationError
-
-from experiments.record.journal import Contents, JournalError
-from experiments.session.history import Told
-from experiments.session.remarks import Halted, Remark, TestShot, remark_from
+from experiments.record.journal import Contents, JournalError, Record, read_as
+from experiments.session.history import History
+from experiments.session.remarks import REMARK, Halted, Remark, TestShot
 from experiments.session.states import EMERGENCY
 from experiments.session.steps import (
+    OUTCOME,
+    STEP,
     Ask,
     Fire,
-    History,
     Interrupted,
     Outcome,
     Present,
     Session,
     Step,
-    outcome_from,
     record,
-    step_from,
 )
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class RunPosition:
-    """Where a run stands: its next step, `None` at the end, and what was told before.
+    """Where a run stands: its next step, `None` at the end, and what was done before.
 
     `halted`: an emergency stop ended it, and no test shot was fired since; one must come before anything else.
     """
 
     step: Step | None
-    told: Told = ()
+    history: History = ()
     halted: bool = False
 
 
 def _halted(contents: Contents) -> bool:
     """Whether the last word on it is an emergency stop: its record, or, where the disk took none, the stop's reason."""
     halted = False
-    for entry in contents.records:
-        word = _read(contents, entry, remark_from) if entry["kind"] == "remark" else None
-        if isinstance(word, Halted) or (entry["kind"] == "stopped" and entry.get("reason") == EMERGENCY):
+    for line in contents.records:
+        word = _remark(contents, line) if line.kind == "remark" else None
+        if isinstance(word, Halted) or (line.kind == "stopped" and line.reason == EMERGENCY):
             halted = True
         elif isinstance(word, TestShot) and not word.cause:
             halted = False
     return halted
 
 
-def told(contents: Contents) -> Told:
-    """All that a journal tells, in order: the steps that were done, each with its outcome, and remarks between them."""
-    tale: list[tuple[Step | None, Outcome | Remark]] = []
-    step: Step | None = None
-    for entry in contents.records:
-        if entry["kind"] == "step":
-            step = _read(contents, entry, step_from)
-        elif entry["kind"] == "remark":
-            tale.append((None, _read(contents, entry, remark_from)))
-        elif entry["kind"] == "outcome":
-            if step is None:
-                raise JournalError(f"{_place(contents, entry)}: an outcome without its step; a line was lost")
-            tale.append((step, _read(contents, entry, outcome_from)))
-            step = None
-    return tale
-
-
 def history(contents: Contents) -> History:
+    """All that a journal tells, in order: the steps that were done, each with its outcome, and remarks between them."""
+    found: list[tuple[Step | None, Outcome | Remark]] = []
+    step: Step | None = None
+    for line in contents.records:
+        if line.kind == "step":
+            step = read_as(STEP, line.body, _place(contents, line))
+        elif line.kind == "remark":
+            found.append((None, _remark(contents, line)))
+        elif line.kind == "outcome":
+            if step is None:
+                raise JournalError(f"{_place(contents, line)}: an outcome without its step; a line was lost")
+            found.append((step, read_as(OUTCOME, line.body, _place(contents, line))))
+            step = None
+    return found
+
+
+def outcomes(history: History) -> list[tuple[Step, Outcome]]:
     """The steps that were done, each with its outcome."""
-    return [(step, outcome) for step, outcome in told(contents) if step and not isinstance(outcome, Remark)]
+    return [(step, outcome) for step, outcome in history if step and not isinstance(outcome, Remark)]
 
 
 def replay(session: Session, contents: Contents) -> RunPosition:
     """Send a journal's outcomes into a fresh session. `JournalError` if they are not those of this plan."""
-    tale = told(contents)
-    done = [(step, outcome) for step, outcome in tale if step and not isinstance(outcome, Remark)]
+    before = history(contents)
     step = next(session, None)
-    for number, (recorded, outcome) in enumerate(done, start=1):
+    for number, (recorded, outcome) in enumerate(outcomes(before), start=1):
         _compare(contents, number, step, recorded)
         step = _send(session, outcome)
-    return RunPosition(step=step, told=tale, halted=_halted(contents))
+    return RunPosition(step=step, history=before, halted=_halted(contents))
 
 
-def go_on(session: Session, contents: Contents, standing: RunPosition, append: Callable[..., None]) -> RunPosition:
+def go_on(session: Session, contents: Contents, position: RunPosition, append: Callable[..., None]) -> RunPosition:
     """Where a replayed run goes on.
 
     A step at which the run broke off is given up, told to the journal through `append`, and its trial presented again:
     its stimulus was felt, may have been, or was about to be.
     """
-    step, announced = standing.step, _last_step_is_open(contents)
+    step, announced = position.step, _last_step_is_open(contents)
     if step is None or not (announced or isinstance(step, Fire | Ask | Present)):
-        return standing
+        return position
     if not announced:
         append("step", body=record(step))
     felt = isinstance(step, Ask) or (announced and isinstance(step, Fire | Present))
     outcome = Interrupted(presented=felt)
     append("outcome", body=record(outcome))
-    return replace(standing, step=_send(session, outcome), told=[*standing.told, (step, outcome)])
+    return replace(position, step=_send(session, outcome), history=[*position.history, (step, outcome)])
 
 
 def _last_step_is_open(contents: Contents) -> bool:
     """Whether the last step has no outcome; a stop or a resumption may stand behind it."""
-    kinds = [entry["kind"] for entry in contents.records if entry["kind"] in ("step", "outcome")]
+    kinds = [line.kind for line in contents.records if line.kind in ("step", "outcome")]
     return bool(kinds) and kinds[-1] == "step"
 
 
@@ -114,22 +109,17 @@ def _send(session: Session, outcome: Outcome) -> Step | None:
         return None
 
 
-def _compare(contents: Contents, number: int, planned: Step | None, told: Step) -> None:
-    if planned is None or record(planned) != record(told):
+def _compare(contents: Contents, number: int, planned: Step | None, recorded: Step) -> None:
+    if planned is None or record(planned) != record(recorded):
         raise JournalError(
-            f"{contents.path}: step {number} is {told.kind!r} and does not follow from the plan in line 1; "
+            f"{contents.path}: step {number} is {recorded.kind!r} and does not follow from the plan in line 1; "
             "the journal was changed, or another version of Recoil wrote it"
         )
 
 
-def _read(contents: Contents, entry: dict[str, Any], reader: Any) -> Any:
-    try:
-        return reader(entry.get("body"))
-    except ValidationError as error:
-        first = error.errors()[0]
-        where = ".".join(str(part) for part in first["loc"])
-        raise JournalError(f"{_place(contents, entry)}: {where}: {first['msg']}; the record was changed") from error
+def _remark(contents: Contents, line: Record) -> Remark:
+    return read_as(REMARK, line.body, _place(contents, line))
 
 
-def _place(contents: Contents, entry: dict[str, Any]) -> str:
-    return f"{contents.path}: line {entry['n'] + 1}"
+def _place(contents: Contents, line: Record) -> str:
+    return f"{contents.path}: line {line.n + 1}"

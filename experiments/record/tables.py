@@ -21,25 +21,25 @@ from experiments.session.steps import Answered, Described, Failed, Fired, Interr
 Row = dict[str, object]
 
 
-def presentation(story: TrialHistory, shown: type[Fired | Presented]) -> Row:
+def presentation(events: TrialHistory, shown: type[Fired | Presented]) -> Row:
     """How a trial was presented: attempts, flags, note, onset of the last stimulus, gun. Empty if it never was."""
-    attempts = sum(is_attempt(step, word) for step, word in story.events)
-    notes = "; ".join(remark.text for remark in story.all(Noted))
-    row: Row = {"attempts": attempts or None, "flags": " ".join(_flags(story)), "note": notes}
-    stimulus = story.last(shown)
+    attempts = sum(is_attempt(step, word) for step, word in events.items)
+    notes = "; ".join(remark.text for remark in events.all(Noted))
+    row: Row = {"attempts": attempts or None, "flags": " ".join(_flags(events)), "note": notes}
+    stimulus = events.last(shown)
     return row | ({"onset_utc": stimulus.onset_utc, "gun": stimulus.gun} if stimulus else {})
 
 
-def _flags(story: TrialHistory) -> list[str]:
+def _flags(events: TrialHistory) -> list[str]:
     """What went wrong with the stimulus on the way, what was changed afterwards, and the experimenter's own marks."""
     found = {
-        "device-error": bool(story.all(Failed)),
-        "interrupted": any(one.presented and one.cause == "break-off" for one in story.all(Interrupted)),
-        "paused": any(one.presented and one.cause == "pause" for one in story.all(Interrupted)),
-        "repeated": story.repeated,
-        "corrected": any(_is_corrected(story, given) for given in _CORRECTIONS),
+        "device-error": bool(events.all(Failed)),
+        "interrupted": any(one.presented and one.cause == "break-off" for one in events.all(Interrupted)),
+        "paused": any(one.presented and one.cause == "pause" for one in events.all(Interrupted)),
+        "repeated": events.repeated,
+        "corrected": any(_is_corrected(events, given) for given in _CORRECTIONS),
     }
-    own = [remark.flag for remark in story.all(Flagged)]
+    own = [remark.flag for remark in events.all(Flagged)]
     return list(dict.fromkeys([flag for flag, there in found.items() if there] + own))
 
 
@@ -50,9 +50,9 @@ _CORRECTIONS: dict[type[Outcome], type[Remark]] = {
 }
 
 
-def _is_corrected(story: TrialHistory, given: type[Outcome]) -> bool:
+def _is_corrected(events: TrialHistory, given: type[Outcome]) -> bool:
     """Whether what counts is a correction: what was entered anew, because its trial was presented again, is none."""
-    both = [word for word in story.words if isinstance(word, (given, _CORRECTIONS[given]))]
+    both = [word for word in events.words if isinstance(word, (given, _CORRECTIONS[given]))]
     return bool(both) and not isinstance(both[-1], given)
 
 

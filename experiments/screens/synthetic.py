@@ -27,7 +27,7 @@ def synthetic_participant_of(setup: Setup[Any], plan: Plan) -> Any:
     `ConfigError` if its table does not fit, or its numbers make nobody.
     """
     try:
-        return catalogue.experiment(setup).observer(setup, plan)
+        return catalogue.experiment(setup).synthetic_participant(setup, plan)
     except ValueError as error:
         synthetic = setup.config.synthetic
         if synthetic.observer == "table":

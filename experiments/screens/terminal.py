@@ -152,12 +152,12 @@ class TerminalScreen:
                 return ""
 
     def _head(self, step: Prepare) -> str:
-        told = self._live.told if self._live else ()
+        told = self._live.history if self._live else ()
         again = again_text(told, step)
         return f"\n{place_text(self._plan, step.trial)}.{f' {again}' if again else ''}{read_out_text(self._plan, step)}"
 
     def _correction(self, entry: Entry) -> str:
-        told = self._live.told if self._live else ()
+        told = self._live.history if self._live else ()
         was = value_text(value(told, entry))
         how = {"answer": "f or b", "rating": "a number, or none", "description": "the words"}[entry.what]
         return (

@@ -9,7 +9,7 @@ import unicodedata
 
 from experiments.design.plan import Plan, Trial
 from experiments.session import remarks, steps
-from experiments.session.history import Entry, Told, Value, is_attempt, together, value
+from experiments.session.history import Entry, History, Value, is_attempt, together, value
 from experiments.session.remarks import MAX_FLAG, Remark
 from experiments.session.steps import Outcome, Prepare, Step, trial_of
 
@@ -42,7 +42,7 @@ def short_place(trial: Trial, here: Trial) -> str:
     return place if trial.session == here.session else f"{place}, session {trial.session}"
 
 
-def again_text(told: Told, step: Prepare) -> str:
+def again_text(told: History, step: Prepare) -> str:
     """How often a trial was felt already, as the table counts its attempts; empty if never."""
     before = sum(is_attempt(one, word) for one, word in told if trial_of(one) == step.trial)
     return f"Presented again, for the {_nth(before + 1)} time." if before else ""
@@ -69,7 +69,7 @@ def value_text(said: Value) -> str:
     return said.upper() if said in ("forward", "backward") else f"“{said}”"
 
 
-def entry_text(plan: Plan, told: Told, entry: Entry) -> str:
+def entry_text(plan: Plan, told: History, entry: Entry) -> str:
     """An entry with what it says."""
     name = f"Trial {entry.trial.trial}" if entry.what == "answer" else f"{ordinal(plan, entry.trial)}, {entry.what}"
     return f"{name}: {value_text(value(told, entry))}"

@@ -1,4 +1,4 @@
-"""What was told of a run so far, of each of its trials, and what of it can be corrected or repeated. Pure."""
+"""What was done in a run so far, what became of each trial, and what of it can be corrected or repeated. Pure."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ from experiments.session.steps import (
 
 Word = TypeVar("Word")
 
-Told = Sequence[tuple[Step | None, Outcome | Remark]]
+History = Sequence[tuple[Step | None, Outcome | Remark]]
 """What a journal tells, in order: steps with their outcomes, and remarks, which have no step."""
 
 
@@ -35,13 +35,13 @@ Told = Sequence[tuple[Step | None, Outcome | Remark]]
 class TrialHistory:
     """What the journal tells of one trial, in order, and whether it was asked to be repeated."""
 
-    events: list[tuple[Step | None, Outcome | Remark]]
+    items: list[tuple[Step | None, Outcome | Remark]]
     repeated: bool
 
     @property
     def words(self) -> list[Outcome | Remark]:
         """The outcomes and remarks, in order."""
-        return [word for _, word in self.events]
+        return [word for _, word in self.items]
 
     def all(self, kind: type[Word]) -> list[Word]:
         """The outcomes or remarks of a kind."""
@@ -52,14 +52,14 @@ class TrialHistory:
         return next(reversed(self.all(kind)), None)
 
 
-def stories(trials: Sequence[Trial], told: Told) -> dict[Trial, TrialHistory]:
+def by_trial(trials: Sequence[Trial], history: History) -> dict[Trial, TrialHistory]:
     """What the journal tells, by trial."""
-    repeated = {word.trial for _, word in told if isinstance(word, Repeat)}
-    found = {trial: TrialHistory(events=[], repeated=trial in repeated) for trial in trials}
-    for step, word in told:
+    repeated = {word.trial for _, word in history if isinstance(word, Repeat)}
+    found = {trial: TrialHistory(items=[], repeated=trial in repeated) for trial in trials}
+    for step, word in history:
         trial = _trial(step, word)
         if trial is not None:
-            found[trial].events.append((step, word))
+            found[trial].items.append((step, word))
     return found
 
 
@@ -85,18 +85,18 @@ class Entry:
     what: What
 
 
-def trial_at(plan: Plan, told: Told, step: Step | None) -> Trial:
+def trial_at(plan: Plan, history: History, step: Step | None) -> Trial:
     """The trial of a step, else the last one that was, else the first."""
-    steps = (step, *(one for one, _ in reversed(told)))
+    steps = (step, *(one for one, _ in reversed(history)))
     return next((trial for one in steps if (trial := trial_of(one)) is not None), plan.trials[0])
 
 
-def entries(told: Told, here: Trial) -> list[Entry]:
+def entries(history: History, here: Trial) -> list[Entry]:
     """What was entered in the set of a trial, in order: what can be corrected.
 
     What is entered anew, because its trial was presented again, stands where it was entered first.
     """
-    found = (entry for step, word in told if (entry := _entry(step, word)) is not None)
+    found = (entry for step, word in history if (entry := _entry(step, word)) is not None)
     return [entry for entry in dict.fromkeys(found) if together(entry.trial, here)]
 
 
@@ -126,9 +126,9 @@ def fits(entry: Entry, value: Value) -> bool:
             return isinstance(value, str)
 
 
-def value(told: Told, entry: Entry) -> Value:
+def value(history: History, entry: Entry) -> Value:
     """What an entry says, as it counts: the last that was entered. `None`: no answer."""
-    said = [_value(step, word, entry) for step, word in told]
+    said = [_value(step, word, entry) for step, word in history]
     return next((one[0] for one in reversed(said) if one), None)
 
 
@@ -164,21 +164,26 @@ def _given(word: Outcome | Remark) -> tuple[Value] | None:
             return None
 
 
-def repeatable(told: Told, step: Step | None, here: Trial) -> Trial | None:
+def repeatable(history: History, step: Step | None, here: Trial) -> Trial | None:
     """The trial that can be presented again: the one that is asked about, else the last of the set.
 
     It can be as long as its rating is not in.
     """
     if isinstance(step, Ask | Rate):
         return step.trial
-    rated = {trial_of(one) for one, word in told if isinstance(word, Rated)}
-    shown = [trial_of(one) for one, word in told if isinstance(word, Answered | Presented)]
+    rated = {trial_of(one) for one, word in history if isinstance(word, Rated)}
+    shown = [trial_of(one) for one, word in history if isinstance(word, Answered | Presented)]
     return next((trial for trial in reversed(shown) if trial and together(trial, here) and trial not in rated), None)
 
 
-def done(told: Told) -> set[Trial]:
+def done(history: History) -> set[Trial]:
     """The trials that were answered, or felt until next."""
-    return {trial for step, word in told if isinstance(word, Answered | Presented) and (trial := trial_of(step))}
+    return {trial for step, word in history if isinstance(word, Answered | Presented) and (trial := trial_of(step))}
+
+
+def answered(history: History) -> set[Trial]:
+    """The trials that were answered or rated, whatever became of the answer."""
+    return {trial for step, word in history if isinstance(word, Answered | Rated) and (trial := trial_of(step))}
 
 
 def together(one: Trial, other: Trial) -> bool:

@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 from experiments.design.plan import Plan, Trial
 from experiments.session import events
 from experiments.session.events import ACTS, OWN, Event, Press
-from experiments.session.history import Entry, Told, entries, fits, repeatable, trial_at, value
+from experiments.session.history import Entry, History, entries, fits, repeatable, trial_at, value
 from experiments.session.remarks import (
     AnswerCorrected,
     Continued,
@@ -37,7 +37,7 @@ class Moment:
     """
 
     plan: Plan
-    told: Told
+    history: History
     position: Position
     now_s: float
     painted_s: float | None
@@ -48,12 +48,12 @@ class Moment:
     def trial(self) -> Trial:
         """The trial at hand: that of an open correction, else that of the step, else the last one."""
         entry = self.position.correcting
-        return entry.trial if entry else trial_at(self.plan, self.told, self.position.step)
+        return entry.trial if entry else trial_at(self.plan, self.history, self.position.step)
 
     @property
     def further_back(self) -> Entry | None:
         """The entry that undo opens: the last of the set, or the one before that which is open."""
-        found, here = entries(self.told, self.trial), self.position.correcting
+        found, here = entries(self.history, self.trial), self.position.correcting
         if here in found:
             return found[max(0, found.index(here) - 1)]
         return found[-1] if found else None
@@ -62,7 +62,7 @@ class Moment:
     def repeatable(self) -> Trial | None:
         """The trial that would be presented again."""
         step = self.position.step
-        return repeatable(self.told, step, trial_at(self.plan, self.told, step))
+        return repeatable(self.history, step, trial_at(self.plan, self.history, step))
 
     def is_ready(self, at_s: float) -> bool:
         """Whether a press at a time would be late enough for what stands there."""
@@ -76,7 +76,7 @@ class Moment:
 def meant(moment: Moment, event: Event) -> tuple[Event, str]:
     """An event as it is meant, and what there is to say of it: a correction to what stands there already is none."""
     entry = moment.position.correcting
-    if isinstance(event, events.Correct) and entry is not None and event.value == value(moment.told, entry):
+    if isinstance(event, events.Correct) and entry is not None and event.value == value(moment.history, entry):
         return events.Leave(), "That is what stands there: nothing was corrected."
     return event, ""
 

@@ -6,12 +6,13 @@ The old value of a correction stays in the journal; the table shows the last one
 from __future__ import annotations
 
 from dataclasses import asdict, dataclass
-from typing import Annotated, Any, Literal
+from typing import Annotated, Literal
 
 from pydantic import Field, TypeAdapter
 
 from device.words import Direction
-from experiments.design.plan import Trial, where_given
+from experiments.config.setup import without_blank_instruction
+from experiments.design.plan import Trial
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -146,14 +147,10 @@ def flag_word(typed: str) -> str | None:
     return flag if plain and len(flag) <= MAX_FLAG else None
 
 
-_REMARK: TypeAdapter[Remark] = TypeAdapter(Annotated[Remark, Field(discriminator="kind")])
+REMARK: TypeAdapter[Remark] = TypeAdapter(Annotated[Remark, Field(discriminator="kind")])
+"""Reads the remark that a record holds."""
 
 
-def record(remark: Remark) -> dict[str, Any]:
+def record(remark: Remark) -> dict[str, object]:
     """A remark as plain JSON values."""
-    return asdict(remark, dict_factory=where_given)
-
-
-def remark_from(body: object) -> Remark:
-    """The remark that a record holds; `pydantic.ValidationError` if it holds none."""
-    return _REMARK.validate_python(body)
+    return asdict(remark, dict_factory=without_blank_instruction)

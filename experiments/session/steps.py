@@ -9,12 +9,13 @@ import math
 from collections import Counter
 from collections.abc import Callable, Generator
 from dataclasses import asdict, dataclass
-from typing import Annotated, Any, Literal, Protocol
+from typing import Annotated, Literal, Protocol
 
 from pydantic import Field, TypeAdapter
 
 from device.words import Direction, ShotTiming
-from experiments.design.plan import Trial, where_given
+from experiments.config.setup import without_blank_instruction
+from experiments.design.plan import Trial
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -253,9 +254,6 @@ TrialStep = Prepare | Fire | Ask | Present | Rate | Describe
 Session = Generator[Step, Outcome, None]
 """Yields what should happen and is sent what did happen. It opens nothing, waits for nothing and knows no clock."""
 
-History = list[tuple[Step, Outcome]]
-"""What was done, in order."""
-
 
 def trial_of(step: Step | None) -> Trial | None:
     """The trial that a step is about, if it is about one."""
@@ -263,24 +261,16 @@ def trial_of(step: Step | None) -> Trial | None:
 
 
 _OPTIONAL_FIELDS = ("damper", "timing", "key_time_s", "shots", "exposure_s")
-_STEP: TypeAdapter[Step] = TypeAdapter(Annotated[Step, Field(discriminator="kind")])
-_OUTCOME: TypeAdapter[Outcome] = TypeAdapter(Annotated[Outcome, Field(discriminator="kind")])
+STEP: TypeAdapter[Step] = TypeAdapter(Annotated[Step, Field(discriminator="kind")])
+"""Reads the step that a record holds."""
+OUTCOME: TypeAdapter[Outcome] = TypeAdapter(Annotated[Outcome, Field(discriminator="kind")])
+"""Reads the outcome that a record holds."""
 
 
-def record(word: Step | Outcome | TrainShot) -> dict[str, Any]:
+def record(word: Step | Outcome | TrainShot) -> dict[str, object]:
     """A step, outcome or shot as plain JSON values; an instruction, and what is not always known, only where it is."""
-    words = asdict(word, dict_factory=where_given)
-    return {key: value for key, value in words.items() if key not in _OPTIONAL_FIELDS or value is not None}
-
-
-def step_from(body: object) -> Step:
-    """The step that a record holds; `pydantic.ValidationError` if it holds none."""
-    return _STEP.validate_python(body)
-
-
-def outcome_from(body: object) -> Outcome:
-    """The outcome that a record holds; `pydantic.ValidationError` if it holds none."""
-    return _OUTCOME.validate_python(body)
+    fields = asdict(word, dict_factory=without_blank_instruction)
+    return {key: value for key, value in fields.items() if key not in _OPTIONAL_FIELDS or value is not None}
 
 
 class Scale(Protocol):

@@ -16,7 +16,7 @@ from experiments.study import places, register
 from experiments.study.places import PlaceError
 from experiments.study.progress import StudyFolder, look_at
 from experiments.study.register import RegisterError
-from experiments.study.study import Facts, Participant, RunStanding, eligible, unanswered, unasked
+from experiments.study.study import Facts, Participant, RunProgress, eligible, unanswered, unasked
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -29,7 +29,7 @@ class Entered:
     facts: Mapping[str, str]
 
 
-def run_of(person: Participant, experiment: str) -> RunStanding:
+def run_of(person: Participant, experiment: str) -> RunProgress:
     """How somebody stands in an experiment."""
     return next(run for run in person.runs if run.experiment == experiment)
 
@@ -37,7 +37,7 @@ def run_of(person: Participant, experiment: str) -> RunStanding:
 def next_experiment(person: Participant | None, experiments: Sequence[str]) -> str:
     """The first experiment in the order of the study that somebody has not done; the first of all if nothing is left.
 
-    >>> runs = [RunStanding(experiment=name, state=state) for name, state in [("a", "done"), ("b", "not begun")]]
+    >>> runs = [RunProgress(experiment=name, state=state) for name, state in [("a", "done"), ("b", "not begun")]]
     >>> next_experiment(Participant(participant_id="P01", runs=tuple(runs)), ["a", "b"])
     'b'
     """
@@ -125,7 +125,7 @@ def read_back_refusal(entered: Entered) -> str:
     return ""
 
 
-def admit(study: StudyFolder, entered: Entered, clock: Clock, *, practice: bool = False) -> RunStanding:
+def admit(study: StudyFolder, entered: Entered, clock: Clock, *, practice: bool = False) -> RunProgress:
     """Have what somebody said on record, and give back how their run stands.
 
     `PlaceError` and `JournalError` say why they may not run; then nothing is recorded.
@@ -136,7 +136,7 @@ def admit(study: StudyFolder, entered: Entered, clock: Clock, *, practice: bool 
     return run
 
 
-def may_run(study: StudyFolder, entered: Entered, *, practice: bool = False) -> tuple[RunStanding, Facts | None]:
+def may_run(study: StudyFolder, entered: Entered, *, practice: bool = False) -> tuple[RunProgress, Facts | None]:
     """Check all that must hold before somebody runs: how their run stands, and what is new of what they said.
 
     `PlaceError` and `JournalError` say why they may not.
@@ -167,9 +167,10 @@ def join(study: StudyFolder, participant_id: str, facts: Facts, clock: Clock) ->
     nothing is recorded. A correction is recorded whatever it says; whether to exclude is then for people to decide.
     """
     _refuse_wrong_facts(study, facts)
-    places.place(study.results, participant_id, study.experiments[0])
+    registered = register.read(study.results)
+    places.place(study.results, participant_id, study.experiments[0], registered)
     reasons = eligible(facts, study.config.eligibility)
-    known = participant_id in places.known_codes(study.results)
+    known = participant_id in places.known_codes(study.results, registered)
     if reasons and not known:
         raise PlaceError(
             f"participant {participant_id} is not eligible: {'; '.join(reasons)} (rules: {study.source}); "
@@ -203,12 +204,14 @@ def readmit(results: Path, participant_id: str, reason: str, clock: Clock) -> No
 
 
 def _excluded_before(results: Path, participant_id: str) -> str | None:
-    places.place(results, participant_id, "direction")
-    known = places.known_codes(results)
+    registered = register.read(results)
+    known = places.known_codes(results, registered)
+    places.check_code(participant_id)
+    places.check_case(results, participant_id, known)
     if participant_id not in known:
         shown = ", ".join(known) or "nobody"
         raise PlaceError(f"participant {participant_id} is not known in {results}; known are {shown}")
-    return register.excluded(results).get(participant_id)
+    return registered.excluded().get(participant_id)
 
 
 def _record(results: Path, kind: str, participant_id: str, reason: str, clock: Clock) -> None:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator
+from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -13,7 +13,9 @@ from experiments.config.models import CODE
 from experiments.config.setup import Setup
 from experiments.design import plan
 from experiments.record import columns, journal
+from experiments.record.journal import Head
 from experiments.study import register
+from experiments.study.register import Register
 
 _CODE = re.compile(CODE)
 
@@ -68,22 +70,30 @@ def check_code(participant_id: str) -> None:
         )
 
 
-def place(results: Path, participant_id: str, experiment: str) -> Place:
-    """The place of a run. `PlaceError` if the code breaks a rule or differs from a known one in case alone."""
+def place(results: Path, participant_id: str, experiment: str, registered: Register | None = None) -> Place:
+    """The place of a run. `PlaceError` if the code breaks a rule or differs from a known one in case alone.
+
+    `registered` is the folder's register, where it has been read.
+    """
     check_code(participant_id)
-    for known in known_codes(results):
-        if known != participant_id and known.lower() == participant_id.lower():
-            raise PlaceError(
-                f"participant code {participant_id!r} differs from {known!r} in {results} in case alone; "
-                f"use {known!r} or another code"
-            )
+    check_case(results, participant_id, known_codes(results, registered or register.read(results)))
     return Place(results=results, participant_id=participant_id, experiment=experiment)
 
 
-def known_codes(results: Path) -> list[str]:
-    """The participants who have a folder or stand in the register."""
+def check_case(results: Path, participant_id: str, known: Iterable[str]) -> None:
+    """`PlaceError`, if a code differs from a known one in case alone."""
+    for code in known:
+        if code != participant_id and code.lower() == participant_id.lower():
+            raise PlaceError(
+                f"participant code {participant_id!r} differs from {code!r} in {results} in case alone; "
+                f"use {code!r} or another code"
+            )
+
+
+def known_codes(results: Path, registered: Register) -> list[str]:
+    """The participants who have a folder, or stand in the register as far as it can be trusted."""
     folders = {path.name.removeprefix("sub-") for path in results.glob("sub-*") if path.is_dir()}
-    return sorted(folders | register.codes(results))
+    return sorted(folders | set(registered.members))
 
 
 def journals(results: Path, experiment: str) -> Iterator[Path]:
@@ -91,23 +101,29 @@ def journals(results: Path, experiment: str) -> Iterator[Path]:
     yield from sorted(results.glob(f"sub-*/sub-*_task-{experiment}_journal.jsonl"))
 
 
-def next_row(setup: Setup[Any], results: Path) -> int | None:
+HeadOf = Callable[[Path], Head | None]
+"""Gives the head of a journal; `None` where nothing in it was acknowledged."""
+
+
+def next_row(setup: Setup[Any], results: Path, registered: Register, head_of: HeadOf = journal.head) -> int | None:
     """The row of the balancing square that the next run takes; `None` for a random order.
 
     The least used row over the runs of participants who are not excluded, the first such row. So rows are used equally
     often, to within one, whenever everyone who was excluded has been replaced.
     """
     design = setup.config.design
-    used = [] if design.order == "random" else used_rows(results, setup.config.experiment)
+    if design.order == "random":
+        return None
+    used = used_rows(results, setup.config.experiment, registered, head_of)
     return plan.next_row(design.order, len(design.methods), used)
 
 
-def used_rows(results: Path, experiment: str) -> list[int]:
+def used_rows(results: Path, experiment: str, registered: Register, head_of: HeadOf = journal.head) -> list[int]:
     """The rows that runs in this folder have taken; who is excluded gives theirs back."""
-    left_out = register.excluded(results)
-    counted = (path for path in journals(results, experiment) if _code(path) not in left_out)
-    heads = filter(None, map(journal.head, counted))
-    return [head["plan"]["order_row"] for head in heads if head["plan"]["order_row"] is not None]
+    left_out = registered.excluded()
+    heads = [head_of(path) for path in journals(results, experiment) if _code(path) not in left_out]
+    rows = [one.plan.order_row for one in heads if one is not None]
+    return [row for row in rows if row is not None]
 
 
 def _code(journal_path: Path) -> str:

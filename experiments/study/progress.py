@@ -6,8 +6,6 @@ begins just then has patience; so looking never stands in the way of a run.
 
 from __future__ import annotations
 
-import csv
-import io
 import os
 from collections.abc import Iterator
 from contextlib import suppress
@@ -19,16 +17,13 @@ from experiments import catalogue
 from experiments.config.models import StudyConfig
 from experiments.config.setup import Setup
 from experiments.load import load_setup, load_study
-from experiments.rebuild import plan_of, rebuild
-from experiments.record import journal, storage
-from experiments.record.journal import JournalError
+from experiments.record import journal, replay, storage
+from experiments.record.journal import Contents, Head, JournalError
+from experiments.session.history import answered
 from experiments.study import places, register
-from experiments.study.places import PlaceError
-from experiments.study.register import Member
-from experiments.study.study import Next, Participant, RunStanding, by_code, who_is_next
-
-ANSWERED_BY = {"direction": "response_source", "preference": "rating_by"}
-"""The column that says, by not being empty, that a trial was answered."""
+from experiments.study.places import Place, PlaceError
+from experiments.study.register import Member, Register
+from experiments.study.study import Next, Participant, RunProgress, by_code, who_is_next
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -73,7 +68,7 @@ def open_study(folder: Path) -> StudyFolder:
     beside = Path(os.path.normpath(folder / ".." / "study.toml"))
     if folder.resolve().name == "results" and beside.is_file():
         return _loaded(str(beside), folder)
-    if not ((folder / register.NAME).exists() or places.known_codes(folder)):
+    if not ((folder / register.NAME).exists() or places.known_codes(folder, register.read(folder))):
         raise PlaceError(
             f"{folder}: neither a study's folder (study.toml) nor a results folder (sub-CODE or {register.NAME}); "
             "`recoil new STUDY` makes one"
@@ -89,32 +84,12 @@ def _loaded(name: str, results: Path) -> StudyFolder:
 
 def overview(study: StudyFolder) -> Overview:
     """How a study stands. What cannot be read is a problem in the list, never an exception."""
-    found, problems = register.read(study.results), list[str]()
-    if found.problem:
-        problems.append(found.problem)
-    people = tuple(_participants(study, found.members, problems))
+    look = _Look(study, register.read(study.results))
+    people = tuple(look.participants())
     next_one = who_is_next(people, study.config, study.experiments)
-    orders_ahead = _orders(study, next_one, problems)
-    return Overview(participants=people, next=next_one, orders=orders_ahead, problems=tuple(dict.fromkeys(problems)))
-
-
-def _participants(study: StudyFolder, members: dict[str, Member], problems: list[str]) -> Iterator[Participant]:
-    for code in sorted(places.known_codes(study.results), key=by_code):
-        try:
-            yield _participant(study, members.get(code, Member(participant_id=code)), problems)
-        except PlaceError as error:
-            problems.append(f"{study.results / f'sub-{code}'}: {error}")
-
-
-def _participant(study: StudyFolder, member: Member, problems: list[str]) -> Participant:
-    where = [places.place(study.results, member.participant_id, experiment) for experiment in study.experiments]
-    return Participant(
-        participant_id=member.participant_id,
-        runs=tuple(_run(one, problems) for one in where),
-        facts=member.facts,
-        joined_utc=member.joined_utc,
-        excluded=member.excluded,
-    )
+    orders_ahead = look.orders(next_one)
+    problems = tuple(dict.fromkeys(filter(None, (look.registered.problem, *look.problems))))
+    return Overview(participants=people, next=next_one, orders=orders_ahead, problems=problems)
 
 
 def look_at(study: StudyFolder, participant_id: str) -> tuple[Participant, tuple[str, ...]]:
@@ -122,40 +97,129 @@ def look_at(study: StudyFolder, participant_id: str) -> tuple[Participant, tuple
 
     `PlaceError` if the code breaks a rule; `JournalError` if the register cannot be trusted.
     """
-    found, problems = register.read(study.results), list[str]()
-    if found.problem:
-        raise JournalError(found.problem)
-    member = found.members.get(participant_id, Member(participant_id=participant_id))
-    return _participant(study, member, problems), tuple(problems)
+    look = _Look(study, register.read(study.results))
+    if look.registered.problem:
+        raise JournalError(look.registered.problem)
+    return look.participant(participant_id), tuple(look.problems)
 
 
-def _run(where: places.Place, problems: list[str]) -> RunStanding:
-    try:
-        return replace(run_standing(where), practised=_practised(where))
-    except JournalError as error:
-        problems.append(str(error))
-        return RunStanding(experiment=where.experiment, state="unreadable")
+class _Look:
+    """One look at a study: register and journals are read once each, and what cannot be read is kept as a problem."""
+
+    def __init__(self, study: StudyFolder, registered: Register) -> None:
+        self._study, self.registered, self._members = study, registered, registered.members
+        self._codes = places.known_codes(study.results, registered)
+        self._heads: dict[Path, Head | JournalError | None] = {}
+        self.problems: list[str] = []
+
+    def participants(self) -> Iterator[Participant]:
+        """All who are known and have a code that keeps the rules."""
+        for code in sorted(self._codes, key=by_code):
+            try:
+                yield self.participant(code)
+            except PlaceError as error:
+                self.problems.append(f"{self._study.results / f'sub-{code}'}: {error}")
+
+    def participant(self, code: str) -> Participant:
+        """How one stands. `PlaceError` if the code breaks a rule."""
+        results = self._study.results
+        places.check_code(code)
+        places.check_case(results, code, self._codes)
+        runs = [Place(results=results, participant_id=code, experiment=name) for name in self._study.experiments]
+        member = self._members.get(code, Member(participant_id=code))
+        return Participant(
+            participant_id=code,
+            runs=tuple(map(self._run, runs)),
+            facts=member.facts,
+            joined_utc=member.joined_utc,
+            excluded=member.excluded,
+        )
+
+    def _run(self, where: Place) -> RunProgress:
+        try:
+            return replace(self._progress(where), practised=_practised(where))
+        except JournalError as error:
+            self.problems.append(str(error))
+            return RunProgress(experiment=where.experiment, state="unreadable")
+
+    def _progress(self, where: Place) -> RunProgress:
+        if not where.journal.exists():
+            return RunProgress(experiment=where.experiment, state="not begun")
+        elsewhere = _is_held(where)
+        data = self._data(where.journal)
+        return progress_of(where, journal.contents_of(where.journal, data), elsewhere=elsewhere)
+
+    def _data(self, path: Path) -> bytes:
+        """The bytes of a journal, whose head is kept."""
+        try:
+            data = journal.load(path)
+            self._heads[path] = journal.head_of(path, data)
+        except JournalError as error:
+            self._heads[path] = error
+            raise
+        return data
+
+    def _head(self, path: Path) -> Head | None:
+        """The head of a journal, from when it was looked at if it was. Raises as `journal.head`."""
+        seen = self._heads[path] if path in self._heads else journal.head(path)
+        if isinstance(seen, JournalError):
+            raise seen
+        return seen
+
+    def orders(self, next_one: Next | None) -> dict[str, tuple[str, ...] | None]:
+        """The methods of who is next, by experiment; `None` where chance decides, or rows cannot be read."""
+        if next_one is None:
+            return {}
+        setups = {setup.config.experiment: setup for setup in self._study.setups}
+        found: dict[str, tuple[str, ...] | None] = {}
+        for run in next_one.runs:
+            ahead = None
+            try:
+                ahead = self._next_methods(setups[run.experiment], next_one.participant_id)
+            except JournalError as error:
+                self.problems.append(str(error))
+            found[run.experiment] = run.methods or ahead
+        return found
+
+    def _next_methods(self, setup: Setup[Any], participant_id: str) -> tuple[str, ...] | None:
+        """The methods of a participant's next run in their order; `None` if chance decides when the run begins."""
+        row, seed = places.next_row(setup, self._study.results, self.registered, self._head), setup.config.seed
+        if row is None and seed is None:
+            return None
+        return catalogue.experiment(setup).make_plan(setup.config, participant_id, seed or 0, row).methods
 
 
-def run_standing(where: places.Place) -> RunStanding:
-    """How far a run has come. `JournalError` if its journal cannot be trusted."""
-    if not where.journal.exists():
-        return RunStanding(experiment=where.experiment, state="not begun")
-    elsewhere = _is_held(where)
-    if journal.is_empty(where.journal):
-        return RunStanding(experiment=where.experiment, state="open elsewhere" if elsewhere else "not begun")
-    begun = _begun(where)
-    return replace(begun, state="open elsewhere") if elsewhere and begun.state != "done" else begun
+def progress_of(where: Place, contents: Contents | None, *, elsewhere: bool = False) -> RunProgress:
+    """How far a run has come by its journal. `JournalError` if that cannot be trusted, or is another's.
+
+    `contents` are `None` where nothing was acknowledged; `elsewhere`: another process is at it.
+    """
+    if contents is None:
+        return RunProgress(experiment=where.experiment, state="open elsewhere" if elsewhere else "not begun")
+    plan = contents.plan
+    if (plan.participant_id, plan.experiment) != (where.participant_id, where.experiment):
+        raise JournalError(
+            f"{where.journal}: line 1: is of participant {plan.participant_id}, experiment {plan.experiment}; "
+            "it was renamed or copied here, so put it back"
+        )
+    return RunProgress(
+        experiment=where.experiment,
+        state="done" if contents.finished else "open elsewhere" if elsewhere else "in progress",
+        answered=len(answered(replay.history(contents))),
+        planned=len(plan.trials),
+        last_utc=contents.records[-1].utc,
+        methods=plan.methods,
+    )
 
 
-def _is_held(where: places.Place) -> bool:
+def _is_held(where: Place) -> bool:
     try:
         return storage.is_held(where.journal)
     except OSError as error:
         raise JournalError(f"{where.journal}: cannot be opened ({error.strerror})") from error
 
 
-def _practised(where: places.Place) -> bool:
+def _practised(where: Place) -> bool:
     """Whether a practice was done to its end, also one that a later practice has set aside."""
     practice = replace(where, practice=True)
     for path in practice.folder.glob(f"{practice.journal.stem}*{practice.journal.suffix}"):
@@ -163,46 +227,3 @@ def _practised(where: places.Place) -> bool:
             if journal.read(path).finished:
                 return True
     return False
-
-
-def _begun(where: places.Place) -> RunStanding:
-    _, table, contents = rebuild(where.journal)
-    plan = plan_of(contents)
-    if (plan.participant_id, plan.experiment) != (where.participant_id, where.experiment):
-        raise JournalError(
-            f"{where.journal}: line 1: is of participant {plan.participant_id}, experiment {plan.experiment}; "
-            "it was renamed or copied here, so put it back"
-        )
-    rows = list(csv.DictReader(io.StringIO(table.decode(), newline="")))
-    return RunStanding(
-        experiment=where.experiment,
-        state="done" if contents.finished else "in progress",
-        answered=sum(row[ANSWERED_BY[where.experiment]] != "" for row in rows),
-        planned=len(rows),
-        last_utc=str(contents.records[-1].get("utc", "")),
-        methods=plan.methods,
-    )
-
-
-def _orders(study: StudyFolder, next_one: Next | None, problems: list[str]) -> dict[str, tuple[str, ...] | None]:
-    if next_one is None:
-        return {}
-    setups = {setup.config.experiment: setup for setup in study.setups}
-    found: dict[str, tuple[str, ...] | None] = {}
-    for run in next_one.runs:
-        try:
-            ahead = next_methods(setups[run.experiment], study.results, next_one.participant_id)
-        except JournalError as error:
-            problems.append(str(error))
-            ahead = None
-        found[run.experiment] = run.methods or ahead
-    return found
-
-
-def next_methods(setup: Setup[Any], results: Path, participant_id: str) -> tuple[str, ...] | None:
-    """The methods of a participant's next run in their order; `None` if chance decides when the run begins."""
-    row, seed = places.next_row(setup, results), setup.config.seed
-    if row is None and seed is None:
-        return None
-    made = catalogue.experiment(setup).make_plan(setup.config, participant_id, seed or 0, row)
-    return made.methods

@@ -9,11 +9,11 @@ from __future__ import annotations
 
 import os
 import time
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterator, Mapping
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Annotated, Any, Literal
+from typing import Annotated, Literal
 
 from pydantic import AfterValidator, Field, StringConstraints, TypeAdapter, ValidationError
 
@@ -101,7 +101,7 @@ def check_reason(text: str) -> None:
         raise RegisterError(f"reason {text!r}: {error.errors()[0]['msg'].removeprefix('Value error, ')}") from error
 
 
-def _checked(values: dict[str, Any]) -> Entry:
+def _checked(values: Mapping[str, object]) -> Entry:
     try:
         return _ENTRY.validate_python(values)
     except ValidationError as error:
@@ -138,16 +138,16 @@ class Register:
     @property
     def members(self) -> dict[str, Member]:
         """The state of every code, as the records in their order leave it."""
-        return members(self.entries)
+        found: dict[str, Member] = {}
+        for utc, one in self.entries:
+            before = found.get(one.participant_id, Member(participant_id=one.participant_id))
+            found[one.participant_id] = _after(before, utc, one)
+        return found
 
-
-def members(entries: Iterable[tuple[str, Entry]]) -> dict[str, Member]:
-    """The state of every code after records, each with its date and time."""
-    found: dict[str, Member] = {}
-    for utc, one in entries:
-        before = found.get(one.participant_id, Member(participant_id=one.participant_id))
-        found[one.participant_id] = _after(before, utc, one)
-    return found
+    def excluded(self) -> dict[str, str]:
+        """Who is excluded, with the reason. `RegisterError` if it cannot be trusted: someone might be missing."""
+        _refuse_problem(self)
+        return {code: member.excluded for code, member in self.members.items() if member.excluded is not None}
 
 
 def _after(before: Member, utc: str, one: Entry) -> Member:
@@ -185,18 +185,6 @@ def _with_line(before: Register, number: int, line: bytes) -> Register:
     body = {key: value for key, value in values.items() if key not in ("n", "link", "utc")}
     entries = (*before.entries, (utc, _checked(body)))
     return replace(before, entries=entries, whole_bytes=before.whole_bytes + len(line) + 1, link=link(line))
-
-
-def codes(results: Path) -> set[str]:
-    """The codes that stand in the register, as far as it can be trusted: so that no run depends on a sound one."""
-    return set(read(results).members)
-
-
-def excluded(results: Path) -> dict[str, str]:
-    """Who is excluded, with the reason. `RegisterError` if the register cannot be trusted: someone might be missing."""
-    found = read(results)
-    _refuse_problem(found)
-    return {code: member.excluded for code, member in found.members.items() if member.excluded is not None}
 
 
 def _refuse_problem(register: Register) -> None:

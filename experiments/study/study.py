@@ -28,7 +28,7 @@ class Facts(Model):
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class RunStanding:
+class RunProgress:
     """How far a participant has come in one experiment.
 
     `answered` of `planned` trials, `last_utc` the time of the last record, `methods` in the order of the run. All four
@@ -49,13 +49,13 @@ class Participant:
     """Who takes part: facts if they joined, the reason if they are excluded, and one standing an experiment."""
 
     participant_id: str
-    runs: tuple[RunStanding, ...]
+    runs: tuple[RunProgress, ...]
     facts: Facts | None = None
     joined_utc: str = ""
     excluded: str | None = None
 
     @property
-    def open_runs(self) -> tuple[RunStanding, ...]:
+    def open_runs(self) -> tuple[RunProgress, ...]:
         """The runs to go on with or to begin."""
         return tuple(run for run in self.runs if run.state in ("in progress", "not begun"))
 
@@ -76,7 +76,7 @@ class Next:
 
     participant_id: str
     new: bool
-    runs: tuple[RunStanding, ...]
+    runs: tuple[RunProgress, ...]
 
 
 def eligible(facts: Facts, eligibility: EligibilityConfig) -> tuple[str, ...]:
@@ -128,7 +128,7 @@ def who_is_next(people: Sequence[Participant], study: StudyConfig, experiments: 
         return Next(participant_id=one.participant_id, new=False, runs=one.open_runs)
     if len(taking_part) >= study.participants:
         return None
-    runs = tuple(RunStanding(experiment=experiment, state="not begun") for experiment in experiments)
+    runs = tuple(RunProgress(experiment=experiment, state="not begun") for experiment in experiments)
     return Next(participant_id=free_code(study, [one.participant_id for one in people]), new=True, runs=runs)
 
 

@@ -31,12 +31,12 @@ class ModelParameters:
     people: People = field(default_factory=People)
 
 
-def rates_by_instruction(mind: ModelParameters, percept: Percept) -> dict[str, float]:
+def rates_by_instruction(model: ModelParameters, percept: Percept) -> dict[str, float]:
     """The share of "forward" after a forward shot in the mean over people, by instruction."""
-    log_odds, neutral = evidence(percept, mind.percept), mind.boundaries[NEUTRAL]
+    log_odds, neutral = evidence(percept, model.percept), model.boundaries[NEUTRAL]
     return {
-        name: float(forward_rates(log_odds * boundary / neutral, mind.percept.start, mind.people, mind.lapses.rate))
-        for name, boundary in mind.boundaries.items()
+        name: float(forward_rates(log_odds * boundary / neutral, model.percept.start, model.people, model.lapses.rate))
+        for name, boundary in model.boundaries.items()
     }
 
 
@@ -47,14 +47,14 @@ class ModelBasedParticipant:
     `ValueError`: somebody whose drift, boundary or non-decision time is beyond what a `Diffusion` may be.
     """
 
-    def __init__(self, mind: ModelParameters, percepts: Mapping[str, Percept], plan: Plan) -> None:
+    def __init__(self, model: ModelParameters, percepts: Mapping[str, Percept], plan: Plan) -> None:
         self._seed, self._who = plan.seed, (plan.experiment, plan.participant_id)
-        someone = person(mind.people, Stream(plan.seed, "person", *self._who))
+        someone = person(model.people, Stream(plan.seed, "person", *self._who))
         self._diffusions = {
-            (method, direction, instruction): someone.own(replace(_neutral(mind, log_odds), boundary=boundary))
+            (method, direction, instruction): someone.own(replace(_neutral(model, log_odds), boundary=boundary))
             for method, forward in percepts.items()
-            for direction, log_odds in zip(DIRECTIONS, _log_odds(forward, mind.percept), strict=True)
-            for instruction, boundary in mind.boundaries.items()
+            for direction, log_odds in zip(DIRECTIONS, _log_odds(forward, model.percept), strict=True)
+            for instruction, boundary in model.boundaries.items()
         }
 
     def decide(self, trial: Trial, instruction: str = NEUTRAL) -> Decision:
@@ -72,17 +72,17 @@ def _log_odds(percept: Percept, parameters: PerceptParameters) -> tuple[float, f
     return forward, -forward
 
 
-def _neutral(mind: ModelParameters, log_odds: float) -> Diffusion:
+def _neutral(model: ModelParameters, log_odds: float) -> Diffusion:
     return diffusion_of(
         log_odds,
-        mind.percept,
-        boundary=mind.boundaries[NEUTRAL],
-        non_decision_s=mind.non_decision_s,
-        lapses=mind.lapses,
+        model.percept,
+        boundary=model.boundaries[NEUTRAL],
+        non_decision_s=model.non_decision_s,
+        lapses=model.lapses,
     )
 
 
-_MIND = ModelParameters()
+_DEFAULT = ModelParameters()
 
 Boundary = Annotated[float, Field(gt=0, le=100)]
 DecisionSeconds = Annotated[float, Field(ge=0, le=60)]
@@ -92,9 +92,9 @@ PeopleSpread = Annotated[float, Field(ge=0, le=5)]
 class LapsesConfig(Model):
     """Answers that are not decided: a fair coin after a time between the two."""
 
-    rate: Share = _MIND.lapses.rate
-    earliest_s: DecisionSeconds = _MIND.lapses.earliest_s
-    latest_s: DecisionSeconds = _MIND.lapses.latest_s
+    rate: Share = _DEFAULT.lapses.rate
+    earliest_s: DecisionSeconds = _DEFAULT.lapses.earliest_s
+    latest_s: DecisionSeconds = _DEFAULT.lapses.latest_s
 
     @model_validator(mode="after")
     def _lapses_last(self) -> Self:
@@ -111,8 +111,8 @@ class LapsesConfig(Model):
 class DiffusionConfig(Model):
     """A boundary (caution, sqrt(s)) for each instruction and for `neutral`, the time beside it, and lapses."""
 
-    boundaries: dict[str, Boundary] = Field(default_factory=lambda: dict(_MIND.boundaries))
-    non_decision_s: DecisionSeconds = _MIND.non_decision_s
+    boundaries: dict[str, Boundary] = Field(default_factory=lambda: dict(_DEFAULT.boundaries))
+    non_decision_s: DecisionSeconds = _DEFAULT.non_decision_s
     lapses: LapsesConfig = LapsesConfig()
 
     @model_validator(mode="after")
@@ -125,10 +125,10 @@ class DiffusionConfig(Model):
 class PeopleConfig(Model):
     """Spreads between people; 0 for people who are alike."""
 
-    drift_factor_sd: PeopleSpread = _MIND.people.drift_factor_sd
-    log_boundary_sd: PeopleSpread = _MIND.people.log_boundary_sd
-    log_non_decision_sd: PeopleSpread = _MIND.people.log_non_decision_sd
-    logit_start_sd: PeopleSpread = _MIND.people.logit_start_sd
+    drift_factor_sd: PeopleSpread = _DEFAULT.people.drift_factor_sd
+    log_boundary_sd: PeopleSpread = _DEFAULT.people.log_boundary_sd
+    log_non_decision_sd: PeopleSpread = _DEFAULT.people.log_non_decision_sd
+    logit_start_sd: PeopleSpread = _DEFAULT.people.logit_start_sd
 
     @property
     def own(self) -> People:

@@ -151,12 +151,11 @@ def doctor(
     """The rig's self-test: what was measured, and what to do about what is not good."""
     from recoil import doctor as feature
 
-    findings = feature.examine(results, gun, gun_config, progress)
-    found = feature.as_json(findings)
-    show(found, feature.as_text(findings), as_json)
+    found = feature.examine(results, gun, gun_config, progress)
+    show(found, feature.as_text(found.checks), as_json)
     if out:
         feature.keep(found, out)
-    raise end(exceptions=bool(feature.fails(findings)))
+    raise end(exceptions=found.verdict == "fails")
 
 
 def bench(

@@ -39,57 +39,71 @@ def check(
     show(found if len(found) > 1 else found[0], "\n\n".join(map(feature.as_text, found)), as_json)
 
 
+Participant = Annotated[
+    str | None, typer.Option(help="Participant's code, 1 to 32 letters and digits; without: the start window.")
+]
+GunAddress = Annotated[str, typer.Option(help="`simulated` or `serial:PORT`.")]
+Screen = Annotated[ScreenName, typer.Option(help="Where the run takes place.")]
+Results = Annotated[Path, typer.Option(help="Folder for the logs.")]
+Resume = Annotated[bool, typer.Option("--resume", help="Go on with an unfinished run.")]
+Fresh = Annotated[bool, typer.Option("--fresh", help="Set an unfinished run aside and start anew.")]
+WhyFresh = Annotated[str, typer.Option(help="With --fresh: why, for the register; never a name.")]
+Visual = Annotated[bool, typer.Option("--visual", help="A synthetic participant works the console.")]
+OwnScreen = Annotated[
+    bool, typer.Option("--participant-screen", help="The participant rates on a screen of their own (PsychoPy).")
+]
+OwnKeys = Annotated[
+    bool, typer.Option("--participant-keys", help="The participant answers with keys of their own (PsychoPy).")
+]
+Noise = Annotated[
+    bool, typer.Option("--noise", help="Masking white noise through the participant's headphones (PsychoPy).")
+]
+Monitor = Annotated[
+    int | None, typer.Option(min=0, help="The participant's screen: 0 is the first; without: the last of several.")
+]
+
+
 def run(
     config: Annotated[str, typer.Argument(help="File or name of a shipped config.")],
-    participant: Annotated[
-        str | None, typer.Option(help="Participant's code, 1 to 32 letters and digits; without: the start window.")
-    ] = None,
-    gun: Annotated[str, typer.Option(help="`simulated` or `serial:PORT`.")] = "simulated",
-    screen: Annotated[ScreenName, typer.Option(help="Where the run takes place.")] = ScreenName.terminal,
-    results: Annotated[Path, typer.Option(help="Folder for the logs.")] = Path("results"),
+    participant: Participant = None,
+    gun: GunAddress = "simulated",
+    screen: Screen = ScreenName.terminal,
+    results: Results = Path("results"),
     seed: Seed = None,
-    resume: Annotated[bool, typer.Option("--resume", help="Go on with an unfinished run.")] = False,
-    fresh: Annotated[bool, typer.Option("--fresh", help="Set an unfinished run aside and start anew.")] = False,
-    reason: Annotated[str, typer.Option(help="With --fresh: why, for the register; never a name.")] = "",
-    visual: Annotated[bool, typer.Option("--visual", help="A synthetic participant works the console.")] = False,
-    participant_screen: Annotated[
-        bool, typer.Option("--participant-screen", help="The participant rates on a screen of their own (PsychoPy).")
-    ] = False,
-    participant_keys: Annotated[
-        bool, typer.Option("--participant-keys", help="The participant answers with keys of their own (PsychoPy).")
-    ] = False,
-    noise: Annotated[
-        bool, typer.Option("--noise", help="Masking white noise through the participant's headphones (PsychoPy).")
-    ] = False,
-    participant_monitor: Annotated[
-        int | None, typer.Option(min=0, help="The participant's screen: 0 is the first; without: the last of several.")
-    ] = None,
+    resume: Resume = False,
+    fresh: Fresh = False,
+    reason: WhyFresh = "",
+    visual: Visual = False,
+    participant_screen: OwnScreen = False,
+    participant_keys: OwnKeys = False,
+    noise: Noise = False,
+    participant_monitor: Monitor = None,
     as_json: AsJson = False,
 ) -> None:
     """One run: a participant doing one experiment."""
+    from experiments.load import load_setup
+    from experiments.run import ParticipantOptions, RunRequest
     from recoil import session
 
-    asked = session.SessionRequest(
-        config=config,
+    request = RunRequest(
+        setup=load_setup(config),
         participant_id=participant or "",
-        gun=gun,
-        screen=screen.value,
         results=results,
+        gun=gun,
         seed=seed,
-        resume=resume,
-        fresh=fresh,
-        reason=reason,
+        again=session.again(resume=resume, fresh=fresh, reason=reason),
+        anew_reason=reason,
+        screen=screen.value,
         visual=visual,
-        participant_screen=participant_screen,
-        participant_keys=participant_keys,
-        noise=noise,
-        monitor=participant_monitor,
+        options=ParticipantOptions(
+            screen=participant_screen, keys=participant_keys, noise=noise, monitor=participant_monitor
+        ),
     )
     if participant is None:
-        session.run_lab_day(asked)
+        session.run_lab_day(request)
         return
-    finished = session.run_session(asked)
-    show({"journal": str(finished.journal), "table": str(finished.table)}, f"Done: {finished.table}", as_json)
+    done = session.run_session(request)
+    show({"journal": str(done.journal), "table": str(done.table)}, f"Done: {done.table}", as_json)
 
 
 def study(
@@ -107,8 +121,8 @@ def study(
     from recoil import study as feature
 
     facts = {"age_years": age, "sex": sex, "handedness": handedness}
-    asked = {"join": join, "exclude": exclude, "readmit": readmit}
-    found, notes = feature.study(folder, feature.change(asked, facts, reason))
+    options = {"join": join, "exclude": exclude, "readmit": readmit}
+    found, notes = feature.study(folder, feature.change(options, facts, reason))
     for message in (*notes, *found.overview.problems):
         say(f"recoil: {message}")
     show(feature.as_json(found), feature.as_text(found), as_json)

@@ -30,6 +30,7 @@ from analysis.summary.sections.data import ReportData
 from analysis.summary.sections.sections import obtained_text, write_report
 from analysis.summary.summary import summarize
 from device.parameters import GunParameters
+from experiments.catalogue import rebuild
 from experiments.clock import VirtualClock
 from experiments.config.door import ConfigError
 from experiments.config.models import StudyConfig
@@ -39,12 +40,10 @@ from experiments.direction.config import DirectionConfig
 from experiments.load import load_setup, load_study
 from experiments.preference.config import PreferenceConfig
 from experiments.preference.synthetic import draw_ratings
-from experiments.rebuild import rebuild
 from experiments.record import storage
-from experiments.record.journal import is_empty
-from experiments.record.journal import read as read_journal
+from experiments.record.journal import begun
 from experiments.record.provenance import git_commit, provenance, recoil_version
-from experiments.run import Request, run
+from experiments.run import RunRequest, run
 from experiments.screens.synthetic import synthetic_screen
 from experiments.study import places
 
@@ -240,7 +239,7 @@ def _seat(study: Study, setup: Setup[Any], code: str, results: Path) -> None:
     """Have a synthetic participant do an experiment, unless the logs hold it already."""
     where = places.place(results, code, setup.config.experiment)
     if not _finished(where):
-        request = Request(setup=setup, participant_id=code, results=results, seed=study.seed, again="resume")
+        request = RunRequest(setup=setup, participant_id=code, results=results, seed=study.seed, again="resume")
         run(request, synthetic_screen, VirtualClock())
     elif not where.table.exists():  # killed between the last record and the table
         table, data, _ = rebuild(where.journal)
@@ -248,7 +247,8 @@ def _seat(study: Study, setup: Setup[Any], code: str, results: Path) -> None:
 
 
 def _finished(where: places.Place) -> bool:
-    return where.journal.exists() and not is_empty(where.journal) and read_journal(where.journal).finished
+    before = begun(where.journal) if where.journal.exists() else None
+    return before is not None and before.finished
 
 
 def _odds(study: Study) -> Iterator[Odds]:
@@ -290,7 +290,7 @@ def _notes(study: Study) -> Iterator[str]:
     """What the numbers rest on beyond the paper."""
     yield from study.notes
     gun = study.setups[0].gun
-    coil = GunParameters(**gun.voice_coil)
+    coil = gun.coil
     yield f"The coil after the pulse is {coil.drive_off}, its back-EMF is {coil.emf}; the paper leaves both open."
     for setup in study.setups:
         keys = ", ".join(setup.config.assumed)

@@ -5,13 +5,13 @@ from __future__ import annotations
 import sys
 from importlib import import_module
 
-from experiments.doctor.figures import Display, Keys, Sound, Stage
-from experiments.doctor.programs.answer import answer
+from experiments.doctor.figures import Seen
+from experiments.doctor.programs import answer
 
 
-def look() -> Display | Keys | Sound | Stage:
+def look() -> Seen:
     """Import what the program needs, which may fail, and look."""
-    found: Display | Keys | Sound | Stage = import_module(f"experiments.doctor.programs.{sys.argv[1]}").look()
+    found: Seen = import_module(f"experiments.doctor.programs.{sys.argv[1]}").look()
     return found
 
 

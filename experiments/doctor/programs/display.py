@@ -8,7 +8,7 @@ from PyQt6.QtCore import QCoreApplication, QEventLoop
 from PyQt6.QtWidgets import QApplication, QLabel, QWidget
 
 from experiments.doctor.figures import Display
-from experiments.doctor.programs.answer import Absent
+from experiments.doctor.programs import Absent
 
 SEEN_WITHIN_S = 5.0
 

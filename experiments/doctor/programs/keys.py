@@ -11,7 +11,7 @@ from Xlib import XK, X, display  # type: ignore[import-untyped, unused-ignore]
 from Xlib.ext import xtest  # type: ignore[import-untyped, unused-ignore]
 
 from experiments.doctor.figures import Keys
-from experiments.doctor.programs.answer import Absent
+from experiments.doctor.programs import Absent
 from experiments.doctor.programs.display import until_seen
 
 KEYS = 30

@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import Any
 
 from experiments.doctor.figures import Sound
-from experiments.doctor.programs.answer import Absent
+from experiments.doctor.programs import Absent
 
 
 def look() -> Sound:

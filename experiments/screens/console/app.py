@@ -5,6 +5,8 @@ from __future__ import annotations
 import os
 import sys
 import threading
+from collections.abc import Iterator
+from contextlib import contextmanager
 from functools import lru_cache
 from typing import Any
 
@@ -17,7 +19,7 @@ from experiments.clock import Clock
 from experiments.config.setup import Setup
 from experiments.design.plan import Plan
 from experiments.live_run import LiveRun, RunStopped, Screen
-from experiments.run import Finished, Request, run
+from experiments.run import Finished, RunRequest, run
 from experiments.screens.console.controls import Controls
 from experiments.screens.console.participant_link import ParticipantSide
 from experiments.screens.console.view import (
@@ -43,6 +45,8 @@ from experiments.study.places import PlaceError
 
 GUN_LOOK_S = 0.2
 """How often the gun's state is looked at."""
+SWITCH_S = 0.0005
+"""How soon a thread gets its turn: an answer is not to wait for its journal while the window is painted."""
 END_S = 1.5
 """How long a run may take to end in order when the display is lost."""
 
@@ -63,6 +67,16 @@ def _only_application() -> QApplication:
     return made
 
 
+@contextmanager
+def _quick_threads() -> Iterator[None]:
+    before = sys.getswitchinterval()
+    sys.setswitchinterval(SWITCH_S)
+    try:
+        yield
+    finally:
+        sys.setswitchinterval(before)
+
+
 class _Bridge(QObject):
     """Takes what the run's thread tells to Qt's own."""
 
@@ -80,17 +94,17 @@ class Console:
 
     def __init__(
         self,
-        request: Request,
+        request: RunRequest,
         clock: Clock,
         *,
-        hand: Hand = "experimenter",
         participant: ParticipantSide | None = None,
         band: str = "",
         last: str = THANK_PARTICIPANT,
     ) -> None:
         application()
         self.clock, self._request = clock, request
-        self._hand, self.participant = hand, participant
+        self.participant = participant
+        self._hand: Hand = "synthetic" if request.visual else "experimenter"
         self._band, self._last = band, last
         self.window: ConsoleWindow | None = None
         self.live: LiveRun | None = None
@@ -110,7 +124,7 @@ class Console:
 
         The window stays open at the end until it is closed. Without a window, an error is raised at once.
         """
-        with on_loss(self._lose_display), signals_to(self._leave):
+        with on_loss(self._lose_display), signals_to(self._leave), _quick_threads():
             self._thread.start()
             self._loop.exec()
             self._thread.join()

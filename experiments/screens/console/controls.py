@@ -308,7 +308,7 @@ class Controls:
     def entered_so_far(self) -> str:
         """What the open correction says now, to be typed over."""
         entry = self.drawn.correcting
-        said = None if entry is None else value(self._live.told, entry)
+        said = None if entry is None else value(self._live.history, entry)
         return "" if said is None else f"{said:g}" if isinstance(said, float) else said
 
     # lines
@@ -405,7 +405,7 @@ _QUESTIONS: dict[Name, str] = {
 
 
 def _question(name: Name, trial: Trial, live: LiveRun) -> str:
-    place = short_place(trial, trial_at(live.plan, live.told, live.position.step))
+    place = short_place(trial, trial_at(live.plan, live.history, live.position.step))
     return _QUESTIONS[name].format(trial=trial.trial, place=place)
 
 

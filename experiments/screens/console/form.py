@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field
-from typing import Any, get_args
+from typing import get_args
 
 from PyQt6.QtCore import Qt, pyqtSignal
 from PyQt6.QtGui import QGuiApplication, QScreen
@@ -22,8 +22,7 @@ from PyQt6.QtWidgets import (
 )
 
 from experiments.config.models import Fact, Handedness, Sex
-from experiments.config.setup import Setup
-from experiments.run import Again
+from experiments.run import ParticipantOptions
 from experiments.screens.console import widgets
 from experiments.screens.console.people import cell_text, note_text
 from experiments.screens.console.widgets import LineEdit, ListBox, TextLines, TickBox
@@ -36,22 +35,6 @@ _HOW_TO_START = "Read the code back with the participant, fill in what is asked,
 _AGE_DIGITS = 3
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Sides:
-    """Who works the console, and what the participant has beside it; `monitor` is theirs, the last one if `None`."""
-
-    visual: bool = False
-    screen: bool = False
-    own_keys: bool = False
-    noise: bool = False
-    monitor: int | None = None
-
-    @property
-    def participant_process(self) -> bool:
-        """Whether the participant's own process runs at all."""
-        return self.screen or self.own_keys or self.noise
-
-
 class Form(QFrame):
     """The fields. `edited` after any change; `code_edited` after one of the code, `experiment_edited` of the other."""
 
@@ -59,7 +42,7 @@ class Form(QFrame):
     code_edited = pyqtSignal()
     experiment_edited = pyqtSignal()
 
-    def __init__(self, experiments: Sequence[str], asked: Sequence[Fact], sides: Sides) -> None:
+    def __init__(self, experiments: Sequence[str], asked: Sequence[Fact], options: ParticipantOptions) -> None:
         super().__init__()
         self.setObjectName("panel")
         self.experiment, self.code, self.code_again = ListBox(experiments), LineEdit(), LineEdit()
@@ -68,7 +51,7 @@ class Form(QFrame):
         self.noise, self.monitor = TickBox("hears masking noise"), ListBox(monitors())
         self.remark = TextLines("remark")
         self._typed: dict[str, str] | None = None
-        self._tick(sides)
+        self._tick(options)
         self._lay_out()
         self._connect()
 
@@ -110,12 +93,12 @@ class Form(QFrame):
         self.code.textChanged.connect(self.code_edited)
         self.experiment.currentIndexChanged.connect(self.experiment_edited)
 
-    def _tick(self, sides: Sides) -> None:
-        self.own_screen.setChecked(sides.screen)
-        self.own_keys.setChecked(sides.own_keys)
-        self.noise.setChecked(sides.noise)
+    def _tick(self, options: ParticipantOptions) -> None:
+        self.own_screen.setChecked(options.screen)
+        self.own_keys.setChecked(options.keys)
+        self.noise.setChecked(options.noise)
         last = self.monitor.count() - 1
-        self.monitor.setCurrentIndex(last if sides.monitor is None else sides.monitor)
+        self.monitor.setCurrentIndex(last if options.monitor is None else options.monitor)
 
     @property
     def participant_id(self) -> str:
@@ -131,11 +114,11 @@ class Form(QFrame):
             facts={fact: _text(widget) for fact, widget in self.facts.items()},
         )
 
-    def sides(self) -> Sides:
+    def options(self) -> ParticipantOptions:
         """What is ticked."""
-        return Sides(
+        return ParticipantOptions(
             screen=self.own_screen.isChecked(),
-            own_keys=self.own_keys.isChecked(),
+            keys=self.own_keys.isChecked(),
             noise=self.noise.isChecked(),
             monitor=self.monitor.currentIndex() if self.monitor.count() > 1 else None,
         )
@@ -174,8 +157,8 @@ def _fact(fact: str) -> LineEdit | ListBox:
     return line
 
 
-def _text(field: Any) -> str:
-    return str(field.text() if isinstance(field, LineEdit) else field.currentText())
+def _text(widget: LineEdit | ListBox) -> str:
+    return widget.text() if isinstance(widget, LineEdit) else widget.currentText()
 
 
 def monitors() -> list[str]:
@@ -189,19 +172,6 @@ def _monitor(number: int, screen: QScreen) -> str:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class RunChoice:
-    """What was chosen: who does which experiment, and how. `anew_reason`: why an unfinished run is set aside."""
-
-    setup: Setup[Any]
-    participant_id: str
-    again: Again = "ask"
-    anew_reason: str = ""
-    practice: bool = False
-    training: bool = False
-    sides: Sides = field(default_factory=Sides)
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
 class Opening:
     """How a start window opens: on which gun, with what ticked, with whom (empty: who comes next), and what it says.
 
@@ -210,7 +180,7 @@ class Opening:
 
     gun: str
     named: str = ""
-    sides: Sides = field(default_factory=Sides)
+    options: ParticipantOptions = field(default_factory=ParticipantOptions)
     participant_id: str = ""
     said: str = ""
 

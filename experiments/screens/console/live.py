@@ -22,10 +22,10 @@ from experiments.config.setup import Setup
 from experiments.live_run import RunStopped
 from experiments.load import load_setup, load_study
 from experiments.record.journal import JournalError
-from experiments.run import Again, Finished, Request, UnfinishedRun
+from experiments.run import Again, Finished, RunRequest, UnfinishedRun
 from experiments.screens.console import people, widgets
 from experiments.screens.console.app import Console, application
-from experiments.screens.console.form import Opening, RunChoice, Sides, monitors
+from experiments.screens.console.form import Opening, monitors
 from experiments.screens.console.participant_link import WAIT, ParticipantSide
 from experiments.screens.console.start import choose_run
 from experiments.screens.console.view import THANK_PARTICIPANT
@@ -34,54 +34,52 @@ from experiments.screens.console.widgets import WHY, Option, QuestionBox, TextLi
 from experiments.screens.console.windows import FreshShortcuts, let_go, signals_to
 from experiments.screens.participant.link import ParticipantError, ParticipantLink
 from experiments.screens.participant.messages import Look, NoiseIs
-from experiments.session.events import Hand
-from experiments.study.places import PlaceError, place
-from experiments.study.progress import StudyFolder, run_standing
+from experiments.study.places import PlaceError
+from experiments.study.progress import StudyFolder, progress_of
 
 _NO_HANDS = "--visual --participant-screen rates by synthetic events, which only an X display takes"
 
 
-def run_live(request: Request, sides: Sides, *, band: str = "", last: str = THANK_PARTICIPANT) -> Finished:
+def run_live(request: RunRequest, *, band: str = "", last: str = THANK_PARTICIPANT) -> Finished:
     """Carry out a run at the console. An unfinished one is shown and asked about, but for a synthetic participant.
 
     `band` and `last` as of a `Console`. `PlaceError` without a display, or if the participant's screen does not open.
     """
     application()
     try:
-        return _carry_out(request, sides, band, last)
-    except UnfinishedRun:
-        decided = None if sides.visual else ask_about(request)
+        return _carry_out(request, band, last)
+    except UnfinishedRun as found:
+        decided = None if request.visual else ask_about(request, found)
         if decided is None:
             raise
-        return _carry_out(decided, sides, band, last)
+        return _carry_out(decided, band, last)
 
 
-def _carry_out(request: Request, sides: Sides, band: str, last: str) -> Finished:
+def _carry_out(request: RunRequest, band: str, last: str) -> Finished:
     clock = RealClock()
-    hand: Hand = "synthetic" if sides.visual else "experimenter"
     with ExitStack() as stack:
-        rater = _rater(stack) if sides.visual and sides.screen else None
-        participant = _participant(stack, request, sides) if sides.participant_process else None
-        console = Console(request, clock, hand=hand, participant=participant, band=band, last=last)
-        if sides.visual:
+        rater = _rater(stack) if request.visual and request.options.screen else None
+        participant = _participant(stack, request) if request.options.any else None
+        console = Console(request, clock, participant=participant, band=band, last=last)
+        if request.visual:
             stack.enter_context(VisualParticipant(console, rater))
         return console.run()
 
 
-def lab_day(request: Request, sides: Sides) -> None:
+def lab_day(request: RunRequest) -> None:
     """One run after the other from the start window, until it is closed.
 
-    `request` says what all have in common, `sides` what is ticked at first. `KeyboardInterrupt` if a signal ended it.
+    `request` says what all have in common, and what is ticked at first. `KeyboardInterrupt` if a signal ended it.
     """
     application()
-    check_monitor(sides.monitor)
+    check_monitor(request.options.monitor)
     study, named = study_of(request), request.setup.config.experiment
-    opening = Opening(gun=request.gun, named=named, sides=sides)
+    opening = Opening(gun=request.gun, named=named, options=request.options)
     with signals_to() as signalled:
         while not signalled and (choice := choose_run(study, opening, RealClock())) is not None:
             said = _of_the_day(request, study, choice)
             code = "" if choice.training else choice.participant_id
-            opening = Opening(gun=request.gun, sides=choice.sides, participant_id=code, said=said)
+            opening = Opening(gun=request.gun, options=choice.options, participant_id=code, said=said)
     if signalled:
         raise KeyboardInterrupt(signalled[0])
 
@@ -93,7 +91,7 @@ def check_monitor(monitor: int | None) -> None:
         raise PlaceError(f"--participant-monitor {monitor}: there is no such screen; known are {'; '.join(known)}")
 
 
-def _band_and_last(study: StudyFolder, choice: RunChoice) -> tuple[str, str]:
+def _band_and_last(study: StudyFolder, choice: RunRequest) -> tuple[str, str]:
     """What the window of a chosen run says of it: its band, and the last sentence."""
     if choice.training:
         return "TRAINING – nothing of it is kept", "The training is over."
@@ -104,13 +102,13 @@ def _band_and_last(study: StudyFolder, choice: RunChoice) -> tuple[str, str]:
     return "", f"Next: {later[0]}." if later else THANK_PARTICIPANT
 
 
-def _of_the_day(request: Request, study: StudyFolder, choice: RunChoice) -> str:
+def _of_the_day(request: RunRequest, study: StudyFolder, choice: RunRequest) -> str:
     """Carry out what was chosen; what went wrong, for the start window, which it must not end."""
     with ExitStack() as stack:
         results = Path(stack.enter_context(tempfile.TemporaryDirectory())) if choice.training else request.results
         try:
             band, last = _band_and_last(study, choice)
-            run_live(_chosen(request, choice, results), choice.sides, band=band, last=last)
+            run_live(replace(choice, seed=request.seed, results=results), band=band, last=last)
         except RunStopped as stop:
             return _stopped(choice, str(stop))
         except RecoilError as error:
@@ -118,7 +116,7 @@ def _of_the_day(request: Request, study: StudyFolder, choice: RunChoice) -> str:
     return ""
 
 
-def _stopped(choice: RunChoice, reason: str) -> str:
+def _stopped(choice: RunRequest, reason: str) -> str:
     if choice.training:
         return f"The training stopped: {reason}."
     if choice.practice:
@@ -126,7 +124,7 @@ def _stopped(choice: RunChoice, reason: str) -> str:
     return f"{choice.participant_id} stopped: {reason}. Start asks whether to go on there or to start anew."
 
 
-def study_of(request: Request) -> StudyFolder:
+def study_of(request: RunRequest) -> StudyFolder:
     """The study that the config lies in, if the study names it; else this experiment alone, by the rules of that study.
 
     Where there is no study beside the config, they are those of the shipped one.
@@ -139,24 +137,11 @@ def study_of(request: Request) -> StudyFolder:
     return StudyFolder(config=config, source=folder / "study.toml", setups=setups, results=request.results)
 
 
-def _chosen(request: Request, choice: RunChoice, results: Path) -> Request:
-    gun = "simulated" if choice.training else request.gun
-    return replace(
-        request,
-        setup=choice.setup,
-        participant_id=choice.participant_id,
-        results=results,
-        gun=gun,
-        again=choice.again,
-        anew_reason=choice.anew_reason,
-        practice=choice.practice,
-    )
-
-
-def _participant(stack: ExitStack, request: Request, sides: Sides) -> ParticipantSide:
+def _participant(stack: ExitStack, request: RunRequest) -> ParticipantSide:
     """The participant's screen, once it is open: PsychoPy takes its time, and a window says so meanwhile."""
-    check_monitor(sides.monitor)
-    look = _look(sides.monitor)
+    options = request.options
+    check_monitor(options.monitor)
+    look = _look(options.monitor)
 
     def open_link() -> ParticipantLink:
         link = stack.enter_context(ParticipantLink.start(look))
@@ -172,10 +157,10 @@ def _participant(stack: ExitStack, request: Request, sides: Sides) -> Participan
         link,
         open_link,
         request.setup,
-        rates=sides.screen,
-        own_keys=sides.own_keys,
-        noise=_noise(link) if sides.noise else None,
-        hand="synthetic" if sides.visual else "participant",
+        rates=options.screen,
+        own_keys=options.keys,
+        noise=_noise(link) if options.noise else None,
+        hand="synthetic" if request.visual else "participant",
     )
 
 
@@ -213,10 +198,10 @@ class Unfinished(QDialog):
     Nothing is chosen by Enter or by closing the window.
     """
 
-    def __init__(self, request: Request) -> None:
+    def __init__(self, request: RunRequest, found: UnfinishedRun) -> None:
         super().__init__()
         self._request = request
-        self.decided: Request | None = None
+        self.decided: RunRequest | None = None
         self.setWindowTitle("Recoil – unfinished run")
         self.setStyleSheet(start_sheet())
         answers = (
@@ -224,7 +209,7 @@ class Unfinished(QDialog):
             Option(text="Set it aside, start anew", key="Ctrl+N", do=self._fresh),
             Option(text="Leave it", key="Esc", do=lambda _: self.reject()),
         )
-        self.question = QuestionBox(_text(request), answers, reason=f"to start anew: {WHY}")
+        self.question = QuestionBox(_text(found), answers, reason=f"to start anew: {WHY}")
         self.said = TextLines("saved")
         down = QVBoxLayout(self)
         down.addWidget(self.question)
@@ -246,20 +231,19 @@ class Unfinished(QDialog):
         self.accept()
 
 
-def _text(request: Request) -> str:
-    where = place(request.results, request.participant_id, request.setup.config.experiment)
+def _text(found: UnfinishedRun) -> str:
     try:
-        return people.stopped_text(request.participant_id, run_standing(where))
+        return people.stopped_text(found.where.participant_id, progress_of(found.where, found.contents))
     except JournalError as error:
         return str(error)
 
 
-def ask_about(request: Request) -> Request | None:
+def ask_about(request: RunRequest, found: UnfinishedRun) -> RunRequest | None:
     """The request with the decision of the person at the console; `None` if they leave the run as it is.
 
     `KeyboardInterrupt` if a signal ended the question.
     """
-    dialog = Unfinished(request)
+    dialog = Unfinished(request, found)
     FreshShortcuts(dialog, time.monotonic)
     with signals_to(lambda _: dialog.reject()) as signalled:
         dialog.exec()

@@ -27,7 +27,7 @@ from experiments.screens.console import widgets
 from experiments.screens.console.controls import TextField
 from experiments.screens.console.keys import BY_NAME, Name, field_at, shown_key
 from experiments.screens.console.progress import (
-    RunProgress,
+    RunTiming,
     answer_lines,
     clock_text,
     coming,
@@ -398,7 +398,7 @@ class SidePanel(QWidget):
         for lines in (self._coming, self._answers):
             lines.setMinimumHeight(1)
 
-    def put(self, seen: Seen, progress: RunProgress) -> None:
+    def put(self, seen: Seen, progress: RunTiming) -> None:
         """Show what is so now."""
         for label, (text, mood) in (
             (self._gun, gun_text(seen.gun)),
@@ -434,7 +434,7 @@ class Bars(QWidget):
             bar.setValue(one.count)
 
 
-def _times(seen: Seen, progress: RunProgress) -> str:
+def _times(seen: Seen, progress: RunTiming) -> str:
     elapsed = f"Elapsed {clock_text(progress.elapsed_s(seen.now_s))}"
     if seen.ended is not None or seen.position.base is State.HALTED:
         return elapsed

@@ -8,12 +8,12 @@ from experiments.clock import date_text
 from experiments.study.enrolment import left_to_do, passed_over, run_of
 from experiments.study.places import is_code
 from experiments.study.progress import Overview
-from experiments.study.study import Participant, RunStanding
+from experiments.study.study import Participant, RunProgress
 
 _CELL = {"done": "done", "not begun": "–", "unreadable": "cannot be read"}
 
 
-def cell_text(run: RunStanding) -> str:
+def cell_text(run: RunProgress) -> str:
     """A run in the table of participants."""
     practice = ["practice done"] if run.practised else []
     if run.state in _CELL:
@@ -27,7 +27,7 @@ def note_text(person: Participant) -> str:
     return "" if person.excluded is None else f"excluded: {person.excluded}"
 
 
-def stopped_text(code: str, run: RunStanding) -> str:
+def stopped_text(code: str, run: RunProgress) -> str:
     """When an unfinished run stopped, and how far it had come."""
     when, counts = date_text(run.last_utc), f"{run.answered} of {run.planned}"
     return f"{code} stopped {run.experiment} on {when} with {counts} trials answered."

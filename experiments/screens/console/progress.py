@@ -54,7 +54,7 @@ def _count(what: str, trials: Sequence[Trial], finished: Collection[Trial | None
 
 
 @dataclass(slots=True)
-class RunProgress:
+class RunTiming:
     """Measures how long trials take, without the time of pauses."""
 
     began_s: float | None = None
@@ -91,7 +91,7 @@ class RunProgress:
         return (PRIOR_TRIALS * planned_s + sum(self.measured_s)) / (PRIOR_TRIALS + len(self.measured_s))
 
 
-def remaining_s(seen: Seen, progress: RunProgress) -> float:
+def remaining_s(seen: Seen, progress: RunTiming) -> float:
     """Seconds still to go: trials left, breaks left, what is left of this one, and the ratings still to come."""
     config, planned = seen.about.setup.config, len(seen.about.plan.trials)
     left = planned - len(done(seen.told))

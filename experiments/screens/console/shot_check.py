@@ -16,10 +16,10 @@ from PyQt6.QtCore import Qt, pyqtSignal
 from PyQt6.QtWidgets import QVBoxLayout, QWidget
 
 from device import DeviceError, Gun, GunStatus, Shot, ShotReport, open_gun
+from device.methods import drive_of
 from device.words import Drive, Effect
 from experiments.clock import Clock
 from experiments.config.setup import Setup
-from experiments.limits import drives
 from experiments.screens.console import widgets
 from experiments.screens.console.widgets import TextLines
 
@@ -96,7 +96,7 @@ class ShotCheck:
         """Open, fire, disarm, read back, close; what came of it, and a word for the colour."""
         self._tell(ShotProgress(phase="opening"))
         methods = self._setup.gun.renderings(self._setup.config.design.methods)
-        drive = drives(self._setup)[self._method]
+        drive = drive_of(methods[self._method])
         with closing(open_gun(self._address, methods, clock=self._clock.now)) as gun:
             self._gun = gun
             try:

@@ -19,9 +19,9 @@ from PyQt6.QtWidgets import (
 from experiments.clock import Clock
 from experiments.config.setup import Setup
 from experiments.record.journal import JournalError
-from experiments.run import Again
+from experiments.run import Again, RunRequest
 from experiments.screens.console import people, widgets
-from experiments.screens.console.form import Form, Opening, PeopleTable, RunChoice
+from experiments.screens.console.form import Form, Opening, PeopleTable
 from experiments.screens.console.shot_check import ShotPage
 from experiments.screens.console.widgets import WHY, Option, QuestionBox, TextLines, start_sheet, unfit
 from experiments.screens.console.windows import (
@@ -36,7 +36,7 @@ from experiments.screens.console.windows import (
 from experiments.study import enrolment
 from experiments.study.places import PlaceError
 from experiments.study.progress import Overview, StudyFolder, overview
-from experiments.study.study import Participant, RunStanding
+from experiments.study.study import Participant, RunProgress
 
 _NAME = "start"
 SIMULATED = "simulated"
@@ -51,7 +51,7 @@ class StartWindow(QWidget):
     def __init__(self, study: StudyFolder, opening: Opening, clock: Clock) -> None:
         super().__init__()
         self._study, self._opening, self._clock = study, opening, clock
-        self.choice: RunChoice | None = None
+        self.choice: RunRequest | None = None
         self.question: QuestionBox | None = None
         self._simulation_is_known = False
         self._closing = False
@@ -65,7 +65,7 @@ class StartWindow(QWidget):
 
     def _build(self) -> None:
         self.setWindowTitle("Recoil – start")
-        self.form = Form(self._study.experiments, self._study.config.eligibility.ask, self._opening.sides)
+        self.form = Form(self._study.experiments, self._study.config.eligibility.ask, self._opening.options)
         self.shots = ShotPage(self._opening.gun, self._clock)
         self.table = PeopleTable(self._study.experiments)
         self.next, self.saved = TextLines("detail"), TextLines("saved", most_lines=5)
@@ -237,12 +237,12 @@ class StartWindow(QWidget):
     def _training(self) -> None:
         self._leave("training", practice=True, training=True)
 
-    def _admit(self, *, practice: bool) -> RunStanding | None:
+    def _admit(self, *, practice: bool) -> RunProgress | None:
         """How the run stands that may begin now; `None`, with the reason shown, if it may not."""
         entered = self.form.entered()
         return self._checked(lambda: enrolment.admit(self._study, entered, self._clock, practice=practice))
 
-    def _checked(self, check: Callable[[], RunStanding]) -> RunStanding | None:
+    def _checked(self, check: Callable[[], RunProgress]) -> RunProgress | None:
         self._take_back()
         try:
             return check()
@@ -264,7 +264,7 @@ class StartWindow(QWidget):
         text = f"The gun is SIMULATED: {self.form.participant_id} will feel nothing. Start all the same?"
         self._ask(QuestionBox(text, (Option(text="Start, simulated", key="Ctrl+S", do=known), self._leave_it())))
 
-    def _ask_resume(self, run: RunStanding) -> None:
+    def _ask_resume(self, run: RunProgress) -> None:
         answers = (
             Option(text="Go on with it", key="Ctrl+G", do=lambda _: self._begin_again("resume", "")),
             Option(text="Set it aside, start anew", key="Ctrl+N", do=lambda why: self._begin_again("fresh", why)),
@@ -296,14 +296,17 @@ class StartWindow(QWidget):
         self, code: str, *, again: Again = "ask", reason: str = "", practice: bool = False, training: bool = False
     ) -> None:
         if self.choice is None:
-            self.choice = RunChoice(
+            self.choice = RunRequest(
                 setup=self._setup(),
                 participant_id=code,
+                results=self._study.results,
+                gun=SIMULATED if training else self._opening.gun,
                 again=again,
                 anew_reason=reason,
                 practice=practice,
                 training=training,
-                sides=self.form.sides(),
+                screen="console",
+                options=self.form.options(),
             )
             self.close()
 
@@ -373,7 +376,7 @@ class StartWindow(QWidget):
         self.form.code_again.setFocus()
 
 
-def choose_run(study: StudyFolder, opening: Opening, clock: Clock) -> RunChoice | None:
+def choose_run(study: StudyFolder, opening: Opening, clock: Clock) -> RunRequest | None:
     """Show the start window until something is chosen; `None` if it was closed, or a signal ended it."""
     window = StartWindow(study, opening, clock)
     loop = QEventLoop()

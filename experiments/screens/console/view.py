@@ -15,7 +15,7 @@ from experiments.design.plan import Plan, Trial
 from experiments.live_run import LiveRun
 from experiments.screens import texts
 from experiments.screens.console.keys import Name, shown_key
-from experiments.session.history import Told, trial_at, value
+from experiments.session.history import History, trial_at, value
 from experiments.session.remarks import Remark
 from experiments.session.states import Position, State
 from experiments.session.steps import Ask, Describe, Outcome, Prepare, Present, Rate, Rest, Step
@@ -114,7 +114,7 @@ class Seen:
 
     about: About
     position: Position = field(default_factory=Position)
-    told: Told = ()
+    told: History = ()
     gun: GunSeen | None = None
     participant: ParticipantSeen | None = None
     ended: Ended | None = None

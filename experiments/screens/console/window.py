@@ -21,7 +21,7 @@ from experiments.screens.console import view, widgets, windows
 from experiments.screens.console.controls import Controls, TextField
 from experiments.screens.console.keys import Name, Typing
 from experiments.screens.console.panels import FITS, Bars, Buttons, Notice, SidePanel, TextFields, TextPage
-from experiments.screens.console.progress import RunProgress, marks
+from experiments.screens.console.progress import RunTiming, marks
 from experiments.screens.console.view import (
     About,
     Began,
@@ -65,7 +65,7 @@ class ConsoleWindow(QMainWindow):
         self.gun: GunSeen | None = None
         self.participant: ParticipantSeen | None = None
         self.ended: Ended | None = None
-        self._progress = RunProgress()
+        self._progress = RunTiming()
         self._brief_until_s: float | None = None
         self._brief_for = -1
         self._lasting = ("", "good")
@@ -206,7 +206,7 @@ class ConsoleWindow(QMainWindow):
         return Seen(
             about=self.about,
             position=self.drawn,
-            told=() if self.live is None else self.live.told,
+            told=() if self.live is None else self.live.history,
             gun=self.gun,
             participant=self.participant,
             ended=self.ended,

@@ -1,0 +1,24 @@
+"""Journals as they stand on the disk: their lines, unchecked."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import Any
+
+from experiments.config.setup import canonical_json, sha256
+from experiments.design.plan import Plan
+
+
+def raw(path: Path) -> list[dict[str, Any]]:
+    """The whole records of a journal, as plain JSON values."""
+    data = path.read_bytes()
+    return [json.loads(line) for line in data[: data.rfind(b"\n") + 1].splitlines()]
+
+
+def write_head(path: Path, plan: Plan) -> None:
+    """A journal whose run has only begun, with an empty setup."""
+    parts = {"plan": plan.record(), "setup": {}}
+    hashes = {f"{name}_sha256": sha256(part) for name, part in parts.items()}
+    times = {"utc": "2026-01-01T00:00:00Z", "monotonic_s": 0.0, "clock": "real"}
+    path.write_bytes(canonical_json({"n": 0, "kind": "run", "link": "", **times, **parts, **hashes}) + b"\n")
