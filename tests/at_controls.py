@@ -358,7 +358,7 @@ class PaperWindow:
         acts = self._presses.down(key, at_s, repeated=repeated)
         name = self.controls.command(key, ctrl=ctrl)
         if name is None and acts and len(key) == 1:
-            self._type(key.lower())
+            self.type_text(key.lower())
         elif name is not None and acts:
             self.controls.down(name, at_s)
 
@@ -392,10 +392,10 @@ class PaperWindow:
 
     def type(self, text: str) -> None:
         """Type into the field that is open, and Enter."""
-        self._type(text)
+        self.type_text(text)
         self.press("Enter")
 
-    def _type(self, text: str) -> None:
+    def type_text(self, text: str) -> None:
         assert self.controls is not None
         if self.controls.typing.line:
             self.fields["line"] += text

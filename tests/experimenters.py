@@ -215,7 +215,7 @@ class Hand:
         self.sitting.settle()
         self.sitting.window.paint()
         if self.sitting.controls.typing.line:
-            self.sitting.window._type(text)
+            self.sitting.window.type_text(text)
             if whole:
                 self.sitting.press("Enter")
 

@@ -206,7 +206,7 @@ def test_after_a_question_was_called_off_the_next_is_answered(child):
 
 
 def test_a_screen_that_reads_nothing_keeps_nobody_waiting_and_is_killed(child, monkeypatch):
-    monkeypatch.setattr("experiments.screens.participant.link._END_S", 1.0)
+    monkeypatch.setattr("experiments.screens.participant.link.END_S", 1.0)
     link = child("import signal; signal.signal(signal.SIGTERM, signal.SIG_IGN); ready(); time.sleep(600)")
     with pytest.raises(ParticipantError, match="no answer within"):
         link.ask_rating(AskRating(**fields(SCALE) | {"question": "long " * 100_000}), 0.5)

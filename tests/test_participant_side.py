@@ -110,7 +110,7 @@ def test_whose_the_keys_are_is_told_also_if_it_was_said_before_anybody_listened(
     heard: list[object] = []
     link = ParticipantLink.start(command=(sys.executable, "-c", program))
     try:
-        wait_for(lambda: link._focused)
+        wait_for(lambda: link.focused)
         link.listen(heard.append, lambda _: None)
     finally:
         link.close()

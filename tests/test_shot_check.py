@@ -166,7 +166,7 @@ def stopping(bench: Bench, at: str) -> None:
 
     def stop() -> None:
         next(once, lambda: None)()
-        for disarming in list(bench.check._disarming):
+        for disarming in list(bench.check.disarming):
             disarming.join(PATIENCE_S)
 
     bench.at[at] = stop

@@ -54,7 +54,7 @@ class ShotCheck:
         self._latched, self._off = threading.Event(), threading.Event()
         self._gun: Gun | None = None
         self._report: ShotReport | None = None
-        self._disarming: list[threading.Thread] = []
+        self.disarming: list[threading.Thread] = []
 
     def start(self) -> None:
         """Begin; returns at once."""
@@ -70,7 +70,7 @@ class ShotCheck:
         self._off.set()
         disarming = threading.Thread(target=self._disarm, name="emergency stop", daemon=True)
         disarming.start()
-        self._disarming.append(disarming)
+        self.disarming.append(disarming)
 
     def _disarm(self) -> None:
         gun = self._gun
@@ -127,7 +127,7 @@ class ShotCheck:
         """The state read back from the gun once it was told to disarm; `None` if it does not say."""
         try:
             gun.disarm()
-            for disarming in self._disarming:
+            for disarming in self.disarming:
                 disarming.join()
             return gun.status()
         except DeviceError:

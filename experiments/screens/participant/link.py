@@ -95,7 +95,7 @@ class ParticipantLink:
         self._mail = Mailbox()
         self._asking = threading.RLock()
         self._page = threading.Lock()
-        self._focused: messages.Focused | None = None
+        self.focused: messages.Focused | None = None
         """Whose the keys are, as far as it was said."""
         self._stands = 0
         """The question that was put on the screen last; 0 when something else was."""
@@ -143,8 +143,8 @@ class ParticipantLink:
     def listen(self, heard: Callable[[messages.Unasked], None], gone: Callable[[str], None]) -> None:
         """Have somebody told what is said without a question, and why the screen is gone if it goes."""
         self._heard, self._gone = heard, gone
-        if self._focused is not None:
-            heard(self._focused)
+        if self.focused is not None:
+            heard(self.focused)
         if self.failure is not None:
             gone(self.failure)
 
@@ -282,7 +282,7 @@ class ParticipantLink:
         if isinstance(word, messages.ScreenFailed):
             self._failed(f"the participant's screen failed: {word.message}")
         elif isinstance(word, messages.Unasked):
-            self._focused = word if isinstance(word, messages.Focused) else self._focused
+            self.focused = word if isinstance(word, messages.Focused) else self.focused
             self._heard(word)
         else:
             self._mail.put(word)
@@ -300,7 +300,7 @@ _ROOT = Path(__file__).parents[3]
 
 _LAST_BYTES = 4_000
 
-_END_S = 3.0
+END_S = 3.0
 """How long a child has to end by itself, and again once it was told to."""
 
 
@@ -343,16 +343,16 @@ class ParticipantProcess:
         for insist in (self._child.poll, self._child.terminate, self._child.kill):
             insist()
             with suppress(subprocess.TimeoutExpired):
-                self._child.wait(_END_S)
+                self._child.wait(END_S)
                 break
         for thread in self._threads:
-            thread.join(_END_S)
+            thread.join(END_S)
         self._errors.close()
 
     def _fate(self) -> str:
         """How the child ended, with its last words."""
         with suppress(subprocess.TimeoutExpired):
-            self._child.wait(_END_S)
+            self._child.wait(END_S)
         return f"the participant's screen {_ending(self._child.returncode)}{self._last_words()}"
 
     def _last_words(self) -> str:

@@ -29,11 +29,11 @@ class MessagePage(Page):
 
     def __init__(self, stage: Stage, text: str) -> None:
         box = TextBox(y=0, width=2 * stage.half_width, height=0.9, anchor="center")
-        self._text = stage.text(text, box, 0.06, stage.palette.ink)
+        self.message = stage.text(text, box, 0.06, stage.palette.ink)
 
     def draw(self) -> None:
         """The message."""
-        self._text.draw()
+        self.message.draw()
 
 
 class DirectionPage(Page):

@@ -154,7 +154,8 @@ class Stage:
         self.half_width = half_width(self.width_px, self.height_px)
         self.page: Page | None = None
         self._focus = Focus(self.window.winHandle)
-        self._drawn_s = 0.0
+        self.drawn_s = 0.0
+        """When the page was drawn last; 0 if it was not yet."""
         self._closed = False
         self.unasked: deque[Unasked] = deque()
         """What is to be said without a question."""
@@ -182,7 +183,7 @@ class Stage:
             self._focus.take()
         elif not keep_keys:
             self._focus.give_back()
-        self._drawn_s = 0.0
+        self.drawn_s = 0.0
 
     def step(self) -> None:
         """Let happen what happens, and draw when it is time. `WindowClosed` if it is."""
@@ -190,8 +191,8 @@ class Stage:
         if self._closed:
             raise WindowClosed("the participant's window was closed")
         now_s = self.toolkit.now()
-        if self.page is not None and now_s - self._drawn_s >= self.page.redraw_s:
-            self._drawn_s = now_s
+        if self.page is not None and now_s - self.drawn_s >= self.page.redraw_s:
+            self.drawn_s = now_s
             self.page.draw()
             self.window.flip()
 
