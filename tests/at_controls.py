@@ -28,11 +28,10 @@ from experiments.record import storage
 from experiments.record.journal import Contents, read
 from experiments.record.replay import history
 from experiments.run import Finished, RunRequest, run
-from experiments.screens.console import overview, parts, view
-from experiments.screens.console.controls import Controls
+from experiments.screens.console import progress, view, widgets
+from experiments.screens.console.controls import Controls, TextField
 from experiments.screens.console.keys import Name, Presses
-from experiments.screens.console.messages import Ended, Field, GunSeen
-from experiments.screens.console.view import About, Seen
+from experiments.screens.console.view import About, Ended, GunSeen, Seen
 from experiments.session import events
 from experiments.session.events import Press
 from experiments.session.remarks import AnswerCorrected, Remark
@@ -284,7 +283,7 @@ class PaperWindow:
         self.live: LiveRun | None = None
         self.controls: Controls | None = None
         self.heard: list[str] = []
-        self.fields: dict[Field, str] = {"line": "", "number": "", "words": ""}
+        self.fields: dict[TextField, str] = {"line": "", "number": "", "words": ""}
         self.painted_s: dict[int, float] = {}
         self.offered: list[Offered] = []
         self.saved: list[tuple[Step | None, Any]] = []
@@ -347,10 +346,10 @@ class PaperWindow:
     def _look(self, drawn: Position) -> None:
         assert self.live is not None
         assert self.controls is not None
-        seen = Seen(about=self.about, position=drawn, told=self.live.history, gun=self.gun)
-        shown = view.instruction(seen, self._clock.now())
-        self.heard += [shown.title, shown.damper, shown.detail, view.place_text(seen)]
-        self.heard += [*overview.coming(seen), *overview.answers(seen), *self.controls.help_lines()]
+        seen = Seen(about=self.about, position=drawn, told=self.live.history, gun=self.gun, now_s=self._clock.now())
+        shown = view.instruction(seen)
+        self.heard += [shown.title, shown.damper, shown.detail, view.where_text(seen)]
+        self.heard += [*progress.coming(seen), *progress.answer_lines(seen), *self.controls.help_lines()]
 
     def down(self, key: str, *, ctrl: bool = False, repeated: bool = False) -> None:
         """A key goes down, or is repeated by the system."""
@@ -359,7 +358,7 @@ class PaperWindow:
         acts = self._presses.down(key, at_s, repeated=repeated)
         name = self.controls.command(key, ctrl=ctrl)
         if name is None and acts and len(key) == 1:
-            self._type(key.lower())
+            self.type_text(key.lower())
         elif name is not None and acts:
             self.controls.down(name, at_s)
 
@@ -393,10 +392,10 @@ class PaperWindow:
 
     def type(self, text: str) -> None:
         """Type into the field that is open, and Enter."""
-        self._type(text)
+        self.type_text(text)
         self.press("Enter")
 
-    def _type(self, text: str) -> None:
+    def type_text(self, text: str) -> None:
         assert self.controls is not None
         if self.controls.typing.line:
             self.fields["line"] += text
@@ -407,7 +406,7 @@ class PaperWindow:
     # View
 
     def say(self, text: str, mood: str) -> None:
-        assert mood in parts.MOODS
+        assert mood in widgets.MOODS
         self.heard.append(text)
 
     def open_line(self, question: str) -> None:
@@ -417,7 +416,7 @@ class PaperWindow:
     def close_line(self) -> None:
         self.fields["line"] = ""
 
-    def typed(self, field: Field) -> str:
+    def typed(self, field: TextField) -> str:
         return self.fields[field]
 
     def show_page(self, title: str, lines: list[str]) -> None:

@@ -109,9 +109,9 @@ class AtDisplay:
             text=True,
             start_new_session=True,
         )
-        from experiments.screens.xkeys import Hands  # here: python-xlib is in the extra `gui`
+        from tests.typing_hands import TypingHands  # here: python-xlib is in the extra `gui`
 
-        self.keys = Hands(display)
+        self.keys = TypingHands(display)
 
     def focus_on(self, title: str = "Recoil") -> tuple[int, int, int, int]:
         """Give the keys to the newest window of a title; its place and size."""

@@ -19,7 +19,7 @@ from experiments.design.plan import Trial
 from experiments.live_run import RunStopped
 from experiments.record.journal import Contents
 from experiments.record.replay import history
-from experiments.screens.console.keys import COMMANDS, Name
+from experiments.screens.console.keys import KEY_COMMANDS, Name
 from experiments.session import events
 from experiments.session.events import ACTS
 from experiments.session.history import is_attempt
@@ -29,7 +29,7 @@ from experiments.session.steps import Answered, Described, Rated
 from tests.at_controls import GUARD_S, Offered, Sitting, WatchedGun, gated, kept, remarks, tells_correctness
 
 KEYS = (*"MFBPUERGNYLST7", "Space", "Enter", "Esc", "Tab", "F1", "F2")
-BUTTONS = [one.name for one in COMMANDS if one.name not in ("rearm", "leave", "theme")]
+BUTTONS = [one.name for one in KEY_COMMANDS if one.name not in ("rearm", "leave", "theme")]
 When = Literal["before", "within", "after"]
 """A press before what stands there was painted, within the guard's time after it, or later."""
 MOST_SITTINGS = 60
@@ -215,7 +215,7 @@ class Hand:
         self.sitting.settle()
         self.sitting.window.paint()
         if self.sitting.controls.typing.line:
-            self.sitting.window._type(text)
+            self.sitting.window.type_text(text)
             if whole:
                 self.sitting.press("Enter")
 

@@ -13,6 +13,7 @@ import sys
 import tempfile
 import threading
 from collections.abc import Callable, Iterator
+from contextlib import suppress
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -23,7 +24,7 @@ from experiments.clock import RealClock
 from experiments.live_run import RunStopped
 from experiments.run import RunRequest
 from experiments.screens.console import app
-from experiments.screens.console.messages import Ended, ParticipantSeen
+from experiments.screens.console.view import Ended, ParticipantSeen
 from experiments.session import events
 from experiments.session.states import State
 from tests.at_controls import changed, short_direction
@@ -107,6 +108,10 @@ class Shown:
         self._timer.timeout.connect(self._turn)
         self._timer.start(LOOK_MS)
 
+    def stop(self) -> None:
+        """Drive no more."""
+        self._timer.stop()
+
     def _turn(self) -> None:
         window = self._console.window
         if window is None or window.live is None:
@@ -187,7 +192,7 @@ class Turns:
         yield from self._beside()
         yield from self.fire(State.ASKING)
         yield "asking"
-        yield from self.offer(events.Answer(response="forward", at_s=self.console._clock.now()), State.PREPARING)
+        yield from self.offer(events.Answer(response="forward", at_s=self.console.clock.now()), State.PREPARING)
         yield from self._pauses()
         yield from self.offer(events.Undo(), State.CORRECTING)
         yield "correcting an answer"
@@ -197,7 +202,7 @@ class Turns:
         yield "preparing again"
         for then in (State.PREPARING, State.RESTING):
             yield from self.fire(State.ASKING)
-            yield from self.offer(events.Answer(response="backward", at_s=self.console._clock.now()), then)
+            yield from self.offer(events.Answer(response="backward", at_s=self.console.clock.now()), then)
         yield "resting"
         self.key("end break")
         yield "resting, why it ends"
@@ -254,7 +259,7 @@ class Turns:
         for event in (
             events.DamperSet(),
             events.Fire(),
-            events.Answer(response="forward", at_s=self.console._clock.now()),
+            events.Answer(response="forward", at_s=self.console.clock.now()),
             events.EndBreak(reason="enough"),
         ):
             if live.offer(event):
@@ -350,16 +355,12 @@ def one_run(  # noqa: PLR0917 - each is needed once
 ) -> None:
     setup = _setup(experiment)
     request = RunRequest(setup=setup, participant_id="P" * 8, results=results, seed=1, again=again)
-    keep: list[Shown] = []
-
-    def watch(console: Any) -> None:
-        turns.console = console
-        keep.append(Shown(console, states(turns), look))
-
-    try:
-        app.run_console(request, RealClock(), band="PRACTICE – nothing of it is analysed", watch=watch)
-    except RunStopped:
-        return
+    console = app.Console(request, RealClock(), band="PRACTICE – nothing of it is analysed")
+    turns.console = console
+    shown = Shown(console, states(turns), look)
+    with suppress(RunStopped):
+        console.run()
+    shown.stop()
 
 
 def _setup(experiment: str) -> Any:

@@ -11,14 +11,14 @@ from hypothesis import strategies as st
 from experiments.design.plan import Trial
 from experiments.screens.console.keys import (
     BOUNCE_S,
-    COMMANDS,
+    KEY_COMMANDS,
     STRANGE_S,
     EventClock,
     Name,
     Presses,
     Typing,
     command_for,
-    field_of,
+    field_at,
     why_not,
 )
 from experiments.session import events
@@ -26,7 +26,7 @@ from experiments.session.history import Entry, What
 from experiments.session.states import TABLE, No, Position, State
 
 S = State
-LETTERS = sorted({command.key for command in COMMANDS if len(command.key) == 1})
+LETTERS = sorted({command.key for command in KEY_COMMANDS if len(command.key) == 1})
 TRIAL = Trial(session=1, method="vibration", set=1, trial=1, direction="forward")
 CORRECTED: tuple[What, ...] = ("answer", "rating", "description")
 
@@ -40,13 +40,13 @@ def at(state: State, what: What = "answer") -> Position:
 
 
 POSITIONS = [*(at(state) for state in State), *(at(S.CORRECTING, what) for what in CORRECTED[1:])]
-NO_FIELD = [position for position in POSITIONS if field_of(position) is None]
-FIELD = [position for position in POSITIONS if field_of(position) is not None]
+NO_FIELD = [position for position in POSITIONS if field_at(position) is None]
+FIELD = [position for position in POSITIONS if field_at(position) is not None]
 LINE, IN_FIELD, NOTHING = Typing(line=True), Typing(field=True), Typing()
 
 
 def command(key: str, position: Position, *, ctrl: bool = False, line: bool = False) -> Name | None:
-    typing = Typing(line=line, field=field_of(position) is not None)
+    typing = Typing(line=line, field=field_at(position) is not None)
     return command_for(key, ctrl=ctrl, typing=typing, position=position)
 
 
@@ -111,7 +111,7 @@ def test_space_is_next_in_a_train_and_fire_wherever_else_it_is_a_command() -> No
 
 def test_ctrl_x_is_no_answer_beside_a_number_and_cuts_text_everywhere_else() -> None:
     for position in POSITIONS:
-        number = field_of(position) == "number"
+        number = field_at(position) == "number"
         assert command("X", position, ctrl=True) == ("no answer" if number else None)
         assert command("X", position, ctrl=True, line=True) is None
         assert command("X", position) is None
@@ -125,10 +125,10 @@ def test_a_key_that_stands_on_no_button_is_no_command(position: Position) -> Non
 
 
 def test_every_command_that_does_something_somewhere_is_had_by_its_key_there() -> None:
-    for one in COMMANDS:
+    for one in KEY_COMMANDS:
         ctrl = one.key.startswith("Ctrl+")
         for position in POSITIONS:
-            letters = field_of(position) is not None and len(one.key) == 1
+            letters = field_at(position) is not None and len(one.key) == 1
             found = command(one.key.removeprefix("Ctrl+"), position, ctrl=ctrl or letters)
             if one.kind is not None and not why_not(one.name, position) and not does_more(one.name, position):
                 assert found == one.name, (one, position)
@@ -136,14 +136,14 @@ def test_every_command_that_does_something_somewhere_is_had_by_its_key_there() -
 
 def does_more(name: Name, position: Position) -> bool:
     """Whether the table takes an event for more than the command's own field: no answer is a rating, never words."""
-    return name == "no answer" and field_of(position) != "number"
+    return name == "no answer" and field_at(position) != "number"
 
 
 def test_why_a_command_does_nothing_is_what_the_table_says() -> None:
-    for one in COMMANDS:
+    for one in KEY_COMMANDS:
         for position in POSITIONS:
             corrects = position.state is S.CORRECTING and (
-                one.name == "no answer" or (one.name in ("forward", "backward") and field_of(position) is None)
+                one.name == "no answer" or (one.name in ("forward", "backward") and field_at(position) is None)
             )
             kind = events.Correct if corrects else one.kind
             if kind is None:

@@ -14,10 +14,9 @@ from hypothesis import strategies as st
 from experiments import catalogue
 from experiments.config.setup import Setup
 from experiments.design.plan import Plan, Trial
-from experiments.screens.console import overview, parts, view
-from experiments.screens.console.messages import Ended, GunSeen, ParticipantSeen
-from experiments.screens.console.overview import Pace, clock_text, end_text, progress, remaining_s
-from experiments.screens.console.view import About, Seen
+from experiments.screens.console import progress, view, widgets
+from experiments.screens.console.progress import RunTiming, clock_text, end_text, remaining_s, trials_done
+from experiments.screens.console.view import About, Ended, GunSeen, ParticipantSeen, Seen
 from experiments.session.remarks import AnswerCorrected, Flagged, Noted
 from experiments.session.states import Position, State
 from experiments.session.steps import Answered, Ask, Describe, Prepare, Present, Presented, Rate, Rated, Repeat, Rest
@@ -52,9 +51,9 @@ def seen(setup: Setup[Any], position: Position, *told: Any, **more: Any) -> Seen
 
 
 def shown_texts(here: Seen) -> list[str]:
-    shown = view.instruction(here, 10.0)
-    texts = [shown.title, shown.damper, shown.detail, view.place_text(here), *overview.coming(here)]
-    return [*texts, *overview.answers(here), *overview.marks(here), overview.gun_text(here.gun)[0]]
+    shown = view.instruction(replace(here, now_s=10.0))
+    texts = [shown.title, shown.damper, shown.detail, view.where_text(here), *progress.coming(here)]
+    return [*texts, *progress.answer_lines(here), *progress.marks(here), progress.gun_text(here.gun)[0]]
 
 
 # what is never told
@@ -80,7 +79,7 @@ def test_every_state_says_what_to_do_and_none_says_anything_of_how_good_the_part
 ) -> None:
     with sat_at(state, tmp_path) as sitting:
         sitting.window.paint()
-        assert view.instruction(Seen(about=sitting.window.about, position=sitting.position), 0.0).title
+        assert view.instruction(Seen(about=sitting.window.about, position=sitting.position)).title
         assert not [text for text in sitting.window.heard if tells_correctness(text)]
 
 
@@ -107,10 +106,10 @@ def test_whoever_looks_finds_the_word_they_need_in_each_state(tmp_path: Path) ->
 
 def test_the_gun_is_shown_as_it_says_itself_and_never_as_safe_when_it_says_nothing() -> None:
     halted = Position(states=(State.HALTED,))
-    silent = view.instruction(seen(DIRECTION, halted, gun=GunSeen(status=None, fault="no answer")), 0.0)
+    silent = view.instruction(seen(DIRECTION, halted, gun=GunSeen(status=None, fault="no answer")))
     assert "SWITCH OFF ITS POWER" in silent.damper
-    assert "SWITCH OFF ITS POWER" in view.instruction(seen(DIRECTION, halted), 0.0).damper
-    assert overview.gun_text(GunSeen(status=None, fault="no answer"))[1] == "bad"
+    assert "SWITCH OFF ITS POWER" in view.instruction(seen(DIRECTION, halted)).damper
+    assert progress.gun_text(GunSeen(status=None, fault="no answer"))[1] == "bad"
 
 
 def test_rating_and_description_are_awaited_from_the_participants_screen_where_there_is_one() -> None:
@@ -122,8 +121,8 @@ def test_rating_and_description_are_awaited_from_the_participants_screen_where_t
         here = seen(PREFERENCE, Position(states=(state,), step=step))
         there = replace(here, about=replace(here.about, participant_rates=True))
         awaited = f"Awaited: the participant's {what} on their own screen, or type it here."
-        assert view.instruction(here, 0.0).detail == "?"
-        assert view.instruction(there, 0.0).detail == f"?\n{awaited}"
+        assert view.instruction(here).detail == "?"
+        assert view.instruction(there).detail == f"?\n{awaited}"
 
 
 def test_a_participants_screen_that_is_gone_is_awaited_no_more() -> None:
@@ -133,15 +132,15 @@ def test_a_participants_screen_that_is_gone_is_awaited_no_more() -> None:
         (DIRECTION, ask, State.ASKING, {"participant_keys": True}),
     ):
         here = seen(setup, Position(states=(state,), step=step(plan_of(setup).trials[0])), participant=gone)
-        detail = view.instruction(replace(here, about=replace(here.about, **does)), 0.0).detail
+        detail = view.instruction(replace(here, about=replace(here.about, **does))).detail
         assert "Awaited" not in detail
         assert "Their screen is gone." in detail
 
 
 def test_after_an_emergency_stop_nothing_comes_next_and_no_end_is_told() -> None:
     trial = plan_of(DIRECTION).trials[0]
-    assert overview.coming(seen(DIRECTION, Position(states=(State.ASKING,), step=ask(trial))))
-    assert not overview.coming(seen(DIRECTION, Position(states=(State.HALTED,), step=ask(trial))))
+    assert progress.coming(seen(DIRECTION, Position(states=(State.ASKING,), step=ask(trial))))
+    assert not progress.coming(seen(DIRECTION, Position(states=(State.HALTED,), step=ask(trial))))
 
 
 def test_the_participants_screen_has_the_keys_from_one_rating_or_description_to_the_next_and_no_longer() -> None:
@@ -156,7 +155,7 @@ def test_the_participants_screen_has_the_keys_from_one_rating_or_description_to_
 
 def test_a_run_that_stopped_says_what_is_safe_only_if_it_was_read_back() -> None:
     def end(**how: Any) -> str:
-        return view.instruction(seen(DIRECTION, Position(), ended=Ended(**how)), 0.0).detail
+        return view.instruction(seen(DIRECTION, Position(), ended=Ended(**how))).detail
 
     assert "1 answer," in end(reason="lunch", saved=1)
     assert "2 answers," in end(reason="lunch", saved=2)
@@ -167,15 +166,15 @@ def test_a_run_that_stopped_says_what_is_safe_only_if_it_was_read_back() -> None
 
 def test_whose_the_keys_are_is_said_where_somebody_else_can_have_them() -> None:
     beside = ParticipantSeen(focused=True)
-    assert overview.focus_text(seen(DIRECTION, Position(), participant=beside), here=False)[0].startswith(
+    assert progress.focus_text(seen(DIRECTION, Position(), participant=beside), here=False)[0].startswith(
         "Keys: the participant's screen"
     )
-    assert overview.focus_text(seen(DIRECTION, Position(), participant=beside), here=True) == (
+    assert progress.focus_text(seen(DIRECTION, Position(), participant=beside), here=True) == (
         "Keys: this window",
         "good",
     )
-    assert overview.focus_text(seen(DIRECTION, Position()), here=True)[0] == ""
-    assert "ANOTHER WINDOW" in overview.focus_text(seen(DIRECTION, Position()), here=False)[0]
+    assert progress.focus_text(seen(DIRECTION, Position()), here=True)[0] == ""
+    assert "ANOTHER WINDOW" in progress.focus_text(seen(DIRECTION, Position()), here=False)[0]
 
 
 def test_the_list_of_marks_has_those_of_this_set_and_an_answer_that_was_given_again_counts() -> None:
@@ -186,14 +185,16 @@ def test_the_list_of_marks_has_those_of_this_set_and_an_answer_that_was_given_ag
     spoiled = (Prepare(trial=trials[1], attempt=1, damper=""), Repeat(trial=first, reason="noise"))
     flagged, noted = (None, Flagged(trial=other, flag="late")), (None, Noted(trial=first, text="a dog"))
     here = Position(states=(State.ASKING,), step=step)
-    marks = overview.marks(seen(DIRECTION, here, given, corrected, spoiled, flagged, noted))
+    marks = progress.marks(seen(DIRECTION, here, given, corrected, spoiled, flagged, noted))
     assert marks == [
         f"Trial {first.trial}: corrected to BACKWARD",
         f"Trial {first.trial}: to be presented again (noise)",
         f"Trial {first.trial}: “a dog”",
     ]
-    assert overview.answers(seen(DIRECTION, here, given, corrected)) != overview.answers(seen(DIRECTION, here, given))
-    assert overview.answers(seen(DIRECTION, here, given, corrected, spoiled, given)) == overview.answers(
+    assert progress.answer_lines(seen(DIRECTION, here, given, corrected)) != progress.answer_lines(
+        seen(DIRECTION, here, given)
+    )
+    assert progress.answer_lines(seen(DIRECTION, here, given, corrected, spoiled, given)) == progress.answer_lines(
         seen(DIRECTION, here, given)
     )
 
@@ -203,33 +204,44 @@ def test_the_strip_shows_the_own_hands_times_of_the_session_alone() -> None:
     own = Answered(response="forward", response_time_s=0.7, response_source="participant", response_time_valid=True)
     told = ((ask(first), own), (ask(second), SAID))
     here = Position(states=(State.ASKING,), step=ask(trials[2]))
-    assert overview.response_times(seen(DIRECTION, here, *told)) == [0.7]
+    assert progress.own_times_s(seen(DIRECTION, here, *told)) == [0.7]
     later = next(trial for trial in trials if trial.session != first.session)
-    assert overview.response_times(seen(DIRECTION, Position(states=(State.ASKING,), step=ask(later)), *told)) == []
+    assert progress.own_times_s(seen(DIRECTION, Position(states=(State.ASKING,), step=ask(later)), *told)) == []
 
 
 # colours
 
 
+def contrast(one: str, other: str) -> float:
+    """The contrast ratio of two colours (WCAG 2): 1 to 21."""
+    light, dark = sorted((_luminance(one), _luminance(other)), reverse=True)
+    return (light + 0.05) / (dark + 0.05)
+
+
+def _luminance(hex_colour: str) -> float:
+    parts = [int(hex_colour[start : start + 2], 16) / 255 for start in (1, 3, 5)]
+    linear = [part / 12.92 if part <= 0.04045 else ((part + 0.055) / 1.055) ** 2.4 for part in parts]
+    return 0.2126 * linear[0] + 0.7152 * linear[1] + 0.0722 * linear[2]
+
+
 @pytest.mark.parametrize("name", ["dark", "light"])
-def test_text_of_every_mood_stands_out_on_ground_and_panel_seven_to_one(name: parts.Theme) -> None:
+def test_text_of_every_mood_stands_out_on_ground_and_panel_seven_to_one(name: widgets.Theme) -> None:
     for ground in ("ground", "panel"):
-        for colour in (*parts.MOODS, "text", "quiet"):
-            assert parts.contrast(name, colour, ground) >= 7, (colour, ground)
+        for text in (*widgets.MOODS, "text", "quiet"):
+            assert contrast(widgets.colour(name, text), widgets.colour(name, ground)) >= 7, (text, ground)
 
 
 @pytest.mark.parametrize("name", ["dark", "light"])
-@pytest.mark.parametrize("ground", ["stop", *parts.BANDS])
-def test_the_text_of_stop_button_and_bands_stands_out(name: parts.Theme, ground: str) -> None:
-    assert parts.contrast(name, f"{ground}_text", ground) >= 4.5  # WCAG 2 AA; it is large and bold
+@pytest.mark.parametrize("ground", ["stop", "practice", "simulated"])
+def test_the_text_of_stop_button_and_bands_stands_out(name: widgets.Theme, ground: str) -> None:
+    text = widgets.colour(name, f"{ground}_text")
+    assert contrast(text, widgets.colour(name, ground)) >= 4.5  # WCAG 2 AA; it is large and bold
 
 
-def test_contrast_is_that_of_the_published_definition(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setitem(parts._COLOURS["light"], "grey", "#767676")
-    assert parts.contrast("light", "grey") == pytest.approx(4.54, abs=0.005)
+def test_contrast_is_that_of_the_published_definition() -> None:
     # WCAG 2: a colour on itself is 1 to 1; #767676 is the lightest grey with 4.5 to 1 on white
-    assert parts.contrast("light", "ground", "ground") == 1
-    assert parts.contrast("light", "stop_text", "ground") == 1
+    assert contrast("#767676", "#ffffff") == pytest.approx(4.54, abs=0.005)
+    assert contrast("#ffffff", "#ffffff") == 1
 
 
 # the time to go
@@ -239,7 +251,7 @@ class Day:
     """A run whose trials take what they are told to."""
 
     def __init__(self, setup: Setup[Any]) -> None:
-        self.setup, self.plan, self.pace = setup, plan_of(setup), Pace()
+        self.setup, self.plan, self.so_far = setup, plan_of(setup), RunTiming()
         self.told: list[Any] = []
         self.now_s = 100.0
         self.position = Position()
@@ -249,17 +261,18 @@ class Day:
 
     def at(self, position: Position) -> None:
         self.position = position
-        self.pace.at(position, self.now_s)
+        self.so_far.at(position, self.now_s)
 
     def answer(self, trial: Trial, duration_s: float) -> None:
         self.begin(trial)
         self.now_s += duration_s
         self.told.append((ask(trial), SAID))
-        self.pace.saved(SAID, self.now_s)
+        self.so_far.saved(SAID, self.now_s)
 
     @property
     def left_s(self) -> float:
-        return remaining_s(self.setup.config, self.plan, self.told, self.pace, self.position, self.now_s)
+        about = About(setup=self.setup, plan=self.plan)
+        return remaining_s(Seen(about=about, position=self.position, told=self.told, now_s=self.now_s), self.so_far)
 
 
 @given(durations=st.lists(st.floats(1, 300), min_size=1, max_size=6))
@@ -311,16 +324,21 @@ def test_ratings_still_to_come_are_counted() -> None:
 
 
 def test_how_far_the_run_is_counts_what_was_felt_and_what_was_rated_where_all_is_rated_last() -> None:
-    plan = plan_of(PREFERENCE)
-    first, second, *_ = plan.trials
+    first, second, *_ = plan_of(PREFERENCE).trials
     felt = [(present(trial), SHOWN) for trial in (first, second)]
     told = (*felt, (rate(first), Rated(rating=None, rating_by="experimenter")))
-    counted = [(one.what, one.count, one.planned) for one in progress(plan, told, first, rated_last=True)]
-    assert counted == [("felt", 2, 3), ("rated", 1, 3)]
-    plan = plan_of(DIRECTION)
-    answers = tuple((ask(trial), SAID) for trial in plan.trials[:4])
-    counted = [(one.what, one.count, one.planned) for one in progress(plan, answers, plan.trials[4], rated_last=False)]
-    assert counted == [("set", 1, 3), ("session", 4, 6), ("experiment", 4, 12)]
+    assert counted(seen(PREFERENCE, Position(step=rate(first)), *told)) == [("felt", 2, 3), ("rated", 1, 3)]
+    trials = plan_of(DIRECTION).trials
+    answers = tuple((ask(trial), SAID) for trial in trials[:4])
+    assert counted(seen(DIRECTION, Position(step=ask(trials[4])), *answers)) == [
+        ("set", 1, 3),
+        ("session", 4, 6),
+        ("experiment", 4, 12),
+    ]
+
+
+def counted(here: Seen) -> list[tuple[str, int, int]]:
+    return [(one.what, one.count, one.planned) for one in trials_done(here)]
 
 
 def test_the_end_is_a_time_of_day_also_over_midnight() -> None:
@@ -330,7 +348,7 @@ def test_the_end_is_a_time_of_day_also_over_midnight() -> None:
 
 
 def test_no_time_has_gone_by_before_the_run_begins() -> None:
-    pace = Pace()
-    assert pace.elapsed_s(5_000.0) == 0.0
-    pace.began_s = 5_000.0
-    assert pace.elapsed_s(5_030.0) == 30.0
+    so_far = RunTiming()
+    assert so_far.elapsed_s(5_000.0) == 0.0
+    so_far.began_s = 5_000.0
+    assert so_far.elapsed_s(5_030.0) == 30.0

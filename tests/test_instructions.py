@@ -23,7 +23,7 @@ from experiments.load import load_setup, shipped_folder
 from experiments.record.journal import read
 from experiments.record.replay import history
 from experiments.run import RunRequest, run
-from experiments.screens.console.overview import coming
+from experiments.screens.console.progress import coming
 from experiments.screens.console.view import About, Seen, instruction
 from experiments.screens.synthetic import synthetic_screen
 from experiments.screens.terminal import TerminalScreen
@@ -135,7 +135,7 @@ def test_every_screen_has_it_read_out_before_a_set_and_shows_it_at_its_other_tri
     plan = make_plan(HURRY.config, "P01", 1, None)
     for step in prepares(HURRY):
         how = "READ OUT" if step.trial.trial in (1, 6) else "Instruction of this set"
-        shown = instruction(seen(HURRY, plan, step), 0.0).detail
+        shown = instruction(seen(HURRY, plan, step)).detail
         assert shown.startswith(f"{how}: “{step.instruction}”\n")
         assert read_out_text(plan, step) in typed(plan, step)
         if step.trial.trial == 4:
@@ -145,7 +145,7 @@ def test_every_screen_has_it_read_out_before_a_set_and_shows_it_at_its_other_tri
 def test_the_console_and_the_terminal_say_nothing_where_there_is_none() -> None:
     step, plan = prepares(PLAIN)[0], make_plan(PLAIN.config, "P01", 1, None)
     here = seen(PLAIN, plan, step)
-    shown = [instruction(here, 0.0).detail, *coming(here), typed(plan, step)]
+    shown = [instruction(here).detail, *coming(here), typed(plan, step)]
     assert not any("READ OUT" in text or "nstruction" in text for text in shown)
 
 

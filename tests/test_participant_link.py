@@ -11,7 +11,7 @@ from contextlib import contextmanager
 import pytest
 
 from experiments.screens.participant.link import ParticipantError, ParticipantLink
-from experiments.screens.participant.words import (
+from experiments.screens.participant.messages import (
     AskDescription,
     AskDirection,
     AskRating,
@@ -88,7 +88,8 @@ def test_moments_are_mapped_there_and_back(child):
     given = link.ask_direction(AskDirection(**fields(WHICH) | {"onset_s": onset_s}), PATIENCE_S)
     assert given.response == "backward"
     assert given.pressed_s == pytest.approx(onset_s + 0.5, abs=1e-6)
-    assert link.clocks.offset_s == pytest.approx(1000, abs=link.clocks.uncertainty_s)
+    clocks = link.map_clocks()
+    assert clocks.offset_s == pytest.approx(1000, abs=clocks.uncertainty_s)
 
 
 def fields(word):
@@ -205,7 +206,7 @@ def test_after_a_question_was_called_off_the_next_is_answered(child):
 
 
 def test_a_screen_that_reads_nothing_keeps_nobody_waiting_and_is_killed(child, monkeypatch):
-    monkeypatch.setattr("experiments.screens.participant.process._END_S", 1.0)
+    monkeypatch.setattr("experiments.screens.participant.link.END_S", 1.0)
     link = child("import signal; signal.signal(signal.SIGTERM, signal.SIG_IGN); ready(); time.sleep(600)")
     with pytest.raises(ParticipantError, match="no answer within"):
         link.ask_rating(AskRating(**fields(SCALE) | {"question": "long " * 100_000}), 0.5)

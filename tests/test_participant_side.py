@@ -13,9 +13,9 @@ import pytest
 
 from experiments.design.plan import Trial
 from experiments.load import load_setup
-from experiments.screens.console.beside import PAUSED, ParticipantSide
+from experiments.screens.console.participant_link import PAUSED, ParticipantSide
 from experiments.screens.participant.link import ParticipantLink
-from experiments.screens.participant.words import BETWEEN, Focused, line
+from experiments.screens.participant.messages import BETWEEN, Focused, line
 from experiments.session.states import Position, State
 from experiments.session.steps import Describe, Rate
 from tests.waiting import PATIENCE_S, wait_for
@@ -110,7 +110,7 @@ def test_whose_the_keys_are_is_told_also_if_it_was_said_before_anybody_listened(
     heard: list[object] = []
     link = ParticipantLink.start(command=(sys.executable, "-c", program))
     try:
-        wait_for(lambda: link._focused)
+        wait_for(lambda: link.focused)
         link.listen(heard.append, lambda _: None)
     finally:
         link.close()

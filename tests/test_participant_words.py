@@ -6,15 +6,13 @@ from hypothesis import strategies as st
 from pydantic import ValidationError
 
 from experiments.screens.participant.link import ClockMap, RoundTrip, clock_map
-from experiments.screens.participant.rating_page import move, put
-from experiments.screens.participant.words import (
+from experiments.screens.participant.messages import (
     AskDescription,
     AskDirection,
     AskRating,
-    Close,
+    CloseScreen,
     DescriptionGiven,
     DirectionGiven,
-    Failed,
     Look,
     Noise,
     NoiseIs,
@@ -22,6 +20,7 @@ from experiments.screens.participant.words import (
     Pong,
     RatingGiven,
     Ready,
+    ScreenFailed,
     Show,
     arguments,
     from_participant_from,
@@ -29,6 +28,7 @@ from experiments.screens.participant.words import (
     look_from,
     to_participant_from,
 )
+from experiments.screens.participant.pages import move, put
 
 TEXT = st.text()
 NUMBER = st.floats(allow_nan=False, allow_infinity=False)
@@ -62,7 +62,7 @@ TO = st.one_of(
     ),
     st.builds(Ping, sent_s=NUMBER),
     st.builds(Noise, on=st.booleans(), level=SHARE, ask=COUNT),
-    st.just(Close()),
+    st.just(CloseScreen()),
 )
 FROM = st.one_of(
     st.builds(Ready, psychopy=TEXT, window=TEXT, refresh_Hz=st.none() | NUMBER),
@@ -71,7 +71,7 @@ FROM = st.one_of(
     st.builds(DescriptionGiven, comment=TEXT, ask=COUNT),
     st.builds(DirectionGiven, response=st.sampled_from(["forward", "backward"]), pressed_s=NUMBER, ask=COUNT),
     st.builds(NoiseIs, on=st.booleans(), message=TEXT, ask=COUNT),
-    st.builds(Failed, message=TEXT),
+    st.builds(ScreenFailed, message=TEXT),
 )
 SCALE = AskRating(
     number=1, of=3, question="?", minimum=0, maximum=10, minimum_text="low", maximum_text="high", grain=0.1
@@ -132,7 +132,7 @@ def test_bytes_are_a_word_or_refused_and_nothing_else(wire):
 
 def test_what_one_side_says_is_no_word_of_the_other():
     with pytest.raises(ValidationError):
-        to_participant_from(line(Failed(message="no")))
+        to_participant_from(line(ScreenFailed(message="no")))
 
 
 def test_a_question_with_a_number_that_is_none_is_not_sent():

@@ -16,7 +16,7 @@ from experiments.clock import RealClock, VirtualClock
 from experiments.load import load_setup
 from experiments.run import RunRequest, run
 from experiments.screens.console import shot_check
-from experiments.screens.console.shot_check import ShotCheck, Told, report_text, state_text
+from experiments.screens.console.shot_check import ShotCheck, ShotProgress, report_text, state_text
 from experiments.screens.synthetic import synthetic_screen
 
 SETUP = load_setup("direction")
@@ -69,7 +69,7 @@ class Bench:
     """A test shot with a spied gun, carried out in this thread."""
 
     def __init__(self, monkeypatch: pytest.MonkeyPatch, method: str = "asymmetric-1", countdown_s: int = 0) -> None:
-        self.told: list[Told] = []
+        self.told: list[ShotProgress] = []
         self.at: dict[str, Callable[[], None]] = {}
         self.guns: list[Spied] = []
         self.clock = RealClock()
@@ -84,11 +84,11 @@ class Bench:
         monkeypatch.setattr(shot_check, "COUNTDOWN_S", countdown_s)
         self.check = ShotCheck(SETUP, method, "simulated", self.clock, self._tell)
 
-    def _tell(self, told: Told) -> None:
+    def _tell(self, told: ShotProgress) -> None:
         self.told.append(told)
         self.at.get(told.phase, lambda: None)()
 
-    def carry_out(self) -> Told:
+    def carry_out(self) -> ShotProgress:
         self.check.carry_out()
         assert self.told[-1].phase == "over"
         assert [one.phase for one in self.told].count("over") == 1
@@ -166,7 +166,7 @@ def stopping(bench: Bench, at: str) -> None:
 
     def stop() -> None:
         next(once, lambda: None)()
-        for disarming in list(bench.check._disarming):
+        for disarming in list(bench.check.disarming):
             disarming.join(PATIENCE_S)
 
     bench.at[at] = stop
@@ -232,7 +232,7 @@ def test_a_gun_that_cannot_be_read_is_to_be_switched_off(bench: Bench) -> None:
 
 
 def test_a_gun_that_is_not_there_is_one_sentence(monkeypatch: pytest.MonkeyPatch) -> None:
-    told: list[Told] = []
+    told: list[ShotProgress] = []
     monkeypatch.setattr(shot_check, "COUNTDOWN_S", 0)
     ShotCheck(SETUP, "vibration", "serial:/dev/nowhere", RealClock(), told.append).carry_out()
     assert told[-1].phase == "over"
@@ -339,7 +339,7 @@ def test_on_a_line_the_shot_that_was_asked_for_is_rendered_and_its_timing_is_tol
     from tests.twins import a_twin
 
     monkeypatch.setattr(shot_check, "COUNTDOWN_S", 0)
-    told: list[Told] = []
+    told: list[ShotProgress] = []
     with a_twin(tmp_path, speed=1.0) as (twin, socket):
         ShotCheck(SETUP, "asymmetric-2", f"serial:{socket.address}", RealClock(), told.append).carry_out()
         (rendered,) = twin.body.ledger
@@ -352,9 +352,9 @@ def test_on_a_line_the_shot_that_was_asked_for_is_rendered_and_its_timing_is_tol
 def test_on_a_line_nothing_is_rendered_after_an_emergency_stop(tmp_path: Path) -> None:
     from tests.twins import a_twin
 
-    told: list[Told] = []
+    told: list[ShotProgress] = []
 
-    def tell(one: Told) -> None:
+    def tell(one: ShotProgress) -> None:
         told.append(one)
         if one.phase == "counting":
             check.emergency_stop()

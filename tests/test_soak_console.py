@@ -18,8 +18,8 @@ import pytest
 
 from experiments.doctor.verdicts import Latencies, latencies, together
 from experiments.record.journal import read
-from tests import test_console as console
-from tests import test_console_faults as faults
+from tests import at_runs as console
+from tests import faulty_console as faults
 from tests.at_display import (
     AtConsole,
     AtDisplay,

@@ -11,9 +11,9 @@ import numpy as np
 import pytest
 
 from experiments.screens.participant.link import ParticipantLink
-from tests import test_participant_screen as screen
+from tests import at_participant as screen
+from tests.at_participant import Hands, console, display, hands, link
 from tests.conftest import Soak
-from tests.test_participant_screen import Hands, console, display, hands, link
 from tests.waiting import PATIENCE_S
 
 pytestmark = [pytest.mark.soak, *screen.pytestmark]

@@ -271,7 +271,7 @@ def hold_down(screen: AtDisplay, *names: str, down: bool = True) -> None:
     from Xlib import XK, X
     from Xlib.ext import xtest
 
-    display = screen.keys._display
+    display = screen.keys.display
     for name in names:
         code = display.keysym_to_keycode(XK.string_to_keysym(name))
         xtest.fake_input(display, X.KeyPress if down else X.KeyRelease, code)

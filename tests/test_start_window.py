@@ -25,10 +25,10 @@ from experiments.clock import RealClock, VirtualClock
 from experiments.load import load_setup
 from experiments.record.journal import hold
 from experiments.run import ParticipantOptions, RunRequest, run
-from experiments.screens.console import parts
+from experiments.screens.console import widgets
 from experiments.screens.console.app import application
 from experiments.screens.console.form import Opening
-from experiments.screens.console.live import _study
+from experiments.screens.console.live import study_of
 from experiments.screens.console.start import StartWindow
 from experiments.screens.synthetic import synthetic_screen
 from experiments.study import enrolment, register
@@ -239,11 +239,11 @@ def test_a_config_that_the_study_does_not_name_is_run_alone_by_the_rules_of_the_
     folder = study.source.parent
     shutil.copy(folder / "direction.toml", folder / "mine.toml")
     asked = RunRequest(setup=load_setup(str(folder / "mine.toml")), participant_id="", results=study.results)
-    found = _study(asked)
+    found = study_of(asked)
     assert [one.source.name for one in found.setups] == ["mine.toml"]
     assert found.config == study.config
     named = RunRequest(setup=load_setup(str(folder / "preference.toml")), participant_id="", results=study.results)
-    assert [one.source.name for one in _study(named).setups] == ["direction.toml", "preference.toml"]
+    assert [one.source.name for one in study_of(named).setups] == ["direction.toml", "preference.toml"]
 
 
 def test_what_cannot_be_read_is_said_when_the_window_opens_below_what_there_is_to_say(
@@ -676,10 +676,10 @@ def test_where_there_are_several_monitors_the_participants_is_chosen_by_its_numb
 
 def test_a_ticked_box_shows_a_tick(opened: Open) -> None:
     box = opened().form.noise
-    tick = parts.colour("dark", "ground")  # of a box that is ticked, on a ground of another colour
+    tick = widgets.colour("dark", "ground")  # of a box that is ticked, on a ground of another colour
     assert tick not in colours_of_box(box)
     box.setChecked(True)
-    assert {tick, parts.colour("dark", "act")} <= colours_of_box(box)
+    assert {tick, widgets.colour("dark", "act")} <= colours_of_box(box)
 
 
 # test shots

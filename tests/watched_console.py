@@ -129,11 +129,11 @@ def _read(label: Any) -> bool:
 
 def _run(window: Any) -> dict[str, Any]:
     """Where the run of a console's window is, as far as it is drawn."""
-    from experiments.screens.console.keys import field_of
+    from experiments.screens.console.keys import field_at
 
     if window.live is None:
         return {"ended": window.ended is not None}
-    drawn, live, now_s = window.drawn, window.live, window._clock.now()
+    drawn, live, now_s = window.drawn, window.live, window.clock.now()
     not_before_s = live.position.not_before_s
     in_time = not_before_s is None or now_s >= not_before_s
     return {
@@ -144,7 +144,7 @@ def _run(window: Any) -> dict[str, Any]:
         "ready": drawn.serial == live.position.serial and live.ready_at_s(now_s) and in_time,
         "ended": window.ended is not None,
         "line": window.controls.typing.line,
-        "typed": window.typed("line" if window.controls.typing.line else field_of(drawn) or "number"),
+        "typed": window.typed("line" if window.controls.typing.line else field_at(drawn) or "number"),
         "page": window.controls.page,
         "theme": window.theme,
         "places": _places(window),
@@ -152,7 +152,7 @@ def _run(window: Any) -> dict[str, Any]:
 
 
 def _places(window: Any) -> dict[str, list[int]]:
-    from experiments.screens.console.buttons import CommandButton
+    from experiments.screens.console.panels import CommandButton
 
     found = {}
     for button in window.findChildren(CommandButton):
@@ -251,7 +251,7 @@ def watch_guns(watch: Watch) -> None:
 def watch_participants(watch: Watch) -> None:
     """From now on every participant's screen that is started is watched."""
     from experiments.screens.participant.link import ParticipantLink
-    from experiments.screens.participant.words import Look, arguments
+    from experiments.screens.participant.messages import Look, arguments
 
     start, left = ParticipantLink.start, watch.participants
 

@@ -30,7 +30,7 @@ def watch(file: Path) -> None:
     def watched_step(stage: Stage) -> None:
         nonlocal last
         step(stage)
-        if stage.page is not last and stage._drawn_s:
+        if stage.page is not last and stage.drawn_s:
             last = stage.page
             with file.open("a", encoding="utf-8") as out:
                 out.write(f"{_told(last)}\n")
@@ -39,7 +39,7 @@ def watch(file: Path) -> None:
 
 
 def _told(page: Any) -> str:
-    message = getattr(page, "_text", None)
+    message = getattr(page, "message", None)
     return " ".join(filter(None, (type(page).__name__, getattr(message, "text", "").strip())))
 
 

@@ -19,11 +19,11 @@ from experiments.live_run import LiveRun
 from experiments.screens.texts import (
     FLAG_RULE,
     again_text,
-    one_line,
     ordinal,
     place_text,
     read_out_text,
     saved_text,
+    typed_line,
     typed_number,
     value_text,
 )
@@ -170,7 +170,7 @@ class TerminalScreen:
     def _read(self) -> None:
         with suppress(OSError):  # a terminal that vanishes ends like one that is closed
             for line in self._source:
-                self._typed(one_line(line))
+                self._typed(typed_line(line))
         self._closed()
 
     def _typed(self, line: str) -> None:

@@ -8,32 +8,10 @@ from __future__ import annotations
 import unicodedata
 
 from experiments.design.plan import Plan, Trial
+from experiments.session import remarks, steps
 from experiments.session.history import Entry, History, Value, is_attempt, together, value
-from experiments.session.remarks import (
-    MAX_FLAG,
-    AnswerCorrected,
-    DescriptionCorrected,
-    Flagged,
-    HaltReason,
-    Noted,
-    RatingCorrected,
-    Remark,
-    TestShot,
-)
-from experiments.session.steps import (
-    Answered,
-    Described,
-    Failed,
-    Interrupted,
-    Outcome,
-    Prepare,
-    Presented,
-    Rated,
-    Repeat,
-    Rested,
-    Step,
-    trial_of,
-)
+from experiments.session.remarks import MAX_FLAG, Remark
+from experiments.session.steps import Outcome, Prepare, Step, trial_of
 
 FLAG_RULE = f"A flag is a word of at most {MAX_FLAG} letters, digits and hyphens."
 
@@ -103,19 +81,19 @@ def saved_text(plan: Plan, step: Step | None, word: Outcome | Remark) -> str:  #
     if trial is None:
         return _rested_text(word) if step is not None else _remark_text(plan, word)
     match word:
-        case Answered():
+        case steps.Answered():
             return f"Saved. Trial {trial.trial}: {value_text(word.response)}."
-        case Rated():
+        case steps.Rated():
             return f"Saved. {ordinal(plan, trial)}: {value_text(word.rating)}."
-        case Described():
+        case steps.Described():
             return f"Saved. {ordinal(plan, trial)}: description."
-        case Presented():
+        case steps.Presented():
             return f"Presented and saved. {shots_text(word.shots)}, {word.exposure_s:.1f} s."
-        case Failed():
+        case steps.Failed():
             return f"The gun failed: {word.cause}. The trial is marked and presented again."
-        case Interrupted():
+        case steps.Interrupted():
             return "The pause ended the stimulus: its trial is presented again." if word.presented else ""
-        case Repeat():
+        case steps.Repeat():
             return f"Saved. Trial {word.trial.trial} is presented again ({word.reason})."
         case _:
             return ""
@@ -123,9 +101,9 @@ def saved_text(plan: Plan, step: Step | None, word: Outcome | Remark) -> str:  #
 
 def _rested_text(word: Outcome | Remark) -> str:
     match word:
-        case Rested():
+        case steps.Rested():
             return "The break is over."
-        case Repeat():
+        case steps.Repeat():
             return f"Saved. Trial {word.trial.trial} is presented again ({word.reason})."
         case _:
             return ""
@@ -133,19 +111,19 @@ def _rested_text(word: Outcome | Remark) -> str:
 
 def _remark_text(plan: Plan, remark: Outcome | Remark) -> str:
     match remark:
-        case AnswerCorrected():
+        case remarks.AnswerCorrected():
             return f"Saved. Trial {remark.trial.trial} corrected to {value_text(remark.response)}."
-        case RatingCorrected():
+        case remarks.RatingCorrected():
             return f"Saved. {ordinal(plan, remark.trial)} corrected to {value_text(remark.rating)}."
-        case DescriptionCorrected():
+        case remarks.DescriptionCorrected():
             return f"Saved. {ordinal(plan, remark.trial)}: description corrected."
-        case Flagged():
+        case remarks.Flagged():
             return f"Saved. Trial {remark.trial.trial} flagged {remark.flag}."
-        case Noted(trial=Trial()):  # one without a trial is the program's own
+        case remarks.Noted(trial=Trial()):  # one without a trial is the program's own
             return "Saved. Note."
-        case HaltReason():
+        case remarks.HaltReason():
             return "Saved. Reason of the emergency stop."
-        case TestShot():
+        case remarks.TestShot():
             return f"Test shot failed: {remark.cause}." if remark.cause else "The test shot was fired; the run goes on."
         case _:
             return ""
@@ -171,10 +149,10 @@ def duration_text(seconds: float) -> str:
     return " ".join(parts)
 
 
-def one_line(text: str) -> str:
+def typed_line(text: str) -> str:
     r"""What was typed or pasted into a line, without what no line holds: control characters become blanks.
 
-    >>> one_line("a\x00b\nc  ")
+    >>> typed_line("a\x00b\nc  ")
     'a b c'
     """
     return "".join(" " if unicodedata.category(letter) == "Cc" else letter for letter in text).strip()

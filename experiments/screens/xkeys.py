@@ -15,8 +15,6 @@ LOOK_S = 0.05
 _SMALLEST_PX = 400
 """Qt keeps small windows of its own; what people work at is wider."""
 
-_NAMES = {" ": "space", "\n": "Return", ".": "period", "-": "minus", ",": "comma", "?": "question"}
-
 
 class NoDisplay(Exception):  # noqa: N818 - a machine may well have none
     """There is no X display that takes synthetic events."""
@@ -27,16 +25,16 @@ class Hands:
 
     def __init__(self, name: str | None = None) -> None:
         try:
-            self._display = Display(name)
+            self.display = Display(name)
         except (DisplayError, OSError) as error:
             raise NoDisplay(f"no X display ({' '.join(str(error).split())})") from error
-        if not self._display.has_extension("XTEST"):
+        if not self.display.has_extension("XTEST"):
             raise NoDisplay("the X display has no XTEST extension")
-        self._root = self._display.screen().root
+        self._root = self.display.screen().root
 
     def close(self) -> None:
         """Let go of the display."""
-        self._display.close()
+        self.display.close()
 
     def key_down(self, name: str) -> float:
         """Press a key by its X name and keep it down, so that the system repeats it.
@@ -51,8 +49,8 @@ class Hands:
 
     def _key(self, event: int, name: str) -> float:
         at_s = time.monotonic()
-        xtest.fake_input(self._display, event, self._display.keysym_to_keycode(XK.string_to_keysym(name)))
-        self._display.sync()
+        xtest.fake_input(self.display, event, self.display.keysym_to_keycode(XK.string_to_keysym(name)))
+        self.display.sync()
         return at_s
 
     def press(self, name: str, *held: str) -> float:
@@ -64,26 +62,20 @@ class Hands:
             self.key_up(key)
         return pressed_s
 
-    def type(self, text: str) -> None:
-        """Type text of letters, digits and blanks, and what stands in `_NAMES`."""
-        for letter in text:
-            shifted = letter.isupper() or letter == "?"
-            self.press(_NAMES.get(letter, letter.lower()), *(["Shift_L"] if shifted else []))
-
     def move(self, x_px: int, y_px: int) -> None:
         """Move the pointer to a place of the display, in pixels from its upper left."""
-        xtest.fake_input(self._display, X.MotionNotify, x=x_px, y=y_px)
-        self._display.sync()
+        xtest.fake_input(self.display, X.MotionNotify, x=x_px, y=y_px)
+        self.display.sync()
 
     def button_down(self) -> None:
         """Press the mouse's left button and keep it down."""
-        xtest.fake_input(self._display, X.ButtonPress, 1)
-        self._display.sync()
+        xtest.fake_input(self.display, X.ButtonPress, 1)
+        self.display.sync()
 
     def button_up(self) -> None:
         """Let go of the mouse's left button."""
-        xtest.fake_input(self._display, X.ButtonRelease, 1)
-        self._display.sync()
+        xtest.fake_input(self.display, X.ButtonRelease, 1)
+        self.display.sync()
 
     def click(self, x_px: int, y_px: int) -> None:
         """Click at a place of the display."""
@@ -110,7 +102,7 @@ class Hands:
                 return None
             window.configure(stack_mode=X.Above)
             window.set_input_focus(X.RevertToParent, X.CurrentTime)
-            self._display.sync()
+            self.display.sync()
             corner, size = self._root.translate_coords(window, 0, 0), window.get_geometry()
             lies_open = self._holding(self._top_at(corner.x + size.width // 2, corner.y + size.height // 2), title)
         except XError:
@@ -139,5 +131,5 @@ class Hands:
 
     def _title(self, window: Any) -> str:
         """The title as modern programs say it, else as old ones do."""
-        told = window.get_full_text_property(self._display.intern_atom("_NET_WM_NAME"))
+        told = window.get_full_text_property(self.display.intern_atom("_NET_WM_NAME"))
         return str(told or window.get_wm_name() or "")

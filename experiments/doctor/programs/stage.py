@@ -6,7 +6,7 @@ import time
 from typing import Any
 
 from experiments.doctor.figures import Stage, percentile
-from experiments.screens.participant.toolkit import load, writable_home
+from experiments.screens.participant.stage import load_toolkit, writable_home
 
 FRAMES = 60
 
@@ -15,7 +15,7 @@ def look() -> Stage:
     """Import PsychoPy, open a window, draw some frames."""
     with writable_home():
         start_s = time.monotonic()
-        toolkit = load()
+        toolkit = load_toolkit()
         imported_s = time.monotonic()
         window = toolkit.visual.Window(size=(480, 120), fullscr=False, checkTiming=False)
         opened_s = time.monotonic()

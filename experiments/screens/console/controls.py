@@ -6,36 +6,71 @@ What a press means depends on what is on the screen: a page over it, a line that
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import Any
+from typing import Any, Literal, Protocol
 
 from device.words import Direction
 from experiments.clock import Clock
 from experiments.design.plan import Trial
 from experiments.live_run import LiveRun, Verdict
 from experiments.preference.config import RatingScale
-from experiments.screens.console import lines
 from experiments.screens.console.keys import (
     BY_NAME,
-    COMMANDS,
+    KEY_COMMANDS,
     Name,
     Typing,
     command_for,
-    field_of,
+    field_at,
     shown_key,
     why_not,
 )
-from experiments.screens.console.messages import Beside, View
-from experiments.screens.texts import FLAG_RULE, one_line, typed_number
+from experiments.screens.console.participant_link import ParticipantSide
+from experiments.screens.texts import FLAG_RULE, short_place, typed_line, typed_number
 from experiments.session import events
 from experiments.session.events import Event, Hand, Press
-from experiments.session.history import value
+from experiments.session.history import Value, trial_at, value
 from experiments.session.judging import REARM_HELD_S
+from experiments.session.remarks import flag_word
 from experiments.session.states import EMERGENCY, Position, State
 from experiments.session.steps import Ask
 
-PAGE_COMMANDS: tuple[Name, ...] = ("help", "list", "leave", "emergency", "theme")
+TextField = Literal["line", "number", "words"]
+"""What can be typed into."""
+
+
+class View(Protocol):
+    """What the controls need of the window."""
+
+    def say(self, text: str, mood: str) -> None:
+        """Show a line of answer, for a few seconds."""
+
+    def open_line(self, question: str) -> None:
+        """Let a line be typed."""
+
+    def close_line(self) -> None:
+        """Take the line away."""
+
+    def typed(self, field: TextField) -> str:
+        """What is typed in a field."""
+
+    def show_page(self, title: str, lines: list[str]) -> None:
+        """Cover the run with a page of text."""
+
+    def close_page(self) -> None:
+        """Show the run again."""
+
+    def show_list(self) -> None:
+        """Cover the run with the marks of the set."""
+
+    def other_theme(self) -> None:
+        """Change the colours."""
+
+    def shut(self) -> None:
+        """Close the window of a run that has ended."""
+
+
+_PAGE_COMMANDS: tuple[Name, ...] = ("help", "list", "leave", "emergency", "theme")
 """What is done while a page covers the run."""
-HOLDS: tuple[Name, ...] = ("pause", "next")
+_HOLDS: tuple[Name, ...] = ("pause", "next")
 """What makes the gun silent: done from a page as well, which goes. The rest would be done unseen."""
 
 _EVENTS: dict[Name, Event] = {
@@ -63,11 +98,11 @@ class Controls:
         *,
         scale: RatingScale | None = None,
         hand: Hand = "experimenter",
-        beside: Beside | None = None,
+        participant: ParticipantSide | None = None,
         observer: Any = None,
     ) -> None:
         self._live, self._clock, self._view = live, clock, view
-        self._scale, self._hand, self._beside = scale, hand, beside
+        self._scale, self._hand, self._participant = scale, hand, participant
         self._observer = observer
         self._enter: Callable[[str, Press], bool] | None = None
         self._held: Press | None = None
@@ -86,7 +121,7 @@ class Controls:
     @property
     def typing(self) -> Typing:
         """What is being typed."""
-        return Typing(line=self._enter is not None, field=field_of(self.drawn) is not None)
+        return Typing(line=self._enter is not None, field=field_at(self.drawn) is not None)
 
     @property
     def covered(self) -> bool:
@@ -128,8 +163,10 @@ class Controls:
             self._held = None
             self._view.say(f"Let go too soon: hold it for {REARM_HELD_S:g} s.", "wait")
 
-    def tick(self) -> None:
-        """Look whether it was held for long enough."""
+    def tick(self, *, here: bool = True) -> None:
+        """Look whether it was held for long enough, and whether a line or a page takes what is typed `here`."""
+        if self._participant is not None:
+            self._participant.covered = here and self.covered
         press = self._held
         if press is not None and (held_s := self._clock.now() - press.at_s) >= REARM_HELD_S:
             self._held = None
@@ -137,16 +174,23 @@ class Controls:
 
     def do(self, name: Name, press: Press) -> None:
         """Carry out a command."""
-        if name == "emergency":
-            self._offer(events.EmergencyStop())
-        elif self.page and name not in PAGE_COMMANDS + HOLDS:
-            self._run_again()
-        elif name in _WINDOWS:
-            _WINDOWS[name](self, press)
-        elif self.ended:
-            self._after_end(name)
-        else:
-            self._run(name, press)
+        match name:
+            case "emergency":
+                self._offer(events.EmergencyStop())
+            case _ if self.page and name not in _PAGE_COMMANDS + _HOLDS:
+                self._run_again()
+            case "help" | "list":
+                self._open_or_close(name)
+            case "theme":
+                self._view.other_theme()
+            case "leave":
+                self._leave(press)
+            case "enter":
+                self._entered(press)
+            case _ if self.ended:
+                self._after_end(name)
+            case _:
+                self._run(name, press)
 
     def _run_again(self) -> None:
         """A key that is not for a page takes it away, and does nothing else: what it does was not to be seen."""
@@ -161,7 +205,7 @@ class Controls:
 
     def _run(self, name: Name, press: Press) -> None:
         self.uncover()
-        if name in lines.NAMES:
+        if name in _QUESTIONS:
             self._ask_for(name)
         elif name in ("forward", "backward"):
             self._answer(name, press)
@@ -195,16 +239,16 @@ class Controls:
         return why_not(name, self.drawn) or self._nothing_to(name)
 
     def _no_restart(self) -> str:
-        if self._beside is None or not self._beside.lost:
+        if self._participant is None or not self._participant.lost:
             return "The participant's screen is not lost."
         return "" if self.drawn.state is State.PAUSED else "Pause first: a new window takes the keys."
 
     def _restart(self) -> None:
         refused = self._no_restart()
-        if refused or self._beside is None:
+        if refused or self._participant is None:
             self._view.say(refused, "bad")
         else:
-            self._beside.restart()
+            self._participant.restart()
 
     def _nothing_to(self, name: Name) -> str:
         if name == "repeat" and self._live.repeated() is None:
@@ -216,12 +260,13 @@ class Controls:
     # what is entered
 
     def _answer(self, response: Direction, press: Press) -> None:
-        if self.drawn.state is State.CORRECTING:
-            self._offer(events.Correct(value=response), press)
-            return
         drawn_s = self._drawn_s(response)
         answer = events.Answer(response=response, at_s=press.at_s, by=self._hand, response_time_s=drawn_s)
-        self._offer(answer, press)
+        self._give(answer, response, press)
+
+    def _give(self, event: Event, said: Value, press: Press) -> None:
+        """Offer what was entered, or the same as a correction where one is open."""
+        self._offer(events.Correct(value=said) if self.drawn.state is State.CORRECTING else event, press)
 
     def _drawn_s(self, response: Direction) -> float | None:
         """The synthetic participant's response time, if it is its answer that was entered."""
@@ -236,11 +281,12 @@ class Controls:
         if self._enter is not None:
             self._enter_line(press)
             return
-        match field_of(self.drawn):
+        match field_at(self.drawn):
             case "number":
                 self._number(self._view.typed("number"), press)
             case "words":
-                self._words(one_line(self._view.typed("words")), press)
+                text = typed_line(self._view.typed("words"))  # none is an answer as well
+                self._give(events.Description(text=text), text, press)
             case None if self.drawn.state is State.CLOSING:
                 self._offer(events.Finish(), press)
             case _:
@@ -257,13 +303,7 @@ class Controls:
             self._rate(rating, press)
 
     def _rate(self, rating: float | None, press: Press) -> None:
-        correcting = self.drawn.state is State.CORRECTING
-        self._offer(events.Correct(value=rating) if correcting else events.Rating(rating=rating, by=self._hand), press)
-
-    def _words(self, text: str, press: Press) -> None:
-        """The participant's words; none is an answer as well."""
-        correcting = self.drawn.state is State.CORRECTING
-        self._offer(events.Correct(value=text) if correcting else events.Description(text=text), press)
+        self._give(events.Rating(rating=rating, by=self._hand), rating, press)
 
     def entered_so_far(self) -> str:
         """What the open correction says now, to be typed over."""
@@ -283,14 +323,14 @@ class Controls:
         else:
             trial = (self._live.repeated() if name == "repeat" else None) or self._live.trial
             self._enter = lambda line, press: self._line(name, trial, line, press)
-            self._view.open_line(f"{lines.question(name, trial, self._live)}  (Enter saves, Esc leaves it)")
+            self._view.open_line(f"{_question(name, trial, self._live)}  (Enter saves, Esc leaves it)")
 
     def ask_why_it_stops(self) -> None:
         """Somebody wants to close the window of a live run."""
         self._ask_for("stop")
 
     def _enter_line(self, press: Press) -> None:
-        text, enter = one_line(self._view.typed("line")), self._enter
+        text, enter = typed_line(self._view.typed("line")), self._enter
         if not text:
             self._view.say("Type a word or two, or leave it with Esc.", "bad")
         elif enter is not None and enter(text, press):
@@ -302,7 +342,7 @@ class Controls:
 
     def _line(self, name: Name, trial: Trial, text: str, press: Press) -> bool:
         """Do what a line was typed for; what comes too late is kept as a note. Whether the line is done with."""
-        event = lines.event_of(name, trial, text)
+        event = _event_of(name, trial, text)
         if event is None:
             self._view.say(FLAG_RULE, "bad")
             return False
@@ -310,7 +350,7 @@ class Controls:
         if verdict.taken:
             self._say(verdict)
             return True
-        kept = self._live.offer(lines.as_note(name, trial, text))
+        kept = self._live.offer(_as_note(name, trial, text))
         self._view.say(f"{verdict.text} What you typed is kept as a note." if kept else verdict.text, "wait")
         return bool(kept)
 
@@ -331,42 +371,62 @@ class Controls:
             self.page = None
             self._view.close_page()
 
-    def _toggle(self, page: Name) -> bool:
-        """Whether a page is to be shown now; the key that opened it closes it."""
-        shown, self.page = self.page != page, page
-        if not shown:
+    def _open_or_close(self, page: Name) -> None:
+        """Show a page; the key that opened it closes it."""
+        if self.page == page:
             self.uncover()
-        return shown
-
-    def _help(self, press: Press) -> None:
-        del press
-        if not self._toggle("help"):
             return
-        self._view.show_page("Keys, and what each does now. Esc leaves this page.", self.help_lines())
+        self.page = page
+        if page == "list":
+            self._view.show_list()
+        else:
+            self._view.show_page("Keys, and what each does now. Esc leaves this page.", self.help_lines())
 
     def help_lines(self) -> list[str]:
         """Every key, what it does, and why it does nothing now."""
-        return [self._help_line(command.name) for command in COMMANDS]
+        return [self._help_line(command.name) for command in KEY_COMMANDS]
 
     def _help_line(self, name: Name) -> str:
         not_now = self.idle(name)
         key = shown_key(name, letters=self.typing.letters)
         return f"{key:<8} {BY_NAME[name].does}{f'   – not now: {not_now}' if not_now else ''}"
 
-    def _list(self, press: Press) -> None:
-        del press
-        if self._toggle("list"):
-            self._view.show_list()
 
-    def _theme(self, press: Press) -> None:
-        del press
-        self._view.other_theme()
+# the lines that are typed for a command: what is asked, and which event comes of it
 
-
-_WINDOWS: dict[Name, Callable[[Controls, Press], None]] = {
-    "help": Controls._help,
-    "list": Controls._list,
-    "theme": Controls._theme,
-    "leave": Controls._leave,
-    "enter": Controls._entered,
+_QUESTIONS: dict[Name, str] = {
+    "end break": "Why does the break end early?",
+    "repeat": "Why is trial {trial} to be presented again?",
+    "flag": "Flag {place} as (a word such as noise or late)",
+    "note": "Note on {place}",
+    "reason": "Why was there an emergency stop?",
+    "stop": "Why does the run stop here? It can be resumed.",
 }
+
+
+def _question(name: Name, trial: Trial, live: LiveRun) -> str:
+    place = short_place(trial, trial_at(live.plan, live.history, live.position.step))
+    return _QUESTIONS[name].format(trial=trial.trial, place=place)
+
+
+def _event_of(name: Name, trial: Trial, text: str) -> Event | None:
+    """What a typed text comes to; `None` if it is to be a flag and is none."""
+    match name:
+        case "end break":
+            return events.EndBreak(reason=text)
+        case "repeat":
+            return events.Repeat(reason=text, trial=trial)
+        case "flag":
+            flag = flag_word(text)
+            return None if flag is None else events.Flag(flag=flag, trial=trial)
+        case "note":
+            return events.Note(text=text, trial=trial)
+        case "reason":
+            return events.Reason(text=text)
+        case _:
+            return events.Stop(reason=text)
+
+
+def _as_note(name: Name, trial: Trial, text: str) -> events.Note:
+    """What was typed for something that is not done any more."""
+    return events.Note(text=f"{'break' if name == 'end break' else name}: {text}", trial=trial)

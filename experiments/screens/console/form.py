@@ -1,4 +1,4 @@
-"""The form of the start window: who, which experiment, what is asked of them, and what they have beside the console."""
+"""The start window's form, and its table of the participants: who, which experiment, and what is asked of them."""
 
 from __future__ import annotations
 
@@ -8,12 +8,24 @@ from typing import get_args
 
 from PyQt6.QtCore import Qt, pyqtSignal
 from PyQt6.QtGui import QGuiApplication, QScreen
-from PyQt6.QtWidgets import QFormLayout, QFrame, QLabel, QScrollArea, QSizePolicy, QVBoxLayout, QWidget
+from PyQt6.QtWidgets import (
+    QFormLayout,
+    QFrame,
+    QHeaderView,
+    QLabel,
+    QScrollArea,
+    QSizePolicy,
+    QTableWidget,
+    QTableWidgetItem,
+    QVBoxLayout,
+    QWidget,
+)
 
 from experiments.config.models import Fact, Handedness, Sex
 from experiments.run import ParticipantOptions
-from experiments.screens.console import parts
-from experiments.screens.console.fields import LineEdit, Lines, ListBox, TickBox
+from experiments.screens.console import widgets
+from experiments.screens.console.people import cell_text, note_text
+from experiments.screens.console.widgets import LineEdit, ListBox, TextLines, TickBox
 from experiments.study.enrolment import Entered, typed_facts
 from experiments.study.study import Participant
 
@@ -37,7 +49,7 @@ class Form(QFrame):
         self.facts: dict[str, LineEdit | ListBox] = {fact: _fact(fact) for fact in asked}
         self.own_screen, self.own_keys = TickBox("rates on their own screen"), TickBox("answers with own keys")
         self.noise, self.monitor = TickBox("hears masking noise"), ListBox(monitors())
-        self.remark = Lines("remark")
+        self.remark = TextLines("remark")
         self._typed: dict[str, str] | None = None
         self._tick(options)
         self._lay_out()
@@ -50,7 +62,7 @@ class Form(QFrame):
         form.setFieldGrowthPolicy(QFormLayout.FieldGrowthPolicy.ExpandingFieldsGrow)
         for name, widget in self._rows():
             widget.setAccessibleName(name)
-            form.addRow(_beside_its_field(name), widget)
+            form.addRow(_field_name(name), widget)
         scroll = QScrollArea()
         scroll.setWidget(fields)
         scroll.setWidgetResizable(True)
@@ -58,7 +70,7 @@ class Form(QFrame):
         scroll.setFocusPolicy(Qt.FocusPolicy.NoFocus)
         scroll.setHorizontalScrollBarPolicy(Qt.ScrollBarPolicy.ScrollBarAlwaysOff)
         down = QVBoxLayout(self)
-        for part in (parts.label("quiet", _HOW_TO_START), self.remark):
+        for part in (widgets.text_label("quiet", _HOW_TO_START), self.remark):
             down.addWidget(part)
         down.addWidget(scroll, 1)
 
@@ -129,9 +141,9 @@ class Form(QFrame):
                 widget.setCurrentText(values[fact])
 
 
-def _beside_its_field(name: str) -> QLabel:
+def _field_name(name: str) -> QLabel:
     """The name of a field, at half its height."""
-    made = parts.label("", name, wrap=False)
+    made = widgets.text_label("", name, wrap=False)
     made.setAlignment(Qt.AlignmentFlag.AlignVCenter)
     made.setSizePolicy(QSizePolicy.Policy.Preferred, QSizePolicy.Policy.Expanding)
     return made
@@ -171,3 +183,43 @@ class Opening:
     options: ParticipantOptions = field(default_factory=ParticipantOptions)
     participant_id: str = ""
     said: str = ""
+
+
+class PeopleTable(QTableWidget):
+    """A row a participant, a column an experiment. `person_chosen` with the code of a row that somebody chose."""
+
+    person_chosen = pyqtSignal(str)
+
+    def __init__(self, experiments: Sequence[str]) -> None:
+        super().__init__()
+        columns = ["code", *experiments, "note"]
+        self.setColumnCount(len(columns))
+        self.setHorizontalHeaderLabels(columns)
+        self.setEditTriggers(QTableWidget.EditTrigger.NoEditTriggers)
+        self.setSelectionBehavior(QTableWidget.SelectionBehavior.SelectRows)
+        self.setSelectionMode(QTableWidget.SelectionMode.SingleSelection)
+        self.setTabKeyNavigation(False)
+        self.setMinimumSize(120, 60)
+        across, down = self.horizontalHeader(), self.verticalHeader()
+        if across is not None and down is not None:
+            across.setSectionResizeMode(QHeaderView.ResizeMode.ResizeToContents)
+            across.setStretchLastSection(True)
+            down.setVisible(False)  # numbers beside codes are no codes
+            down.setSectionResizeMode(QHeaderView.ResizeMode.ResizeToContents)
+        self.itemSelectionChanged.connect(self._chosen)
+        self.cellClicked.connect(self._chosen)  # also the row that was chosen before
+
+    def show_people(self, seen: Sequence[Participant]) -> None:
+        """Show how the participants stand."""
+        self.blockSignals(True)
+        self.setRowCount(len(seen))
+        for line, person in enumerate(seen):
+            cells = [person.participant_id, *map(cell_text, person.runs), note_text(person)]
+            for column, text in enumerate(cells):
+                self.setItem(line, column, QTableWidgetItem(text))
+        self.blockSignals(False)
+
+    def _chosen(self) -> None:
+        code = self.item(self.currentRow(), 0)
+        if code is not None:
+            self.person_chosen.emit(code.text())

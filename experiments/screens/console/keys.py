@@ -11,7 +11,6 @@ from typing import Literal
 
 from experiments.session import events
 from experiments.session.events import Event
-from experiments.session.history import What
 from experiments.session.states import No, Position, State, change_of
 
 BOUNCE_S = 0.02
@@ -48,7 +47,7 @@ Name = Literal[
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Command:
+class KeyCommand:
     """Something that a key does. `kind` is the event that it offers, if it offers one."""
 
     name: Name
@@ -58,8 +57,8 @@ class Command:
     kind: type[Event] | None = None
 
 
-_C = Command
-COMMANDS: tuple[Command, ...] = (
+_C = KeyCommand
+KEY_COMMANDS: tuple[KeyCommand, ...] = (
     _C(name="emergency", key="F12", text="EMERGENCY STOP", does="disarms; fires no more", kind=events.EmergencyStop),
     _C(name="fire", key="Space", text="Fire", does="fires, when the gun is handed over", kind=events.Fire),
     _C(name="next", key="Space", text="“Next” was said", does="ends the train", kind=events.Next),
@@ -85,17 +84,12 @@ COMMANDS: tuple[Command, ...] = (
     _C(name="note", key="N", text="Note…", does="writes a note on the trial", kind=events.Note),
     _C(name="reason", key="Y", text="Say why…", does="says why there was an emergency stop", kind=events.Reason),
     _C(name="stop", key="Q", text="Stop…", does="stops the run, which can be resumed", kind=events.Stop),
-    _C(
-        name="restart",
-        key="S",
-        text="Start it again",
-        does="starts the participant's screen again",
-    ),
+    _C(name="restart", key="S", text="Start it again", does="starts the participant's screen again"),
     _C(name="list", key="L", text="List", does="lists flags, notes and corrections of the set"),
     _C(name="help", key="F1", text="Keys", does="shows this page"),
     _C(name="theme", key="F2", text="Dark/light", does="changes the colours"),
 )
-BY_NAME: dict[Name, Command] = {command.name: command for command in COMMANDS}
+BY_NAME: dict[Name, KeyCommand] = {command.name: command for command in KEY_COMMANDS}
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -116,20 +110,19 @@ def command_for(key: str, *, ctrl: bool, typing: Typing, position: Position) -> 
 
     Where letters are text, a letter is a command with Ctrl held; elsewhere Ctrl changes nothing, but answers take none.
     """
-    if key in ("F12", "F1", "F2", "Esc"):
-        return {"F12": "emergency", "F1": "help", "F2": "theme", "Esc": "leave"}[key]  # type: ignore[return-value]
-    if key == "Enter":
-        return "enter"
+    if key in _ALWAYS:
+        return _ALWAYS[key]
     if ctrl and key == "Space":
         return None  # it changes the input method: nobody fires by that
     if ctrl and key == "X":
-        return "no answer" if field_of(position) == "number" and not typing.line else None
+        return "no answer" if field_at(position) == "number" and not typing.line else None
     if typing.letters and not ctrl:
         return None
     name = _letter(key, position)
     return None if ctrl and not typing.letters and name in _ANSWERS else name
 
 
+_ALWAYS: dict[str, Name] = {"F12": "emergency", "F1": "help", "F2": "theme", "Esc": "leave", "Enter": "enter"}
 _ANSWERS: tuple[Name, ...] = ("forward", "backward")
 
 
@@ -144,20 +137,20 @@ def _letter(key: str, position: Position) -> Name | None:
 
 
 _LETTERS: dict[str, Name] = {
-    command.key: command.name for command in COMMANDS if len(command.key) == 1 and command.key != "P"
+    command.key: command.name for command in KEY_COMMANDS if len(command.key) == 1 and command.key != "P"
 }
 
 
-def field_of(position: Position) -> Literal["number", "words"] | None:
+def field_at(position: Position) -> Literal["number", "words"] | None:
     """What is typed at a position, apart from a line that was asked for."""
-    what: What | None = None
-    if position.state is State.CORRECTING and position.correcting is not None:
-        what = position.correcting.what
-    elif position.state is State.RATING:
-        what = "rating"
-    elif position.state is State.DESCRIBING:
-        what = "description"
-    return {"rating": "number", "description": "words"}.get(what or "")  # type: ignore[return-value]
+    entry = position.correcting if position.state is State.CORRECTING else None
+    match entry.what if entry is not None else position.state:
+        case "rating" | State.RATING:
+            return "number"
+        case "description" | State.DESCRIBING:
+            return "words"
+        case _:
+            return None
 
 
 def shown_key(name: Name, *, letters: bool) -> str:
@@ -175,8 +168,8 @@ def shown_key(name: Name, *, letters: bool) -> str:
 def why_not(name: Name, position: Position) -> str:
     """Why a command does nothing at a position; empty if it does something."""
     kind = BY_NAME[name].kind
-    if name in ("forward", "backward") and position.state is State.CORRECTING:
-        kind = events.Correct if field_of(position) is None else kind
+    if name in _ANSWERS and position.state is State.CORRECTING:
+        kind = events.Correct if field_at(position) is None else kind
     if name == "no answer" and position.state is State.CORRECTING:
         kind = events.Correct
     if kind is None:

@@ -3,74 +3,67 @@
 from __future__ import annotations
 
 import tempfile
+import threading
+import time
+from collections.abc import Callable
+from concurrent.futures import Future
 from contextlib import ExitStack
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeVar
 
+from PyQt6.QtCore import QEventLoop, Qt, QTimer
 from PyQt6.QtGui import QGuiApplication
+from PyQt6.QtWidgets import QDialog, QLabel, QPushButton, QVBoxLayout
 
-from device import DeviceError
+from device.words import RecoilError
 from experiments.clock import RealClock
-from experiments.config.door import ConfigError
 from experiments.config.setup import Setup
 from experiments.live_run import RunStopped
 from experiments.load import load_setup, load_study
 from experiments.record.journal import JournalError
-from experiments.run import Finished, RunRequest, UnfinishedRun
-from experiments.screens.console.app import Console, application, run_console
-from experiments.screens.console.beside import WAIT, ParticipantSide
+from experiments.run import Again, Finished, RunRequest, UnfinishedRun
+from experiments.screens.console import people, widgets
+from experiments.screens.console.app import Console, application
 from experiments.screens.console.form import Opening, monitors
-from experiments.screens.console.start import choose
-from experiments.screens.console.unfinished import ask, while_shown
+from experiments.screens.console.participant_link import WAIT, ParticipantSide
+from experiments.screens.console.start import choose_run
+from experiments.screens.console.view import THANK_PARTICIPANT
 from experiments.screens.console.visual import Rater, VisualParticipant
-from experiments.screens.console.windows import signals_to
-from experiments.screens.participant.link import ParticipantLink
-from experiments.screens.participant.process import ParticipantError
-from experiments.screens.participant.words import Look, NoiseIs
+from experiments.screens.console.widgets import WHY, Option, QuestionBox, TextLines, start_sheet, unfit
+from experiments.screens.console.windows import FreshShortcuts, let_go, signals_to
+from experiments.screens.participant.link import ParticipantError, ParticipantLink
+from experiments.screens.participant.messages import Look, NoiseIs
 from experiments.study.places import PlaceError
-from experiments.study.progress import StudyFolder
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Words:
-    """What the window says of a run: the band of a practice or a training, and the last sentence."""
-
-    band: str = ""
-    last: str = "Thank the participant."
-
+from experiments.study.progress import StudyFolder, progress_of
 
 _NO_HANDS = "--visual --participant-screen rates by synthetic events, which only an X display takes"
 
 
-def run_live(request: RunRequest, words: Words | None = None) -> Finished:
+def run_live(request: RunRequest, *, band: str = "", last: str = THANK_PARTICIPANT) -> Finished:
     """Carry out a run at the console. An unfinished one is shown and asked about, but for a synthetic participant.
 
-    `PlaceError` without a display, or if the participant's screen does not open.
+    `band` and `last` as of a `Console`. `PlaceError` without a display, or if the participant's screen does not open.
     """
     application()
     try:
-        return _carry_out(request, words or Words())
+        return _carry_out(request, band, last)
     except UnfinishedRun as found:
-        decided = None if request.visual else ask(request, found)
+        decided = None if request.visual else ask_about(request, found)
         if decided is None:
             raise
-        return _carry_out(decided, words or Words())
+        return _carry_out(decided, band, last)
 
 
-def _carry_out(request: RunRequest, words: Words) -> Finished:
-    driver: list[VisualParticipant] = []
+def _carry_out(request: RunRequest, band: str, last: str) -> Finished:
     clock = RealClock()
-
     with ExitStack() as stack:
         rater = _rater(stack) if request.visual and request.options.screen else None
-        beside = _participant(stack, request) if request.options.any else None
-
-        def watch(console: Console) -> None:
-            if request.visual:
-                driver.append(VisualParticipant(console, clock, rater, beside))
-
-        return run_console(request, clock, beside=beside, band=words.band, last=words.last, watch=watch)
+        participant = _participant(stack, request) if request.options.any else None
+        console = Console(request, clock, participant=participant, band=band, last=last)
+        if request.visual:
+            stack.enter_context(VisualParticipant(console, rater))
+        return console.run()
 
 
 def lab_day(request: RunRequest) -> None:
@@ -80,12 +73,13 @@ def lab_day(request: RunRequest) -> None:
     """
     application()
     check_monitor(request.options.monitor)
-    study, named = _study(request), request.setup.config.experiment
+    study, named = study_of(request), request.setup.config.experiment
     opening = Opening(gun=request.gun, named=named, options=request.options)
     with signals_to() as signalled:
-        while not signalled and (choice := choose(study, opening, RealClock())) is not None:
+        while not signalled and (choice := choose_run(study, opening, RealClock())) is not None:
             said = _of_the_day(request, study, choice)
-            opening = Opening(gun=request.gun, options=choice.options, participant_id=_seated(choice), said=said)
+            code = "" if choice.training else choice.participant_id
+            opening = Opening(gun=request.gun, options=choice.options, participant_id=code, said=said)
     if signalled:
         raise KeyboardInterrupt(signalled[0])
 
@@ -97,20 +91,15 @@ def check_monitor(monitor: int | None) -> None:
         raise PlaceError(f"--participant-monitor {monitor}: there is no such screen; known are {'; '.join(known)}")
 
 
-def _seated(choice: RunRequest) -> str:
-    """Who was there; nobody in a training."""
-    return "" if choice.training else choice.participant_id
-
-
-def _words(study: StudyFolder, choice: RunRequest) -> Words:
-    """What the window of a chosen run is to say of it."""
+def _band_and_last(study: StudyFolder, choice: RunRequest) -> tuple[str, str]:
+    """What the window of a chosen run says of it: its band, and the last sentence."""
     if choice.training:
-        return Words(band="TRAINING – nothing of it is kept", last="The training is over.")
+        return "TRAINING – nothing of it is kept", "The training is over."
     if choice.practice:
-        return Words(band="PRACTICE – never analysed", last="The practice is over: the run itself comes next.")
-    names = [setup.config.experiment for setup in study.setups]
+        return "PRACTICE – never analysed", "The practice is over: the run itself comes next."
+    names = study.experiments
     later = names[names.index(choice.setup.config.experiment) + 1 :]
-    return Words(last=f"Next: {later[0]}.") if later else Words()
+    return "", f"Next: {later[0]}." if later else THANK_PARTICIPANT
 
 
 def _of_the_day(request: RunRequest, study: StudyFolder, choice: RunRequest) -> str:
@@ -118,10 +107,11 @@ def _of_the_day(request: RunRequest, study: StudyFolder, choice: RunRequest) -> 
     with ExitStack() as stack:
         results = Path(stack.enter_context(tempfile.TemporaryDirectory())) if choice.training else request.results
         try:
-            run_live(replace(choice, seed=request.seed, results=results), _words(study, choice))
+            band, last = _band_and_last(study, choice)
+            run_live(replace(choice, seed=request.seed, results=results), band=band, last=last)
         except RunStopped as stop:
             return _stopped(choice, str(stop))
-        except (PlaceError, JournalError, ConfigError, DeviceError) as error:
+        except RecoilError as error:
             return str(error)
     return ""
 
@@ -134,7 +124,7 @@ def _stopped(choice: RunRequest, reason: str) -> str:
     return f"{choice.participant_id} stopped: {reason}. Start asks whether to go on there or to start anew."
 
 
-def _study(request: RunRequest) -> StudyFolder:
+def study_of(request: RunRequest) -> StudyFolder:
     """The study that the config lies in, if the study names it; else this experiment alone, by the rules of that study.
 
     Where there is no study beside the config, they are those of the shipped one.
@@ -200,3 +190,93 @@ def _rater(stack: ExitStack) -> Rater:
         raise PlaceError(f"{_NO_HANDS}: {error}") from error
     stack.callback(hands.close)
     return Rater(hands)
+
+
+class Unfinished(QDialog):
+    """Go on with a run, set it aside for a reason, or leave it. `decided` is the request with the decision, if any.
+
+    Nothing is chosen by Enter or by closing the window.
+    """
+
+    def __init__(self, request: RunRequest, found: UnfinishedRun) -> None:
+        super().__init__()
+        self._request = request
+        self.decided: RunRequest | None = None
+        self.setWindowTitle("Recoil – unfinished run")
+        self.setStyleSheet(start_sheet())
+        answers = (
+            Option(text="Go on with it", key="Ctrl+G", do=lambda _: self._decide("resume", "")),
+            Option(text="Set it aside, start anew", key="Ctrl+N", do=self._fresh),
+            Option(text="Leave it", key="Esc", do=lambda _: self.reject()),
+        )
+        self.question = QuestionBox(_text(found), answers, reason=f"to start anew: {WHY}")
+        self.said = TextLines("saved")
+        down = QVBoxLayout(self)
+        down.addWidget(self.question)
+        down.addWidget(self.said)
+        self.setMinimumWidth(720)
+        for button in self.findChildren(QPushButton):
+            button.setAutoDefault(False)
+
+    def _fresh(self, reason: str) -> None:
+        wrong = unfit(reason)
+        if not wrong:
+            self._decide("fresh", reason)
+            return
+        self.said.say(wrong, "bad")
+        self.question.reason.setFocus()
+
+    def _decide(self, again: Again, reason: str) -> None:
+        self.decided = replace(self._request, again=again, anew_reason=reason)
+        self.accept()
+
+
+def _text(found: UnfinishedRun) -> str:
+    try:
+        return people.stopped_text(found.where.participant_id, progress_of(found.where, found.contents))
+    except JournalError as error:
+        return str(error)
+
+
+def ask_about(request: RunRequest, found: UnfinishedRun) -> RunRequest | None:
+    """The request with the decision of the person at the console; `None` if they leave the run as it is.
+
+    `KeyboardInterrupt` if a signal ended the question.
+    """
+    dialog = Unfinished(request, found)
+    FreshShortcuts(dialog, time.monotonic)
+    with signals_to(lambda _: dialog.reject()) as signalled:
+        dialog.exec()
+    decided = dialog.decided
+    let_go(dialog)
+    if signalled:
+        raise KeyboardInterrupt(signalled[0])
+    return decided
+
+
+_LOOK_MS = 30
+Made = TypeVar("Made")
+
+
+def while_shown(text: str, make: Callable[[], Made]) -> Made:
+    """What `make` gives back, done in a thread of its own while a window shows the text. Raises what it raises."""
+    shown = QLabel(text)
+    shown.setWindowTitle("Recoil – please wait")
+    shown.setStyleSheet(f"{widgets.sheet('dark')} QLabel {{ font-size: 26px; padding: 40px; }}")
+    shown.setAlignment(Qt.AlignmentFlag.AlignCenter)
+    made: Future[Made] = Future()
+
+    def work() -> None:
+        try:
+            made.set_result(make())
+        except BaseException as error:  # noqa: BLE001 - raised again where it is waited for
+            made.set_exception(error)
+
+    loop, look = QEventLoop(), QTimer()
+    look.timeout.connect(lambda: loop.quit() if made.done() else None)
+    shown.show()
+    threading.Thread(target=work, daemon=True, name="waiting").start()
+    look.start(_LOOK_MS)
+    loop.exec()
+    shown.close()
+    return made.result()

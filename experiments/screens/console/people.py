@@ -1,11 +1,8 @@
-"""How participants stand, in the sentences of the start window, and the table to choose one from."""
+"""How participants stand, in the sentences of the start window. Pure."""
 
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-
-from PyQt6.QtCore import pyqtSignal
-from PyQt6.QtWidgets import QHeaderView, QTableWidget, QTableWidgetItem
 
 from experiments.clock import date_text
 from experiments.study.enrolment import left_to_do, passed_over, run_of
@@ -101,43 +98,3 @@ def _progress(person: Participant, experiment: str) -> str:
         return stopped_text(code, run)
     done = [one.experiment for one in person.runs if one.state == "done"]
     return f"{code} has done {' and '.join(done)}." if done else f"{code} has not begun."
-
-
-class PeopleTable(QTableWidget):
-    """A row a participant, a column an experiment. `person_chosen` with the code of a row that somebody chose."""
-
-    person_chosen = pyqtSignal(str)
-
-    def __init__(self, experiments: Sequence[str]) -> None:
-        super().__init__()
-        columns = ["code", *experiments, "note"]
-        self.setColumnCount(len(columns))
-        self.setHorizontalHeaderLabels(columns)
-        self.setEditTriggers(QTableWidget.EditTrigger.NoEditTriggers)
-        self.setSelectionBehavior(QTableWidget.SelectionBehavior.SelectRows)
-        self.setSelectionMode(QTableWidget.SelectionMode.SingleSelection)
-        self.setTabKeyNavigation(False)
-        self.setMinimumSize(120, 60)
-        across, down = self.horizontalHeader(), self.verticalHeader()
-        if across is not None and down is not None:
-            across.setSectionResizeMode(QHeaderView.ResizeMode.ResizeToContents)
-            across.setStretchLastSection(True)
-            down.setVisible(False)  # numbers beside codes are no codes
-            down.setSectionResizeMode(QHeaderView.ResizeMode.ResizeToContents)
-        self.itemSelectionChanged.connect(self._chosen)
-        self.cellClicked.connect(self._chosen)  # also the row that was chosen before
-
-    def show_people(self, seen: Sequence[Participant]) -> None:
-        """Show how the participants stand."""
-        self.blockSignals(True)
-        self.setRowCount(len(seen))
-        for line, person in enumerate(seen):
-            cells = [person.participant_id, *map(cell_text, person.runs), note_text(person)]
-            for column, text in enumerate(cells):
-                self.setItem(line, column, QTableWidgetItem(text))
-        self.blockSignals(False)
-
-    def _chosen(self) -> None:
-        code = self.item(self.currentRow(), 0)
-        if code is not None:
-            self.person_chosen.emit(code.text())

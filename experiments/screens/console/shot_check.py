@@ -1,4 +1,4 @@
-"""A test shot: one shot of one method as a run fires it, beside the window, after a countdown. No Qt.
+"""A test shot: one shot of one method as a run fires it, beside the window, after a countdown; and its page.
 
 The emergency stop is a latch: it is set before the gun is told to disarm, and looked at after the gun was armed and
 before it fires, so that nothing of this test fires after it, whatever the gun does meanwhile.
@@ -12,18 +12,23 @@ from contextlib import closing, suppress
 from dataclasses import dataclass
 from typing import Any, Literal
 
+from PyQt6.QtCore import Qt, pyqtSignal
+from PyQt6.QtWidgets import QVBoxLayout, QWidget
+
 from device import DeviceError, Gun, GunStatus, Shot, ShotReport, open_gun
 from device.methods import drive_of
 from device.words import Drive, Effect
 from experiments.clock import Clock
 from experiments.config.setup import Setup
+from experiments.screens.console import widgets
+from experiments.screens.console.widgets import TextLines
 
 COUNTDOWN_S = 3
 SWITCH_OFF = "SWITCH OFF ITS POWER."
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Told:
+class ShotProgress:
     """What a test shot has to tell: how far it is, the seconds until the shot, and at the end what came of it."""
 
     phase: Literal["opening", "counting", "firing", "over"]
@@ -42,14 +47,14 @@ class ShotCheck:
         method: str,
         address: str,
         clock: Clock,
-        tell: Callable[[Told], None],
+        tell: Callable[[ShotProgress], None],
     ) -> None:
         self._setup, self._method, self._address = setup, method, address
         self._clock, self._tell = clock, tell
         self._latched, self._off = threading.Event(), threading.Event()
         self._gun: Gun | None = None
         self._report: ShotReport | None = None
-        self._disarming: list[threading.Thread] = []
+        self.disarming: list[threading.Thread] = []
 
     def start(self) -> None:
         """Begin; returns at once."""
@@ -65,7 +70,7 @@ class ShotCheck:
         self._off.set()
         disarming = threading.Thread(target=self._disarm, name="emergency stop", daemon=True)
         disarming.start()
-        self._disarming.append(disarming)
+        self.disarming.append(disarming)
 
     def _disarm(self) -> None:
         gun = self._gun
@@ -81,7 +86,7 @@ class ShotCheck:
         except (DeviceError, ValueError) as error:
             text = f"Test shot of {self._label}: {error}"
         finally:
-            self._tell(Told(phase="over", fired=self._report is not None, text=text, mood=mood))
+            self._tell(ShotProgress(phase="over", fired=self._report is not None, text=text, mood=mood))
 
     @property
     def _label(self) -> str:
@@ -89,7 +94,7 @@ class ShotCheck:
 
     def _with_gun(self) -> tuple[str, str]:
         """Open, fire, disarm, read back, close; what came of it, and a word for the colour."""
-        self._tell(Told(phase="opening"))
+        self._tell(ShotProgress(phase="opening"))
         methods = self._setup.gun.renderings(self._setup.config.design.methods)
         drive = drive_of(methods[self._method])
         with closing(open_gun(self._address, methods, clock=self._clock.now)) as gun:
@@ -103,7 +108,7 @@ class ShotCheck:
 
     def _fire(self, gun: Gun, drive: Drive) -> str:
         for seconds in range(COUNTDOWN_S, 0, -1):
-            self._tell(Told(phase="counting", seconds=seconds))
+            self._tell(ShotProgress(phase="counting", seconds=seconds))
             if self._off.wait(1.0):
                 break
         if not self._off.is_set():
@@ -112,7 +117,7 @@ class ShotCheck:
 
     def _armed_shot(self, gun: Gun, drive: Drive) -> ShotReport | None:
         """As the runner fires the first shot of a stimulus: armed for it alone, as soon as the magnet is home."""
-        self._tell(Told(phase="firing"))
+        self._tell(ShotProgress(phase="firing"))
         gun.arm()
         if self._off.wait(max(0.0, gun.status().ready_at_s - self._clock.now())):
             return None
@@ -122,7 +127,7 @@ class ShotCheck:
         """The state read back from the gun once it was told to disarm; `None` if it does not say."""
         try:
             gun.disarm()
-            for disarming in self._disarming:
+            for disarming in self.disarming:
                 disarming.join()
             return gun.status()
         except DeviceError:
@@ -168,3 +173,133 @@ def state_text(status: GunStatus | None) -> tuple[str, bool]:
     if status.state != "disarmed":
         return f"The gun reports: {status.state}. {SWITCH_OFF}", False
     return "The gun reports: disarmed.", True
+
+
+class ShotPage(QWidget):
+    """Takes the window's place from the press of a button until somebody goes back. One test shot at a time."""
+
+    told = pyqtSignal(object)
+    left = pyqtSignal()
+
+    def __init__(self, gun: str, clock: Clock) -> None:
+        super().__init__()
+        self._gun, self._clock = gun, clock
+        self._check: ShotCheck | None = None
+        self._setup: Setup[Any] | None = None
+        self.stopped = False
+        """The emergency stop: nothing is fired from this page until it was left, and entered on purpose."""
+        self._method_at = 0
+        self.over: Callable[[], None] = lambda: None
+        self.told.connect(self._take)
+        self._build()
+
+    def _build(self) -> None:
+        self.title, self.count, self.detail = (
+            widgets.text_label("title"),
+            widgets.text_label("count"),
+            TextLines("detail", most_lines=9),
+        )
+        self.count.setAlignment(Qt.AlignmentFlag.AlignHCenter)
+        self.call_off_button = widgets.button(self, "Call it off", "Esc", self._escape)
+        self.next_button = widgets.button(self, "Next test shot", "Ctrl+T", self.begin)
+        self.stop_button = widgets.button(self, "EMERGENCY STOP", "F12", self.emergency_stop, name="stop")
+        down = QVBoxLayout(self)
+        down.setContentsMargins(0, 0, 0, 0)
+        for part in (self.title, self.detail, self.count):
+            down.addWidget(part)
+        down.addStretch(1)
+        for button in (self.stop_button, self.call_off_button, self.next_button):
+            down.addWidget(button)
+        # its place stays empty: there the second click of a double click on the window's own button falls
+        kept = self.next_button.sizePolicy()
+        kept.setRetainSizeWhenHidden(True)
+        self.next_button.setSizePolicy(kept)
+
+    @property
+    def is_running(self) -> bool:
+        """Whether a test shot is under way."""
+        return self._check is not None
+
+    def enter(self) -> None:
+        """The page was entered anew."""
+        self.stopped = False
+
+    def choose(self, setup: Setup[Any]) -> None:
+        """Test the methods of an experiment, from the first on."""
+        if self._setup is not setup:
+            self._setup, self._method_at = setup, 0
+
+    def next_text(self) -> str:
+        """What the button of the next test shot says: the method, and the damper that is to be set by hand before."""
+        if self._setup is None:
+            return "Test shot"
+        method = self._setup.gun.methods[self._next_method(self._setup)]
+        damper = f", damper {method.damper.upper()}" if method.damper else ""
+        return f"Test shot: {method.label}{damper}"
+
+    def _next_method(self, setup: Setup[Any]) -> str:
+        methods: tuple[str, ...] = setup.config.design.methods
+        return methods[self._method_at % len(methods)]
+
+    def begin(self) -> None:
+        """Test the next method."""
+        if self._check is not None or self._setup is None or self.stopped:
+            return
+        method = self._next_method(self._setup)
+        self._shown = self.next_text().removeprefix("Test shot: ")
+        self._show("One moment", f"Looking for the gun. Test shot of {self._shown}.", "wait")
+        self._running(True)
+        self._check = ShotCheck(self._setup, method, self._gun, self._clock, self.told.emit)
+        self._check.start()
+
+    def emergency_stop(self) -> None:
+        """Latch and disarm."""
+        if self._check is None:
+            return
+        self._check.emergency_stop()
+        self.stopped = True
+        self._show("EMERGENCY STOP", f"Disarming. If the gun does not fall silent: {SWITCH_OFF}", "bad")
+
+    def call_off(self) -> None:
+        """Fire no more, if it has not fired."""
+        if self._check is not None:
+            self._check.call_off()
+
+    def _escape(self) -> None:
+        if self._check is None:
+            self.left.emit()
+        else:
+            self.call_off()
+
+    def _take(self, told: ShotProgress) -> None:
+        """Show how far the test shot is."""
+        if told.phase == "over":
+            self._end(told)
+        elif self.stopped:
+            return
+        elif told.phase == "counting":
+            self._show("STAND CLEAR", f"{self._shown} will be fired. Nobody may hold the gun. Esc calls it off.", "ask")
+            self.count.setText(str(told.seconds))
+        elif told.phase == "firing":
+            self._show("Firing", self._shown, "wait")
+
+    def _end(self, told: ShotProgress) -> None:
+        self._check = None
+        if told.fired:
+            self._method_at += 1
+        title = "EMERGENCY STOP" if self.stopped else "Fired" if told.fired else "Not fired"
+        self._show(title, told.text, told.mood)
+        self._running(False)
+        self.over()
+
+    def _show(self, title: str, detail: str, mood: str) -> None:
+        self.title.setText(title)
+        widgets.set_mood(self.title, mood)
+        self.detail.say(detail, mood)
+        self.count.setText("")
+
+    def _running(self, running: bool) -> None:
+        self.stop_button.setVisible(running)
+        self.next_button.setVisible(not (running or self.stopped))
+        self.next_button.setText(f"{self.next_text()}  [Ctrl+T]")
+        self.call_off_button.setText("Call it off  [Esc]" if running else "Back  [Esc]")

@@ -20,19 +20,25 @@ from experiments.clock import Clock
 from experiments.config.setup import Setup
 from experiments.record.journal import JournalError
 from experiments.run import Again, RunRequest
-from experiments.screens.console import parts, people
-from experiments.screens.console.fields import WHY, Answer, Lines, Question, sheet, unfit
-from experiments.screens.console.form import Form, Opening
-from experiments.screens.console.keyboard import FreshShortcuts
-from experiments.screens.console.people import PeopleTable
-from experiments.screens.console.shot_page import ShotPage
-from experiments.screens.console.windows import let_go, open_as_left, remember, scaled, signals_to, type_scale
+from experiments.screens.console import people, widgets
+from experiments.screens.console.form import Form, Opening, PeopleTable
+from experiments.screens.console.shot_check import ShotPage
+from experiments.screens.console.widgets import WHY, Option, QuestionBox, TextLines, start_sheet, unfit
+from experiments.screens.console.windows import (
+    FreshShortcuts,
+    let_go,
+    open_as_left,
+    remember,
+    scaled_sheet,
+    signals_to,
+    type_scale,
+)
 from experiments.study import enrolment
 from experiments.study.places import PlaceError
 from experiments.study.progress import Overview, StudyFolder, overview
 from experiments.study.study import Participant, RunProgress
 
-NAME = "start"
+_NAME = "start"
 SIMULATED = "simulated"
 STOPPED = "The last test shot ended by an emergency stop."
 
@@ -46,7 +52,7 @@ class StartWindow(QWidget):
         super().__init__()
         self._study, self._opening, self._clock = study, opening, clock
         self.choice: RunRequest | None = None
-        self.question: Question | None = None
+        self.question: QuestionBox | None = None
         self._simulation_is_known = False
         self._closing = False
         self._scale = 0.0
@@ -62,12 +68,14 @@ class StartWindow(QWidget):
         self.form = Form(self._study.experiments, self._study.config.eligibility.ask, self._opening.options)
         self.shots = ShotPage(self._opening.gun, self._clock)
         self.table = PeopleTable(self._study.experiments)
-        self.next, self.saved = Lines("detail"), Lines("saved", most_lines=5)
+        self.next, self.saved = TextLines("detail"), TextLines("saved", most_lines=5)
         self.pages = QStackedWidget()
         for page in (self._page(), self.shots):
             self.pages.addWidget(page)
         down, top = QVBoxLayout(self), QHBoxLayout()
-        top.addWidget(Lines("place", f"{self._study.config.title} · {self._study.results.resolve()}", most_lines=3), 1)
+        top.addWidget(
+            TextLines("place", f"{self._study.config.title} · {self._study.results.resolve()}", most_lines=3), 1
+        )
         top.addWidget(self._gun())
         down.addLayout(top)
         down.addWidget(self.pages, 1)
@@ -89,13 +97,13 @@ class StartWindow(QWidget):
 
     def _gun(self) -> QWidget:
         simulated = self._opening.gun == SIMULATED
-        made = parts.label("gun", "SIMULATED GUN" if simulated else f"Gun: {self._opening.gun}", wrap=False)
-        parts.set_mood(made, "ask" if simulated else "wait")
+        made = widgets.text_label("gun", "SIMULATED GUN" if simulated else f"Gun: {self._opening.gun}", wrap=False)
+        widgets.set_mood(made, "ask" if simulated else "wait")
         return made
 
     def _buttons(self, page: QWidget) -> QGridLayout:
         def button(text: str, key: str, slot: Callable[[], object], name: str = "") -> QPushButton:
-            return parts.button(page, text, key, slot, name=name)
+            return widgets.button(page, text, key, slot, name=name)
 
         self.test_button = button("Test shot", "Ctrl+T", self._test_shot)
         self.exclude_button = button("Exclude…", "Alt+E", self._ask_exclusion)
@@ -166,7 +174,7 @@ class StartWindow(QWidget):
         scale = type_scale(self.width(), self.height())
         if scale != self._scale:
             self._scale = scale
-            self.setStyleSheet(scaled(parts.sheet("dark") + sheet(), scale))
+            self.setStyleSheet(scaled_sheet(start_sheet(), scale))
 
     def closeEvent(self, event: QCloseEvent | None) -> None:  # noqa: N802 - Qt's name
         """Let whoever waits for a choice go on, once no test shot is under way."""
@@ -176,7 +184,7 @@ class StartWindow(QWidget):
             event.ignore()
             return
         super().closeEvent(event)
-        remember(self, NAME)
+        remember(self, _NAME)
         self.closed.emit()
 
     def leave_for(self, signal: str) -> None:
@@ -190,7 +198,7 @@ class StartWindow(QWidget):
 
     # questions
 
-    def _ask(self, question: Question) -> None:
+    def _ask(self, question: QuestionBox) -> None:
         self._take_back()
         self.question = question
         self._foot.addWidget(question)
@@ -204,8 +212,8 @@ class StartWindow(QWidget):
             self.question.deleteLater()
             self.question = None
 
-    def _leave_it(self) -> Answer:
-        return Answer(text="Leave it", key="Esc", do=lambda _: self._take_back())
+    def _leave_it(self) -> Option:
+        return Option(text="Leave it", key="Esc", do=lambda _: self._take_back())
 
     # choosing
 
@@ -254,16 +262,16 @@ class StartWindow(QWidget):
             self._start()
 
         text = f"The gun is SIMULATED: {self.form.participant_id} will feel nothing. Start all the same?"
-        self._ask(Question(text, (Answer(text="Start, simulated", key="Ctrl+S", do=known), self._leave_it())))
+        self._ask(QuestionBox(text, (Option(text="Start, simulated", key="Ctrl+S", do=known), self._leave_it())))
 
     def _ask_resume(self, run: RunProgress) -> None:
         answers = (
-            Answer(text="Go on with it", key="Ctrl+G", do=lambda _: self._begin_again("resume", "")),
-            Answer(text="Set it aside, start anew", key="Ctrl+N", do=lambda why: self._begin_again("fresh", why)),
+            Option(text="Go on with it", key="Ctrl+G", do=lambda _: self._begin_again("resume", "")),
+            Option(text="Set it aside, start anew", key="Ctrl+N", do=lambda why: self._begin_again("fresh", why)),
             self._leave_it(),
         )
         text = f"{people.stopped_text(self.form.participant_id, run)} Go on there, or set it aside and start anew?"
-        self._ask(Question(text, answers, reason=f"to start anew: {WHY}"))
+        self._ask(QuestionBox(text, answers, reason=f"to start anew: {WHY}"))
 
     def _begin_again(self, again: Again, reason: str) -> None:
         """Check everything once more, as Start does: the study may have gone on at another console meanwhile."""
@@ -287,21 +295,20 @@ class StartWindow(QWidget):
     def _leave(
         self, code: str, *, again: Again = "ask", reason: str = "", practice: bool = False, training: bool = False
     ) -> None:
-        if self.choice is not None:
-            return
-        self.choice = RunRequest(
-            setup=self._setup(),
-            participant_id=code,
-            results=self._study.results,
-            gun=SIMULATED if training else self._opening.gun,
-            again=again,
-            anew_reason=reason,
-            practice=practice,
-            training=training,
-            screen="console",
-            options=self.form.options(),
-        )
-        self.close()
+        if self.choice is None:
+            self.choice = RunRequest(
+                setup=self._setup(),
+                participant_id=code,
+                results=self._study.results,
+                gun=SIMULATED if training else self._opening.gun,
+                again=again,
+                anew_reason=reason,
+                practice=practice,
+                training=training,
+                screen="console",
+                options=self.form.options(),
+            )
+            self.close()
 
     def _setup(self) -> Setup[Any]:
         return next(s for s in self._study.setups if s.config.experiment == self.form.experiment.currentText())
@@ -325,8 +332,8 @@ class StartWindow(QWidget):
             if self._is_reason(reason):
                 self._change(lambda: act(self._study.results, person.participant_id, reason, self._clock))
 
-        answers = (Answer(text=f"{verb} {person.participant_id}", key="Ctrl+D", do=carry_out), self._leave_it())
-        self._ask(question := Question(text, answers, reason=WHY))
+        answers = (Option(text=f"{verb} {person.participant_id}", key="Ctrl+D", do=carry_out), self._leave_it())
+        self._ask(question := QuestionBox(text, answers, reason=WHY))
         question.reason.setFocus()
 
     def _change(self, act: Callable[[], None]) -> None:
@@ -347,8 +354,8 @@ class StartWindow(QWidget):
     def _test_shot(self) -> None:
         self._take_back()
         if self.shots.stopped:
-            sure = Answer(text="It is: test shot", key="Ctrl+S", do=lambda _: self._enter_shots())
-            self._ask(Question(f"{STOPPED} Is the gun where it hurts nobody?", (sure, self._leave_it())))
+            sure = Option(text="It is: test shot", key="Ctrl+S", do=lambda _: self._enter_shots())
+            self._ask(QuestionBox(f"{STOPPED} Is the gun where it hurts nobody?", (sure, self._leave_it())))
         else:
             self._enter_shots()
 
@@ -369,13 +376,13 @@ class StartWindow(QWidget):
         self.form.code_again.setFocus()
 
 
-def choose(study: StudyFolder, opening: Opening, clock: Clock) -> RunRequest | None:
+def choose_run(study: StudyFolder, opening: Opening, clock: Clock) -> RunRequest | None:
     """Show the start window until something is chosen; `None` if it was closed, or a signal ended it."""
     window = StartWindow(study, opening, clock)
     loop = QEventLoop()
     window.closed.connect(loop.quit)
     with signals_to(window.leave_for):
-        open_as_left(window, NAME)
+        open_as_left(window, _NAME)
         FreshShortcuts(window, clock.now)
         window.activateWindow()
         loop.exec()

@@ -1,4 +1,4 @@
-"""What the console shows of a live run. Pure: no Qt, no clock.
+"""What the run, which works in a thread of its own, tells the console, and what is shown of it. Pure: no Qt, no clock.
 
 Neither correctness nor a score is in here. The method's name appears only where a damper is set by hand, else a code.
 """
@@ -9,14 +9,81 @@ from collections.abc import Callable
 from dataclasses import dataclass, field
 from typing import Any
 
+from device import GunStatus
 from experiments.config.setup import Setup
 from experiments.design.plan import Plan, Trial
+from experiments.live_run import LiveRun
 from experiments.screens import texts
 from experiments.screens.console.keys import Name, shown_key
-from experiments.screens.console.messages import Ended, GunSeen, ParticipantSeen
 from experiments.session.history import History, trial_at, value
+from experiments.session.remarks import Remark
 from experiments.session.states import Position, State
-from experiments.session.steps import Ask, Describe, Prepare, Present, Rate, Rest
+from experiments.session.steps import Ask, Describe, Outcome, Prepare, Present, Rate, Rest, Step
+
+THANK_PARTICIPANT = "Thank the participant."
+"""The last sentence, where nothing else comes next."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Message:
+    """Something that the run tells the window."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Began(Message):
+    """The run is there, and can be worked."""
+
+    live: LiveRun
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Shown(Message):
+    """A position is to be shown."""
+
+    position: Position
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Saved(Message):
+    """A step's outcome, or a remark, is on the disk."""
+
+    step: Step | None
+    word: Outcome | Remark
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class GunSeen(Message):
+    """The gun as it was a moment ago, or why it does not answer."""
+
+    status: GunStatus | None
+    fault: str = ""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ParticipantSeen(Message):
+    """Whether the participant's screen has the keys, or why it is gone."""
+
+    focused: bool = False
+    failure: str = ""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Trouble(Message):
+    """Something went wrong, and what; or, by its mood, what is done about it."""
+
+    text: str
+    mood: str = "bad"
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Ended(Message):
+    """The run is over: finished (no reason), or stopped or failed for one.
+
+    `saved`: the answers that were read back from the disk; `None` if none were looked for.
+    """
+
+    reason: str | None
+    saved: int | None = None
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -30,10 +97,15 @@ class About:
     setup: Setup[Any]
     plan: Plan
     band: str = ""
-    last: str = "Thank the participant."
+    last: str = THANK_PARTICIPANT
     simulated: bool = False
     participant_rates: bool = False
     participant_keys: bool = False
+
+    @property
+    def rated_last(self) -> bool:
+        """Whether all stimuli are rated after all were felt."""
+        return bool(self.setup.config.rating_s)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -48,6 +120,7 @@ class Seen:
     ended: Ended | None = None
     letters: bool = False
     """Whether letters are text now."""
+    now_s: float = 0.0
 
     def key(self, name: Name) -> str:
         """The key of a command as it is now."""
@@ -94,7 +167,7 @@ def method_text(about: About, trial: Trial) -> str:
     return method.label if method.damper else code(about.plan, trial)
 
 
-def place_text(seen: Seen) -> str:
+def where_text(seen: Seen) -> str:
     """Where the run stands: trial, set, session; nowhere, if it ended before it began."""
     if seen.ended is not None and seen.position.step is None:
         return ""
@@ -110,11 +183,12 @@ def bands(seen: Seen) -> list[tuple[str, str]]:
     return found
 
 
-def instruction(seen: Seen, now_s: float) -> Instruction:
+def instruction(seen: Seen) -> Instruction:
     """What to do now."""
     if seen.ended is not None:
         return _end(seen.about, seen.ended)
-    return _OF_STATE[seen.position.state](seen, now_s)
+    shown = _OF_STATE.get(seen.position.state, _MOMENT)
+    return shown if isinstance(shown, Instruction) else shown(seen)
 
 
 def _end(about: About, ended: Ended) -> Instruction:
@@ -141,29 +215,13 @@ def _answers(count: int) -> str:
     return f"{count} answer{'' if count == 1 else 's'}"
 
 
-def _moment(seen: Seen, now_s: float) -> Instruction:
-    del seen, now_s
-    return Instruction(title="One moment", mood="wait")
-
-
-def _firing(seen: Seen, now_s: float) -> Instruction:
-    del seen, now_s
-    return Instruction(title="Firing", detail="F12 stops it at once.", mood="wait")
-
-
-def _rearming(seen: Seen, now_s: float) -> Instruction:
-    del seen, now_s
-    return Instruction(
-        title="There was an emergency stop.\nStand clear.",
-        detail="Put the gun where it hurts nobody, then hold T for a second: a test shot, then the run goes on.",
-        mood="bad",
-    )
+_MOMENT = Instruction(title="One moment", mood="wait")
 
 
 def _turned(seen: Seen, *, damper: str, then: str) -> Instruction:
     step = seen.position.step
     if not isinstance(step, Prepare):
-        return _moment(seen, 0.0)
+        return _MOMENT
     again = texts.again_text(seen.told, step)
     told = texts.read_out_text(seen.about.plan, step).strip()
     return Instruction(
@@ -173,22 +231,19 @@ def _turned(seen: Seen, *, damper: str, then: str) -> Instruction:
     )
 
 
-def _setting(seen: Seen, now_s: float) -> Instruction:
-    del now_s
+def _setting(seen: Seen) -> Instruction:
     return _turned(
         seen, damper="Set the damper {damper} ({method})", then=f"Confirm the damper with {seen.key('damper')}."
     )
 
 
-def _preparing(seen: Seen, now_s: float) -> Instruction:
-    del now_s
+def _preparing(seen: Seen) -> Instruction:
     step = seen.position.step
     damper = "Damper {damper} ({method})" if isinstance(step, Prepare) and step.damper else ""
     return _turned(seen, damper=damper, then=f"Then fire with {seen.key('fire')}.")
 
 
-def _train(seen: Seen, now_s: float) -> Instruction:
-    del now_s
+def _train(seen: Seen) -> Instruction:
     least_s = seen.position.step.least_exposure_s if isinstance(seen.position.step, Present) else 0.0
     after = f", not before {least_s:g}\N{NO-BREAK SPACE}s" if least_s else ""
     return Instruction(
@@ -198,8 +253,7 @@ def _train(seen: Seen, now_s: float) -> Instruction:
     )
 
 
-def _asking(seen: Seen, now_s: float) -> Instruction:
-    del now_s
+def _asking(seen: Seen) -> Instruction:
     step = seen.position.step
     question = step.question if isinstance(step, Ask) else ""
     own = "Awaited: the participant's own key, UP for forward or DOWN for backward.\nF or B enters it for them."
@@ -213,11 +267,10 @@ def _asked_there(seen: Seen, awaited: str, here: str) -> str:
     return f"Their screen is gone. {here} To start it again, pause first." if seen.participant_gone else awaited
 
 
-def _rating(seen: Seen, now_s: float) -> Instruction:
-    del now_s
+def _rating(seen: Seen) -> Instruction:
     step = seen.position.step
     if not isinstance(step, Rate | Describe):
-        return _moment(seen, 0.0)
+        return _MOMENT
     what = "rating" if isinstance(step, Rate) else "description"
     own = f"Awaited: the participant's {what} on their own screen, or type it here."
     there = _asked_there(seen, own, "Type here what they say.") if seen.about.participant_rates else ""
@@ -225,9 +278,9 @@ def _rating(seen: Seen, now_s: float) -> Instruction:
     return Instruction(title=texts.ordinal(seen.about.plan, step.trial), detail=detail, mood="ask")
 
 
-def _resting(seen: Seen, now_s: float) -> Instruction:
+def _resting(seen: Seen) -> Instruction:
     until_s, step = seen.position.until_s, seen.position.step
-    left_s = max(0, round((now_s if until_s is None else until_s) - now_s))
+    left_s = 0 if until_s is None else max(0, round(until_s - seen.now_s))
     between = step.between if isinstance(step, Rest) else ""
     return Instruction(
         title=f"Break: {texts.duration_text(left_s)}",
@@ -236,17 +289,7 @@ def _resting(seen: Seen, now_s: float) -> Instruction:
     )
 
 
-def _closing(seen: Seen, now_s: float) -> Instruction:
-    del seen, now_s
-    return Instruction(
-        title="Everything is answered",
-        detail="Is there anything to correct, to note or to flag? Enter ends the run.",
-        mood="good",
-    )
-
-
-def _paused(seen: Seen, now_s: float) -> Instruction:
-    del now_s
+def _paused(seen: Seen) -> Instruction:
     if seen.position.why:
         again = f"{seen.key('restart')} starts it again. {seen.key('go on')} goes on without it: you enter the answers."
         detail = f"{_sentence(seen.position.why)}\n{again}"
@@ -255,11 +298,10 @@ def _paused(seen: Seen, now_s: float) -> Instruction:
     return Instruction(title="Paused", detail=detail, mood="wait")
 
 
-def _correcting(seen: Seen, now_s: float) -> Instruction:
-    del now_s
+def _correcting(seen: Seen) -> Instruction:
     entry = seen.position.correcting
     if entry is None:
-        return _moment(seen, 0.0)
+        return _MOMENT
     how = {
         "answer": "Enter what the participant said: F or B.",
         "rating": "Type what the participant said, Enter saves; Ctrl+X for no answer.",
@@ -275,36 +317,39 @@ def _correcting(seen: Seen, now_s: float) -> Instruction:
     )
 
 
-def _halted(seen: Seen, now_s: float) -> Instruction:
-    del now_s
+def _halted(seen: Seen) -> Instruction:
     status = None if seen.gun is None else seen.gun.status
-    if status is not None and status.state == "disarmed":
-        gun = "The gun itself says that it is disarmed."
-    else:
-        gun = "The gun does not say that it is disarmed: SWITCH OFF ITS POWER."
+    disarmed = status is not None and status.state == "disarmed"
+    does_not = "The gun does not say that it is disarmed: SWITCH OFF ITS POWER."
     return Instruction(
         title="EMERGENCY STOP",
-        damper=gun,
+        damper="The gun itself says that it is disarmed." if disarmed else does_not,
         detail=f"Nothing fires in this run any more. {seen.key('reason')} says why, {seen.key('stop')} closes it. "
         "Resumed, it begins with a test shot.",
         mood="bad",
     )
 
 
-_OF_STATE: dict[State, Callable[[Seen, float], Instruction]] = {
-    State.SAVING: _moment,
-    State.REARMING: _rearming,
+_OF_STATE: dict[State, Instruction | Callable[[Seen], Instruction]] = {
+    State.REARMING: Instruction(
+        title="There was an emergency stop.\nStand clear.",
+        detail="Put the gun where it hurts nobody, then hold T for a second: a test shot, then the run goes on.",
+        mood="bad",
+    ),
     State.SETTING: _setting,
     State.PREPARING: _preparing,
-    State.FIRING: _firing,
+    State.FIRING: Instruction(title="Firing", detail="F12 stops it at once.", mood="wait"),
     State.TRAIN: _train,
     State.ASKING: _asking,
     State.RATING: _rating,
     State.DESCRIBING: _rating,
     State.RESTING: _resting,
-    State.CLOSING: _closing,
+    State.CLOSING: Instruction(
+        title="Everything is answered",
+        detail="Is there anything to correct, to note or to flag? Enter ends the run.",
+        mood="good",
+    ),
     State.PAUSED: _paused,
     State.CORRECTING: _correcting,
     State.HALTED: _halted,
-    State.STOPPED: _moment,
 }

@@ -3,22 +3,23 @@
 from __future__ import annotations
 
 import time
-from typing import Any, Protocol
+from typing import TYPE_CHECKING, Any, Self
 
 from PyQt6.QtCore import Qt, QTimer
 from PyQt6.QtGui import QWindow
 from PyQt6.QtTest import QTest
 
-from experiments.clock import Clock
 from experiments.screens.console.app import Console
-from experiments.screens.console.beside import ParticipantSide
 from experiments.screens.console.window import ConsoleWindow
-from experiments.screens.participant.rating_page import spot_px
-from experiments.screens.participant.stage import TITLE
+from experiments.screens.participant.pages import spot_px
+from experiments.screens.participant.stage import WINDOW_TITLE
 from experiments.session.states import Position, State
 from experiments.session.steps import Ask, Rate, on_scale
 
-LOOK_MS = 10
+if TYPE_CHECKING:
+    from experiments.screens.xkeys import Hands  # Linux alone has it
+
+_LOOK_MS = 10
 AGAIN_S = 0.5
 """A key that was refused, because it came too soon, is pressed again after so long."""
 BREAK_REASON = "synthetic participant"
@@ -26,25 +27,24 @@ _KEYS = {"forward": Qt.Key.Key_F, "backward": Qt.Key.Key_B}
 
 
 class VisualParticipant:
-    """Watches a console's window and presses a key at every position that waits. Keep it as long as the run lasts."""
+    """Watches a console's window and presses a key at every position that waits, as long as it is open."""
 
-    def __init__(
-        self,
-        console: Console,
-        clock: Clock,
-        rater: Rater | None = None,
-        beside: ParticipantSide | None = None,
-    ) -> None:
-        self._console, self._clock = console, clock
-        self._rater, self._beside = rater, beside
+    def __init__(self, console: Console, rater: Rater | None = None) -> None:
+        self._console, self._clock, self._rater = console, console.clock, rater
         self._done, self._done_s = -1, 0.0
         self._timer = QTimer()
         self._timer.timeout.connect(self._look)
-        self._timer.start(LOOK_MS)
+
+    def __enter__(self) -> Self:
+        self._timer.start(_LOOK_MS)
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self._timer.stop()
 
     def _look(self) -> None:
         window = self._console.window
-        if window is None or window.live is None or self._answers_beside(window):
+        if window is None or window.live is None or self._answers_there(window):
             return
         if not window.isActiveWindow():
             window.activateWindow()  # keys reach the window that has the focus
@@ -59,12 +59,12 @@ class VisualParticipant:
             self._done, self._done_s = position.serial, now_s
             self._press(window, position)
 
-    def _answers_beside(self, window: ConsoleWindow) -> bool:
+    def _answers_there(self, window: ConsoleWindow) -> bool:
         """Whether a rating or description is being given on the participant's screen. No answer has no place there."""
         step = window.drawn.step
-        if self._rater is None or self._beside is None:
+        if self._rater is None or self._console.participant is None:
             return False
-        asking = self._beside.asking  # only then: what comes later would be done to the next question
+        asking = self._console.participant.asking  # only then: what comes later would be done to the next question
         match window.drawn.state:
             case State.RATING if isinstance(step, Rate) and (rating := self._observer.rate(step.trial)) is not None:
                 if asking:
@@ -133,19 +133,6 @@ RATE_AGAIN_S = 0.2
 """How long hands wait before they try again: what is done before the page stands is lost, as a person's would be."""
 
 
-class Hands(Protocol):
-    """What is needed of hands."""
-
-    def focus_on(self, title: str) -> tuple[int, int, int, int] | None:
-        """Raise a window and give it the keys; its place and size."""
-
-    def click(self, x_px: int, y_px: int) -> None:
-        """Click at a place of the display."""
-
-    def press(self, name: str, *held: str) -> float:
-        """Press a key, with others held."""
-
-
 class Rater:
     """Rates on the participant's screen. Whatever it does may be done again, on whichever page stands, to no harm."""
 
@@ -171,7 +158,7 @@ class Rater:
         if time.monotonic() - self._at_s < RATE_AGAIN_S:
             return None
         self._at_s = time.monotonic()
-        return self._hands.focus_on(TITLE)
+        return self._hands.focus_on(WINDOW_TITLE)
 
     def _confirm(self) -> None:
         """With Ctrl, as Enter alone begins a new line of a description."""

@@ -5,9 +5,7 @@ It decides nothing: keys and buttons become events, and the table of states judg
 
 from __future__ import annotations
 
-from typing import Any
-
-from PyQt6.QtCore import QObject, QTimer, pyqtSignal
+from PyQt6.QtCore import QTimer, pyqtSignal
 from PyQt6.QtGui import QCloseEvent, QResizeEvent, QShowEvent
 from PyQt6.QtWidgets import (
     QHBoxLayout,
@@ -19,30 +17,27 @@ from PyQt6.QtWidgets import (
 
 from experiments.clock import Clock
 from experiments.live_run import LiveRun
-from experiments.screens.console import overview, parts, tone, view
-from experiments.screens.console.beside import ParticipantSide
-from experiments.screens.console.buttons import Buttons
-from experiments.screens.console.controls import Controls
-from experiments.screens.console.instruction import FITS, Notice, TextFields, TextPage
-from experiments.screens.console.keyboard import Keyboard
+from experiments.screens.console import view, widgets, windows
+from experiments.screens.console.controls import Controls, TextField
 from experiments.screens.console.keys import Name, Typing
-from experiments.screens.console.messages import (
+from experiments.screens.console.panels import FITS, Bars, Buttons, Notice, SidePanel, TextFields, TextPage
+from experiments.screens.console.progress import RunTiming, marks
+from experiments.screens.console.view import (
+    About,
     Began,
     Ended,
-    Field,
     GunSeen,
     Message,
     ParticipantSeen,
     Saved,
+    Seen,
     Shown,
     Trouble,
 )
-from experiments.screens.console.overview import Pace
-from experiments.screens.console.side import Bars, Side
-from experiments.screens.console.view import About, Seen
-from experiments.screens.console.windows import remember, scaled
+from experiments.screens.console.windows import Keyboard, remember, scaled_sheet
+from experiments.screens.participant.messages import Theme
 from experiments.screens.texts import saved_text
-from experiments.session.events import Hand, Press
+from experiments.session.events import Press
 from experiments.session.remarks import Halted
 from experiments.session.states import Position
 from experiments.session.steps import Failed, Rested
@@ -56,45 +51,28 @@ SMALLEST, LARGEST = 0.55, 2.2
 """How far type shrinks and grows with the window."""
 
 
-class Bridge(QObject):
-    """Takes messages from any thread to the window's."""
-
-    message = pyqtSignal(object)
-
-
 class ConsoleWindow(QMainWindow):
     """What to do now, the keys that do it, and what an experimenter looks for: progress, gun, what comes next."""
 
     closed = pyqtSignal()
 
-    def __init__(
-        self,
-        about: About,
-        bridge: Bridge,
-        clock: Clock,
-        *,
-        hand: Hand = "experimenter",
-        beside: ParticipantSide | None = None,
-        observer: Any = None,
-    ) -> None:
+    def __init__(self, about: About, clock: Clock) -> None:
         super().__init__()
-        self.about, self._clock = about, clock
-        self._hand, self._beside, self._observer = hand, beside, observer
+        self.about, self.clock = about, clock
         self.live: LiveRun | None = None
         self.controls: Controls | None = None
         self.drawn = Position()
         self.gun: GunSeen | None = None
         self.participant: ParticipantSeen | None = None
         self.ended: Ended | None = None
-        self._pace = Pace()
+        self._progress = RunTiming()
         self._brief_until_s: float | None = None
         self._brief_for = -1
         self._lasting = ("", "good")
-        self.theme: parts.Theme = "dark"
+        self.theme: Theme = "dark"
         self._scale = 0.0
         self._build()
         self._keyboard = Keyboard(self, clock.now)
-        bridge.message.connect(self.take)
         self._timer = QTimer(self)
         self._timer.timeout.connect(self.refresh)
         self._timer.start(REFRESH_MS)
@@ -104,9 +82,9 @@ class ConsoleWindow(QMainWindow):
     def _build(self) -> None:
         what = self.about.band or self.about.plan.experiment
         self.setWindowTitle(f"Recoil – {self.about.plan.participant_id}, {what}")
-        self.bands = [parts.label("band", wrap=False) for _ in range(2)]
-        self.place, self.saved = parts.label("place"), parts.label("saved")
-        self.notice, self.fields, self.side, self.buttons = Notice(), TextFields(), Side(self.about), Buttons(self)
+        self.bands = [widgets.text_label("band", wrap=False) for _ in range(2)]
+        self.place, self.saved = widgets.text_label("place"), widgets.text_label("saved")
+        self.notice, self.fields, self.side, self.buttons = Notice(), TextFields(), SidePanel(self.about), Buttons(self)
         self.bars = Bars(self.about)
         self._main = QWidget()
         left = QVBoxLayout(self._main)
@@ -129,7 +107,7 @@ class ConsoleWindow(QMainWindow):
         self.pages.addWidget(self.page)
         outer = QVBoxLayout(central := QWidget())
         outer.setContentsMargins(0, 0, 0, 4)
-        outer.addWidget(parts.row(*self.bands))
+        outer.addWidget(widgets.row(*self.bands))
         outer.addWidget(self.pages, 1)
         outer.addWidget(self.buttons.row)
         self.setCentralWidget(central)
@@ -139,11 +117,15 @@ class ConsoleWindow(QMainWindow):
 
     # messages
 
+    def begin(self, live: LiveRun, controls: Controls) -> None:
+        """A live run is there, and who works it."""
+        self.live, self.controls = live, controls
+
     def take(self, message: Message) -> None:  # noqa: C901 - one case a message
         """Take a message from the run, show it, and say when it was painted."""
         match message:
             case Began():
-                self._begin(message.live)
+                self._arrive()
             case Saved():
                 self._acknowledge(message)
             case GunSeen():
@@ -159,22 +141,14 @@ class ConsoleWindow(QMainWindow):
         self.refresh()
         if isinstance(message, Shown | Began) and self.live is not None:
             self.repaint()
-            self.live.painted(self.drawn.serial, self._clock.now())
-
-    def _begin(self, live: LiveRun) -> None:
-        self.live = live
-        scale = getattr(self.about.setup.config, "rating", None)
-        self.controls = Controls(
-            live, self._clock, self, scale=scale, hand=self._hand, beside=self._beside, observer=self._observer
-        )
-        self._arrive()
+            self.live.painted(self.drawn.serial, self.clock.now())
 
     def _end(self, message: Ended) -> None:
         self.ended = message
         if self.controls is not None:
             self.controls.ended = True
         self.close_line()
-        tone.play()
+        windows.play_tone()
 
     def _arrive(self) -> None:
         """Draw the newest position: its field, and where the cursor goes; a line that is being typed keeps it."""
@@ -187,24 +161,24 @@ class ConsoleWindow(QMainWindow):
             self.controls.draw(self.drawn)
             if self.drawn.serial != self._brief_for:
                 self._unbrief()
-        self._pace.at(self.drawn, self._clock.now())
+        self._progress.at(self.drawn, self.clock.now())
         self.fields.at(self.drawn, self.controls.entered_so_far() if self.controls is not None else "")
         self.fields.focus(self.drawn, self)
 
     def _acknowledge(self, message: Saved) -> None:
         """Say that it is safe; a tone at the end of a break."""
-        self._pace.saved(message.word, self._clock.now())
+        self._progress.saved(message.word, self.clock.now())
         text = saved_text(self.about.plan, message.step, message.word)
         if isinstance(message.word, Rested):
             self.say(text, "good")
         elif text:
             self._last(text, "bad" if isinstance(message.word, Failed | Halted) else "good")
         if isinstance(message.word, Rested):
-            tone.play()
+            windows.play_tone()
 
     def say(self, text: str, mood: str) -> None:
         """Show a line of answer, for a few seconds."""
-        self._brief_until_s, self._brief_for = self._clock.now() + BRIEF_S, self.drawn.serial
+        self._brief_until_s, self._brief_for = self.clock.now() + BRIEF_S, self.drawn.serial
         self._show_line(text, mood)
 
     def _unbrief(self) -> None:
@@ -222,7 +196,7 @@ class ConsoleWindow(QMainWindow):
     def _show_line(self, text: str, mood: str) -> None:
         for label in (self.saved, self.page.said):
             label.setText(text)
-            parts.set_mood(label, mood)
+            widgets.set_mood(label, mood)
 
     # showing
 
@@ -237,22 +211,21 @@ class ConsoleWindow(QMainWindow):
             participant=self.participant,
             ended=self.ended,
             letters=self._typing.letters,
+            now_s=self.clock.now(),
         )
 
     def refresh(self) -> None:
         """Show what is so now."""
         if self.controls is not None:
-            self.controls.tick()
-            if self._beside is not None:
-                self._beside.covered = self.controls.covered and self.isActiveWindow()
-        now_s, seen = self._clock.now(), self.seen
-        self.notice.put(view.instruction(seen, now_s))
-        self.place.setText(view.place_text(seen))
+            self.controls.tick(here=self.isActiveWindow())
+        seen = self.seen
+        self.notice.put(view.instruction(seen))
+        self.place.setText(view.where_text(seen))
         self._show_bands(seen)
         self.bars.put(seen)
-        self.side.put(seen, self._pace, now_s)
+        self.side.put(seen, self._progress)
         self.buttons.put(self.drawn, over=self.ended is not None, letters=self._typing.letters, idle=self._idle)
-        if self._brief_until_s is not None and now_s > self._brief_until_s:
+        if self._brief_until_s is not None and seen.now_s > self._brief_until_s:
             self._unbrief()
         self._fit()
 
@@ -261,7 +234,7 @@ class ConsoleWindow(QMainWindow):
         for label, (text, name) in zip(self.bands, [*found, *[("", "")] * (2 - len(found))], strict=True):
             label.setVisible(bool(text))
             label.setText(text)
-            parts.set_mood(label, name)
+            widgets.set_mood(label, name)
 
     def _idle(self, name: Name) -> bool:
         """Whether a command does nothing now."""
@@ -288,7 +261,7 @@ class ConsoleWindow(QMainWindow):
             self._restyle()
 
     def _restyle(self) -> None:
-        self.setStyleSheet(scaled(parts.sheet(self.theme), self._scale))
+        self.setStyleSheet(scaled_sheet(widgets.sheet(self.theme), self._scale))
 
     def showEvent(self, event: QShowEvent | None) -> None:  # noqa: N802 - Qt's name
         """Hear the keys before any widget does."""
@@ -306,7 +279,7 @@ class ConsoleWindow(QMainWindow):
 
     def press(self) -> Press:
         """A press of a button that begins now."""
-        return Press(at_s=self._clock.now(), serial=self.drawn.serial)
+        return Press(at_s=self.clock.now(), serial=self.drawn.serial)
 
     def command(self, key: str, *, ctrl: bool) -> Name | None:
         """The command that a key is now."""
@@ -351,7 +324,7 @@ class ConsoleWindow(QMainWindow):
         """Take the line away."""
         self.fields.close_line(self.drawn, self)
 
-    def typed(self, field: Field) -> str:
+    def typed(self, field: TextField) -> str:
         """What is typed in a field."""
         return self.fields.typed(field)
 
@@ -366,9 +339,7 @@ class ConsoleWindow(QMainWindow):
 
     def show_list(self) -> None:
         """Cover the run with the marks of the set."""
-        self.show_page(
-            "Flags, notes, corrections and repeats of this set. Esc leaves this page.", overview.marks(self.seen)
-        )
+        self.show_page("Flags, notes, corrections and repeats of this set. Esc leaves this page.", marks(self.seen))
 
     def other_theme(self) -> None:
         """Change the colours."""

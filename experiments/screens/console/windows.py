@@ -1,4 +1,4 @@
-"""Windows: they open as they were left, else maximised, their type grows with them, and they end in Qt's own thread.
+"""What every window of the console needs of the system: its place, its keys, signals, a tone; and the display's loss.
 
 When the display is lost, Qt says so in a warning, then calls `exit`, which can hang. The warning is heard here, so that
 the run ends in order first. Signals end a window in order too: an exception out of a Qt slot would end the process.
@@ -6,16 +6,19 @@ the run ends in order first. Signals end a window in order too: an exception out
 
 from __future__ import annotations
 
+import math
 import os
 import re
 import signal
 import sys
+import threading
+from array import array
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
 from functools import lru_cache
 from types import FrameType
-from typing import Any
+from typing import Any, Protocol
 
 from PyQt6.QtCore import (
     QByteArray,
@@ -24,11 +27,15 @@ from PyQt6.QtCore import (
     QMessageLogContext,
     QObject,
     QSettings,
+    Qt,
     QTimer,
     QtMsgType,
     qInstallMessageHandler,
 )
-from PyQt6.QtWidgets import QWidget
+from PyQt6.QtGui import QKeyEvent
+from PyQt6.QtWidgets import QApplication, QWidget
+
+from experiments.screens.console.keys import EventClock, Name, Presses
 
 DESIGNED_FOR_PX = (1280, 800)
 """The size of a window at which type has the sizes that the style sheet says."""
@@ -74,28 +81,30 @@ def type_scale(width_px: int, height_px: int) -> float:
     return round(_GRAIN * int(min(max(fitting, _SMALLEST), _LARGEST) / _GRAIN + 1e-9), 2)
 
 
-def scaled(sheet: str, scale: float) -> str:
+def scaled_sheet(sheet: str, scale: float) -> str:
     """A style sheet with all its sizes in pixels scaled.
 
-    >>> scaled("font-size: 20px; border: 1px", 1.5)
+    >>> scaled_sheet("font-size: 20px; border: 1px", 1.5)
     'font-size: 30px; border: 2px'
     """
     return re.sub(r"\b(\d+)px", lambda size: f"{max(1, round(int(size[1]) * scale))}px", sheet)
 
 
 _SIGNS = ("connection broke", "X connection", "XIO:", "Did the X11 server die", "compositor die")
-LOST = "the display was lost"
-
 _on_loss: list[Callable[[], None]] = []
 
 
-def on_loss(act: Callable[[], None]) -> Callable[[], None]:
-    """Have something done when the display is lost; gives back what takes it back."""
+@contextmanager
+def on_loss(act: Callable[[], None]) -> Iterator[None]:
+    """Have something done when the display is lost meanwhile."""
     _on_loss.append(act)
-    return lambda: _on_loss.remove(act)
+    try:
+        yield
+    finally:
+        _on_loss.remove(act)
 
 
-def listen() -> None:
+def hear_of_loss() -> None:
     """Hear Qt's messages from now on; they still go where they went."""
     qInstallMessageHandler(_heard)
 
@@ -104,14 +113,14 @@ def _heard(kind: QtMsgType, context: QMessageLogContext, text: str | None) -> No
     del kind, context
     sys.stderr.write(f"{text}\n")
     if text and any(sign in text for sign in _SIGNS):
-        lost()
+        _end_all()
 
 
-def lost() -> None:
+def _end_all() -> None:
     """End everything that is under way, then the process."""
     for act in _on_loss:
         act()
-    sys.stderr.write(f"recoil: stopped: {LOST}. Every window is gone; go on with --resume.\n")
+    sys.stderr.write("recoil: stopped: the display was lost. Every window is gone; go on with --resume.\n")
     sys.stderr.flush()
     os._exit(1)
 
@@ -168,3 +177,198 @@ class _Handler:
         outer = self.before.get(number)
         if isinstance(outer, _Handler):
             outer._note(number)
+
+
+LET_GO_MS = 100
+"""A key is let go when it is not down again after so long: a busy machine tells an auto-repeat as two events, and they
+may come apart.
+"""
+_NAMES = {
+    Qt.Key.Key_Space: "Space",
+    Qt.Key.Key_Return: "Enter",
+    Qt.Key.Key_Enter: "Enter",
+    Qt.Key.Key_Escape: "Esc",
+    Qt.Key.Key_F1: "F1",
+    Qt.Key.Key_F2: "F2",
+    Qt.Key.Key_F12: "F12",
+}
+_PLACES = {
+    24: "Q",
+    26: "E",
+    27: "R",
+    28: "T",
+    29: "Y",
+    30: "U",
+    33: "P",
+    39: "S",
+    41: "F",
+    42: "G",
+    46: "L",
+    53: "X",
+    56: "B",
+    57: "N",
+    58: "M",
+}
+"""Letters by X's number of their place on the keyboard, for alphabets that have others there."""
+
+
+class Hears(Protocol):
+    """Who is told of the keys."""
+
+    def command(self, key: str, *, ctrl: bool) -> Name | None:
+        """The command that a key is now."""
+
+    def down(self, name: Name, at_s: float) -> None:
+        """The key of a command went down."""
+
+    def up(self, key: str) -> None:
+        """A key was let go."""
+
+
+class Keyboard(QObject):
+    """An event filter for a window (`QWindow`): what is a command is taken out, the rest is text for the widgets."""
+
+    def __init__(self, hears: Hears, now: Callable[[], float]) -> None:
+        super().__init__()
+        self._hears, self._now = hears, now
+        self._presses, self._clock = Presses(), EventClock()
+        self._into: dict[str, QWidget | None] = {}
+        """Where a key went as text when it went down."""
+
+    def eventFilter(self, watched: QObject | None, event: QEvent | None) -> bool:  # noqa: N802 - Qt's name
+        """Take a key that is a command; true keeps it from everybody else."""
+        del watched
+        if event is not None and event.type() == QEvent.Type.FocusOut:
+            for key in self._presses.lost():
+                self._hears.up(key)
+        if not isinstance(event, QKeyEvent):
+            return False
+        key, at_s = key_name(event), self._clock.at(event.timestamp(), self._now())
+        if event.type() == QEvent.Type.KeyRelease:
+            number = self._presses.up(key, at_s, repeated=event.isAutoRepeat())
+            if not event.isAutoRepeat():
+                QTimer.singleShot(LET_GO_MS, lambda: self._let_go(key, number))
+            return False
+        if event.type() != QEvent.Type.KeyPress:
+            return False
+        return self._pressed(key, event, at_s)
+
+    def _let_go(self, key: str, number: int) -> None:
+        """Say that a key was let go by a release, if it was."""
+        if self._presses.was_let_go(key, number):
+            self._hears.up(key)
+
+    def _pressed(self, key: str, event: QKeyEvent, at_s: float) -> bool:
+        acts = self._presses.down(key, at_s, repeated=event.isAutoRepeat())
+        name = self._hears.command(key, ctrl=bool(event.modifiers() & Qt.KeyboardModifier.ControlModifier))
+        if name is None:
+            return self._is_stale_text(key, fresh=acts)
+        self._into.pop(key, None)
+        if acts:
+            self._hears.down(name, at_s)
+        return True
+
+    def _is_stale_text(self, key: str, *, fresh: bool) -> bool:
+        """Whether text comes from a key that went down for something else and is held still."""
+        into = QApplication.focusWidget()
+        if fresh:
+            self._into[key] = into
+        return key not in self._into or self._into[key] is not into
+
+
+class FreshShortcuts(QObject):
+    """Has each shortcut of a window act once a press, however long its key is held.
+
+    Qt itself takes a repeated key for a new one when the machine is too busy to read its two events together.
+    """
+
+    def __init__(self, widget: QWidget, now: Callable[[], float]) -> None:
+        super().__init__(widget)
+        self._now, self._presses, self._clock = now, Presses(), EventClock()
+        self._stale = ""
+        widget.winId()  # it has no window (`QWindow`) before
+        if (window := widget.windowHandle()) is not None:
+            window.installEventFilter(self)
+
+    def eventFilter(self, watched: QObject | None, event: QEvent | None) -> bool:  # noqa: N802 - Qt's name
+        """Take a key that is held still; true keeps it from everybody else. Text repeats as it always does."""
+        del watched
+        if event is not None and event.type() == QEvent.Type.FocusOut:
+            self._presses.lost()
+        if not isinstance(event, QKeyEvent):
+            return False
+        key, at_s = key_name(event), self._clock.at(event.timestamp(), self._now())
+        if event.type() == QEvent.Type.KeyRelease:
+            if self._presses.is_down(key):
+                self._presses.up(key, at_s, repeated=event.isAutoRepeat())
+            return False
+        if event.type() == QEvent.Type.ShortcutOverride and _may_be_shortcut(event):
+            acts = self._presses.down(key, at_s, repeated=event.isAutoRepeat())
+            self._stale = "" if acts else key
+            event.setAccepted(not acts)
+        elif event.type() == QEvent.Type.ShortcutOverride:
+            self._stale = ""
+        return key == self._stale
+
+
+def _may_be_shortcut(event: QKeyEvent) -> bool:
+    """Whether a key is no text, nor moves within it."""
+    held = event.modifiers() & (Qt.KeyboardModifier.ControlModifier | Qt.KeyboardModifier.AltModifier)
+    return bool(held) or event.key() == Qt.Key.Key_Escape or Qt.Key.Key_F1 <= event.key() <= Qt.Key.Key_F12
+
+
+def key_name(event: QKeyEvent) -> str:
+    """A key by the name that commands have: letters as capitals, by their place where the alphabet is another."""
+    key = event.key()
+    named = _NAMES.get(Qt.Key(key)) if key in set(_NAMES) else None
+    if named is not None:
+        return named
+    if Qt.Key.Key_A <= key <= Qt.Key.Key_Z:
+        return chr(key)
+    if event.text().isalpha() and not event.text().isascii():
+        return _PLACES.get(event.nativeScanCode(), f"#{key}")
+    return f"#{key}"
+
+
+RATE_Hz = 44_100
+PITCH_Hz = 880.0
+LENGTH_S = 0.35
+LOUDNESS = 0.4
+MOST_S = 3.0
+"""How long a sound system that hangs is waited for."""
+_TONE = "tone"
+
+
+def tone() -> array[float]:
+    """The tone, faded in and out so that it does not click: 32-bit samples from -1 to 1."""
+    count = int(RATE_Hz * LENGTH_S)
+    fade = RATE_Hz // 50
+    return array(
+        "f",
+        (
+            LOUDNESS * min(1.0, n / fade, (count - n) / fade) * math.sin(2 * math.pi * PITCH_Hz * n / RATE_Hz)
+            for n in range(count)
+        ),
+    )
+
+
+def play_tone() -> None:
+    """Play the tone beside everything else; silence is no error."""
+    threading.Thread(target=_play_tone, daemon=True, name=_TONE).start()
+
+
+def finish_tone() -> None:
+    """Wait until no tone is played: as the sound system opens it swallows what the program says on the terminal."""
+    for thread in threading.enumerate():
+        if thread.name == _TONE:
+            thread.join(MOST_S)
+
+
+def _play_tone() -> None:
+    try:
+        import sounddevice  # noqa: PLC0415 - opens the sound system
+
+        with sounddevice.RawOutputStream(samplerate=RATE_Hz, channels=1, dtype="float32") as stream:
+            stream.write(tone().tobytes())
+    except Exception:  # noqa: BLE001, S110 - no library, no device: `recoil doctor` says so
+        pass

@@ -9,8 +9,8 @@ import os
 import signal
 import sys
 
-from experiments.screens.participant.toolkit import writable_home
-from experiments.screens.participant.words import look_from
+from experiments.screens.participant.messages import look_from
+from experiments.screens.participant.stage import writable_home
 
 
 def main() -> int:
@@ -21,9 +21,9 @@ def main() -> int:
     os.dup2(2, 1)
     sys.stdout = sys.stderr
     with writable_home():
-        from experiments.screens.participant.app import run  # noqa: PLC0415 - after the output is safe
+        from experiments.screens.participant.app import run_program  # noqa: PLC0415 - after the output is safe
 
-        return run(look, sys.stdin.buffer, said)
+        return run_program(look, sys.stdin.buffer, said)
 
 
 if __name__ == "__main__":

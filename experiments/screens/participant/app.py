@@ -13,29 +13,10 @@ from typing import BinaryIO
 
 from pydantic import ValidationError
 
-from experiments.screens.participant.pages import DirectionPage, Drafts, MessagePage
-from experiments.screens.participant.rating_page import DescriptionPage, RatingPage
-from experiments.screens.participant.stage import Stage
-from experiments.screens.participant.toolkit import Keys, MaskingNoise, load
-from experiments.screens.participant.words import (
-    BETWEEN,
-    AskDescription,
-    AskDirection,
-    AskRating,
-    Close,
-    Failed,
-    FromParticipant,
-    KeyPressed,
-    Look,
-    Noise,
-    Ping,
-    Pong,
-    Ready,
-    Show,
-    ToParticipant,
-    line,
-    to_participant_from,
-)
+from experiments.screens.participant import messages
+from experiments.screens.participant.messages import line
+from experiments.screens.participant.pages import DescriptionPage, DirectionPage, Drafts, MessagePage, RatingPage
+from experiments.screens.participant.stage import KeyPresses, MaskingNoise, Stage, load_toolkit
 
 
 class Wire:
@@ -44,20 +25,20 @@ class Wire:
     def __init__(self, heard: BinaryIO, said: BinaryIO, now: Callable[[], float]) -> None:
         self._heard, self._said, self._now = heard, said, now
         self._lock = threading.Lock()
-        self._words: queue.SimpleQueue[ToParticipant] = queue.SimpleQueue()
+        self._words: queue.SimpleQueue[messages.ToParticipant] = queue.SimpleQueue()
 
     def listen(self) -> None:
         """Begin to hear."""
         threading.Thread(target=self._listen, name="console's words", daemon=True).start()
 
-    def say(self, word: FromParticipant) -> None:
+    def say(self, word: messages.FromParticipant) -> None:
         """Say a word; a console that is gone hears nothing, and its silence ends the program."""
         with self._lock, suppress(OSError):
             self._said.write(line(word))
             self._said.flush()
 
-    def word(self) -> ToParticipant | None:
-        """The next word that was heard, if there is one. A console that is gone said `Close`."""
+    def word(self) -> messages.ToParticipant | None:
+        """The next word that was heard, if there is one. A console that is gone said `CloseScreen`."""
         with suppress(queue.Empty):
             return self._words.get_nowait()
         return None
@@ -66,39 +47,39 @@ class Wire:
         for wire in self._heard:
             there_s = self._now()
             try:
-                word = to_participant_from(wire)
+                word = messages.to_participant_from(wire)
             except ValidationError:
-                self.say(Failed(message=f"the console said what is no word: {wire[:200]!r}"))
+                self.say(messages.ScreenFailed(message=f"the console said what is no word: {wire[:200]!r}"))
                 break
-            if isinstance(word, Ping):
-                self.say(Pong(sent_s=word.sent_s, there_s=there_s))
+            if isinstance(word, messages.Ping):
+                self.say(messages.Pong(sent_s=word.sent_s, there_s=there_s))
             else:
                 self._words.put(word)
-        self._words.put(Close())
+        self._words.put(messages.CloseScreen())
 
 
 _STEP_S = 0.004
 """How long the program rests between two looks at words, mouse and keys."""
 
 
-def run(look: Look, heard: BinaryIO, said: BinaryIO) -> int:
-    """Run the program; whatever ends it but the console is said as `Failed`. Gives back the exit code."""
+def run_program(look: messages.Look, heard: BinaryIO, said: BinaryIO) -> int:
+    """Run the program; whatever ends it but the console is said as `ScreenFailed`. Gives back the exit code."""
     wire = Wire(heard, said, time.monotonic)
     try:
-        toolkit = load()
+        toolkit = load_toolkit()
         wire = Wire(heard, said, toolkit.now)
         app = App(Stage(toolkit, look), wire)
         app.begin()
         app.serve()
     except KeyboardInterrupt:
-        wire.say(Failed(message="it was interrupted from the keyboard (Ctrl-C)"))
+        wire.say(messages.ScreenFailed(message="it was interrupted from the keyboard (Ctrl-C)"))
         return 130
     except SystemExit as error:  # PsychoPy ends the program where others raise
-        wire.say(Failed(message=f"PsychoPy ended the program ({error.code})"))
+        wire.say(messages.ScreenFailed(message=f"PsychoPy ended the program ({error.code})"))
         return 1
     except BaseException as error:  # noqa: BLE001 - some of PsychoPy's errors derive from BaseException alone
         traceback.print_exc()
-        wire.say(Failed(message=f"{type(error).__name__}: {error}"))
+        wire.say(messages.ScreenFailed(message=f"{type(error).__name__}: {error}"))
         return 1
     return 0
 
@@ -108,7 +89,7 @@ class App:
 
     def __init__(self, stage: Stage, wire: Wire) -> None:
         self._stage, self._wire = stage, wire
-        self._keys = Keys(stage.toolkit)
+        self._keys = KeyPresses(stage.toolkit)
         self._noise = MaskingNoise()
         self._told: tuple[str, ...] = ()
         self._told_s = 0.0
@@ -122,12 +103,12 @@ class App:
         self._stage.put(MessagePage(self._stage, ""))
         self._stage.step()
         size = f"{self._stage.width_px}x{self._stage.height_px}"
-        self._wire.say(Ready(psychopy=self._stage.toolkit.version, window=size, refresh_Hz=refresh_Hz))
+        self._wire.say(messages.Ready(psychopy=self._stage.toolkit.version, window=size, refresh_Hz=refresh_Hz))
         self._wire.listen()
 
     def serve(self) -> None:
         """Do as the words say until they say close."""
-        while not isinstance(word := self._wire.word(), Close):
+        while not isinstance(word := self._wire.word(), messages.CloseScreen):
             if word is not None:
                 self._obey(word)
             self._stage.step()
@@ -147,24 +128,24 @@ class App:
         for press in self._keys.since(self._told_s):
             self._told_s = math.nextafter(press.pressed_s, math.inf)
             if press.name in self._told:
-                self._wire.say(KeyPressed(name=press.name))
+                self._wire.say(messages.KeyPressed(name=press.name))
 
-    def _obey(self, word: ToParticipant) -> None:
-        self._told = word.tell if isinstance(word, Show) else ()
+    def _obey(self, word: messages.ToParticipant) -> None:
+        self._told = word.tell if isinstance(word, messages.Show) else ()
         self._told_s = self._stage.toolkit.now()
         match word:
-            case Show():
+            case messages.Show():
                 self._stage.put(MessagePage(self._stage, word.text), keep_keys=word.keep_keys)
-            case AskRating():
+            case messages.AskRating():
                 self._stage.put(RatingPage(self._stage, word, self._drafts_of(word)))
-            case AskDescription():
+            case messages.AskDescription():
                 self._stage.put(DescriptionPage(self._stage, word, self._drafts_of(word)))
-            case AskDirection():
+            case messages.AskDirection():
                 self._stage.put(DirectionPage(self._stage, word, self._keys))
-            case Noise():
+            case messages.Noise():
                 self._wire.say(self._noise.turn(word))
 
-    def _drafts_of(self, word: AskRating | AskDescription) -> Drafts:
+    def _drafts_of(self, word: messages.AskRating | messages.AskDescription) -> Drafts:
         """What is given as a pause begins is not taken, and asked for again: it is there still."""
         if (word.kind, word.draft) != self._asked_for:
             self._drafts, self._asked_for = {}, (word.kind, word.draft)
@@ -176,4 +157,4 @@ class App:
         given = None if page is None else page.outcome()
         if page is not None and given is not None:
             self._wire.say(given)
-            self._stage.put(MessagePage(self._stage, BETWEEN), keep_keys=page.typed)
+            self._stage.put(MessagePage(self._stage, messages.BETWEEN), keep_keys=page.typed)

@@ -6,39 +6,24 @@ Questions may be asked from any thread but the one that draws the console; `canc
 
 from __future__ import annotations
 
+import os
+import queue
+import subprocess
 import sys
+import tempfile
 import threading
 from collections.abc import Callable, Iterable, Iterator, Sequence
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass, replace
-from typing import Self, TypeVar
+from pathlib import Path
+from typing import IO, Self, TypeVar
 
 from pydantic import ValidationError
 
+from device.words import RecoilError
 from experiments.clock import Clock, RealClock
-from experiments.screens.participant.process import Mailbox, ParticipantError, ParticipantProcess
-from experiments.screens.participant.words import (
-    AskDescription,
-    AskDirection,
-    AskRating,
-    Close,
-    DescriptionGiven,
-    DirectionGiven,
-    Failed,
-    Focused,
-    Look,
-    Noise,
-    NoiseIs,
-    Ping,
-    Pong,
-    RatingGiven,
-    Ready,
-    Show,
-    Unasked,
-    arguments,
-    from_participant_from,
-    line,
-)
+from experiments.screens.participant import messages
+from experiments.screens.participant.messages import line
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -98,10 +83,8 @@ NOISE_S = 15.0
 MAX_CLOCK_STEP_S = 0.02
 """How far the clocks may move against each other while a direction is asked; a clock that was set moves further."""
 
-Question = AskRating | AskDescription | AskDirection | Noise
-Answer = TypeVar("Answer", RatingGiven, DescriptionGiven, DirectionGiven, NoiseIs)
-
-__all__ = ["ParticipantError", "ParticipantLink"]
+_Asked = messages.AskRating | messages.AskDescription | messages.AskDirection | messages.Noise
+_Given = TypeVar("_Given", messages.RatingGiven, messages.DescriptionGiven, messages.DirectionGiven, messages.NoiseIs)
 
 
 class ParticipantLink:
@@ -112,12 +95,11 @@ class ParticipantLink:
         self._mail = Mailbox()
         self._asking = threading.RLock()
         self._page = threading.Lock()
-        self._focused: Focused | None = None
+        self.focused: messages.Focused | None = None
         """Whose the keys are, as far as it was said."""
         self._stands = 0
         """The question that was put on the screen last; 0 when something else was."""
-        self._clocks: ClockMap | None = None
-        self._heard: Callable[[Unasked], None] = lambda _: None
+        self._heard: Callable[[messages.Unasked], None] = lambda _: None
         self._gone: Callable[[str], None] = lambda _: None
         try:
             self._process = ParticipantProcess(command, self._said, self._failed)
@@ -126,10 +108,15 @@ class ParticipantLink:
 
     @classmethod
     def start(
-        cls, look: Look | None = None, *, clock: Clock | None = None, command: Sequence[str] | None = None
+        cls, look: messages.Look | None = None, *, clock: Clock | None = None, command: Sequence[str] | None = None
     ) -> Self:
         """Start the program and return at once; its window takes seconds to open. `command` is another program."""
-        program = command or (sys.executable, "-m", "experiments.screens.participant", *arguments(look or Look()))
+        program = command or (
+            sys.executable,
+            "-m",
+            "experiments.screens.participant",
+            *messages.arguments(look or messages.Look()),
+        )
         return cls(program, clock or RealClock())
 
     @property
@@ -143,26 +130,21 @@ class ParticipantLink:
         return self._mail.asking
 
     @property
-    def clocks(self) -> ClockMap | None:
-        """The last mapping of the clocks, with its uncertainty; `None` before the first."""
-        return self._clocks
-
-    @property
     def pid(self) -> int:
         """The process id of the program."""
         return self._process.pid
 
-    def wait_ready(self, timeout_s: float = 60.0) -> Ready:
+    def wait_ready(self, timeout_s: float = 60.0) -> messages.Ready:
         """Wait until the window is open, and map the clocks."""
-        ready = self._mail.wait(Ready, lambda _: True, timeout_s, None)
+        ready = self._mail.wait(messages.Ready, lambda _: True, timeout_s, None)
         self.map_clocks()
         return ready
 
-    def listen(self, heard: Callable[[Unasked], None], gone: Callable[[str], None]) -> None:
+    def listen(self, heard: Callable[[messages.Unasked], None], gone: Callable[[str], None]) -> None:
         """Have somebody told what is said without a question, and why the screen is gone if it goes."""
         self._heard, self._gone = heard, gone
-        if self._focused is not None:
-            heard(self._focused)
+        if self.focused is not None:
+            heard(self.focused)
         if self.failure is not None:
             gone(self.failure)
 
@@ -174,36 +156,43 @@ class ParticipantLink:
         with self._page:
             self._mail.call_off()
             self._stands = 0
-            self._process.write(line(Show(text=text, tell=tell, keep_keys=keep_keys)))
+            self._process.write(line(messages.Show(text=text, tell=tell, keep_keys=keep_keys)))
 
     def map_clocks(self, pings: int = PINGS) -> ClockMap:
         """Map the clocks anew."""
         with self._alone():
-            self._clocks = clock_map([self._trip() for _ in range(pings)])
-            return self._clocks
+            return clock_map([self._trip() for _ in range(pings)])
 
     def ask_rating(
-        self, question: AskRating, timeout_s: float | None = None, *, wanted: Callable[[], bool] = lambda: True
-    ) -> RatingGiven:
+        self, question: messages.AskRating, timeout_s: float | None = None, *, wanted: Callable[[], bool] = lambda: True
+    ) -> messages.RatingGiven:
         """Have a stimulus rated. Waits for the participant.
 
         `wanted` is looked at just before the question is put on the screen; if it is not, it counts as called off.
         """
         with self._alone():
-            asked = replace(question, ask=self._mail.open_ask())
-            return self._answer(asked, RatingGiven, timeout_s, wanted)
+            return self._answer(replace(question, ask=self._mail.open_ask()), messages.RatingGiven, timeout_s, wanted)
 
     def ask_description(
-        self, question: AskDescription, timeout_s: float | None = None, *, wanted: Callable[[], bool] = lambda: True
-    ) -> DescriptionGiven:
+        self,
+        question: messages.AskDescription,
+        timeout_s: float | None = None,
+        *,
+        wanted: Callable[[], bool] = lambda: True,
+    ) -> messages.DescriptionGiven:
         """Have a stimulus described. Waits for the participant. `wanted` as of a rating."""
         with self._alone():
-            asked = replace(question, ask=self._mail.open_ask())
-            return self._answer(asked, DescriptionGiven, timeout_s, wanted)
+            return self._answer(
+                replace(question, ask=self._mail.open_ask()), messages.DescriptionGiven, timeout_s, wanted
+            )
 
     def ask_direction(
-        self, question: AskDirection, timeout_s: float | None = None, *, wanted: Callable[[], bool] = lambda: True
-    ) -> DirectionGiven:
+        self,
+        question: messages.AskDirection,
+        timeout_s: float | None = None,
+        *,
+        wanted: Callable[[], bool] = lambda: True,
+    ) -> messages.DirectionGiven:
         """Have a direction judged. Waits for the participant. `onset_s` and `pressed_s` are on this side's clock.
 
         `wanted` as of a rating.
@@ -211,7 +200,7 @@ class ParticipantLink:
         with self._alone():
             ask, clocks = self._mail.open_ask(), self.map_clocks()
             asked = replace(question, ask=ask, onset_s=clocks.there(question.onset_s))
-            given = self._answer(asked, DirectionGiven, timeout_s, wanted)
+            given = self._answer(asked, messages.DirectionGiven, timeout_s, wanted)
             after = self.map_clocks()
         if surely_moved_s(clocks, after) > MAX_CLOCK_STEP_S:
             moved_s = after.offset_s - clocks.offset_s
@@ -220,10 +209,12 @@ class ParticipantLink:
             )
         return replace(given, pressed_s=clocks.here(given.pressed_s))
 
-    def noise(self, on: bool, level: float = 0.3) -> NoiseIs:
+    def noise(self, on: bool, level: float = 0.3) -> messages.NoiseIs:
         """Turn the masking noise on or off; the answer says whether it plays, and if it cannot, why."""
         with self._alone():
-            return self._answer(Noise(on=on, level=level, ask=self._mail.open_ask()), NoiseIs, NOISE_S, lambda: True)
+            return self._answer(
+                messages.Noise(on=on, level=level, ask=self._mail.open_ask()), messages.NoiseIs, NOISE_S, lambda: True
+            )
 
     def cancel(self) -> bool:
         """Call off the question that is being asked, from another thread; true if there was one."""
@@ -232,7 +223,7 @@ class ParticipantLink:
     def close(self) -> None:
         """End the program: by asking, then by force. Who still waits for it is told."""
         self._gone = lambda _: None
-        self._process.write(line(Close()))
+        self._process.write(line(messages.CloseScreen()))
         self._mail.fail("the participant's screen was closed by the console")
         self._process.end()
 
@@ -252,9 +243,7 @@ class ParticipantLink:
         finally:
             self._asking.release()
 
-    def _answer(
-        self, asked: Question, kind: type[Answer], timeout_s: float | None, wanted: Callable[[], bool]
-    ) -> Answer:
+    def _answer(self, asked: _Asked, kind: type[_Given], timeout_s: float | None, wanted: Callable[[], bool]) -> _Given:
         """Ask and wait; a question that gets no answer is taken off the screen, if it still stands there."""
         try:
             self._put(asked, wanted)
@@ -265,35 +254,35 @@ class ParticipantLink:
         finally:
             self._mail.call_off()
 
-    def _put(self, asked: Question, wanted: Callable[[], bool]) -> None:
+    def _put(self, asked: _Asked, wanted: Callable[[], bool]) -> None:
         with self._page:
             if not wanted():
                 raise ParticipantError("the question was called off")
             self._stands = asked.ask
             self._process.write(line(asked))
 
-    def _take_off(self, asked: Question) -> None:
+    def _take_off(self, asked: _Asked) -> None:
         with self._page:
             if self._stands == asked.ask:
-                self._process.write(line(Show(text="")))
+                self._process.write(line(messages.Show(text="")))
 
     def _trip(self) -> RoundTrip:
         """One ping, waited for where its return is stamped."""
         sent_s = self._clock.now()
-        self._process.write(line(Ping(sent_s=sent_s)))
-        pong = self._mail.wait(Pong, lambda pong: pong.sent_s == sent_s, REPLY_S, None)
+        self._process.write(line(messages.Ping(sent_s=sent_s)))
+        pong = self._mail.wait(messages.Pong, lambda pong: pong.sent_s == sent_s, REPLY_S, None)
         return RoundTrip(sent_s=sent_s, there_s=pong.there_s, back_s=self._clock.now())
 
     def _said(self, wire: bytes) -> None:
         try:
-            word = from_participant_from(wire)
+            word = messages.from_participant_from(wire)
         except ValidationError:
             self._failed(f"the participant's screen said what is no word: {wire[:200]!r}")
             return
-        if isinstance(word, Failed):
+        if isinstance(word, messages.ScreenFailed):
             self._failed(f"the participant's screen failed: {word.message}")
-        elif isinstance(word, Unasked):
-            self._focused = word if isinstance(word, Focused) else self._focused
+        elif isinstance(word, messages.Unasked):
+            self.focused = word if isinstance(word, messages.Focused) else self.focused
             self._heard(word)
         else:
             self._mail.put(word)
@@ -304,3 +293,159 @@ class ParticipantLink:
         self._mail.fail(why)
         if first:
             self._gone(why)
+
+
+_ROOT = Path(__file__).parents[3]
+"""Where `experiments` lies: started there, the child runs the same code, whatever the console's folder holds."""
+
+_LAST_BYTES = 4_000
+
+END_S = 3.0
+"""How long a child has to end by itself, and again once it was told to."""
+
+
+class ParticipantProcess:
+    """A child that is spoken to in lines. Neither writing nor ending ever hangs."""
+
+    def __init__(self, command: Sequence[str], said: Callable[[bytes], None], gone: Callable[[str], None]) -> None:
+        self._said, self._gone = said, gone
+        self._errors = tempfile.TemporaryFile()  # noqa: SIM115 - closed in end()
+        try:
+            self._child = subprocess.Popen(
+                list(command), stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=self._errors, cwd=_ROOT
+            )
+        except OSError:
+            self._errors.close()
+            raise
+        self._out: queue.SimpleQueue[bytes | None] = queue.SimpleQueue()
+        self._threads = [
+            threading.Thread(target=target, args=(pipe,), name=name, daemon=True)
+            for target, pipe, name in (
+                (self._read, self._child.stdout, "participant's words"),
+                (self._write, self._child.stdin, "words to participant"),
+            )
+        ]
+        for thread in self._threads:
+            thread.start()
+
+    @property
+    def pid(self) -> int:
+        """The child's process id."""
+        return self._child.pid
+
+    def write(self, line: bytes) -> None:
+        """Hand over a line; a child that reads nothing keeps nobody waiting."""
+        self._out.put(line)
+
+    def end(self) -> None:
+        """Close its input, then ask it to end, then kill it."""
+        self._out.put(None)
+        for insist in (self._child.poll, self._child.terminate, self._child.kill):
+            insist()
+            with suppress(subprocess.TimeoutExpired):
+                self._child.wait(END_S)
+                break
+        for thread in self._threads:
+            thread.join(END_S)
+        self._errors.close()
+
+    def _fate(self) -> str:
+        """How the child ended, with its last words."""
+        with suppress(subprocess.TimeoutExpired):
+            self._child.wait(END_S)
+        return f"the participant's screen {_ending(self._child.returncode)}{self._last_words()}"
+
+    def _last_words(self) -> str:
+        """The end of what the child wrote as errors; its file position is the child's too, so it stays where it is."""
+        errors = self._errors.fileno()
+        start = max(0, os.fstat(errors).st_size - _LAST_BYTES)
+        lines = os.pread(errors, _LAST_BYTES, start).decode(errors="replace").strip().splitlines()
+        return f"; its last words: {lines[-1].strip()}" if lines else ""
+
+    def _read(self, pipe: IO[bytes]) -> None:
+        with pipe:
+            for line in pipe:
+                self._said(line)
+        self._gone(self._fate())
+
+    def _write(self, pipe: IO[bytes]) -> None:
+        with suppress(OSError), pipe:  # the reader tells of a child that is gone
+            while (line := self._out.get()) is not None:
+                pipe.write(line)
+                pipe.flush()
+
+
+def _ending(code: int | None) -> str:
+    if code is None:
+        return "closed its output"
+    return f"was killed by signal {-code}" if code < 0 else f"ended with exit code {code}"
+
+
+_Kind = TypeVar("_Kind", bound=messages.FromParticipant)
+
+
+class ParticipantError(RecoilError):
+    """The participant's screen did not do it; the message says what and why."""
+
+
+class Mailbox:
+    """The last word of each kind, and the one question that is open. Safe to use from any thread."""
+
+    def __init__(self) -> None:
+        self._news = threading.Condition()
+        self._last: dict[type, messages.FromParticipant] = {}
+        self._asked = 0
+        self._open: int | None = None
+        self.failure: str | None = None
+
+    def put(self, word: messages.FromParticipant) -> None:
+        """Keep a word for who waits for it."""
+        with self._news:
+            self._last[type(word)] = word
+            self._news.notify_all()
+
+    @property
+    def asking(self) -> bool:
+        """Whether a question is open."""
+        return self._open is not None
+
+    def fail(self, message: str) -> None:
+        """Nothing comes any more; the first reason stands."""
+        with self._news:
+            self.failure = self.failure or message
+            self._news.notify_all()
+
+    def open_ask(self) -> int:
+        """The number of a new question."""
+        with self._news:
+            self._asked += 1
+            self._open = self._asked
+            return self._asked
+
+    def call_off(self) -> bool:
+        """Whoever waits for the open question waits no longer; true if there was one."""
+        with self._news:
+            was_open, self._open = self._open is not None, None
+            self._news.notify_all()
+            return was_open
+
+    def wait(self, kind: type[_Kind], fits: Callable[[_Kind], bool], timeout_s: float | None, ask: int | None) -> _Kind:
+        """The word of a kind that fits, once it is here. `ParticipantError` if it does not come."""
+
+        def here() -> _Kind | None:
+            word = self._last.get(kind)
+            return word if isinstance(word, kind) and fits(word) else None
+
+        with self._news:
+            self._news.wait_for(lambda: here() or self.failure or ask != (self._open if ask else None), timeout_s)
+            word = here()
+            if word is None:
+                raise ParticipantError(self._why_not(ask, timeout_s))
+            return word
+
+    def _why_not(self, ask: int | None, timeout_s: float | None) -> str:
+        if self.failure:
+            return self.failure
+        if ask and ask != self._open:
+            return "the question was called off"
+        return f"the participant's screen gave no answer within {timeout_s:g} s"

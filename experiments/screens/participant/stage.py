@@ -3,17 +3,34 @@
 Places are in parts of the window's height from its middle, `half_width` to either side and 0.5 up and down. On X a
 program may say whose the keys are; elsewhere the system decides, and nothing is given back here. The console cannot
 take them back by itself: X and window managers refuse whoever was not worked at last.
+
+PsychoPy is imported here, all but its sound, and only when the program runs: it takes seconds and a display. Its
+keyboard stamps keys as they happen and not as frames are drawn, and hears them whichever window has the focus: a
+two-button box that acts as keys needs none; and so the console must not use the participant's keys for its own ends.
 """
 
 from __future__ import annotations
 
+import os
+import tempfile
 from collections import deque
+from collections.abc import Iterator
+from contextlib import contextmanager
 from ctypes import byref, c_int, c_ulong
 from dataclasses import dataclass
-from typing import Any, Protocol
+from pathlib import Path
+from typing import Any
 
-from experiments.screens.participant.toolkit import Toolkit
-from experiments.screens.participant.words import PALETTES, EmergencyPressed, Focused, FromParticipant, Look, Unasked
+from experiments.screens.participant.messages import (
+    PALETTES,
+    EmergencyPressed,
+    Focused,
+    FromParticipant,
+    Look,
+    Noise,
+    NoiseIs,
+    Unasked,
+)
 
 _NO_WINDOW = 1
 """Up to this X means nobody, or whoever is under the pointer."""
@@ -63,7 +80,7 @@ def _xlib() -> Any:
 _SMALLEST = 0.018
 _SHRINK = 0.92
 _MARGIN = 0.94
-TITLE = "Recoil: participant"
+WINDOW_TITLE = "Recoil: participant"
 EMERGENCY_KEY = "F12"
 _STEADY_FLIPS, _MOST_FLIPS = 10, 60
 
@@ -72,12 +89,16 @@ class WindowClosed(Exception):  # noqa: N818 - somebody closed it; that is no er
     """The participant's window was closed."""
 
 
-class Page(Protocol):
-    """What fills the window, and hears what happens on it. A handler that returns true keeps it from PsychoPy."""
+STILL_S = 0.1
+"""How often a page is drawn on which nothing moves."""
 
-    redraw_s: float
-    pointer: bool
-    typed: bool
+
+class Page:
+    """What fills the window, and hears what happens on it: nothing, but for what a page says of itself."""
+
+    redraw_s = STILL_S
+    pointer = False
+    typed = False
 
     def draw(self) -> None:
         """Draw one frame."""
@@ -92,20 +113,23 @@ class Page(Protocol):
         """The mouse was let go."""
 
     def key(self, name: str, ctrl: bool) -> bool:
-        """A key went down while the window had the focus; `name` as pyglet names it."""
+        """A key went down while the window had the focus; `name` as pyglet names it. True keeps it from PsychoPy."""
+        del name, ctrl
+        return True
 
     def motion(self, name: str) -> None:
         """A key that moves something went down, or is held."""
 
     def outcome(self) -> FromParticipant | None:
-        """What it comes to: a word to say, or nothing yet."""
+        """What it comes to: a message to say, or nothing yet."""
+        return None
 
     def leave(self) -> None:
         """It is taken off the window."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Box:
+class TextBox:
     """Where text goes: its anchor point, how large it may be, and what of it stands at the anchor."""
 
     x: float = 0.0
@@ -130,7 +154,8 @@ class Stage:
         self.half_width = half_width(self.width_px, self.height_px)
         self.page: Page | None = None
         self._focus = Focus(self.window.winHandle)
-        self._drawn_s = 0.0
+        self.drawn_s = 0.0
+        """When the page was drawn last; 0 if it was not yet."""
         self._closed = False
         self.unasked: deque[Unasked] = deque()
         """What is to be said without a question."""
@@ -158,7 +183,7 @@ class Stage:
             self._focus.take()
         elif not keep_keys:
             self._focus.give_back()
-        self._drawn_s = 0.0
+        self.drawn_s = 0.0
 
     def step(self) -> None:
         """Let happen what happens, and draw when it is time. `WindowClosed` if it is."""
@@ -166,8 +191,8 @@ class Stage:
         if self._closed:
             raise WindowClosed("the participant's window was closed")
         now_s = self.toolkit.now()
-        if self.page is not None and now_s - self._drawn_s >= self.page.redraw_s:
-            self._drawn_s = now_s
+        if self.page is not None and now_s - self.drawn_s >= self.page.redraw_s:
+            self.drawn_s = now_s
             self.page.draw()
             self.window.flip()
 
@@ -179,7 +204,7 @@ class Stage:
         """A place in pixels from the lower left, as a place of this window."""
         return (x_px - self.width_px / 2) / self.height_px, y_px / self.height_px - 0.5
 
-    def text(self, text: str, box: Box, size: float, color: str) -> Any:
+    def text(self, text: str, box: TextBox, size: float, color: str) -> Any:
         """Text that fits its box: smaller than asked if it must."""
         while True:
             stimulus = self._text(text, box, size, color)
@@ -189,7 +214,7 @@ class Stage:
                 return stimulus
             size *= _SHRINK
 
-    def _text(self, text: str, box: Box, size: float, color: str) -> Any:
+    def _text(self, text: str, box: TextBox, size: float, color: str) -> Any:
         return self.toolkit.visual.TextStim(
             self.window,
             text=text or " ",  # PsychoPy cannot measure no text
@@ -204,7 +229,7 @@ class Stage:
             color=color,
         )
 
-    def panel(self, box: Box, fill: str, line: str | None = None) -> Any:
+    def panel(self, box: TextBox, fill: str, line: str | None = None) -> Any:
         """A filled rectangle; its box's place is its middle."""
         return self.toolkit.visual.Rect(
             self.window,
@@ -233,7 +258,7 @@ def _open(toolkit: Toolkit, look: Look, ground: str) -> Any:
         checkTiming=False,
         monitor=None,
     )
-    window.winHandle.set_caption(TITLE)
+    window.winHandle.set_caption(WINDOW_TITLE)
     return window
 
 
@@ -278,3 +303,146 @@ class _Handlers:
     def on_text_motion(self, motion: int) -> None:
         if self._stage.page is not None:
             self._stage.page.motion(self._names.motion_string(motion))
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Toolkit:
+    """The parts of PsychoPy that this program uses. It has no types."""
+
+    version: str
+    visual: Any
+    keyboard: Any
+    key_epoch_s: float
+    key: Any
+    fonts: Path
+    now: Any
+
+
+@contextmanager
+def writable_home() -> Iterator[None]:
+    """A home folder for PsychoPy, which writes to it when it is imported: another if this one takes nothing."""
+    if _takes_files(Path(os.environ.get("HOME", "")) / ".psychopy3"):
+        yield
+        return
+    with tempfile.TemporaryDirectory(prefix="recoil-home-", ignore_cleanup_errors=True) as home:
+        os.environ["HOME"] = home
+        yield
+
+
+def _takes_files(folder: Path) -> bool:
+    try:
+        folder.mkdir(exist_ok=True)
+        with tempfile.TemporaryFile(dir=folder):
+            return True
+    except OSError:
+        return False
+
+
+def load_toolkit() -> Toolkit:
+    """Import PsychoPy. What it raises without a display or without a part of itself passes through."""
+    # imported when used: see above
+    import psychopy  # noqa: PLC0415
+    from psychopy import clock, logging, visual  # noqa: PLC0415
+    from psychopy.hardware import keyboard  # noqa: PLC0415
+    from pyglet.window import key  # noqa: PLC0415
+
+    logging.console.setLevel(logging.ERROR)
+    return Toolkit(
+        version=psychopy.__version__,
+        visual=visual,
+        keyboard=keyboard,
+        key_epoch_s=logging.defaultClock.getLastResetTime(),
+        key=key,
+        fonts=Path(psychopy.__file__).parent / "assets" / "fonts",
+        now=clock.getTime,
+    )
+
+
+_KEPT = 256
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class KeyDown:
+    """A key by PsychoPy's name, and when it went down on the clock of this process."""
+
+    name: str
+    pressed_s: float
+
+
+class KeyPresses:
+    """The last keys that went down, oldest first."""
+
+    def __init__(self, toolkit: Toolkit) -> None:
+        self._board = toolkit.keyboard.Keyboard()
+        self._epoch_s = toolkit.key_epoch_s
+        self._presses: deque[KeyDown] = deque(maxlen=_KEPT)
+
+    def since(self, onset_s: float) -> Iterator[KeyDown]:
+        """The keys that went down from a moment on."""
+        self.poll()
+        return (
+            press for press in sorted(self._presses, key=lambda press: press.pressed_s) if press.pressed_s >= onset_s
+        )
+
+    def poll(self) -> None:
+        """Take what PsychoPy holds. It gives keys still down and keys let go apart, a key that was both twice."""
+        for released in (False, True):
+            for found in self._board.getKeys(waitRelease=released):
+                press = KeyDown(name=str(found.name), pressed_s=float(found.tDown) + self._epoch_s)
+                if press not in self._presses:
+                    self._presses.append(press)
+
+
+_LOOP_S = 10.0
+_RATE_Hz = 44_100
+_SEED = 20_240  # assumed; any will do, and the same noise for everybody
+
+
+class MaskingNoise:
+    """White noise in a loop. Where it cannot play it stays off and says why, in one message."""
+
+    def __init__(self) -> None:
+        self._sound: Any = None
+
+    def turn(self, asked: Noise) -> NoiseIs:
+        """Turn it on or off."""
+        self.stop()
+        if not asked.on:
+            return NoiseIs(on=False, message="", ask=asked.ask)
+        try:
+            self._sound = _playing(asked.level)
+        except (KeyboardInterrupt, SystemExit):
+            raise
+        except BaseException as error:  # noqa: BLE001 - PsychoPy raises plain Exception, and some that derive from BaseException alone
+            return NoiseIs(on=False, message=_why_not(error), ask=asked.ask)
+        return NoiseIs(on=True, message="", ask=asked.ask)
+
+    def stop(self) -> None:
+        """Silence."""
+        if self._sound is not None:
+            self._sound.stop()
+            self._sound = None
+
+
+def _playing(level: float) -> Any:
+    # imported when used: looking for sound devices takes seconds, and most studies use none
+    import numpy as np  # noqa: PLC0415
+    from psychopy import prefs  # noqa: PLC0415
+
+    prefs.hardware["audioLib"] = ["sounddevice"]
+    from psychopy import sound  # noqa: PLC0415
+
+    mono = np.random.default_rng(_SEED).uniform(-1, 1, int(_LOOP_S * _RATE_Hz))
+    noise = sound.Sound(
+        np.column_stack([mono, mono]), sampleRate=_RATE_Hz, stereo=True, volume=level, loops=-1, hamming=False
+    )
+    noise.play()
+    return noise
+
+
+def _why_not(error: BaseException) -> str:
+    reason = " ".join(str(error).split()) or type(error).__name__
+    return (
+        f"Masking noise stays off: no sound device plays it ({type(error).__name__}: {reason}). "
+        "Connect headphones, see that the system lists them, then stop this run and resume it."
+    )

@@ -7,29 +7,14 @@ from dataclasses import dataclass, field
 from datetime import datetime, timedelta
 
 from device import GunStatus
-from experiments.config.models import ExperimentConfig
-from experiments.design.plan import Plan, Trial
+from experiments.design.plan import Trial
 from experiments.screens import texts
-from experiments.screens.console.messages import GunSeen
-from experiments.screens.console.view import About, Seen
-from experiments.session.history import History, done, entries, together
+from experiments.screens.console.view import About, GunSeen, Seen
+from experiments.session import steps
+from experiments.session.history import done, entries, together
 from experiments.session.remarks import AnswerCorrected, DescriptionCorrected, Flagged, Noted, RatingCorrected, Remark
 from experiments.session.states import Position, State
-from experiments.session.steps import (
-    Answered,
-    Ask,
-    Close,
-    Describe,
-    Outcome,
-    Presented,
-    Rate,
-    Rated,
-    Repeat,
-    Rest,
-    Rested,
-    Step,
-    trial_of,
-)
+from experiments.session.steps import Outcome, Step, trial_of
 
 PRIOR_TRIALS = 5
 """The plan counts as much as so many measured trials, so that the estimate does not jump with the first."""
@@ -39,7 +24,7 @@ ROUGH_S = 1200.0
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Progress:
+class TrialCount:
     """How many trials are done of those planned, and of what."""
 
     what: str
@@ -47,26 +32,29 @@ class Progress:
     planned: int
 
 
-def progress(plan: Plan, told: History, current: Trial, *, rated_last: bool) -> list[Progress]:
+def trials_done(seen: Seen) -> list[TrialCount]:
     """How far the run is, seen from the current trial.
 
     Trials of the set, of the session and of the experiment; where all are rated after all were felt, felt and rated.
     """
-    felt, rated = done(told), {trial_of(step) for step, word in told if isinstance(word, Rated)}
-    if rated_last:
-        return [_progress("felt", plan.trials, felt), _progress("rated", plan.trials, rated)]
-    session = [trial for trial in plan.trials if trial.session == current.session]
-    here = [trial for trial in session if together(trial, current)]
-    parts = {"set": here, "session": session, "experiment": plan.trials}
-    return [_progress(what, trials, felt) for what, trials in parts.items()]
+    felt, trials, here = done(seen.told), seen.about.plan.trials, seen.here
+    if seen.about.rated_last:
+        return [_count("felt", trials, felt), _count("rated", trials, _rated(seen))]
+    session = [trial for trial in trials if trial.session == here.session]
+    parts = {"set": [trial for trial in session if together(trial, here)], "session": session, "experiment": trials}
+    return [_count(what, trials, felt) for what, trials in parts.items()]
 
 
-def _progress(what: str, trials: Sequence[Trial], finished: Collection[Trial | None]) -> Progress:
-    return Progress(what=what, count=sum(trial in finished for trial in trials), planned=len(trials))
+def _rated(seen: Seen) -> set[Trial | None]:
+    return {trial_of(step) for step, word in seen.told if isinstance(word, steps.Rated)}
+
+
+def _count(what: str, trials: Sequence[Trial], finished: Collection[Trial | None]) -> TrialCount:
+    return TrialCount(what=what, count=sum(trial in finished for trial in trials), planned=len(trials))
 
 
 @dataclass(slots=True)
-class Pace:
+class RunTiming:
     """Measures how long trials take, without the time of pauses."""
 
     began_s: float | None = None
@@ -89,9 +77,9 @@ class Pace:
 
     def saved(self, word: Outcome | Remark, now_s: float) -> None:
         """Take what was saved: a trial is over with its answer, or with its stimulus where answers come at the end."""
-        if isinstance(word, Answered | Presented) and self._trial_s is not None:
+        if isinstance(word, steps.Answered | steps.Presented) and self._trial_s is not None:
             self.measured_s.append(now_s - self._trial_s - self._paused_s)
-        if isinstance(word, Answered | Presented | Rested):
+        if isinstance(word, steps.Answered | steps.Presented | steps.Rested):
             self._trial_s = None
 
     def elapsed_s(self, now_s: float) -> float:
@@ -103,21 +91,23 @@ class Pace:
         return (PRIOR_TRIALS * planned_s + sum(self.measured_s)) / (PRIOR_TRIALS + len(self.measured_s))
 
 
-def remaining_s(  # noqa: PLR0917 - each is looked at
-    config: ExperimentConfig, plan: Plan, told: History, pace: Pace, position: Position, now_s: float
-) -> float:
+def remaining_s(seen: Seen, progress: RunTiming) -> float:
     """Seconds still to go: trials left, breaks left, what is left of this one, and the ratings still to come."""
-    left = len(plan.trials) - len(done(told))
-    rated = sum(isinstance(word, Rated) for _, word in told)
-    ratings_s = max(0, len(plan.trials) - rated) * config.rating_s
-    return left * pace.trial_s(config.trial_s) + _breaks_left_s(config, told, position, now_s) + ratings_s
+    config, planned = seen.about.setup.config, len(seen.about.plan.trials)
+    left = planned - len(done(seen.told))
+    rated = sum(isinstance(word, steps.Rated) for _, word in seen.told)
+    ratings_s = max(0, planned - rated) * config.rating_s
+    return float(left * progress.trial_s(config.trial_s) + _breaks_left_s(seen) + ratings_s)
 
 
-def _breaks_left_s(config: ExperimentConfig, told: History, position: Position, now_s: float) -> float:
-    taken: list[Step | None] = [step for step, word in told if isinstance(step, Rest) and isinstance(word, Rested)]
-    left_s = config.break_s - sum(step.duration_s for step in taken if isinstance(step, Rest))
-    if position.base is State.RESTING and position.until_s is not None and isinstance(position.step, Rest):
-        since_s = now_s if position.paused_s is None else position.paused_s
+def _breaks_left_s(seen: Seen) -> float:
+    position = seen.position
+    taken_s = sum(
+        step.duration_s for step, word in seen.told if isinstance(step, steps.Rest) and isinstance(word, steps.Rested)
+    )
+    left_s: float = seen.about.setup.config.break_s - taken_s
+    if position.base is State.RESTING and position.until_s is not None and isinstance(position.step, steps.Rest):
+        since_s = seen.now_s if position.paused_s is None else position.paused_s
         left_s -= position.step.duration_s - max(0.0, position.until_s - since_s)
     return max(0.0, left_s)
 
@@ -155,15 +145,15 @@ def coming(seen: Seen, count: int = 3) -> list[str]:
     step = seen.position.step
     if seen.ended is not None or seen.position.base is State.HALTED:
         return []
-    if isinstance(step, Rate | Describe):
+    if isinstance(step, steps.Rate | steps.Describe):
         return _still_to_rate(seen, step)[:count]
-    if isinstance(step, Close):
+    if isinstance(step, steps.Close):
         return ["the end"]
     trials, here = seen.about.plan.trials, seen.here
     after = trials.index(here) + 1
     lines: list[str] = []
     for before, trial in zip(trials[after - 1 :], trials[after : after + count], strict=False):
-        if lines or not isinstance(step, Rest):  # a break that is taken now is not still to come
+        if lines or not isinstance(step, steps.Rest):  # a break that is taken now is not still to come
             lines += _break_between(seen.about, before, trial)
         lines += _to_do(seen.about, before, trial)
     if len(lines) < count and seen.about.setup.config.rating_s:
@@ -179,9 +169,9 @@ def _to_do(about: About, before: Trial, trial: Trial) -> list[str]:
     return [*told, f"{trial.direction.upper()}{changed}"]
 
 
-def _still_to_rate(seen: Seen, step: Rate | Describe) -> list[str]:
+def _still_to_rate(seen: Seen, step: steps.Rate | steps.Describe) -> list[str]:
     plan = seen.about.plan
-    lines = ["its description"] if isinstance(step, Rate) else []
+    lines = ["its description"] if isinstance(step, steps.Rate) else []
     later = plan.trials[plan.trials.index(step.trial) + 1 :]
     return [*lines, *(f"rating: {texts.ordinal(plan, trial)}" for trial in later), "the end"]
 
@@ -194,7 +184,7 @@ def _break_between(about: About, before: Trial, trial: Trial) -> list[str]:
     return [f"break of {texts.duration_text(seconds)}"] if seconds else []
 
 
-def answers(seen: Seen) -> list[str]:
+def answer_lines(seen: Seen) -> list[str]:
     """What was entered in the set at hand, as it counts now."""
     return [texts.entry_text(seen.about.plan, seen.told, entry) for entry in entries(seen.told, seen.here)]
 
@@ -207,7 +197,7 @@ def marks(seen: Seen) -> list[str]:
 
 
 def _about(step: Step | None, word: Outcome | Remark) -> Trial | None:
-    return word.trial if isinstance(word, Repeat) or (step is None and hasattr(word, "trial")) else None
+    return word.trial if isinstance(word, steps.Repeat) or (step is None and hasattr(word, "trial")) else None
 
 
 def _same_set(one: Trial, other: Trial) -> bool:
@@ -226,7 +216,7 @@ def _mark(word: Outcome | Remark) -> str:
             return f"Trial {word.trial.trial}: rating corrected to {texts.value_text(word.rating)}"
         case DescriptionCorrected():
             return f"Trial {word.trial.trial}: description corrected"
-        case Repeat():
+        case steps.Repeat():
             return f"Trial {word.trial.trial}: to be presented again ({word.reason})"
         case _:
             return ""
@@ -252,11 +242,11 @@ def focus_text(seen: Seen, *, here: bool) -> tuple[str, str]:
     return "Keys: ANOTHER WINDOW – click here", "bad"
 
 
-def response_times(seen: Seen) -> list[float]:
+def own_times_s(seen: Seen) -> list[float]:
     """The participant's own response times of this session, in order: by their own hand alone."""
     times = [
         (step.trial, word.response_time_s)
         for step, word in seen.told
-        if isinstance(step, Ask) and isinstance(word, Answered) and word.response_time_valid
+        if isinstance(step, steps.Ask) and isinstance(word, steps.Answered) and word.response_time_valid
     ]
     return [time_s for trial, time_s in times if trial.session == seen.here.session][-STRIP:]

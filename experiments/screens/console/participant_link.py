@@ -13,30 +13,18 @@ from typing import Any
 from device.words import Direction
 from experiments.config.setup import Setup
 from experiments.live_run import LiveRun
-from experiments.screens.console.messages import Message, ParticipantSeen, Trouble
-from experiments.screens.participant.link import ParticipantLink
-from experiments.screens.participant.process import ParticipantError
-from experiments.screens.participant.words import (
-    BETWEEN,
-    AskDescription,
-    AskDirection,
-    AskRating,
-    EmergencyPressed,
-    Focused,
-    KeyPressed,
-    NoiseIs,
-)
+from experiments.screens.console.view import Message, ParticipantSeen, Trouble
+from experiments.screens.participant import messages
+from experiments.screens.participant.link import ParticipantError, ParticipantLink
 from experiments.session import events
 from experiments.session.events import OwnHand
 from experiments.session.states import Position, State
 from experiments.session.steps import Ask, Describe, Rate
 
-KEYS: dict[str, Direction] = {"up": "forward", "down": "backward"}
+_KEYS: dict[str, Direction] = {"up": "forward", "down": "backward"}
 """The participant's keys, by PsychoPy's names, and what they say."""
 WAIT, PAUSED, THANKS = "Please wait.", "Paused. Please wait.", "Thank you."
 
-Desire = tuple[Any, ...]
-"""What is to stand on the participant's screen: a text, or a question by the number of its step."""
 Wanted = Callable[[], bool]
 """Whether a question is still to be asked."""
 
@@ -55,7 +43,7 @@ class ParticipantSide:
         *,
         rates: bool,
         own_keys: bool,
-        noise: NoiseIs | None = None,
+        noise: messages.NoiseIs | None = None,
         hand: OwnHand = "participant",
     ) -> None:
         self._link, self._open_link, self._setup = link, open_link, setup
@@ -64,7 +52,8 @@ class ParticipantSide:
         self._lock = threading.RLock()
         self._live: LiveRun | None = None
         self._tell: Callable[[Message], None] = lambda _: None
-        self._shows: Desire = (WAIT,)
+        self._shows: str | int = WAIT
+        """What is to stand there: a text, or a question by the number of its step."""
         self._serial = -1
         self._closed = self._starting = False
         self.covered = False
@@ -93,53 +82,49 @@ class ParticipantSide:
             if position.serial < self._serial:
                 return
             self._serial = position.serial
-            desire = self._desire(position)
-            if desire == self._shows or self._closed:
+            shows = self._to_be_shown(position)
+            if shows == self._shows or self._closed:
                 return
-            self._shows = desire
-            target = self._asks(desire, position)
-            if target is None:
-                told = tuple(KEYS) if self.own_keys and desire == (PAUSED,) else ()
-                self._link.show(str(desire[0]), tell=told, keep_keys=desire == (BETWEEN,))
+            self._shows = shows
+            if isinstance(shows, str):
+                told = tuple(_KEYS) if self.own_keys and shows == PAUSED else ()
+                self._link.show(shows, tell=told, keep_keys=shows == messages.BETWEEN)
             else:
                 self._link.cancel()
-                threading.Thread(target=target, daemon=True, name="participant").start()
+                threading.Thread(target=self._ask, args=(position,), daemon=True, name="participant").start()
 
-    def _desire(self, position: Position) -> Desire:
-        if position.state is State.PAUSED or State.PAUSED in position.states:
-            return (PAUSED,)
-        if position.base is State.ASKING and self.own_keys:
-            return ("direction", position.number)
-        if position.base is State.RATING and self.rates:
-            return ("rating", position.number)
-        if position.base is State.DESCRIBING and self.rates:
-            return ("description", position.number)
-        if position.base is State.SAVING and self.rates and isinstance(position.step, Rate | Describe):
-            return (BETWEEN,)
-        return (THANKS,) if position.base in (State.CLOSING, State.STOPPED) else (WAIT,)
+    def _to_be_shown(self, position: Position) -> str | int:
+        base, by_screen = position.base, self.rates and isinstance(position.step, Rate | Describe)
+        if State.PAUSED in position.states:
+            return PAUSED
+        if (base is State.ASKING and self.own_keys) or (base in (State.RATING, State.DESCRIBING) and by_screen):
+            return position.number
+        if base is State.SAVING and by_screen:
+            return messages.BETWEEN
+        return THANKS if base in (State.CLOSING, State.STOPPED) else WAIT
 
-    def _asks(self, desire: Desire, position: Position) -> Callable[[], None] | None:
-        step = position.step
-        if desire[0] == "direction" and isinstance(step, Ask):
-            return lambda: self._carefully(desire, lambda wanted: self._judged(step, position, wanted))
-        if desire[0] == "rating" and isinstance(step, Rate):
-            return lambda: self._carefully(desire, lambda wanted: self._rated(step, position, wanted))
-        if desire[0] == "description" and isinstance(step, Describe):
-            return lambda: self._carefully(desire, lambda wanted: self._described(step, position, wanted))
-        return None
-
-    def _carefully(self, desire: Desire, ask: Callable[[Wanted], None]) -> None:
+    def _ask(self, position: Position) -> None:
         """Ask; a question that was called off is over, one that fails otherwise leaves the answer to the console."""
+
+        def wanted() -> bool:
+            return self._shows == position.number
+
         try:
-            ask(lambda: self._shows == desire)
+            match position.step:
+                case Ask() as step:
+                    self._judged(step, position, wanted)
+                case Rate() as step:
+                    self._rated(step, position, wanted)
+                case Describe() as step:
+                    self._described(step, position, wanted)
         except ParticipantError as error:
-            if self._shows == desire and self._link.failure is None:
+            if wanted() and self._link.failure is None:
                 self._tell(Trouble(text=f"Enter the answer here: {error}."))
 
     def _judged(self, step: Ask, position: Position, wanted: Wanted) -> None:
         onset_s = position.since_s if position.onset_s is None else position.onset_s
         paused = self._live is not None and self._live.paused_between(onset_s, position.since_s)
-        question = AskDirection(
+        question = messages.AskDirection(
             question=step.question,
             forward=step.forward,
             backward=step.backward,
@@ -151,7 +136,7 @@ class ParticipantSide:
         while wanted() and not self._keyed(question, position, wanted):
             question = replace(question, once_seen=True)  # it was refused: the next key counts
 
-    def _keyed(self, question: AskDirection, position: Position, wanted: Wanted) -> bool:
+    def _keyed(self, question: messages.AskDirection, position: Position, wanted: Wanted) -> bool:
         """Have the participant press a key; whether it was taken for the answer."""
         given = self._link.ask_direction(question, wanted=wanted)
         key = events.ParticipantKey(
@@ -164,7 +149,7 @@ class ParticipantSide:
 
     def _rated(self, step: Rate, position: Position, wanted: Wanted) -> None:
         given = self._link.ask_rating(
-            AskRating(
+            messages.AskRating(
                 number=step.trial.trial,
                 of=self._setup.config.design.trials,
                 question=step.question,
@@ -182,7 +167,8 @@ class ParticipantSide:
     def _described(self, step: Describe, position: Position, wanted: Wanted) -> None:
         of = self._setup.config.design.trials
         given = self._link.ask_description(
-            AskDescription(number=step.trial.trial, of=of, question=step.question, draft=position.number), wanted=wanted
+            messages.AskDescription(number=step.trial.trial, of=of, question=step.question, draft=position.number),
+            wanted=wanted,
         )
         self._offer(events.ParticipantDescribed(text=given.comment, step=position.number, by=self._hand))
 
@@ -190,16 +176,16 @@ class ParticipantSide:
         if self._live is not None:
             self._live.offer(event)
 
-    def _heard(self, word: EmergencyPressed | Focused | KeyPressed) -> None:
+    def _heard(self, word: messages.EmergencyPressed | messages.Focused | messages.KeyPressed) -> None:
         """What comes from there without a question: the emergency stop, whose the keys are, keys in a pause."""
         match word:
-            case EmergencyPressed():
+            case messages.EmergencyPressed():
                 self._offer(events.EmergencyStop(by="participant"))
-            case Focused():
+            case messages.Focused():
                 self._tell(ParticipantSeen(focused=word.on))
-            case KeyPressed() if self._live is not None and word.name in KEYS:
+            case messages.KeyPressed() if self._live is not None and word.name in _KEYS:
                 number, now_s = self._live.position.number, self._live.clock.now()
-                self._offer(events.ParticipantKey(response=KEYS[word.name], at_s=now_s, step=number))
+                self._offer(events.ParticipantKey(response=_KEYS[word.name], at_s=now_s, step=number))
 
     def _gone(self, cause: str) -> None:
         """The program has ended, and was not told to."""
@@ -228,7 +214,7 @@ class ParticipantSide:
             self._offer(events.Stop(reason=f"the participant's screen did not start again: {error}"))
             return
         with self._lock:
-            self._link, self._shows, self._starting = link, ("",), False
+            self._link, self._shows, self._starting = link, "", False
         self._tell(ParticipantSeen())
         link.listen(self._heard, self._gone)
         self._tell(Trouble(text="The participant's screen is there again.", mood="good"))

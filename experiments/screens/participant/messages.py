@@ -17,9 +17,9 @@ from pydantic import Field, TypeAdapter
 
 from device.words import Direction
 
-Finite = Annotated[float, Field(allow_inf_nan=False)]
-Positive = Annotated[float, Field(gt=0, allow_inf_nan=False)]
-Share = Annotated[float, Field(ge=0, le=1, allow_inf_nan=False)]
+_Finite = Annotated[float, Field(allow_inf_nan=False)]
+_Positive = Annotated[float, Field(gt=0, allow_inf_nan=False)]
+_Share = Annotated[float, Field(ge=0, le=1, allow_inf_nan=False)]
 
 BETWEEN = "Thank you. Please wait."
 """What stands between two questions: put there by the window at once, and then by the console until it asks."""
@@ -48,11 +48,11 @@ class AskRating:
     number: int
     of: int
     question: str
-    minimum: Finite
-    maximum: Finite
+    minimum: _Finite
+    maximum: _Finite
     minimum_text: str
     maximum_text: str
-    grain: Positive
+    grain: _Positive
     draft: int = 0
     ask: int = 0
     kind: Literal["ask-rating"] = "ask-rating"
@@ -82,7 +82,7 @@ class AskDirection:
     backward: str
     forward_key: str
     backward_key: str
-    onset_s: Finite
+    onset_s: _Finite
     once_seen: bool = False
     ask: int = 0
     kind: Literal["ask-direction"] = "ask-direction"
@@ -92,7 +92,7 @@ class AskDirection:
 class Ping:
     """What time is it there?"""
 
-    sent_s: Finite
+    sent_s: _Finite
     kind: Literal["ping"] = "ping"
 
 
@@ -101,13 +101,13 @@ class Noise:
     """Turn the masking noise on or off; `level` is a part of full scale."""
 
     on: bool
-    level: Share = 0.3
+    level: _Share = 0.3
     ask: int = 0
     kind: Literal["noise"] = "noise"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Close:
+class CloseScreen:
     """Close the window and end."""
 
     kind: Literal["close"] = "close"
@@ -119,7 +119,7 @@ class Ready:
 
     psychopy: str
     window: str
-    refresh_Hz: Finite | None
+    refresh_Hz: _Finite | None
     kind: Literal["ready"] = "ready"
 
 
@@ -127,8 +127,8 @@ class Ready:
 class Pong:
     """It was `there_s` here when the ping came that was sent at `sent_s`."""
 
-    sent_s: Finite
-    there_s: Finite
+    sent_s: _Finite
+    there_s: _Finite
     kind: Literal["pong"] = "pong"
 
 
@@ -136,7 +136,7 @@ class Pong:
 class RatingGiven:
     """A confirmed rating, of which 0 is one."""
 
-    rating: Finite
+    rating: _Finite
     ask: int = 0
     kind: Literal["rating-given"] = "rating-given"
 
@@ -155,7 +155,7 @@ class DirectionGiven:
     """Which way, and when the key went down."""
 
     response: Direction
-    pressed_s: Finite
+    pressed_s: _Finite
     ask: int = 0
     kind: Literal["direction-given"] = "direction-given"
 
@@ -194,17 +194,17 @@ class KeyPressed:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Failed:
+class ScreenFailed:
     """The participant's screen ends, and why."""
 
     message: str
     kind: Literal["failed"] = "failed"
 
 
-ToParticipant = Show | AskRating | AskDescription | AskDirection | Ping | Noise | Close
+ToParticipant = Show | AskRating | AskDescription | AskDirection | Ping | Noise | CloseScreen
 Unasked = EmergencyPressed | Focused | KeyPressed
 """What the participant's screen says without being asked."""
-FromParticipant = Ready | Pong | RatingGiven | DescriptionGiven | DirectionGiven | NoiseIs | Unasked | Failed
+FromParticipant = Ready | Pong | RatingGiven | DescriptionGiven | DirectionGiven | NoiseIs | Unasked | ScreenFailed
 
 _TO: TypeAdapter[ToParticipant] = TypeAdapter(Annotated[ToParticipant, Field(discriminator="kind")])
 _FROM: TypeAdapter[FromParticipant] = TypeAdapter(Annotated[FromParticipant, Field(discriminator="kind")])

@@ -1,0 +1,448 @@
+"""What the console's window is made of: the instruction, fields to type in, buttons, what stands beside and below."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from datetime import datetime
+from typing import Protocol
+
+from PyQt6.QtCore import QPointF, QRectF, Qt
+from PyQt6.QtGui import QMouseEvent, QPainter, QPaintEvent, QResizeEvent, QShowEvent
+from PyQt6.QtWidgets import (
+    QGridLayout,
+    QHBoxLayout,
+    QLabel,
+    QLineEdit,
+    QListWidget,
+    QPlainTextEdit,
+    QProgressBar,
+    QPushButton,
+    QSizePolicy,
+    QStackedWidget,
+    QVBoxLayout,
+    QWidget,
+)
+
+from experiments.screens.console import widgets
+from experiments.screens.console.controls import TextField
+from experiments.screens.console.keys import BY_NAME, Name, field_at, shown_key
+from experiments.screens.console.progress import (
+    RunTiming,
+    answer_lines,
+    clock_text,
+    coming,
+    end_text,
+    focus_text,
+    gun_text,
+    own_times_s,
+    remaining_s,
+    trials_done,
+)
+from experiments.screens.console.view import About, Instruction, Seen
+from experiments.session.events import Press
+from experiments.session.history import Entry
+from experiments.session.states import Position, State
+from experiments.session.steps import Rate
+
+SIZES_PX = {"title": 46, "damper": 34, "detail": 23}
+FITS = (1.0, 0.88, 0.76, 0.66, 0.56)
+"""How far the type shrinks."""
+_PAGE_PX, _LEAST_PX = 20, 9
+
+
+class Notice:
+    """What to do now, the damper, and what belongs to it: three labels."""
+
+    def __init__(self) -> None:
+        self.title, self.damper, self.detail = self.labels = [widgets.text_label(name) for name in SIZES_PX]
+
+    def put(self, shown: Instruction) -> None:
+        """Show an instruction."""
+        for label, text in zip(self.labels, (shown.title, shown.damper, shown.detail), strict=True):
+            if label.text() != text:
+                label.setText(text)
+            label.setVisible(bool(text))
+        widgets.set_mood(self.title, shown.mood)
+        widgets.set_mood(self.damper, shown.mood)
+
+    def size(self, factor: float) -> None:
+        """Give the type so many times its own size."""
+        for label, size_px in zip(self.labels, SIZES_PX.values(), strict=True):
+            _size(label, round(size_px * factor), bold=label is not self.detail)
+
+
+class TextPage(QWidget):
+    """A page of text that is only looked at, in type that has room for all of it, and below it what was said last."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self._title, self.said = widgets.text_label("place"), widgets.text_label("saved")
+        self._text = QPlainTextEdit()
+        self._text.setReadOnly(True)
+        self._text.setFocusPolicy(widgets.NO_FOCUS)
+        down = QVBoxLayout(self)
+        down.setContentsMargins(10, 6, 10, 6)
+        for widget in (self._title, self._text, self.said):
+            down.addWidget(widget)
+
+    def put(self, title: str, lines: list[str]) -> None:
+        """Show lines of text."""
+        self._title.setText(title)
+        self._text.setPlainText("\n".join(lines))
+        self._fit()
+
+    def resizeEvent(self, event: QResizeEvent | None) -> None:  # noqa: N802 - Qt's name
+        """Type shrinks with the page."""
+        super().resizeEvent(event)
+        self._fit()
+
+    def showEvent(self, event: QShowEvent | None) -> None:  # noqa: N802 - Qt's name
+        """Its room is known now."""
+        super().showEvent(event)
+        self._fit()
+
+    def _fit(self) -> None:
+        if not self.isVisible():
+            return
+        for size_px in range(_PAGE_PX, _LEAST_PX - 1, -1):
+            self._text.setStyleSheet(f"font-size: {size_px}px;")
+            text, view = self._text.document(), self._text.viewport()
+            if text is None or view is None:
+                return
+            rows = text.size().height()  # of such a widget's document, which trials_done in lines
+            if rows * self._text.fontMetrics().lineSpacing() + 2 * text.documentMargin() < view.height():
+                return
+
+
+def _size(label: QLabel, size_px: int, *, bold: bool) -> None:
+    """Give a label's type a size in pixels; the window's style sheet would win over a font."""
+    style = f"font-size: {max(8, size_px)}px; font-weight: {'bold' if bold else 'normal'};"
+    if label.styleSheet() != style:
+        label.setStyleSheet(style)
+
+
+_Belongs = tuple[TextField | None, int, Entry | None]
+"""What a field is for: its kind, the number of the step, and the entry that is corrected."""
+
+
+class TextFields:
+    """The field of the state at hand, and below it the line for a reason, a note or a flag."""
+
+    def __init__(self) -> None:
+        self.rating, self.words, self.line = QLineEdit(), QLineEdit(), QLineEdit()
+        self._fields: dict[TextField, QLineEdit] = {"number": self.rating, "words": self.words, "line": self.line}
+        self._ends, self._question = widgets.text_label("quiet"), widgets.text_label("quiet")
+        for field, name, how in (
+            (self.rating, "rating", "type a number, Enter saves"),
+            (self.words, "description", "type the participant's words, Enter saves"),
+            (self.line, "line of text", ""),
+        ):
+            field.setAccessibleName(name)
+            field.setPlaceholderText(how)
+        self.pages = QStackedWidget()
+        for page in (QWidget(), widgets.column(self._ends, self.rating), widgets.column(self.words)):
+            self.pages.addWidget(page)
+        self.bar = widgets.column(self._question, self.line)
+        self.bar.hide()
+        self._belongs: _Belongs = (None, -1, None)
+        self._drafts: dict[_Belongs, str] = {}
+
+    def at(self, position: Position, said: str) -> None:
+        """Take a position: a new field begins with what was half typed there before, else with what was said so far."""
+        belongs = (field_at(position), position.number, position.correcting)
+        if belongs == self._belongs:
+            return
+        self._keep(self._belongs)
+        self._belongs = belongs
+        draft = self._drafts.pop(belongs, "") if position.correcting is None else ""
+        if isinstance(step := position.step, Rate):
+            self._ends.setText(f"{step.minimum:g} = {step.minimum_text}     {step.maximum:g} = {step.maximum_text}")
+        for field in (self.rating, self.words):
+            field.setText(draft or said)
+            if not draft:
+                field.selectAll()
+
+    def _keep(self, belongs: _Belongs) -> None:
+        """Keep what is half typed in the field that is left; of other steps nothing is kept any more."""
+        name, number, _ = belongs
+        typed = "" if name is None else self.typed(name)
+        self._drafts = {one: text for one, text in self._drafts.items() if one[1] == number} | {belongs: typed}
+
+    def focus(self, position: Position, otherwise: QWidget) -> None:
+        """Show the field of a position, and put the cursor into it; an open line keeps the cursor."""
+        self.pages.setCurrentIndex((None, "number", "words").index(field_at(position)))
+        if self.bar.isHidden():
+            self._field(position, otherwise).setFocus()
+
+    def close_line(self, position: Position, otherwise: QWidget) -> None:
+        """Take the line away; the cursor goes back to where it was."""
+        self._field(position, otherwise).setFocus()
+        self.bar.hide()
+
+    def _field(self, position: Position, otherwise: QWidget) -> QWidget:
+        name = field_at(position)
+        return otherwise if name is None else self._fields[name]
+
+    def open_line(self, question: str) -> None:
+        """Let a line be typed."""
+        self._question.setText(question)
+        self.line.clear()
+        self.bar.show()
+        self.line.setFocus()
+
+    def typed(self, field: TextField) -> str:
+        """What is typed in a field."""
+        return self._fields[field].text()
+
+
+class Mouse(Protocol):
+    """What a mouse does with buttons."""
+
+    def press(self) -> Press:
+        """A press that begins now."""
+
+    def do(self, name: Name, press: Press) -> None:
+        """A button was clicked."""
+
+    def hold(self, press: Press) -> None:
+        """The button that has to be held went down."""
+
+    def let_go(self) -> None:
+        """It was let go."""
+
+
+class CommandButton(QPushButton):
+    """A button of a command. It never takes the keys, and the second press of a double click is none."""
+
+    def __init__(self, name: Name, mouse: Mouse, style: str = "") -> None:
+        super().__init__()
+        self.name, self._press, self._mouse = name, Press(at_s=0.0, serial=-1), mouse
+        self.setObjectName(style)
+        self.setAccessibleName(BY_NAME[name].text)
+        self.setFocusPolicy(Qt.FocusPolicy.NoFocus)
+        self.setSizePolicy(QSizePolicy.Policy.Ignored, QSizePolicy.Policy.Preferred)
+        self.pressed.connect(self._keep)
+        if name == "rearm":  # it has to be held
+            self.pressed.connect(lambda: mouse.hold(self._press))
+            self.released.connect(mouse.let_go)
+        else:
+            self.clicked.connect(lambda _: mouse.do(self.name, self._press))
+        self.label()
+
+    def _keep(self) -> None:
+        self._press = self._mouse.press()
+
+    def label(self, text: str = "", *, letters: bool = False) -> None:
+        """Show what it does, and its key below."""
+        shown = f"{text or BY_NAME[self.name].text}\n[{shown_key(self.name, letters=letters)}]"
+        if shown != self.text():
+            self.setText(shown)
+
+    def mouseDoubleClickEvent(self, event: QMouseEvent | None) -> None:  # noqa: N802 - Qt's name
+        """The second press of a double click is the same intent as the first."""
+        if event is not None:
+            event.accept()
+
+
+class Slots(QWidget):
+    """Three places side by side, each for buttons of its own: what comes after Fire is never where Fire was."""
+
+    def __init__(self, left: Sequence[QWidget], middle: Sequence[QWidget], right: Sequence[QWidget]) -> None:
+        super().__init__()
+        across = QHBoxLayout(self)
+        across.setContentsMargins(0, 0, 0, 0)
+        self._widgets = [*left, *middle, *right]
+        for place_of in (left, middle, right):
+            place = QWidget()
+            stack = QGridLayout(place)
+            stack.setContentsMargins(0, 0, 0, 0)
+            for widget in place_of:
+                policy = widget.sizePolicy()
+                policy.setRetainSizeWhenHidden(True)
+                widget.setSizePolicy(policy)
+                stack.addWidget(widget, 0, 0)
+                widget.hide()
+            across.addWidget(place, 1)
+
+    def show_only(self, shown: set[QWidget]) -> None:
+        """Show these buttons and hide the others."""
+        for widget in self._widgets:
+            if widget.isVisibleTo(self) != (widget in shown):
+                widget.setVisible(widget in shown)
+
+
+_LEFT: tuple[Name, ...] = ("forward", "damper", "restart")
+_MIDDLE: tuple[Name, ...] = ("fire", "next", "go on", "enter", "rearm", "reason")
+_RIGHT: tuple[Name, ...] = ("backward", "end break", "no answer")
+_ROW: tuple[Name, ...] = ("undo", "repeat", "flag", "note", "list", "pause", "stop", "help")
+_OF_STATE: dict[State, tuple[Name, ...]] = {
+    State.REARMING: ("rearm",),
+    State.SETTING: ("damper",),
+    State.PREPARING: ("fire",),
+    State.TRAIN: ("next",),
+    State.ASKING: ("forward", "backward"),
+    State.RATING: ("no answer",),
+    State.RESTING: ("end break",),
+    State.CLOSING: ("enter",),
+    State.PAUSED: ("go on",),
+    State.HALTED: ("reason",),
+}
+_OF_CORRECTION: dict[str | None, tuple[Name, ...]] = {None: ("forward", "backward"), "number": ("no answer",)}
+
+
+class Buttons:
+    """`slots` is the place of the large buttons, `row` that of the others and of the emergency stop."""
+
+    def __init__(self, mouse: Mouse) -> None:
+        self._large = {name: CommandButton(name, mouse, "large") for name in (*_LEFT, *_MIDDLE, *_RIGHT)}
+        self.slots = Slots(*([self._large[name] for name in names] for names in (_LEFT, _MIDDLE, _RIGHT)))
+        self._row = {name: CommandButton(name, mouse) for name in _ROW}
+        self.row = QWidget()
+        across = QHBoxLayout(self.row)
+        across.setContentsMargins(10, 0, 10, 2)
+        for button in self._row.values():
+            across.addWidget(button, 2)
+        across.addWidget(CommandButton("emergency", mouse, "stop"), 5)
+
+    def put(self, position: Position, *, over: bool, letters: bool, idle: Callable[[Name], bool]) -> None:
+        """Show what can be done now, and which of the keys below do nothing.
+
+        `over`: the run has ended; `letters`: letters are text, commands take Ctrl as well.
+        """
+        closes = over or position.base is State.HALTED
+        shown = set[str]() if over else set(_shown(position, screen_lost=not idle("restart")))
+        self.slots.show_only({button for name, button in self._large.items() if name in shown})
+        for name, button in self._large.items():
+            button.label("End the run" if name == "enter" else "", letters=letters)
+        for name, button in self._row.items():
+            held = name == "pause" and position.state is State.PAUSED
+            button.name = "go on" if held else name
+            button.label("Close" if name == "stop" and closes else "", letters=letters)
+            dim = "yes" if idle(button.name) else "no"
+            if button.property("dim") != dim:
+                button.setProperty("dim", dim)
+                widgets.restyle(button)
+
+
+def _shown(position: Position, *, screen_lost: bool) -> tuple[Name, ...]:
+    if position.state is State.CORRECTING:
+        return _OF_CORRECTION.get(field_at(position), ())
+    return (*_OF_STATE.get(position.state, ()), *(("restart",) if screen_lost else ()))
+
+
+LONGEST_S = 3.0
+"""The height of the strip; longer times stand at its upper edge."""
+_DOT_PX, _HIGH_PX = 3.0, 70
+
+
+class Strip(QWidget):
+    """One dot an answer, oldest on the left, 0 s at the bottom."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self._times_s: list[float] = []
+        self.setMinimumHeight(_HIGH_PX)
+        self.setAccessibleName("response times")
+
+    def put(self, times_s: list[float]) -> None:
+        """Show these times in seconds."""
+        if times_s != self._times_s:
+            self._times_s = times_s
+            last = f"last {times_s[-1]:.2f} s" if times_s else "none yet"
+            self.setToolTip(f"The participant's own response times: {last}")
+            self.update()
+
+    def paintEvent(self, event: QPaintEvent | None) -> None:  # noqa: N802 - Qt's name
+        """Draw the dots, a line at each second, and the last time in digits."""
+        del event
+        painter, area = QPainter(self), QRectF(self.rect()).adjusted(4, 4, -4, -4)
+        painter.setRenderHint(QPainter.RenderHint.Antialiasing)
+        painter.setPen(Qt.GlobalColor.gray)
+        for second in range(int(LONGEST_S) + 1):
+            y = area.bottom() - area.height() * second / LONGEST_S
+            painter.drawLine(QPointF(area.left(), y), QPointF(area.right(), y))
+        painter.setBrush(self.palette().text())
+        for place, time_s in enumerate(self._times_s):
+            x = area.left() + (place + 0.5) * area.width() / max(10, len(self._times_s))
+            y = area.bottom() - area.height() * min(time_s, LONGEST_S) / LONGEST_S
+            painter.drawEllipse(QPointF(x, y), _DOT_PX, _DOT_PX)
+        if self._times_s:
+            painter.setPen(self.palette().text().color())
+            painter.drawText(
+                area, Qt.AlignmentFlag.AlignRight | Qt.AlignmentFlag.AlignTop, f"{self._times_s[-1]:.2f} s"
+            )
+        painter.end()
+
+
+class SidePanel(QWidget):
+    """The gun, whose the keys are, the time, what comes next, and the answers of the set."""
+
+    def __init__(self, about: About) -> None:
+        super().__init__()
+        self._gun, self._times, self._focus = (widgets.text_label("quiet") for _ in range(3))
+        self._coming, self._answers = widgets.quiet_list(), widgets.quiet_list()
+        self._strip = Strip()
+        self._strip.setVisible(about.setup.config.console.response_times)
+        down = QVBoxLayout(self)
+        down.setContentsMargins(0, 0, 0, 0)
+        for widget in (
+            widgets.panel(self._gun, self._focus),
+            widgets.panel(self._times),
+            widgets.text_label("quiet", "Coming next"),
+            self._coming,
+            widgets.text_label("quiet", "Answers of this set"),
+            self._answers,
+            self._strip,
+        ):
+            down.addWidget(widget)
+        for lines in (self._coming, self._answers):
+            lines.setMinimumHeight(1)
+
+    def put(self, seen: Seen, progress: RunTiming) -> None:
+        """Show what is so now."""
+        for label, (text, mood) in (
+            (self._gun, gun_text(seen.gun)),
+            (self._focus, focus_text(seen, here=self.isActiveWindow())),
+        ):
+            label.setText(text)
+            label.setVisible(bool(text))
+            widgets.set_mood(label, mood)
+        self._times.setText(_times(seen, progress))
+        _fill(self._coming, coming(seen))
+        _fill(self._answers, answer_lines(seen))
+        if self._strip.isVisibleTo(self):
+            self._strip.put(own_times_s(seen))
+
+
+class Bars(QWidget):
+    """How far the run is, as bars side by side."""
+
+    def __init__(self, about: About) -> None:
+        super().__init__()
+        self._bars = [QProgressBar() for _ in range(2 if about.rated_last else 3)]
+        across = QHBoxLayout(self)
+        across.setContentsMargins(0, 0, 0, 0)
+        for bar in self._bars:
+            across.addWidget(bar)
+
+    def put(self, seen: Seen) -> None:
+        """Show what is so now."""
+        for bar, one in zip(self._bars, trials_done(seen), strict=True):
+            bar.setAccessibleName(one.what)
+            bar.setFormat(f"{one.what}: %v of %m")
+            bar.setMaximum(one.planned)
+            bar.setValue(one.count)
+
+
+def _times(seen: Seen, progress: RunTiming) -> str:
+    elapsed = f"Elapsed {clock_text(progress.elapsed_s(seen.now_s))}"
+    if seen.ended is not None or seen.position.base is State.HALTED:
+        return elapsed
+    return f"{elapsed}\nEnds {end_text(remaining_s(seen, progress), datetime.now())}"
+
+
+def _fill(shown: QListWidget, lines: list[str]) -> None:
+    if [item.text() for i in range(shown.count()) if (item := shown.item(i))] != lines:
+        shown.clear()
+        shown.addItems(lines)
+        shown.scrollToBottom()
