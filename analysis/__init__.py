@@ -1,10 +1,19 @@
-"""Log tables into the statistics, figures and report of a paper. Importing this loads numpy and scipy, nothing more."""
+"""Log tables into the statistics, figures and report of a paper. The tests of the core are named here.
 
-from analysis.stats.anova import Anova, RepeatedMeasuresAnova, one_way_anova, rm_anova
-from analysis.stats.binomial import BinomialTest, binomial_test
-from analysis.stats.detection import Detection, yes_no
-from analysis.stats.studentized_range import studentized_range_isf, studentized_range_logsf, studentized_range_sf
-from analysis.stats.tukey import Comparison, rm_tukey_hsd, rm_tukey_hsd_paired, tukey_hsd
+They are looked up when they are used: importing this loads nothing, a test loads numpy and scipy.
+"""
+
+from __future__ import annotations
+
+from importlib import import_module
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from analysis.stats.anova import Anova, RepeatedMeasuresAnova, one_way_anova, rm_anova
+    from analysis.stats.binomial import BinomialTest, binomial_test
+    from analysis.stats.detection import Detection, yes_no
+    from analysis.stats.studentized_range import studentized_range_isf, studentized_range_logsf, studentized_range_sf
+    from analysis.stats.tukey import Comparison, rm_tukey_hsd, rm_tukey_hsd_paired, tukey_hsd
 
 __all__ = [
     "Anova",
@@ -23,3 +32,12 @@ __all__ = [
     "tukey_hsd",
     "yes_no",
 ]
+
+_MODULES = ("anova", "binomial", "detection", "studentized_range", "tukey")
+
+
+def __getattr__(name: str) -> object:
+    if name not in __all__:
+        raise AttributeError(f"module 'analysis' has no attribute {name!r}; it has {', '.join(__all__)}")
+    modules = (import_module(f"analysis.stats.{module}") for module in _MODULES)
+    return next(getattr(module, name) for module in modules if getattr(module, name, None) is not None)

@@ -5,9 +5,11 @@ from __future__ import annotations
 import os
 import signal
 import sys
+from typing import Annotated
 
 import typer
 
+import recoil
 from analysis.report.terminal import INTERRUPTED, UNUSABLE, say
 from device.words import RecoilError
 from recoil.commands import design, fit, guns, numbers, power, sessions
@@ -39,6 +41,23 @@ COMMANDS = (
     guns.doctor,
     guns.bench,
 )
+
+
+def _say_version(asked: bool) -> None:
+    if asked:
+        typer.echo(recoil.__version__)
+        raise typer.Exit
+
+
+@app.callback()
+def _about(
+    version: Annotated[
+        bool, typer.Option("--version", help="Say which version this is.", callback=_say_version, is_eager=True)
+    ] = False,
+) -> None:
+    """Psychophysics experiments on haptic guns: plan, run, log, analyse, report."""
+
+
 for command in COMMANDS:
     app.command()(command)
 export.command()(numbers.bids)

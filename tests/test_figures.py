@@ -226,10 +226,10 @@ def test_names_and_stars_are_the_papers() -> None:
     assert [stars(p) for p in (0.001, 0.01, 0.05, math.nan)] == ["**", "*", "n.s.", "n.s."]
 
 
-def test_importing_analysis_loads_numpy_and_scipy_alone_and_drawing_leaves_pyplot_alone() -> None:
+def test_importing_analysis_loads_nothing_and_drawing_leaves_pyplot_alone() -> None:
     code = """
 import sys, analysis
-assert not {"matplotlib", "pandas", "jinja2", "pydantic", "experiments", "device"} & set(sys.modules)
+assert not {"numpy", "scipy", "matplotlib", "pandas", "jinja2", "pydantic", "experiments", "device"} & set(sys.modules)
 import analysis.report.figures
 assert "matplotlib.pyplot" not in sys.modules
 """

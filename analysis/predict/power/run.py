@@ -53,6 +53,12 @@ def power(request: PowerRequest, where: Where, out: Path, progress: Progress) ->
     return found
 
 
+def simulated_power(request: PowerRequest) -> Power:
+    """What `power` finds, worked out in this process; nothing is written."""
+    grid = make_grid(request)
+    return power_of(grid, map(run_chunk, grid.chunks()), assumptions(grid))
+
+
 def job_of(grid: Grid) -> str:
     """The hash of all that the tallies depend on."""
     published = grid.published.model_dump(mode="json") if grid.published else None
