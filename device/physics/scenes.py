@@ -150,7 +150,7 @@ class ModelChoice:
 def choose_model(scene: Scene, gun: GunParameters = _PAPER, **arrays: ArrayLike) -> ModelChoice:
     """The cheapest model within what the scene bears, for a gun, or for guns whose numbers are in `arrays`.
 
-    >>> choose(SCENES["sweep"]).fidelity, choose(SCENES["sweep"], GunParameters(voltage_V=5.0)).fidelity
+    >>> choose_model(SCENES["sweep"]).fidelity, choose_model(SCENES["sweep"], GunParameters(voltage_V=5.0)).fidelity
     ('ballistic', 'full')
     """
     refused = [_far_from_paper(gun, arrays) or ("only full gives the course over time" if scene.curves else "")]
