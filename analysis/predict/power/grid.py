@@ -114,7 +114,7 @@ def trials_of(asked: str | None, config: DrawnConfig) -> list[int]:
 def whole_numbers(text: str, option: str, low: int, high: int) -> list[int]:
     """Whole numbers and ranges, in order and once each. `GridError` for others, or outside `low`..`high`.
 
-    >>> numbers("14, 8-10", "--participants", 2, 999)
+    >>> whole_numbers("14, 8-10", "--participants", 2, 999)
     [8, 9, 10, 14]
     """
     found = set[int]()
