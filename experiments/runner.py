@@ -11,8 +11,8 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass, fields
-from typing import Any, Literal
+from dataclasses import dataclass
+from typing import Literal
 
 from device import DeviceError, Gun, LimitError, Shot, ShotReport
 from device.words import Drive, Identity
@@ -311,7 +311,16 @@ class Stimulus:
         finally:
             disarm(self._desk.gun)
         self._live.stimulus_begins(report.pulse_start_s)
-        return Fired(gun=self._desk.gun_name, onset_utc=onset_utc, **_times(report))
+        return Fired(
+            gun=self._desk.gun_name,
+            onset_utc=onset_utc,
+            requested_s=report.requested_s,
+            pulse_start_s=report.pulse_start_s,
+            pulse_end_s=report.pulse_end_s,
+            home_predicted_s=report.home_predicted_s,
+            motion=report.motion,
+            timing=report.timing,
+        )
 
     def present(self, step: Present) -> Presented | Failed | Interrupted:
         """Shots at whole multiples of the interval since the first, until next is said."""
@@ -403,7 +412,16 @@ class _Train:
     def fired(self, report: ShotReport) -> None:
         """Have a shot on the disk."""
         self.shots += 1
-        self._desk.journal.append("shot", body=record(TrainShot(shot=self.shots, **_times(report))))
+        shot = TrainShot(
+            shot=self.shots,
+            requested_s=report.requested_s,
+            pulse_start_s=report.pulse_start_s,
+            pulse_end_s=report.pulse_end_s,
+            home_predicted_s=report.home_predicted_s,
+            motion=report.motion,
+            timing=report.timing,
+        )
+        self._desk.journal.append("shot", body=record(shot))
 
     def due_s(self) -> float:
         """The next shot's tick, whole microseconds after the first; later if the magnet is not home by then."""
@@ -428,8 +446,3 @@ class _Train:
 
     def _exposure_s(self) -> float:
         return self._desk.clock.now() - self._onset_s
-
-
-def _times(report: ShotReport) -> dict[str, Any]:
-    """What the journal keeps of a shot's report, beside what was asked for."""
-    return {field.name: getattr(report, field.name) for field in fields(report) if field.name != "shot"}

@@ -2,12 +2,58 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import mpmath
 import numpy as np
+from numpy.typing import ArrayLike
 
 from analysis.times.likelihood import Trials, trials_of
 from experiments.design.streams import Stream, generator
-from experiments.synthetic.diffusion import Decision, Diffusion, decide, decide_all
+from experiments.synthetic.diffusion import (
+    Bools,
+    Decision,
+    Diffusion,
+    Floats,
+    crossing_times,
+    decide,
+    upper_probabilities,
+)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Decisions:
+    """Answers and times, arrays of one shape."""
+
+    upper: Bools
+    time_s: Floats
+
+
+def decide_all(
+    drift: ArrayLike,
+    boundary: ArrayLike,
+    start: ArrayLike,
+    non_decision_s: ArrayLike,
+    *,
+    generator: np.random.Generator,
+    shape: tuple[int, ...] | None = None,
+) -> Decisions:
+    """One decision each of the broadcast parameters (or of `shape`), without lapses."""
+    values = (np.asarray(value, dtype=np.float64) for value in (drift, boundary, start, non_decision_s))
+    v, a, w, t0 = (np.array(x) for x in np.broadcast_arrays(*values))
+    shape = v.shape if shape is None else shape
+    v, a, w, t0 = (np.broadcast_to(x, shape).ravel() for x in (v, a, w, t0))
+    upper = uniforms(generator, v.size) < upper_probabilities(v, a, w)
+    gap, back = np.where(upper, 1.0 - w, w) * a, np.where(upper, w, 1.0 - w) * a
+    time_s = t0 + crossing_times(np.abs(v), gap, back, lambda count: uniforms(generator, count))
+    return Decisions(upper=upper.reshape(shape), time_s=time_s.reshape(shape))
+
+
+def uniforms(generator: np.random.Generator, count: int) -> Floats:
+    """Numbers strictly between 0 and 1, as `Stream.uniform` makes them."""
+    raw = np.asarray(generator.bit_generator.random_raw(count), dtype=np.uint64)
+    return ((raw >> np.uint64(12)).astype(np.float64) + 0.5) * 2.0**-52
+
 
 METHODS = ("asymmetric-1", "asymmetric-2", "vibration")
 DRIFTS = (1.0, 1.8, 0.0)

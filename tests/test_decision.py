@@ -16,8 +16,7 @@ from analysis.times.ez import ez, ez_from_summary
 from analysis.times.first_passage import distribution, log_density, moments, with_slopes
 from analysis.times.own_trials import own_times
 from experiments.design.streams import generator
-from experiments.synthetic.diffusion import decide_all
-from tests.decisions import reference
+from tests.decisions import decide_all, reference
 
 CASES = [(1.0, 2.0, 0.5), (-3.0, 1.2, 0.2), (0.0, 1.0, 0.9), (8.0, 3.0, 0.1), (0.3, 0.6, 0.03)]
 TIMES = (1e-3, 0.05, 0.2999, 0.3001, 1.0, 4.0, 40.0)

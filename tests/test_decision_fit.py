@@ -12,8 +12,7 @@ from analysis.times.fit import fit, profile, starts
 from analysis.times.likelihood import coordinates, log_likelihood, model_of, natural, trials_of
 from analysis.times.people import fit_people
 from experiments.design.streams import generator
-from experiments.synthetic.diffusion import decide_all
-from tests.decisions import BOUNDARIES, DRIFTS, INSTRUCTIONS, METHODS, RANGE_S, START, T0_S, TRUTH, made
+from tests.decisions import BOUNDARIES, DRIFTS, INSTRUCTIONS, METHODS, RANGE_S, START, T0_S, TRUTH, decide_all, made
 
 STUDY = made(1)
 

@@ -12,16 +12,8 @@ from scipy.stats import kstwo
 
 from analysis.times.first_passage import distribution, moments
 from experiments.design.streams import Stream, generator
-from experiments.synthetic.diffusion import (
-    Diffusion,
-    Lapses,
-    People,
-    decide,
-    decide_all,
-    person,
-    upper_probabilities,
-)
-from tests.decisions import EXTREMES, law, scalar
+from experiments.synthetic.diffusion import Diffusion, Lapses, People, decide, person, upper_probabilities
+from tests.decisions import EXTREMES, decide_all, law, scalar
 
 GRID = [(v, a, w) for v in (-2.0, 0.0, 0.5, 3.0) for a in (0.7, 2.0) for w in (0.2, 0.5, 0.9)]
 
@@ -188,9 +180,6 @@ NAN = math.nan
 def test_an_impossible_diffusion_cannot_be_built(values: dict[str, float], word: str) -> None:
     with pytest.raises(ValueError, match=word):
         Diffusion(**({"drift": 1.0, "boundary": 1.0} | values))
-    full = {"drift": 1.0, "boundary": 1.0, "start": 0.5, "non_decision_s": 0.3} | values
-    with pytest.raises(ValueError, match=word):
-        decide_all(*full.values(), generator=generator(1, "x"))
 
 
 @pytest.mark.parametrize("values", [{"rate": 1.1}, {"earliest_s": 3.0}, {"latest_s": NAN}])

@@ -14,9 +14,8 @@ from analysis.times.first_passage import distribution
 from analysis.times.fit import answered_by, fit
 from experiments.config.door import ConfigError
 from experiments.design.streams import generator
-from experiments.synthetic.diffusion import decide_all
 from tests.conftest import Recoil
-from tests.decisions import made
+from tests.decisions import decide_all, made
 from tests.log_files import METHODS, TextRow, trial_rows, trials_path, write_rows
 
 DRIFTS = {"vibration": 0.0, "asymmetric-1": 1.0, "asymmetric-2": 1.8}

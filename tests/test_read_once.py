@@ -19,6 +19,7 @@ from experiments.study import register
 from experiments.study.enrolment import exclude
 from experiments.study.progress import StudyFolder, look_at, open_study, overview
 from recoil.config_files import new_study
+from tests.traced_trial import MOST, traced
 
 JOURNAL = "sub-{}_task-preference_journal.jsonl"
 
@@ -131,3 +132,7 @@ def counted(kind: type[Any], made: Counter[str]) -> Any:
         check(parameters)
 
     return counting
+
+
+def test_a_live_trial_runs_through_few_files(tmp_path: Path) -> None:
+    assert len(traced(tmp_path).calls) <= MOST

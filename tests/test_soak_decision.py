@@ -16,9 +16,9 @@ from analysis.times.first_passage import distribution, log_density, moments
 from analysis.times.fit import DiffusionFit, fit
 from analysis.times.people import PeopleFit, fit_people
 from experiments.design.streams import generator
-from experiments.synthetic.diffusion import Diffusion, decide_all, upper_probabilities
+from experiments.synthetic.diffusion import Diffusion, upper_probabilities
 from tests.conftest import Soak
-from tests.decisions import EXTREMES, RANGE_S, TRUTH, law, made, reference, scalar
+from tests.decisions import EXTREMES, RANGE_S, TRUTH, decide_all, law, made, reference, scalar
 
 pytestmark = pytest.mark.soak
 

@@ -35,7 +35,7 @@ from analysis.times.own_trials import ordered, own_trials, quantiles
 from analysis.times.people import MOST_PEOPLE, as_trials, fit_people, sampled_fit
 from experiments.design.streams import generator
 from experiments.record import columns
-from experiments.synthetic.diffusion import decide_all
+from tests.decisions import decide_all
 from tests.log_files import METHODS, TextRow, trial_rows, trials_path, write_many, write_rows
 
 DRIFTS = {"vibration": 0.0, "asymmetric-1": 1.2, "asymmetric-2": 2.0}

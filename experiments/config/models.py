@@ -6,7 +6,7 @@ Unknown keys, wrong types, infinities and contradictions are refused here, at th
 from __future__ import annotations
 
 from collections.abc import Iterator
-from typing import Annotated, Any, Literal, Self, TypeVar
+from typing import Annotated, Literal, Self, TypeVar
 
 from pydantic import (
     AfterValidator,
@@ -180,7 +180,7 @@ def leaves(model: BaseModel, prefix: str = "") -> Iterator[str]:
         yield from _inner_leaves(getattr(model, name), f"{prefix}{name}.")
 
 
-def _inner_leaves(value: Any, prefix: str) -> Iterator[str]:
+def _inner_leaves(value: object, prefix: str) -> Iterator[str]:
     if isinstance(value, BaseModel):
         yield from leaves(value, prefix)
     elif isinstance(value, dict):

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterator, Mapping
-from typing import Any
 
 _BARE = re.compile(r"[A-Za-z0-9_-]+")
 _LINE = 100
@@ -12,7 +11,7 @@ _LINE = 100
 _ESCAPES = {'"': '\\"', "\\": "\\\\", "\b": "\\b", "\t": "\\t", "\n": "\\n", "\f": "\\f", "\r": "\\r"}
 
 
-def toml_text(values: Mapping[str, Any]) -> str:
+def toml_text(values: Mapping[str, object]) -> str:
     r"""A table as the text of a TOML file: its own values first, then its tables in their order.
 
     `ValueError` for what TOML cannot hold and read back: a value of another kind, or `None` in a list.
@@ -28,7 +27,7 @@ def toml_text(values: Mapping[str, Any]) -> str:
     return "\n".join(_table(values, ())).lstrip("\n") + "\n"
 
 
-def _table(values: Mapping[str, Any], keys: tuple[str, ...]) -> Iterator[str]:
+def _table(values: Mapping[str, object], keys: tuple[str, ...]) -> Iterator[str]:
     if keys:
         yield f"\n[{'.'.join(map(_key, keys))}]"
     for key, value in values.items():

@@ -10,8 +10,7 @@ alternating series of Devroye 2009; at least 0.9991 of the proposals are accepte
 Sources: Ratcliff 1978, Psychol. Rev. 85, 59; Devroye 2009, Stat. Probab. Lett. 79, 2251; Polson, Scott & Windle 2013,
 J. Am. Stat. Assoc. 108, 1339 (J is four times their Polya-Gamma variable); cf. Drugowitsch 2016, Sci. Rep. 6, 20490.
 
-Of many at once the draws are made of the bit generator's raw output, which numpy promises never to change, in the order
-in which the draws still wanting stand in the array; so a seed gives the same answers and times everywhere.
+Of many at once the draws are made in the order in which those still wanting stand in the array.
 """
 
 from __future__ import annotations
@@ -148,14 +147,6 @@ def person(people: People, draws: Draws) -> Person:
     )
 
 
-@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class Decisions:
-    """Answers and times, arrays of one shape."""
-
-    upper: Bools
-    time_s: Floats
-
-
 def decide(diffusion: Diffusion, draws: Draws) -> Decision:
     """One decision. The first draw says whether it lapses, the second which answer, the rest how long it takes.
 
@@ -169,12 +160,9 @@ def decide(diffusion: Diffusion, draws: Draws) -> Decision:
     a, w = diffusion.boundary, diffusion.start
     upper = side < float(upper_probabilities(diffusion.drift, a, w))
     gap, back = ((1.0 - w) * a, w * a) if upper else (w * a, (1.0 - w) * a)
-    way = _ways(np.array([abs(diffusion.drift)]), np.array([gap]), np.array([back]), lambda count: _drawn(draws, count))
-    return Decision(upper=upper, time_s=diffusion.non_decision_s + float(way[0]))
-
-
-def _drawn(draws: Draws, count: int) -> Floats:
-    return np.array([draws.uniform() for _ in range(count)])
+    ahead, behind, speed = np.array([gap]), np.array([back]), np.array([abs(diffusion.drift)])
+    (way,) = crossing_times(speed, ahead, behind, lambda count: np.array([draws.uniform() for _ in range(count)]))
+    return Decision(upper=upper, time_s=diffusion.non_decision_s + float(way))
 
 
 def upper_probabilities(drift: ArrayLike, boundary: ArrayLike, start: ArrayLike) -> Floats:
@@ -191,49 +179,7 @@ def upper_probabilities(drift: ArrayLike, boundary: ArrayLike, start: ArrayLike)
     return np.where(v < 0.0, 1.0 - share, share)
 
 
-def decide_all(
-    drift: ArrayLike,
-    boundary: ArrayLike,
-    start: ArrayLike,
-    non_decision_s: ArrayLike,
-    *,
-    generator: np.random.Generator,
-    shape: tuple[int, ...] | None = None,
-) -> Decisions:
-    """One decision each of the broadcast parameters (or of `shape`), without lapses; about 1 us each.
-
-    `ValueError`: a drift or boundary beyond `LARGEST`, a boundary not above 0, a start outside 0..1, a time below 0.
-    """
-    values = (np.asarray(value, dtype=np.float64) for value in (drift, boundary, start, non_decision_s))
-    v, a, w, t0 = (np.array(x) for x in np.broadcast_arrays(*values))
-    _check(v, a, w, t0)
-    shape = v.shape if shape is None else shape
-    v, a, w, t0 = (np.broadcast_to(x, shape).ravel() for x in (v, a, w, t0))
-    upper = uniforms(generator, v.size) < upper_probabilities(v, a, w)
-    gap, back = np.where(upper, 1.0 - w, w) * a, np.where(upper, w, 1.0 - w) * a
-    time_s = t0 + _ways(np.abs(v), gap, back, lambda count: uniforms(generator, count))
-    return Decisions(upper=upper.reshape(shape), time_s=time_s.reshape(shape))
-
-
-def uniforms(generator: np.random.Generator, count: int) -> Floats:
-    """Numbers strictly between 0 and 1, as `Stream.uniform` makes them."""
-    raw = np.asarray(generator.bit_generator.random_raw(count), dtype=np.uint64)
-    return ((raw >> np.uint64(12)).astype(np.float64) + 0.5) * 2.0**-52
-
-
-def _check(v: Floats, a: Floats, w: Floats, t0: Floats) -> None:
-    rules = (
-        (np.abs(v) <= LARGEST, f"drift must be within {LARGEST:g}"),
-        ((a > 0.0) & (a <= LARGEST), f"boundary must be above 0 and at most {LARGEST:g}"),
-        ((w >= 0.0) & (w <= 1.0), "start must be 0 to 1"),
-        ((t0 >= 0.0) & (t0 <= 3_600.0), "non_decision_s must be 0 to 3600"),
-    )
-    for holds, rule in rules:
-        if not holds.all():
-            raise ValueError(f"{rule}, but element {int(np.argmin(holds.ravel()))} is not")
-
-
-def _ways(v: Floats, gap: Floats, back: Floats, draw: Draw) -> Floats:
+def crossing_times(v: Floats, gap: Floats, back: Floats, draw: Draw) -> Floats:
     """The times in s until points `gap` away are met, given that those `back` behind are not; a round is an exit each.
 
     Nearer to the point behind, the way is doubled for sure; nearer to the one ahead, it ends with at least 1/2. Given
