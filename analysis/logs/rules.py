@@ -61,6 +61,12 @@ class _Table:
         found = self.coded(name)
         return found.values[int(found.codes[row])]
 
+    @property
+    def codes(self) -> list[str]:
+        """The participant's code in the first row of each log."""
+        found = self.coded("participant_id")
+        return [str(found.values[code]) for code in found.codes[self.first].tolist()]
+
     def whole(self, name: str) -> Integers:
         """The values of such a column as whole numbers, -1 for none."""
         values = [-1 if value is None else value for value in self.coded(name).values]
@@ -110,8 +116,7 @@ def check(texts: TextTable, codes_in_names: Mapping[int, str | None]) -> tuple[B
         log=np.array(texts.logs, dtype=np.int64)[good],
         rows=rows[good],
     )
-    codes = (str(table.value("participant_id", row)) for row in table.first.tolist())
-    logs = (faults.get(place) or Log(code=code, experiment=experiment) for place, code in enumerate(codes))
+    logs = (faults.get(place) or Log(code=code, experiment=experiment) for place, code in enumerate(table.codes))
     return block, dict(zip(texts.logs, logs, strict=True))
 
 
@@ -228,9 +233,9 @@ def _one_participant(table: _Table, names: Mapping[int, str | None]) -> Rule:
     """One participant a file, with a code that is one, and that of the file's name."""
     column = table.coded("participant_id")
     own = column.codes[table.first]
-    codes = [str(column.values[code]) for code in own.tolist()]
     named = [names.get(log) for log in table.texts.logs]
-    unfit = [not _CODE.fullmatch(code) or name not in (None, code) for code, name in zip(codes, named, strict=True)]
+    both = zip(table.codes, named, strict=True)
+    unfit = [not _CODE.fullmatch(code) or name not in (None, code) for code, name in both]
     others = np.flatnonzero(column.codes != np.repeat(own, table.texts.rows))
     return np.append(table.first[np.array(unfit)], others), partial(_say_participant, table, names)
 

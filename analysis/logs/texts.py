@@ -114,7 +114,7 @@ def _plain(number: int, content: bytes) -> _Plain | None:
         return None
     quoted = b'"' in content
     bare = _QUOTED.sub(b"", content) if quoted else content
-    if (quoted and b'"' in bare) or b"\n\n" in bare or b"\n\r\n" in bare:  # a blank line is no row of empty cells
+    if quoted and b'"' in bare:
         return None
     return _Plain(number=number, content=content, header=header[0], quoted=quoted, rows=bare.count(b"\n") - 1)
 
@@ -144,7 +144,7 @@ def _plain_tables(files: Sequence[_Plain]) -> Iterator[TextTable]:
 
 
 def _arrow_table(files: Sequence[_Plain]) -> pa.Table | None:
-    """The rows of files with one header, one file after the other; `None` if they are not as many as they look."""
+    """The rows of files with one header, one file after the other; `None` if they are not one a line."""
     header, quoted = files[0].header, files[0].quoted
     data = b"".join([header, *(memoryview(file.content)[len(header) :] for file in files)])
     names = header.decode("ascii").rstrip().split(",")
@@ -163,7 +163,8 @@ def _arrow_table(files: Sequence[_Plain]) -> pa.Table | None:
         )
     except pa.ArrowInvalid:
         return None
-    return found.combine_chunks() if found.num_rows == sum(file.rows for file in files) else None
+    blank = all(column.null_count for column in found.columns)  # a blank line is no row of empty cells
+    return None if blank or found.num_rows != sum(file.rows for file in files) else found.combine_chunks()
 
 
 def csv_tables(contents: Mapping[int, bytes]) -> tuple[list[TextTable], dict[int, BadLogError]]:
