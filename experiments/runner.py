@@ -10,16 +10,11 @@ the line nor this machine delays them. Each is in the journal before the next is
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
-from dataclasses import dataclass
-from typing import Literal
 
 from device import DeviceError, Gun, LimitError, Shot, ShotReport
-from device.words import Drive, Identity
-from experiments.clock import Clock
+from device.words import Identity
 from experiments.design.plan import Trial
-from experiments.live_run import Held, LiveRun, RunStopped
-from experiments.record.journal import Journal
+from experiments.live_run import Held, RunStopped
 from experiments.record.replay import RunPosition
 from experiments.session import events
 from experiments.session.history import trial_at
@@ -48,10 +43,10 @@ from experiments.session.steps import (
     Rested,
     Session,
     Step,
-    TrainShot,
     on_scale,
     record,
 )
+from experiments.train import Desk, Train
 
 MAX_FAILURES = 3
 """Failures of the gun in a row after which a run stops and can be resumed."""
@@ -271,18 +266,6 @@ Assumed: twice what the doctor lets pass, 5 ms that a sleep overruns and 10 ms t
 """
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Desk:
-    """All that carries steps out: gun and how each method drives it, journal, clock, and the live run."""
-
-    gun: Gun
-    gun_name: str
-    drives: Mapping[str, Drive]
-    journal: Journal
-    clock: Clock
-    live: LiveRun
-
-
 def disarm(gun: Gun) -> None:
     """Disarm, or stop the run: nobody is to hold a gun that may fire. `RunStopped` says what to do."""
     try:
@@ -324,7 +307,7 @@ class Stimulus:
 
     def present(self, step: Present) -> Presented | Failed | Interrupted:
         """Shots at whole multiples of the interval since the first, until next is said."""
-        train, asked = _Train(step, self._desk), False
+        train, asked = Train(step, self._desk), False
         try:
             self._get_ready(State.TRAIN, step)
             asked = True
@@ -393,56 +376,3 @@ class Stimulus:
         fired = TestShot(method=trial.method, held_s=held_s, pulse_start_s=report.pulse_start_s, motion=report.motion)
         self._live.remark(fired)
         return True
-
-
-class _Train:
-    """A stimulus of several shots: each in the journal before the next is asked for."""
-
-    def __init__(self, step: Present, desk: Desk) -> None:
-        self._step, self._desk = step, desk
-        self._onset_utc, self._onset_s = "", math.nan
-        self.shots = 0
-
-    def began(self, onset_utc: str, first: ShotReport) -> None:
-        """Take the first shot; `next` counts after the least exposure."""
-        self._onset_utc, self._onset_s = onset_utc, first.pulse_start_s
-        self._desk.live.stimulus_begins(first.pulse_start_s, least_s=self._step.least_exposure_s)
-        self.fired(first)
-
-    def fired(self, report: ShotReport) -> None:
-        """Have a shot on the disk."""
-        self.shots += 1
-        shot = TrainShot(
-            shot=self.shots,
-            requested_s=report.requested_s,
-            pulse_start_s=report.pulse_start_s,
-            pulse_end_s=report.pulse_end_s,
-            home_predicted_s=report.home_predicted_s,
-            motion=report.motion,
-            timing=report.timing,
-        )
-        self._desk.journal.append("shot", body=record(shot))
-
-    def due_s(self) -> float:
-        """The next shot's tick, whole microseconds after the first; later if the magnet is not home by then."""
-        tick_s = self._onset_s + self.shots * round(self._step.repeat_every_s * 1e6) / 1e6
-        return max(tick_s, self._desk.gun.status().ready_at_s)
-
-    def presented(self, ended_by: Literal["next", "limit"]) -> Presented:
-        """The stimulus as it was felt to its end."""
-        return Presented(
-            gun=self._desk.gun_name,
-            onset_utc=self._onset_utc,
-            shots=self.shots,
-            exposure_s=self._exposure_s(),
-            ended_by=ended_by,
-        )
-
-    def interrupted(self) -> Interrupted:
-        """The stimulus as it was felt until a pause ended it."""
-        if not self.shots:
-            return Interrupted(presented=False, cause="pause")
-        return Interrupted(presented=True, cause="pause", shots=self.shots, exposure_s=self._exposure_s())
-
-    def _exposure_s(self) -> float:
-        return self._desk.clock.now() - self._onset_s

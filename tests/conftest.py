@@ -14,6 +14,7 @@ import pytest
 from hypothesis import settings
 
 from experiments.load import shipped_folder
+from tests.forked_commands import forked
 from tests.waiting import PATIENCE_S
 
 pytest.register_assert_rewrite("tests.at_controls", "tests.experimenters")
@@ -28,22 +29,13 @@ Recoil = Callable[..., subprocess.CompletedProcess[str]]
 
 @pytest.fixture
 def recoil(tmp_path: Path) -> Recoil:
-    """The installed command, called in an empty folder with an empty home."""
+    """The command, called in an empty folder with an empty home."""
     home = tmp_path / "home"
     home.mkdir()
     environment = {key: value for key, value in os.environ.items() if key in ("PATH", "LANG", "LC_ALL", "TMPDIR")}
 
     def call(*words: object) -> subprocess.CompletedProcess[str]:
-        return subprocess.run(
-            [str(RECOIL), *map(str, words)],
-            capture_output=True,
-            text=True,
-            cwd=tmp_path,
-            env=environment | {"HOME": str(home)},
-            stdin=subprocess.DEVNULL,
-            timeout=PATIENCE_S,
-            check=False,
-        )
+        return forked([str(word) for word in words], tmp_path, environment | {"HOME": str(home)}, PATIENCE_S)
 
     return call
 

@@ -18,12 +18,13 @@ from experiments.record import replay, storage
 from experiments.record.journal import Journal, read
 from experiments.record.replay import RunPosition
 from experiments.run import RunRequest, run
-from experiments.runner import Desk, carry_out
+from experiments.runner import carry_out
 from experiments.screens.synthetic import SyntheticScreen, synthetic_screen
 from experiments.session.remarks import Remark
 from experiments.session.states import Position, State
 from experiments.session.steps import Outcome, Step, record
 from experiments.study.places import Place, place
+from experiments.train import Desk
 
 SETUPS = {name: load_setup(name) for name in ("direction", "preference")}
 

@@ -37,7 +37,8 @@ def test_the_bench_tells_error_and_time_of_every_model(recoil: Recoil, tmp_path:
     assert [(row["drive_off"], row["fidelity"]) for row in rows] == [
         (drive_off, fidelity) for drive_off in ("open", "shorted") for fidelity in FIDELITIES
     ]
-    assert all(row["error"] <= row["stated"] and row["single_us"] > 0 for row in rows)
+    assert all(row["single_us"] > 0 for row in rows)
+    assert all(row["error"] <= row["stated"] for row in rows if row["stated"] is not None)  # null: nothing is promised
     assert {row["error"] for row in rows if row["fidelity"] == "full"} == {0.0}
     page = (out / "report.md").read_text(encoding="utf-8")
     assert all(fidelity in page and fidelity in done.stdout for fidelity in FIDELITIES)

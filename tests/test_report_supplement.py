@@ -6,12 +6,12 @@ import pytest
 
 from analysis.report.section import Section
 from analysis.summary.sections.supplement import TITLES, supplement_sections
-from tests.made_scores import CEILING, ONE_AT_CEILING, RIGHT, _ratings, _study
+from tests.made_scores import CEILING, ONE_AT_CEILING, RIGHT, ratings_of, study_of
 
 
 @pytest.fixture(scope="module")
 def direction(tmp_path_factory: pytest.TempPathFactory) -> Section:
-    (section,) = supplement_sections(_study(tmp_path_factory.mktemp("study"), RIGHT))
+    (section,) = supplement_sections(study_of(tmp_path_factory.mktemp("study"), RIGHT))
     return section
 
 
@@ -47,14 +47,14 @@ def test_assumptions_are_a_list_with_warnings_in_the_words_of_the_report(directi
 
 
 def test_ratings_have_no_model_of_answers(tmp_path: Path) -> None:
-    (section,) = supplement_sections(_ratings(tmp_path, RIGHT))
+    (section,) = supplement_sections(ratings_of(tmp_path, RIGHT))
     assert section.title == TITLES["preference"]
     assert len(section.tables) == 2
     assert "odds" not in " ".join(section.paragraphs)
 
 
 def test_separation_is_told_instead_of_a_table(tmp_path: Path) -> None:
-    (section,) = supplement_sections(_study(tmp_path, ONE_AT_CEILING))
+    (section,) = supplement_sections(study_of(tmp_path, ONE_AT_CEILING))
     assert any(
         "Asymmetric Force II (every answer right); no contrast is given" in words for words in section.paragraphs
     )
@@ -62,7 +62,7 @@ def test_separation_is_told_instead_of_a_table(tmp_path: Path) -> None:
 
 
 def test_reasons_stand_where_there_are_no_numbers(tmp_path: Path) -> None:
-    (section,) = supplement_sections(_study(tmp_path, CEILING))
+    (section,) = supplement_sections(study_of(tmp_path, CEILING))
     told = "\n".join(section.paragraphs)
     assert "Sphericity: There is no error variance" in told
     assert "Friedman test: Every participant scores all conditions alike" in told

@@ -24,9 +24,14 @@ def wheel(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return next(folder.glob("*.whl"))
 
 
-def test_the_wheel_holds_the_three_packages_and_the_configs_and_nothing_else(wheel: Path) -> None:
+def test_the_wheel_holds_the_four_packages_and_the_configs_and_nothing_else(wheel: Path) -> None:
     names = zipfile.ZipFile(wheel).namelist()
-    assert {name.split("/")[0] for name in names if ".dist-info" not in name} == {"analysis", "device", "experiments"}
+    assert {name.split("/")[0] for name in names if ".dist-info" not in name} == {
+        "analysis",
+        "device",
+        "experiments",
+        "recoil",
+    }
     for name in ("experiments/shipped_configs/direction.toml", "analysis/report/templates/report.html.j2"):
         assert name in names
 
