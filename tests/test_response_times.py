@@ -58,7 +58,7 @@ def test_one_rule_says_which_times_are_valid_for_the_counts_and_for_the_fits(tmp
     rows = trial_rows("P01")
     rows[:6] = [row | cells for row, cells in zip(rows, spoilt, strict=False)]
     write_rows(trials_path(tmp_path, "P01"), rows)
-    found = summarize(read_logs([tmp_path]))["direction"]
+    found = summarize(read_logs([tmp_path])).to_dict()["direction"]
     assert (found["response_times"]["n"], found["response_times"]["left_out"]) == (54, 6)
     assert sum(one["n"] for one in found["response_time"].values()) == 54
     assert (found["speed_accuracy"]["n"], found["speed_accuracy"]["answered"]) == (54, 60)

