@@ -14,7 +14,7 @@ import pandas as pd
 from analysis.logs.column_map import ColumnMap, MappedLog, is_recoils, read_mapped
 from analysis.logs.files import ENDINGS, BadLogError, Problem, code_in_name, find_logs, read_content, study_names
 from analysis.logs.frames import Block, joined
-from analysis.logs.rules import Log, check
+from analysis.logs.rules import Log, check_logs
 from analysis.logs.texts import TextTable, table_of_records, text_tables
 from experiments.record import columns
 from experiments.study import register
@@ -197,7 +197,7 @@ def _checked(waiting: Sequence[_Waiting], mapping: ColumnMap | None) -> _Batch:
     batch.logs |= faults
     for texts in (*own, *tables):
         try:
-            block, logs = check(texts, names)
+            block, logs = check_logs(texts, names)
         except BadLogError as bad:
             batch.logs |= dict.fromkeys(texts.logs, bad)
         else:

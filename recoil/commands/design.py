@@ -7,7 +7,7 @@ from typing import Annotated
 
 import typer
 
-from analysis.report.terminal import AsJson, FixedSeed, end, in_text, progress, show
+from analysis.report.terminal import AsJsonOption, FixedSeedOption, end, in_text, progress, show
 
 Config = Annotated[str | None, typer.Argument(help="Config whose gun is meant; else the shipped gun.")]
 Gun = Annotated[str | None, typer.Option(help="Config of a gun, instead of CONFIG.")]
@@ -29,10 +29,10 @@ def design(
     pulse: Pulse = None,
     rate_above: RateAbove = 5.0,
     grid: Grid = 40,
-    seed: FixedSeed = 1,
+    seed: FixedSeedOption = 1,
     workers: Workers = None,
     out: Annotated[Path, typer.Option(help="Folder for design.json, figures and report.")] = Path("results/design"),
-    as_json: AsJson = False,
+    as_json: AsJsonOption = False,
 ) -> None:
     """Which damper, voltage and pulse would be felt best, and where a direction begins to be felt. Predictions."""
     from analysis.predict.design_search import run as feature

@@ -8,7 +8,17 @@ from typing import Annotated
 import typer
 from typer.core import TyperGroup
 
-from analysis.report.terminal import AsJson, FixedSeed, GunConfig, end, in_text, progress, say, show, tracked
+from analysis.report.terminal import (
+    AsJsonOption,
+    FixedSeedOption,
+    GunConfigOption,
+    end,
+    in_text,
+    progress,
+    say,
+    show,
+    tracked,
+)
 
 
 class _PerceptUnlessNamed(TyperGroup):
@@ -45,14 +55,14 @@ def percept(
     paper: Paper = "paper",
     rates: Rates = None,
     trials: Trials = None,
-    gun: GunConfig = "gun",
+    gun: GunConfigOption = "gun",
     spread: Spread = 0.0,
     studies: Studies = 10_000,
-    seed: FixedSeed = 1,
+    seed: FixedSeedOption = 1,
     out: Annotated[Path, typer.Option(help="Folder for fit.json, percept.toml, figures and report.")] = Path(
         "results/fit"
     ),
-    as_json: AsJson = False,
+    as_json: AsJsonOption = False,
 ) -> None:
     """The percept fitted to forward rates, what they cannot tell, and studies of it against what else is published."""
     from analysis.predict.fit import percept as feature
@@ -75,7 +85,7 @@ def times(
     bias: Annotated[bool, typer.Option("--bias/--no-bias", help="Fit the start, or hold it at one half.")] = True,
     profile: Annotated[bool, typer.Option("--profile", help="Likelihood intervals as well; slower.")] = False,
     out: Annotated[Path, typer.Option(help="Folder for fit.json, figure and report.")] = Path("results/fit-times"),
-    as_json: AsJson = False,
+    as_json: AsJsonOption = False,
 ) -> None:
     """The diffusion model (drift, boundary, start, non-decision time) fitted to people's own response times."""
     from analysis.predict.fit import times as feature

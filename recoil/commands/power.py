@@ -7,7 +7,7 @@ from typing import Annotated
 
 import typer
 
-from analysis.report.terminal import AsJson, Config, FixedSeed, in_text, progress, show
+from analysis.report.terminal import AsJsonOption, ConfigArgument, FixedSeedOption, in_text, progress, show
 
 Participants = Annotated[str | None, typer.Option(metavar="N,N-N", help="How many people, such as 8,10,14-20.")]
 TrialsList = Annotated[
@@ -24,7 +24,7 @@ Scheduler = Annotated[str | None, typer.Option(metavar="ADDRESS", help="Work on 
 
 
 def power(
-    config: Config,
+    config: ConfigArgument,
     *,
     participants: Participants = None,
     trials: TrialsList = None,
@@ -33,12 +33,12 @@ def power(
     studies: Simulated = 10_000,
     target: Annotated[float, typer.Option(help="Power that a design is to reach.")] = 0.8,
     null: Null = False,
-    seed: FixedSeed = 1,
+    seed: FixedSeedOption = 1,
     paper: Annotated[str, typer.Option(help="Published numbers whose pattern may recur.")] = "paper",
     workers: Workers = None,
     scheduler: Scheduler = None,
     out: Annotated[Path, typer.Option(help="Folder for power.json, figures and report.")] = Path("results/power"),
-    as_json: AsJson = False,
+    as_json: AsJsonOption = False,
 ) -> None:
     """Simulated power and precision: how many people and trials does it take, and what does it cost?"""
     from analysis.predict.power import run as feature

@@ -10,8 +10,8 @@ from typing import Annotated
 import typer
 
 from analysis.report.terminal import (
-    AsJson,
-    Seed,
+    AsJsonOption,
+    SeedOption,
     end,
     say,
     show,
@@ -28,15 +28,15 @@ class ScreenName(StrEnum):
 
 def check(
     configs: Annotated[list[str], typer.Argument(metavar="CONFIG...", help="Files or names of shipped configs.")],
-    seed: Seed = None,
+    seed: SeedOption = None,
     participants: Annotated[int, typer.Option(min=1, max=999, help="Show the orders of so many.")] = 14,
-    as_json: AsJson = False,
+    as_json: AsJsonOption = False,
 ) -> None:
     """Validate configs; print design, orders, duration, drive and limits. Nothing is run."""
     from analysis.predict import check as feature
 
     found = [feature.check(name, seed, participants) for name in configs]
-    show(found if len(found) > 1 else found[0], "\n\n".join(map(feature.as_text, found)), as_json)
+    show(found if len(found) > 1 else found[0], "\n\n".join(map(feature.check_text, found)), as_json)
 
 
 Participant = Annotated[
@@ -69,7 +69,7 @@ def run(
     gun: GunAddress = "simulated",
     screen: Screen = ScreenName.terminal,
     results: Results = Path("results"),
-    seed: Seed = None,
+    seed: SeedOption = None,
     resume: Resume = False,
     fresh: Fresh = False,
     reason: WhyFresh = "",
@@ -78,7 +78,7 @@ def run(
     participant_keys: OwnKeys = False,
     noise: Noise = False,
     participant_monitor: Monitor = None,
-    as_json: AsJson = False,
+    as_json: AsJsonOption = False,
 ) -> None:
     """One run: a participant doing one experiment."""
     from experiments.load import load_setup
@@ -115,7 +115,7 @@ def study(
     exclude: Annotated[str | None, typer.Option(metavar="CODE", help="Exclude a participant; needs --reason.")] = None,
     readmit: Annotated[str | None, typer.Option(metavar="CODE", help="Take an exclusion back; needs --reason.")] = None,
     reason: Annotated[str | None, typer.Option(help="Why; never a name.")] = None,
-    as_json: AsJson = False,
+    as_json: AsJsonOption = False,
 ) -> None:
     """The participants of a study: done, in progress, excluded, and who comes next in which orders."""
     from recoil import study as feature
@@ -129,7 +129,9 @@ def study(
     raise end(exceptions=bool(found.overview.problems))
 
 
-def rebuild(journals: Annotated[list[Path], typer.Argument(metavar="JOURNAL...")], as_json: AsJson = False) -> None:
+def rebuild(
+    journals: Annotated[list[Path], typer.Argument(metavar="JOURNAL...")], as_json: AsJsonOption = False
+) -> None:
     """Make the CSV again from its journal, byte for byte."""
     from recoil.session import rebuild_tables
 
