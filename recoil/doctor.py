@@ -46,13 +46,13 @@ def keep(found: Examination, path: Path) -> None:
     storage.write_whole(path, as_json(found))
 
 
-def section(findings: tuple[Finding, ...]) -> Section:
+def findings_section(findings: tuple[Finding, ...]) -> Section:
     """The findings as a table."""
     rows = tuple((one.check, str(one.verdict), one.measured, one.advice) for one in findings)
     header = ("check", "verdict", "measured", "what to do")
     return Section(title="", tables=(Table(caption="", header=header, rows=rows),))
 
 
-def as_text(findings: tuple[Finding, ...]) -> str:
+def examination_text(findings: tuple[Finding, ...]) -> str:
     """The table for people at a terminal."""
-    return with_tables(section(findings), ruled=True, unfolded=2)
+    return with_tables(findings_section(findings), ruled=True, unfolded=2)

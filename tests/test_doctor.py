@@ -62,7 +62,7 @@ from experiments.session.steps import (
     record,
 )
 from experiments.study.places import PlaceError
-from recoil.doctor import as_text
+from recoil.doctor import examination_text
 from tests.conftest import RECOIL, Recoil
 from tests.kills import can_mount, in_small_disk
 from tests.waiting import PATIENCE_S
@@ -276,7 +276,7 @@ def test_a_dead_child_is_explained_by_the_library_it_missed_or_by_its_first_word
 
 
 def test_the_table_shows_names_in_brackets_as_they_are() -> None:
-    text = as_text((Finding(check="sound", verdict="good", measured="[red]Headphones[/red]"),))
+    text = examination_text((Finding(check="sound", verdict="good", measured="[red]Headphones[/red]"),))
     assert "[red]Headphones[/red]" in text
 
 

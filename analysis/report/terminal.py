@@ -28,6 +28,7 @@ SeedOption = Annotated[int | None, typer.Option(min=0, max=2**63 - 1, help="Seed
 FixedSeedOption = Annotated[int, typer.Option(min=0, max=2**63 - 1, help="Seed of the random streams.")]
 GunConfigOption = Annotated[str, typer.Option(help="Config of a gun, or the name of a shipped one.")]
 ConfigArgument = Annotated[str, typer.Argument(help="File or name of a shipped config.")]
+WorkersOption = Annotated[int | None, typer.Option(min=1, help="Processes; as many as cores unless given.")]
 
 
 Progress = Callable[[str, int], AbstractContextManager[Callable[[str], None]]]

@@ -38,26 +38,30 @@ app = typer.Typer(
     rich_markup_mode=None,
 )
 
-Paper = Annotated[str, typer.Option(help="Published numbers: file, or the name of a shipped one.")]
-Rates = Annotated[
+PaperOption = Annotated[str, typer.Option(help="Published numbers: file, or the name of a shipped one.")]
+RatesOption = Annotated[
     str | None, typer.Option(metavar="NAME=SHARE,...", help="Forward rates by method instead of a paper's.")
 ]
-Trials = Annotated[int | None, typer.Option(min=1, max=10**9, help="Forward trials behind each of --rates (140).")]
-Spread = Annotated[
+TrialsOption = Annotated[
+    int | None, typer.Option(min=1, max=10**9, help="Forward trials behind each of --rates (140).")
+]
+SpreadOption = Annotated[
     float, typer.Option(metavar="FACTOR", help="People differ by so many times the assumed spread; 0: all alike.")
 ]
-Studies = Annotated[int, typer.Option(min=0, max=10_000_000, help="Simulated studies to judge the fit by; 0: none.")]
+StudiesOption = Annotated[
+    int, typer.Option(min=0, max=10_000_000, help="Simulated studies to judge the fit by; 0: none.")
+]
 
 
 @app.command()
 def percept(
     *,
-    paper: Paper = "paper",
-    rates: Rates = None,
-    trials: Trials = None,
+    paper: PaperOption = "paper",
+    rates: RatesOption = None,
+    trials: TrialsOption = None,
     gun: GunConfigOption = "gun",
-    spread: Spread = 0.0,
-    studies: Studies = 10_000,
+    spread: SpreadOption = 0.0,
+    studies: StudiesOption = 10_000,
     seed: FixedSeedOption = 1,
     out: Annotated[Path, typer.Option(help="Folder for fit.json, percept.toml, figures and report.")] = Path(
         "results/fit"

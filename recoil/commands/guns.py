@@ -19,43 +19,43 @@ from analysis.report.terminal import (
     show,
 )
 
-Method = Annotated[str | None, typer.Option(help="Rendering method of the gun.")]
-Changes = Annotated[list[str] | None, typer.Option("--set", metavar="KEY=VALUE", help="Change a parameter.")]
-Fidelity = Annotated[str | None, typer.Option(help="Model to use; full unless given.")]
-SceneName = Annotated[
+MethodOption = Annotated[str | None, typer.Option(help="Rendering method of the gun.")]
+ChangesOption = Annotated[list[str] | None, typer.Option("--set", metavar="KEY=VALUE", help="Change a parameter.")]
+FidelityOption = Annotated[str | None, typer.Option(help="Model to use; full unless given.")]
+SceneOption = Annotated[
     str | None, typer.Option(help="Pick the cheapest model for a use: session, figure, sweep, percept.")
 ]
-Needs = Annotated[list[str] | None, typer.Option(metavar="OUTPUT=ERROR", help="The same for a use of your own.")]
-Trace = Annotated[Path | None, typer.Option(help="Write the shot over time as CSV.")]
-Plot = Annotated[Path | None, typer.Option(help="Write Figure 5's panels as PNG and SVG.")]
-Audit = Annotated[bool, typer.Option("--audit", help="Where energy and momentum went.")]
-HandWords = Annotated[
+NeedsOption = Annotated[list[str] | None, typer.Option(metavar="OUTPUT=ERROR", help="The same for a use of your own.")]
+TraceOption = Annotated[Path | None, typer.Option(help="Write the shot over time as CSV.")]
+PlotOption = Annotated[Path | None, typer.Option(help="Write Figure 5's panels as PNG and SVG.")]
+AuditOption = Annotated[bool, typer.Option("--audit", help="Where energy and momentum went.")]
+HandOption = Annotated[
     str | None, typer.Option(metavar="KEY=VALUE,...", help="The gun in a hand; `assumed` for the usual one.")
 ]
-Stiffness = Annotated[float | None, typer.Option(metavar="N/m", help="A stop that gives way.")]
-Vary = Annotated[
+StiffnessOption = Annotated[float | None, typer.Option(metavar="N/m", help="A stop that gives way.")]
+VaryOption = Annotated[
     list[str] | None,
     typer.Option(metavar="KEY=VALUES", help="FROM:TO:COUNT, log:FROM:TO:COUNT or A,B,C; with --table."),
 ]
-TableFile = Annotated[Path | None, typer.Option(metavar="FILE.parquet|.csv", help="Shots over all of --vary.")]
-Yes = Annotated[bool, typer.Option("--yes", help="Also more than ten million of them.")]
+TableFileOption = Annotated[Path | None, typer.Option(metavar="FILE.parquet|.csv", help="Shots over all of --vary.")]
+YesOption = Annotated[bool, typer.Option("--yes", help="Also more than ten million of them.")]
 
 
 def simulate(
-    method: Method = None,
+    method: MethodOption = None,
     gun: GunConfigOption = "gun",
-    changes: Changes = None,
-    fidelity: Fidelity = None,
-    scene: SceneName = None,
-    need: Needs = None,
-    trace: Trace = None,
-    plot: Plot = None,
-    audit: Audit = False,
-    hand: HandWords = None,
-    contact_stiffness: Stiffness = None,
-    vary: Vary = None,
-    table: TableFile = None,
-    yes: Yes = False,
+    changes: ChangesOption = None,
+    fidelity: FidelityOption = None,
+    scene: SceneOption = None,
+    need: NeedsOption = None,
+    trace: TraceOption = None,
+    plot: PlotOption = None,
+    audit: AuditOption = False,
+    hand: HandOption = None,
+    contact_stiffness: StiffnessOption = None,
+    vary: VaryOption = None,
+    table: TableFileOption = None,
+    yes: YesOption = False,
     as_json: AsJsonOption = False,
 ) -> None:
     """One shot by the model (summary, trace, figure), a table of shots over parameters that vary, or a vibration."""
@@ -120,7 +120,7 @@ def doctor(
     from recoil import doctor as feature
 
     found = feature.examine(results, gun, gun_config, progress)
-    show(found, feature.as_text(found.checks), as_json)
+    show(found, feature.examination_text(found.checks), as_json)
     if out:
         feature.keep(found, out)
     raise end(exceptions=found.verdict == "fails")
