@@ -220,5 +220,5 @@ def _mapped(batch: _Batch, first: int, logs: Sequence[MappedLog], mapping: Colum
 
 def _exclusions(results: str) -> dict[str, str]:
     """Who is excluded in a results folder, as far as its register can be read."""
-    members = register.read(Path(results)).members
+    members = register.read_register(Path(results)).members
     return {code: member.excluded for code, member in members.items() if member.excluded is not None}
