@@ -341,7 +341,7 @@ def test_work_that_is_interrupted_may_put_away_what_it_holds(tmp_path: Path) -> 
         "signal.signal(signal.SIGINT, interrupt)\n"
         "def work():\n    os.kill(os.getpid(), signal.SIGINT)\n    interrupted.wait()\n    Path({!r}).touch()\n"
         "checks.PUT_AWAY_S = {}\n"
-        "checks.within({}, work)"
+        "checks.within_seconds({}, work)"
     )
     program = program.format(str(tmp_path / "put away"), PATIENCE_S, PATIENCE_S)
     answer = run_child([sys.executable, "-c", program], PATIENCE_S)

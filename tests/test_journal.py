@@ -139,9 +139,9 @@ def test_a_record_that_was_written_in_part_is_taken_back(path: Path) -> None:
 import resource, signal, sys
 from pathlib import Path
 from experiments.clock import VirtualClock
-from experiments.record.journal import Journal, JournalError, read
+from experiments.record.journal import Journal, JournalError, read_journal
 signal.signal(signal.SIGXFSZ, signal.SIG_IGN)
-contents = read(Path({str(path)!r}))
+contents = read_journal(Path({str(path)!r}))
 with Journal.reopen(contents, VirtualClock()) as journal:
     resource.setrlimit(resource.RLIMIT_FSIZE, ({size} + 40, {size} + 40))
     try:
@@ -306,9 +306,9 @@ def test_a_second_holder_is_refused_in_another_process_and_loses_nothing(tmp_pat
 import sys
 from pathlib import Path
 from experiments.clock import VirtualClock
-from experiments.record.journal import Journal, JournalError, read
+from experiments.record.journal import Journal, JournalError, read_journal
 try:
-    Journal.reopen(read(Path({str(path)!r})), VirtualClock()).append("step", body="other")
+    Journal.reopen(read_journal(Path({str(path)!r})), VirtualClock()).append("step", body="other")
 except JournalError as error:
     sys.exit(str(error))
 """
