@@ -33,15 +33,15 @@ _FACTORS = np.geomspace(1.02, 1e3, 24)
 """d_2/d_1, between which the solution is looked for."""
 _MOST_NEPERS = 200.0  # of the slow one's decay over the duration
 
-Numbers = NDArray[np.complex128]
+_ComplexArray = NDArray[np.complex128]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Vibration:
     """A sum of decaying exponentials in conjugate pairs, in m/s2: residues at poles in 1/s."""
 
-    residues: Numbers
-    poles: Numbers
+    residues: _ComplexArray
+    poles: _ComplexArray
 
     def acceleration_m_s2(self, time_s: NDArray[np.float64]) -> NDArray[np.float64]:
         """The acceleration at times from 0 on."""

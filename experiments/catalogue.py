@@ -26,7 +26,7 @@ from experiments.preference.session import rows as preference_rows
 from experiments.preference.session import session as preference_session
 from experiments.record import replay
 from experiments.record.columns import FILE_SUFFIX
-from experiments.record.journal import Contents, JournalError, read
+from experiments.record.journal import Contents, JournalError, read_journal
 from experiments.record.tables import Row, table_bytes
 from experiments.session.history import History
 from experiments.session.steps import Session
@@ -84,7 +84,7 @@ def table(contents: Contents) -> bytes:
 
 def rebuild(path: Path) -> tuple[Path, bytes, Contents]:
     """The table of a journal: where it belongs, its bytes, and what the journal holds."""
-    contents = read(path)
+    contents = read_journal(path)
     data = table(contents)
     name = path.name.replace("_journal", f"_{FILE_SUFFIX[contents.plan.experiment]}")
     return path.with_name(name).with_suffix(".csv"), data, contents

@@ -22,7 +22,7 @@ from experiments.session import events, judging
 from experiments.session.events import DISARMS, TYPED, Event, Press
 from experiments.session.history import History
 from experiments.session.judging import Moment, refused, remark_of
-from experiments.session.remarks import Remark, record
+from experiments.session.remarks import Remark, remark_record
 from experiments.session.states import ARMED, Position, State, entered
 from experiments.session.steps import Outcome, Step
 
@@ -44,7 +44,7 @@ class Held(Exception):  # noqa: N818 - what is so, not what went wrong
 
 
 @dataclass(frozen=True, slots=True)
-class Verdict:
+class EventVerdict:
     """Whether an event was taken, and what there is to say about it."""
 
     taken: bool
@@ -140,12 +140,12 @@ class LiveRun:
                 self._painted_s = at_s
                 self.shown_s = at_s if self.shown_s is None else self.shown_s
 
-    def offer(self, event: Event, press: Press | None = None) -> Verdict:
+    def offer(self, event: Event, press: Press | None = None) -> EventVerdict:
         """Have an event judged, and taken if it may be. Never waits. `press`: by the experimenter's hand."""
         with self._news:
             moment = self._moment()
             meant, text = judging.meant(moment, event)
-            refusal = judging.refusal(moment, meant, press)
+            refusal = judging.event_refusal(moment, meant, press)
             if not refusal:
                 self._take(meant, moment)
             before, position = moment.position, self._position
@@ -155,7 +155,7 @@ class LiveRun:
             written.add_done_callback(lambda done: self._written(kept, done))
         if not refusal:
             self._screen.show(position)
-        return Verdict(taken=not refusal, text=refusal or text)
+        return EventVerdict(taken=not refusal, text=refusal or text)
 
     def _take(self, event: Event, moment: Moment) -> None:
         """Stand where an event leads; where it disarms, that begins when this is so, and before anything else."""
@@ -273,7 +273,7 @@ class LiveRun:
     def _submit(self, remark: Remark) -> Future[None] | None:
         """Have a remark written; `None` if the journal is closed, as the run has just ended."""
         try:
-            written = self._journal.submit("remark", body=record(remark))
+            written = self._journal.submit("remark", body=remark_record(remark))
         except RuntimeError:
             return None
         self._history.append((None, remark))

@@ -20,7 +20,7 @@ from experiments.design.streams import draw_seed
 from experiments.limits import check_limits
 from experiments.live_run import LiveRun, RunStopped, Screen
 from experiments.record import replay, storage
-from experiments.record.journal import Contents, Journal, JournalError, begun, hold, read
+from experiments.record.journal import Contents, Journal, JournalError, begun, hold_journal, read_journal
 from experiments.record.provenance import provenance
 from experiments.record.replay import RunPosition
 from experiments.runner import carry_out, gun_name
@@ -112,7 +112,7 @@ def run(request: RunRequest, make_screen: MakeScreen, clock: Clock) -> Finished:
     """Carry out a run. `PlaceError`, `JournalError`, `ConfigError`, `RunStopped`: nothing acknowledged is ever lost."""
     setup = request.setup
     drives = {one.method: one.drive for one in check_limits(setup)}
-    registered = register.read(request.results)
+    registered = register.read_register(request.results)
     place = places.place(request.results, request.participant_id, setup.config.experiment, registered)
     place = replace(place, practice=request.practice)
     if not place.journal.exists():
@@ -178,7 +178,7 @@ def _before(where: Place, request: RunRequest, clock: Clock) -> Contents | None:
         if request.again == "ask":
             raise UnfinishedRun(where, contents)
         return contents
-    os.close(hold(where.journal))  # refused while another run is at it
+    os.close(hold_journal(where.journal))  # refused while another run is at it
     _record_reason(where, request.anew_reason, clock)
     places.set_aside(where)
     return None
@@ -202,7 +202,7 @@ def _refuse_finished(where: Place, contents: Contents | None) -> None:
 def _new_plan(request: RunRequest, place: Place, registered: Register) -> Plan:
     setup, seed = request.setup, resolve_seed(request)
     if not request.practice:
-        row = places.next_row(setup, place.results, registered)
+        row = places.row_of_next_run(setup, place.results, registered)
         return experiment(setup).make_plan(setup.config, place.participant_id, seed, row)
     plan = experiment(setup).make_practice(setup.config, place.participant_id, seed)
     if plan is None:
@@ -277,7 +277,7 @@ def _to_the_end(session: Session, desk: Desk, position: RunPosition, place: Plac
         why = str(stop) or "interrupted"
         desk.live.end(why)
         desk.journal.append("stopped", reason=why)
-        saved = _write_table(place, read(place.journal))
+        saved = _write_table(place, read_journal(place.journal))
         if isinstance(stop, RunStopped):
             stop.saved = saved
         raise
@@ -285,7 +285,7 @@ def _to_the_end(session: Session, desk: Desk, position: RunPosition, place: Plac
         desk.live.end(str(error))
         raise
     desk.live.end("")
-    contents = read(place.journal)
+    contents = read_journal(place.journal)
     desk.journal.append("finished", table_sha256=hashlib.sha256(table(contents)).hexdigest())
     return _write_table(place, contents)
 

@@ -28,8 +28,8 @@ from experiments.session.steps import (
     Describe,
     Described,
     Failed,
-    Fire,
     Fired,
+    FireShot,
     Interrupted,
     Outcome,
     Prepare,
@@ -38,13 +38,13 @@ from experiments.session.steps import (
     Presented,
     Rate,
     Rated,
-    Repeat,
+    Repeated,
     Rest,
     Rested,
     Session,
     Step,
     on_scale,
-    record,
+    step_record,
 )
 from experiments.train import Desk, Train
 
@@ -83,7 +83,7 @@ class _Runner:
 
     def __init__(self, session: Session, desk: Desk) -> None:
         self._session, self._desk, self._live = session, desk, desk.live
-        self._stimulus = Stimulus(desk)
+        self._stimulus = DeskGun(desk)
         self._failures = 0
         self._onset_s = math.nan
         self._damper = ""
@@ -94,9 +94,9 @@ class _Runner:
         if position.halted:
             self._rearm(trial_at(self._live.plan, position.history, step))
         while step is not None:
-            self._desk.journal.append("step", body=record(step))
+            self._desk.journal.append("step", body=step_record(step))
             outcome = self._do(step)
-            self._desk.journal.append("outcome", body=record(outcome), **self._shown())
+            self._desk.journal.append("outcome", body=step_record(outcome), **self._shown())
             self._live.keep(step, outcome)
             self._count(outcome)
             step = self._send(outcome)
@@ -122,7 +122,7 @@ class _Runner:
         match step:
             case Prepare():
                 return self._prepare(step)
-            case Fire():
+            case FireShot():
                 return self._fired(step)
             case Ask():
                 return self._ask(step)
@@ -139,7 +139,7 @@ class _Runner:
 
     # steps that wait for a person
 
-    def _prepare(self, step: Prepare) -> Prepared | Repeat:
+    def _prepare(self, step: Prepare) -> Prepared | Repeated:
         to_be_set = step.damper not in ("", self._damper)
         if to_be_set:
             self._damper = ""  # it may be set by now, or not: known again when that is said
@@ -155,7 +155,7 @@ class _Runner:
                 case other:
                     raise Unforeseen(other)
 
-    def _ask(self, step: Ask) -> Answered | Repeat:
+    def _ask(self, step: Ask) -> Answered | Repeated:
         self._live.enter(State.ASKING, step)
         match self._live.wait():
             case events.Answer() | events.ParticipantKey() as answer:
@@ -182,7 +182,7 @@ class _Runner:
             key_time_s=key_time_s if drawn_s is not None else None,
         )
 
-    def _rest(self, step: Rest) -> Rested | Repeat:
+    def _rest(self, step: Rest) -> Rested | Repeated:
         start_s = self._desk.clock.now()
         self._live.enter(State.RESTING, step, until_s=start_s + step.duration_s)
         while True:
@@ -201,7 +201,7 @@ class _Runner:
     def _rested(self, start_s: float, reason: str) -> Rested:
         return Rested(rested_s=round(self._desk.clock.now() - start_s, 6), cut_reason=reason)
 
-    def _rate(self, step: Rate) -> Rated | Repeat:
+    def _rate(self, step: Rate) -> Rated | Repeated:
         self._live.enter(State.RATING, step)
         match self._live.wait():
             case events.Rating(rating=rating, by=by) | events.ParticipantRated(rating=rating, by=by):
@@ -219,7 +219,7 @@ class _Runner:
             case other:
                 raise Unforeseen(other)
 
-    def _close(self, step: Close) -> Closed | Repeat:
+    def _close(self, step: Close) -> Closed | Repeated:
         self._live.enter(State.CLOSING, step)
         match self._live.wait():
             case events.Finish():
@@ -229,15 +229,15 @@ class _Runner:
             case other:
                 raise Unforeseen(other)
 
-    def _repeat(self, reason: str) -> Repeat:
+    def _repeat(self, reason: str) -> Repeated:
         trial = self._live.repeated()
         if trial is None:
             raise TypeError("a repeat of no trial was taken")
-        return Repeat(trial=trial, reason=reason)
+        return Repeated(trial=trial, reason=reason)
 
     # the gun
 
-    def _fired(self, step: Fire) -> Fired | Failed | Interrupted:
+    def _fired(self, step: FireShot) -> Fired | Failed | Interrupted:
         outcome = self._stimulus.fire(step)
         if isinstance(outcome, Fired):
             self._onset_s = outcome.pulse_start_s
@@ -274,13 +274,13 @@ def disarm(gun: Gun) -> None:
         raise RunStopped(f"the gun cannot be disarmed ({error}): switch off its power") from error
 
 
-class Stimulus:
+class DeskGun:
     """The gun at a desk, as a run uses it."""
 
     def __init__(self, desk: Desk) -> None:
         self._desk, self._live = desk, desk.live
 
-    def fire(self, step: Fire) -> Fired | Failed | Interrupted:
+    def fire(self, step: FireShot) -> Fired | Failed | Interrupted:
         """One shot, armed for it alone."""
         asked = False
         try:
@@ -325,7 +325,7 @@ class Stimulus:
             disarm(self._desk.gun)
         return train.presented("next") if isinstance(event, events.Next) else train.interrupted()
 
-    def _get_ready(self, state: State, step: Fire | Present) -> None:
+    def _get_ready(self, state: State, step: FireShot | Present) -> None:
         """Enter a state in which the gun fires, and arm it. Raises as `allow_shot`.
 
         If the run ends before the shot, it is on the disk that nothing was felt.
@@ -336,7 +336,7 @@ class Stimulus:
                 self._live.stimulus_begins(None)
             self._arm()
         except RunStopped:
-            self._desk.journal.append("outcome", body=record(Interrupted(presented=False)))
+            self._desk.journal.append("outcome", body=step_record(Interrupted(presented=False)))
             raise
 
     def _arm(self) -> None:

@@ -12,7 +12,7 @@ from device.words import Drive
 from experiments.clock import Clock
 from experiments.live_run import LiveRun
 from experiments.record.journal import Journal
-from experiments.session.steps import Interrupted, Present, Presented, TrainShot, record
+from experiments.session.steps import Interrupted, Present, Presented, TrainShot, step_record
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -53,7 +53,7 @@ class Train:
             motion=report.motion,
             timing=report.timing,
         )
-        self._desk.journal.append("shot", body=record(shot))
+        self._desk.journal.append("shot", body=step_record(shot))
 
     def due_s(self) -> float:
         """The next shot's tick, whole microseconds after the first; later if the magnet is not home by then."""

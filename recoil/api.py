@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from analysis.paper.audit.run import Finding
+    from analysis.paper.audit.run import AuditFinding
     from analysis.predict.power.results import Power
     from analysis.summary.results import StudyStatistics
     from experiments.config.setup import Setup
@@ -76,7 +76,7 @@ def analyze(*paths: str | Path) -> StudyStatistics:
     return summarize(read_logs(paths))
 
 
-def audit(paper: str | Path = "paper") -> tuple[Finding, ...]:
+def audit(paper: str | Path = "paper") -> tuple[AuditFinding, ...]:
     """Whether data could give the published numbers: of a paper's file, or of a shipped one.
 
     >>> findings = audit()

@@ -22,7 +22,7 @@ app = typer.Typer(
     no_args_is_help=True,
     add_completion=False,
 )
-export = typer.Typer(help="Data sets for other programs.", rich_markup_mode=None, no_args_is_help=True)
+export_commands = typer.Typer(help="Data sets for other programs.", rich_markup_mode=None, no_args_is_help=True)
 
 COMMANDS = (
     numbers.reproduce,
@@ -60,8 +60,8 @@ def _about(
 
 for command in COMMANDS:
     app.command()(command)
-export.command()(numbers.bids)
-app.add_typer(export, name="export")
+export_commands.command()(numbers.bids)
+app.add_typer(export_commands, name="export")
 app.add_typer(fit.app, name="fit")
 
 

@@ -10,8 +10,8 @@ from analysis.report.section import Section, Table
 from analysis.report.serial import as_json
 from analysis.report.terminal import Progress, with_tables
 from experiments.clock import RealClock
-from experiments.doctor.checks import carry_out, checks
-from experiments.doctor.figures import Finding
+from experiments.doctor.checks import carry_out_check, checks
+from experiments.doctor.figures import DoctorFinding
 from experiments.doctor.verdicts import overall
 from experiments.load import find, load_gun
 from experiments.record import storage
@@ -23,7 +23,7 @@ class Examination:
 
     utc: str
     verdict: Literal["good", "warning", "fails"]
-    checks: tuple[Finding, ...]
+    checks: tuple[DoctorFinding, ...]
 
 
 def examine(results: Path, gun: str, config: str, progress: Progress) -> Examination:
@@ -31,10 +31,10 @@ def examine(results: Path, gun: str, config: str, progress: Progress) -> Examina
 
     `PlaceError`: the gun's address has no such form; `ConfigError`: the config cannot be used.
     """
-    findings, planned = list[Finding](), checks(results, gun, load_gun(find(config)).serial.round_trip_limit_s)
+    findings, planned = list[DoctorFinding](), checks(results, gun, load_gun(find(config)).serial.round_trip_limit_s)
     with progress("doctor", len(planned)) as tell:
         for check in planned:
-            findings += carry_out(check)
+            findings += carry_out_check(check)
             tell(check.name)
     verdict = overall([finding.verdict for finding in findings])
     return Examination(utc=RealClock().utc(), verdict=verdict, checks=tuple(findings))
@@ -46,13 +46,13 @@ def keep(found: Examination, path: Path) -> None:
     storage.write_whole(path, as_json(found))
 
 
-def section(findings: tuple[Finding, ...]) -> Section:
+def findings_section(findings: tuple[DoctorFinding, ...]) -> Section:
     """The findings as a table."""
     rows = tuple((one.check, str(one.verdict), one.measured, one.advice) for one in findings)
     header = ("check", "verdict", "measured", "what to do")
     return Section(title="", tables=(Table(caption="", header=header, rows=rows),))
 
 
-def as_text(findings: tuple[Finding, ...]) -> str:
+def examination_text(findings: tuple[DoctorFinding, ...]) -> str:
     """The table for people at a terminal."""
-    return with_tables(section(findings), ruled=True, unfolded=2)
+    return with_tables(findings_section(findings), ruled=True, unfolded=2)

@@ -138,7 +138,7 @@ def again(*, resume: bool, fresh: bool, reason: str) -> Again:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Rebuilt:
+class RebuiltTable:
     """A table made again: whether it had to be written, and what there is to say."""
 
     table: Path
@@ -146,12 +146,12 @@ class Rebuilt:
     messages: tuple[str, ...]
 
 
-def rebuild_tables(journals: list[Path]) -> list[Rebuilt]:
+def rebuild_tables(journals: list[Path]) -> list[RebuiltTable]:
     """The tables of journals. A table that differs from its journal is set aside, not overwritten."""
     return [_rebuild(path) for path in journals]
 
 
-def _rebuild(path: Path) -> Rebuilt:
+def _rebuild(path: Path) -> RebuiltTable:
     table, data, contents = rebuild(path)
     messages = [contents.cut_message] if contents.cut_message else []
     same = table.exists() and table.read_bytes() == data
@@ -159,4 +159,4 @@ def _rebuild(path: Path) -> Rebuilt:
         messages.append(f"{table}: differed from its journal and was set aside as {set_aside_file(table)}")
     if not same:
         storage.write_whole(table, data)
-    return Rebuilt(table=table, rebuilt=not same, messages=tuple(messages))
+    return RebuiltTable(table=table, rebuilt=not same, messages=tuple(messages))

@@ -21,7 +21,7 @@ _UNDER_WAY = ("in progress", "open elsewhere")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Change:
+class StudyChange:
     """What was asked for: someone joins with facts, or is excluded or readmitted for a reason."""
 
     action: str
@@ -31,14 +31,14 @@ class Change:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Found:
+class StudyStatus:
     """A study and how it stands."""
 
     study: StudyFolder
     overview: Overview
 
 
-def change(options: Mapping[str, str | None], facts: Mapping[str, object], reason: str | None) -> Change | None:
+def change(options: Mapping[str, str | None], facts: Mapping[str, object], reason: str | None) -> StudyChange | None:
     """What is to be changed; `None` for a look alone. `PlaceError` for options that do not go together."""
     given = [(action, code) for action, code in options.items() if code is not None]
     if len(given) > 1:
@@ -47,7 +47,7 @@ def change(options: Mapping[str, str | None], facts: Mapping[str, object], reaso
     _refuse_stray(action, facts, reason)
     if not action:
         return None
-    return Change(action=action, participant_id=code, facts=_facts(facts), reason=reason or "")
+    return StudyChange(action=action, participant_id=code, facts=_facts(facts), reason=reason or "")
 
 
 def _refuse_stray(action: str, facts: Mapping[str, object], reason: str | None) -> None:
@@ -68,14 +68,14 @@ def _facts(values: Mapping[str, object]) -> Facts:
         raise PlaceError(f"{_OPTIONS[str(first['loc'][0])]} {first['input']!r}: {first['msg']}") from error
 
 
-def study(folder: Path, change: Change | None) -> tuple[Found, tuple[str, ...]]:
+def study(folder: Path, change: StudyChange | None) -> tuple[StudyStatus, tuple[str, ...]]:
     """How a folder's study stands after a change, and what there is to say of the change. Errors name what to do."""
     where = open_study(folder)
     notes = _carry_out(where, change) if change else ()
-    return Found(study=where, overview=overview(where)), notes
+    return StudyStatus(study=where, overview=overview(where)), notes
 
 
-def _carry_out(where: StudyFolder, change: Change) -> tuple[str, ...]:
+def _carry_out(where: StudyFolder, change: StudyChange) -> tuple[str, ...]:
     clock, code = RealClock(), change.participant_id
     if change.action == "join":
         reasons = enrolment.join(where, code, change.facts, clock)
@@ -85,7 +85,7 @@ def _carry_out(where: StudyFolder, change: Change) -> tuple[str, ...]:
     return ()
 
 
-def as_json(found: Found) -> dict[str, object]:
+def study_json(found: StudyStatus) -> dict[str, object]:
     """The study as plain JSON values."""
     coming = found.overview.next
     return {
@@ -98,7 +98,7 @@ def as_json(found: Found) -> dict[str, object]:
     }
 
 
-def _participant(found: Found, one: Participant) -> dict[str, object]:
+def _participant(found: StudyStatus, one: Participant) -> dict[str, object]:
     return {
         "participant_id": one.participant_id,
         "facts": one.facts and one.facts.model_dump(mode="json"),
@@ -113,11 +113,11 @@ def _run(run: RunProgress) -> dict[str, object]:
     return {key: value for key, value in asdict(run).items() if key != "experiment"}
 
 
-def _not_eligible(found: Found, one: Participant) -> tuple[str, ...]:
+def _not_eligible(found: StudyStatus, one: Participant) -> tuple[str, ...]:
     return eligible(one.facts, found.study.config.eligibility) if one.facts else ()
 
 
-def section(found: Found) -> Section:
+def study_section(found: StudyStatus) -> Section:
     """The study for people: a table, then who comes next."""
     header = ("code", "age", "sex", "hand", *found.study.experiments, "remark")
     rows = tuple(tuple(_cells(found, one)) for one in found.overview.participants)
@@ -128,12 +128,12 @@ def section(found: Found) -> Section:
     )
 
 
-def as_text(found: Found) -> str:
+def study_text(found: StudyStatus) -> str:
     """The study for people at a terminal."""
-    return with_tables(section(found))
+    return with_tables(study_section(found))
 
 
-def _cells(found: Found, one: Participant) -> Iterator[str]:
+def _cells(found: StudyStatus, one: Participant) -> Iterator[str]:
     facts = one.facts or Facts()
     yield one.participant_id
     for fact in (facts.age_years, facts.sex, facts.handedness):
@@ -150,14 +150,14 @@ def _state(run: RunProgress) -> str:
     return "\n".join(filter(None, [*lines, "practice done" if run.practised else ""]))
 
 
-def _count_lines(found: Found) -> Iterator[str]:
+def _count_lines(found: StudyStatus) -> Iterator[str]:
     taking_part = [one for one in found.overview.participants if one.excluded is None]
     done = sum(all(run.state == "done" for run in one.runs) for one in taking_part)
     excluded = len(found.overview.participants) - len(taking_part)
     yield f"{done} of {found.study.config.participants} participants done, {excluded} excluded"
 
 
-def _next_lines(found: Found) -> Iterator[str]:
+def _next_lines(found: StudyStatus) -> Iterator[str]:
     coming = found.overview.next
     if coming is None:
         yield f"Next: {_nobody([one for one in found.overview.participants if one.excluded is None])}"

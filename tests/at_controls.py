@@ -25,7 +25,7 @@ from experiments.design.plan import Plan, Trial
 from experiments.live_run import LiveRun, Screen
 from experiments.load import load_setup
 from experiments.record import storage
-from experiments.record.journal import Contents, read
+from experiments.record.journal import Contents, read_journal
 from experiments.record.replay import history
 from experiments.run import Finished, RunRequest, run
 from experiments.screens.console import progress, view, widgets
@@ -36,7 +36,7 @@ from experiments.session import events
 from experiments.session.events import Press
 from experiments.session.remarks import AnswerCorrected, Remark
 from experiments.session.states import Position, State
-from experiments.session.steps import Answered, Fire, Outcome, Step
+from experiments.session.steps import Answered, FireShot, Outcome, Step
 from experiments.study.places import Place, place
 from tests.waiting import PATIENCE_S, wait_for
 
@@ -200,7 +200,7 @@ class WatchedGun:
         return report
 
     def _feel(self, step: Step | None) -> None:
-        if isinstance(step, Fire):
+        if isinstance(step, FireShot):
             self.felt.append(step.trial)
 
     def status(self) -> GunStatus:
@@ -655,7 +655,7 @@ def ended(sitting: Sitting) -> Ended:
 def kept(results: Path, experiment: str) -> tuple[Place, Contents, list[dict[str, str]]]:
     """Where a run lies, what its journal holds, and the rows of the table that was written."""
     where = place(results, "P01", experiment)
-    contents = read(where.journal)
+    contents = read_journal(where.journal)
     assert where.table.read_bytes() == table(contents)
     with where.table.open(newline="", encoding="utf-8") as file:
         return where, contents, list(csv.DictReader(file))

@@ -5,7 +5,7 @@ from __future__ import annotations
 import csv
 from pathlib import Path
 
-from experiments.record.journal import read
+from experiments.record.journal import read_journal
 from experiments.record.replay import history
 from experiments.session.steps import Answered
 from tests.conftest import RECOIL
@@ -26,4 +26,4 @@ def rows(folder: Path, stem: str, kind: str) -> list[dict[str, str]]:
 
 
 def answers(journal: Path) -> list[str]:
-    return [outcome.response for _, outcome in history(read(journal)) if isinstance(outcome, Answered)]
+    return [outcome.response for _, outcome in history(read_journal(journal)) if isinstance(outcome, Answered)]

@@ -418,7 +418,9 @@ def refused(offered: list[Offered]) -> list[tuple[str, str]]:
     return [
         (events.word(type(one.event)), str(one.position.state))
         for one in offered
-        if not one.taken and isinstance(one.event, (*events.OWN, *ACTS)) and one.position.base is not State.STOPPED
+        if not one.taken
+        and isinstance(one.event, (*events.OWN_HAND_EVENTS, *ACTS))
+        and one.position.base is not State.STOPPED
     ]
 
 

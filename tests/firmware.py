@@ -27,7 +27,7 @@ from device.twin.core import IDENTITY
 from device.twin.machine import LATE_PULSE_US
 from device.wire.frame import LAST_NUMBER, Frame, encode
 from device.wire.records import ShotRecord, StatusRecord
-from experiments.record.journal import read
+from experiments.record.journal import read_journal
 from tests.conftest import Recoil
 from tests.serial_runs import rows, timings_of
 from tests.twin_scripts import random_script, transcript
@@ -416,7 +416,7 @@ def logs_of(recoil: Recoil, folder: Path, config: Path, gun: str) -> tuple[list[
     done = recoil("run", config, *words, "--gun", gun)
     assert done.returncode == 0, done.stderr
     paths = {key: config.parent.parent / path for key, path in json.loads(done.stdout).items()}
-    return rows(paths["table"]), timings_of(read(paths["journal"]))
+    return rows(paths["table"]), timings_of(read_journal(paths["journal"]))
 
 
 def driven(chip: Emulated) -> list[int]:

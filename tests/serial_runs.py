@@ -18,7 +18,7 @@ from experiments import run as runs
 from experiments.clock import RealClock
 from experiments.live_run import RunStopped
 from experiments.load import load_setup
-from experiments.record.journal import Contents, read
+from experiments.record.journal import Contents, read_journal
 from experiments.record.replay import history
 from experiments.run import RunRequest
 from experiments.screens.synthetic import synthetic_screen
@@ -80,7 +80,7 @@ def run_all(config: Path, results: Path, gun: str, people: range) -> Tally:
 
 
 def _count(tally: Tally, results: Path, code: str) -> None:
-    contents = read(place(results, code, "direction").journal)
+    contents = read_journal(place(results, code, "direction").journal)
     assert contents.finished
     answered = set()
     for step, outcome in history(contents):

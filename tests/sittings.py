@@ -15,14 +15,14 @@ from experiments.design.plan import Plan
 from experiments.live_run import LiveRun
 from experiments.load import load_setup
 from experiments.record import replay, storage
-from experiments.record.journal import Journal, read
+from experiments.record.journal import Journal, read_journal
 from experiments.record.replay import RunPosition
 from experiments.run import RunRequest, run
 from experiments.runner import carry_out
 from experiments.screens.synthetic import SyntheticScreen, synthetic_screen
 from experiments.session.remarks import Remark
 from experiments.session.states import Position, State
-from experiments.session.steps import Outcome, Step, record
+from experiments.session.steps import Outcome, Step, step_record
 from experiments.study.places import Place, place
 from experiments.train import Desk
 
@@ -94,8 +94,8 @@ class WatchingScreen(SyntheticScreen):
         lines = self._journal.read_bytes().splitlines(keepends=True)
         announced, done = [one for line in lines if (one := json.loads(line))["kind"] != "shot"][-2:]
         assert lines[-1].endswith(b"\n")
-        assert (announced["kind"], announced["body"]) == ("step", json.loads(json.dumps(record(step))))
-        assert (done["kind"], done["body"]) == ("outcome", record(outcome))
+        assert (announced["kind"], announced["body"]) == ("step", json.loads(json.dumps(step_record(step))))
+        assert (done["kind"], done["body"]) == ("outcome", step_record(outcome))
         self.acknowledged += 1
         if trouble := self.trouble.get(self.acknowledged):
             raise trouble
@@ -128,10 +128,10 @@ class Sitting(NamedTuple):
         self.screen.begin(live)
         with self.journal:
             carry_out(going, desk, RunPosition(step=next(going)))
-        return replay.outcomes(replay.history(read(self.where.journal)))
+        return replay.outcomes(replay.history(read_journal(self.where.journal)))
 
     def rows(self) -> list[dict[str, str]]:
-        data = table(read(self.where.journal))
+        data = table(read_journal(self.where.journal))
         return list(csv.DictReader(data.decode().splitlines(keepends=True)))
 
 

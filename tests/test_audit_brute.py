@@ -17,8 +17,8 @@ import numpy as np
 import pytest
 
 from analysis.paper.audit import (
-    Comparison,
-    Result,
+    CheckResult,
+    ClaimedComparison,
     between_f,
     binomial_p,
     debit,
@@ -73,7 +73,7 @@ def grid(low: int, high: int, digits: int) -> list[str]:
     return [str(Decimal(i).scaleb(-digits)) for i in range(low * 10**digits, high * 10**digits + 1)]
 
 
-def compared(cases: Iterable[tuple[object, str, Result]]) -> int:
+def compared(cases: Iterable[tuple[object, str, CheckResult]]) -> int:
     """How many cases; the first whose verdict is another is told."""
     count = 0
     for what, verdict, result in cases:
@@ -82,14 +82,14 @@ def compared(cases: Iterable[tuple[object, str, Result]]) -> int:
     return count
 
 
-def grim_cases(sizes: Iterable[int], digits: int, top: int) -> Iterator[tuple[object, str, Result]]:
+def grim_cases(sizes: Iterable[int], digits: int, top: int) -> Iterator[tuple[object, str, CheckResult]]:
     for n in sizes:
         sets = Printed((printed(Fraction(total, n), digits),) for total in range(top * n + 1))
         for mean in grid(0, top - 1, digits):
             yield (mean, n), expected((mean,), sets), grim(mean, n)
 
 
-def percent_cases(sizes: Iterable[int], digits: int) -> Iterator[tuple[object, str, Result]]:
+def percent_cases(sizes: Iterable[int], digits: int) -> Iterator[tuple[object, str, CheckResult]]:
     def of(count: int, n: int) -> Printed:
         return Printed([(printed(Fraction(100 * count, n), digits),)])
 
@@ -113,7 +113,7 @@ def spread_sets(
     return [Printed(part) for part in rows]
 
 
-def grimmer_cases(n: int, top: int, digits: tuple[int, int], every: int) -> Iterator[tuple[object, str, Result]]:
+def grimmer_cases(n: int, top: int, digits: tuple[int, int], every: int) -> Iterator[tuple[object, str, CheckResult]]:
     """Scale 0..top; every so many-th pair of texts."""
     data = combinations_with_replacement(range(top + 1), n)
     plain, *others = spread_sets(data, n, digits, Fraction(1), Fraction(0))
@@ -123,7 +123,7 @@ def grimmer_cases(n: int, top: int, digits: tuple[int, int], every: int) -> Iter
         yield (mean, sd, n), expected((mean, sd), plain, others), result
 
 
-def unbounded_grimmer_cases(n: int, every: int) -> Iterator[tuple[object, str, Result]]:
+def unbounded_grimmer_cases(n: int, every: int) -> Iterator[tuple[object, str, CheckResult]]:
     """Means of 5 and some, SDs up to 3, no scale: values from -25 to 35 are all that can matter (Samuelson)."""
     data = combinations_with_replacement(range(-12, 13), n)
     plain, *others = spread_sets(data, n, (1, 2), Fraction(1), Fraction(0))
@@ -132,7 +132,7 @@ def unbounded_grimmer_cases(n: int, every: int) -> Iterator[tuple[object, str, R
         yield (mean, sd, n), expected((mean, sd), plain, others), grimmer(mean, sd, n)
 
 
-def debit_cases(sizes: Iterable[int], digits: int) -> Iterator[tuple[object, str, Result]]:
+def debit_cases(sizes: Iterable[int], digits: int) -> Iterator[tuple[object, str, CheckResult]]:
     for n in sizes:
         data = ((1,) * k + (0,) * (n - k) for k in range(n + 1))
         plain, *others = spread_sets(data, n, (digits, digits), Fraction(1), Fraction(0))
@@ -140,7 +140,7 @@ def debit_cases(sizes: Iterable[int], digits: int) -> Iterator[tuple[object, str
             yield (mean, sd, n), expected((mean, sd), plain, others), debit(mean, sd, n)
 
 
-def binomial_cases(sizes: Iterable[int], chance: Fraction, digits: int) -> Iterator[tuple[object, str, Result]]:
+def binomial_cases(sizes: Iterable[int], chance: Fraction, digits: int) -> Iterator[tuple[object, str, CheckResult]]:
     """Against plain sums over the outcomes; the normal approximations in 40 digits."""
     for n in sizes:
         chances = [comb(n, k) * chance**k * (1 - chance) ** (n - k) for k in range(n + 1)]
@@ -168,7 +168,7 @@ def _finite(F: Callable[[], Fraction]) -> Fraction | None:
         return None
 
 
-def repeated_cases(n: int, k: int, top: int, digits: int, every: int) -> Iterator[tuple[object, str, Result]]:
+def repeated_cases(n: int, k: int, top: int, digits: int, every: int) -> Iterator[tuple[object, str, CheckResult]]:
     """All tables of n rows of k scores 0..top, with every set of means that one of them prints and F from 0 to 30."""
     plain: list[tuple[Texts, ...]] = []
     other: list[tuple[Texts, ...]] = []
@@ -191,7 +191,7 @@ def repeated_cases(n: int, k: int, top: int, digits: int, every: int) -> Iterato
         yield (F, mean), expected((*mean, F), sets[0], sets[1:]), result
 
 
-def between_cases(sizes: tuple[int, ...], top: int, every: int) -> Iterator[tuple[object, str, Result]]:
+def between_cases(sizes: tuple[int, ...], top: int, every: int) -> Iterator[tuple[object, str, CheckResult]]:
     """All groups of these sizes of scores 0..top; unequal sizes have no other error term."""
     assert len(set(sizes)) > 1
     rows: set[tuple[Texts, ...]] = set()
@@ -208,7 +208,7 @@ def between_cases(sizes: tuple[int, ...], top: int, every: int) -> Iterator[tupl
         yield (F, mean), expected((*mean, F), sets), between_f(F, sizes, mean, low="0", high=str(top))
 
 
-def p_cases(count: int, seed: int) -> Iterator[tuple[object, str, Result]]:
+def p_cases(count: int, seed: int) -> Iterator[tuple[object, str, CheckResult]]:
     """Random statistics, and p-values near the true ones; the reference is mpmath's, in 30 digits."""
     random = np.random.default_rng(seed)
     for _ in range(count):
@@ -281,9 +281,9 @@ def tukey_accusations(count: int, seed: int) -> tuple[int, int]:
             continue
         texts = tuple(printed(Fraction(int(c), n), 2)[0] for c in data.sum(axis=0))
         claims = [
-            Comparison(higher=int(pair.a), lower=int(pair.b), p=f"{pair.p:.3f}")
+            ClaimedComparison(higher=int(pair.a), lower=int(pair.b), p=f"{pair.p:.3f}")
             if pair.difference > 0
-            else Comparison(higher=int(pair.b), lower=int(pair.a), p=f"{pair.p:.3f}")
+            else ClaimedComparison(higher=int(pair.b), lower=int(pair.a), p=f"{pair.p:.3f}")
             for pair in rm_tukey_hsd(data)
             if pair.difference != 0
         ]
@@ -296,7 +296,7 @@ def tukey_accusations(count: int, seed: int) -> tuple[int, int]:
     return done, undecided
 
 
-def df_cases(most: int) -> Iterator[tuple[object, str, Result]]:
+def df_cases(most: int) -> Iterator[tuple[object, str, CheckResult]]:
     """Whole df of repeated designs: the plain ones, those of the readings listed here, and no others."""
     for n, k in product(range(3, most), range(2, 5)):
         others = {(k - 1, k * (n - 1))} | {(k - 1, (m - 1) * (k - 1)) for m in range(2, n)}

@@ -9,7 +9,7 @@ from typing import Any
 
 import pytest
 
-from analysis.paper.audit import Result, Rounding, debit, grim, grimmer, p_against_statistic, read
+from analysis.paper.audit import CheckResult, Rounding, debit, grim, grimmer, p_against_statistic, read_printed
 from analysis.paper.audit.means import scale_of
 
 GOLDEN = Path(__file__).parent / "golden" / "audit"
@@ -18,7 +18,7 @@ STATCHECK: dict[str, Any] = tomllib.loads((GOLDEN / "statcheck.toml").read_text(
 TIES = {Rounding.HALF_UP.value, Rounding.HALF_EVEN.value, Rounding.HALF_DOWN.value}
 
 
-def rounded_either_way(result: Result) -> bool:
+def rounded_either_way(result: CheckResult) -> bool:
     """Attainable when a tie may fall either way: scrutiny's default."""
     return result.verdict == "attainable" or bool(TIES & set(result.readings))
 
@@ -41,7 +41,7 @@ def test_grim_agrees_with_scrutiny(block: dict[str, Any], mean: str, n: int, con
 @pytest.mark.parametrize(("block", "mean", "up", "down"), rows("rounding", "mean", "up", "down"))
 def test_each_rounding_agrees_with_scrutiny(block: dict[str, Any], mean: str, up: bool, down: bool) -> None:
     roundings = (Rounding.HALF_UP, Rounding.HALF_DOWN)
-    sums = [scale_of("1").sums(read(mean).interval(rounding), block["n"]) for rounding in roundings]
+    sums = [scale_of("1").sums(read_printed(mean).interval(rounding), block["n"]) for rounding in roundings]
     assert [len(found) > 0 for found in sums] == [up, down]
 
 

@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from analysis.paper.audit import CHECKS, Finding, audit, load_paper_file, parse_paper, repeated_f
+from analysis.paper.audit import CHECKS, AuditFinding, audit, load_paper_file, parse_paper, repeated_f
 from analysis.paper.audit.claims import AnyClaim
 from experiments.config.door import ConfigError
 from tests.exact import exact_rm_F
@@ -20,17 +20,17 @@ RATES = ["55.7%", "79.3%", "92.9%"]
 
 
 @pytest.fixture(scope="module")
-def findings() -> tuple[Finding, ...]:
+def findings() -> tuple[AuditFinding, ...]:
     return audit(load_paper_file(ROOT.parent / "configs" / "paper.toml"))
 
 
-def one(findings: tuple[Finding, ...], check: str, quote: str) -> Finding:
+def one(findings: tuple[AuditFinding, ...], check: str, quote: str) -> AuditFinding:
     found = [f for f in findings if f.result.check == check and quote in f.quote]
     assert len(found) == 1, [f.quote for f in found]
     return found[0]
 
 
-def test_f_of_experiment_1_is_off_the_lattice_and_rescued_by_readings_only(findings: tuple[Finding, ...]) -> None:
+def test_f_of_experiment_1_is_off_the_lattice_and_rescued_by_readings_only(findings: tuple[AuditFinding, ...]) -> None:
     """By hand: A = 3 (78^2 + 111^2 + 130^2) - 319^2 = 4154, F = 13 A / (14 W - A), W even: 434 and 432 are next."""
     result = one(findings, "repeated-measures F", "28.45").result
     assert result.verdict == "only under a reading"
@@ -56,7 +56,7 @@ def test_the_neighbours_of_f_have_data_that_give_them(F: str) -> None:
     assert f"{float(exact_rm_F(rows.astype(float))):.2f}" == F
 
 
-def test_two_percentages_contradict_their_counts(findings: tuple[Finding, ...]) -> None:
+def test_two_percentages_contradict_their_counts(findings: tuple[AuditFinding, ...]) -> None:
     wrong = {f.result.printed: dict(f.result.numbers) for f in findings if f.result.verdict == "not attainable"}
     assert wrong == {
         "5 of 14, 33.7%": {"counts of 14 that print 33.7%": "none"},
@@ -64,14 +64,14 @@ def test_two_percentages_contradict_their_counts(findings: tuple[Finding, ...]) 
     }
 
 
-def test_the_binomial_p_say_which_counts_gave_them(findings: tuple[Finding, ...]) -> None:
+def test_the_binomial_p_say_which_counts_gave_them(findings: tuple[AuditFinding, ...]) -> None:
     forward = one(findings, "binomial p", "0.205").result
     backward = one(findings, "binomial p", "0.673").result
     assert (forward.verdict, dict(forward.numbers)["counts of 140 that give p"]) == ("attainable", "62, 78")
     assert (backward.verdict, dict(backward.numbers)["counts of 140 that give p"]) == ("attainable", "67, 73")
 
 
-def test_all_else_stands_or_is_left_open(findings: tuple[Finding, ...]) -> None:
+def test_all_else_stands_or_is_left_open(findings: tuple[AuditFinding, ...]) -> None:
     others = {f.result.check for f in findings if f.result.verdict in {"not attainable", "only under a reading"}}
     assert others == {"repeated-measures F", "percent of count"}
     assert {f.result.check for f in findings if f.result.verdict == "undecided"} == {"stated"}
@@ -79,7 +79,7 @@ def test_all_else_stands_or_is_left_open(findings: tuple[Finding, ...]) -> None:
     assert len(findings) > 55
 
 
-def test_every_attainable_f_has_its_data(findings: tuple[Finding, ...]) -> None:
+def test_every_attainable_f_has_its_data(findings: tuple[AuditFinding, ...]) -> None:
     second = one(findings, "repeated-measures F", "33.810").result
     assert second.verdict == "attainable"
     table = [[int(10 * value) for value in row] for row in second.witness]

@@ -14,11 +14,11 @@ import pytest
 
 from analysis import rm_anova, rm_tukey_hsd
 from analysis.paper.audit import repeated_f
-from analysis.paper.audit.annealing import Order
+from analysis.paper.audit.annealing import ColumnOrder
 from analysis.paper.audit.means import scale_of
 from analysis.paper.audit.participants import attainable_f, backward_counts, forward_counts, rating_grains
-from analysis.paper.audit.printed import Interval, read
-from analysis.paper.audit.reconstruct import Column, Constraints, meets, printed_constraints, reconstruct
+from analysis.paper.audit.printed import Interval, read_printed
+from analysis.paper.audit.reconstruct import ConditionColumn, Constraints, meets, printed_constraints, reconstruct
 from analysis.paper.paper import Paper, load_paper
 from analysis.stats.binomial import binomial_test
 from tests.exact import exact_rm_F
@@ -116,14 +116,18 @@ def test_that_there_are_none_is_said_by_proof_only() -> None:
     off = printed_constraints(14, ["55.7%", "79.3%", "92.9%"], rates, F="28.45")
     assert (reconstruct(off).exists, reconstruct(off).data) == (False, ())
     assert reconstruct(printed_constraints(2, [".30"], scale_of("1", "0", "1"))).exists is False
-    contradiction = (Order(one=0, other=1, above=14), Order(one=1, other=0, above=14))
-    open_case = Constraints(n=14, top=10, columns=(Column(sums=[70]), Column(sums=[70])), orders=contradiction)
+    contradiction = (ColumnOrder(one=0, other=1, above=14), ColumnOrder(one=1, other=0, above=14))
+    open_case = Constraints(
+        n=14, top=10, columns=(ConditionColumn(sums=[70]), ConditionColumn(sums=[70])), orders=contradiction
+    )
     assert reconstruct(open_case, starts=2).exists is None
 
 
 def test_orders_and_column_sums_are_kept() -> None:
-    orders = (Order(one=1, other=0, above=9), Order(one=2, other=1, tied=4))
-    wanted = Constraints(n=12, top=20, columns=tuple(Column(sums=[total]) for total in (60, 90, 95)), orders=orders)
+    orders = (ColumnOrder(one=1, other=0, above=9), ColumnOrder(one=2, other=1, tied=4))
+    wanted = Constraints(
+        n=12, top=20, columns=tuple(ConditionColumn(sums=[total]) for total in (60, 90, 95)), orders=orders
+    )
     for rows in reconstruct(wanted, 3, count=20).data:
         table = np.array(rows)
         assert table.sum(axis=0).tolist() == [60, 90, 95]
@@ -192,4 +196,4 @@ def test_numbers_that_contradict_each_other_are_refused_in_words(paper: Paper) -
 def test_a_reconstruction_needs_a_scale_with_ends() -> None:
     with pytest.raises(ValueError, match="both ends"):
         printed_constraints(5, ["2.0"], scale_of("1"))
-    assert read("2.0").digits == 20
+    assert read_printed("2.0").digits == 20

@@ -10,44 +10,44 @@ from pathlib import Path
 import pytest
 
 from analysis.paper.audit import audit, binomial_p, debit, degrees_of_freedom, grim, grimmer, load_paper_file
-from analysis.paper.audit.page import as_json, as_text, counts, page
-from analysis.paper.audit.run import Finding
+from analysis.paper.audit.page import counts, findings_json, findings_text, sections
+from analysis.paper.audit.run import AuditFinding
 from analysis.paper.audit.sentences import ELSEWHERE, nearest_text, other_rows, predictions, sentences
-from analysis.paper.audit.words import Result
+from analysis.paper.audit.words import CheckResult
 from tests.conftest import Recoil
 
 CONFIGS = Path(__file__).parent.parent / "configs"
 
 
 @pytest.fixture(scope="module")
-def findings() -> tuple[Finding, ...]:
+def findings() -> tuple[AuditFinding, ...]:
     return audit(load_paper_file(CONFIGS / "paper.toml"))
 
 
-def of(result: Result) -> Finding:
-    return Finding(place="Results", quote="as printed", note="", result=result)
+def of(result: CheckResult) -> AuditFinding:
+    return AuditFinding(place="Results", quote="as printed", note="", result=result)
 
 
-def text_of(findings: tuple[Finding, ...], printed: str) -> str:
+def text_of(findings: tuple[AuditFinding, ...], printed: str) -> str:
     (found,) = [finding for finding in findings if finding.result.printed == printed]
     return " ".join(sentences(found))
 
 
-def test_every_finding_is_told_in_two_sentences(findings: tuple[Finding, ...]) -> None:
+def test_every_finding_is_told_in_two_sentences(findings: tuple[AuditFinding, ...]) -> None:
     for finding in findings:
         said = sentences(finding)
         assert len(said) == 2
         assert all(sentence.endswith(".") and not re.search(r"[.] [A-Z]", sentence) for sentence in said), said
 
 
-def test_the_finding_on_f_says_what_it_would_have_to_be_and_what_rescues_it(findings: tuple[Finding, ...]) -> None:
+def test_the_finding_on_f_says_what_it_would_have_to_be_and_what_rescues_it(findings: tuple[AuditFinding, ...]) -> None:
     text = text_of(findings, "F = 28.45")
     assert "28.10 and 28.51" in text
     assert "arcsine transform" in text
     assert "steps of 0.05 with other means" in text
 
 
-def test_a_wrong_percentage_is_told_with_the_count_that_has_it(findings: tuple[Finding, ...]) -> None:
+def test_a_wrong_percentage_is_told_with_the_count_that_has_it(findings: tuple[AuditFinding, ...]) -> None:
     assert "5 of 14 people are 35.7 %, not 33.7%; no count of them has that" in text_of(findings, "5 of 14, 33.7%")
     assert "4 of 14 people are 28.6 %, not 35.7%; that is the percentage of 5" in text_of(findings, "4 of 14, 35.7%")
 
@@ -62,37 +62,37 @@ def test_a_wrong_percentage_is_told_with_the_count_that_has_it(findings: tuple[F
         (degrees_of_freedom(["2", "39"], "repeated", [14, 3]), ""),
     ],
 )
-def test_neighbours_are_shown_in_the_unit_of_what_is_printed(result: Result, nearest: str) -> None:
+def test_neighbours_are_shown_in_the_unit_of_what_is_printed(result: CheckResult, nearest: str) -> None:
     """5.179 is 145 / 28 and 5.214 is 146 / 28; 7 of 20 ones have SD sqrt(91 / 380) = 0.489; p(6 of 20) = 0.115."""
     assert nearest_text(result) == nearest
     assert nearest.partition(" ")[0] in sentences(of(result))[0]
 
 
-def test_the_page_names_all_numbers_and_is_fair(findings: tuple[Finding, ...]) -> None:
-    parts = page(findings, [("file", "paper.toml")])
+def test_the_page_names_all_numbers_and_is_fair(findings: tuple[AuditFinding, ...]) -> None:
+    parts = sections(findings, [("file", "paper.toml")])
     assert [part.title for part in parts] == [
         "Verdicts", "Numbers to ask about", "Every number", "Proofs", "Provenance",
     ]  # fmt: skip
     assert "not how it came about" in parts[0].paragraphs[0]
     assert len(parts[1].items) == 3
     assert len(parts[2].tables[0].rows) == len(findings)
-    assert "Numbers to ask about" not in [part.title for part in page([f for f in findings if not f.note][:3], [])]
+    assert "Numbers to ask about" not in [part.title for part in sections([f for f in findings if not f.note][:3], [])]
 
 
-def test_json_keeps_the_exact_fractions(findings: tuple[Finding, ...]) -> None:
-    (found,) = [one for one in as_json(findings) if one["printed"] == "F = 28.45"]
+def test_json_keeps_the_exact_fractions(findings: tuple[AuditFinding, ...]) -> None:
+    (found,) = [one for one in findings_json(findings) if one["printed"] == "F = 28.45"]
     assert Fraction(found["above"]["exact"]) == Fraction(27001, 947)
     assert found["readings"] == ["arcsine transform", "scores in steps of 0.05 with other means"]
     assert json.loads(json.dumps(found)) == found
 
 
-def test_the_terminal_ends_with_the_counts_and_what_to_ask_about(findings: tuple[Finding, ...]) -> None:
-    text = as_text(findings)
+def test_the_terminal_ends_with_the_counts_and_what_to_ask_about(findings: tuple[AuditFinding, ...]) -> None:
+    text = findings_text(findings)
     assert f"{len(findings)} numbers: {counts(findings)['attainable']} attainable" in text
     assert text.count("“F(2,26)=28.45") == 1
 
 
-def test_predictions_are_named_as_the_comparison_names_its_rows(findings: tuple[Finding, ...]) -> None:
+def test_predictions_are_named_as_the_comparison_names_its_rows(findings: tuple[AuditFinding, ...]) -> None:
     known = predictions(findings)
     assert known["direction: ANOVA F"].nearest == pytest.approx((28.0968, 28.5121), abs=1e-4)
     assert known["direction: mean correct rate forward, vibration"].verdict == "attainable"

@@ -17,15 +17,15 @@ from analysis.paper.audit import (
     binomial_p,
     grimmer,
     p_against_statistic,
-    read,
+    read_printed,
     repeated_f,
     total,
 )
-from analysis.paper.audit.lattices import Levels, effect, find, find_groups, ratio, search, within
+from analysis.paper.audit.lattices import Levels, effect, find_groups, find_rows, ratio, search_rows, within_rows
 from analysis.paper.audit.p_values import p_bounds
 from analysis.paper.audit.power_sums import BudgetError, numbers_with_sums
 from analysis.paper.audit.printed import Interval, decimal
-from analysis.paper.audit.words import NONE_EXISTS, UNKNOWN, Found, decide
+from analysis.paper.audit.words import NONE_EXISTS, UNKNOWN, DataExistence, judge_readings
 from tests.exact import exact_rm_F
 
 
@@ -45,7 +45,7 @@ from tests.exact import exact_rm_F
     ],
 )
 def test_a_printed_number_stands_for_what_prints_so(text: str, rounding: Rounding, inside: str, outside: str) -> None:
-    interval = read(text).interval(rounding)
+    interval = read_printed(text).interval(rounding)
     assert interval.holds(Fraction(inside))
     assert not interval.holds(Fraction(outside))
 
@@ -54,7 +54,7 @@ def test_a_printed_number_stands_for_what_prints_so(text: str, rounding: Roundin
 def test_the_mixed_interval_holds_what_any_rounding_prints(value: Fraction, digits: int) -> None:
     cut = int(value * 10**digits)
     for units in (cut - 1, cut, cut + 1):
-        number = read(f"{'-' if units < 0 else ''}{decimal(Fraction(abs(units), 10**digits))}")
+        number = read_printed(f"{'-' if units < 0 else ''}{decimal(Fraction(abs(units), 10**digits))}")
         held = [number.interval(r).holds(value) for r in Rounding if r is not Rounding.ANY]
         assert not any(held) or number.interval(Rounding.ANY).holds(value)
 
@@ -62,7 +62,7 @@ def test_the_mixed_interval_holds_what_any_rounding_prints(value: Fraction, digi
 @pytest.mark.parametrize("text", ["", "%", "1.2.3", "abc", "1e5", "< "])
 def test_what_is_no_number_is_refused(text: str) -> None:
     with pytest.raises(ValueError, match="no printed number"):
-        read(text)
+        read_printed(text)
 
 
 def test_integers_within_an_interval_respect_open_ends() -> None:
@@ -73,16 +73,16 @@ def test_integers_within_an_interval_respect_open_ends() -> None:
 
 def test_verdicts_follow_from_attempts() -> None:
     def under(*roundings: Rounding) -> object:
-        return lambda r: Found(True) if r in {*roundings, Rounding.ANY} else NONE_EXISTS
+        return lambda r: DataExistence(True) if r in {*roundings, Rounding.ANY} else NONE_EXISTS
 
     both = under(Rounding.HALF_UP, Rounding.HALF_EVEN)
-    assert decide(both).verdict == "attainable"  # type: ignore[arg-type]
-    assert decide(under(Rounding.TRUNCATION)).readings == ("truncation",)  # type: ignore[arg-type]
-    assert decide(under()).readings == ("roundings mixed",)  # type: ignore[arg-type]
-    assert decide(lambda _: NONE_EXISTS).verdict == "not attainable"
-    assert decide(lambda _: NONE_EXISTS, [("other", both)]).readings == ("other",)  # type: ignore[list-item]
-    assert decide(lambda _: NONE_EXISTS, [("other", lambda _: UNKNOWN)]).verdict == "undecided"
-    assert decide(lambda _: UNKNOWN, [("other", both)]).verdict == "undecided"  # type: ignore[list-item]
+    assert judge_readings(both).verdict == "attainable"  # type: ignore[arg-type]
+    assert judge_readings(under(Rounding.TRUNCATION)).readings == ("truncation",)  # type: ignore[arg-type]
+    assert judge_readings(under()).readings == ("roundings mixed",)  # type: ignore[arg-type]
+    assert judge_readings(lambda _: NONE_EXISTS).verdict == "not attainable"
+    assert judge_readings(lambda _: NONE_EXISTS, [("other", both)]).readings == ("other",)  # type: ignore[list-item]
+    assert judge_readings(lambda _: NONE_EXISTS, [("other", lambda _: UNKNOWN)]).verdict == "undecided"
+    assert judge_readings(lambda _: UNKNOWN, [("other", both)]).verdict == "undecided"  # type: ignore[list-item]
 
 
 @pytest.mark.parametrize("n", [1, 2, 3, 4, 5])
@@ -104,16 +104,16 @@ def test_a_search_that_runs_out_says_so() -> None:
 def test_the_identity_of_the_repeated_lattice_holds() -> None:
     rows = ((1, 3, 4), (0, 5, 2), (2, 2, 6))
     columns = tuple(map(sum, zip(*rows, strict=True)))
-    assert (columns, effect(columns), within(rows)) == ((3, 10, 12), 134, 84)  # by hand
-    assert ratio(columns, within(rows), 3) == exact_rm_F(np.array(rows, dtype=float))
+    assert (columns, effect(columns), within_rows(rows)) == ((3, 10, 12), 134, 84)  # by hand
+    assert ratio(columns, within_rows(rows), 3) == exact_rm_F(np.array(rows, dtype=float))
 
 
 def test_rows_found_have_the_sums_asked_for() -> None:
-    rows = search((78, 111, 130), 14, range(432, 433), Levels(10))
+    rows = search_rows((78, 111, 130), 14, range(432, 433), Levels(10))
     assert rows is not None
     assert tuple(map(sum, zip(*rows, strict=True))) == (78, 111, 130)
-    assert within(rows) == 432
-    assert find((3, 3), 2, range(1, 2), Levels(2)) is False  # W is even with T
+    assert within_rows(rows) == 432
+    assert find_rows((3, 3), 2, range(1, 2), Levels(2)) is False  # W is even with T
 
 
 def test_groups_beyond_enumeration_are_found_too() -> None:

@@ -14,7 +14,7 @@ from experiments.clock import VirtualClock
 from experiments.config.door import ConfigError
 from experiments.config.setup import canonical_json, sha256
 from experiments.load import load_setup, shipped_folder
-from experiments.record.journal import JournalError, read
+from experiments.record.journal import JournalError, read_journal
 from experiments.run import RunRequest, run
 from experiments.screens.synthetic import synthetic_screen
 from experiments.study.places import PlaceError
@@ -101,7 +101,7 @@ def test_the_files_that_a_run_began_with_load_to_the_same_setup(case: str, tmp_p
     journal = journal_of(config, tmp_path / "results")
     copied = copy_began_with(journal, tmp_path / "back")
     assert load_setup(str(copied[0])).record() == load_setup(str(config)).record()
-    assert load_setup(str(copied[0])).sha256() == read(journal).head.setup_sha256
+    assert load_setup(str(copied[0])).sha256() == read_journal(journal).head.setup_sha256
     assert all(path.is_relative_to(tmp_path / "back") for path in copied)
 
 
@@ -124,7 +124,7 @@ def test_a_resume_that_was_refused_names_the_command_that_makes_it_possible(reco
     assert given.returncode == 0, given.stderr
     assert given.stdout.splitlines() == ["back/direction.toml", "back/gun.toml"]
     assert resume("back/direction.toml").returncode == 0
-    assert read(journal).finished
+    assert read_journal(journal).finished
 
 
 def test_nothing_is_overwritten_and_then_nothing_is_written(tmp_path: Path) -> None:

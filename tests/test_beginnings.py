@@ -13,13 +13,14 @@ from hypothesis import strategies as st
 
 from experiments.clock import VirtualClock
 from experiments.config.models import EligibilityConfig
-from experiments.record.journal import JournalError, hold
+from experiments.record.journal import JournalError, hold_journal
 from experiments.run import RunRequest, run
 from experiments.screens.synthetic import synthetic_screen
 from experiments.study import register
 from experiments.study.enrolment import (
     Entered,
     admit,
+    enrolment_refusal,
     exclude,
     facts_of,
     is_news,
@@ -29,12 +30,11 @@ from experiments.study.enrolment import (
     passed_over,
     read_back_refusal,
     readmit,
-    refusal,
     typed_facts,
 )
 from experiments.study.places import PlaceError
 from experiments.study.progress import StudyFolder, open_study
-from experiments.study.study import Facts, Participant, State
+from experiments.study.study import Facts, Participant, RunState
 from tests.people import ORDER, someone
 
 RULES = EligibilityConfig(ask=("age_years", "handedness"), handedness=("right",), age_years_max=29)
@@ -63,7 +63,7 @@ def entered(code: str = "P01", experiment: str = "direction", facts: dict[str, s
     ],
 )
 def test_the_first_experiment_of_the_study_that_somebody_has_not_done_comes_next(
-    states: tuple[State, State], coming: str
+    states: tuple[RunState, RunState], coming: str
 ) -> None:
     assert next_experiment(someone(*states), ORDER) == coming
 
@@ -123,7 +123,7 @@ def test_a_code_has_to_be_read_back_as_it_stands(code: str, again: str, may: boo
 def test_what_stands_in_the_way_is_said_in_one_sentence(
     person: Participant, facts: Facts, practice: bool, said: str
 ) -> None:
-    found = refusal(person, entered(), facts, RULES, practice=practice)
+    found = enrolment_refusal(person, entered(), facts, RULES, practice=practice)
     assert found.startswith(said)
     assert bool(found) is bool(said)
 
@@ -187,20 +187,20 @@ def broken_off(study: StudyFolder, code: str = "P01") -> Path:
 
 
 def records(study: StudyFolder) -> list[str]:
-    return [one.kind for _, one in register.read(study.results).entries]
+    return [one.kind for _, one in register.read_register(study.results).entries]
 
 
 def test_who_is_new_joins_with_their_facts_and_once(study: StudyFolder) -> None:
     for _ in range(2):
         assert admit(study, entered(), VirtualClock()).state == "not begun"
-    assert register.read(study.results).members["P01"].facts == FACTS
+    assert register.read_register(study.results).members["P01"].facts == FACTS
     assert records(study) == ["joined"]
 
 
 def test_a_fact_that_was_corrected_is_on_record(study: StudyFolder) -> None:
     admit(study, entered(), VirtualClock())
     admit(study, entered(facts=RIGHT | {"age_years": "26"}), VirtualClock())
-    found = register.read(study.results).members["P01"].facts
+    found = register.read_register(study.results).members["P01"].facts
     assert found is not None
     assert found.age_years == 26
 
@@ -244,7 +244,7 @@ def test_who_is_excluded_may_not_go_on_until_they_are_readmitted(study: StudyFol
 def test_a_run_that_is_open_elsewhere_is_neither_gone_on_with_nor_practised_for(
     practice: bool, study: StudyFolder
 ) -> None:
-    descriptor = hold(broken_off(study))
+    descriptor = hold_journal(broken_off(study))
     with pytest.raises(PlaceError, match="sits at another console"):
         admit(study, entered(), VirtualClock(), practice=practice)
     os.close(descriptor)
@@ -262,7 +262,7 @@ def test_a_damaged_journal_stands_in_the_way_of_its_own_experiment_alone(study: 
 
 
 def test_nobody_begins_by_a_register_that_cannot_be_trusted(study: StudyFolder) -> None:
-    (study.results / register.NAME).write_text("damage\n")
+    (study.results / register.REGISTER_FILE).write_text("damage\n")
     with pytest.raises(JournalError, match=r"participants\.jsonl: line 1"):
         admit(study, entered(), VirtualClock())
-    assert (study.results / register.NAME).read_text() == "damage\n"
+    assert (study.results / register.REGISTER_FILE).read_text() == "damage\n"

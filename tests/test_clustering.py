@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from scipy import stats
 
-from analysis.stats.logit_model import ALL_EQUAL, ONE_PERSON, ONE_TRIAL, clustering
+from analysis.stats.logit_model import ALL_ANSWERS_EQUAL, ONE_PERSON, ONE_TRIAL, clustering
 from tests.made_scores import RIGHT
 
 
@@ -55,8 +55,8 @@ def test_people_more_alike_than_chance_do_not_make_the_test_sharper_than_indepen
         ([5], [10], ONE_PERSON),
         ([5, 0], [10, 0], ONE_PERSON),
         ([1, 0], [1, 1], ONE_TRIAL),
-        ([10, 10], [10, 10], ALL_EQUAL),
-        ([0, 0], [10, 10], ALL_EQUAL),
+        ([10, 10], [10, 10], ALL_ANSWERS_EQUAL),
+        ([0, 0], [10, 10], ALL_ANSWERS_EQUAL),
     ],
 )
 def test_what_cannot_be_told_has_a_reason(successes: list[int], trials: list[int], reason: str) -> None:

@@ -13,10 +13,10 @@ from typing import Any
 import pytest
 
 from experiments import run as runs
-from experiments.record.journal import Contents, read
+from experiments.record.journal import Contents, read_journal
 from experiments.record.replay import history
 from experiments.run import RunRequest
-from experiments.session.steps import Answered, Ask, Failed, Fire, Fired
+from experiments.session.steps import Answered, Ask, Failed, Fired, FireShot
 from experiments.study.places import place
 from tests.at_controls import short_direction
 from tests.faulty_console import PATIENCE_S, SLOW_SYNC_S, child
@@ -35,7 +35,7 @@ def case(tmp_path: Path) -> Case:
         seen = child(name, tmp_path)
         where = place(tmp_path, "P01", "direction")
         with where.table.open(newline="", encoding="utf-8") as file:
-            return seen, read(where.journal), list(csv.DictReader(file))
+            return seen, read_journal(where.journal), list(csv.DictReader(file))
 
     return carry_out
 
@@ -51,7 +51,7 @@ def check_answers(contents: Contents) -> None:
     for place_, (step, word) in enumerate(told_so_far):
         if isinstance(step, Ask) and isinstance(word, Answered):
             before, shot = told_so_far[place_ - 1]
-            assert isinstance(before, Fire)
+            assert isinstance(before, FireShot)
             assert isinstance(shot, Fired)
             assert before.trial == step.trial
 

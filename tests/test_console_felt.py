@@ -9,7 +9,7 @@ from pathlib import Path
 
 import pytest
 
-from experiments.record.journal import read
+from experiments.record.journal import read_journal
 from experiments.record.replay import history
 from experiments.session.steps import Answered
 from tests.at_display import AtDisplay, needs_display, virtual_display
@@ -52,7 +52,9 @@ def test_data_mode_and_the_console_give_the_same_answers_in_the_same_times(tmp_p
     assert len(answers(tmp_path / "data")) == 16
     assert answers(tmp_path / "seen") == answers(tmp_path / "data")
     given = [
-        word for _, word in history(read(tmp_path / "seen" / f"{STEM}_journal.jsonl")) if isinstance(word, Answered)
+        word
+        for _, word in history(read_journal(tmp_path / "seen" / f"{STEM}_journal.jsonl"))
+        if isinstance(word, Answered)
     ]
     assert all(word.key_time_s is not None and word.key_time_s >= word.response_time_s for word in given)
 

@@ -19,7 +19,7 @@ from experiments.screens.console.progress import RunTiming, clock_text, end_text
 from experiments.screens.console.view import About, Ended, GunSeen, ParticipantSeen, Seen
 from experiments.session.remarks import AnswerCorrected, Flagged, Noted
 from experiments.session.states import Position, State
-from experiments.session.steps import Answered, Ask, Describe, Prepare, Present, Presented, Rate, Rated, Repeat, Rest
+from experiments.session.steps import Answered, Ask, Describe, Prepare, Present, Presented, Rate, Rated, Repeated, Rest
 from tests.at_controls import DIRECTION, PREFERENCE, sat_at, tells_correctness
 
 SAID = Answered(response="forward", response_time_s=1.0, response_source="experimenter", response_time_valid=False)
@@ -182,7 +182,7 @@ def test_the_list_of_marks_has_those_of_this_set_and_an_answer_that_was_given_ag
     first, other = trials[0], trials[-1]
     step, given = ask(first), (ask(first), SAID)
     corrected = (None, AnswerCorrected(trial=first, response="backward"))
-    spoiled = (Prepare(trial=trials[1], attempt=1, damper=""), Repeat(trial=first, reason="noise"))
+    spoiled = (Prepare(trial=trials[1], attempt=1, damper=""), Repeated(trial=first, reason="noise"))
     flagged, noted = (None, Flagged(trial=other, flag="late")), (None, Noted(trial=first, text="a dog"))
     here = Position(states=(State.ASKING,), step=step)
     marks = progress.marks(seen(DIRECTION, here, given, corrected, spoiled, flagged, noted))

@@ -10,7 +10,7 @@ import pandas as pd
 import pytest
 
 from analysis import one_way_anova, rm_anova, rm_tukey_hsd, rm_tukey_hsd_paired, tukey_hsd
-from analysis.stats.anova import NO_ERROR, NO_VARIANCE
+from analysis.stats.anova import F_UNDEFINED, NO_ERROR
 from tests.exact import exact_rm_F
 from tests.made_scores import ADDITIVE, COLUMNS, PEOPLE
 
@@ -49,7 +49,7 @@ def test_neither_effect_nor_error_is_undefined_and_says_so(scores: np.ndarray) -
     found = rm_anova(scores)
     assert math.isnan(found.F)
     assert math.isnan(found.p)
-    assert (found.ss_effect, found.ss_error, found.reason) == (0.0, 0.0, NO_VARIANCE)
+    assert (found.ss_effect, found.ss_error, found.reason) == (0.0, 0.0, F_UNDEFINED)
     assert all(math.isnan(c.q) and math.isnan(c.p) and c.difference == 0.0 for c in rm_tukey_hsd(scores))
 
 
@@ -69,7 +69,7 @@ def test_whole_numbers_whose_error_rounding_could_have_made_keep_their_own_F() -
 def test_reasons_come_one_a_data_set() -> None:
     ordinary = np.random.default_rng(1).normal(size=(14, 3))
     found = rm_anova(np.stack([ordinary, ADDITIVE, np.ones((14, 3))]))
-    assert list(found.reason) == ["", NO_ERROR, NO_VARIANCE]
+    assert list(found.reason) == ["", NO_ERROR, F_UNDEFINED]
 
 
 def test_two_participants_or_fewer_than_conditions_are_enough() -> None:
@@ -81,7 +81,7 @@ def test_two_participants_or_fewer_than_conditions_are_enough() -> None:
 
 def test_equal_groups_are_undefined_and_constant_different_groups_infinite() -> None:
     same, apart = [[0.1, 0.1], [0.1, 0.1, 0.1]], [[0.1, 0.1], [0.3, 0.3]]
-    assert (math.isnan(one_way_anova(same).F), one_way_anova(same).reason) == (True, NO_VARIANCE)
+    assert (math.isnan(one_way_anova(same).F), one_way_anova(same).reason) == (True, F_UNDEFINED)
     assert (one_way_anova(apart).F, one_way_anova(apart).p, one_way_anova(apart).reason) == (math.inf, 0.0, NO_ERROR)
     assert math.isnan(tukey_hsd(same)[0].p)
     assert tukey_hsd(apart)[0].p == 0.0

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from analysis.predict.design_search.critical import (
-    LEVEL,
+    THRESHOLD_SHARE,
     Contour,
     band_of,
     contour_of,
@@ -17,11 +17,11 @@ from analysis.predict.design_search.critical import (
     drawn_contours,
     rate_at,
 )
-from analysis.predict.design_search.rates import Floats
 from analysis.predict.design_search.shots import Layer, layers, rows_of, simulate_rows
 from analysis.predict.design_search.space import DesignRequest, Space, make_space
 from analysis.predict.fit.percept_model import PAPER_RATES, PerceptFit, fit_percept, predicted_rate
 from analysis.predict.jobs import on_processes
+from analysis.stats.arrays import FloatArray
 from device.methods import paper_methods
 from experiments.synthetic.percept import percept_of
 
@@ -53,8 +53,8 @@ def test_on_the_contour_three_of_four_are_right_when_simulated_alone(contour: Co
     """By the sweep's own sampling to a thousandth; by the fit's route, another sampling of the force, to 0.005."""
     for friction_N, voltage_V in points(contour):
         gun = replace(SPACE.gun, friction_N=friction_N, voltage_V=voltage_V)
-        assert rate_at(gun, fit.parameters) == pytest.approx(LEVEL, abs=1e-3)
-        assert predicted_rate(fit, percept_of(gun, 0.02)).value == pytest.approx(LEVEL, abs=5e-3)
+        assert rate_at(gun, fit.parameters) == pytest.approx(THRESHOLD_SHARE, abs=1e-3)
+        assert predicted_rate(fit, percept_of(gun, 0.02)).value == pytest.approx(THRESHOLD_SHARE, abs=5e-3)
     assert len(points(contour)) >= 6
 
 
@@ -100,7 +100,7 @@ def test_the_draws_are_those_of_the_seed(layer: Layer, fit: PerceptFit) -> None:
     assert not np.array_equal(one, other, equal_nan=True)
 
 
-def curves(count: int, length: int) -> Floats:
+def curves(count: int, length: int) -> FloatArray:
     """Random walks: what is extreme in one place need not be so in another."""
     return np.cumsum(np.random.default_rng(3).normal(size=(count, length)), axis=1)
 

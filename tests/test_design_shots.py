@@ -14,15 +14,7 @@ from hypothesis import strategies as st
 from analysis.predict.design_search import shots as design_shots
 from analysis.predict.design_search.critical import both_ways
 from analysis.predict.design_search.rates import evidences, logits, predict, rates
-from analysis.predict.design_search.shots import (
-    COIL_POINTS,
-    FREE_POINTS,
-    HOME,
-    FrictionRow,
-    shot_percepts,
-    shots,
-    summarised,
-)
+from analysis.predict.design_search.shots import COIL_POINTS, FREE_POINTS, FrictionRow, shot_percepts, shots, summarised
 from analysis.predict.fit.percept_model import PAPER_RATES, fit_percept, predicted_rate
 from device.limits import (
     BEYOND_DUTY,
@@ -38,6 +30,7 @@ from device.limits import (
 from device.methods import paper_methods
 from device.parameters import GunParameters
 from device.physics import simulate, trace
+from device.physics.equations import HOME
 from device.words import LimitError, Pulse
 from experiments.synthetic.diffusion import People
 from experiments.synthetic.percept import (

@@ -21,17 +21,17 @@ from experiments.session.steps import (
     Close,
     Closed,
     Failed,
-    Fire,
     Fired,
+    FireShot,
     Interrupted,
     Outcome,
     Prepare,
     Prepared,
-    Repeat,
+    Repeated,
     Rest,
     Rested,
     Step,
-    record,
+    step_record,
 )
 
 SETUP = load_setup("direction")
@@ -60,7 +60,7 @@ def fitting(step: Step) -> Outcome:
     match step:
         case Prepare():
             return Prepared()
-        case Fire():
+        case FireShot():
             return FIRED
         case Ask():
             return answered(step.trial)
@@ -104,7 +104,7 @@ STEPS = driven(PLAN, SETUP)
 
 def test_each_of_sixty_trials_is_prepared_fired_and_asked_in_the_order_of_the_plan() -> None:
     of_trials = [step for step in STEPS if not isinstance(step, Rest)]
-    assert [type(step) for step in of_trials] == [Prepare, Fire, Ask] * 60
+    assert [type(step) for step in of_trials] == [Prepare, FireShot, Ask] * 60
     assert [step.trial for step in of_trials] == [trial for trial in PLAN.trials for _ in range(3)]
     assert {step.attempt for step in of_trials} == {1}
 
@@ -131,16 +131,16 @@ def test_a_rest_follows_every_fifth_trial_but_the_last() -> None:
 
 def test_a_session_ends_with_a_close_before_which_the_last_trial_can_still_be_presented_again() -> None:
     last = len(STEPS)
-    again = to_the_end(PLAN, SETUP, {last: Repeat(trial=PLAN.trials[-1], reason="noise")})
+    again = to_the_end(PLAN, SETUP, {last: Repeated(trial=PLAN.trials[-1], reason="noise")})
     assert again[:last] == STEPS
-    assert [type(step) for step in again[last:]] == [Close, Prepare, Fire, Ask, Close]
+    assert [type(step) for step in again[last:]] == [Close, Prepare, FireShot, Ask, Close]
     assert {step.trial for step in again[last + 1 : -1]} == {PLAN.trials[-1]}
 
 
 def test_a_trial_can_be_presented_again_in_the_break_that_follows_it_which_then_begins_anew() -> None:
     place = STEPS.index(Rest(between="sets", duration_s=20.0))
-    again = driven(PLAN, SETUP, {place: Repeat(trial=PLAN.trials[4], reason="noise")})
-    assert [type(step) for step in again[place : place + 5]] == [Rest, Prepare, Fire, Ask, Rest]
+    again = driven(PLAN, SETUP, {place: Repeated(trial=PLAN.trials[4], reason="noise")})
+    assert [type(step) for step in again[place : place + 5]] == [Rest, Prepare, FireShot, Ask, Rest]
     assert again[place + 5 :] == STEPS[place + 1 :]
 
 
@@ -166,7 +166,7 @@ def test_a_trial_that_was_not_done_is_presented_again_from_the_hand_over(
     number = trial * 3 + rests + part
     steps = driven(PLAN, SETUP, {number: trouble})
     again = steps[number + 1 : number + 4]
-    assert [type(step) for step in again] == [Prepare, Fire, Ask]
+    assert [type(step) for step in again] == [Prepare, FireShot, Ask]
     assert {(step.trial, step.attempt) for step in again} == {(PLAN.trials[trial], 2)}
     assert steps[: number + 1] + steps[number + 4 :] == STEPS[: number + 1] + STEPS[number - part + 3 :]
 
@@ -210,7 +210,7 @@ def test_a_break_of_no_length_is_no_step(
 
 def test_a_session_of_one_trial_has_no_rest() -> None:
     plan = Plan(experiment="direction", participant_id="P01", seed=1, order_row=None, trials=PLAN.trials[:1])
-    assert [type(step) for step in driven(plan, SETUP)] == [Prepare, Fire, Ask]
+    assert [type(step) for step in driven(plan, SETUP)] == [Prepare, FireShot, Ask]
 
 
 @settings(deadline=None, max_examples=40)
@@ -251,13 +251,13 @@ outcomes_of_any_kind = st.one_of([facts(kind) for kind in get_args(Outcome)])
 @settings(deadline=None, max_examples=200)
 @given(steps_of_any_kind)
 def test_any_step_reads_back_from_the_journal(step: Step) -> None:
-    assert STEP.validate_python(json.loads(canonical_json(record(step)))) == step
+    assert STEP.validate_python(json.loads(canonical_json(step_record(step)))) == step
 
 
 @settings(deadline=None, max_examples=200)
 @given(outcomes_of_any_kind)
 def test_any_outcome_reads_back_from_the_journal(outcome: Outcome) -> None:
-    assert OUTCOME.validate_python(json.loads(canonical_json(record(outcome)))) == outcome
+    assert OUTCOME.validate_python(json.loads(canonical_json(step_record(outcome)))) == outcome
 
 
 def test_kinds_are_told_apart_by_one_word_each() -> None:
@@ -274,9 +274,10 @@ def test_kinds_are_told_apart_by_one_word_each() -> None:
         {"kind": "leap"},
         {"kind": "fire"},
         {"kind": "fire", "trial": {}, "attempt": 1},
-        record(STEPS[1]) | {"attempt": "twice"},
-        record(STEPS[1]) | {"trial": {"session": 1, "method": "vibration", "set": 1, "trial": 1, "direction": "up"}},
-        record(FIRED),
+        step_record(STEPS[1]) | {"attempt": "twice"},
+        step_record(STEPS[1])
+        | {"trial": {"session": 1, "method": "vibration", "set": 1, "trial": 1, "direction": "up"}},
+        step_record(FIRED),
     ],
 )
 def test_what_is_no_step_is_refused(body: object) -> None:
@@ -290,10 +291,10 @@ def test_what_is_no_step_is_refused(body: object) -> None:
         None,
         {},
         {"kind": "answered"},
-        record(answered(PLAN.trials[0])) | {"response": "left"},
-        record(answered(PLAN.trials[0])) | {"response_source": "nobody"},
+        step_record(answered(PLAN.trials[0])) | {"response": "left"},
+        step_record(answered(PLAN.trials[0])) | {"response_source": "nobody"},
         {"kind": "rated", "rating": "good", "rating_by": "participant"},
-        record(STEPS[0]),
+        step_record(STEPS[0]),
     ],
 )
 def test_what_is_no_outcome_is_refused(body: object) -> None:

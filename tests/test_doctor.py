@@ -27,50 +27,59 @@ from experiments.config.door import ConfigError
 from experiments.config.setup import sha256
 from experiments.design.plan import Trial
 from experiments.doctor import verdicts
-from experiments.doctor.checks import Check, Reply, carry_out, cause, checks, no_display, run_child, within
+from experiments.doctor.checks import (
+    Check,
+    ProgramReply,
+    carry_out_check,
+    cause,
+    checks,
+    no_display,
+    run_child,
+    within_seconds,
+)
 from experiments.doctor.figures import (
-    VERDICTS,
+    DOCTOR_VERDICTS,
     Adapter,
     Appends,
     Display,
-    Finding,
+    DoctorFinding,
+    GunLine,
     Keys,
-    Link,
     Machine,
+    Percentiles,
+    PsychoPyStage,
     Sound,
-    Spread,
-    Stage,
     Ticks,
     percentile,
     spread,
 )
 from experiments.doctor.measures import APPENDS, adapters, appends, ticks
-from experiments.doctor.verdicts import Latencies, latencies, together
+from experiments.doctor.verdicts import Latencies, latencies, pooled
 from experiments.load import find, load_gun
 from experiments.record.journal import Journal, Record
 from experiments.session.steps import (
     Answered,
     Ask,
-    Fire,
     Fired,
+    FireShot,
     Outcome,
     Prepare,
     Prepared,
     Present,
     Presented,
     Step,
-    record,
+    step_record,
 )
 from experiments.study.places import PlaceError
-from recoil.doctor import as_text
+from recoil.doctor import examination_text
 from tests.conftest import RECOIL, Recoil
 from tests.kills import can_mount, in_small_disk
 from tests.waiting import PATIENCE_S
 
 milliseconds = st.floats(min_value=0, max_value=1e4)
 
-FAST = Spread(n=200, median=0.2, p95=0.3, p99=0.4, worst=0.5)
-SLOW = Spread(n=25, median=190.0, p95=210.0, p99=220.0, worst=230.0)
+FAST = Percentiles(n=200, median=0.2, p95=0.3, p99=0.4, worst=0.5)
+SLOW = Percentiles(n=25, median=190.0, p95=210.0, p99=220.0, worst=230.0)
 
 
 # sums
@@ -108,7 +117,7 @@ HEAD = Record(n=0, kind="run", utc="", monotonic_s=0.0, clock="real")
 
 
 def line(kind: Any, word: Step | Outcome | None = None, *, at_s: float = 0.0, **more: Any) -> Record:
-    return Record(n=1, kind=kind, utc="", monotonic_s=at_s, body=word and record(word), **more)
+    return Record(n=1, kind=kind, utc="", monotonic_s=at_s, body=word and step_record(word), **more)
 
 
 def recorded(trials: list[tuple[float, float]]) -> list[Record]:
@@ -118,7 +127,12 @@ def recorded(trials: list[tuple[float, float]]) -> list[Record]:
         start_s = 10.0 * number
         done: list[tuple[Step, Outcome, float, float]] = [
             (Prepare(trial=TRIAL, attempt=1, damper=""), Prepared(), start_s, start_s + paint_ms / 1000),
-            (Fire(trial=TRIAL, attempt=1), replace(FIRED, pulse_start_s=start_s + 2), start_s + 1.9, start_s + 0.02),
+            (
+                FireShot(trial=TRIAL, attempt=1),
+                replace(FIRED, pulse_start_s=start_s + 2),
+                start_s + 1.9,
+                start_s + 0.02,
+            ),
             (ASK, ANSWERED, start_s + 2.1, start_s + 2.1 + paint_ms / 1000),
         ]
         for step, outcome, at_s, shown_s in done:
@@ -164,9 +178,9 @@ def test_a_presentation_is_left_out_since_every_shot_paints_it_anew() -> None:
 
 
 def test_latencies_of_several_journals_are_counted_together() -> None:
-    found = together(latencies(recorded([(paint, 1.0)])) for paint in (10.0, 20.0))
+    found = pooled(latencies(recorded([(paint, 1.0)])) for paint in (10.0, 20.0))
     assert (found.trials, len(found.step_to_screen_ms), len(found.key_to_disk_ms)) == (2, 4, 2)
-    assert together([]) == Latencies()
+    assert pooled([]) == Latencies()
 
 
 # verdicts
@@ -174,10 +188,10 @@ def test_latencies_of_several_journals_are_counted_together() -> None:
 MACHINE = Machine(system="Linux", python="3.11.7", cores=2, versions={"numpy": "2.4", "psychopy": "2026.2.5"})
 TICKS = Ticks(resolution_s=1e-9, smallest_step_s=4e-8, oversleep_ms=FAST)
 DISK = Appends(append_ms=FAST, free_bytes=10**10)
-LINK = Link(gun="RG-1:7", state="disarmed", fault=None, round_trip_ms=FAST)
+LINK = GunLine(gun="RG-1:7", state="disarmed", fault=None, round_trip_ms=FAST)
 ADAPTER = Adapter(name="ttyUSB0", setting="sys/ttyUSB0/latency_timer", latency_ms=1)
 DISPLAY = Display(platform="xcb", width_px=1280, height_px=800, refresh_Hz=60.0, opened_ms=20.0)
-STAGE = Stage(version="2026.2.5", import_s=8.0, opened_s=0.6, frames_Hz=444.0)
+STAGE = PsychoPyStage(version="2026.2.5", import_s=8.0, opened_s=0.6, frames_Hz=444.0)
 SOUND = Sound(outputs=["Headphones"], default="Headphones")
 KEYS = Keys(injected=2, to_event_ms=[0.4, 0.5], to_painted_ms=[0.8, 0.9])
 
@@ -227,7 +241,9 @@ KEYS = Keys(injected=2, to_event_ms=[0.4, 0.5], to_painted_ms=[0.8, 0.9])
         (verdicts.of_failure("clock", "did not end within 20 s"), "fails", "look again"),
     ],
 )
-def test_every_figure_has_its_verdict_and_all_but_good_ones_advice(finding: Finding, verdict: str, advice: str) -> None:
+def test_every_figure_has_its_verdict_and_all_but_good_ones_advice(
+    finding: DoctorFinding, verdict: str, advice: str
+) -> None:
     assert finding.verdict == verdict
     assert advice in finding.advice
     assert bool(finding.advice) == (verdict != "good")
@@ -244,7 +260,7 @@ def test_without_console_runs_it_says_so() -> None:
     assert {finding.measured for finding in verdicts.of_latencies(Latencies())} == {"no console runs here"}
 
 
-@given(st.lists(st.sampled_from(VERDICTS)))
+@given(st.lists(st.sampled_from(DOCTOR_VERDICTS)))
 def test_the_worst_verdict_counts_and_what_is_not_there_does_no_harm(found: list[Any]) -> None:
     there = [("good", "warning", "fails").index(verdict) for verdict in found if verdict != "not there"]
     assert verdicts.overall(found) == ("good", "warning", "fails")[max(there, default=0)]
@@ -276,7 +292,7 @@ def test_a_dead_child_is_explained_by_the_library_it_missed_or_by_its_first_word
 
 
 def test_the_table_shows_names_in_brackets_as_they_are() -> None:
-    text = as_text((Finding(check="sound", verdict="good", measured="[red]Headphones[/red]"),))
+    text = examination_text((DoctorFinding(check="sound", verdict="good", measured="[red]Headphones[/red]"),))
     assert "[red]Headphones[/red]" in text
 
 
@@ -306,13 +322,13 @@ def test_latency_timers_are_read_and_an_adapter_pulled_out_is_passed_over(tmp_pa
 
 
 def test_work_that_hangs_is_left_to_itself_and_errors_come_through() -> None:
-    assert within(PATIENCE_S, lambda: 3) == 3
+    assert within_seconds(PATIENCE_S, lambda: 3) == 3
     hangs = threading.Event()
     with pytest.raises(TimeoutError, match=r"did not end within 0\.05 s"):
-        within(0.05, hangs.wait)
+        within_seconds(0.05, hangs.wait)
     hangs.set()
     with pytest.raises(LinkError, match="gone"):
-        within(PATIENCE_S, lose_the_gun)
+        within_seconds(PATIENCE_S, lose_the_gun)
 
 
 def test_work_that_is_interrupted_may_put_away_what_it_holds(tmp_path: Path) -> None:
@@ -325,7 +341,7 @@ def test_work_that_is_interrupted_may_put_away_what_it_holds(tmp_path: Path) -> 
         "signal.signal(signal.SIGINT, interrupt)\n"
         "def work():\n    os.kill(os.getpid(), signal.SIGINT)\n    interrupted.wait()\n    Path({!r}).touch()\n"
         "checks.PUT_AWAY_S = {}\n"
-        "checks.within({}, work)"
+        "checks.within_seconds({}, work)"
     )
     program = program.format(str(tmp_path / "put away"), PATIENCE_S, PATIENCE_S)
     answer = run_child([sys.executable, "-c", program], PATIENCE_S)
@@ -360,20 +376,20 @@ def test_what_the_libraries_of_a_child_print_and_raise_does_not_spoil_its_answer
         "answer(look)"
     )
     for error, said in (
-        ("SystemExit(0)", Reply(error="SystemExit: 0")),
-        ("Absent('no screen')", Reply(absent="no screen")),
-        ("ModuleNotFoundError(name='Xlib')", Reply(absent="Xlib is not installed")),
-        ("ModuleNotFoundError('no wx', name='wx')", Reply(error="ModuleNotFoundError: no wx")),
+        ("SystemExit(0)", ProgramReply(error="SystemExit: 0")),
+        ("Absent('no screen')", ProgramReply(absent="no screen")),
+        ("ModuleNotFoundError(name='Xlib')", ProgramReply(absent="Xlib is not installed")),
+        ("ModuleNotFoundError('no wx', name='wx')", ProgramReply(error="ModuleNotFoundError: no wx")),
     ):
         assert run_child([sys.executable, "-c", program.format(error)], PATIENCE_S) == said
 
 
 def test_a_check_that_breaks_off_is_a_finding_and_an_impossible_wish_is_refused() -> None:
-    (finding,) = carry_out(Check(name="gun", look=lose_the_gun))
+    (finding,) = carry_out_check(Check(name="gun", look=lose_the_gun))
     assert (finding.verdict, finding.check, finding.measured) == ("fails", "gun", "gone")
     gun = next(check for check in checks(Path("results"), "water", 0.01) if check.name == "gun")
     with pytest.raises(PlaceError, match="water"):
-        carry_out(gun)
+        carry_out_check(gun)
 
 
 def test_the_limit_of_the_line_is_the_guns_and_no_part_of_a_run(tmp_path: Path) -> None:
@@ -474,13 +490,13 @@ def console_run(results: Path) -> None:
     with Journal.create(folder / "sub-P01_task-direction_journal.jsonl", clock) as journal:
         journal.append("run", **parts, **hashes, clock="real")
         for _ in range(25):
-            journal.append("step", body=record(Fire(trial=TRIAL, attempt=1)))
+            journal.append("step", body=step_record(FireShot(trial=TRIAL, attempt=1)))
             fired_s = clock.now()
-            journal.append("outcome", body=record(replace(FIRED, pulse_start_s=fired_s)))
-            journal.append("step", body=record(ASK))
+            journal.append("outcome", body=step_record(replace(FIRED, pulse_start_s=fired_s)))
+            journal.append("step", body=step_record(ASK))
             clock.sleep(1)
             answered = replace(ANSWERED, response_time_s=1 - 0.004)
-            journal.append("outcome", body=record(answered), shown_s=fired_s + 0.020)
+            journal.append("outcome", body=step_record(answered), shown_s=fired_s + 0.020)
         journal.append("finished")
 
 

@@ -9,7 +9,7 @@ from pathlib import Path
 
 import pytest
 
-from experiments.record.journal import read
+from experiments.record.journal import read_journal
 from tests.at_terminal import ANSWERS, FIRES, AtTerminal, answer_until_killed
 from tests.kills import answers, can_mount, in_small_disk, words
 
@@ -31,7 +31,7 @@ def check_killed_run(configs: Path, folder: Path, seconds: float, *, begun: bool
     if not journal.exists() or not journal.read_bytes().count(b"\n"):
         assert acknowledged == ""
         return 0
-    recorded = answers(read(journal))
+    recorded = answers(read_journal(journal))
     assert recorded.startswith(acknowledged)
     assert len(recorded) - len(acknowledged) <= 1
     return len(acknowledged)
@@ -47,13 +47,13 @@ def test_a_killed_run_goes_on_where_it_broke_off_and_ends_with_a_whole_table(
 ) -> None:
     acknowledged, journal = killed_run(quick_configs, tmp_path, 2.0, begun=True)
     assert acknowledged
-    before = answers(read(journal))
+    before = answers(read_journal(journal))
     with AtTerminal(words(quick_configs, "--resume"), tmp_path) as screen:
         screen.answer_trials(2, already=len(before))
         screen.wait_for(FIRES, 3)
         screen.type("stop lunch")
         assert screen.end() == 130
-    assert answers(read(journal)) == (ANSWERS * 8)[: len(before) + 2]
+    assert answers(read_journal(journal)) == (ANSWERS * 8)[: len(before) + 2]
     table = journal.with_name("sub-P01_task-direction_trials.csv").read_text().splitlines()
     assert len(table) == 61
 
@@ -103,11 +103,11 @@ def test_a_full_disk_stops_the_run_at_the_last_safe_answer(quick_configs: Path, 
     )
     assert done.stdout.count("code 2") == 1
     assert done.stdout.count("code 0") == 1
-    full = read(tmp_path / "full" / f"{STEM}_journal.jsonl")
+    full = read_journal(tmp_path / "full" / f"{STEM}_journal.jsonl")
     assert "No space left" in done.stderr
     assert f"everything up to record {len(full.records) - 1} is safe" in done.stderr
     assert "Traceback" not in done.stderr
-    safe, whole = answers(full), read(tmp_path / "whole" / f"{STEM}_journal.jsonl")
+    safe, whole = answers(full), read_journal(tmp_path / "whole" / f"{STEM}_journal.jsonl")
     assert 0 < len(safe) < 60
     assert answers(whole).startswith(safe)
     assert whole.finished

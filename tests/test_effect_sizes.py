@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from analysis.stats.anova import rm_anova
-from analysis.stats.effect_sizes import NO_VARIANCE, TOO_LARGE, effect_size, partial_eta_squared_interval
+from analysis.stats.effect_sizes import NO_ERROR_VARIANCE, TOO_LARGE, effect_size, partial_eta_squared_interval
 from tests.made_scores import RIGHT
 
 
@@ -54,7 +54,7 @@ def test_a_gigantic_effect_has_no_interval_but_a_reason() -> None:
 @pytest.mark.parametrize("scores", [np.ones((4, 3)), [[1.0, 2.0, 3.0], [2.0, 3.0, 4.0]]])
 def test_without_error_variance_there_is_no_interval_but_a_reason(scores: object) -> None:
     found = effect_size(rm_anova(scores))  # type: ignore[arg-type]
-    assert (found.ci_90, found.ci_95, found.reason) == (None, None, NO_VARIANCE)
+    assert (found.ci_90, found.ci_95, found.reason) == (None, None, NO_ERROR_VARIANCE)
     assert found.partial_eta_squared in (None, 1.0)
 
 

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from analysis.logs.exclusions import Effect, KeptTrials, LeftOutByRule, Rules, apply_rules
+from analysis.logs.exclusions import ExclusionEffect, KeptTrials, LeftOutByRule, Rules, apply_rules
 from analysis.logs.reading import Logs, read_logs
 from analysis.summary.summary import summarize
 from experiments.config.door import ConfigError, load
@@ -39,11 +39,11 @@ def _forward(row: TextRow) -> TextRow:
 
 
 @pytest.fixture
-def effect(tmp_path: Path) -> Effect:
+def effect(tmp_path: Path) -> ExclusionEffect:
     return apply_rules(_spoilt(tmp_path), load(Rules, EXAMPLE))
 
 
-def test_dropped_trials_are_counted_by_participant_and_the_first_rule_that_drops_them(effect: Effect) -> None:
+def test_dropped_trials_are_counted_by_participant_and_the_first_rule_that_drops_them(effect: ExclusionEffect) -> None:
     assert effect.dropped == {
         "direction": {
             "P02": {"drop_flags": 2, "response_time_min_s": 1, "response_time_max_s": 1, "drop_unanswered": 1}
@@ -53,7 +53,7 @@ def test_dropped_trials_are_counted_by_participant_and_the_first_rule_that_drops
     assert effect.trials["direction"] == KeptTrials(recorded=240, kept=235)
 
 
-def test_statistics_are_over_the_trials_and_people_that_are_kept(effect: Effect) -> None:
+def test_statistics_are_over_the_trials_and_people_that_are_kept(effect: ExclusionEffect) -> None:
     found = summarize(effect.logs).to_dict()
     assert found["excluded"] == []
     assert (found["direction"]["n"], found["preference"]["n"]) == (3, 4)
@@ -61,7 +61,7 @@ def test_statistics_are_over_the_trials_and_people_that_are_kept(effect: Effect)
     assert sum(tested) == 180 - 5
 
 
-def test_who_says_always_the_same_is_left_out_with_rule_and_reason(effect: Effect) -> None:
+def test_who_says_always_the_same_is_left_out_with_rule_and_reason(effect: ExclusionEffect) -> None:
     reason = "1 of the answers are the same (rule: at most 0.95)"
     assert effect.excluded == (
         LeftOutByRule(experiment="direction", participant="P03", reason=reason, rule="max_same_response_share"),

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from analysis.predict.check import ExperimentCheck, as_text, check
+from analysis.predict.check import ExperimentCheck, check, check_text
 from experiments.clock import VirtualClock
 from experiments.config.door import ConfigError
 from experiments.direction.session import make_plan
@@ -159,7 +159,7 @@ def test_a_check_tells_of_who_feels_the_gun(tmp_path: Path, name: str) -> None:
     told = {method: set(rates) for method, rates in found.felt_forward_rates.items()}
     methods = ("vibration", "asymmetric-1", "asymmetric-2")
     assert told == ({method: {"neutral"} for method in methods} if name == "direction" else {})
-    assert ("Felt  " in as_text(found)) == (name == "direction")
+    assert ("Felt  " in check_text(found)) == (name == "direction")
 
 
 def test_a_check_refuses_numbers_that_make_nobody(tmp_path: Path) -> None:

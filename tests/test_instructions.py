@@ -20,7 +20,7 @@ from experiments.design.plan import Plan
 from experiments.direction.config import DirectionConfig
 from experiments.direction.session import make_plan, make_practice, session
 from experiments.load import load_setup, shipped_folder
-from experiments.record.journal import read
+from experiments.record.journal import read_journal
 from experiments.record.replay import history
 from experiments.run import RunRequest, run
 from experiments.screens.console.progress import coming
@@ -29,7 +29,7 @@ from experiments.screens.synthetic import synthetic_screen
 from experiments.screens.terminal import TerminalScreen
 from experiments.screens.texts import read_out_text
 from experiments.session.states import Position, State
-from experiments.session.steps import OUTCOME, STEP, Prepare, record
+from experiments.session.steps import OUTCOME, STEP, Prepare, step_record
 
 HURRY = load_setup(str(shipped_folder() / "examples" / "hurry.toml"))
 PLAIN = load_setup("direction")
@@ -117,13 +117,13 @@ def prepares(setup: Setup[Any]) -> list[Prepare]:
 def test_a_hand_over_carries_the_text_of_its_sets_instruction() -> None:
     for step in prepares(HURRY):
         assert step.instruction == HURRY.config.instructions[step.trial.instruction].text
-        assert STEP.validate_python(record(step)) == step
+        assert STEP.validate_python(step_record(step)) == step
 
 
 def test_a_hand_over_without_an_instruction_is_recorded_as_before_there_were_any() -> None:
     step = prepares(PLAIN)[0]
-    assert set(record(step)) == {"trial", "attempt", "damper", "kind"}
-    assert set(record(step)["trial"]) == {"session", "method", "set", "trial", "direction"}
+    assert set(step_record(step)) == {"trial", "attempt", "damper", "kind"}
+    assert set(step_record(step)["trial"]) == {"session", "method", "set", "trial", "direction"}
 
 
 def seen(setup: Setup[Any], plan: Plan, step: Prepare) -> Seen:
@@ -167,7 +167,7 @@ def done(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, Path]:
 
 
 def test_the_first_record_and_the_table_hold_each_trials_instruction(done: tuple[Path, Path]) -> None:
-    contents = read(done[0])
+    contents = read_journal(done[0])
     planned = [trial.instruction for trial in contents.plan.trials]
     with done[1].open(newline="", encoding="utf-8") as file:
         rows = list(csv.DictReader(file))
@@ -194,6 +194,6 @@ def test_the_time_of_a_key_is_in_the_record_only_where_there_is_one() -> None:
         "response_time_valid": True,
     }  # fmt: skip
     answered = OUTCOME.validate_python(body)
-    assert record(answered) == body
-    assert record(replace(answered, key_time_s=0.0))["key_time_s"] == 0.0
+    assert step_record(answered) == body
+    assert step_record(replace(answered, key_time_s=0.0))["key_time_s"] == 0.0
     assert math.isclose(OUTCOME.validate_python(body | {"key_time_s": 0.51}).key_time_s, 0.51)

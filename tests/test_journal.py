@@ -13,7 +13,7 @@ import pytest
 from experiments.clock import VirtualClock
 from experiments.config.setup import sha256
 from experiments.record import storage
-from experiments.record.journal import Journal, JournalError, head, read
+from experiments.record.journal import Journal, JournalError, head, read_journal
 
 PARTS = {"plan": {"trials": [1, 2]}, "setup": {"title": "é – 20 °C"}}
 HEAD = PARTS | {f"{name}_sha256": sha256(part) for name, part in PARTS.items()}
@@ -44,7 +44,7 @@ def lines_of(path: Path) -> list[bytes]:
 
 
 def test_every_record_has_number_kind_and_times(path: Path) -> None:
-    records = read(path).records
+    records = read_journal(path).records
     assert [entry.n for entry in records] == list(range(RECORDS))
     assert [entry.kind for entry in records] == ["run", *["step", "outcome"] * 3, "step"]
     assert [entry.monotonic_s for entry in records] == [0.5 * number for number in range(RECORDS)]
@@ -53,7 +53,7 @@ def test_every_record_has_number_kind_and_times(path: Path) -> None:
 
 
 def test_the_first_record_is_the_head(path: Path) -> None:
-    contents = read(path)
+    contents = read_journal(path)
     parts = {"plan": contents.head.plan_json, "setup": contents.head.setup_json}
     hashes = {"plan_sha256": contents.head.plan_sha256, "setup_sha256": contents.head.setup_sha256}
     assert parts | hashes == HEAD
@@ -61,7 +61,7 @@ def test_the_first_record_is_the_head(path: Path) -> None:
 
 
 def test_every_record_tells_when_the_one_before_it_was_on_the_disk(path: Path) -> None:
-    first, *others = read(path).records
+    first, *others = read_journal(path).records
     assert first.synced_s is None
     # on the virtual clock writing takes no time: synced at the time of the record itself, half a second ago
     assert [entry.synced_s for entry in others] == [entry.monotonic_s - 0.5 for entry in others]
@@ -72,7 +72,7 @@ def test_a_record_is_on_the_disk_when_append_returns(tmp_path: Path) -> None:
         journal.append("run", **HEAD)
         for count in range(2, 5):
             journal.append("step", body=count)
-            assert len(read(tmp_path / "j").records) == count
+            assert len(read_journal(tmp_path / "j").records) == count
 
 
 def test_one_record_is_one_line_of_json(path: Path) -> None:
@@ -82,11 +82,11 @@ def test_one_record_is_one_line_of_json(path: Path) -> None:
 
 
 def test_a_run_is_finished_once_its_last_record_says_so(path: Path) -> None:
-    contents = read(path)
+    contents = read_journal(path)
     assert not contents.finished
     with Journal.reopen(contents, VirtualClock()) as journal:
         journal.append("finished", table_sha256="0")
-    assert read(path).finished
+    assert read_journal(path).finished
 
 
 def test_an_existing_file_is_never_written_over(path: Path) -> None:
@@ -102,7 +102,7 @@ def test_a_journal_where_there_is_no_folder_is_refused(tmp_path: Path) -> None:
 
 
 def test_a_journal_that_is_not_there_cannot_be_read(tmp_path: Path) -> None:
-    for reader in (read, head):
+    for reader in (read_journal, head):
         with pytest.raises(JournalError, match=r"cannot be read \(No such file"):
             reader(tmp_path / "none")
 
@@ -114,9 +114,9 @@ def test_what_a_terminal_may_take_for_text_is_written_or_refused_as_a_journal_er
         try:
             journal.append("outcome", body={"comment": "sch\udcf6n"})
         except JournalError:
-            assert len(read(tmp_path / "j").records) == 1
+            assert len(read_journal(tmp_path / "j").records) == 1
         else:
-            assert len(read(tmp_path / "j").records) == 2
+            assert len(read_journal(tmp_path / "j").records) == 2
 
 
 # a full disk
@@ -125,7 +125,7 @@ def test_what_a_terminal_may_take_for_text_is_written_or_refused_as_a_journal_er
 @pytest.mark.skipif(not Path("/dev/full").exists(), reason="no /dev/full")
 def test_a_full_disk_is_told_with_what_is_safe(path: Path) -> None:
     descriptor = os.open("/dev/full", os.O_RDWR | os.O_APPEND)
-    whole = read(path)
+    whole = read_journal(path)
     before = replace(whole, path=Path("/dev/full"), records=whole.records[:7], whole_bytes=0)
     journal = Journal(Path("/dev/full"), descriptor, VirtualClock(), before)
     with journal, pytest.raises(JournalError, match=r"record 7 cannot be written \(No space left .*record 6 is safe"):
@@ -139,9 +139,9 @@ def test_a_record_that_was_written_in_part_is_taken_back(path: Path) -> None:
 import resource, signal, sys
 from pathlib import Path
 from experiments.clock import VirtualClock
-from experiments.record.journal import Journal, JournalError, read
+from experiments.record.journal import Journal, JournalError, read_journal
 signal.signal(signal.SIGXFSZ, signal.SIG_IGN)
-contents = read(Path({str(path)!r}))
+contents = read_journal(Path({str(path)!r}))
 with Journal.reopen(contents, VirtualClock()) as journal:
     resource.setrlimit(resource.RLIMIT_FSIZE, ({size} + 40, {size} + 40))
     try:
@@ -152,7 +152,7 @@ with Journal.reopen(contents, VirtualClock()) as journal:
     done = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, check=False)
     assert f"record {RECORDS} cannot be written (File too large); everything up to record {RECORDS - 1}" in done.stderr
     assert path.stat().st_size == size
-    assert len(read(path).records) == RECORDS
+    assert len(read_journal(path).records) == RECORDS
 
 
 # cut off
@@ -167,9 +167,9 @@ def test_a_journal_cut_at_any_byte_is_read_to_its_last_whole_record(path: Path) 
         if not whole:
             assert head(cut) is None
             with pytest.raises(JournalError, match=r"line 1: no whole record, so nothing was acknowledged"):
-                read(cut)
+                read_journal(cut)
             continue
-        contents = read(cut)
+        contents = read_journal(cut)
         assert len(contents.records) == whole
         assert contents.whole_bytes == ends[whole - 1]
         assert contents.cut_bytes == length - ends[whole - 1]
@@ -186,7 +186,7 @@ def test_a_journal_cut_at_any_byte_is_read_to_its_last_whole_record(path: Path) 
 def test_rubbish_behind_the_last_line_end_is_taken_for_a_cut(path: Path) -> None:
     with path.open("ab") as file:
         file.write(b"\0" * 4096)  # what some file systems leave behind after a power cut
-    contents = read(path)
+    contents = read_journal(path)
     assert (len(contents.records), contents.cut_bytes) == (RECORDS, 4096)
 
 
@@ -194,10 +194,10 @@ def test_rubbish_behind_the_last_line_end_is_taken_for_a_cut(path: Path) -> None
 def test_reopening_takes_away_what_was_cut_off_and_goes_on_numbering(path: Path, cut_bytes: int) -> None:
     lines = lines_of(path)
     path.write_bytes(b"".join(lines[:5]) + lines[5][:cut_bytes])
-    with Journal.reopen(read(path), VirtualClock()) as journal:
+    with Journal.reopen(read_journal(path), VirtualClock()) as journal:
         journal.append("resumed", cut_bytes=cut_bytes)
         journal.append("step", body=1)
-    contents = read(path)
+    contents = read_journal(path)
     assert [entry.n for entry in contents.records] == list(range(7))
     assert [entry.kind for entry in contents.records[5:]] == ["resumed", "step"]
     assert contents.records[5].synced_s is None
@@ -214,7 +214,7 @@ def test_a_record_that_was_removed_is_noticed_at_its_line(path: Path, number: in
     with pytest.raises(
         JournalError, match=rf"a_journal.jsonl: line {number + 1}: record number is {number + 1}, must be {number};"
     ):
-        read(path)
+        read_journal(path)
 
 
 @pytest.mark.parametrize("number", range(1, RECORDS))
@@ -222,20 +222,20 @@ def test_a_record_that_was_doubled_is_noticed_at_its_line(path: Path, number: in
     lines = lines_of(path)
     path.write_bytes(b"".join([*lines[: number + 1], lines[number], *lines[number + 1 :]]))
     with pytest.raises(JournalError, match=rf"line {number + 2}: record number is {number}, must be {number + 1}"):
-        read(path)
+        read_journal(path)
 
 
 def test_records_that_were_exchanged_are_noticed(path: Path) -> None:
     lines = lines_of(path)
     path.write_bytes(b"".join([*lines[:3], lines[4], lines[3], *lines[5:]]))
     with pytest.raises(JournalError, match="line 4: record number is 4, must be 3"):
-        read(path)
+        read_journal(path)
 
 
 def test_a_missing_head_is_noticed(path: Path) -> None:
     path.write_bytes(b"".join(lines_of(path)[1:]))
     with pytest.raises(JournalError, match="line 1: record number is 1, must be 0"):
-        read(path)
+        read_journal(path)
 
 
 @pytest.mark.parametrize(
@@ -262,7 +262,7 @@ def test_a_record_that_was_changed_is_refused_with_its_line(path: Path, line: by
     lines = lines_of(path)
     path.write_bytes(b"".join([*lines[:3], line, b"\n", *lines[4:]]))
     with pytest.raises(JournalError, match=r"a_journal\.jsonl: line 4: ") as refused:
-        read(path)
+        read_journal(path)
     assert rule in str(refused.value)
 
 
@@ -277,26 +277,26 @@ def test_a_record_that_was_changed_is_refused_with_its_line(path: Path, line: by
 )
 def test_a_head_that_is_none_is_refused(tmp_path: Path, record: dict[str, Any]) -> None:
     (tmp_path / "j").write_text(json.dumps(record) + "\n")
-    for reader in (read, head):
+    for reader in (read_journal, head):
         with pytest.raises(JournalError, match="j: line 1: "):
             reader(tmp_path / "j")
 
 
 def test_line_ends_of_another_system_do_no_harm(path: Path) -> None:
-    before = read(path).records
+    before = read_journal(path).records
     path.write_bytes(path.read_bytes().replace(b"\n", b"\r\n"))
-    assert read(path).records == before
+    assert read_journal(path).records == before
 
 
 # held by one
 
 
 def test_a_second_holder_is_refused_in_the_same_process(path: Path) -> None:
-    with Journal.reopen(read(path), VirtualClock()) as journal:
+    with Journal.reopen(read_journal(path), VirtualClock()) as journal:
         with pytest.raises(JournalError, match="another run holds this journal; close that one first"):
-            Journal.reopen(read(path), VirtualClock())
+            Journal.reopen(read_journal(path), VirtualClock())
         journal.append("step", body=0)
-    with Journal.reopen(read(path), VirtualClock()):
+    with Journal.reopen(read_journal(path), VirtualClock()):
         pass
 
 
@@ -306,9 +306,9 @@ def test_a_second_holder_is_refused_in_another_process_and_loses_nothing(tmp_pat
 import sys
 from pathlib import Path
 from experiments.clock import VirtualClock
-from experiments.record.journal import Journal, JournalError, read
+from experiments.record.journal import Journal, JournalError, read_journal
 try:
-    Journal.reopen(read(Path({str(path)!r})), VirtualClock()).append("step", body="other")
+    Journal.reopen(read_journal(Path({str(path)!r})), VirtualClock()).append("step", body="other")
 except JournalError as error:
     sys.exit(str(error))
 """
@@ -322,20 +322,20 @@ except JournalError as error:
         assert "another run holds this journal" in other().stderr
         assert path.read_bytes() == before
     assert other().returncode == 0
-    assert len(read(path).records) == 2
+    assert len(read_journal(path).records) == 2
 
 
 def test_records_that_another_run_wrote_since_the_reading_are_not_cut_away(path: Path) -> None:
-    early = read(path)
-    with Journal.reopen(read(path), VirtualClock()) as other:
+    early = read_journal(path)
+    with Journal.reopen(read_journal(path), VirtualClock()) as other:
         other.append("outcome", body="acknowledged")
     with suppress(JournalError):  # refusing is as good as going on behind the other's last record
         Journal.reopen(early, VirtualClock()).close()
-    assert len(read(path).records) == RECORDS + 1
+    assert len(read_journal(path).records) == RECORDS + 1
 
 
 def test_a_journal_that_vanished_since_the_reading_is_a_journal_error(path: Path) -> None:
-    contents = read(path)
+    contents = read_journal(path)
     path.unlink()
     with pytest.raises(JournalError):
         Journal.reopen(contents, VirtualClock())

@@ -12,7 +12,7 @@ import pytest
 
 from device import LimitError, LinkError
 from experiments.design.plan import Trial
-from experiments.live_run import RunStopped, Verdict
+from experiments.live_run import EventVerdict, RunStopped
 from experiments.record import storage
 from experiments.record.replay import history
 from experiments.screens.texts import again_text
@@ -31,7 +31,7 @@ from experiments.session.remarks import (
     Refused,
 )
 from experiments.session.states import EMERGENCY, State
-from experiments.session.steps import Failed, Fire, Interrupted, Prepare, Presented, Rated, Repeat, trial_of
+from experiments.session.steps import Failed, FireShot, Interrupted, Prepare, Presented, Rated, Repeated, trial_of
 from experiments.study.places import place
 from tests.at_controls import (
     DIRECTION,
@@ -76,7 +76,7 @@ def own_key(sitting: Sitting, **changes: Any) -> events.ParticipantKey:
     return events.ParticipantKey(**known | changes)
 
 
-def by_hand(sitting: Sitting, event: Event) -> Verdict:
+def by_hand(sitting: Sitting, event: Event) -> EventVerdict:
     """What somebody does who looks first and takes their time."""
     sitting.ready()
     verdict = sitting.live.offer(event, Press(at_s=sitting.clock.now(), serial=sitting.position.serial))
@@ -129,10 +129,12 @@ def test_what_carries_on_counts_from_the_guard_time_after_its_position_was_paint
         painted_s, serial = presses(sitting)
         for early_s in (-1.0, 0.0, 0.249):
             verdict = sitting.live.offer(event, Press(at_s=painted_s + early_s, serial=serial))
-            assert verdict == Verdict(taken=False, text="Too soon after the change: press again.")
+            assert verdict == EventVerdict(taken=False, text="Too soon after the change: press again.")
         old = sitting.live.offer(event, Press(at_s=painted_s + 1.0, serial=serial - 1))
         assert (
-            unpainted == old == Verdict(taken=False, text="That was pressed for what stood there before: press again.")
+            unpainted
+            == old
+            == EventVerdict(taken=False, text="That was pressed for what stood there before: press again.")
         )
         assert sitting.position == position
         assert GUARD_S == 0.25
@@ -157,7 +159,7 @@ def test_next_is_taken_from_the_least_exposure_on_and_not_before_the_first_shot(
         sitting.to(S.PREPARING)
         sitting.gun.hang = "fire"
         sitting.press("Space")
-        too_soon = Verdict(taken=False, text="Too soon: it is to be felt for longer.")
+        too_soon = EventVerdict(taken=False, text="Too soon: it is to be felt for longer.")
         assert sitting.live.offer(events.Next()) == too_soon
         sitting.gun.release()
         sitting.settle()
@@ -204,7 +206,7 @@ def test_a_key_counts_if_it_went_down_after_the_onset(tmp_path: Path) -> None:
         onset_s = sitting.position.onset_s
         assert onset_s is not None
         early = sitting.live.offer(own_key(sitting, at_s=onset_s - 0.001))
-        assert early == Verdict(taken=False, text="It went down before the stimulus, or in a pause.")
+        assert early == EventVerdict(taken=False, text="It went down before the stimulus, or in a pause.")
         assert sitting.live.offer(own_key(sitting, at_s=onset_s + 0.05))
         contents, rows = to_the_end(sitting)
     assert (rows[0]["response_source"], rows[0]["response_time_valid"]) == ("participant", "1")
@@ -279,14 +281,14 @@ def test_a_time_over_a_pause_that_began_before_the_shot_is_not_the_participants(
 # the participant's own rating and description
 
 
-def own_rating(sitting: Sitting) -> Verdict:
+def own_rating(sitting: Sitting) -> EventVerdict:
     """A rating of 3 on the participant's own screen."""
     verdict = sitting.live.offer(events.ParticipantRated(rating=3.0, step=sitting.position.number))
     sitting.settle()
     return verdict
 
 
-def own_words(sitting: Sitting, text: str = "soft") -> Verdict:
+def own_words(sitting: Sitting, text: str = "soft") -> EventVerdict:
     """A description on the participant's own screen."""
     verdict = sitting.live.offer(events.ParticipantDescribed(text=text, step=sitting.position.number))
     sitting.settle()
@@ -411,7 +413,7 @@ def test_forward_corrected_to_forward_is_no_correction(tmp_path: Path) -> None:
         sitting.press("F")
         assert by_hand(sitting, events.Undo())
         same = by_hand(sitting, events.Correct(value="forward"))
-        assert same == Verdict(taken=True, text="That is what stands there: nothing was corrected.")
+        assert same == EventVerdict(taken=True, text="That is what stands there: nothing was corrected.")
         assert S.CORRECTING not in sitting.position.states
         contents, rows = to_the_end(sitting)
     assert not remarks(contents, AnswerCorrected)
@@ -487,7 +489,7 @@ def test_a_repeat_that_was_asked_for_one_trial_is_not_taken_for_the_next(tmp_pat
         said = "Trial 1 cannot be presented again any more. What you typed is kept as a note."
         assert sitting.window.heard.count(said) == 1
         contents = of_journal(sitting)
-    assert not [word for _, word in history(contents) if isinstance(word, Repeat)]
+    assert not [word for _, word in history(contents) if isinstance(word, Repeated)]
 
 
 # the emergency stop
@@ -615,7 +617,7 @@ def test_a_pause_between_the_key_and_the_shot_takes_the_shot_back_also_if_it_is_
         assert sitting.position.base in (S.SETTING, S.PREPARING)
         assert again_text(sitting.live.history, prepare(sitting)) == ""
         contents, rows = to_the_end(sitting)
-    given_up = next(word for step, word in history(contents) if isinstance(step, Fire))
+    given_up = next(word for step, word in history(contents) if isinstance(step, FireShot))
     assert given_up == Interrupted(presented=False, cause="pause")
     assert (rows[0]["attempts"], rows[0]["flags"]) == ("1", "")
 

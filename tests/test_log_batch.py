@@ -17,7 +17,7 @@ from analysis.logs import reading
 from analysis.logs.files import BadLogError, find_logs
 from analysis.logs.frames import joined
 from analysis.logs.reading import read_logs
-from analysis.logs.rules import check
+from analysis.logs.rules import check_logs
 from analysis.logs.texts import TEXT, TextTable, arrow_tables, csv_tables, decimals, records, text_tables
 from experiments.record import columns
 from tests.log_files import TextRow, rating_rows, trial_rows, trials_path, write_rows, write_study
@@ -92,7 +92,7 @@ def _over_arrays(tables: list[TextTable]) -> tuple[dict[int, pd.DataFrame], dict
     frames, faults = dict[int, pd.DataFrame](), dict[int, Fault]()
     for table in tables:
         try:
-            block, logs = check(table, dict.fromkeys(table.logs, "P01"))
+            block, logs = check_logs(table, dict.fromkeys(table.logs, "P01"))
         except BadLogError as bad:
             faults |= dict.fromkeys(table.logs, (bad.message, bad.line, bad.column))
             continue

@@ -5,7 +5,7 @@ import pytest
 from scipy import stats
 
 from analysis import rm_tukey_hsd, rm_tukey_hsd_paired
-from analysis.stats.operating import LEVEL, POST_HOCS, box_epsilon, characteristics
+from analysis.stats.operating import ALPHA, POST_HOCS, box_epsilon, characteristics
 from analysis.stats.tukey import pairs_of
 
 DATA_SETS = 4_000
@@ -31,9 +31,9 @@ def test_every_post_hoc_keeps_the_error_that_it_claims(found) -> None:
 def test_pooling_the_error_is_nominal_at_sphericity_and_liberal_far_from_it(found) -> None:
     at_one, _, far = of(found, "Tukey, pooled error")
     assert at_one.epsilon == pytest.approx(1.0)
-    assert abs(at_one.null_error - LEVEL) < 3 * at_one.monte_carlo_error(LEVEL)
+    assert abs(at_one.null_error - ALPHA) < 3 * at_one.monte_carlo_error(ALPHA)
     assert far.epsilon < 0.55
-    assert far.null_error > LEVEL + 2 * far.monte_carlo_error(LEVEL)
+    assert far.null_error > ALPHA + 2 * far.monte_carlo_error(ALPHA)
 
 
 def test_taking_the_same_people_for_others_costs_most_of_the_power(found) -> None:
@@ -55,18 +55,18 @@ def test_more_data_sets_than_a_chunk_are_all_counted() -> None:
 def test_what_a_post_hoc_finds_is_what_its_own_function_says(seed: int) -> None:
     scores = np.random.default_rng(seed).normal([0.0, 0.4, 0.9], [1.0, 1.0, 2.0], (14, 3))
     pooled, paired, holm, between = (post_hoc.rejects(scores).tolist() for post_hoc in POST_HOCS)
-    assert pooled == [one.p < LEVEL for one in rm_tukey_hsd(scores)]
-    assert paired == [one.p < LEVEL for one in rm_tukey_hsd_paired(scores)]
+    assert pooled == [one.p < ALPHA for one in rm_tukey_hsd(scores)]
+    assert paired == [one.p < ALPHA for one in rm_tukey_hsd_paired(scores)]
     p = [float(stats.ttest_rel(scores[:, a], scores[:, b]).pvalue) for a, b in pairs_of(3)]
     assert holm == holm_by_hand(p)
     theirs = stats.tukey_hsd(*scores.T).pvalue
-    assert between == [bool(theirs[a, b] < LEVEL) for a, b in pairs_of(3)]
+    assert between == [bool(theirs[a, b] < ALPHA) for a, b in pairs_of(3)]
 
 
 def holm_by_hand(p: list[float]) -> list[bool]:
     rejected = [False] * len(p)
     for tried, i in enumerate(sorted(range(len(p)), key=lambda i: p[i])):
-        if p[i] > LEVEL / (len(p) - tried):
+        if p[i] > ALPHA / (len(p) - tried):
             break
         rejected[i] = True
     return rejected

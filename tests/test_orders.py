@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from experiments.design.plan import method_order, next_row, rows
+from experiments.design.plan import method_order, next_row, square_rows
 from experiments.design.streams import Stream
 
 COUNTS = range(2, 9)
@@ -14,7 +14,7 @@ SQUARES = ("latin-square", "williams")
 
 @pytest.mark.parametrize("count", [1, *COUNTS, 26])
 def test_a_latin_square_has_each_method_once_at_each_place(count: int) -> None:
-    square = rows("latin-square", count)
+    square = square_rows("latin-square", count)
     assert len(square) == count
     for line in [*square, *zip(*square, strict=True)]:
         assert sorted(line) == list(range(count))
@@ -22,7 +22,7 @@ def test_a_latin_square_has_each_method_once_at_each_place(count: int) -> None:
 
 @pytest.mark.parametrize("count", COUNTS)
 def test_williams_has_each_method_equally_often_at_each_place(count: int) -> None:
-    square = rows("williams", count)
+    square = square_rows("williams", count)
     times = 2 if count % 2 else 1
     assert len(square) == times * count
     for place in zip(*square, strict=True):
@@ -31,18 +31,18 @@ def test_williams_has_each_method_equally_often_at_each_place(count: int) -> Non
 
 @pytest.mark.parametrize("count", COUNTS)
 def test_williams_has_each_ordered_pair_of_neighbours_equally_often(count: int) -> None:
-    pairs = Counter(pair for row in rows("williams", count) for pair in pairwise(row))
+    pairs = Counter(pair for row in square_rows("williams", count) for pair in pairwise(row))
     assert pairs == dict.fromkeys(permutations(range(count), 2), 2 if count % 2 else 1)
 
 
 @pytest.mark.parametrize("count", COUNTS)
 def test_every_row_of_a_square_is_a_permutation(count: int) -> None:
     for order in SQUARES:
-        assert all(sorted(row) == list(range(count)) for row in rows(order, count))
+        assert all(sorted(row) == list(range(count)) for row in square_rows(order, count))
 
 
 def test_a_random_order_has_no_rows() -> None:
-    assert rows("random", 3) == []
+    assert square_rows("random", 3) == []
     assert next_row("random", 3, []) is None
 
 
@@ -63,10 +63,10 @@ def test_counts_stay_within_one_after_any_drop_outs(order: str, count: int, even
             used.append(next_row(order, count, used))
         elif used:
             used.pop(event % len(used))
-    for _ in range(len(used) + 2 * len(rows(order, count))):
+    for _ in range(len(used) + 2 * len(square_rows(order, count))):
         used.append(next_row(order, count, used))
     times = Counter(used)
-    assert len(times) == len(rows(order, count))
+    assert len(times) == len(square_rows(order, count))
     assert max(times.values()) - min(times.values()) <= 1
 
 
@@ -76,14 +76,14 @@ def test_without_drop_outs_counts_differ_by_one_at_most_at_any_time(order: str, 
     used: list[int] = []
     for _ in range(people):
         used.append(next_row(order, count, used))
-    times = [used.count(row) for row in range(len(rows(order, count)))]
+    times = [used.count(row) for row in range(len(square_rows(order, count)))]
     assert max(times) - min(times) <= 1
 
 
 @settings(deadline=None)
 @given(st.sampled_from(SQUARES), st.integers(2, 8), st.lists(st.integers(0, 15), max_size=40))
 def test_the_next_row_is_one_that_no_other_was_used_less_than(order: str, count: int, taken: list[int]) -> None:
-    square = rows(order, count)
+    square = square_rows(order, count)
     used = [row % len(square) for row in taken]
     row = next_row(order, count, used)
     assert used.count(row) == min(used.count(other) for other in range(len(square)))

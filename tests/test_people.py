@@ -11,7 +11,7 @@ import pytest
 from experiments.clock import date_text, time_text
 from experiments.screens.console.people import cell_text, coming_text, note_text, remark, stopped_text
 from experiments.study.progress import Overview
-from experiments.study.study import Next, Participant, RunProgress, State
+from experiments.study.study import NextParticipant, Participant, RunProgress, RunState
 from tests.people import ORDER, someone
 
 STOPPED = RunProgress(
@@ -93,7 +93,7 @@ def test_an_exclusion_is_a_note() -> None:
     ],
 )
 def test_what_there_is_to_know_of_a_choice_is_said(
-    states: tuple[State, State], experiment: str, said: str, mood: str
+    states: tuple[RunState, RunState], experiment: str, said: str, mood: str
 ) -> None:
     assert remark("P01", someone(*states), experiment, ORDER) == (said, mood)
 
@@ -118,13 +118,13 @@ def test_a_stop_is_told_with_its_local_date() -> None:
 # who comes next
 
 
-def seen(*people: Participant, coming: Next | None = None) -> Overview:
+def seen(*people: Participant, coming: NextParticipant | None = None) -> Overview:
     return Overview(participants=people, next=coming, orders={}, problems=())
 
 
 def test_who_comes_next_is_said_and_otherwise_why_nobody_does() -> None:
     runs = someone("not begun", "not begun").runs
-    assert coming_text(seen(coming=Next(participant_id="P02", new=True, runs=runs))) == (
+    assert coming_text(seen(coming=NextParticipant(participant_id="P02", new=True, runs=runs))) == (
         "Next: P02 (new), direction and preference"
     )
     assert coming_text(seen(someone("done", "done"))) == "Everyone has done everything."

@@ -16,7 +16,7 @@ from experiments.study.places import (
     set_aside_file,
     used_rows,
 )
-from experiments.study.register import read
+from experiments.study.register import read_register
 from tests.journals import write_head
 
 RESULTS = Path("/nowhere/results")
@@ -85,11 +85,11 @@ def test_a_collision_is_found_beside_the_code_itself(tmp_path: Path) -> None:
 
 
 def test_known_codes_are_those_of_folders(tmp_path: Path) -> None:
-    assert known_codes(tmp_path / "none", read(tmp_path / "none")) == []
+    assert known_codes(tmp_path / "none", read_register(tmp_path / "none")) == []
     for name in ("sub-P02", "sub-P01", "other"):
         (tmp_path / name).mkdir()
     (tmp_path / "sub-P03").touch()
-    assert known_codes(tmp_path, read(tmp_path)) == ["P01", "P02"]
+    assert known_codes(tmp_path, read_register(tmp_path)) == ["P01", "P02"]
 
 
 # setting aside
@@ -155,14 +155,14 @@ def test_rows_are_taken_by_runs_that_began_even_if_their_journal_is_cut(tmp_path
     for code, row in (("P01", 0), ("P02", 3), ("P03", None)):
         a_head(tmp_path, code, row)
     a_head(tmp_path, "P01", 5, "preference")
-    assert used_rows(tmp_path, "direction", read(tmp_path)) == [0, 3]
-    assert used_rows(tmp_path, "preference", read(tmp_path)) == [5]
-    assert used_rows(tmp_path / "none", "direction", read(tmp_path / "none")) == []
+    assert used_rows(tmp_path, "direction", read_register(tmp_path)) == [0, 3]
+    assert used_rows(tmp_path, "preference", read_register(tmp_path)) == [5]
+    assert used_rows(tmp_path / "none", "direction", read_register(tmp_path / "none")) == []
 
 
 def test_a_run_that_was_set_aside_gives_its_row_back(tmp_path: Path) -> None:
     where = a_head(tmp_path, "P01", 0)
     a_head(tmp_path, "P02", 1)
     set_aside(where)
-    assert used_rows(tmp_path, "direction", read(tmp_path)) == [1]
+    assert used_rows(tmp_path, "direction", read_register(tmp_path)) == [1]
     assert [file.parent.name for file in journals(tmp_path, "direction")] == ["sub-P02"]

@@ -31,9 +31,9 @@ from analysis.predict.power.studies import Chunk, StudyDesign, run_chunk
 from analysis.predict.synthetic_studies import (
     direction_counts,
     null_rates,
-    on_scale,
     pattern_odds,
     preference_scores,
+    ratings_on_scale,
 )
 from analysis.stats.tukey import rm_tukey_hsd
 from experiments.design.streams import Stream, generator
@@ -121,7 +121,7 @@ def test_ratings_are_those_of_the_observer_for_the_same_draws() -> None:
 def test_a_scale_of_many_ratings_is_the_scale_of_one(grain: float) -> None:
     scale = RatingScale.model_validate({**PREFERENCE.rating.model_dump(), "grain": grain})
     values = draws().uniform(-2, 12, 2000)
-    assert on_scale(values, scale).tolist() == [one_on_scale(value, scale) for value in values]
+    assert ratings_on_scale(values, scale).tolist() == [one_on_scale(value, scale) for value in values]
 
 
 def test_half_the_effect_halves_the_distances_and_the_habit() -> None:

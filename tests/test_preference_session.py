@@ -20,9 +20,9 @@ from experiments.session.steps import (
     Presented,
     Rate,
     Rated,
-    Repeat,
+    Repeated,
     Step,
-    record,
+    step_record,
 )
 
 SETUP = load_setup("preference")
@@ -91,7 +91,7 @@ def test_a_stimulus_is_repeated_as_the_config_says_until_next() -> None:
 def test_the_question_is_the_papers_and_names_no_method() -> None:
     rates = [step for step in STEPS if isinstance(step, Rate)]
     assert {step.question for step in rates} == {QUESTION}
-    shown = {key: value for key, value in record(rates[0]).items() if key != "trial"}
+    shown = {key: value for key, value in step_record(rates[0]).items() if key != "trial"}
     for method in PLAN.methods:
         for name in (method, SETUP.gun.methods[method].label):
             assert name.lower() not in str(shown).lower()
@@ -136,6 +136,6 @@ def test_whatever_goes_wrong_each_method_is_felt_rated_and_described_once(troubl
 def test_a_stimulus_can_be_presented_again_as_long_as_its_rating_is_not_in() -> None:
     steps = driven()
     place = next(number for number, step in enumerate(steps) if isinstance(step, Rate))
-    again = driven({place: Repeat(trial=PLAN.trials[0], reason="a phone")})
+    again = driven({place: Repeated(trial=PLAN.trials[0], reason="a phone")})
     assert [type(step) for step in again[place : place + 4]] == [Rate, Prepare, Present, Rate]
     assert again[place + 3 :] == steps[place:]

@@ -11,7 +11,7 @@ from scipy import stats
 from analysis import rm_anova, rm_tukey_hsd
 from analysis.logs.reading import read_logs
 from analysis.paper.paper import Paper, load_paper
-from analysis.paper.published import Prediction, Row, rounds_to
+from analysis.paper.published import ComparisonRow, Prediction, rounds_to
 from analysis.paper.recurrence import WHOLE_PATTERN, chance_recurs, odds_of, recurs, wilson_interval
 from analysis.summary.comparison import compare
 from analysis.summary.results import DirectionStatistics, Pair, StudyStatistics
@@ -67,7 +67,7 @@ def _of(direction: DirectionStatistics | None) -> StudyStatistics:
     return StudyStatistics(direction=direction)
 
 
-def _row(rows: tuple[Row, ...], quantity: str, experiment: str = "direction") -> Row:
+def _row(rows: tuple[ComparisonRow, ...], quantity: str, experiment: str = "direction") -> ComparisonRow:
     (row,) = [row for row in rows if row.quantity == quantity and row.experiment == experiment]
     return row
 

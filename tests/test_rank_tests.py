@@ -9,8 +9,8 @@ import pytest
 from scipy import stats
 
 from analysis.stats.rank_tests import (
-    ALL_EQUAL,
     ALL_TIED,
+    NOTHING_TO_RANK,
     TWO_CONDITIONS,
     exact_signed_rank_p,
     friedman,
@@ -90,6 +90,6 @@ def test_ties_in_tenths_stay_ties() -> None:
 
 def test_equal_conditions_are_left_out_of_holm_and_say_why() -> None:
     first, second, third = signed_rank_tests(RIGHT[:, [0, 0, 1]])
-    assert (first.p, first.p_holm, first.reason, first.n) == (None, None, ALL_EQUAL, 0)
+    assert (first.p, first.p_holm, first.reason, first.n) == (None, None, NOTHING_TO_RANK, 0)
     assert second.p is not None
     assert second.p_holm == third.p_holm == 2.0 * second.p

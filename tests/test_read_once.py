@@ -60,7 +60,7 @@ def test_an_overview_reads_the_register_and_each_journal_once(study: StudyFolder
     assert [run.state for one in found.participants for run in one.runs] == ["not begun", "done"] * 3
     assert found.next is not None
     assert found.next.participant_id == "P01"
-    assert reads == {register.NAME: 1} | {JOURNAL.format(code): 1 for code in ("P01", "P02", "P03")}
+    assert reads == {register.REGISTER_FILE: 1} | {JOURNAL.format(code): 1 for code in ("P01", "P02", "P03")}
 
 
 def test_an_overview_that_looks_for_the_next_row_reads_no_journal_again(
@@ -78,7 +78,7 @@ def test_a_look_at_one_participant_reads_the_register_and_their_journal_once(
     study: StudyFolder, reads: Counter[str]
 ) -> None:
     look_at(study, "P02")
-    assert reads == {register.NAME: 1, JOURNAL.format("P02"): 1}
+    assert reads == {register.REGISTER_FILE: 1, JOURNAL.format("P02"): 1}
 
 
 def test_an_overview_makes_no_table(study: StudyFolder, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -91,7 +91,7 @@ def test_a_run_reads_the_register_once_and_its_own_journal_once_at_its_end(
     study: StudyFolder, reads: Counter[str]
 ) -> None:
     run(asked(study, "P04"), synthetic_screen, VirtualClock())
-    assert (reads[register.NAME], reads[JOURNAL.format("P04")]) == (1, 1)
+    assert (reads[register.REGISTER_FILE], reads[JOURNAL.format("P04")]) == (1, 1)
 
 
 def test_an_unfinished_run_that_is_asked_about_is_read_once(study: StudyFolder, reads: Counter[str]) -> None:
@@ -101,7 +101,7 @@ def test_an_unfinished_run_that_is_asked_about_is_read_once(study: StudyFolder, 
     with pytest.raises(UnfinishedRun, match="unfinished run") as found:
         run(asked(study, "P01"), synthetic_screen, VirtualClock())
     assert len(found.value.contents.records) == 4
-    assert (reads[register.NAME], reads[journal.name]) == (1, 1)
+    assert (reads[register.REGISTER_FILE], reads[journal.name]) == (1, 1)
 
 
 def test_the_methods_of_a_run_are_rendered_once_when_its_gun_is_loaded(

@@ -17,14 +17,22 @@ from experiments.clock import VirtualClock
 from experiments.record import storage
 from experiments.study import register
 from experiments.study.places import PlaceError, known_codes, place
-from experiments.study.register import NAME, Entry, Register, RegisterError, append, entry, read
+from experiments.study.register import (
+    REGISTER_FILE,
+    Register,
+    RegisterEntry,
+    RegisterError,
+    append,
+    entry,
+    read_register,
+)
 from tests.waiting import PATIENCE_S
 
 ROOT = Path(__file__).parent.parent
 FACTS = {"age_years": 25, "sex": "female", "handedness": "right"}
 
 
-def joined(code: str, **changes: object) -> Entry:
+def joined(code: str, **changes: object) -> RegisterEntry:
     return entry("joined", code, facts=FACTS | changes)
 
 
@@ -45,40 +53,40 @@ def results(tmp_path: Path) -> Path:
 
 
 def lines_of(results: Path) -> list[bytes]:
-    return (results / NAME).read_bytes().splitlines(keepends=True)
+    return (results / REGISTER_FILE).read_bytes().splitlines(keepends=True)
 
 
 # what is written is read
 
 
 def test_what_was_appended_is_read_in_its_order(results: Path) -> None:
-    found = read(results)
+    found = read_register(results)
     assert tuple(one for _, one in found.entries) == ENTRIES
     assert found.problem == ""
     assert all(utc.endswith("Z") for utc, _ in found.entries)
 
 
 def test_a_folder_without_a_register_has_nobody(tmp_path: Path) -> None:
-    assert read(tmp_path).members == {}
-    assert read(tmp_path).excluded() == {}
+    assert read_register(tmp_path).members == {}
+    assert read_register(tmp_path).excluded() == {}
     assert not list(tmp_path.iterdir())
 
 
 def test_the_register_is_for_its_owner_alone(results: Path) -> None:
-    assert stat.S_IMODE((results / NAME).stat().st_mode) == 0o600
+    assert stat.S_IMODE((results / REGISTER_FILE).stat().st_mode) == 0o600
     assert stat.S_IMODE(results.stat().st_mode) == 0o700
 
 
 def test_a_later_joined_record_corrects_the_facts_and_keeps_the_day(results: Path) -> None:
-    found = read(results)
+    found = read_register(results)
     assert found.members["P01"].facts == joined("P01", age_years=26).facts  # type: ignore[union-attr]
     assert found.members["P01"].joined_utc == found.entries[0][0]
 
 
 def test_the_last_exclusion_or_readmission_counts(results: Path) -> None:
-    assert read(results).excluded() == {}
+    assert read_register(results).excluded() == {}
     append(results, entry("excluded", "P02", reason="left for good"), VirtualClock())
-    assert read(results).excluded() == {"P02": "left for good"}
+    assert read_register(results).excluded() == {"P02": "left for good"}
 
 
 codes = st.sampled_from(["P01", "P02", "P03"])
@@ -91,8 +99,8 @@ any_entry = st.one_of(
 
 
 @given(st.lists(any_entry))
-def test_the_state_of_a_code_is_what_its_own_last_records_say(entries: list[Entry]) -> None:
-    found = Register(path=Path(NAME), entries=tuple(("2026-01-01T00:00:00Z", one) for one in entries)).members
+def test_the_state_of_a_code_is_what_its_own_last_records_say(entries: list[RegisterEntry]) -> None:
+    found = Register(path=Path(REGISTER_FILE), entries=tuple(("2026-01-01T00:00:00Z", one) for one in entries)).members
     assert set(found) == {one.participant_id for one in entries}
     for code, member in found.items():
         facts = [one.facts for one in entries if one.participant_id == code and isinstance(one, register.Joined)]
@@ -139,7 +147,7 @@ def test_a_code_that_differs_from_a_registered_one_in_case_alone_is_refused(resu
     with pytest.raises(RegisterError, match=r"'p01' differs from 'P01' .* in case alone"):
         append(results, joined("p01"), VirtualClock())
     assert lines_of(results) == before
-    assert known_codes(results, read(results)) == ["P01", "P02"]
+    assert known_codes(results, read_register(results)) == ["P01", "P02"]
     with pytest.raises(PlaceError, match="in case alone"):
         place(results, "p02", "direction")
 
@@ -148,14 +156,14 @@ def test_a_code_that_differs_from_a_registered_one_in_case_alone_is_refused(resu
 
 
 def test_a_register_cut_off_at_any_byte_holds_its_whole_records_and_can_be_gone_on_with(results: Path) -> None:
-    data = (results / NAME).read_bytes()
+    data = (results / REGISTER_FILE).read_bytes()
     for length in range(len(data)):
-        (results / NAME).write_bytes(data[:length])
-        found = read(results)
+        (results / REGISTER_FILE).write_bytes(data[:length])
+        found = read_register(results)
         assert found.problem == ""
         assert tuple(one for _, one in found.entries) == ENTRIES[: data[:length].count(b"\n")]
     append(results, joined("P09"), VirtualClock())
-    assert [one.participant_id for _, one in read(results).entries] == ["P01", "P02", "P02", "P02", "P09"]
+    assert [one.participant_id for _, one in read_register(results).entries] == ["P01", "P02", "P02", "P02", "P09"]
 
 
 @settings(max_examples=200)
@@ -164,16 +172,16 @@ def test_a_byte_changed_before_the_last_record_is_noticed_and_named(data: st.Dat
     with tempfile.TemporaryDirectory() as folder:
         for one in ENTRIES:
             append(Path(folder), one, VirtualClock())
-        file = Path(folder) / NAME
+        file = Path(folder) / REGISTER_FILE
         content = bytearray(file.read_bytes())
         place_in_file = data.draw(st.integers(0, content.rindex(b"\n", 0, -1) - 1))
         content[place_in_file] = data.draw(st.integers(0, 255).filter(lambda byte: byte != content[place_in_file]))
         file.write_bytes(content)
-        found = read(Path(folder))
-        assert f"{NAME}: line " in found.problem
+        found = read_register(Path(folder))
+        assert f"{REGISTER_FILE}: line " in found.problem
         assert len(found.entries) < len(ENTRIES)
         with pytest.raises(RegisterError, match="restore it from a copy"):
-            read(Path(folder)).excluded()
+            read_register(Path(folder)).excluded()
         with pytest.raises(RegisterError, match="restore it from a copy"):
             append(Path(folder), joined("P09"), VirtualClock())
         assert file.read_bytes() == content
@@ -181,21 +189,21 @@ def test_a_byte_changed_before_the_last_record_is_noticed_and_named(data: st.Dat
 
 @pytest.mark.parametrize("line", [b"{}", b"[]", b"7", b"\xff", b"[" * 100_000, b'{"n":0,"link":"","kind":"joined"}'])
 def test_a_line_that_is_no_record_is_a_problem_with_its_place(tmp_path: Path, line: bytes) -> None:
-    (tmp_path / NAME).write_bytes(line + b"\n")
-    assert read(tmp_path).problem.startswith(f"{tmp_path / NAME}: line 1: ")
+    (tmp_path / REGISTER_FILE).write_bytes(line + b"\n")
+    assert read_register(tmp_path).problem.startswith(f"{tmp_path / REGISTER_FILE}: line 1: ")
 
 
 def test_a_damaged_register_still_gives_the_codes_before_the_damage(results: Path) -> None:
-    (results / NAME).write_bytes(b"".join([*lines_of(results)[:2], b"damage\n"]))
-    assert known_codes(results, read(results)) == ["P01", "P02"]
+    (results / REGISTER_FILE).write_bytes(b"".join([*lines_of(results)[:2], b"damage\n"]))
+    assert known_codes(results, read_register(results)) == ["P01", "P02"]
 
 
 # the disk and other programs
 
 
 def test_a_register_that_cannot_be_read_or_made_is_one_message(tmp_path: Path) -> None:
-    (tmp_path / NAME).mkdir()
-    assert "cannot be read" in read(tmp_path).problem
+    (tmp_path / REGISTER_FILE).mkdir()
+    assert "cannot be read" in read_register(tmp_path).problem
     with pytest.raises(RegisterError, match="nothing was added"):
         append(tmp_path, joined("P01"), VirtualClock())
     (tmp_path / "file").touch()
@@ -207,12 +215,12 @@ def test_a_register_held_by_another_program_is_waited_for_and_then_left(
     results: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(register, "_PAUSE_S", 0.001)
-    holder = storage.reopen(results / NAME)
+    holder = storage.reopen(results / REGISTER_FILE)
     assert storage.hold(holder)
     before = lines_of(results)
     with pytest.raises(RegisterError, match="another program has held it"):
         append(results, joined("P09"), VirtualClock())
-    assert len(read(results).entries) == len(ENTRIES)  # reading never waits
+    assert len(read_register(results).entries) == len(ENTRIES)  # reading never waits
     os.close(holder)
     append(results, joined("P09"), VirtualClock())
     assert lines_of(results)[:-1] == before
@@ -242,7 +250,7 @@ def test_consoles_that_write_at_once_neither_lose_nor_tear_a_record(tmp_path: Pa
     for console in consoles:
         _, said = console.communicate(timeout=PATIENCE_S)
         assert (console.returncode, said) == (0, "")
-    found = read(tmp_path / "results")
+    found = read_register(tmp_path / "results")
     assert found.problem == ""
     for name in "ABCD":
         own = [one.participant_id for _, one in found.entries if one.participant_id.startswith(name)]
@@ -250,9 +258,9 @@ def test_consoles_that_write_at_once_neither_lose_nor_tear_a_record(tmp_path: Pa
 
 
 def test_a_full_disk_is_said_and_leaves_whole_records(results: Path) -> None:
-    before = (results / NAME).read_bytes()
+    before = (results / REGISTER_FILE).read_bytes()
     full = appending(results, "A", 1, limit=len(before) + 40)
     _, said = full.communicate(timeout=PATIENCE_S)
     assert full.returncode == 1
     assert "cannot be written" in said
-    assert (results / NAME).read_bytes() == before
+    assert (results / REGISTER_FILE).read_bytes() == before

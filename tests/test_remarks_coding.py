@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 from analysis.logs.reading import read_logs
-from analysis.summary.remarks_coding import Codebook, Remark, code_remarks, load_codebook, section
+from analysis.summary.remarks_coding import Codebook, WrittenRemark, code_remarks, coding_section, load_codebook
 from experiments.config.door import ConfigError
 from tests.conftest import Recoil
 from tests.log_files import write_study
@@ -33,8 +33,8 @@ participants = ["P04"]
 PEOPLE = [f"P{number:02d}" for number in range(1, 15)]
 
 
-def remark(participant: str, text: str, method: str = "vibration") -> Remark:
-    return Remark(participant=participant, method=method, text=text)
+def remark(participant: str, text: str, method: str = "vibration") -> WrittenRemark:
+    return WrittenRemark(participant=participant, method=method, text=text)
 
 
 @pytest.fixture
@@ -69,7 +69,7 @@ def test_the_papers_own_counts_get_the_percentages_that_they_have() -> None:
         {"code": name, "label": name, "participants": tuple(PEOPLE[:count])} for name, count in (("a", 5), ("b", 4))
     ]
     coded = code_remarks([], PEOPLE, Codebook.model_validate({"codes": tuple(codes)}))
-    assert [row[-1] for row in section(coded).tables[0].rows] == ["35.7 %", "28.6 %"]
+    assert [row[-1] for row in coding_section(coded).tables[0].rows] == ["35.7 %", "28.6 %"]
 
 
 def test_codes_given_by_hand_come_from_a_table(tmp_path: Path) -> None:

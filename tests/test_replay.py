@@ -17,7 +17,7 @@ from experiments.clock import VirtualClock
 from experiments.config.setup import Setup, canonical_json
 from experiments.design.plan import Plan
 from experiments.load import load_setup
-from experiments.record.journal import Journal, JournalError, link, read
+from experiments.record.journal import Journal, JournalError, link_of, read_journal
 from experiments.record.replay import go_on, history, replay
 from experiments.run import Again, RunRequest, run
 from experiments.screens.synthetic import synthetic_screen
@@ -107,7 +107,7 @@ def check_resumed(whole: Unbroken, journal: Path, records: int) -> None:
     name, results = whole.name, journal.parent.parent
     done = run(request(name, results, "resume", seed=None), synthetic_screen, VirtualClock())
     assert done.plan == whole.plan
-    contents = read(journal)
+    contents = read_journal(journal)
     assert contents.finished
     # nothing that was on the disk changed
     assert b"".join(journal.read_bytes().splitlines(keepends=True)[:records]) == b"".join(whole.lines[:records])
@@ -180,7 +180,7 @@ def test_a_run_may_be_broken_off_and_gone_on_with_many_times(
         resumed = max(number for number, line in enumerate(lines) if json.loads(line)["kind"] == "resumed")
         journal.write_bytes(b"".join(lines[: resumed + 6]))
     run(request(name, tmp_path, "resume"), synthetic_screen, VirtualClock())
-    assert [entry.kind for entry in read(journal).records].count("resumed") == 5
+    assert [entry.kind for entry in read_journal(journal).records].count("resumed") == 5
     rows = rows_of(place(tmp_path, "P01", name).table)
     for column in ANSWERS[name]:
         assert [row[column] for row in rows] == [row[column] for row in whole.rows]
@@ -237,7 +237,7 @@ def forged(entries: Sequence[dict[str, Any]]) -> bytes:
     """Records as lines whose numbers and links are right, whatever they say."""
     lines: list[bytes] = []
     for n, entry in enumerate(entries):
-        before = link(lines[-1]) if lines else ""
+        before = link_of(lines[-1]) if lines else ""
         lines.append(canonical_json(entry | {"n": n, "link": before}) + b"\n")
     return b"".join(lines)
 
@@ -309,7 +309,7 @@ def test_an_outcome_without_its_step_is_refused_with_its_line(unbroken: dict[str
     journal = broken_off(whole, tmp_path, 1)
     journal.write_bytes(forged(doubled))
     with pytest.raises(JournalError, match="line 4: an outcome without its step"):
-        history(read(journal))
+        history(read_journal(journal))
 
 
 def test_an_emergency_stop_that_the_disk_did_not_take_is_known_from_the_reason_of_the_stop(
@@ -320,8 +320,8 @@ def test_an_emergency_stop_that_the_disk_did_not_take_is_known_from_the_reason_o
     journal = broken_off(whole, tmp_path, 1)
     for reason, halted in ((EMERGENCY, True), ("lunch", False)):
         journal.write_bytes(forged([*(whole.records[number] for number in (0, 1, 2)), stopped | {"reason": reason}]))
-        session = catalogue.CATALOGUE["direction"].session(read(journal).plan, SETUPS["direction"])
-        assert replay(session, read(journal)).halted == halted
+        session = catalogue.CATALOGUE["direction"].session(read_journal(journal).plan, SETUPS["direction"])
+        assert replay(session, read_journal(journal)).halted == halted
 
 
 @pytest.mark.parametrize("name", SETUPS)
@@ -343,7 +343,7 @@ def test_a_fresh_run_sets_the_unfinished_one_aside_with_every_byte(
     before = journal.read_bytes()
     run(request(name, tmp_path, "fresh", seed=5), synthetic_screen, VirtualClock())
     assert journal.with_name(f"{journal.stem}.aside-1.jsonl").read_bytes() == before
-    assert read(journal).plan.seed == 5
+    assert read_journal(journal).plan.seed == 5
 
 
 def test_why_a_run_was_set_aside_stands_in_the_register_and_in_the_new_journals_head(
@@ -352,7 +352,7 @@ def test_why_a_run_was_set_aside_stands_in_the_register_and_in_the_new_journals_
     journal = broken_off(unbroken["preference"], tmp_path, 6)
     asked = replace(request("preference", tmp_path, "fresh"), anew_reason="the gun came loose")
     run(asked, synthetic_screen, VirtualClock())
-    (_, one), *others = register.read(tmp_path).entries
+    (_, one), *others = register.read_register(tmp_path).entries
     assert not others
     assert one.model_dump() == {
         "kind": "set-aside",
@@ -366,7 +366,7 @@ def test_why_a_run_was_set_aside_stands_in_the_register_and_in_the_new_journals_
 def test_where_there_was_nothing_to_set_aside_no_reason_is_recorded(tmp_path: Path) -> None:
     asked = replace(request("preference", tmp_path, "fresh"), anew_reason="the gun came loose")
     done = run(asked, synthetic_screen, VirtualClock())
-    assert not register.read(tmp_path).entries
+    assert not register.read_register(tmp_path).entries
     assert "set_aside_reason" not in raw(done.place.journal)[0]
 
 
@@ -391,13 +391,13 @@ def test_a_journal_in_which_nothing_was_acknowledged_is_set_aside(
 ) -> None:
     journal = broken_off(unbroken["preference"], tmp_path, 0, b'{"half')
     run(request("preference", tmp_path, again), synthetic_screen, VirtualClock())
-    assert read(journal).finished
+    assert read_journal(journal).finished
     assert journal.with_name(f"{journal.stem}.aside-1.jsonl").read_bytes() == b'{"half'
 
 
 def test_a_run_that_another_process_is_at_cannot_be_set_aside(unbroken: dict[str, Unbroken], tmp_path: Path) -> None:
     journal = broken_off(unbroken["preference"], tmp_path, 6)
-    with Journal.reopen(read(journal), VirtualClock()), pytest.raises(JournalError, match="another run holds"):
+    with Journal.reopen(read_journal(journal), VirtualClock()), pytest.raises(JournalError, match="another run holds"):
         run(request("preference", tmp_path, "fresh"), synthetic_screen, VirtualClock())
 
 
@@ -416,7 +416,7 @@ def test_a_finished_run_is_never_done_again(again: Again, unbroken: dict[str, Un
 @pytest.mark.parametrize("name", SETUPS)
 def test_replaying_a_whole_journal_stands_at_the_end(name: str, unbroken: dict[str, Unbroken], tmp_path: Path) -> None:
     whole = unbroken[name]
-    contents = read(broken_off(whole, tmp_path, len(whole.lines) - 1))
+    contents = read_journal(broken_off(whole, tmp_path, len(whole.lines) - 1))
     session = catalogue.CATALOGUE[name].session(whole.plan, SETUPS[name])
     standing = replay(session, contents)
     assert standing.step is None

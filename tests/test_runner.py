@@ -12,7 +12,7 @@ from experiments.clock import Clock, VirtualClock
 from experiments.config.setup import Setup
 from experiments.design.plan import Plan
 from experiments.live_run import RunStopped
-from experiments.record.journal import Journal, read
+from experiments.record.journal import Journal, read_journal
 from experiments.run import RunRequest, run
 from experiments.runner import MAX_FAILURES
 from experiments.screens.synthetic import SyntheticScreen, synthetic_screen
@@ -226,10 +226,10 @@ def test_what_was_acknowledged_before_an_interrupt_is_there_when_resumed(name: s
     desk.screen.trouble[9] = KeyboardInterrupt()
     with suppress(KeyboardInterrupt):
         desk.carry_out()
-    before = read(desk.where.journal).records
+    before = read_journal(desk.where.journal).records
     assert before[-1].kind == "outcome"
     rows = resumed_rows(desk)
-    assert read(desk.where.journal).records[: len(before)] == before
+    assert read_journal(desk.where.journal).records[: len(before)] == before
     assert {row["flags"] for row in rows} == {""}
 
 
@@ -247,7 +247,7 @@ def test_an_interrupted_run_leaves_a_reason_and_a_table_of_what_was_answered(tmp
     with pytest.raises(KeyboardInterrupt):
         run(request, impatient, VirtualClock())
     where = place(tmp_path, "P01", "direction")
-    last = read(where.journal).records[-1]
+    last = read_journal(where.journal).records[-1]
     assert (last.kind, last.reason) == ("stopped", "interrupted")
     with where.table.open(newline="") as file:
         rows = list(csv.DictReader(file))
@@ -258,5 +258,5 @@ def test_an_interrupted_run_leaves_a_reason_and_a_table_of_what_was_answered(tmp
 def test_the_gun_is_closed_and_the_journal_let_go_after_a_run(tmp_path: Path) -> None:
     request = RunRequest(setup=SETUPS["preference"], participant_id="P01", results=tmp_path, seed=1)
     done = run(request, synthetic_screen, VirtualClock())
-    with closing(Journal.reopen(read(done.place.journal), VirtualClock())) as journal:
+    with closing(Journal.reopen(read_journal(done.place.journal), VirtualClock())) as journal:
         assert journal.path == done.place.journal

@@ -23,7 +23,7 @@ from device.serial_gun.reports import (
     ready_s,
 )
 from device.wire.records import ShotRecord, StatusRecord
-from experiments.record.journal import read
+from experiments.record.journal import read_journal
 from experiments.study.places import place
 from tests.forger import FORGERIES, ShotLiar, a_lying_pair, a_lying_twin
 from tests.serial_runs import SPEED, check, hasty, run_all, timings_of
@@ -192,7 +192,9 @@ def test_a_run_with_a_lying_gun_goes_on_and_each_row_has_one_valid_shot(tmp_path
     assert set(liar.told) == set(FORGERIES)
     for _, cause in FORGERIES.values():
         assert any(re.search(cause, found) for found in tally.causes)
-    counts = [one["gun_count"] for one in timings_of(read(place(tmp_path / "results", "P0001", "direction").journal))]
+    counts = [
+        one["gun_count"] for one in timings_of(read_journal(place(tmp_path / "results", "P0001", "direction").journal))
+    ]
     assert counts == sorted(set(counts))
     assert len(counts) == 60 < counts[-1]  # the gaps are the shots that were not believed
 

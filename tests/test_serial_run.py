@@ -9,7 +9,7 @@ from dataclasses import replace
 import pytest
 
 from device.wire import errors
-from experiments.record.journal import read
+from experiments.record.journal import read_journal
 from experiments.record.replay import history
 from experiments.session.steps import Failed
 from experiments.study.places import PlaceError
@@ -40,7 +40,7 @@ def test_trains_on_a_bad_line_are_whole_and_never_too_soon(tmp_path, quick_confi
     with a_twin(tmp_path, noise, speed=SPEED) as (twin, socket):
         gun = f"serial:{socket.address}?speed={SPEED:g}"
         done = resumed(lambda again: one_run(config, tmp_path / "results", gun, "P01", again))
-    contents = read(done.journal)
+    contents = read_journal(done.journal)
     whole = [(shots, body) for shots, body in of_trains(contents) if body and body["kind"] == "presented"]
     assert [len(shots) for shots, _ in whole] == [body["shots"] for _, body in whole]
     assert len(whole) == 3
@@ -94,13 +94,13 @@ def test_a_run_on_the_twin_logs_what_one_on_the_simulated_gun_does_but_for_times
         logs.append({key: tmp_path / path for key, path in json.loads(done.stdout).items()})
     simulated, twin = (rows(log["table"]) for log in logs)
     assert [told(row) for row in twin] == [told(row) for row in simulated]
-    contents = read(logs[1]["journal"])
+    contents = read_journal(logs[1]["journal"])
     causes = [outcome.cause for _, outcome in history(contents) if isinstance(outcome, Failed)]
     assert [cause for cause in causes if "watchdog" not in cause] == []
     timings = timings_of(contents)
     assert len(timings) == sum(int(row.get("shots", 1)) for row in twin) or causes
     assert all(one["requested_s"] <= one["written_s"] <= one["acknowledged_s"] for one in timings)
-    assert all("timing" not in str(record.body) for record in read(logs[0]["journal"]).records)
+    assert all("timing" not in str(record.body) for record in read_journal(logs[0]["journal"]).records)
 
 
 @pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGKILL])

@@ -11,7 +11,7 @@ from pathlib import Path
 
 import pytest
 
-from analysis.paper.audit import Result, audit, debit, grim, grimmer, load_paper_file, p_against_statistic
+from analysis.paper.audit import CheckResult, audit, debit, grim, grimmer, load_paper_file, p_against_statistic
 from analysis.paper.audit.participants import forward_counts, rating_grains
 from analysis.paper.audit.reconstruct import meets, reconstruct
 from analysis.paper.paper import load_paper
@@ -22,7 +22,7 @@ from tests.conftest import Soak
 
 pytestmark = pytest.mark.soak
 
-Cases = Iterator[tuple[object, str, Result]]
+Cases = Iterator[tuple[object, str, CheckResult]]
 SUITES: dict[str, Callable[[], Cases]] = {
     "GRIM": lambda: brute.grim_cases(range(1, 101), 2, 2),
     "percentage of a count": lambda: brute.percent_cases(range(1, 21), 1),

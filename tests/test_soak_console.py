@@ -16,8 +16,8 @@ from typing import Any
 import numpy as np
 import pytest
 
-from experiments.doctor.verdicts import Latencies, latencies, together
-from experiments.record.journal import read
+from experiments.doctor.verdicts import Latencies, latencies, pooled
+from experiments.record.journal import read_journal
 from tests import at_runs as console
 from tests import faulty_console as faults
 from tests.at_display import (
@@ -130,12 +130,12 @@ def kill_a_terminal(configs: Path, folder: Path, seconds: float) -> tuple[int, b
     """Go on with a run and kill it: the answers that were acknowledged, and whether all are given."""
     journal = folder / "results" / f"{console.DIRECTION.removeprefix('results/')}_journal.jsonl"
     begun = journal.exists() and journal.read_bytes().count(b"\n") > 0
-    before = terminal_answers(read(journal)) if begun else ""
+    before = terminal_answers(read_journal(journal)) if begun else ""
     with AtTerminal(terminal_words(configs, "--resume" if begun else "--fresh"), folder) as screen:
         screen.wait_for("Participant P01", timeout_s=60)
         answer_until_killed(screen, seconds, len(before))
         said = len(re.findall(r"Saved\. Trial", screen.seen))
-    after = terminal_answers(read(journal)) if journal.exists() and journal.read_bytes().count(b"\n") else ""
+    after = terminal_answers(read_journal(journal)) if journal.exists() and journal.read_bytes().count(b"\n") else ""
     assert after.startswith(before)
     assert len(after) - len(before) - said in (0, 1)
     assert after == (ANSWERS * 8)[: len(after)]
@@ -170,7 +170,7 @@ def measured(configs: Path, folder: Path, display: str) -> Latencies:
         with AtDisplay(console.words(configs, "direction", *more), folder, display) as screen:
             code, said = screen.end()
         assert code == 0, said
-    return together(latencies(read(path).records) for path in folder.glob("results/*/*_journal.jsonl"))
+    return pooled(latencies(read_journal(path).records) for path in folder.glob("results/*/*_journal.jsonl"))
 
 
 def percentile_99(values: tuple[float, ...] | list[float]) -> float:

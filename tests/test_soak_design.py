@@ -13,7 +13,7 @@ from typing import Any
 
 import pytest
 
-from analysis.predict.design_search.critical import LEVEL, rate_at
+from analysis.predict.design_search.critical import THRESHOLD_SHARE, rate_at
 from analysis.predict.jobs import cores
 from device.parameters import GunParameters
 from device.physics.shot import highest_rate_Hz
@@ -84,7 +84,9 @@ def test_the_contour_holds_when_simulated_alone(whole: tuple[Any, float], soak: 
         for friction, voltage in zip(critical["friction_N"], critical["voltage_V"], strict=True)
         if voltage is not None
     ]
-    worst = max(abs(rate_at(replace(PAPER, friction_N=f, voltage_V=v), parameters) - LEVEL) for f, v in points)
+    worst = max(
+        abs(rate_at(replace(PAPER, friction_N=f, voltage_V=v), parameters) - THRESHOLD_SHARE) for f, v in points
+    )
     soak("the contour's points, simulated alone: off 75 %", f"{100 * worst:.3f} points", "0.1 points", f"{len(points)}")
     for friction in (0.21, 1.12):
         place = critical["friction_N"].index(friction)

@@ -17,7 +17,7 @@ from statsmodels.stats.anova import AnovaRM
 
 from experiments.direction.session import make_plan
 from experiments.load import load_setup
-from experiments.record.journal import JournalError, read
+from experiments.record.journal import JournalError, read_journal
 from tests import test_durability as durability
 from tests import test_reproduce as reproduction
 from tests.conftest import RECOIL, Soak
@@ -140,7 +140,7 @@ def test_a_journal_cut_at_every_byte(out: Path, tmp_path: Path, soak: Soak) -> N
         cut.write_bytes(data[:length])
         whole = data[:length].count(b"\n")
         try:
-            contents = read(cut)
+            contents = read_journal(cut)
             wrong += len(contents.records) != whole or bool(contents.cut_message) != (data[length - 1] != 0x0A)
         except JournalError:
             wrong += whole > 0

@@ -10,7 +10,7 @@ import pytest
 
 from device.serial_gun.link import WATCHDOG_S
 from device.serial_gun.opening import MAX_SPEED
-from experiments.record.journal import read
+from experiments.record.journal import read_journal
 from tests.forger import ShotLiar, a_lying_twin
 from tests.serial_runs import SPEED, TROUBLES, check, hasty, of_trains, one_run, run_all
 from tests.twins import Troubles, a_pair, a_twin
@@ -56,7 +56,7 @@ def test_the_shots_of_trains_in_real_time(tmp_path, quick_configs, soak):
     with a_twin(tmp_path, line, speed=1.0, drift_ppm=80.0) as (twin, socket):
         done = one_run(config, tmp_path / "results", f"serial:{socket.address}", "P01", "ask")
         assert not any(true.too_soon for true in twin.body.ledger)
-    trains = [[shot["timing"]["gun_start_us"] for shot in shots] for shots, _ in of_trains(read(done.journal))]
+    trains = [[shot["timing"]["gun_start_us"] for shot in shots] for shots, _ in of_trains(read_journal(done.journal))]
     off_us = [start - train[0] - 1_000_000 * n for train in trains for n, start in enumerate(train)]
     exact = sum(off == 0 for off in off_us) / len(off_us)
     detail = f"{len(off_us)} shots at 1 Hz, worst {max(off_us) / 1000:.3f} ms late; line of 1 to 5 ms each way, 80 ppm"

@@ -17,7 +17,7 @@ import pytest
 
 from device import LinkError
 from device.serial_gun import triggering
-from experiments.record.journal import read
+from experiments.record.journal import read_journal
 from tests import armed_host
 from tests.conftest import RECOIL
 from tests.forger import a_lying_pair
@@ -111,7 +111,7 @@ def test_trains_under_load_lose_few_shots_to_the_watchdog(tmp_path, quick_config
         words += ["--gun", gun, "--results", str(tmp_path / "results")]
         run_to_its_end(words)
     (journal,) = (tmp_path / "results").rglob("*_journal.jsonl")
-    trains = list(of_trains(read(journal)))
+    trains = list(of_trains(read_journal(journal)))
     shots = sum(len(shots) for shots, _ in trains)
     causes = Counter(body["cause"] for _, body in trains if body and body["kind"] == "failed")
     lapses = sum(count for cause, count in causes.items() if "watchdog" in cause)

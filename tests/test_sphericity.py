@@ -7,7 +7,7 @@ import pytest
 
 from analysis.stats.anova import rm_anova
 from analysis.stats.diagnostics import residuals
-from analysis.stats.sphericity import NO_VARIANCE, SINGULAR, TOO_FEW, TRIVIAL, Corrected, sphericity
+from analysis.stats.sphericity import NO_COVARIANCES, SINGULAR, TOO_FEW, TRIVIAL, Corrected, sphericity
 from tests.made_scores import RIGHT
 
 
@@ -78,7 +78,7 @@ def test_a_contrast_without_variance_has_no_chi_square() -> None:
 )
 def test_no_variance_is_no_result_but_a_reason(scores: Any) -> None:
     found = sphericity(scores)
-    assert (found.W, found.greenhouse_geisser, found.huynh_feldt, found.reason) == (None, None, None, NO_VARIANCE)
+    assert (found.W, found.greenhouse_geisser, found.huynh_feldt, found.reason) == (None, None, None, NO_COVARIANCES)
 
 
 def test_residuals_sum_to_zero_both_ways() -> None:

@@ -18,7 +18,7 @@ from experiments.clock import VirtualClock
 from experiments.load import load_setup
 from experiments.run import RunRequest, run
 from experiments.screens.synthetic import synthetic_screen
-from experiments.study.register import read
+from experiments.study.register import read_register
 from recoil.config_files import new_study
 from tests import watched_start
 from tests.at_display import HAND_S, AtDisplay, last_record, needs_display
@@ -307,7 +307,7 @@ def test_starting_anew_from_the_window_keeps_the_reason(pilot: Path, display: st
         wait_until(lambda: last_record(folder / "sub-P01_task-direction_journal.jsonl").get("kind") == "step")
         screen.process.terminate()
         assert screen.end()[0] == 130
-    said = [(one.kind, getattr(one, "reason", "")) for _, one in read(pilot / LONG).entries]
+    said = [(one.kind, getattr(one, "reason", "")) for _, one in read_register(pilot / LONG).entries]
     assert said == [("joined", ""), ("set-aside", "loose")]
 
 

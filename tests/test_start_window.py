@@ -23,7 +23,7 @@ from PyQt6.QtWidgets import QApplication, QPushButton, QWidget
 
 from experiments.clock import RealClock, VirtualClock
 from experiments.load import load_setup
-from experiments.record.journal import hold
+from experiments.record.journal import hold_journal
 from experiments.run import ParticipantOptions, RunRequest, run
 from experiments.screens.console import widgets
 from experiments.screens.console.app import application
@@ -34,7 +34,7 @@ from experiments.screens.synthetic import synthetic_screen
 from experiments.study import enrolment, register
 from experiments.study.places import place
 from experiments.study.progress import StudyFolder, open_study
-from experiments.study.register import read
+from experiments.study.register import read_register
 from experiments.study.study import Facts
 from recoil.config_files import new_study
 
@@ -144,7 +144,7 @@ def experiment(window: StartWindow) -> str:
 
 
 def entries(study: StudyFolder) -> list[tuple[str, str]]:
-    return [(one.kind, one.participant_id) for _, one in read(study.results).entries]
+    return [(one.kind, one.participant_id) for _, one in read_register(study.results).entries]
 
 
 def table(window: StartWindow) -> dict[str, list[str]]:
@@ -270,7 +270,7 @@ def test_start_chooses_who_was_entered_and_has_their_facts_on_record(study: Stud
     assert (choice.options, choice.practice) == (ParticipantOptions(screen=True), False)
     assert (choice.screen, choice.gun, choice.results) == ("console", SERIAL, study.results)
     assert not window.isVisible()
-    assert read(study.results).members["P01"].facts == FACTS
+    assert read_register(study.results).members["P01"].facts == FACTS
 
 
 @pytest.mark.parametrize(
@@ -487,7 +487,7 @@ def test_a_run_that_was_opened_elsewhere_meanwhile_is_left_alone(answer: str, st
     ask_resume(window)
     assert window.question is not None
     window.question.reason.setText("why not")
-    descriptor = hold(journal)
+    descriptor = hold_journal(journal)
     key(window, answer, CTRL)
     assert window.choice is None
     assert "P01 sits at another console" in said(window)
@@ -496,7 +496,7 @@ def test_a_run_that_was_opened_elsewhere_meanwhile_is_left_alone(answer: str, st
 
 
 def test_a_run_that_is_open_elsewhere_is_shown_as_such(study: StudyFolder, opened: Open) -> None:
-    descriptor = hold(do(study, "P01", records=40))
+    descriptor = hold_journal(do(study, "P01", records=40))
     window = opened()
     assert table(window)["P01"][0].startswith("open elsewhere, ")
     assert window.form.code.text() == "P02"
@@ -560,13 +560,13 @@ def test_somebody_is_excluded_for_a_reason_and_readmitted(study: StudyFolder, op
     assert said(window) == "Type why, first."
     QTest.keyClicks(QApplication.focusWidget(), "fell ill")
     key(window, "D", CTRL)
-    assert register.read(study.results).excluded() == {"P01": "fell ill"}
+    assert register.read_register(study.results).excluded() == {"P01": "fell ill"}
     assert (table(window)["P01"][-1], remark(window)) == ("excluded: fell ill", "P01 is excluded: fell ill.")
     assert window.exclude_button.text().startswith("Readmit")
     key(window, "E", ALT)
     QTest.keyClicks(QApplication.focusWidget(), "well again")
     key(window, "D", CTRL)
-    assert register.read(study.results).excluded() == {}
+    assert register.read_register(study.results).excluded() == {}
     assert entries(study) == [("excluded", "P01"), ("readmitted", "P01")]
 
 
@@ -588,7 +588,7 @@ def test_the_exclusion_is_of_the_code_it_was_asked_for(study: StudyFolder, opene
     window.question.reason.setText("fell ill")
     window.form.code.setText("P02")
     key(window, "D", CTRL)
-    assert register.read(study.results).excluded() == {}
+    assert register.read_register(study.results).excluded() == {}
 
 
 # the simulated gun
@@ -599,10 +599,10 @@ def test_a_person_is_run_on_a_simulated_gun_only_after_a_question(study: StudyFo
     fill(window, "P01")
     key(window, "Return", CTRL)
     assert question(window).startswith("The gun is SIMULATED: P01 will feel nothing.")
-    assert not read(study.results).members
+    assert not read_register(study.results).members
     key(window, "Return", CTRL)
     assert window.choice is None
-    assert not read(study.results).members
+    assert not read_register(study.results).members
     key(window, "S", CTRL)
     assert window.choice is not None
 

@@ -39,7 +39,7 @@ ENDS = (events.EmergencyStop, events.Stop, events.DisplayLost, events.ResultsGon
 """What may end a run from wherever it is."""
 CARRY_ON = (
     *(events.DamperSet, events.Fire, events.Answer, events.Next, events.Rating, events.Description, events.EndBreak),
-    *(events.Finish, events.Rearm, events.Repeat, events.BreakOver, *events.OWN),
+    *(events.Finish, events.Rearm, events.Repeat, events.BreakOver, *events.OWN_HAND_EVENTS),
 )
 """What takes a run to its next step."""
 OWN = {S.ASKING: events.ParticipantKey, S.RATING: events.ParticipantRated, S.DESCRIBING: events.ParticipantDescribed}

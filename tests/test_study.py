@@ -18,13 +18,13 @@ from experiments.config.models import EligibilityConfig, Handedness, Sex, StudyC
 from experiments.config.setup import Setup
 from experiments.design.plan import Plan
 from experiments.load import load_setup, load_study, shipped_folder
-from experiments.study.places import next_row, place, used_rows
-from experiments.study.register import append, entry, read
+from experiments.study.places import place, row_of_next_run, used_rows
+from experiments.study.register import append, entry, read_register
 from experiments.study.study import (
     Facts,
     Participant,
     RunProgress,
-    State,
+    RunState,
     by_code,
     eligible,
     free_code,
@@ -144,7 +144,7 @@ def test_a_contradiction_is_refused_with_file_line_key_value_and_rule(
 # who comes next
 
 
-def someone(code: str, *states: State, excluded: str | None = None) -> Participant:
+def someone(code: str, *states: RunState, excluded: str | None = None) -> Participant:
     runs = tuple(RunProgress(experiment=name, state=state) for name, state in zip(EXPERIMENTS, states, strict=True))
     return Participant(participant_id=code, runs=runs, excluded=excluded)
 
@@ -203,7 +203,9 @@ def test_a_free_code_is_nobodys_whatever_the_case(taken: list[str]) -> None:
 
 
 everyone = st.lists(
-    st.tuples(st.integers(1, 30), st.sampled_from(get_args(State)), st.sampled_from(get_args(State)), st.booleans()),
+    st.tuples(
+        st.integers(1, 30), st.sampled_from(get_args(RunState)), st.sampled_from(get_args(RunState)), st.booleans()
+    ),
     unique_by=lambda drawn: drawn[0],
 )
 
@@ -248,7 +250,7 @@ def begin(results: Path, code: str, setup: Setup[Any]) -> None:
     """The head of a run that takes the next row, as the program would write it."""
     where = place(results, code, setup.config.experiment)
     where.folder.mkdir(parents=True)
-    row = next_row(setup, results, read(results))
+    row = row_of_next_run(setup, results, read_register(results))
     plan = Plan(experiment=where.experiment, participant_id=code, seed=1, order_row=row, trials=())
     write_head(where.journal, plan)
 
@@ -270,7 +272,7 @@ def test_rows_differ_by_one_at_most_once_drop_outs_are_replaced(
                 begun += 1
                 taking_part.append(f"P{begun:02d}")
                 begin(results, taking_part[-1], setup)
-            counts = Counter(used_rows(results, setup.config.experiment, read(results)))
+            counts = Counter(used_rows(results, setup.config.experiment, read_register(results)))
             assert counts.total() == len(taking_part)
             full = len(taking_part) == planned or begun == len(taking_part)
             assert not full or max(counts[row] for row in range(rows)) - min(counts[row] for row in range(rows)) <= 1
@@ -280,16 +282,16 @@ def test_a_drop_out_gives_the_row_back_and_a_readmitted_one_takes_it_again(tmp_p
     setup, _ = SQUARES[0]
     for code in ("P01", "P02", "P03"):
         begin(tmp_path, code, setup)
-    assert next_row(setup, tmp_path, read(tmp_path)) == 0
+    assert row_of_next_run(setup, tmp_path, read_register(tmp_path)) == 0
     append(tmp_path, entry("excluded", "P02", reason="left"), VirtualClock())
-    assert used_rows(tmp_path, "preference", read(tmp_path)) == [0, 2]
-    assert next_row(setup, tmp_path, read(tmp_path)) == 1
+    assert used_rows(tmp_path, "preference", read_register(tmp_path)) == [0, 2]
+    assert row_of_next_run(setup, tmp_path, read_register(tmp_path)) == 1
     append(tmp_path, entry("readmitted", "P02", reason="came back"), VirtualClock())
-    assert used_rows(tmp_path, "preference", read(tmp_path)) == [0, 1, 2]
+    assert used_rows(tmp_path, "preference", read_register(tmp_path)) == [0, 1, 2]
 
 
 def test_a_random_order_has_no_rows(tmp_path: Path) -> None:
-    assert next_row(load_setup("direction"), tmp_path, read(tmp_path)) is None
+    assert row_of_next_run(load_setup("direction"), tmp_path, read_register(tmp_path)) is None
 
 
 def test_facts_and_standings_cannot_be_changed() -> None:

@@ -13,7 +13,7 @@ import pytest
 
 from experiments.clock import VirtualClock
 from experiments.load import load_setup
-from experiments.record.journal import hold
+from experiments.record.journal import hold_journal
 from experiments.run import RunRequest, run
 from experiments.screens.synthetic import synthetic_screen
 from experiments.study.register import append, entry
@@ -155,7 +155,7 @@ def test_a_run_that_another_process_is_at_is_open_elsewhere_until_it_lets_go(
 ) -> None:
     do(pilot, "P01")
     answered = cut(journal_of(pilot, "P01"), lines)
-    descriptor = hold(journal_of(pilot, "P01"))
+    descriptor = hold_journal(journal_of(pilot, "P01"))
     found = told(recoil)
     run = found["participants"][0]["experiments"]["direction"]
     assert (run["state"], run["answered"]) == ("open elsewhere", answered)
@@ -170,14 +170,14 @@ def test_when_all_who_are_left_sit_at_a_console_the_study_is_not_called_done(rec
     config.write_text(config.read_text().replace("participants = 14", "participants = 1"))
     do(pilot, "P01")
     cut(journal_of(pilot, "P01"), 40)
-    descriptor = hold(journal_of(pilot, "P01"))
+    descriptor = hold_journal(journal_of(pilot, "P01"))
     assert "Next: nobody waits; at a console now: P01" in recoil("study", "pilot").stdout
     os.close(descriptor)
 
 
 def test_a_finished_run_is_done_whoever_still_looks_at_it(recoil: Recoil, pilot: Path) -> None:
     do(pilot, "P01")
-    descriptor = hold(journal_of(pilot, "P01"))
+    descriptor = hold_journal(journal_of(pilot, "P01"))
     assert states(told(recoil)) == {"P01": ["done", "not begun"]}
     os.close(descriptor)
 

@@ -21,8 +21,8 @@ from experiments.session.steps import (
     Describe,
     Described,
     Failed,
-    Fire,
     Fired,
+    FireShot,
     Interrupted,
     Outcome,
     Prepare,
@@ -145,7 +145,7 @@ def told(place: int, *outcomes: tuple[str, Outcome]) -> list[tuple[Step, Outcome
     trial = DIRECTION.trials[place]
     steps = {
         "prepare": Prepare(trial=trial, attempt=1, damper=""),
-        "fire": Fire(trial=trial, attempt=1),
+        "fire": FireShot(trial=trial, attempt=1),
         "ask": Ask(trial=trial, attempt=1, question="?", forward="f", backward="b"),
     }
     return [(steps[name], outcome) for name, outcome in outcomes]

@@ -12,7 +12,7 @@ import pytest
 
 from device import LimitError, LinkError, Pulse, Shot, ShotReport, ShotTiming
 from device.words import GunStatus
-from experiments.record.journal import read
+from experiments.record.journal import read_journal
 from experiments.runner import LEAD_S
 from tests.serial_runs import of_trains
 from tests.sittings import Sitting, TroubledGun, resumed_rows, sitting
@@ -93,7 +93,7 @@ def test_a_shot_whose_magnet_is_not_home_by_its_tick_waits_for_it(tmp_path: Path
 def test_every_shot_of_a_train_is_in_the_journal_with_its_times(tmp_path: Path) -> None:
     desk, gun = listening(tmp_path)
     desk.carry_out()
-    trains = list(of_trains(read(desk.where.journal)))
+    trains = list(of_trains(read_journal(desk.where.journal)))
     assert [len(shots) for shots, _ in trains] == [int(row["shots"]) for row in desk.rows()]
     shots = [shot for train, _ in trains for shot in train]
     assert [shot["pulse_start_s"] for shot in shots] == [report.pulse_start_s for report in gun.reports]
@@ -104,7 +104,7 @@ def test_every_shot_of_a_train_is_in_the_journal_with_its_times(tmp_path: Path) 
 def test_a_train_that_fails_keeps_the_shots_that_were_felt_before(tmp_path: Path) -> None:
     desk, gun = listening(tmp_path, {("fire", 5): LinkError("no answer")})
     desk.carry_out()
-    (felt, outcome), (_, again), *_ = of_trains(read(desk.where.journal))
+    (felt, outcome), (_, again), *_ = of_trains(read_journal(desk.where.journal))
     assert outcome == {"kind": "failed", "cause": "no answer", "presented": True}
     assert [shot["shot"] for shot in felt] == [1, 2, 3, 4]
     assert [shot["pulse_start_s"] for shot in felt] == [report.pulse_start_s for report in gun.reports[:4]]
@@ -117,7 +117,7 @@ def test_a_train_that_is_stopped_keeps_them_as_well_and_is_presented_again(tmp_p
     desk, _ = listening(tmp_path, {("fire", 4): stop})
     with suppress(type(stop)):
         desk.carry_out()
-    ((felt, outcome),) = of_trains(read(desk.where.journal))
+    ((felt, outcome),) = of_trains(read_journal(desk.where.journal))
     assert [shot["shot"] for shot in felt] == [1, 2, 3]
     assert outcome is None
     rows = resumed_rows(desk)

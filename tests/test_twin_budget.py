@@ -24,17 +24,17 @@ def spent(*settings: Setting) -> Budget:
 
 def test_five_pulses_of_20_ms_fill_a_second() -> None:
     assert 5 * STRONG.length_us == DUTY_US
-    assert spent(*[STRONG] * 4).refusal(STRONG, 200_000) == errors.NONE
+    assert spent(*[STRONG] * 4).refusal(STRONG, 200_000) == errors.NO_DEVICE_ERROR
     assert spent(*[STRONG] * 5).refusal(STRONG, 250_000) == errors.DUTY
 
 
 def test_a_vibration_in_between_hides_no_earlier_pulse() -> None:
-    assert spent(*[STRONG] * 4, EFFECT).refusal(STRONG, 250_000) == errors.NONE
+    assert spent(*[STRONG] * 4, EFFECT).refusal(STRONG, 250_000) == errors.NO_DEVICE_ERROR
     assert spent(*[STRONG] * 4, EFFECT, STRONG).refusal(STRONG, 300_000) == errors.DUTY
 
 
 def test_what_lies_a_second_back_counts_no_more() -> None:
-    assert spent(*[STRONG] * 5).refusal(STRONG, 1_000_000) == errors.NONE
+    assert spent(*[STRONG] * 5).refusal(STRONG, 1_000_000) == errors.NO_DEVICE_ERROR
 
 
 def shots_until(hand, code, every_us):

@@ -22,7 +22,7 @@ from device.wire.frame import (
     following,
     is_newer,
 )
-from device.wire.records import Named, Refusal, Setting, ShotRecord, StatusRecord, refusal
+from device.wire.records import Named, Refusal, Setting, ShotRecord, StatusRecord, refusal_in
 
 BODIES = st.text(st.characters(min_codepoint=0x20, max_codepoint=0x7E), min_size=1, max_size=MAX_BODY)
 FRAMES = st.builds(Frame, number=st.integers(1, LAST_NUMBER), body=BODIES)
@@ -59,9 +59,9 @@ READERS = (
     Setting.parse,
     ShotRecord.parse,
     StatusRecord.parse,
-    records.number,
-    lambda text: records.value(text, "TIME"),
-    refusal,
+    records.whole_number,
+    lambda text: records.named_value(text, "TIME"),
+    refusal_in,
 )
 
 
@@ -136,7 +136,7 @@ def test_a_record_comes_back_from_its_text_and_fits_a_frame(record):
 
 @pytest.mark.parametrize("code", errors.TEXTS)
 def test_every_error_is_read_back_as_a_refusal(code):
-    assert refusal(f"ERR {errors.message(code)}") == Refusal(code=code, reason=errors.TEXTS[code])
+    assert refusal_in(f"ERR {errors.message(code)}") == Refusal(code=code, reason=errors.TEXTS[code])
 
 
 @given(st.binary(max_size=3000), st.lists(st.integers(0, 3000), max_size=10))

@@ -71,7 +71,7 @@ _MORE: dict[str, ColumnDescription] = {
 
 _CLEANED = "line breaks and tabs are blanks, double quotes single ones; a leading = + - @ or ' has a ' in front"
 
-PARTICIPANTS: dict[str, ColumnDescription] = {
+PARTICIPANT_COLUMNS: dict[str, ColumnDescription] = {
     "participant_id": {
         "LongName": "Participant",
         "Description": "sub- and the participant's code, as in the names of folders and files",
@@ -168,7 +168,7 @@ def readme(people: int, synthetic: int, *, free_text: bool) -> str:
 BIDS_VERSION = "1.11.1"
 GENERATOR = "Recoil"
 DESCRIPTION = "dataset_description.json"
-MISSING = "n/a"
+NOT_AVAILABLE = "n/a"
 OLDEST_AGE = 89
 """Ages above are given as this one: people so old are so few that their age might tell who they are."""
 
@@ -268,7 +268,7 @@ def data_set(
         DESCRIPTION: json_bytes(_description(name, version)),
         "README": readme(len(people), synthetic, free_text=free_text).encode(),
         "participants.tsv": _tsv(list(people[0]), (person.values() for person in people)),
-        "participants.json": json_bytes(PARTICIPANTS),
+        "participants.json": json_bytes(PARTICIPANT_COLUMNS),
         **{f"task-{task}_beh.json": json_bytes(_sidecar(task, free_text)) for task in runs.experiments},
         **{_path(run): _beh(run, free_text) for run in runs.runs},
     }
@@ -288,13 +288,13 @@ def _participant(code: str, done: Sequence[Run], member: Member | None) -> dict[
     """The participant's row. A person is of the species that BIDS takes for granted; a synthetic participant is not."""
     facts = member.facts if member else None
     hands = set[str]().union(*(run.hands for run in done))
-    synthetic = {True: "true", False: "false"}["synthetic" in hands] if hands else MISSING
+    synthetic = {True: "true", False: "false"}["synthetic" in hands] if hands else NOT_AVAILABLE
     return {
         "participant_id": f"sub-{code}",
-        "species": "homo sapiens" if synthetic == "false" else MISSING,
-        "age": str(min(facts.age_years, OLDEST_AGE)) if facts and facts.age_years is not None else MISSING,
-        "sex": _SEX.get(facts.sex or "", MISSING) if facts else MISSING,
-        "handedness": _HANDEDNESS.get(facts.handedness or "", MISSING) if facts else MISSING,
+        "species": "homo sapiens" if synthetic == "false" else NOT_AVAILABLE,
+        "age": str(min(facts.age_years, OLDEST_AGE)) if facts and facts.age_years is not None else NOT_AVAILABLE,
+        "sex": _SEX.get(facts.sex or "", NOT_AVAILABLE) if facts else NOT_AVAILABLE,
+        "handedness": _HANDEDNESS.get(facts.handedness or "", NOT_AVAILABLE) if facts else NOT_AVAILABLE,
         "synthetic": synthetic,
     }
 
@@ -342,11 +342,11 @@ def _moment(cell: Cell) -> datetime | None:
 
 def _cell(column: Column, value: Cell) -> str:
     if value is None:
-        return MISSING
+        return NOT_AVAILABLE
     if isinstance(value, float):
         return repr(float(value))
     text = one_line(str(value))
-    return (columns.guard(text) if column.type == "text" else text) or MISSING
+    return (columns.guard(text) if column.type == "text" else text) or NOT_AVAILABLE
 
 
 def one_line(text: str) -> str:

@@ -114,7 +114,7 @@ def _results(folder: Path, logs: Logs) -> Path:
 
 def _members(results: Path) -> dict[str, Member]:
     """What the register says of everyone."""
-    found = register.read(results)
+    found = register.read_register(results)
     if found.problem:
         raise RegisterError(f"{found.problem}\nnothing was exported: someone might be excluded")
     return found.members

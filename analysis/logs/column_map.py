@@ -26,11 +26,11 @@ from typing import Annotated, Literal, Self
 from pydantic import AfterValidator, Field, model_validator
 
 from analysis.logs.files import BadLogError
-from analysis.logs.texts import Record
+from analysis.logs.texts import CsvRecord
 from experiments.config.door import Model
 from experiments.record import columns
 
-Text = Annotated[str, Field(min_length=1, max_length=500)]
+ShortText = Annotated[str, Field(min_length=1, max_length=500)]
 MEASURES = {"direction": ("method", "direction", "response"), "preference": ("method", "rating")}
 """The columns without which there is nothing to analyse."""
 
@@ -54,11 +54,11 @@ class TextFormat(Model):
     missing: tuple[str, ...] = ("", "None", "NA", "nan")
 
 
-class Participant(Model):
+class ParticipantMapping(Model):
     """Where the participant's code stands."""
 
-    column: Text | None = None
-    file_name: Annotated[Text, AfterValidator(_with_one_group)] | None = None
+    column: ShortText | None = None
+    file_name: Annotated[ShortText, AfterValidator(_with_one_group)] | None = None
 
     @model_validator(mode="after")
     def _one_of_both(self) -> Self:
@@ -70,28 +70,28 @@ class Participant(Model):
 class Columns(Model):
     """The names of the columns."""
 
-    method: Text
-    direction: Text | None = None
-    response: Text | None = None
-    response_time: Text | None = None
-    instruction: Text | None = None
-    rating: Text | None = None
-    study: Text | None = None
-    session: Text | None = None
-    set: Text | None = None
-    trial: Text | None = None
-    flags: Text | None = None
-    note: Text | None = None
-    comment: Text | None = None
+    method: ShortText
+    direction: ShortText | None = None
+    response: ShortText | None = None
+    response_time: ShortText | None = None
+    instruction: ShortText | None = None
+    rating: ShortText | None = None
+    study: ShortText | None = None
+    session: ShortText | None = None
+    set: ShortText | None = None
+    trial: ShortText | None = None
+    flags: ShortText | None = None
+    note: ShortText | None = None
+    comment: ShortText | None = None
 
 
-class ResponseTime(Model):
+class ResponseTimeMapping(Model):
     """In which unit response times are."""
 
     unit: Literal["s", "ms"]
 
 
-class Scale(Model):
+class ScaleMapping(Model):
     """The ends of the rating scale, which become 0 and 10."""
 
     scale_min: float
@@ -107,7 +107,7 @@ class Scale(Model):
 class Skip(Model):
     """Rows to leave out."""
 
-    column: Text
+    column: ShortText
     values: tuple[str, ...] = ()
     empty: bool = False
 
@@ -118,7 +118,7 @@ class Skip(Model):
         return self
 
 
-class Values(Model):
+class ValuesMapping(Model):
     """What cells mean."""
 
     participant: dict[str, str] = Field(default_factory=dict)
@@ -132,15 +132,15 @@ class ColumnMap(Model):
     """A whole map."""
 
     experiment: Literal["direction", "preference"]
-    files_end_with: Annotated[tuple[Text, ...], Field(min_length=1)] = (".csv",)
-    gun: Text = "not stated"
+    files_end_with: Annotated[tuple[ShortText, ...], Field(min_length=1)] = (".csv",)
+    gun: ShortText = "not stated"
     response_source: Literal["participant", "experimenter", "synthetic"] = "participant"
     text: TextFormat = TextFormat()
-    participant: Participant
+    participant: ParticipantMapping
     columns: Columns
-    values: Values = Values()
-    response_time: ResponseTime | None = None
-    rating: Scale | None = None
+    values: ValuesMapping = ValuesMapping()
+    response_time: ResponseTimeMapping | None = None
+    rating: ScaleMapping | None = None
     skip: tuple[Skip, ...] = ()
 
     @model_validator(mode="after")
@@ -167,7 +167,7 @@ class MappedLog:
     """One participant's log in a file, or why it cannot be mapped; the study if the map knows it."""
 
     study: str | None
-    records: tuple[Record, ...] | BadLogError
+    records: tuple[CsvRecord, ...] | BadLogError
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -197,7 +197,7 @@ def is_recoils(content: bytes) -> bool:
     return any({one.name for one in table if one.required} <= header for table in columns.TABLES.values())
 
 
-def _records_or_fault(code: str, lines: Sequence[_Line], mapping: ColumnMap) -> tuple[Record, ...] | BadLogError:
+def _records_or_fault(code: str, lines: Sequence[_Line], mapping: ColumnMap) -> tuple[CsvRecord, ...] | BadLogError:
     try:
         return _records(code, lines, mapping)
     except BadLogError as bad:
@@ -265,7 +265,7 @@ def _participant(line: _Line, file_name: str, mapping: ColumnMap) -> str:
     return mapping.values.participant.get(code, code)
 
 
-def _records(code: str, lines: Sequence[_Line], mapping: ColumnMap) -> tuple[Record, ...]:
+def _records(code: str, lines: Sequence[_Line], mapping: ColumnMap) -> tuple[CsvRecord, ...]:
     """A participant's rows with the columns of Recoil's own table."""
     make = _trial if mapping.experiment == "direction" else _rating
     rows = [make(line, mapping) | _common(code, line, mapping) for line in lines]

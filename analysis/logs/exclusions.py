@@ -30,14 +30,16 @@ from typing import Annotated, Self
 
 import numpy as np
 import pandas as pd
-from numpy.typing import NDArray
 from pydantic import Field, model_validator
 
+from analysis.logs.column_map import ShortText
 from analysis.logs.frames import STUDY
 from analysis.logs.reading import Logs
+from analysis.stats.arrays import BoolArray
 from analysis.stats.cells import codes_of, places_among
 from analysis.times.own_trials import timed
 from experiments.config.door import Model
+from experiments.config.models import Seconds, Share
 
 _MEASURES = {"direction": ("correct", "trials unanswered"), "preference": ("rating", "ratings missing")}
 
@@ -116,16 +118,10 @@ def _alone(table: pd.DataFrame, study: str) -> pd.DataFrame:
     return rows.assign(participant_id=codes)
 
 
-Share = Annotated[float, Field(ge=0, le=1)]
-Seconds = Annotated[float, Field(ge=0, le=86_400)]
-Text = Annotated[str, Field(min_length=1, max_length=500)]
-Flags = NDArray[np.bool_]
-
-
 class TrialRules(Model):
     """Which trials do not count."""
 
-    drop_flags: tuple[Text, ...] = ()
+    drop_flags: tuple[ShortText, ...] = ()
     response_time_min_s: Seconds | None = None
     response_time_max_s: Seconds | None = None
     drop_unanswered: bool = False
@@ -148,7 +144,7 @@ class ParticipantRules(Model):
 class AccuracyRule(Model):
     """How much of a method's trials a participant has to get right."""
 
-    method: Text
+    method: ShortText
     min_share: Share
 
 
@@ -156,8 +152,8 @@ class ExcludedCode(Model):
     """A participant who does not count, and why."""
 
     code: Annotated[str, Field(pattern=r"^[A-Za-z0-9]{1,32}$")]
-    study: Text | None = None
-    reason: Text
+    study: ShortText | None = None
+    reason: ShortText
 
 
 class Rules(Model):
@@ -178,7 +174,7 @@ class KeptTrials:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Effect:
+class ExclusionEffect:
     """What rules did: the logs that are left, who was left out, and of each experiment how many trials were kept.
 
     `dropped` counts dropped trials by experiment, person and rule.
@@ -191,7 +187,7 @@ class Effect:
     warnings: tuple[str, ...]
 
 
-def apply_rules(logs: Logs, rules: Rules) -> Effect:
+def apply_rules(logs: Logs, rules: Rules) -> ExclusionEffect:
     """Leave out what the rules say. A trial that several rules drop counts for the first of them."""
     excluded: list[LeftOutByRule] = []
     dropped: dict[str, dict[str, dict[str, int]]] = {}
@@ -208,7 +204,7 @@ def apply_rules(logs: Logs, rules: Rules) -> Effect:
             ]
             tables[experiment] = rows_without(kept, reasons) if reasons else kept
             trials[experiment] = KeptTrials(recorded=len(table), kept=len(kept))
-    return Effect(
+    return ExclusionEffect(
         logs=replace(logs, trials=tables["direction"], ratings=tables["preference"]),
         excluded=tuple(excluded),
         dropped=dropped,
@@ -231,7 +227,7 @@ def _without_trials(
     return kept, dict(sorted(counts.items()))
 
 
-def _trial_rules(table: pd.DataFrame, rules: TrialRules, experiment: str) -> Iterator[tuple[str, Flags]]:
+def _trial_rules(table: pd.DataFrame, rules: TrialRules, experiment: str) -> Iterator[tuple[str, BoolArray]]:
     """Each rule's name, and the rows that break it."""
     if rules.drop_flags:
         unwanted = set(rules.drop_flags)

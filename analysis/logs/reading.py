@@ -14,7 +14,7 @@ import pandas as pd
 from analysis.logs.column_map import ColumnMap, MappedLog, is_recoils, read_mapped
 from analysis.logs.files import ENDINGS, BadLogError, Problem, code_in_name, find_logs, read_content, study_names
 from analysis.logs.frames import Block, joined
-from analysis.logs.rules import Log, check
+from analysis.logs.rules import Log, check_logs
 from analysis.logs.texts import TextTable, table_of_records, text_tables
 from experiments.record import columns
 from experiments.study import register
@@ -197,7 +197,7 @@ def _checked(waiting: Sequence[_Waiting], mapping: ColumnMap | None) -> _Batch:
     batch.logs |= faults
     for texts in (*own, *tables):
         try:
-            block, logs = check(texts, names)
+            block, logs = check_logs(texts, names)
         except BadLogError as bad:
             batch.logs |= dict.fromkeys(texts.logs, bad)
         else:
@@ -220,5 +220,5 @@ def _mapped(batch: _Batch, first: int, logs: Sequence[MappedLog], mapping: Colum
 
 def _exclusions(results: str) -> dict[str, str]:
     """Who is excluded in a results folder, as far as its register can be read."""
-    members = register.read(Path(results)).members
+    members = register.read_register(Path(results)).members
     return {code: member.excluded for code, member in members.items() if member.excluded is not None}

@@ -19,11 +19,11 @@ from numpy.typing import NDArray
 from analysis.logs.files import BadLogError
 from analysis.logs.frames import Block, Cell, Cells, Coded, chosen
 from analysis.logs.texts import Texts, TextTable, decimals, few, has_many_values, unguarded
+from analysis.stats.arrays import BoolArray
 from experiments.record import columns
 from experiments.record.columns import Column
 
 Integers = NDArray[np.int64]
-Flags = NDArray[np.bool_]
 
 _MEASURES = {"direction": ("response", "correct"), "preference": ("rating",)}
 """Columns without which a table has nothing to analyse, though a cell of them may be empty."""
@@ -88,11 +88,13 @@ class _Table:
         return BadLogError(message, self.texts.lines[place][row - rows.start], column)
 
 
-Rule = tuple[Integers, Callable[[int], BadLogError]]
+_LogRule = tuple[Integers, Callable[[int], BadLogError]]
 """The rows that break a rule, and what is to be said of one of them."""
 
 
-def check(texts: TextTable, codes_in_names: Mapping[int, str | None]) -> tuple[Block, dict[int, Log | BadLogError]]:
+def check_logs(
+    texts: TextTable, codes_in_names: Mapping[int, str | None]
+) -> tuple[Block, dict[int, Log | BadLogError]]:
     """The rows of those logs of a table that keep every rule, and each log by its number, or what is wrong with it.
 
     `codes_in_names` are the participants' codes in the names of the logs' files, as far as there are some.
@@ -106,7 +108,7 @@ def check(texts: TextTable, codes_in_names: Mapping[int, str | None]) -> tuple[B
     cells = {name: values for name, (values, _) in parsed.items()}
     table = _Table(texts=texts, cells=cells, first=np.cumsum(rows) - rows)
     wrong = np.concatenate([list(texts.ragged), *(odd for _, odd in parsed.values())]).astype(np.int64)
-    rules: list[Rule] = [(wrong, partial(_say_cell, table, experiment)), *_rules(table, experiment, codes_in_names)]
+    rules: list[_LogRule] = [(wrong, partial(_say_cell, table, experiment)), *_rules(table, experiment, codes_in_names)]
     faults = _first_faults(table, rules)
     good = np.array([place not in faults for place in range(len(rows))], dtype=np.bool_)
     kept = None if good.all() else np.flatnonzero(np.repeat(good, rows))
@@ -120,7 +122,7 @@ def check(texts: TextTable, codes_in_names: Mapping[int, str | None]) -> tuple[B
     return block, dict(zip(texts.logs, logs, strict=True))
 
 
-def _first_faults(table: _Table, rules: Iterable[Rule]) -> dict[int, BadLogError]:
+def _first_faults(table: _Table, rules: Iterable[_LogRule]) -> dict[int, BadLogError]:
     """By the places of logs what is wrong first: by the first rule that a log breaks, in the first row that does."""
     found: dict[int, BadLogError] = {}
     for rows, said in rules:
@@ -132,7 +134,7 @@ def _first_faults(table: _Table, rules: Iterable[Rule]) -> dict[int, BadLogError
     return found
 
 
-def _rules(table: _Table, experiment: str, codes_in_names: Mapping[int, str | None]) -> Iterator[Rule]:
+def _rules(table: _Table, experiment: str, codes_in_names: Mapping[int, str | None]) -> Iterator[_LogRule]:
     """The rules that bind cells together, in their order."""
     yield _one_participant(table, codes_in_names)
     if experiment == "direction":
@@ -229,7 +231,7 @@ def _say_cell(table: _Table, experiment: str, row: int) -> BadLogError:
     return table.fault(message, row, name)
 
 
-def _one_participant(table: _Table, names: Mapping[int, str | None]) -> Rule:
+def _one_participant(table: _Table, names: Mapping[int, str | None]) -> _LogRule:
     """One participant a file, with a code that is one, and that of the file's name."""
     column = table.coded("participant_id")
     own = column.codes[table.first]
@@ -253,7 +255,7 @@ def _say_participant(table: _Table, names: Mapping[int, str | None], row: int) -
     return table.fault(message, row, "participant_id")
 
 
-def _right_answers(table: _Table) -> Rule:
+def _right_answers(table: _Table) -> _LogRule:
     """`correct` says whether the response is the direction."""
     direction, response = table.coded("direction"), table.coded("response")
     due = np.array(
@@ -274,7 +276,7 @@ def _say_answer(table: _Table, row: int) -> BadLogError:
     return table.fault(message, row, "correct")
 
 
-def _ratings_on_the_scale(table: _Table) -> Rule:
+def _ratings_on_the_scale(table: _Table) -> _LogRule:
     rating = np.asarray(table.cells["rating"], dtype=np.float64)
 
     def said(row: int) -> BadLogError:
@@ -301,7 +303,7 @@ def _sessions(table: _Table, session: Integers) -> _Sessions:
     return _Sessions(session=session, trial=trial, order=order, begins=begins, first=np.minimum.reduceat(order, begins))
 
 
-def _begins(changes: Flags) -> Integers:
+def _begins(changes: BoolArray) -> Integers:
     """Where runs begin, from whether each but the first begins one."""
     return np.append(0, np.flatnonzero(changes) + 1)
 
@@ -312,7 +314,7 @@ def _miscounted(numbers: Integers, begins: Integers) -> Integers:
     return np.unique(run[numbers != np.arange(1, len(numbers) + 1) - begins[run]])
 
 
-def _numbered_sessions(table: _Table) -> Iterator[Rule]:
+def _numbered_sessions(table: _Table) -> Iterator[_LogRule]:
     """One method a session; sessions 1, 2, 3, ... in a log, and trials 1, 2, 3, ... in a session, in any order."""
     found = _sessions(table, table.whole("session"))
     method = table.coded("method").codes
@@ -323,7 +325,7 @@ def _numbered_sessions(table: _Table) -> Iterator[Rule]:
     yield _numbered_trials(table, found)
 
 
-def _numbered_trials(table: _Table, found: _Sessions) -> Rule:
+def _numbered_trials(table: _Table, found: _Sessions) -> _LogRule:
     """The trials of a session are 1, 2, 3, ...; of one where they are not, the first row stands for all."""
     return found.first[_miscounted(found.trial[found.order], found.begins)], partial(_say_trial, table, found)
 

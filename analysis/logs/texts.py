@@ -24,7 +24,7 @@ from experiments.record.columns import Column
 
 Texts = Any
 """An Arrow array of texts, null for an empty cell. Arrow ships no types."""
-Record = tuple[int, list[str]]
+CsvRecord = tuple[int, list[str]]
 """The line on which a record starts, and its cells."""
 
 TEXT = pa.large_string()
@@ -169,7 +169,7 @@ def _arrow_table(files: Sequence[_Plain]) -> pa.Table | None:
 
 def csv_tables(contents: Mapping[int, bytes]) -> tuple[list[TextTable], dict[int, BadLogError]]:
     """As `text_tables`, every file read by the csv module. Files without a row are in tables of their own."""
-    groups: dict[tuple[tuple[str, ...], bool], dict[int, list[Record]]] = {}
+    groups: dict[tuple[tuple[str, ...], bool], dict[int, list[CsvRecord]]] = {}
     faults: dict[int, BadLogError] = {}
     for number, content in contents.items():
         try:
@@ -181,7 +181,7 @@ def csv_tables(contents: Mapping[int, bytes]) -> tuple[list[TextTable], dict[int
     return [table_of_records(header, logs) for (header, _), logs in groups.items()], faults
 
 
-def table_of_records(header: Sequence[str], logs: Mapping[int, Sequence[Record]]) -> TextTable:
+def table_of_records(header: Sequence[str], logs: Mapping[int, Sequence[CsvRecord]]) -> TextTable:
     """Records of numbered logs as a table."""
     cells = [row for rows in logs.values() for _, row in rows]
     empty = [columns.MISSING] * len(header)
@@ -203,11 +203,11 @@ def _column(name: str, texts: Iterable[str]) -> Texts:
     return pa.array(cells, TEXT) if name in _MANY else pa.array(cells, pa.string()).dictionary_encode()
 
 
-def records(content: bytes) -> list[Record]:
+def records(content: bytes) -> list[CsvRecord]:
     """The records of an RFC 4180 file. `BadLogError` if it is none."""
     text = _text(content)
     reader = csv.reader(io.StringIO(text, newline=""), strict=True)
-    found: list[Record] = []
+    found: list[CsvRecord] = []
     start = 1
     try:
         for cells in reader:

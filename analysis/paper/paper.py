@@ -22,7 +22,7 @@ def _is_share(text: str) -> str:
 
 PrintedP = Annotated[Printed, AfterValidator(_is_share)]
 """A printed p-value or its bound."""
-Count = Annotated[int, Field(ge=1)]
+AtLeastOne = Annotated[int, Field(ge=1)]
 
 
 class PaperHead(Model):
@@ -36,7 +36,7 @@ class PaperHead(Model):
 class Participants(Model):
     """Who took part."""
 
-    n: Count
+    n: AtLeastOne
     female: int
     male: int
     age_min: int
@@ -48,11 +48,11 @@ class PublishedAnova(Model):
     """F with its degrees of freedom, and the bound that p is said to be below."""
 
     F: Printed
-    df: Annotated[list[Count], Field(min_length=2, max_length=2)]
+    df: Annotated[list[AtLeastOne], Field(min_length=2, max_length=2)]
     p_below: PrintedP
 
 
-class TukeyClaim(Model):
+class PublishedTukeyTest(Model):
     """`higher` is said to be significantly above `lower`, with p below the bound."""
 
     higher: str
@@ -60,7 +60,7 @@ class TukeyClaim(Model):
     p_below: PrintedP
 
 
-class BinomialClaim(Model):
+class PublishedBinomialTest(Model):
     """The p of the binomial test of a method and direction against one half."""
 
     method: str
@@ -71,9 +71,9 @@ class BinomialClaim(Model):
 class DirectionProtocol(Model):
     """How the trials of experiment 1 were laid out."""
 
-    sessions: Count
-    sets_per_session: Count
-    trials_per_set: Count
+    sessions: AtLeastOne
+    sets_per_session: AtLeastOne
+    trials_per_set: AtLeastOne
     forward_trials_per_session: int
     backward_trials_per_session: int
     set_break_s: int
@@ -84,7 +84,7 @@ class DirectionProtocol(Model):
 class PreferenceProtocol(Model):
     """How the trials of experiment 2 were laid out."""
 
-    trials: Count
+    trials: AtLeastOne
     duration_min: Printed
 
 
@@ -105,10 +105,10 @@ class SameScore(Model):
 class PublishedExperiment(Model):
     """What both experiments print: n, the methods in order, F, and the pattern of the post-hoc tests."""
 
-    n: Count
+    n: AtLeastOne
     methods: Annotated[list[str], Field(min_length=2)]
     anova: PublishedAnova
-    tukey: list[TukeyClaim]
+    tukey: list[PublishedTukeyTest]
 
     @model_validator(mode="after")
     def _pairs_are_of_known_methods(self) -> PublishedExperiment:
@@ -123,7 +123,7 @@ class PublishedDirection(PublishedExperiment):
 
     protocol: DirectionProtocol
     means: dict[str, Printed]
-    binomial: list[BinomialClaim]
+    binomial: list[PublishedBinomialTest]
 
 
 class PublishedPreference(PublishedExperiment):

@@ -7,10 +7,10 @@ from decimal import Decimal
 from typing import Literal
 
 from analysis.paper.paper import (
-    BinomialClaim,
     Lowest,
+    PublishedBinomialTest,
+    PublishedTukeyTest,
     SameScore,
-    TukeyClaim,
 )
 
 ANOVA_F, ANOVA_P, PARTICIPANTS = "ANOVA F", "ANOVA p", "participants"
@@ -21,7 +21,7 @@ def anova_df(kind: str) -> str:
     return f"ANOVA df of the {kind}"
 
 
-def tukey_p(claim: TukeyClaim) -> str:
+def tukey_p(claim: PublishedTukeyTest) -> str:
     """The p of a post-hoc comparison."""
     return f"Tukey p, {claim.higher} above {claim.lower}"
 
@@ -31,7 +31,7 @@ def mean_rate(method: str) -> str:
     return f"mean correct rate forward, {method}"
 
 
-def binomial_p(claim: BinomialClaim) -> str:
+def one_half_p(claim: PublishedBinomialTest) -> str:
     """The p of a test against one half."""
     return f"binomial p, {claim.method} {claim.direction}"
 
@@ -55,7 +55,7 @@ def named_in(experiment: str, quantity: str) -> str:
     return f"{experiment}: {quantity}"
 
 
-Verdict = Literal[
+ComparisonVerdict = Literal[
     "agrees",
     "differs",
     "differs as predicted",
@@ -66,12 +66,12 @@ Verdict = Literal[
     "not attainable",
     "undecided",
 ]
-AUDITED: tuple[Verdict, ...] = ("attainable", "only under a reading", "not attainable", "undecided")
+AUDITED: tuple[ComparisonVerdict, ...] = ("attainable", "only under a reading", "not attainable", "undecided")
 """The audit's verdicts, of numbers that no log holds; the others are of numbers that were obtained or could be."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Row:
+class ComparisonRow:
     """One quantity: `published` as the paper prints it, `obtained` unrounded in the same unit.
 
     `audit`: what the audit says of the published number; empty if it was not asked.
@@ -81,7 +81,7 @@ class Row:
     quantity: str
     published: str
     obtained: float | None
-    verdict: Verdict
+    verdict: ComparisonVerdict
     note: str = ""
     audit: str = ""
 

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy import special
 
-from analysis.paper.paper import PublishedDirection, PublishedExperiment, TukeyClaim
+from analysis.paper.paper import PublishedDirection, PublishedExperiment, PublishedTukeyTest
 from analysis.stats.anova import check_scores, rm_anova
 from analysis.stats.binomial import binomial_test
 from analysis.stats.studentized_range import studentized_range_isf
@@ -24,7 +24,7 @@ Recurrence = NDArray[np.bool_]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Share:
+class ShareOfStudies:
     """The share of studies in which a claim held, with its 95 % Wilson interval: the Monte Carlo error."""
 
     claim: str
@@ -40,7 +40,7 @@ class PatternOdds:
 
     experiment: str
     replications: int
-    rows: tuple[Share, ...]
+    rows: tuple[ShareOfStudies, ...]
     assumptions: str
 
 
@@ -98,10 +98,10 @@ def with_whole_pattern(claims: Mapping[str, Recurrence]) -> dict[str, Recurrence
     return {**claims, WHOLE_PATTERN: np.logical_and.reduce(list(claims.values()))}
 
 
-def share_of(claim: str, held: int, studies: int) -> Share:
+def share_of(claim: str, held: int, studies: int) -> ShareOfStudies:
     """The share of so many studies in which a claim held."""
     low, high = wilson_interval(held, studies)
-    return Share(claim=claim, held=held, share=held / studies, ci_low=low, ci_high=high)
+    return ShareOfStudies(claim=claim, held=held, share=held / studies, ci_low=low, ci_high=high)
 
 
 def odds_of(experiment: str, recurrences: Mapping[str, ArrayLike], assumptions: str) -> PatternOdds:
@@ -132,7 +132,7 @@ def wilson_interval(successes: int, trials: int, confidence: float = 0.95) -> tu
     return low, 1.0 if successes == trials else (centre + half) / scale
 
 
-def _holds(pairs: PairStatistics, claim: TukeyClaim, methods: list[str]) -> Recurrence:
+def _holds(pairs: PairStatistics, claim: PublishedTukeyTest, methods: list[str]) -> Recurrence:
     higher, lower = methods.index(claim.higher), methods.index(claim.lower)
     i = pairs_of(pairs.k).index((max(higher, lower), min(higher, lower)))
     difference = pairs.difference[..., i] if higher > lower else -pairs.difference[..., i]

@@ -147,7 +147,7 @@ def _model_section(rows: list[ModelTime], request: BenchRequest) -> Section:
 
 
 def _model_cells(row: ModelTime) -> tuple[str, ...]:
-    batch = apa.NONE if row.batch_us is None else f"{row.batch_us:.3g}"
+    batch = apa.NO_NUMBER if row.batch_us is None else f"{row.batch_us:.3g}"
     return (row.drive_off, row.fidelity, f"{row.error:.1e}", f"{row.stated:.2g}", f"{row.single_us:.3g}", batch)
 
 
@@ -165,8 +165,8 @@ def post_hocs(request: BenchRequest) -> Measured:
         tell("data sets")
     table = Table(
         caption=(
-            f"Shares of {rows[0].data_sets} simulated data sets of {operating.PARTICIPANTS} participants by three "
-            f"conditions (standard error at most {max(_errors(rows)):.4f}), at the nominal level {operating.LEVEL}"
+            f"Shares of {rows[0].data_sets} simulated data sets of {operating.STUDY_SIZE} participants by three "
+            f"conditions (standard error at most {max(_errors(rows)):.4f}), at the nominal level {operating.ALPHA}"
         ),
         header=(
             "Post-hoc test",
@@ -197,7 +197,7 @@ def _errors(rows: tuple[operating.Characteristics, ...]) -> list[float]:
 
 
 def _post_hoc_cells(row: operating.Characteristics) -> tuple[str, ...]:
-    claimed = apa.NONE if row.claimed is None else apa.number(row.claimed)
+    claimed = apa.NO_NUMBER if row.claimed is None else apa.number(row.claimed)
     shares = (apa.number(share, 4) for share in (row.null_error, row.partial_error, row.power))
     return (row.post_hoc, apa.number(row.epsilon, 3), claimed, *shares)
 

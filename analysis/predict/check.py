@@ -222,7 +222,7 @@ def _method(setup: Setup[Any], limit: MethodLimits) -> MethodCheck:
     return found
 
 
-def as_text(found: AnyCheck) -> str:
+def check_text(found: AnyCheck) -> str:
     """What was found, for a person."""
     if isinstance(found, GunCheck | PaperCheck):
         return "\n".join(f"{one.name}: {plain(getattr(found, one.name))}" for one in fields(found))

@@ -16,6 +16,7 @@ from scipy.special import ndtr
 
 from analysis.paper.paper import PublishedDirection, PublishedExperiment
 from analysis.paper.recurrence import PatternOdds, Recurrence, answers_recur, odds_of, recurs
+from analysis.stats.arrays import FloatArray
 from device.words import DIRECTIONS
 from experiments.config.setup import Setup
 from experiments.design.streams import generator
@@ -26,7 +27,6 @@ from experiments.synthetic.diffusion import People, upper_probabilities
 from experiments.synthetic.model_based import NEUTRAL
 from experiments.synthetic.percept import Percept, evidence, own_start, percepts_of
 
-Floats = NDArray[np.float64]
 Counts = NDArray[np.int64]
 
 PEOPLE_A_PIECE = 70_000
@@ -62,7 +62,7 @@ def direction_counts(
 
 def preference_scores(
     config: PreferenceConfig, n: int, studies: int, draws: np.random.Generator, effect: float = 1.0
-) -> Floats:
+) -> FloatArray:
     """Ratings, (studies, n, methods), of people drawn as `draw_ratings` draws them.
 
     `effect` is a factor on the distances of the methods' means from their common mean, and, below 1, on the share of
@@ -71,27 +71,27 @@ def preference_scores(
     law, scale, methods = config.synthetic.ratings, config.rating, config.design.methods
     person = law.person_sd * draws.standard_normal((studies, n, 1))
     noise = law.noise_sd * draws.standard_normal((studies, n, len(methods)))
-    ratings = on_scale(scaled_means(law, methods, effect) + person + noise, scale)
+    ratings = ratings_on_scale(scaled_means(law, methods, effect) + person + noise, scale)
     if law.same and set(law.same) <= set(methods):
         first, second = (methods.index(name) for name in law.same)
         alike = draws.random((studies, n)) < law.same_share
         ratings[..., second] = np.where(alike, ratings[..., first], ratings[..., second])
     if law.lowest in methods:
         lowest = methods.index(law.lowest)
-        below = on_scale(np.delete(ratings, lowest, axis=-1).min(axis=-1) - scale.grain, scale)
+        below = ratings_on_scale(np.delete(ratings, lowest, axis=-1).min(axis=-1) - scale.grain, scale)
         kept = draws.random((studies, n)) < effect
         ratings[..., lowest] = np.where(kept, np.minimum(ratings[..., lowest], below), ratings[..., lowest])
     return ratings
 
 
-def scaled_means(law: Ratings, methods: tuple[str, ...], effect: float) -> Floats:
+def scaled_means(law: Ratings, methods: tuple[str, ...], effect: float) -> FloatArray:
     """The methods' means, their distances from the common mean times `effect`."""
     means = np.array([law.mean[method] for method in methods])
     centre = means.mean()
     return means if effect == 1.0 else centre + effect * (means - centre)
 
 
-def on_scale(values: Floats, scale: RatingScale) -> Floats:
+def ratings_on_scale(values: FloatArray, scale: RatingScale) -> FloatArray:
     """`experiments.session.steps.on_scale` of many values."""
     steps = np.rint((np.clip(values, scale.minimum, scale.maximum) - scale.minimum) / scale.grain)
     decimals = max(0, -int(np.floor(np.log10(scale.grain)))) + 2
@@ -150,7 +150,7 @@ def felt_counts(felt: Felt, trials: tuple[int, int], n: int, studies: int, draws
     return np.asarray(draws.binomial(each, shares).sum(axis=-1))
 
 
-def _correct_shares(felt: Felt, size: tuple[int, int], draws: np.random.Generator) -> Floats:
+def _correct_shares(felt: Felt, size: tuple[int, int], draws: np.random.Generator) -> FloatArray:
     """Each person's chances of being right, (studies, n, methods, 2 directions, instructions)."""
     drift, boundary, logit = (draws.standard_normal(size) for _ in range(3))
     people = felt.people
@@ -252,7 +252,7 @@ def pattern_odds(
     """How often the published claims recur among people of a config, in a study of the paper's size."""
     draws, n, methods = generator(seed, "odds", config.experiment), published.n, config.design.methods
     if isinstance(config, DirectionConfig):
-        answers: Counts | Floats = direction_counts(config, n, replications, draws)
+        answers: Counts | FloatArray = direction_counts(config, n, replications, draws)
         trials = config.design.forward_per_session, config.design.backward_per_session
         law, size = rates_law(config.synthetic.rates), f"{trials[0]} forward and {trials[1]} backward trials a method"
         known = "of their rates only those that the paper prints are its own, all else is assumed"

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 
-NONE = "–"
+NO_NUMBER = "–"
 """Stands where there is no number."""
 
 
@@ -21,7 +21,7 @@ def number(value: float | None, digits: int = 2) -> str:
     ('−1.23', '–', '–')
     """
     if value is None or not math.isfinite(value):
-        return NONE
+        return NO_NUMBER
     text = f"{value:.{digits}f}"
     return text.lstrip("-") if float(text) == 0.0 else text.replace("-", "−")
 
@@ -41,7 +41,7 @@ def percent(share: float | None, digits: int = 1) -> str:
     >>> percent(0.55714)
     '55.7 %'
     """
-    return NONE if share is None or not math.isfinite(share) else f"{number(100.0 * share, digits)} %"
+    return NO_NUMBER if share is None or not math.isfinite(share) else f"{number(100.0 * share, digits)} %"
 
 
 def p_cell(p: float | None) -> str:
@@ -51,7 +51,7 @@ def p_cell(p: float | None) -> str:
     ('< .001', '.042', '> .999')
     """
     if p is None or math.isnan(p):
-        return NONE
+        return NO_NUMBER
     if p < 0.001:
         return "< .001"
     return "> .999" if p > 0.9995 else f"{p:.3f}".removeprefix("0")
@@ -64,7 +64,7 @@ def p_value(p: float | None) -> str:
     ('p < .001', 'p = .042', 'p undefined')
     """
     cell = p_cell(p)
-    if cell == NONE:
+    if cell == NO_NUMBER:
         return "p undefined"
     return f"p {cell}" if cell[0] in "<>" else f"p = {cell}"
 
@@ -77,7 +77,7 @@ def f_test(F: float | None, df: Sequence[float], p: float | None) -> str:
     """
     shown = number(F)
     of = ", ".join(str(one) if isinstance(one, int) else number(one) for one in df)
-    return f"F({of}) = {'undefined or infinite' if shown == NONE else shown}, {p_value(p)}"
+    return f"F({of}) = {'undefined or infinite' if shown == NO_NUMBER else shown}, {p_value(p)}"
 
 
 def interval(low: float | None, high: float | None, digits: int = 2) -> str:

@@ -10,7 +10,7 @@ from jinja2 import Environment, PackageLoader, StrictUndefined, select_autoescap
 
 from analysis.report.section import Section
 
-VERDICTS = (
+_VERDICTS = (
     *("agrees", "differs", "differs as predicted", "not published", "not obtained"),
     *("attainable", "only under a reading", "not attainable", "undecided"),
 )
@@ -60,7 +60,7 @@ def _render(template: str, title: str, parts: tuple[Section, ...], figures: Path
     embedded = {
         part.stem: _data_address(figures / f"{part.stem}.png") for section in parts for part in section.pictures
     }
-    return environment.get_template(template).render(title=title, sections=parts, embedded=embedded, verdicts=VERDICTS)
+    return environment.get_template(template).render(title=title, sections=parts, embedded=embedded, verdicts=_VERDICTS)
 
 
 def _data_address(png: Path) -> str:

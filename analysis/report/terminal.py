@@ -23,11 +23,12 @@ DONE, EXCEPTIONS, UNUSABLE, INTERRUPTED = 0, 1, 2, 130
 WIDTH = 160
 """Columns of a table where it does not go to a terminal."""
 
-AsJson = Annotated[bool, typer.Option("--json", help="Print the machine-readable result.")]
-Seed = Annotated[int | None, typer.Option(min=0, max=2**63 - 1, help="Seed of the random streams.")]
-FixedSeed = Annotated[int, typer.Option(min=0, max=2**63 - 1, help="Seed of the random streams.")]
-GunConfig = Annotated[str, typer.Option(help="Config of a gun, or the name of a shipped one.")]
-Config = Annotated[str, typer.Argument(help="File or name of a shipped config.")]
+AsJsonOption = Annotated[bool, typer.Option("--json", help="Print the machine-readable result.")]
+SeedOption = Annotated[int | None, typer.Option(min=0, max=2**63 - 1, help="Seed of the random streams.")]
+FixedSeedOption = Annotated[int, typer.Option(min=0, max=2**63 - 1, help="Seed of the random streams.")]
+GunConfigOption = Annotated[str, typer.Option(help="Config of a gun, or the name of a shipped one.")]
+ConfigArgument = Annotated[str, typer.Argument(help="File or name of a shipped config.")]
+WorkersOption = Annotated[int | None, typer.Option(min=1, help="Processes; as many as cores unless given.")]
 
 
 Progress = Callable[[str, int], AbstractContextManager[Callable[[str], None]]]

@@ -9,11 +9,11 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy import special
 
-from analysis.stats.arrays import FloatArray, Values, numbers, plain
+from analysis.stats.arrays import FloatArray, Values, float_or_array, numbers
 from analysis.stats.sums_of_squares import Sums, between_sums, repeated_sums, unscaled
 
 NO_ERROR = "no error variance: the effect is the same in everyone, F is infinite"
-NO_VARIANCE = "neither effect nor error beyond the rounding of the data: F is 0/0, undefined"
+F_UNDEFINED = "neither effect nor error beyond the rounding of the data: F is 0/0, undefined"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -37,7 +37,7 @@ class Anova:
     @property
     def reason(self) -> str | NDArray[np.str_]:
         """Why F is infinite or undefined, empty if it is neither; an array of texts over the leading axes for many."""
-        texts = np.select([np.isnan(self.F), np.isinf(self.F)], [NO_VARIANCE, NO_ERROR], default="")
+        texts = np.select([np.isnan(self.F), np.isinf(self.F)], [F_UNDEFINED, NO_ERROR], default="")
         return str(texts) if texts.ndim == 0 else texts
 
 
@@ -100,7 +100,7 @@ def rm_anova(scores: ArrayLike) -> RepeatedMeasuresAnova:
         ss_effect=effect,
         ss_error=error,
         ms_error=ms_error,
-        ss_participants=plain(unscaled(sums.participants, 2 * sums.exponent)),
+        ss_participants=float_or_array(unscaled(sums.participants, 2 * sums.exponent)),
     )
 
 
@@ -131,11 +131,11 @@ def check_groups(groups: Sequence[ArrayLike]) -> list[FloatArray]:
 def _f_test(sums: Sums) -> tuple[Values, Values]:
     with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
         F = (sums.effect / sums.df_effect) / sums.ms_error
-    return plain(F), plain(special.fdtrc(sums.df_effect, sums.df_error, F))
+    return float_or_array(F), float_or_array(special.fdtrc(sums.df_effect, sums.df_error, F))
 
 
 def _in_data_units(sums: Sums) -> tuple[Values, Values, Values]:
     squared = 2 * sums.exponent
     values = (sums.effect, sums.error, sums.ms_error)
-    effect, error, ms_error = (plain(unscaled(value, squared)) for value in values)
+    effect, error, ms_error = (float_or_array(unscaled(value, squared)) for value in values)
     return effect, error, ms_error

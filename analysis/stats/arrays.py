@@ -11,6 +11,8 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 FloatArray = NDArray[np.float64]
+BoolArray = NDArray[np.bool_]
+IndexArray = NDArray[np.intp]
 Values = float | FloatArray
 """A plain float for one data set, an array over the leading axes for many."""
 
@@ -52,7 +54,7 @@ def _first_stranger(array: NDArray[np.generic]) -> str:
     return ""
 
 
-def plain(values: ArrayLike) -> Values:
+def float_or_array(values: ArrayLike) -> Values:
     """A Python float if `values` has no axis, else a float64 array."""
     array = np.asarray(values, dtype=np.float64)
     return float(array) if array.ndim == 0 else array

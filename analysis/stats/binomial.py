@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy import special
 
-from analysis.stats.arrays import FloatArray, Values, numbers, plain, share
+from analysis.stats.arrays import FloatArray, Values, float_or_array, numbers, share
 
 LongArray = NDArray[np.longdouble]
 
@@ -163,7 +163,7 @@ def wilson(k: FloatArray, n: FloatArray, tail: float) -> tuple[FloatArray, Float
 TIE = 1e-7
 """Outcomes within this relative distance of the observed one's probability count as equally likely (R's rule)."""
 
-MOST_TRIALS = 1e10
+_MOST_TRIALS = 1e10
 """The sums take time with the square root of the trials: beyond this, seconds."""
 
 
@@ -205,7 +205,7 @@ def binomial_test(
     columns = [np.exp(log_p), log_p, cases[0] / cases[1]]
     columns += [*clopper_pearson(cases[0], cases[1], tail), *wilson(cases[0], cases[1], tail)]
     with np.errstate(under="ignore"):
-        found = [plain(column.astype(np.float64)[where.ravel()].reshape(k.shape)) for column in columns]
+        found = [float_or_array(column.astype(np.float64)[where.ravel()].reshape(k.shape)) for column in columns]
     p, log, estimate, ci_low, ci_high, wilson_low, wilson_high = found
     return BinomialTest(
         p=p,
@@ -222,9 +222,9 @@ def _checked(successes: ArrayLike, trials: ArrayLike, p0: ArrayLike) -> tuple[Fl
     k, n, chance = np.broadcast_arrays(numbers(successes, "successes"), numbers(trials, "trials"), numbers(p0, "p0"))
     if (k != np.floor(k)).any() or (n != np.floor(n)).any():
         raise ValueError("successes and trials must be whole numbers")
-    if ((n < 1.0) | (n > MOST_TRIALS)).any():
-        wrong = n[(n < 1.0) | (n > MOST_TRIALS)][0]
-        raise ValueError(f"trials must be at least 1 and at most {MOST_TRIALS:g}, not {wrong:g}")
+    if ((n < 1.0) | (n > _MOST_TRIALS)).any():
+        wrong = n[(n < 1.0) | (n > _MOST_TRIALS)][0]
+        raise ValueError(f"trials must be at least 1 and at most {_MOST_TRIALS:g}, not {wrong:g}")
     if ((k < 0.0) | (k > n)).any():
         raise ValueError(f"successes must lie in 0..trials, not {k[(k < 0.0) | (k > n)][0]:g}")
     if ((chance < 0.0) | (chance > 1.0)).any():

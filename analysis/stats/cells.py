@@ -11,8 +11,8 @@ import pandas as pd
 from numpy.typing import NDArray
 
 from analysis.stats.arrays import FloatArray
+from device.words import DIRECTIONS
 
-DIRECTIONS = ("forward", "backward")
 _KEYS = ("participant_id", "method", "direction", "response_source", "rating_by", "gun")
 _MEASURES = ("correct", "rating", "response_time_s", "response_time_valid")
 

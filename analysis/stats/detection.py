@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 from scipy import special
 
-from analysis.stats.arrays import FloatArray, Values, numbers, plain
+from analysis.stats.arrays import FloatArray, Values, float_or_array, numbers
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -35,10 +35,10 @@ def yes_no(hits: ArrayLike, signal_trials: ArrayLike, false_alarms: ArrayLike, n
     hit_rate, z_hit = _rate_and_z(hits, signal_trials, "hits")
     false_alarm_rate, z_false_alarm = _rate_and_z(false_alarms, noise_trials, "false_alarms")
     return Detection(
-        d_prime=plain(z_hit - z_false_alarm),
-        criterion=plain(-(z_hit + z_false_alarm) / 2.0),
-        hit_rate=plain(hit_rate),
-        false_alarm_rate=plain(false_alarm_rate),
+        d_prime=float_or_array(z_hit - z_false_alarm),
+        criterion=float_or_array(-(z_hit + z_false_alarm) / 2.0),
+        hit_rate=float_or_array(hit_rate),
+        false_alarm_rate=float_or_array(false_alarm_rate),
     )
 
 

@@ -14,10 +14,12 @@ from scipy.optimize import brentq
 from analysis.stats.anova import RepeatedMeasuresAnova
 from analysis.stats.arrays import FloatArray, numbers, share
 
-NO_VARIANCE = "There is no error variance: the partial eta squared is 1 or undefined, and no interval can be given."
+NO_ERROR_VARIANCE = (
+    "There is no error variance: the partial eta squared is 1 or undefined, and no interval can be given."
+)
 LARGEST_F = 1e8
 TOO_LARGE = "F is above 1e8: the interval of the partial eta squared cannot be told from 1."
-NOTE = (
+EFFECT_SIZE_NOTE = (
     "The intervals are those of the partial eta squared, from the noncentral F distribution (Steiger 2004); the 90 % "
     "interval leaves out 0 exactly if the F test has p < .05. The generalised eta squared has none: its denominator "
     "also holds the variance between participants, and the ratio follows no known noncentral distribution."
@@ -44,7 +46,7 @@ def effect_size(anova: RepeatedMeasuresAnova) -> EffectSize:
     effect, error, people = (float(ss) for ss in (anova.ss_effect, anova.ss_error, anova.ss_participants))
     partial, generalized = _ratio(effect, error), _ratio(effect, people + error)
     F = float(anova.F)
-    reason = TOO_LARGE if math.isfinite(F) and F > LARGEST_F else None if math.isfinite(F) else NO_VARIANCE
+    reason = TOO_LARGE if math.isfinite(F) and F > LARGEST_F else None if math.isfinite(F) else NO_ERROR_VARIANCE
     ci_90, ci_95 = (
         None if reason else partial_eta_squared_interval(F, anova.df_effect, anova.df_error, level)
         for level in (0.90, 0.95)

@@ -22,7 +22,7 @@ METHOD = (
 )
 ONE_PERSON = "There are fewer than two participants: nothing tells the spread between people from chance."
 ONE_TRIAL = "Nobody has two trials: nothing tells the spread between people from chance."
-ALL_EQUAL = "All answers are equal: the intraclass correlation is 0/0."
+ALL_ANSWERS_EQUAL = "All answers are equal: the intraclass correlation is 0/0."
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -67,7 +67,7 @@ def _undefined(y: FloatArray, m: FloatArray) -> str | None:
         return ONE_PERSON
     if m.max() < 2.0:
         return ONE_TRIAL
-    return ALL_EQUAL if y.sum() in (0.0, m.sum()) else None
+    return ALL_ANSWERS_EQUAL if y.sum() in (0.0, m.sum()) else None
 
 
 def _icc(y: FloatArray, m: FloatArray) -> float:
@@ -78,8 +78,8 @@ def _icc(y: FloatArray, m: FloatArray) -> float:
     return (between - within) / (between + (size - 1.0) * within)
 
 
-NAME = "logistic GEE, independence working correlation, bias-reduced sandwich (Mancl & DeRouen 2001)"
-NOTE = (
+MODEL_NAME = "logistic GEE, independence working correlation, bias-reduced sandwich (Mancl & DeRouen 2001)"
+MODEL_NOTE = (
     "The model is a population-averaged logistic regression of the single forward answers on the method, with the "
     "participants as clusters (generalised estimating equations). It is not a mixed-effects logistic regression, "
     "because no frequentist one is at hand in Python (statsmodels has a variational Bayesian one only). With few "

@@ -17,8 +17,8 @@ from analysis.stats.arrays import FloatArray
 from analysis.stats.studentized_range import studentized_range_isf
 from analysis.stats.tukey import PairStatistics, own_pairs, pairs_of, pooled_pairs
 
-LEVEL = 0.05
-PARTICIPANTS = 14
+ALPHA = 0.05
+STUDY_SIZE = 14
 DATA_SETS = 20_000
 NOISE_RATIOS = (1.0, 2.5, 6.0)
 """Standard deviation of the third condition over that of the others: epsilon 1, about .69 and about .53."""
@@ -30,7 +30,7 @@ _CHUNK = 5_000
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class PostHoc:
+class PostHocMethod:
     """A way to compare all pairs, and the error it claims to keep to at epsilon 1 and below; None where it claims none.
 
     `rejects` takes (..., n, k) and tells of each pair, in the order of `pairs_of(k)`, whether it is found different.
@@ -63,7 +63,10 @@ class Characteristics:
 
 
 def characteristics(
-    seed: int, participants: int = PARTICIPANTS, data_sets: int = DATA_SETS, ratios: Sequence[float] = NOISE_RATIOS
+    seed: int,
+    participants: int = STUDY_SIZE,
+    data_sets: int = DATA_SETS,
+    ratios: Sequence[float] = NOISE_RATIOS,
 ) -> tuple[Characteristics, ...]:
     """Every post-hoc test at every departure from sphericity, on the same data sets.
 
@@ -130,7 +133,7 @@ def _pairs_without_and_with_the_third() -> tuple[list[int], list[int]]:
 
 
 def _tukey(pairs: PairStatistics) -> np.ndarray[tuple[int, ...], np.dtype[np.bool_]]:
-    critical = studentized_range_isf(LEVEL, pairs.k, pairs.df)
+    critical = studentized_range_isf(ALPHA, pairs.k, pairs.df)
     return np.asarray(pairs.q > critical)
 
 
@@ -141,7 +144,7 @@ def _between(scores: FloatArray) -> np.ndarray[tuple[int, ...], np.dtype[np.bool
     error = np.sqrt(scores.var(axis=-2, ddof=1).mean(axis=-1) / n)[..., None]
     first, second = np.array(pairs_of(k)).T
     q = np.abs(means[..., first] - means[..., second]) / error
-    return np.asarray(q > studentized_range_isf(LEVEL, k, k * (n - 1)))
+    return np.asarray(q > studentized_range_isf(ALPHA, k, k * (n - 1)))
 
 
 def _holm(scores: FloatArray) -> np.ndarray[tuple[int, ...], np.dtype[np.bool_]]:
@@ -150,16 +153,18 @@ def _holm(scores: FloatArray) -> np.ndarray[tuple[int, ...], np.dtype[np.bool_]]
     p = 2.0 * special.stdtr(pairs.df, -pairs.q / math.sqrt(2.0))
     order = np.argsort(p, axis=-1)
     tried = np.arange(p.shape[-1], 0, -1)
-    passed = np.logical_and.accumulate(np.take_along_axis(p, order, -1) * tried <= LEVEL, axis=-1)
+    passed = np.logical_and.accumulate(np.take_along_axis(p, order, -1) * tried <= ALPHA, axis=-1)
     rejected = np.zeros_like(passed)
     np.put_along_axis(rejected, order, passed, axis=-1)
     return rejected
 
 
 POST_HOCS = (
-    PostHoc(name="Tukey, pooled error", claimed=(LEVEL, None), rejects=lambda scores: _tukey(pooled_pairs(scores))),
-    PostHoc(name="Tukey, paired errors", claimed=(0.06, 0.06), rejects=lambda scores: _tukey(own_pairs(scores))),
-    PostHoc(name="paired t, Holm", claimed=(LEVEL, LEVEL), rejects=_holm),
-    PostHoc(name="Tukey between participants, misused", claimed=(None, None), rejects=_between),
+    PostHocMethod(
+        name="Tukey, pooled error", claimed=(ALPHA, None), rejects=lambda scores: _tukey(pooled_pairs(scores))
+    ),
+    PostHocMethod(name="Tukey, paired errors", claimed=(0.06, 0.06), rejects=lambda scores: _tukey(own_pairs(scores))),
+    PostHocMethod(name="paired t, Holm", claimed=(ALPHA, ALPHA), rejects=_holm),
+    PostHocMethod(name="Tukey between participants, misused", claimed=(None, None), rejects=_between),
 )
 """The paired errors differ from pair to pair, which the studentized range does not know: so near LEVEL, not at most."""

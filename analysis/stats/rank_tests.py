@@ -18,7 +18,7 @@ from analysis.stats.tukey import Label, pairs_of
 EXACT_UP_TO = 50
 TWO_CONDITIONS = "The Friedman test needs three conditions; with two, read the signed-rank test."
 ALL_TIED = "Every participant scores all conditions alike: there are no ranks to compare."
-ALL_EQUAL = "The two conditions are equal in every participant: there is nothing to rank."
+NOTHING_TO_RANK = "The two conditions are equal in every participant: there is nothing to rank."
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -106,7 +106,7 @@ def _signed_ranks(first: FloatArray, second: FloatArray, a: Label, b: Label) -> 
     difference = _tidy(first - second, float(np.abs([first, second]).max()))
     difference = difference[difference != 0.0]
     if not difference.size:
-        return SignedRanks(a=a, b=b, n=0, reason=ALL_EQUAL)
+        return SignedRanks(a=a, b=b, n=0, reason=NOTHING_TO_RANK)
     ranks = stats.rankdata(np.abs(difference))
     favour, total = float(ranks[difference > 0.0].sum()), float(ranks.sum())
     smaller = min(favour, total - favour)

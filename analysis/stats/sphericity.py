@@ -14,7 +14,7 @@ from analysis.stats.arrays import FloatArray, pingouin
 from analysis.stats.diagnostics import residuals
 
 TRIVIAL = "With two conditions there is one difference only: sphericity holds trivially and nothing is corrected."
-NO_VARIANCE = "There is no error variance, so there are no covariances to compare."
+NO_COVARIANCES = "There is no error variance, so there are no covariances to compare."
 TOO_FEW = (
     "There are fewer participants than conditions: the covariance matrix of the contrasts is singular, so Mauchly's W "
     "and the Huynh-Feldt epsilon are undefined; the Greenhouse-Geisser epsilon is defined, but leans towards its bound."
@@ -64,7 +64,7 @@ def sphericity(scores: ArrayLike) -> Sphericity:
     n, k = array.shape
     rest = residuals(array)
     if not rest.any():
-        return Sphericity(reason=NO_VARIANCE)
+        return Sphericity(reason=NO_COVARIANCES)
     if k == 2:
         trivial = _corrected(array, 1.0)
         return Sphericity(greenhouse_geisser=trivial, huynh_feldt=trivial, reason=TRIVIAL)

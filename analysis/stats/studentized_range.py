@@ -11,7 +11,7 @@ from collections.abc import Callable
 import numpy as np
 from numpy.typing import ArrayLike
 
-from analysis.stats.arrays import FloatArray, Values, plain
+from analysis.stats.arrays import FloatArray, Values, float_or_array
 from analysis.stats.studentized_tail import log_tails
 
 LOWEST_X = -45.0
@@ -30,7 +30,7 @@ def studentized_range_sf(q: ArrayLike, k: ArrayLike, df: ArrayLike) -> Values:
     >>> round(studentized_range_sf(3.514, 3, 26), 3)
     0.05
     """
-    return plain(np.exp(_logsf(*_checked(q, k, df))))
+    return float_or_array(np.exp(_logsf(*_checked(q, k, df))))
 
 
 def studentized_range_logsf(q: ArrayLike, k: ArrayLike, df: ArrayLike) -> Values:
@@ -39,7 +39,7 @@ def studentized_range_logsf(q: ArrayLike, k: ArrayLike, df: ArrayLike) -> Values
     >>> round(studentized_range_logsf(1e9, 3, 26), 3)
     -488.21
     """
-    return plain(_logsf(*_checked(q, k, df)))
+    return float_or_array(_logsf(*_checked(q, k, df)))
 
 
 def studentized_range_isf(p: ArrayLike, k: ArrayLike, df: ArrayLike) -> Values:
@@ -56,7 +56,7 @@ def studentized_range_isf(p: ArrayLike, k: ArrayLike, df: ArrayLike) -> Values:
     q = np.select([p == 0.0, p == 1.0], [np.inf, 0.0], default=np.nan)
     inside = (p > 0.0) & (p < 1.0)
     q[inside] = _quantile(p[inside], k[inside], df[inside])
-    return plain(q)
+    return float_or_array(q)
 
 
 def _checked(x: ArrayLike, k: ArrayLike, df: ArrayLike) -> tuple[FloatArray, FloatArray, FloatArray]:

@@ -27,7 +27,7 @@ from analysis.stats.arrays import FloatArray
 
 DEPTH = 40.0
 """Sums end where a term is exp(-DEPTH) = 4e-18 of the largest: below a double's rounding."""
-STEP = 0.6
+GRID_STEP = 0.6
 """Step times sqrt(k) of the sums over z: φ^k has the standard deviation 1/√k, the error exp(-2π² / STEP²)."""
 LOWEST_Z = -7.0
 """The largest of two normals lies below with probability 1e-24, that of more even more rarely."""
@@ -262,7 +262,7 @@ def range_lower(w: FloatArray, k: float) -> FloatArray:
 
 def _normal_nodes(k: float) -> tuple[FloatArray, float]:
     """Equidistant z over all of k φ(z) that counts, and their step."""
-    step = STEP / np.sqrt(min(k, FINEST_K))
+    step = GRID_STEP / np.sqrt(min(k, FINEST_K))
     return np.arange(LOWEST_Z, np.sqrt(2.0 * (DEPTH + np.log(k))) + step, step), float(step)
 
 

@@ -60,7 +60,7 @@ def sliced(values: FloatArray) -> FloatArray:
     return slices
 
 
-def joined(slices: FloatArray) -> FloatArray:
+def _joined(slices: FloatArray) -> FloatArray:
     """The number (...) that the slices (3, ...) stand for: where the first two cancel, their sum is exact."""
     total: FloatArray = slices[0] + slices[1]
     total += slices[2]
@@ -118,7 +118,7 @@ class Sums:
     def differences(self, a: NDArray[np.intp], b: NDArray[np.intp]) -> FloatArray:
         """Means of the conditions `a` less those of `b`, (..., pairs), in 2**exponent: total_a n_b - total_b n_a."""
         weighted = self.totals[..., a] * self.counts[b] - self.totals[..., b] * self.counts[a]
-        difference: FloatArray = joined(weighted) / (self.counts[a] * self.counts[b])
+        difference: FloatArray = _joined(weighted) / (self.counts[a] * self.counts[b])
         return difference
 
 
@@ -161,11 +161,11 @@ def _decomposed(sets: FloatArray) -> _Parts:
     grand = columns.sum(axis=1)[:, None]
     rows *= n
     effects = k * columns - grand
-    effect, people = (pairwise(np.square(joined(parts))) for parts in (effects, rows - grand))
+    effect, people = (pairwise(np.square(_joined(parts))) for parts in (effects, rows - grand))
     slices *= n * k
     slices -= rows[:, :, None]
     slices -= effects[:, None]
-    error = pairwise(np.square(joined(slices)).reshape(flat.shape)) / float((n * k) ** 2)
+    error = pairwise(np.square(_joined(slices)).reshape(flat.shape)) / float((n * k) ** 2)
     noise = _NOISE**2 * pairwise(np.square(flat))
     return exponent, columns, effect / float(n * k**2), people / float(n**2 * k), error, noise
 
@@ -204,7 +204,7 @@ def between_sums(groups: Sequence[FloatArray]) -> Sums:
 def _between_effect(totals: FloatArray, counts: FloatArray) -> FloatArray:
     """Sum of n_i (m_i - m)^2, where N n_i (m_i - m) = N total_i - n_i total."""
     everyone = counts.sum()
-    deviations = joined(everyone * totals - counts * totals.sum(axis=-1, keepdims=True))
+    deviations = _joined(everyone * totals - counts * totals.sum(axis=-1, keepdims=True))
     effect: FloatArray = (np.square(deviations) / (counts * everyone**2)).sum(axis=-1)
     return effect
 
@@ -212,7 +212,7 @@ def _between_effect(totals: FloatArray, counts: FloatArray) -> FloatArray:
 def _spread(slices: FloatArray) -> FloatArray:
     """Sum of (x - m)^2 over the last axis of the slices (3, ..., n), where n (x - m) = n x - total."""
     n = slices.shape[-1]
-    deviations = joined(n * slices - slices.sum(axis=-1, keepdims=True))
+    deviations = _joined(n * slices - slices.sum(axis=-1, keepdims=True))
     spread: FloatArray = np.square(deviations).sum(axis=-1) / float(n) ** 2
     return spread
 

@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from analysis.stats.anova import check_groups, check_scores
-from analysis.stats.arrays import FloatArray, Values, plain, share
+from analysis.stats.arrays import FloatArray, Values, float_or_array, share
 from analysis.stats.studentized_range import studentized_range_isf, studentized_range_sf
 from analysis.stats.sums_of_squares import Sums, between_sums, repeated_sums, unscaled
 
@@ -137,11 +137,11 @@ def _comparisons(pairs: PairStatistics, labels: Sequence[Label] | None, confiden
         Comparison(
             a=names[a],
             b=names[b],
-            difference=plain(pairs.difference[..., i]),
-            q=plain(pairs.q[..., i]),
-            p=plain(p[..., i]),
-            ci_low=plain(low[..., i]),
-            ci_high=plain(high[..., i]),
+            difference=float_or_array(pairs.difference[..., i]),
+            q=float_or_array(pairs.q[..., i]),
+            p=float_or_array(p[..., i]),
+            ci_low=float_or_array(low[..., i]),
+            ci_high=float_or_array(high[..., i]),
         )
         for i, (a, b) in enumerate(pairs_of(pairs.k))
     )

@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 from analysis.logs.column_map import ColumnMap
-from analysis.logs.exclusions import Effect, Rules, apply_rules, by_study
+from analysis.logs.exclusions import ExclusionEffect, Rules, apply_rules, by_study
 from analysis.logs.reading import Logs, Problem, Track, read_logs
 from analysis.paper.audit import audit
 from analysis.paper.audit.paper_file import load_paper_file
@@ -70,7 +70,7 @@ def analyze(request: Request, track: Track = iter) -> tuple[StudyStatistics, tup
         files=logs.files,
         provenance=provenance() | _read_by(request.columns, mapping),
         notes=tuple(_notes(effect)),
-        extra=() if coded is None else (remarks_coding.section(coded),),
+        extra=() if coded is None else (remarks_coding.coding_section(coded),),
     )
     write_report(request.out, report)
     write_tables(request.out, used, statistics)
@@ -95,7 +95,7 @@ def _coded(logs: Logs, statistics: StudyStatistics, book: remarks_coding.Codeboo
     ratings = logs.ratings
     columns = ratings["participant_id"].astype(str), ratings["method"].astype(str), ratings["comment"].fillna("")
     remarks = [
-        remarks_coding.Remark(participant=who, method=method, text=text)
+        remarks_coding.WrittenRemark(participant=who, method=method, text=text)
         for who, method, text in zip(*columns, strict=True)
     ]
     try:
@@ -109,7 +109,7 @@ def _by_study(logs: Logs) -> dict[str, StudyStatistics] | None:
     return {name: replace(summarize(alone), versions=None) for name, alone in by_study(logs).items()} or None
 
 
-def _with_rules(statistics: StudyStatistics, effect: Effect, rules: Rules, path: Path) -> StudyStatistics:
+def _with_rules(statistics: StudyStatistics, effect: ExclusionEffect, rules: Rules, path: Path) -> StudyStatistics:
     return replace(
         statistics,
         excluded=(*effect.excluded, *statistics.excluded),
@@ -120,7 +120,7 @@ def _with_rules(statistics: StudyStatistics, effect: Effect, rules: Rules, path:
     )
 
 
-def _notes(effect: Effect | None) -> list[str]:
+def _notes(effect: ExclusionEffect | None) -> list[str]:
     """How many trials the rules dropped, for the report."""
     if effect is None:
         return []

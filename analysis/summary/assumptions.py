@@ -8,7 +8,7 @@ EPSILON = 0.75
 """Below it the pooled Tukey test is not to be read: its familywise error grows to .064 at .72 and .088 at .45."""
 END_SHARE = 0.15
 """Share of participants at an end of the scale that counts as a floor or ceiling effect (Terwee et al. 2007)."""
-ALPHA = 0.05
+_ALPHA = 0.05
 
 
 def assumptions(found: WithinStatistics) -> tuple[Assumption, ...]:
@@ -46,8 +46,10 @@ def _sphericity(found: Supplement) -> Assumption:
 def _normality(found: Supplement) -> Assumption:
     text = "The residuals of the ANOVA are normal; F and t tests of means hardly mind small departures."
     p = found.diagnostics.normality.test.p
-    departs = p is not None and p < ALPHA
-    warning = f"the residuals depart from normal (Shapiro-Wilk p < {ALPHA}): see the Friedman test" if departs else None
+    departs = p is not None and p < _ALPHA
+    warning = (
+        f"the residuals depart from normal (Shapiro-Wilk p < {_ALPHA}): see the Friedman test" if departs else None
+    )
     return Assumption(assumption=text, warning=warning)
 
 
@@ -93,7 +95,7 @@ def _turned(pooled: PooledBinomial) -> bool:
     found = pooled.clustering
     if found.design_effect is None or found.p_adjusted is None or found.design_effect <= 1.0:
         return False
-    return bool((pooled.p < ALPHA) != (found.p_adjusted < ALPHA))
+    return bool((pooled.p < _ALPHA) != (found.p_adjusted < _ALPHA))
 
 
 def _log_odds(found: DirectionStatistics) -> Assumption:

@@ -6,18 +6,18 @@ import math
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 
-from analysis.paper.paper import Paper, PublishedDirection, PublishedExperiment, PublishedPreference, TukeyClaim
+from analysis.paper.paper import Paper, PublishedDirection, PublishedExperiment, PublishedPreference, PublishedTukeyTest
 from analysis.paper.published import (
     ANOVA_F,
     ANOVA_P,
     PARTICIPANTS,
+    ComparisonRow,
+    ComparisonVerdict,
     Prediction,
-    Row,
-    Verdict,
     anova_df,
-    binomial_p,
     mean_rate,
     named_in,
+    one_half_p,
     one_score,
     rated_lowest,
     rounds_to,
@@ -29,7 +29,7 @@ from analysis.summary.results import DirectionStatistics, Pair, StudyStatistics,
 
 def compare(
     statistics: StudyStatistics, paper: Paper, predicted: Mapping[str, Prediction] | None = None
-) -> tuple[Row, ...]:
+) -> tuple[ComparisonRow, ...]:
     """Every published number against the statistics of a study.
 
     A number agrees if it rounds to the printed digits; a bound or an order, if it is true of the obtained numbers. What
@@ -43,14 +43,14 @@ def compare(
     return tuple(_with_audit(row, audited.get(named_in(row.experiment, row.quantity))) for row in rows)
 
 
-def _with_audit(row: Row, prediction: Prediction | None) -> Row:
+def _with_audit(row: ComparisonRow, prediction: Prediction | None) -> ComparisonRow:
     """The row with what the audit says of its number."""
     if prediction is None or row.verdict == "not published":
         return row
     printed = row.published.split(" ", maxsplit=1)[0]
     obtained = row.obtained
     nearest = obtained is not None and any(_alike(obtained, value, printed) for value in prediction.nearest)
-    verdict: Verdict = "differs as predicted" if row.verdict == "differs" and nearest else row.verdict
+    verdict: ComparisonVerdict = "differs as predicted" if row.verdict == "differs" and nearest else row.verdict
     note = "; ".join(text for text in (row.note, prediction.note) if text)
     return replace(row, verdict=verdict, note=note, audit=prediction.verdict)
 
@@ -61,21 +61,21 @@ def _alike(one: float, other: float, printed: str) -> bool:
     return abs(one - other) < 1e-9 or f"{one:.{digits}f}" == f"{other:.{digits}f}"
 
 
-def _number(experiment: str, quantity: str, printed: str, obtained: float | None, unit: str = "") -> Row:
-    verdict: Verdict = "not obtained"
+def _number(experiment: str, quantity: str, printed: str, obtained: float | None, unit: str = "") -> ComparisonRow:
+    verdict: ComparisonVerdict = "not obtained"
     if obtained is not None:
         verdict = "agrees" if rounds_to(obtained, printed) else "differs"
     published = f"{printed} {unit}".strip()
-    return Row(
+    return ComparisonRow(
         experiment=experiment, quantity=quantity, published=published, obtained=_float(obtained), verdict=verdict
     )
 
 
 def _claim(
     experiment: str, quantity: str, published: str, obtained: float | None, *, truth: bool, note: str = ""
-) -> Row:
-    verdict: Verdict = "not obtained" if obtained is None else "agrees" if truth else "differs"
-    return Row(
+) -> ComparisonRow:
+    verdict: ComparisonVerdict = "not obtained" if obtained is None else "agrees" if truth else "differs"
+    return ComparisonRow(
         experiment=experiment,
         quantity=quantity,
         published=published,
@@ -85,8 +85,8 @@ def _claim(
     )
 
 
-def _unpublished(experiment: str, quantity: str, obtained: float | None, note: str) -> Row:
-    return Row(
+def _unpublished(experiment: str, quantity: str, obtained: float | None, note: str) -> ComparisonRow:
+    return ComparisonRow(
         experiment=experiment,
         quantity=quantity,
         published="",
@@ -100,7 +100,7 @@ def _float(value: float | None) -> float | None:
     return None if value is None else float(value)
 
 
-def _common(name: str, published: PublishedExperiment, found: WithinStatistics | None) -> Iterator[Row]:
+def _common(name: str, published: PublishedExperiment, found: WithinStatistics | None) -> Iterator[ComparisonRow]:
     anova = found.anova if found is not None else None
     yield _number(name, PARTICIPANTS, str(published.n), found.n if found is not None else None)
     for i, (df, kind) in enumerate(zip(published.anova.df, ("effect", "error"), strict=True)):
@@ -112,7 +112,7 @@ def _common(name: str, published: PublishedExperiment, found: WithinStatistics |
         yield _tukey(name, claim, (found.tukey if found is not None else None) or ())
 
 
-def _tukey(name: str, claim: TukeyClaim, pairs: Sequence[Pair]) -> Row:
+def _tukey(name: str, claim: PublishedTukeyTest, pairs: Sequence[Pair]) -> ComparisonRow:
     quantity, published = tukey_p(claim), f"< {claim.p_below}"
     found = next((pair for pair in pairs if {pair.a, pair.b} == {claim.higher, claim.lower}), None)
     if found is None or math.isnan(found.p):
@@ -122,7 +122,7 @@ def _tukey(name: str, claim: TukeyClaim, pairs: Sequence[Pair]) -> Row:
     return _claim(name, quantity, published, found.p, truth=above and found.p < float(claim.p_below), note=note)
 
 
-def _direction(published: PublishedDirection, found: DirectionStatistics | None) -> Iterator[Row]:
+def _direction(published: PublishedDirection, found: DirectionStatistics | None) -> Iterator[ComparisonRow]:
     name = "direction"
     means, sds, backward = (found.means, found.sds, found.backward.means) if found is not None else ({}, {}, {})
     for method, printed in published.means.items():
@@ -130,7 +130,7 @@ def _direction(published: PublishedDirection, found: DirectionStatistics | None)
     for claim in published.binomial:
         tests = found.binomial.get(claim.method, {}) if found is not None else {}
         test = tests.get(claim.direction)
-        yield _number(name, binomial_p(claim), claim.p, test.p if test is not None else None)
+        yield _number(name, one_half_p(claim), claim.p, test.p if test is not None else None)
     for method in published.methods:
         sd = _percent(sds.get(method))
         yield _unpublished(name, f"SD of the correct rate, {method} (%)", sd, "drawn in Fig. 8 (a) only")
@@ -145,7 +145,7 @@ def _percent(share: float | None) -> float | None:
     return None if value is None else 100.0 * value
 
 
-def _preference(published: PublishedPreference, found: WithinStatistics | None) -> Iterator[Row]:
+def _preference(published: PublishedPreference, found: WithinStatistics | None) -> Iterator[ComparisonRow]:
     name, lowest, same = "preference", published.lowest, published.same_score
     ratings = None if found is None else found.participants.values()
     yield _number(

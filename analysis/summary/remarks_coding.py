@@ -40,18 +40,18 @@ def _compiles(text: str) -> str:
     return text
 
 
-Text = Annotated[str, Field(min_length=1)]
+_NonEmpty = Annotated[str, Field(min_length=1)]
 
 
-class Code(Model):
+class RemarkCode(Model):
     """One code: what it is called, and how it is recognised."""
 
     code: Annotated[str, Field(pattern=r"^[A-Za-z0-9_-]{1,40}$")]
-    label: Text
-    method: Text | None = None
-    words: tuple[Text, ...] = ()
+    label: _NonEmpty
+    method: _NonEmpty | None = None
+    words: tuple[_NonEmpty, ...] = ()
     pattern: Annotated[str, AfterValidator(_compiles)] | None = None
-    participants: tuple[Text, ...] = ()
+    participants: tuple[_NonEmpty, ...] = ()
 
     def found_in(self, text: str) -> bool:
         """Is one of the words, or the pattern, in the text?"""
@@ -62,8 +62,8 @@ class Code(Model):
 class Codebook(Model):
     """The codes, each once."""
 
-    codes: Annotated[tuple[Code, ...], Field(min_length=1)]
-    hand_coded: Text | None = None
+    codes: Annotated[tuple[RemarkCode, ...], Field(min_length=1)]
+    hand_coded: _NonEmpty | None = None
 
     @model_validator(mode="after")
     def _codes_are_distinct(self) -> Self:
@@ -75,7 +75,7 @@ class Codebook(Model):
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Remark:
+class WrittenRemark:
     """What a participant wrote of a method."""
 
     participant: str
@@ -136,7 +136,7 @@ def _hand_coded(path: Path, known: set[str]) -> Iterable[tuple[str, str]]:
         yield row["participant_id"], row["code"]
 
 
-def code_remarks(remarks: Sequence[Remark], participants: Sequence[str], book: Codebook) -> CodedRemarks:
+def code_remarks(remarks: Sequence[WrittenRemark], participants: Sequence[str], book: Codebook) -> CodedRemarks:
     """How many of `participants` have each code, from their remarks and from the codes given by hand.
 
     `ValueError` without participants, or for a code given by hand to somebody who is not among them.
@@ -155,11 +155,11 @@ def code_remarks(remarks: Sequence[Remark], participants: Sequence[str], book: C
     )
 
 
-def _has(remark: Remark, code: Code) -> bool:
+def _has(remark: WrittenRemark, code: RemarkCode) -> bool:
     return code.method in {None, remark.method} and code.found_in(remark.text)
 
 
-def _count(code: Code, remarks: Sequence[Remark], participants: Sequence[str]) -> CodeCount:
+def _count(code: RemarkCode, remarks: Sequence[WrittenRemark], participants: Sequence[str]) -> CodeCount:
     said = {remark.participant for remark in remarks if _has(remark, code)} | set(code.participants)
     who = tuple(person for person in dict.fromkeys(participants) if person in said)
     share = len(who) / len(set(participants))
@@ -168,7 +168,7 @@ def _count(code: Code, remarks: Sequence[Remark], participants: Sequence[str]) -
     )
 
 
-def section(coded: CodedRemarks) -> Section:
+def coding_section(coded: CodedRemarks) -> Section:
     """The counts as a section of a report."""
     rows = tuple(
         (one.label, one.code, one.method or "any", str(one.count), apa.percent(one.share)) for one in coded.codes

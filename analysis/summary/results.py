@@ -30,7 +30,7 @@ from analysis.times.speed_accuracy import NoSpeedAccuracy, SpeedAccuracy
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Interval:
+class ConfidenceInterval:
     """The ends of a confidence interval."""
 
     ci_low: float
@@ -211,7 +211,7 @@ class WithinStatistics:
     means: Mapping[str, float]
     sds: Mapping[str, float]
     participants: ByParticipant
-    within_ci: Mapping[str, Interval] | None
+    within_ci: Mapping[str, ConfidenceInterval] | None
     anova: AnovaTest | None
     tukey: tuple[Pair, ...] | None
     tukey_error_term: str
@@ -339,7 +339,7 @@ class StudyStatistics:
 
     def to_frame(self) -> pd.DataFrame:
         """A row an experiment and method: participants, mean and SD, and the within-subject interval of the mean."""
-        blank = Interval(ci_low=math.nan, ci_high=math.nan)
+        blank = ConfidenceInterval(ci_low=math.nan, ci_high=math.nan)
         rows = [
             (name, method, found.n, found.means[method], found.sds[method], ends.ci_low, ends.ci_high)
             for name, found in self.analysed.items()

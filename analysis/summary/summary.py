@@ -17,7 +17,7 @@ from analysis.report.serial import undefined
 from analysis.stats.anova import rm_anova
 from analysis.stats.arrays import FloatArray
 from analysis.stats.binomial import binomial_test
-from analysis.stats.cells import DIRECTIONS, ByParticipant, TrialCells, coded, trial_cells
+from analysis.stats.cells import ByParticipant, TrialCells, coded, trial_cells
 from analysis.stats.detection import yes_no
 from analysis.stats.effect_sizes import cousineau_morey
 from analysis.stats.logit_model import METHOD as CLUSTERING_NOTE
@@ -25,8 +25,8 @@ from analysis.stats.tukey import rm_tukey_hsd
 from analysis.summary.assumptions import assumptions
 from analysis.summary.results import (
     AnovaTest,
+    ConfidenceInterval,
     DirectionStatistics,
-    Interval,
     MeanSd,
     MedianTime,
     Origin,
@@ -41,6 +41,7 @@ from analysis.summary.supplement import model, pooled_clustering, within_supplem
 from analysis.times.own_trials import INSTRUCTION, timed
 from analysis.times.response_times import response_times
 from analysis.times.speed_accuracy import speed_accuracy
+from device.words import DIRECTIONS
 
 SCALES = {"direction": (0.0, 1.0), "preference": (0.0, 10.0)}
 """The least and the most that a score can be."""
@@ -65,10 +66,10 @@ def summarize(logs: Logs, *, trade: bool = True) -> StudyStatistics:
     direction, left_out = _direction(logs.trials, trade=trade) if len(logs.trials) else (None, [])
     preference, also_out = _preference(logs.ratings) if len(logs.ratings) else (None, [])
     found = StudyStatistics(direction=direction, preference=preference, excluded=(*left_out, *also_out))
-    return replace(found, warnings=tuple(_warnings(found)), versions=versions())
+    return replace(found, warnings=tuple(_warnings(found)), versions=statistics_versions())
 
 
-def versions() -> dict[str, str]:
+def statistics_versions() -> dict[str, str]:
     """What computed the statistics."""
     return {"python": platform.python_version()} | {
         name: _version(name) for name in ("numpy", "scipy", "pandas", "pingouin", "recoil")
@@ -185,11 +186,11 @@ def _by_method(row: pd.Series) -> dict[str, float]:
     return {str(method): float(value) for method, value in row.items()}
 
 
-def _within_ci(scores: pd.DataFrame) -> dict[str, Interval]:
+def _within_ci(scores: pd.DataFrame) -> dict[str, ConfidenceInterval]:
     """Cousineau-Morey intervals of the means."""
     found = cousineau_morey(scores.to_numpy())
     rows = zip(scores.columns, found.ci_low, found.ci_high, strict=True)
-    return {str(method): Interval(ci_low=float(low), ci_high=float(high)) for method, low, high in rows}
+    return {str(method): ConfidenceInterval(ci_low=float(low), ci_high=float(high)) for method, low, high in rows}
 
 
 def _anova(scores: FloatArray) -> AnovaTest:
@@ -218,7 +219,7 @@ def _tukey(scores: pd.DataFrame) -> tuple[Pair, ...]:
 
 def _binomials(cells: TrialCells, method: str) -> dict[str, PooledBinomial]:
     """The test of each direction that was presented; empty without complete participants."""
-    result = {}
+    result: dict[str, PooledBinomial] = {}
     for place, direction in enumerate(DIRECTIONS):
         column = cells.methods.index(method), place
         successes, trials = int(cells.correct[:, *column].sum()), int(cells.trials[:, *column].sum())

@@ -12,13 +12,10 @@ import pandas as pd
 
 from analysis.stats.anova import rm_anova
 from analysis.stats.arrays import FloatArray
-from analysis.stats.cells import DIRECTIONS, TrialCells
+from analysis.stats.cells import TrialCells
 from analysis.stats.diagnostics import NORMALITY_NOTE, OUTLIER_RULE, ends, normality, outliers, unit_scaled
-from analysis.stats.effect_sizes import NOTE as EFFECT_SIZE_NOTE
-from analysis.stats.effect_sizes import effect_size
-from analysis.stats.logit_model import NAME as MODEL_NAME
-from analysis.stats.logit_model import NOTE as MODEL_NOTE
-from analysis.stats.logit_model import Clustering, LogitModel, clustering, logit_model
+from analysis.stats.effect_sizes import EFFECT_SIZE_NOTE, effect_size
+from analysis.stats.logit_model import MODEL_NAME, MODEL_NOTE, Clustering, LogitModel, clustering, logit_model
 from analysis.stats.paired import CONSTANT, EQUAL, SCALE, PairedT, jzs_paired, paired_t_tests
 from analysis.stats.rank_tests import friedman, signed_rank_tests
 from analysis.stats.sphericity import sphericity
@@ -37,6 +34,7 @@ from analysis.summary.results import (
     PostHoc,
     Supplement,
 )
+from device.words import DIRECTIONS
 
 SIGNED_RANKS = (
     "Wilcoxon's signed-rank test of each pair, Holm's correction. Chosen over Conover's and Nemenyi's because these "

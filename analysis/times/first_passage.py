@@ -5,7 +5,7 @@
 
 f is the density without drift from w in (0, 1), by one of two series (Navarro & Fuss 2009, J. Math. Psychol. 53, 222;
 Feller 1968): images for short times, waves for long ones. Where they take the number of terms that keeps the absolute
-error below a bound, here it is fixed: their meeting point `CUT` is such that `IMAGES` and `WAVES` terms leave a
+error below a bound, here it is fixed: their meeting point `MEET_AT` is such that `IMAGES` and `WAVES` terms leave a
 *relative* error below 1e-18 for w from 1e-6 to 1 - 1e-6, so rounding rules, in the tails as well. Each series is
 divided by its leading exponential, so the logarithm never meets an underflow.
 
@@ -20,7 +20,7 @@ EZ forms of Wagenmakers, van der Maas & Grasman 2007, Psychon. Bull. Rev. 14, 3.
 Source of the transform: Cox & Miller 1965, The Theory of Stochastic Processes, section 5.7.
 
 Short times: the images' inverse Gaussian distributions (Blurton, Kesselmeier & Gondan 2012, J. Math. Psychol. 56, 470);
-long times: the answer's probability less the waves' tail (Ratcliff 1978, Psychol. Rev. 85, 59). They meet at `CUT`,
+long times: the answer's probability less the waves' tail (Ratcliff 1978, Psychol. Rev. 85, 59). They meet at `MEET_AT`,
 where what is left out is below 1e-20; the absolute error is that of rounding, about 1e-15.
 """
 
@@ -33,9 +33,9 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy import special
 
-from analysis.stats.arrays import FloatArray, Values, plain
+from analysis.stats.arrays import FloatArray, Values, float_or_array
 
-CUT = 0.3
+MEET_AT = 0.3
 """Scaled time t / a^2 where the series meet: at most 7 exp(-60) and 36 exp(-51) of the sums are left out there."""
 IMAGES = 3
 """Pairs of images, (m - 1 + w) and -(m + 1 - w) for m = 1, 3, 5."""
@@ -70,7 +70,7 @@ def log_density(time_s: ArrayLike, upper: ArrayLike, drift: ArrayLike, boundary:
     some = t > 0.0
     tau = np.where(some, t, 1.0) / a**2
     value = unit_log_density(tau, near, far) - 2.0 * np.log(a) - v * a * near - v * v * t / 2.0
-    return plain(np.where(some, value, -math.inf))
+    return float_or_array(np.where(some, value, -math.inf))
 
 
 def check_bounds(boundary: FloatArray, start: FloatArray) -> None:
@@ -86,7 +86,7 @@ def check_bounds(boundary: FloatArray, start: FloatArray) -> None:
 def unit_log_density(tau: FloatArray, near: FloatArray, far: FloatArray) -> FloatArray:
     """Log f(tau, near), with far = 1 - near given apart so that neither end loses digits."""
     value = np.empty(np.shape(tau))
-    short = tau <= CUT
+    short = tau <= MEET_AT
     value[short] = _log_images(tau[short], near[short], far[short])
     value[~short] = _log_waves(tau[~short], near[~short], far[~short])
     return value
@@ -118,7 +118,7 @@ def _log_waves(tau: FloatArray, near: FloatArray, far: FloatArray) -> FloatArray
 def with_slopes(tau: NDArray[np.float64], near: FloatArray) -> LogDensity:
     """Log f with its derivatives by tau and w, of arrays of one axis; for likelihoods."""
     value, by_time, by_start = (np.empty(tau.shape) for _ in range(3))
-    short = tau <= CUT
+    short = tau <= MEET_AT
     for where, series in ((short, _image_slopes), (~short, _wave_slopes)):
         value[where], by_time[where], by_start[where] = series(tau[where], near[where])
     return LogDensity(value=value, by_time=by_time, by_start=by_start)
@@ -186,13 +186,13 @@ def moments(drift: ArrayLike, boundary: ArrayLike, start: ArrayLike = 0.5) -> Mo
     mean = p * up[0] + (1.0 - p) * down[0]
     within = p * up[1] + (1.0 - p) * down[1]
     return Moments(
-        upper=plain(p),
-        mean_s=plain(mean),
-        variance_s2=plain(within + p * (1.0 - p) * (up[0] - down[0]) ** 2),
-        upper_mean_s=plain(up[0]),
-        upper_variance_s2=plain(up[1]),
-        lower_mean_s=plain(down[0]),
-        lower_variance_s2=plain(down[1]),
+        upper=float_or_array(p),
+        mean_s=float_or_array(mean),
+        variance_s2=float_or_array(within + p * (1.0 - p) * (up[0] - down[0]) ** 2),
+        upper_mean_s=float_or_array(up[0]),
+        upper_variance_s2=float_or_array(up[1]),
+        lower_mean_s=float_or_array(down[0]),
+        lower_variance_s2=float_or_array(down[1]),
     )
 
 
@@ -250,10 +250,10 @@ def distribution(
     some = t > 0.0
     tau = np.where(some, t, 1.0) / a**2
     value = np.empty(tau.shape)
-    short = tau <= CUT
+    short = tau <= MEET_AT
     value[short] = _images(tau[short], c[short], near[short])
     value[~short] = _waves(tau[~short], c[~short], near[~short])
-    return plain(np.where(some, value, 0.0))
+    return float_or_array(np.where(some, value, 0.0))
 
 
 def _images(tau: FloatArray, c: FloatArray, near: FloatArray) -> FloatArray:

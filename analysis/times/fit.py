@@ -12,13 +12,22 @@ from scipy import optimize, special
 from analysis.stats.arrays import FloatArray, share
 from analysis.times.ez import ez_from_summary
 from analysis.times.first_passage import distribution
-from analysis.times.likelihood import Model, Range, Trials, coordinates, log_likelihood, model_of, natural, trial_scores
+from analysis.times.likelihood import (
+    DiffusionLikelihood,
+    LapseRange,
+    Trials,
+    coordinates,
+    log_likelihood,
+    model_of,
+    natural,
+    trial_scores,
+)
 
 EDGE = 1e-4
 """A share of lapses below this counts as none: its logit has no curvature left to take an interval from."""
 BLIND = 1e-6
 """An eigenvalue of the information, scaled to a diagonal of ones, below this marks a direction the data do not see."""
-STEP = 1e-4
+_DIFFERENCE_STEP = 1e-4
 
 _DRIFT_END, _LOG_BOUNDARY_END, _LOGIT_END = 100.0, 5.0, 12.0
 """As far as a fit climbs: boundaries of 0.007 to 150 sqrt(s), shares to 6e-6 of their ends."""
@@ -71,7 +80,7 @@ def fit(
     trials: Trials,
     *,
     bias: bool = True,
-    lapses: bool | Range = False,
+    lapses: bool | LapseRange = False,
     by_person: bool = False,
     confidence: float = 0.95,
     near: DiffusionFit | None = None,
@@ -92,9 +101,9 @@ def fit(
     """
     alpha = 1.0 - share(confidence, "confidence")
     model = model_of(trials, bias=bias, lapses=lapses)
-    peak = best(model, starts(model) if near is None else [_beside(model, near)])
+    peak = highest_peak(model, starts(model) if near is None else [_beside(model, near)])
     if near is not None and not peak.converged:
-        peak = best(model, starts(model))
+        peak = highest_peak(model, starts(model))
     people = np.unique(trials.person).size if by_person else None
     covariance, unidentified = _covariance(model, peak.at, by_person=by_person)
     if not peak.converged:
@@ -110,7 +119,7 @@ def fit(
     )
 
 
-def starts(model: Model) -> list[FloatArray]:
+def starts(model: DiffusionLikelihood) -> list[FloatArray]:
     """Coordinates to climb from: EZ's of all trials together, and with the boundary halved and doubled."""
     trials = model.trials
     right = trials.upper == (trials.sign > 0)
@@ -126,7 +135,7 @@ def starts(model: Model) -> list[FloatArray]:
     return places
 
 
-def _beside(model: Model, near: DiffusionFit) -> FloatArray:
+def _beside(model: DiffusionLikelihood, near: DiffusionFit) -> FloatArray:
     """Coordinates at the estimates of another fit; `KeyError` if it lacks a parameter."""
     values = np.array([near[name].value for name in model.names])
     first = model.drifts + model.boundaries
@@ -142,12 +151,12 @@ def _first_drift(right: FloatArray, boundary: float) -> float:
     return float(special.logit(rate)) / boundary
 
 
-def best(model: Model, places: list[FloatArray], held: tuple[int, float] | None = None) -> _Peak:
+def highest_peak(model: DiffusionLikelihood, places: list[FloatArray], held: tuple[int, float] | None = None) -> _Peak:
     """The highest peak climbed to from the given places, one coordinate held if asked."""
     return max((_climb(model, place, held) for place in places), key=lambda peak: (peak.converged, peak.value))
 
 
-def _climb(model: Model, place: FloatArray, held: tuple[int, float] | None) -> _Peak:
+def _climb(model: DiffusionLikelihood, place: FloatArray, held: tuple[int, float] | None) -> _Peak:
     n = model.trials.time_s.size
     at = np.array(place)
     free = np.ones(at.size, dtype=np.bool_)
@@ -174,19 +183,19 @@ def _climb(model: Model, place: FloatArray, held: tuple[int, float] | None) -> _
     return _Peak(at=at, value=-float(found.fun) * n, converged=bool(np.abs(found.jac).max() < 1e-4))
 
 
-def information(model: Model, at: FloatArray) -> FloatArray:
+def information(model: DiffusionLikelihood, at: FloatArray) -> FloatArray:
     """The observed information in the coordinates: central differences of the exact gradient."""
     rows = []
     for i in range(at.size):
         step = np.zeros(at.size)
-        step[i] = STEP
+        step[i] = _DIFFERENCE_STEP
         ahead, behind = (log_likelihood(model, at + sign * step)[1] for sign in (1.0, -1.0))
-        rows.append((behind - ahead) / (2.0 * STEP))
+        rows.append((behind - ahead) / (2.0 * _DIFFERENCE_STEP))
     matrix = np.array(rows)
     return (matrix + matrix.T) / 2.0
 
 
-def _covariance(model: Model, at: FloatArray, *, by_person: bool) -> tuple[FloatArray, tuple[str, ...]]:
+def _covariance(model: DiffusionLikelihood, at: FloatArray, *, by_person: bool) -> tuple[FloatArray, tuple[str, ...]]:
     """Covariance of the coordinates (NaN where there is none) and the names that the data do not tell."""
     matrix = information(model, at)
     seen = np.ones(at.size, dtype=np.bool_)
@@ -210,7 +219,7 @@ def _blind(matrix: FloatArray) -> FloatArray:
     return np.asarray((np.abs(flat) > 0.1).any(axis=1))
 
 
-def _spread(model: Model, at: FloatArray) -> FloatArray:
+def _spread(model: DiffusionLikelihood, at: FloatArray) -> FloatArray:
     """Sum over people of the outer products of their scores, n / (n - 1) times."""
     _, scores = trial_scores(model, at)
     person = model.trials.person
@@ -220,10 +229,10 @@ def _spread(model: Model, at: FloatArray) -> FloatArray:
     return summed.T @ summed * (n / (n - 1.0)) if n > 1 else np.full((at.size, at.size), math.nan)
 
 
-def _estimates(model: Model, at: FloatArray, se: FloatArray, critical: float) -> tuple[Estimate, ...]:
+def _estimates(model: DiffusionLikelihood, at: FloatArray, se: FloatArray, critical: float) -> tuple[Estimate, ...]:
     known = np.where(np.isfinite(se), se, 0.0)
     low, value, high = (natural(model, at + sign * critical * known) for sign in (-1.0, 0.0, 1.0))
-    slope = (natural(model, at + STEP) - natural(model, at - STEP)) / (2.0 * STEP)
+    slope = (natural(model, at + _DIFFERENCE_STEP) - natural(model, at - _DIFFERENCE_STEP)) / (2.0 * _DIFFERENCE_STEP)
     blank = np.where(np.isfinite(se), 0.0, math.nan)
     return tuple(
         Estimate(
@@ -242,7 +251,7 @@ _FARTHEST = 12.0
 
 
 def profile(
-    trials: Trials, name: str, *, bias: bool = True, lapses: bool | Range = False, confidence: float = 0.95
+    trials: Trials, name: str, *, bias: bool = True, lapses: bool | LapseRange = False, confidence: float = 0.95
 ) -> tuple[float, float]:
     """The limits where twice the fall of the profile likelihood equals the chi-squared quantile on 1 df.
 
@@ -255,17 +264,17 @@ def profile(
     if name not in model.names:
         raise KeyError(name)
     index = model.names.index(name)
-    peak = best(model, starts(model))
+    peak = highest_peak(model, starts(model))
     limits = [_limit(model, index, peak.at, peak.value - fall, sign) for sign in (-1.0, 1.0)]
     return limits[0], limits[1]
 
 
-def _limit(model: Model, index: int, peak: FloatArray, wanted: float, sign: float) -> float:
+def _limit(model: DiffusionLikelihood, index: int, peak: FloatArray, wanted: float, sign: float) -> float:
     """Where the profile falls to `wanted` on one side, in the parameter's unit; doubled steps, then Brent's method."""
     last = [np.array(peak)]
 
     def excess(distance: float) -> float:
-        found = best(model, [last[0]], held=(index, float(peak[index]) + sign * distance))
+        found = highest_peak(model, [last[0]], held=(index, float(peak[index]) + sign * distance))
         last[0] = found.at
         return found.value - wanted
 
@@ -280,7 +289,7 @@ def _limit(model: Model, index: int, peak: FloatArray, wanted: float, sign: floa
     return float(natural(model, at)[index])
 
 
-def _edge(model: Model, index: int, sign: float) -> float:
+def _edge(model: DiffusionLikelihood, index: int, sign: float) -> float:
     if index < model.drifts:
         return sign * math.inf
     at = np.full(len(model.names), 0.0)
@@ -303,7 +312,7 @@ def answered_by(
     condition: str,
     instruction: str,
     towards_upper: float = 0.5,
-    lapse_range_s: Range | None = None,
+    lapse_range_s: LapseRange | None = None,
 ) -> AnsweredBy:
     """The fit's prediction for a condition and instruction, at times of one axis.
 

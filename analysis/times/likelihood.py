@@ -17,13 +17,12 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy import special
 
-from analysis.stats.arrays import FloatArray
+from analysis.stats.arrays import FloatArray, IndexArray
 from analysis.times.first_passage import with_slopes
 from analysis.times.own_trials import answers, own_times
 
-Places = NDArray[np.intp]
-Label = str
-Range = tuple[float, float]
+_Label = str
+LapseRange = tuple[float, float]
 """Earliest and latest time of a lapse in s."""
 
 
@@ -34,11 +33,11 @@ class Trials:
     upper: NDArray[np.bool_]
     time_s: FloatArray
     sign: FloatArray  # 1 if the stimulus drives to the upper answer, -1 if to the lower
-    condition: Places
-    instruction: Places
-    person: Places
-    conditions: tuple[Label, ...]
-    instructions: tuple[Label, ...]
+    condition: IndexArray
+    instruction: IndexArray
+    person: IndexArray
+    conditions: tuple[_Label, ...]
+    instructions: tuple[_Label, ...]
 
 
 def trials_of(
@@ -47,8 +46,8 @@ def trials_of(
     time_s: ArrayLike,
     sources: Sequence[str] | ArrayLike,
     towards_upper: ArrayLike,
-    condition: Sequence[Label] | ArrayLike,
-    instruction: Sequence[Label] | ArrayLike | None = None,
+    condition: Sequence[_Label] | ArrayLike,
+    instruction: Sequence[_Label] | ArrayLike | None = None,
     person: Sequence[str] | ArrayLike | None = None,
 ) -> Trials:
     """Columns of a log as `Trials`: for a judgement of direction "upper" is the answer "forward".
@@ -73,7 +72,7 @@ def trials_of(
     )
 
 
-def _places(labels: Sequence[Label] | ArrayLike, count: int, name: str) -> tuple[tuple[Label, ...], Places]:
+def _places(labels: Sequence[_Label] | ArrayLike, count: int, name: str) -> tuple[tuple[_Label, ...], IndexArray]:
     found = np.asarray(labels, dtype=np.str_)
     if found.shape != (count,):
         raise ValueError(f"{name} must be {count} labels, one a trial, not {found.shape}")
@@ -82,7 +81,7 @@ def _places(labels: Sequence[Label] | ArrayLike, count: int, name: str) -> tuple
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class Model:
+class DiffusionLikelihood:
     """The likelihood in unbounded coordinates: drifts; log boundaries; logit w; logit(t0 / cap); logit lapse.
 
     `cap_s` is the largest t0: the shortest time that only a decision can have (no density before t0), at most the
@@ -114,7 +113,7 @@ class Model:
         return (*drifts, *boundaries, *extra)
 
 
-def model_of(trials: Trials, *, bias: bool = True, lapses: bool | Range = False) -> Model:
+def model_of(trials: Trials, *, bias: bool = True, lapses: bool | LapseRange = False) -> DiffusionLikelihood:
     """The model to fit; lapses over the range of the data if True. `ValueError`: their range is empty."""
     t = trials.time_s
     if lapses is False:
@@ -126,13 +125,13 @@ def model_of(trials: Trials, *, bias: bool = True, lapses: bool | Range = False)
         density = np.where((t >= earliest) & (t <= latest), 0.5 / (latest - earliest), 0.0)
     decided = t[density == 0.0]
     cap_s = min(float(np.median(t)), float(decided.min())) if decided.size else float(np.median(t))
-    return Model(trials=trials, bias=bias, lapses=lapses is not False, cap_s=cap_s, lapse_density=density)
+    return DiffusionLikelihood(trials=trials, bias=bias, lapses=lapses is not False, cap_s=cap_s, lapse_density=density)
 
 
 _TOP = 1.0 - 1e-12  # t0 stays below its cap
 
 
-def natural(model: Model, at: FloatArray) -> FloatArray:
+def natural(model: DiffusionLikelihood, at: FloatArray) -> FloatArray:
     """The parameters in their own units, from coordinates."""
     values, first, second = np.array(at), model.drifts, model.drifts + model.boundaries
     values[first:second] = np.exp(at[first:second])
@@ -141,7 +140,7 @@ def natural(model: Model, at: FloatArray) -> FloatArray:
     return values
 
 
-def coordinates(model: Model, values: FloatArray) -> FloatArray:
+def coordinates(model: DiffusionLikelihood, values: FloatArray) -> FloatArray:
     """The coordinates of parameters in their own units."""
     at, first, second = np.array(values, dtype=np.float64), model.drifts, model.drifts + model.boundaries
     at[first:second] = np.log(at[first:second])
@@ -150,13 +149,13 @@ def coordinates(model: Model, values: FloatArray) -> FloatArray:
     return at
 
 
-def log_likelihood(model: Model, at: FloatArray) -> tuple[float, FloatArray]:
+def log_likelihood(model: DiffusionLikelihood, at: FloatArray) -> tuple[float, FloatArray]:
     """The log-likelihood and its gradient by the coordinates."""
     value, scores = trial_scores(model, at)
     return float(value.sum()), scores.sum(axis=0)
 
 
-def trial_scores(model: Model, at: FloatArray) -> tuple[FloatArray, FloatArray]:
+def trial_scores(model: DiffusionLikelihood, at: FloatArray) -> tuple[FloatArray, FloatArray]:
     """Each trial's log-likelihood (trials,) and gradient by the coordinates (trials, parameters)."""
     trials, values = model.trials, natural(model, at)
     place = model.drifts + model.boundaries
@@ -193,7 +192,9 @@ def _diffusion(trials: Trials, values: FloatArray, w: float, t0: float) -> tuple
     return np.where(late, value, -np.inf), *(np.where(late, slope, 0.0) for slope in slopes)
 
 
-def _with_lapses(model: Model, value: FloatArray, scores: FloatArray, rate: float) -> tuple[FloatArray, FloatArray]:
+def _with_lapses(
+    model: DiffusionLikelihood, value: FloatArray, scores: FloatArray, rate: float
+) -> tuple[FloatArray, FloatArray]:
     """The mixture in logarithms, so that a time far from any decision's underflows to no 0 / 0."""
     with np.errstate(divide="ignore"):
         decided, lapsed = np.log1p(-rate) + value, np.log(rate * model.lapse_density)

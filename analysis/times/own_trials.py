@@ -10,10 +10,11 @@ import numpy as np
 import pandas as pd
 from numpy.typing import ArrayLike, NDArray
 
-from analysis.stats.arrays import FloatArray, numbers
+from analysis.stats.arrays import BoolArray, FloatArray, IndexArray, numbers
 from analysis.stats.cells import codes_of, places_among
+from experiments.synthetic.model_based import NEUTRAL
 
-OWN = ("participant", "synthetic")
+OWN_SOURCES = ("participant", "synthetic")
 """The values of `response_source` whose times are the answerer's own."""
 REASON = (
     "such a time holds the spoken answer and the experimenter's reaction to it as well, so it says nothing of the "
@@ -31,7 +32,7 @@ def own_times(time_s: ArrayLike, sources: Sequence[str] | ArrayLike) -> FloatArr
         raise ValueError(
             f"response_time_s and response_source must be columns of one length, not {times.shape} and {names.shape}"
         )
-    foreign = np.flatnonzero(~np.isin(names, OWN))
+    foreign = np.flatnonzero(~np.isin(names, OWN_SOURCES))
     if foreign.size:
         raise ValueError(
             f"{foreign.size} of {times.size} response times are not the participant's own; the first, row "
@@ -51,15 +52,12 @@ def answers(values: ArrayLike, name: str, count: int) -> FloatArray:
     return found
 
 
-Places = NDArray[np.intp]
-
-
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Ordered:
     """Rows of trials, person after person in the codes' sorted order, each one's by time; equal times as they stood."""
 
-    rows: Places
-    count: Places  # of each person's trials
+    rows: IndexArray
+    count: IndexArray  # of each person's trials
 
     @property
     def people(self) -> int:
@@ -67,12 +65,12 @@ class Ordered:
         return int(self.count.size)
 
     @property
-    def person(self) -> Places:
+    def person(self) -> IndexArray:
         """The person of each row, from 0."""
         return np.repeat(np.arange(self.people), self.count)
 
     @property
-    def rank(self) -> Places:
+    def rank(self) -> IndexArray:
         """The place of each row among its person's, from 0."""
         first = np.cumsum(self.count) - self.count
         return np.asarray(np.arange(self.rows.size) - np.repeat(first, self.count))
@@ -127,12 +125,8 @@ def quantiles(time_s: FloatArray, by: Ordered, shares: Sequence[float]) -> Float
     return np.asarray(low + (high - low) * (wanted - below))
 
 
-Flags = NDArray[np.bool_]
-
 INSTRUCTION = "instruction"
 """The optional column that says what the participant was told."""
-NEUTRAL = "neutral"
-"""The instruction of a trial that has none."""
 INSTRUCTION_ORDER = ("speed", NEUTRAL, "accuracy")
 
 REFUSALS = {
@@ -152,8 +146,8 @@ class Timed:
     `by_own_hand` are those with a time that is said to be the answerer's own, also if it is not above 0.
     """
 
-    own: Flags
-    by_own_hand: Flags
+    own: BoolArray
+    by_own_hand: BoolArray
     answered: int
     refused: dict[str, int]  # reason in `REFUSALS` -> trials
 
@@ -164,7 +158,7 @@ def timed(trials: pd.DataFrame) -> Timed:
     time_s = trials["response_time_s"].to_numpy(dtype=np.float64)
     faults = {
         "experimenter": (sources == "experimenter")[source],
-        "no_source": ~np.isin(sources, (*OWN, "experimenter"))[source],
+        "no_source": ~np.isin(sources, (*OWN_SOURCES, "experimenter"))[source],
         "not_valid": ~(trials["response_time_valid"] == 1).fillna(value=False).to_numpy(dtype=np.bool_),
         "no_time": np.isnan(time_s),
         "not_above_0": time_s <= 0.0,
@@ -186,10 +180,10 @@ def timed(trials: pd.DataFrame) -> Timed:
 class OwnTrials:
     """Trials, one axis, each person's in order of time; persons, methods and instructions as places in their names."""
 
-    person: Places
-    method: Places
-    instruction: Places
-    forward: Flags  # which way the shot went
+    person: IndexArray
+    method: IndexArray
+    instruction: IndexArray
+    forward: BoolArray  # which way the shot went
     correct: FloatArray
     time_s: FloatArray
     source: NDArray[np.str_]
@@ -199,7 +193,7 @@ class OwnTrials:
     answered: int
     refused: dict[str, int]  # reason in `REFUSALS` -> trials
 
-    def of(self, rows: Flags) -> OwnTrials:
+    def of(self, rows: BoolArray) -> OwnTrials:
         """Some of the trials, under the same names."""
         names = ("person", "method", "instruction", "forward", "correct", "time_s", "source")
         return replace(self, **{name: getattr(self, name)[rows] for name in names})
@@ -235,7 +229,7 @@ def own_trials(trials: pd.DataFrame, methods: Sequence[str]) -> OwnTrials:
     )
 
 
-def _instructions(trials: pd.DataFrame) -> tuple[tuple[str, ...], Places]:
+def _instructions(trials: pd.DataFrame) -> tuple[tuple[str, ...], IndexArray]:
     """The instructions that occur, from speed to accuracy if they are those, else sorted; and each trial's place."""
     if INSTRUCTION not in trials:
         return (NEUTRAL,), np.zeros(len(trials), dtype=np.intp)
@@ -247,7 +241,7 @@ def _instructions(trials: pd.DataFrame) -> tuple[tuple[str, ...], Places]:
     return tuple(order), where[places]
 
 
-def _names(column: pd.Series) -> tuple[NDArray[np.str_], Places]:
+def _names(column: pd.Series) -> tuple[NDArray[np.str_], IndexArray]:
     """The names in a column and each row's place among them; the last is empty and stands for a missing one."""
     found = column.astype("category").cat
     names = np.array([*map(str, found.categories), ""], dtype=np.str_)

@@ -13,7 +13,7 @@ from scipy import special
 
 from analysis.stats.arrays import FloatArray, share
 from analysis.times.fit import DiffusionFit, fit
-from analysis.times.likelihood import Range, Trials, trials_of
+from analysis.times.likelihood import LapseRange, Trials, trials_of
 from analysis.times.own_trials import OwnTrials, ordered, quantiles
 
 
@@ -53,7 +53,7 @@ def fit_people(
     trials: Trials,
     *,
     bias: bool = True,
-    lapses: bool | Range = False,
+    lapses: bool | LapseRange = False,
     confidence: float = 0.95,
     track: Callable[[Sequence[int]], Iterable[int]] = iter,
     together: DiffusionFit | None = None,

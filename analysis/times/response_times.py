@@ -12,8 +12,8 @@ from numpy.typing import NDArray
 from analysis.stats.arrays import FloatArray
 from analysis.stats.cells import Finite
 from analysis.times.own_trials import timed
+from device.words import DIRECTIONS
 
-DIRECTIONS = ("forward", "backward")
 _KEYS = ("participant_id", "method", "direction")
 _PERCENT = np.arange(101)
 

@@ -74,7 +74,7 @@ NO_TIMES = "No measure of the speed-accuracy trade-off is given: no answered tri
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Refused:
+class RefusedAnswers:
     """How many answered trials are refused, and why."""
 
     trials: int
@@ -135,7 +135,7 @@ class EachFit:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class TogetherFit:
+class PooledFit:
     """The fit of all trials as if they were of one person."""
 
     estimates: Mapping[str, Parameter]
@@ -145,7 +145,7 @@ class TogetherFit:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Diffusion:
+class DiffusionFits:
     """The diffusion fitted to `fitted` of the people: person by person, and together; without fits, the reason."""
 
     people: int
@@ -153,7 +153,7 @@ class Diffusion:
     trials: int
     reason: str | None
     each: EachFit | None
-    together: TogetherFit | None
+    together: PooledFit | None
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -163,7 +163,7 @@ class _UsedTrials:
     n: int
     people: int
     answered: int
-    refused: Mapping[str, Refused]
+    refused: Mapping[str, RefusedAnswers]
     reason: str | None
     instructions: tuple[str, ...]
 
@@ -182,7 +182,7 @@ class SpeedAccuracy(_UsedTrials):
     quantiles: tuple[float, ...]
     methods: Mapping[str, Mapping[str, CellTrade]]
     instruction_effects: tuple[InstructionEffect, ...]
-    diffusion: Diffusion
+    diffusion: DiffusionFits
     caveats: Mapping[str, str]
 
 
@@ -193,7 +193,7 @@ def speed_accuracy(trials: pd.DataFrame, methods: Sequence[str]) -> SpeedAccurac
     """
     own = own_trials(trials, methods)
     n, people = int(own.time_s.size), int(np.unique(own.person).size)
-    refused = {reason: Refused(trials=count, why=REFUSALS[reason]) for reason, count in own.refused.items()}
+    refused = {reason: RefusedAnswers(trials=count, why=REFUSALS[reason]) for reason, count in own.refused.items()}
     if not n:
         return NoSpeedAccuracy(
             n=n,
@@ -279,8 +279,8 @@ def _ez(some: OwnTrials) -> EZMeans:
     )
 
 
-def _diffusion(found: SampledFit) -> Diffusion:
-    return Diffusion(
+def _diffusion(found: SampledFit) -> DiffusionFits:
+    return DiffusionFits(
         people=found.people,
         fitted=found.fitted,
         trials=found.trials,
@@ -299,9 +299,9 @@ def _each(found: PeopleFit) -> EachFit:
     return EachFit(estimates=means, left_out=len(found.fits) - len(clear))
 
 
-def _together(found: DiffusionFit) -> TogetherFit:
+def _together(found: DiffusionFit) -> PooledFit:
     known = () if found.reason else found.estimates
-    return TogetherFit(
+    return PooledFit(
         estimates={
             one.name: Parameter(
                 value=defined(one.value), se=defined(one.se), ci_low=defined(one.ci_low), ci_high=defined(one.ci_high)

@@ -9,7 +9,7 @@ from dataclasses import dataclass, field
 from typing import Literal
 
 from device.wire.frame import Garbled
-from device.wire.records import refusal
+from device.wire.records import refusal_in
 from device.words import LinkError
 
 CommandOutcome = Literal["done", "refused", "timed out", "garbled", "disconnected"]
@@ -170,5 +170,5 @@ def _outcome(waiting: Waiting) -> Reply | LinkError:
     reply = waiting.reply
     if reply is None:
         return waiting.trouble or TimedOut(f"no answer to {waiting.header} within its time")
-    no = refusal(reply.body)
+    no = refusal_in(reply.body)
     return reply if no is None else CommandRefused(no.code, f"the gun refused {waiting.header}: {no.reason}")

@@ -26,7 +26,7 @@ from device.serial_gun.commands import (
 from device.serial_gun.port import OpenPort, Port, SerialPort
 from device.wire import errors
 from device.wire.frame import Frame, Garbled, Splitter, decode, encode, following
-from device.wire.records import WIRE_VERSION, Named, value
+from device.wire.records import WIRE_VERSION, Named, named_value
 from device.words import LinkError
 
 PATIENCE_S = 0.25
@@ -41,8 +41,8 @@ GREETING_TRIES = 5
 FIRST_EXCHANGES = 8
 SILENT_S = 2.0
 """After so long without a word from the gun the line is closed and opened again."""
-MAX_WATCHDOG_MS, MIN_WATCHDOG_MS = 60_000, 100
-NO_SESSION = f"ERR {errors.message(errors.NO_SESSION)}"
+_MAX_WATCHDOG_MS, _MIN_WATCHDOG_MS = 60_000, 100
+_NO_SESSION = f"ERR {errors.message(errors.NO_SESSION)}"
 
 
 class Link:
@@ -57,7 +57,7 @@ class Link:
         self.remembers = False  # whether the gun at this greeting still knew the one before
         self.why_lost = ""  # what ended the session before this one
         self._find, self._clock, self._open_port = find, clock, open_port
-        self._watchdog_ms = round(min(max(1000 * WATCHDOG_S * speed, MIN_WATCHDOG_MS), MAX_WATCHDOG_MS))
+        self._watchdog_ms = round(min(max(1000 * WATCHDOG_S * speed, _MIN_WATCHDOG_MS), _MAX_WATCHDOG_MS))
         self.watchdog_s = self._watchdog_ms / 1000 / speed
         self._keep_alive_s = min(KEEP_ALIVE_S, self.watchdog_s / 6)
         self._clocks = Clocks()
@@ -183,7 +183,7 @@ class Link:
             self._heard_s = time.monotonic()
         self._introduce(port)
         token = self._token + 1 if self._token else int(time.time() * 1e3) % 2**32 + 1
-        before = value(self._greet(f"SYST:STRI {token}").body, "STRI")
+        before = named_value(self._greet(f"SYST:STRI {token}").body, "STRI")
         same = self._token != 0 and before == self._token
         self._unbroken = self._unbroken and same  # a greeting that broke off may have met a gun that was reset
         named = Named.parse(self._greet("*IDN?").body)
@@ -300,7 +300,7 @@ class Link:
             self._pending.end_all(Garbled("the gun understood no line"))
             return
         waiting = self._pending.take(frame.number)
-        if frame.body == NO_SESSION:
+        if frame.body == _NO_SESSION:
             raise Forgotten(self._alone(waiting))
         if waiting is None:  # its deadline has passed
             return
@@ -311,7 +311,7 @@ class Link:
     def _learn(self, waiting: Waiting, reply: Reply) -> None:
         if waiting.body != "TIME?" or not reply.body.startswith("TIME "):
             return
-        exchange = Exchange(sent_s=reply.written_s, gun_us=value(reply.body, "TIME"), received_s=reply.received_s)
+        exchange = Exchange(sent_s=reply.written_s, gun_us=named_value(reply.body, "TIME"), received_s=reply.received_s)
         with self._lock:
             self._clocks.add(exchange)
 

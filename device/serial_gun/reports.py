@@ -153,7 +153,7 @@ MAX_UNCERTAINTY_S: Final = 0.05
 """The most by which the two clocks may disagree for a shot to count, in seconds of the real world. Assumed: it lets
 through a line whose quickest round trip takes 0.1 s, three times that of an adapter that keeps bytes back for 16 ms
 each way; `recoil doctor` warns from 0.01 s on. A response time that is off by more is none."""
-MAX_REST_US: Final = 10_000_000
+_MAX_REST_US: Final = 10_000_000
 """No magnet takes longer to come home, by the wire's own bound of REST."""
 ROUNDING_S: Final = 2e-6
 """Times on the wire are whole microseconds, rounded down."""
@@ -221,5 +221,5 @@ def check_times(told: BelievedShot, order: ShotOrder, speed: float) -> None:
 def check_standing(standing: StatusRecord) -> None:
     """Nothing, if the magnet will be home in a time that the wire allows. `Contradiction`: never, as good as."""
     left_us = standing.ready_us - standing.clock_us
-    if left_us > MAX_REST_US:
-        raise Contradiction(f"READY is {left_us} microseconds after CLOCK; it must be {MAX_REST_US} or less")
+    if left_us > _MAX_REST_US:
+        raise Contradiction(f"READY is {left_us} microseconds after CLOCK; it must be {_MAX_REST_US} or less")

@@ -241,7 +241,7 @@ class Triggering:
                 f"not fired: the gun was switched on or reset {found.clock_us / 1e6:.1f} s ago, and fires nothing in "
                 "its first second, because what was driven before is not known"
             )
-        if error.code == errors.NOT_HOME:
+        if error.code == errors.MAGNET_NOT_HOME:
             return LimitError(
                 f"not fired: its magnet was not home, by the gun's own clock ({max(left_s, 0):.3f} s to go)"
             )

@@ -12,7 +12,7 @@ from device.twin.machine import Carried, DriveEvent, StateMachine
 from device.wire import errors
 from device.wire.errors import message
 from device.wire.frame import Frame, Garbled, Splitter, decode, encode, is_newer
-from device.wire.records import WIRE_VERSION, Named, Setting, number
+from device.wire.records import WIRE_VERSION, Named, Setting, whole_number
 
 QUEUE_SIZE: Final = 16
 WATCHDOG_MS: Final = 30_000
@@ -118,7 +118,7 @@ class Core:
     def _enter(self, frame: Frame, now_us: int) -> None:
         """A session of the strict mode begins: disarmed, numbered from this frame on. It tells the token before."""
         try:
-            token = number(frame.body.removeprefix("SYST:STRI "))
+            token = whole_number(frame.body.removeprefix("SYST:STRI "))
         except Garbled:
             self._send(frame.number, f"ERR {message(errors.BAD_TYPE)}")
             return
@@ -161,7 +161,9 @@ class Core:
         if header in _WITHOUT:
             return errors.NOT_ALLOWED if parameters else self._simple(header, now_us)
         try:
-            return self._with(header, rest, [] if header == "CONF" else [number(text) for text in parameters], now_us)
+            return self._with(
+                header, rest, [] if header == "CONF" else [whole_number(text) for text in parameters], now_us
+            )
         except Garbled:
             return errors.BAD_TYPE if header in _WITH else errors.UNDEFINED
 
@@ -196,12 +198,12 @@ class Core:
             case "SYST:WATC?":
                 return f"WATC {self._watchdog_us // 1000}"
             case _:
-                return message(self._errors.pop(0) if self._errors else errors.NONE)
+                return message(self._errors.pop(0) if self._errors else errors.NO_DEVICE_ERROR)
 
     def _with(self, header: str, rest: str, numbers: list[int], now_us: int) -> Said:
         match header:
             case "CONF":
-                return (self.machine.configure(Setting.parse(rest)) if rest else errors.MISSING) or None
+                return (self.machine.configure(Setting.parse(rest)) if rest else errors.MISSING_PARAMETER) or None
             case "TRIG" if len(numbers) <= 3:
                 mark, at_us, before_us = [*numbers, 0, 0, 0][:3]
                 return self.machine.trigger(mark, at_us, before_us, now_us) or None
@@ -243,7 +245,7 @@ _WITH: Final = frozenset(("CONF", "TRIG", "SYST:WATC"))
 def _wrong_count(header: str, count: int) -> int:
     if header not in _WITH:
         return errors.UNDEFINED
-    return errors.MISSING if count == 0 else errors.NOT_ALLOWED
+    return errors.MISSING_PARAMETER if count == 0 else errors.NOT_ALLOWED
 
 
 def _text(line: bytes) -> str:

@@ -17,7 +17,7 @@ from device.wire.records import Setting, ShotRecord, StatusRecord, WireState
 
 MAX_MILLIVOLTS: Final = 24_000
 MAX_PULSE_US: Final = 20_000
-MAX_EFFECT: Final = 123
+_MAX_EFFECT: Final = 123
 MAX_EFFECT_US: Final = 1_000_000
 MAX_REST_US: Final = 10_000_000
 FLOOR_US: Final = {"PULS": 50_000, "EFF": 10_000}
@@ -46,7 +46,7 @@ def out_of_range(setting: Setting) -> bool:
     if setting.kind == "PULS":
         amount, length = setting.amount <= MAX_MILLIVOLTS, setting.length_us <= MAX_PULSE_US
     else:
-        amount, length = 1 <= setting.amount <= MAX_EFFECT, setting.length_us <= MAX_EFFECT_US
+        amount, length = 1 <= setting.amount <= _MAX_EFFECT, setting.length_us <= MAX_EFFECT_US
     least = max(setting.length_us, FLOOR_US[setting.kind])
     return not (amount and length and least <= setting.rest_us <= MAX_REST_US)
 
@@ -67,7 +67,7 @@ class Budget:
             return errors.DUTY
         if self._warmth_at(start_us) + _heat_nanojoules(setting) > MAX_WARMTH_NJ:
             return errors.HOT
-        return errors.NONE
+        return errors.NO_DEVICE_ERROR
 
     def spend(self, setting: Setting, start_us: int) -> None:
         """Take a shot into account. A pulse that is cut short counts in full."""
@@ -163,7 +163,7 @@ class Carried:
     """How the board carried a drive out: when, or the error for which it did not."""
 
     at_us: int
-    error: int = errors.NONE
+    error: int = errors.NO_DEVICE_ERROR
 
 
 @dataclass(slots=True, kw_only=True)
@@ -178,7 +178,7 @@ class Board:
         at_us = drive.time_us + self.late_us
         if self.dead:
             return Carried(at_us=at_us, error=errors.FAULT)
-        return Carried(at_us=at_us, error=errors.TOO_LATE if drive.is_over(at_us) else errors.NONE)
+        return Carried(at_us=at_us, error=errors.TOO_LATE if drive.is_over(at_us) else errors.NO_DEVICE_ERROR)
 
 
 class StateMachine:
@@ -193,7 +193,7 @@ class StateMachine:
         self.setting: Setting | None = None
         self.shot: ShotRecord = NO_SHOT
         self.drives: list[DriveEvent] = []
-        self.never = errors.NONE
+        self.never = errors.NO_DEVICE_ERROR
         self._board = board or Board()
         self._fault = 0
         self._ready_us = boot_us + BOOT_REST_US
@@ -213,7 +213,7 @@ class StateMachine:
 
     def configure(self, setting: Setting) -> int:
         """Make the next shots of this. The error, or 0."""
-        error = REFUSED.get(("CONF", self.state), errors.NONE)
+        error = REFUSED.get(("CONF", self.state), errors.NO_DEVICE_ERROR)
         if not error and out_of_range(setting):
             error = errors.OUT_OF_RANGE
         if not error:
@@ -222,7 +222,7 @@ class StateMachine:
 
     def arm(self) -> int:
         """Allow shots. The error, or 0."""
-        error = REFUSED.get(("ARM", self.state), errors.NONE)
+        error = REFUSED.get(("ARM", self.state), errors.NO_DEVICE_ERROR)
         if not error:
             self.state = "ARMED"
         return error
@@ -244,11 +244,11 @@ class StateMachine:
             setting=self.setting,
         )
         self.state = "WAITING"
-        return errors.NONE
+        return errors.NO_DEVICE_ERROR
 
     def _forbidden(self, mark: int, start_us: int, before_us: int, now_us: int) -> int:
         """The first rule that a trigger breaks, in this order; or 0."""
-        error = REFUSED.get(("TRIG", self.state), errors.NONE)
+        error = REFUSED.get(("TRIG", self.state), errors.NO_DEVICE_ERROR)
         if error:
             return error
         if self.setting is None:
@@ -260,7 +260,7 @@ class StateMachine:
         if before_us != 0 and start_us > before_us:
             return errors.TOO_LATE
         if start_us < self._ready_us:
-            return errors.NOT_HOME if self.shot.count else errors.JUST_BOOTED
+            return errors.MAGNET_NOT_HOME if self.shot.count else errors.JUST_BOOTED
         return self._budget.refusal(self.setting, start_us)
 
     def abort(self, now_us: int) -> bool:

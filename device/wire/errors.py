@@ -4,16 +4,16 @@ from __future__ import annotations
 
 from typing import Final
 
-NONE: Final = 0
+NO_DEVICE_ERROR: Final = 0
 BAD_TYPE: Final = -104
 NOT_ALLOWED: Final = -108
-MISSING: Final = -109
+MISSING_PARAMETER: Final = -109
 UNDEFINED: Final = -113
 OUT_OF_RANGE: Final = -222
 QUEUE_OVERFLOW: Final = -350
 OVERRUN: Final = -363
 DISARMED: Final = 101
-NOT_HOME: Final = 102
+MAGNET_NOT_HOME: Final = 102
 DUTY: Final = 103
 RATE: Final = 104
 HOT: Final = 105
@@ -28,16 +28,16 @@ ALREADY_FIRED: Final = 113
 JUST_BOOTED: Final = 114
 
 TEXTS: Final = {
-    NONE: "No error",
+    NO_DEVICE_ERROR: "No error",
     BAD_TYPE: "Data type error",
     NOT_ALLOWED: "Parameter not allowed",
-    MISSING: "Missing parameter",
+    MISSING_PARAMETER: "Missing parameter",
     UNDEFINED: "Undefined header",
     OUT_OF_RANGE: "Data out of range",
     QUEUE_OVERFLOW: "Queue overflow",
     OVERRUN: "Input buffer overrun",
     DISARMED: "Disarmed",
-    NOT_HOME: "Magnet not home",
+    MAGNET_NOT_HOME: "Magnet not home",
     DUTY: "Duty limit",
     RATE: "Shots per minute limit",
     HOT: "Coil too hot",

@@ -161,26 +161,26 @@ class Refusal:
     reason: str
 
 
-def refusal(text: str) -> Refusal | None:
+def refusal_in(text: str) -> Refusal | None:
     """The refusal that an answer is, or None if it is another answer.
 
-    >>> refusal('ERR 101,"Disarmed"')
+    >>> refusal_in('ERR 101,"Disarmed"')
     Refusal(code=101, reason='Disarmed')
     """
     found = _ERROR.fullmatch(text)
     return None if found is None else Refusal(code=int(found[1]), reason=found[2])
 
 
-def number(text: str) -> int:
+def whole_number(text: str) -> int:
     """A whole number of at most 16 digits, without sign and leading zeros. `Garbled`: anything else."""
     if _NUMBER.fullmatch(text) is None:
         raise Garbled(f"not a whole number: {text[:40]!r}")
     return int(text)
 
 
-def value(text: str, name: str) -> int:
+def named_value(text: str, name: str) -> int:
     """The number behind a name: `TIME 123`. `Garbled`: anything else."""
-    return number(_behind(text, name))
+    return whole_number(_behind(text, name))
 
 
 def _behind(text: str, name: str) -> str:
@@ -198,7 +198,7 @@ def _fields(text: str, count: int, what: str) -> list[str]:
 
 
 def _numbers(fields: Sequence[str]) -> list[int]:
-    return [number(field) for field in fields]
+    return [whole_number(field) for field in fields]
 
 
 def _one_of(text: str, words: Sequence[str]) -> str:

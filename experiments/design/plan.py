@@ -13,15 +13,15 @@ from experiments.config.setup import sha256, without_blank_instruction
 from experiments.design.streams import Stream
 
 
-def rows(order: Order, count: int) -> list[list[int]]:
+def square_rows(order: Order, count: int) -> list[list[int]]:
     """All rows of a balancing square over `count` methods; none for a random order.
 
     A Latin square has each method once at each place. Williams' design has, beyond that, each method equally often
     right after each other one: `count` rows if it is even, twice as many if it is odd (Williams 1949).
 
-    >>> rows("latin-square", 3)
+    >>> square_rows("latin-square", 3)
     [[0, 1, 2], [1, 2, 0], [2, 0, 1]]
-    >>> rows("williams", 4)
+    >>> square_rows("williams", 4)
     [[0, 3, 1, 2], [1, 0, 2, 3], [2, 1, 3, 0], [3, 2, 0, 1]]
     """
     if order == "random":
@@ -44,7 +44,7 @@ def next_row(order: Order, count: int, used: Sequence[int]) -> int | None:
     >>> next_row("latin-square", 3, [0, 1, 1])
     2
     """
-    square = rows(order, count)
+    square = square_rows(order, count)
     if not square:
         return None
     return min(range(len(square)), key=lambda row: (list(used).count(row), row))
@@ -54,7 +54,7 @@ def method_order(order: Order, methods: Sequence[str], row: int | None, stream: 
     """The methods in the order of a row of the square, or shuffled where there is none."""
     if row is None:
         return stream.shuffled(methods)
-    return [methods[place] for place in rows(order, len(methods))[row]]
+    return [methods[place] for place in square_rows(order, len(methods))[row]]
 
 
 PLAN_FORMAT = 1

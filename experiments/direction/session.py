@@ -14,7 +14,7 @@ from experiments.direction.config import Breaks, Design, DirectionConfig
 from experiments.record.tables import Row, presentation
 from experiments.session.history import History, TrialHistory, by_trial
 from experiments.session.remarks import AnswerCorrected
-from experiments.session.steps import Answered, Ask, Fire, Fired, Prepare, Presenter, Rest, Session, Step
+from experiments.session.steps import Answered, Ask, Fired, FireShot, Prepare, Presenter, Rest, Session, Step
 
 
 def make_plan(config: DirectionConfig, participant_id: str, seed: int, order_row: int | None) -> Plan:
@@ -132,7 +132,7 @@ def _steps(setup: Setup[DirectionConfig], texts: Mapping[str, str], trial: Trial
             damper=setup.gun.methods[trial.method].damper,
             instruction=texts[trial.instruction],
         ),
-        Fire(trial=trial, attempt=attempt),
+        FireShot(trial=trial, attempt=attempt),
         Ask(
             trial=trial,
             attempt=attempt,

@@ -29,7 +29,7 @@ TABLE_COLUMNS = ("participant_id", "method", "forward_correct", "backward_correc
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Answer:
+class SyntheticAnswer:
     """A synthetic participant's answer to one shot."""
 
     response: Direction
@@ -82,13 +82,15 @@ class RatesParticipant:
         self._ability = self._rates.ability_sd * person.normal()
         self._bias = self._rates.bias_sd * person.normal()
 
-    def answer(self, trial: Trial) -> Answer:
+    def answer(self, trial: Trial) -> SyntheticAnswer:
         """The answer to a shot of this trial's method and direction."""
         draws = _trial_stream(self._seed, self._who, trial)
         towards = self._ability if trial.direction == "forward" else -self._ability
         probit = probit_of_forward(self._rates, trial.method, trial.direction) + towards + self._bias
         forward = draws.uniform() < _NORMAL.cdf(probit)
-        return Answer(response="forward" if forward else "backward", response_time_s=_response_time(self._times, draws))
+        return SyntheticAnswer(
+            response="forward" if forward else "backward", response_time_s=_response_time(self._times, draws)
+        )
 
 
 class TableParticipant:
@@ -108,11 +110,11 @@ class TableParticipant:
                 shuffled = Stream(self._seed, "correct", *self._who, method, direction).shuffled(marks)
                 self._correct |= dict(zip(trials, shuffled, strict=True))
 
-    def answer(self, trial: Trial) -> Answer:
+    def answer(self, trial: Trial) -> SyntheticAnswer:
         """The answer that the table leaves for this trial."""
         other: Direction = "backward" if trial.direction == "forward" else "forward"
         draws = _trial_stream(self._seed, self._who, trial)
-        return Answer(
+        return SyntheticAnswer(
             response=trial.direction if self._correct[trial] else other,
             response_time_s=_response_time(self._times, draws),
         )
@@ -127,11 +129,11 @@ class ModelParticipant:
     def __init__(self, model: ModelParameters, percepts: Mapping[str, Percept], plan: Plan) -> None:
         self._participant = ModelBasedParticipant(model, percepts, plan)
 
-    def answer(self, trial: Trial) -> Answer:
+    def answer(self, trial: Trial) -> SyntheticAnswer:
         """The answer to a shot of this trial's method and direction."""
         decision = self._participant.decide(trial, trial.instruction or NEUTRAL)
         response: Direction = "forward" if decision.upper else "backward"
-        return Answer(response=response, response_time_s=_as_boxed(decision.time_s))
+        return SyntheticAnswer(response=response, response_time_s=_as_boxed(decision.time_s))
 
 
 def _trial_stream(seed: int, who: tuple[str, str], trial: Trial) -> Stream:

@@ -23,8 +23,8 @@ from pydantic import TypeAdapter
 
 from device import DeviceError
 from experiments.doctor import measures, verdicts
-from experiments.doctor.figures import Finding, Seen
-from experiments.doctor.verdicts import Latencies, latencies, together
+from experiments.doctor.figures import DoctorFinding, ProgramFigures
+from experiments.doctor.verdicts import Latencies, latencies, pooled
 from experiments.record import journal
 from experiments.record.journal import JournalError
 from experiments.study.places import PlaceError
@@ -39,12 +39,12 @@ class Check:
     """One thing to look at."""
 
     name: str
-    look: Callable[[], tuple[Finding, ...]]
+    look: Callable[[], tuple[DoctorFinding, ...]]
 
 
 def checks(results: Path, gun: str, limit_s: float) -> tuple[Check, ...]:
     """What there is to look at, for a results folder and a gun's address; `limit_s` is its line's, there and back."""
-    looks: dict[str, Callable[[], tuple[Finding, ...]]] = {
+    looks: dict[str, Callable[[], tuple[DoctorFinding, ...]]] = {
         "machine": lambda: (verdicts.of_machine(measures.machine()),),
         "clock": lambda: (verdicts.of_clock(measures.ticks()),),
         "disk": partial(_disk, results),
@@ -59,7 +59,7 @@ def checks(results: Path, gun: str, limit_s: float) -> tuple[Check, ...]:
     return tuple(Check(name=name, look=look) for name, look in looks.items())
 
 
-def carry_out(check: Check) -> tuple[Finding, ...]:
+def carry_out_check(check: Check) -> tuple[DoctorFinding, ...]:
     """What a check found; that it broke off is a finding too. `PlaceError` if it was asked for the impossible."""
     try:
         return check.look()
@@ -80,54 +80,54 @@ def no_display(environment: Mapping[str, str], platform: str) -> str:
     return "neither DISPLAY nor WAYLAND_DISPLAY is set"
 
 
-def _disk(results: Path) -> tuple[Finding, ...]:
+def _disk(results: Path) -> tuple[DoctorFinding, ...]:
     try:
-        return (verdicts.of_disk(within(DEADLINE_S, partial(measures.appends, results))),)
+        return (verdicts.of_disk(within_seconds(DEADLINE_S, partial(measures.appends, results))),)
     except OSError as error:  # a deadline that passed is one as well
         return (verdicts.of_disk_failure(str(results), error.strerror or str(error)),)
 
 
-def _gun(address: str, limit_s: float) -> tuple[Finding, ...]:
+def _gun(address: str, limit_s: float) -> tuple[DoctorFinding, ...]:
     try:
-        return (verdicts.of_link(within(DEADLINE_S, partial(measures.link, address)), limit_s),)
+        return (verdicts.of_link(within_seconds(DEADLINE_S, partial(measures.gun_line, address)), limit_s),)
     except (DeviceError, OSError) as error:
         return (verdicts.of_link_failure(str(error)),)
 
 
-def _on_display(name: str, program: str, seconds: float = DEADLINE_S) -> tuple[Finding, ...]:
+def _on_display(name: str, program: str, seconds: float = DEADLINE_S) -> tuple[DoctorFinding, ...]:
     missing = no_display(os.environ, sys.platform)
-    answer = Reply(absent=missing) if missing else ask(program, seconds)
+    answer = ProgramReply(absent=missing) if missing else ask(program, seconds)
     if answer.figures is not None:
         return (verdicts.of_seen(answer.figures),)
     return (verdicts.of_absent(name, answer.absent) if answer.absent else verdicts.of_failure(name, answer.error),)
 
 
-def _sound() -> tuple[Finding, ...]:
+def _sound() -> tuple[DoctorFinding, ...]:
     answer = ask("sound", DEADLINE_S)
     seen = answer.figures
     return (verdicts.no_sound(answer.absent or answer.error) if seen is None else verdicts.of_seen(seen),)
 
 
-def _console(results: Path) -> tuple[Finding, ...]:
-    return within(DEADLINE_S, lambda: verdicts.of_latencies(together(_latencies(results))))
+def _console(results: Path) -> tuple[DoctorFinding, ...]:
+    return within_seconds(DEADLINE_S, lambda: verdicts.of_latencies(pooled(_latencies(results))))
 
 
 def _latencies(results: Path) -> Iterator[Latencies]:
     for path in sorted(results.glob("sub-*/sub-*_journal.jsonl")):
         try:
-            yield latencies(journal.read(path).records)
+            yield latencies(journal.read_journal(path).records)
         except JournalError:
             continue  # `recoil study` tells of journals that cannot be read; here they have no stamps to give
 
 
-Result = TypeVar("Result")
+_Result = TypeVar("_Result")
 
 PUT_AWAY_S = 2.0
 
 
-def within(seconds: float, work: Callable[[], Result]) -> Result:
+def within_seconds(seconds: float, work: Callable[[], _Result]) -> _Result:
     """The result of some work, or what it raises. `TimeoutError` if it takes longer; it is then left to itself."""
-    results: list[Result] = []
+    results: list[_Result] = []
     errors: list[Exception] = []
     done = threading.Event()  # not `join`: once interrupted, it takes the thread for ended
 
@@ -164,23 +164,23 @@ _MISSING = re.compile(r"\S+\.so[.\d]*: cannot open shared object file")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Reply:
+class ProgramReply:
     """What a child said: figures, or why there are none: it is `absent` here, or an `error` came in between."""
 
-    figures: Seen | None = None
+    figures: ProgramFigures | None = None
     absent: str = ""
     error: str = ""
 
 
-_REPLY = TypeAdapter(Reply)
+_REPLY = TypeAdapter(ProgramReply)
 
 
-def ask(program: str, seconds: float) -> Reply:
+def ask(program: str, seconds: float) -> ProgramReply:
     """Run one of the programs beside this module for so long at most."""
     return run_child([sys.executable, "-m", "experiments.doctor.programs", program], seconds)
 
 
-def run_child(command: list[str], seconds: float) -> Reply:
+def run_child(command: list[str], seconds: float) -> ProgramReply:
     """Run a command that answers with one JSON object; killed after its time, or when this process is interrupted."""
     with tempfile.TemporaryFile() as said, tempfile.TemporaryFile() as errors:
         child = subprocess.Popen(
@@ -189,7 +189,7 @@ def run_child(command: list[str], seconds: float) -> Reply:
         try:
             code = child.wait(seconds)
         except subprocess.TimeoutExpired:
-            return Reply(error=f"did not end within {seconds:g} s")
+            return ProgramReply(error=f"did not end within {seconds:g} s")
         finally:
             child.kill()
             with suppress(subprocess.TimeoutExpired):  # stuck in the system: left behind
@@ -197,11 +197,11 @@ def run_child(command: list[str], seconds: float) -> Reply:
         return _answer(code, _text(said), _text(errors))
 
 
-def _answer(code: int, said: str, errors: str) -> Reply:
+def _answer(code: int, said: str, errors: str) -> ProgramReply:
     if code == 0 and said:
         return _REPLY.validate_json(said)
     ending = f"was killed by signal {-code}" if code < 0 else f"ended with exit code {code}"
-    return Reply(error=f"{ending}: {cause(errors)}")
+    return ProgramReply(error=f"{ending}: {cause(errors)}")
 
 
 def cause(errors: str) -> str:

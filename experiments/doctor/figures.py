@@ -10,7 +10,7 @@ import numpy as np
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Spread:
+class Percentiles:
     """Median, 95th and 99th percentile and the largest of `n` values, in the unit of the values."""
 
     n: int
@@ -34,9 +34,9 @@ def percentile(values: Sequence[float], percent: float) -> float:
     return float(np.percentile(values, percent, method="inverted_cdf"))
 
 
-def spread(values: Sequence[float]) -> Spread:
+def spread(values: Sequence[float]) -> Percentiles:
     """Middle and tail of some values. `ValueError` if there are none."""
-    return Spread(
+    return Percentiles(
         n=len(values),
         median=percentile(values, 50),
         p95=percentile(values, 95),
@@ -61,25 +61,25 @@ class Ticks:
 
     resolution_s: float
     smallest_step_s: float
-    oversleep_ms: Spread
+    oversleep_ms: Percentiles
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Appends:
     """Lines appended to a file, each synced, and what is free on its disk."""
 
-    append_ms: Spread
+    append_ms: Percentiles
     free_bytes: int
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Link:
+class GunLine:
     """A gun that answered: who, how fast, and its state when asked to be disarmed."""
 
     gun: str
     state: str
     fault: str | None
-    round_trip_ms: Spread
+    round_trip_ms: Percentiles
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -103,7 +103,7 @@ class Display:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Stage:
+class PsychoPyStage:
     """PsychoPy: the time of its import, of a window's opening, and the frames a second that it drew."""
 
     version: str
@@ -140,7 +140,7 @@ class Adapters:
 class ConsoleLatency:
     """What a way through the console took, in so many trials, against its bound."""
 
-    ms: Spread
+    ms: Percentiles
     bound_ms: float
     trials: int
 
@@ -150,22 +150,22 @@ class NoFigures:
     """Nothing was measured."""
 
 
-Seen = Display | Stage | Sound | Keys
+ProgramFigures = Display | PsychoPyStage | Sound | Keys
 """What a program of its own looks at."""
-Figures = Machine | Ticks | Appends | Link | Adapters | Seen | ConsoleLatency | NoFigures
+Figures = Machine | Ticks | Appends | GunLine | Adapters | ProgramFigures | ConsoleLatency | NoFigures
 
-Verdict = Literal["good", "warning", "fails", "not there"]
+DoctorVerdict = Literal["good", "warning", "fails", "not there"]
 """`warning`: works, but not as it should; `fails`: a run would suffer; `not there`: this machine has no such thing."""
 
-VERDICTS: tuple[Verdict, ...] = get_args(Verdict)
+DOCTOR_VERDICTS: tuple[DoctorVerdict, ...] = get_args(DoctorVerdict)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Finding:
+class DoctorFinding:
     """One row of the table. `figures` are the raw ones; the unit ends the name of each."""
 
     check: str
-    verdict: Verdict
+    verdict: DoctorVerdict
     measured: str
     advice: str = ""
     figures: Figures = NoFigures()

@@ -15,7 +15,7 @@ from pathlib import Path
 from device import open_gun
 from device.serial_gun.opening import speed_of
 from experiments.clock import RealClock
-from experiments.doctor.figures import Adapter, Appends, Link, Machine, Ticks, spread
+from experiments.doctor.figures import Adapter, Appends, GunLine, Machine, Ticks, spread
 from experiments.record import storage
 from experiments.record.provenance import recoil_version
 from experiments.runner import gun_name
@@ -111,7 +111,7 @@ ADAPTERS = Path("/sys/bus/usb-serial/devices")
 """Where Linux shows them; nowhere else."""
 
 
-def link(address: str) -> Link:
+def gun_line(address: str) -> GunLine:
     """Ask the gun who it is and how it stands, many times.
 
     `DeviceError` if it does not answer; `PlaceError` if there is no such form of address.
@@ -125,7 +125,7 @@ def link(address: str) -> Link:
         gun.disarm()
         times = timed_ms(ROUND_TRIPS, gun.status)
         status = gun.status()
-    return Link(gun=name, state=status.state, fault=status.fault, round_trip_ms=spread(times))
+    return GunLine(gun=name, state=status.state, fault=status.fault, round_trip_ms=spread(times))
 
 
 def adapters(folder: Path = ADAPTERS) -> list[Adapter]:

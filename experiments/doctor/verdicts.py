@@ -18,17 +18,17 @@ from experiments.doctor.figures import (
     Appends,
     ConsoleLatency,
     Display,
+    DoctorFinding,
+    DoctorVerdict,
     Figures,
-    Finding,
+    GunLine,
     Keys,
-    Link,
     Machine,
-    Seen,
+    Percentiles,
+    ProgramFigures,
+    PsychoPyStage,
     Sound,
-    Spread,
-    Stage,
     Ticks,
-    Verdict,
     spread,
 )
 from experiments.record.journal import Record, read_as
@@ -44,7 +44,7 @@ class Latencies:
     trials: int = 0
 
 
-def together(some: Iterable[Latencies]) -> Latencies:
+def pooled(some: Iterable[Latencies]) -> Latencies:
     """The latencies of several journals as one."""
     every = list(some)
     return Latencies(
@@ -124,7 +124,7 @@ MIN_WIDTH_PX, MIN_HEIGHT_PX = 1024, 720
 INSTALL = 'install the screens: pip install "recoil[gui]"'
 
 
-def of_machine(found: Machine) -> Finding:
+def of_machine(found: Machine) -> DoctorFinding:
     """The machine itself; a warning if the packages of the screens are not installed."""
     versions = ", ".join(f"{name} {version or 'none'}" for name, version in found.versions.items())
     missing = [name for name, version in found.versions.items() if version is None]
@@ -136,7 +136,7 @@ def of_machine(found: Machine) -> Finding:
     )
 
 
-def of_clock(found: Ticks) -> Finding:
+def of_clock(found: Ticks) -> DoctorFinding:
     """The clock that stamps the trials."""
     step_us, sleep = 1e6 * found.smallest_step_s, found.oversleep_ms
     advice = []
@@ -151,7 +151,7 @@ def of_clock(found: Ticks) -> Finding:
     return _judged("clock", measured, "; ".join(advice), found)
 
 
-def of_disk(found: Appends) -> Finding:
+def of_disk(found: Appends) -> DoctorFinding:
     """The disk under the results folder."""
     advice = []
     if found.append_ms.p95 > MAX_APPEND_MS:
@@ -164,17 +164,17 @@ def of_disk(found: Appends) -> Finding:
     return _judged("disk", measured, "; ".join(advice), found)
 
 
-def of_disk_failure(folder: str, reason: str) -> Finding:
+def of_disk_failure(folder: str, reason: str) -> DoctorFinding:
     """A results folder that takes no records."""
     advice = f"make {folder} a folder that you may write to, with room on its disk, or give another with --results"
-    return Finding(check="disk", verdict="fails", measured=f"{folder}: {reason}", advice=advice)
+    return DoctorFinding(check="disk", verdict="fails", measured=f"{folder}: {reason}", advice=advice)
 
 
-def of_link(found: Link, limit_s: float) -> Finding:
+def of_link(found: GunLine, limit_s: float) -> DoctorFinding:
     """The gun and the way to it, whose 95th percentile is to keep a limit."""
     measured = f"{found.gun}, {found.state}; round trip {_tail(found.round_trip_ms)}"
     if found.fault is not None or found.state != "disarmed":
-        return Finding(
+        return DoctorFinding(
             check="gun",
             verdict="fails",
             measured=measured if found.fault is None else f"{measured}; fault: {found.fault}",
@@ -188,24 +188,24 @@ def of_link(found: Link, limit_s: float) -> Finding:
     return _judged("gun", measured, advice if found.round_trip_ms.p95 > 1000 * limit_s else "", found)
 
 
-def of_link_failure(reason: str) -> Finding:
+def of_link_failure(reason: str) -> DoctorFinding:
     """A gun that does not answer."""
     advice = "check power, cable and port; on Linux you must be in the group dialout"
-    return Finding(check="gun", verdict="fails", measured=reason, advice=advice)
+    return DoctorFinding(check="gun", verdict="fails", measured=reason, advice=advice)
 
 
-def of_adapters(found: Sequence[Adapter]) -> Finding:
+def of_adapters(found: Sequence[Adapter]) -> DoctorFinding:
     """The latency timers of USB serial adapters, where the system shows them."""
     if not found:
         measured = "this system shows no USB serial adapter with a latency timer"
-        return Finding(
+        return DoctorFinding(
             check="USB adapter",
             verdict="not there",
             measured=measured,
             advice="nothing, unless the gun is on a USB serial port",
         )
     slow = [adapter for adapter in found if adapter.latency_ms > MAX_ADAPTER_MS]
-    return Finding(
+    return DoctorFinding(
         check="USB adapter",
         verdict="warning" if slow else "good",
         measured=", ".join(f"{adapter.name}: latency timer {adapter.latency_ms} ms" for adapter in found),
@@ -214,12 +214,12 @@ def of_adapters(found: Sequence[Adapter]) -> Finding:
     )
 
 
-def of_seen(found: Seen) -> Finding:
+def of_seen(found: ProgramFigures) -> DoctorFinding:
     """What a program of its own saw."""
     match found:
         case Display():
             return of_display(found)
-        case Stage():
+        case PsychoPyStage():
             return of_stage(found)
         case Sound():
             return of_sound(found)
@@ -227,12 +227,12 @@ def of_seen(found: Seen) -> Finding:
             return of_keys(found)
 
 
-def of_display(found: Display) -> Finding:
+def of_display(found: Display) -> DoctorFinding:
     """The screen that the console is seen on."""
     size = f"{found.width_px} x {found.height_px} at {found.refresh_Hz:.0f} Hz ({found.platform})"
     if found.opened_ms is None:
         advice = "see that the desktop shows windows, then look again"
-        return Finding(
+        return DoctorFinding(
             check="display", verdict="fails", measured=f"{size}; no window was seen", advice=advice, figures=found
         )
     advice = ""
@@ -243,7 +243,7 @@ def of_display(found: Display) -> Finding:
     return _judged("display", f"{size}; a window was seen after {found.opened_ms:.0f} ms", advice, found)
 
 
-def of_stage(found: Stage) -> Finding:
+def of_stage(found: PsychoPyStage) -> DoctorFinding:
     """PsychoPy. How fast it draws is information only: without vertical sync it means nothing."""
     measured = (
         f"PsychoPy {found.version} imported in {found.import_s:.1f} s, a window in {found.opened_s:.1f} s; "
@@ -252,7 +252,7 @@ def of_stage(found: Stage) -> Finding:
     return _judged("PsychoPy", measured, "", found)
 
 
-def of_sound(found: Sound) -> Finding:
+def of_sound(found: Sound) -> DoctorFinding:
     """The device that plays the break's tone and the masking noise."""
     if not found.outputs:
         return no_sound("no output device")
@@ -261,22 +261,22 @@ def of_sound(found: Sound) -> Finding:
     return _judged("sound", f"{count}, default: {found.default or 'none'}", advice, found)
 
 
-def no_sound(reason: str) -> Finding:
+def no_sound(reason: str) -> DoctorFinding:
     """A machine that cannot be heard."""
     advice = (
         "the break's tone and masking noise stay silent: connect headphones or loudspeakers "
         "and see that the system lists them"
     )
-    return Finding(check="sound", verdict="not there", measured=reason, advice=advice)
+    return DoctorFinding(check="sound", verdict="not there", measured=reason, advice=advice)
 
 
-def of_keys(found: Keys) -> Finding:
+def of_keys(found: Keys) -> DoctorFinding:
     """The way of a key to a Qt window. It begins at the display's server: the keyboard's own delay is not in it."""
     came = len(found.to_event_ms)
     if came == 0:
         measured = f"none of {found.injected} injected keys came to the window"
         advice = "leave the doctor's window in front, keep your hands off, and look again"
-        return Finding(check="keyboard", verdict="warning", measured=measured, advice=advice, figures=found)
+        return DoctorFinding(check="keyboard", verdict="warning", measured=measured, advice=advice, figures=found)
     event, painted = spread(found.to_event_ms), spread(found.to_painted_ms)
     measured = f"{came} of {found.injected} keys; to the event {_short(event)}; until painted {_short(painted)}"
     advice = "" if came == found.injected else "some keys went elsewhere: leave the doctor's window in front"
@@ -285,7 +285,7 @@ def of_keys(found: Keys) -> Finding:
     return _judged("keyboard", measured, advice, found)
 
 
-def of_latencies(found: Latencies) -> tuple[Finding, Finding]:
+def of_latencies(found: Latencies) -> tuple[DoctorFinding, DoctorFinding]:
     """What the console took in the runs of a results folder."""
     return (
         _latency("step to screen", found.step_to_screen_ms, MAX_STEP_TO_SCREEN_MS, "steps", found.trials),
@@ -293,9 +293,9 @@ def of_latencies(found: Latencies) -> tuple[Finding, Finding]:
     )
 
 
-def _latency(check: str, values: Sequence[float], bound: float, what: str, trials: int) -> Finding:
+def _latency(check: str, values: Sequence[float], bound: float, what: str, trials: int) -> DoctorFinding:
     if not values:
-        return Finding(
+        return DoctorFinding(
             check=check,
             verdict="not there",
             measured="no console runs here",
@@ -304,7 +304,7 @@ def _latency(check: str, values: Sequence[float], bound: float, what: str, trial
     found = spread(values)
     measured = f"{_short(found)}, worst {_ms(found.worst)}; {found.n} {what} in {trials} trials"
     slow = found.p99 > bound
-    return Finding(
+    return DoctorFinding(
         check=check,
         verdict="warning" if slow else "good",
         measured=measured,
@@ -313,15 +313,15 @@ def _latency(check: str, values: Sequence[float], bound: float, what: str, trial
     )
 
 
-def of_absent(check: str, reason: str) -> Finding:
+def of_absent(check: str, reason: str) -> DoctorFinding:
     """Something that this machine does not have."""
     advice = INSTALL if reason.endswith("not installed") else _ABSENT[check]
-    return Finding(check=check, verdict="not there", measured=reason, advice=advice)
+    return DoctorFinding(check=check, verdict="not there", measured=reason, advice=advice)
 
 
-def of_failure(check: str, reason: str) -> Finding:
+def of_failure(check: str, reason: str) -> DoctorFinding:
     """A check that broke off."""
-    return Finding(check=check, verdict="fails", measured=reason, advice=_BROKEN.get(check, _REPORT))
+    return DoctorFinding(check=check, verdict="fails", measured=reason, advice=_BROKEN.get(check, _REPORT))
 
 
 _ABSENT = {
@@ -342,22 +342,22 @@ _BROKEN = {
 }
 
 
-def overall(verdicts: Sequence[Verdict]) -> Literal["good", "warning", "fails"]:
+def overall(verdicts: Sequence[DoctorVerdict]) -> Literal["good", "warning", "fails"]:
     """The worst of the verdicts; what is not there does no harm."""
     return "fails" if "fails" in verdicts else "warning" if "warning" in verdicts else "good"
 
 
-def _judged(check: str, measured: str, advice: str, figures: Figures) -> Finding:
+def _judged(check: str, measured: str, advice: str, figures: Figures) -> DoctorFinding:
     """Good if there is nothing to advise, else a warning."""
-    verdict: Verdict = "warning" if advice else "good"
-    return Finding(check=check, verdict=verdict, measured=measured, advice=advice, figures=figures)
+    verdict: DoctorVerdict = "warning" if advice else "good"
+    return DoctorFinding(check=check, verdict=verdict, measured=measured, advice=advice, figures=figures)
 
 
-def _tail(of: Spread) -> str:
+def _tail(of: Percentiles) -> str:
     return f"median {_ms(of.median)}, 95th percentile {_ms(of.p95)}, worst {_ms(of.worst)} (n = {of.n})"
 
 
-def _short(of: Spread) -> str:
+def _short(of: Percentiles) -> str:
     return f"median {_ms(of.median)}, 99th percentile {_ms(of.p99)}"
 
 

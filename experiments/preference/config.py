@@ -72,7 +72,7 @@ class RatingScale(Model):
         return self
 
 
-class Description(Model):
+class DescriptionConfig(Model):
     """What is asked beside each rating."""
 
     text: Text
@@ -128,7 +128,7 @@ class PreferenceConfig(ExperimentConfig):
     design: Design
     stimulus: Stimulus
     rating: RatingScale
-    description: Description
+    description: DescriptionConfig
     fatigue: Fatigue
     timing: Timing
     synthetic: Synthetic

@@ -2,7 +2,7 @@
 
 One JSON object a line. The first record holds the whole plan, the resolved setup and where they came from. Every record
 has its number `n`, its `kind`, monotonic and UTC time, when the record before it was on the disk (`synced_s`), and the
-hash of that record's line (`link`): a record changed by hand breaks the chain.
+hash of that record's line (`link_of`): a record changed by hand breaks the chain.
 """
 
 from __future__ import annotations
@@ -140,7 +140,7 @@ class Journal:
 
         `JournalError` if another run holds it, or wrote to it since `contents` was read.
         """
-        descriptor = hold(contents.path)
+        descriptor = hold_journal(contents.path)
         try:
             if os.fstat(descriptor).st_size != contents.whole_bytes + contents.cut_bytes:
                 raise JournalError(f"{contents.path}: another run wrote to it just now; look again and start anew")
@@ -176,7 +176,7 @@ class Journal:
         self._synced_s = self._clock.now()
         self._count += 1
         self._length += len(line)
-        self._link = link(line)
+        self._link = link_of(line)
         if not storage.is_at(self._descriptor, self.path):
             self._gone = self._rescue()
             raise JournalGone(self._gone)
@@ -228,7 +228,7 @@ def _written_again(path: Path, data: bytes) -> bool:
     return True
 
 
-def hold(path: Path) -> int:
+def hold_journal(path: Path) -> int:
     """An existing journal opened for this process alone. `JournalError` if it is gone or another run holds it."""
     try:
         descriptor = storage.reopen(path)
@@ -244,12 +244,12 @@ def _held(path: Path, descriptor: int) -> int:
     return descriptor
 
 
-def link(line: bytes) -> str:
+def link_of(line: bytes) -> str:
     """What the next record says of a line: the first 16 digits of its SHA-256."""
     return hashlib.sha256(line.rstrip(b"\r\n")).hexdigest()[:16]
 
 
-def parsed(line: bytes) -> dict[str, object]:
+def parsed_line(line: bytes) -> dict[str, object]:
     """The JSON object on a line; else `JournalError`."""
     try:
         value = json.loads(line)
@@ -268,7 +268,7 @@ def check_chain(value: dict[str, object], number: int, before: str) -> None:
         raise JournalError(f"does not follow from line {number}, which was changed after it was written")
 
 
-def read(path: Path) -> Contents:
+def read_journal(path: Path) -> Contents:
     """Every whole record of a journal. A record is whole if its line has its end; the rest is counted, not read.
 
     `JournalError` names file, line and rule if there is no whole record, or if one was changed by hand.
@@ -280,16 +280,16 @@ def read(path: Path) -> Contents:
 
 
 def begun(path: Path) -> Contents | None:
-    """What a journal holds; `None` if the run was killed before anything was acknowledged. Raises as `read`."""
-    return contents_of(path, load(path))
+    """What a journal holds; `None` if the run was killed before anything was acknowledged. Raises as `read_journal`."""
+    return contents_of(path, journal_bytes(path))
 
 
 def head(path: Path) -> Head | None:
-    """The first record of a journal; `None` if the run was killed before it was whole. Raises as `read`."""
-    return head_of(path, load(path))
+    """The first record of a journal; `None` if the run was killed before it was whole. Raises as `read_journal`."""
+    return head_of(path, journal_bytes(path))
 
 
-def load(path: Path) -> bytes:
+def journal_bytes(path: Path) -> bytes:
     """The bytes of a journal. `JournalError` if there are none to be had."""
     try:
         return path.read_bytes()
@@ -298,13 +298,13 @@ def load(path: Path) -> bytes:
 
 
 def contents_of(path: Path, data: bytes) -> Contents | None:
-    """What the bytes of a journal hold; `None` if there is no whole record. Raises as `read`."""
+    """What the bytes of a journal hold; `None` if there is no whole record. Raises as `read_journal`."""
     whole_bytes = data.rfind(b"\n") + 1
     lines = data[:whole_bytes].split(b"\n")[:-1]
     first = head_of(path, data)
     if first is None:
         return None
-    links = [*map(link, lines)]
+    links = [*map(link_of, lines)]
     others = (_record(path, number, line, links[number - 1]) for number, line in enumerate(lines[1:], start=1))
     return Contents(
         path=path,
@@ -351,7 +351,7 @@ def read_as(kind: TypeAdapter[Typed], value: object, place: str) -> Typed:
 
 def _values(path: Path, number: int, line: bytes, before: str) -> dict[str, object]:
     try:
-        value = parsed(line)
+        value = parsed_line(line)
         if value.get("kind") not in _KINDS:
             raise JournalError(f"kind must be one of {', '.join(_KINDS)}; it was changed or damaged")
         check_chain(value, number, before)

@@ -13,13 +13,13 @@ from experiments.session.steps import (
     OUTCOME,
     STEP,
     Ask,
-    Fire,
+    FireShot,
     Interrupted,
     Outcome,
     Present,
     Session,
     Step,
-    record,
+    step_record,
 )
 
 
@@ -86,13 +86,13 @@ def go_on(session: Session, contents: Contents, position: RunPosition, append: C
     its stimulus was felt, may have been, or was about to be.
     """
     step, announced = position.step, _last_step_is_open(contents)
-    if step is None or not (announced or isinstance(step, Fire | Ask | Present)):
+    if step is None or not (announced or isinstance(step, FireShot | Ask | Present)):
         return position
     if not announced:
-        append("step", body=record(step))
-    felt = isinstance(step, Ask) or (announced and isinstance(step, Fire | Present))
+        append("step", body=step_record(step))
+    felt = isinstance(step, Ask) or (announced and isinstance(step, FireShot | Present))
     outcome = Interrupted(presented=felt)
-    append("outcome", body=record(outcome))
+    append("outcome", body=step_record(outcome))
     return replace(position, step=_send(session, outcome), history=[*position.history, (step, outcome)])
 
 
@@ -110,7 +110,7 @@ def _send(session: Session, outcome: Outcome) -> Step | None:
 
 
 def _compare(contents: Contents, number: int, planned: Step | None, recorded: Step) -> None:
-    if planned is None or record(planned) != record(recorded):
+    if planned is None or step_record(planned) != step_record(recorded):
         raise JournalError(
             f"{contents.path}: step {number} is {recorded.kind!r} and does not follow from the plan in line 1; "
             "the journal was changed, or another version of Recoil wrote it"

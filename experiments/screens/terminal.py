@@ -29,7 +29,7 @@ from experiments.screens.texts import (
 )
 from experiments.session import events
 from experiments.session.events import Event, Press
-from experiments.session.history import Entry, value
+from experiments.session.history import Entry, entered_value
 from experiments.session.remarks import Remark, flag_word
 from experiments.session.states import Position, State
 from experiments.session.steps import Ask, Describe, Outcome, Prepare, Rate, Rest, Step
@@ -158,7 +158,7 @@ class TerminalScreen:
 
     def _correction(self, entry: Entry) -> str:
         told = self._live.history if self._live else ()
-        was = value_text(value(told, entry))
+        was = value_text(entered_value(told, entry))
         how = {"answer": "f or b", "rating": "a number, or none", "description": "the words"}[entry.what]
         return (
             f"\n  Correct the {entry.what} of {place_text(self._plan, entry.trial)} (entered: {was}): {how}; "

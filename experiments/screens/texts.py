@@ -9,7 +9,7 @@ import unicodedata
 
 from experiments.design.plan import Plan, Trial
 from experiments.session import remarks, steps
-from experiments.session.history import Entry, History, Value, is_attempt, together, value
+from experiments.session.history import Entry, History, Value, entered_value, is_attempt, of_one_set
 from experiments.session.remarks import MAX_FLAG, Remark
 from experiments.session.steps import Outcome, Prepare, Step, trial_of
 
@@ -36,7 +36,7 @@ def place_text(plan: Plan, trial: Trial) -> str:
 def short_place(trial: Trial, here: Trial) -> str:
     """Where a trial stands that is looked at from another: its set and session are named where they differ."""
     place = f"trial {trial.trial}"
-    if together(trial, here):
+    if of_one_set(trial, here):
         return place
     place += f" of set {trial.set}"
     return place if trial.session == here.session else f"{place}, session {trial.session}"
@@ -72,7 +72,7 @@ def value_text(said: Value) -> str:
 def entry_text(plan: Plan, told: History, entry: Entry) -> str:
     """An entry with what it says."""
     name = f"Trial {entry.trial.trial}" if entry.what == "answer" else f"{ordinal(plan, entry.trial)}, {entry.what}"
-    return f"{name}: {value_text(value(told, entry))}"
+    return f"{name}: {value_text(entered_value(told, entry))}"
 
 
 def saved_text(plan: Plan, step: Step | None, word: Outcome | Remark) -> str:  # noqa: C901, PLR0911 - one case a word
@@ -93,7 +93,7 @@ def saved_text(plan: Plan, step: Step | None, word: Outcome | Remark) -> str:  #
             return f"The gun failed: {word.cause}. The trial is marked and presented again."
         case steps.Interrupted():
             return "The pause ended the stimulus: its trial is presented again." if word.presented else ""
-        case steps.Repeat():
+        case steps.Repeated():
             return f"Saved. Trial {word.trial.trial} is presented again ({word.reason})."
         case _:
             return ""
@@ -103,7 +103,7 @@ def _rested_text(word: Outcome | Remark) -> str:
     match word:
         case steps.Rested():
             return "The break is over."
-        case steps.Repeat():
+        case steps.Repeated():
             return f"Saved. Trial {word.trial.trial} is presented again ({word.reason})."
         case _:
             return ""

@@ -318,7 +318,7 @@ _WORDS: dict[type[Event], str] = {
 KINDS: tuple[type[Event], ...] = tuple(_WORDS)
 """Every kind of event."""
 
-OWN = (ParticipantKey, ParticipantRated, ParticipantDescribed)
+OWN_HAND_EVENTS = (ParticipantKey, ParticipantRated, ParticipantDescribed)
 """What the participant says by their own hand."""
 
 ACTS: tuple[type[Event], ...] = (

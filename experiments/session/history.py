@@ -13,14 +13,14 @@ from experiments.session.steps import (
     Ask,
     Described,
     Failed,
-    Fire,
+    FireShot,
     Interrupted,
     Outcome,
     Present,
     Presented,
     Rate,
     Rated,
-    Repeat,
+    Repeated,
     Step,
     trial_of,
 )
@@ -54,7 +54,7 @@ class TrialHistory:
 
 def by_trial(trials: Sequence[Trial], history: History) -> dict[Trial, TrialHistory]:
     """What the journal tells, by trial."""
-    repeated = {word.trial for _, word in history if isinstance(word, Repeat)}
+    repeated = {word.trial for _, word in history if isinstance(word, Repeated)}
     found = {trial: TrialHistory(items=[], repeated=trial in repeated) for trial in trials}
     for step, word in history:
         trial = _trial(step, word)
@@ -70,7 +70,7 @@ def _trial(step: Step | None, word: Outcome | Remark) -> Trial | None:
 
 def is_attempt(step: Step | None, word: Outcome | Remark) -> bool:
     """Whether a stimulus was felt, or may have been: what `attempts` counts."""
-    return isinstance(step, Fire | Present) and not (isinstance(word, Failed | Interrupted) and not word.presented)
+    return isinstance(step, FireShot | Present) and not (isinstance(word, Failed | Interrupted) and not word.presented)
 
 
 What = Literal["answer", "rating", "description"]
@@ -97,7 +97,7 @@ def entries(history: History, here: Trial) -> list[Entry]:
     What is entered anew, because its trial was presented again, stands where it was entered first.
     """
     found = (entry for step, word in history if (entry := _entry(step, word)) is not None)
-    return [entry for entry in dict.fromkeys(found) if together(entry.trial, here)]
+    return [entry for entry in dict.fromkeys(found) if of_one_set(entry.trial, here)]
 
 
 def _entry(step: Step | None, word: Outcome | Remark) -> Entry | None:
@@ -126,7 +126,7 @@ def fits(entry: Entry, value: Value) -> bool:
             return isinstance(value, str)
 
 
-def value(history: History, entry: Entry) -> Value:
+def entered_value(history: History, entry: Entry) -> Value:
     """What an entry says, as it counts: the last that was entered. `None`: no answer."""
     said = [_value(step, word, entry) for step, word in history]
     return next((one[0] for one in reversed(said) if one), None)
@@ -173,7 +173,7 @@ def repeatable(history: History, step: Step | None, here: Trial) -> Trial | None
         return step.trial
     rated = {trial_of(one) for one, word in history if isinstance(word, Rated)}
     shown = [trial_of(one) for one, word in history if isinstance(word, Answered | Presented)]
-    return next((trial for trial in reversed(shown) if trial and together(trial, here) and trial not in rated), None)
+    return next((trial for trial in reversed(shown) if trial and of_one_set(trial, here) and trial not in rated), None)
 
 
 def done(history: History) -> set[Trial]:
@@ -186,6 +186,6 @@ def answered(history: History) -> set[Trial]:
     return {trial for step, word in history if isinstance(word, Answered | Rated) and (trial := trial_of(step))}
 
 
-def together(one: Trial, other: Trial) -> bool:
+def of_one_set(one: Trial, other: Trial) -> bool:
     """Whether two trials are of one set."""
     return (one.session, one.set) == (other.session, other.set)

@@ -7,8 +7,8 @@ from dataclasses import dataclass, replace
 
 from experiments.design.plan import Plan, Trial
 from experiments.session import events
-from experiments.session.events import ACTS, OWN, Event, Press
-from experiments.session.history import Entry, History, entries, fits, repeatable, trial_at, value
+from experiments.session.events import ACTS, OWN_HAND_EVENTS, Event, Press
+from experiments.session.history import Entry, History, entered_value, entries, fits, repeatable, trial_at
 from experiments.session.remarks import (
     AnswerCorrected,
     Continued,
@@ -76,12 +76,12 @@ class Moment:
 def meant(moment: Moment, event: Event) -> tuple[Event, str]:
     """An event as it is meant, and what there is to say of it: a correction to what stands there already is none."""
     entry = moment.position.correcting
-    if isinstance(event, events.Correct) and entry is not None and event.value == value(moment.history, entry):
+    if isinstance(event, events.Correct) and entry is not None and event.value == entered_value(moment.history, entry):
         return events.Leave(), "That is what stands there: nothing was corrected."
     return event, ""
 
 
-def refusal(moment: Moment, event: Event, press: Press | None) -> str:
+def event_refusal(moment: Moment, event: Event, press: Press | None) -> str:
     """Why an event is not taken; empty if it is. `press`: by the experimenter's hand."""
     judged = after(moment.position, type(event), moment.now_s)
     if isinstance(judged, No):
@@ -118,7 +118,7 @@ def _mistimed(moment: Moment, event: Event, press: Press | None) -> str:
 
 def _impossible(moment: Moment, event: Event) -> str:
     match event:
-        case _ if isinstance(event, OWN):
+        case _ if isinstance(event, OWN_HAND_EVENTS):
             return _not_asked(moment, event)
         case events.Correct() if (entry := moment.position.correcting) is not None and not fits(entry, event.value):
             return f"That is no {entry.what}."
@@ -179,7 +179,7 @@ def remark_of(  # noqa: C901, PLR0911 - one case an event
 
 def refused(event: Event, position: Position, because: str) -> Refused | None:
     """What is kept of an event that would have carried the run on, and was refused."""
-    own = isinstance(event, OWN)
+    own = isinstance(event, OWN_HAND_EVENTS)
     if not (own or isinstance(event, ACTS)) or position.base is State.STOPPED:
         return None
     return Refused(

@@ -151,6 +151,6 @@ REMARK: TypeAdapter[Remark] = TypeAdapter(Annotated[Remark, Field(discriminator=
 """Reads the remark that a record holds."""
 
 
-def record(remark: Remark) -> dict[str, object]:
+def remark_record(remark: Remark) -> dict[str, object]:
     """A remark as plain JSON values."""
     return asdict(remark, dict_factory=without_blank_instruction)

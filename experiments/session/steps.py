@@ -33,7 +33,7 @@ class Prepare:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Fire:
+class FireShot:
     """Fire one shot of the trial's method."""
 
     trial: Trial
@@ -239,7 +239,7 @@ class Interrupted:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Repeat:
+class Repeated:
     """A trial was spoiled, this one or an earlier one of its set, and is to be presented again."""
 
     trial: Trial
@@ -247,9 +247,11 @@ class Repeat:
     kind: Literal["repeat"] = "repeat"
 
 
-Step = Prepare | Fire | Ask | Rest | Present | Rate | Describe | Close
-Outcome = Prepared | Fired | Answered | Rested | Presented | Rated | Described | Closed | Failed | Interrupted | Repeat
-TrialStep = Prepare | Fire | Ask | Present | Rate | Describe
+Step = Prepare | FireShot | Ask | Rest | Present | Rate | Describe | Close
+Outcome = (
+    Prepared | Fired | Answered | Rested | Presented | Rated | Described | Closed | Failed | Interrupted | Repeated
+)
+TrialStep = Prepare | FireShot | Ask | Present | Rate | Describe
 """A step that is about one trial."""
 Session = Generator[Step, Outcome, None]
 """Yields what should happen and is sent what did happen. It opens nothing, waits for nothing and knows no clock."""
@@ -267,7 +269,7 @@ OUTCOME: TypeAdapter[Outcome] = TypeAdapter(Annotated[Outcome, Field(discriminat
 """Reads the outcome that a record holds."""
 
 
-def record(word: Step | Outcome | TrainShot) -> dict[str, object]:
+def step_record(word: Step | Outcome | TrainShot) -> dict[str, object]:
     """A step, outcome or shot as plain JSON values; an instruction, and what is not always known, only where it is."""
     fields = asdict(word, dict_factory=without_blank_instruction)
     return {key: value for key, value in fields.items() if key not in _OPTIONAL_FIELDS or value is not None}
@@ -314,17 +316,17 @@ class Presenter:
         """Present a trial until it is done; an earlier one that is to be repeated comes in between."""
         while True:
             outcome = yield from _attempt(self._steps_of(trial, self._presented[trial] + 1))
-            if isinstance(outcome, Repeat) and outcome.trial != trial:
+            if isinstance(outcome, Repeated) and outcome.trial != trial:
                 yield from self.present(outcome.trial)
                 continue
             self._presented[trial] += 1
-            if not isinstance(outcome, Failed | Interrupted | Repeat):
+            if not isinstance(outcome, Failed | Interrupted | Repeated):
                 return
 
     def until_done(self, step: Step) -> Session:
         """A step that a break-off only delays, and before which a trial can be presented again."""
-        while isinstance(outcome := (yield step), Interrupted | Repeat):
-            if isinstance(outcome, Repeat):
+        while isinstance(outcome := (yield step), Interrupted | Repeated):
+            if isinstance(outcome, Repeated):
                 yield from self.present(outcome.trial)
 
     def close(self) -> Session:
@@ -336,6 +338,6 @@ def _attempt(steps: tuple[Step, ...]) -> Generator[Step, Outcome, Outcome]:
     """One presentation: its last outcome, or the first that breaks it off."""
     for step in steps:
         outcome = yield step
-        if isinstance(outcome, Failed | Interrupted | Repeat):
+        if isinstance(outcome, Failed | Interrupted | Repeated):
             break
     return outcome

@@ -88,7 +88,9 @@ def is_news(person: Participant, facts: Facts, asked: Sequence[Fact]) -> bool:
     return known is None or any(getattr(facts, fact) != getattr(known, fact) for fact in asked)
 
 
-def refusal(person: Participant, entered: Entered, facts: Facts, rules: EligibilityConfig, *, practice: bool) -> str:
+def enrolment_refusal(
+    person: Participant, entered: Entered, facts: Facts, rules: EligibilityConfig, *, practice: bool
+) -> str:
     """Why no run begins, in one sentence; empty if one may. A practice may be done before and after every run."""
     code = person.participant_id
     elsewhere = [run.experiment for run in person.runs if run.state == "open elsewhere"]
@@ -151,7 +153,7 @@ def may_run(study: StudyFolder, entered: Entered, *, practice: bool = False) -> 
     except ValueError as error:
         raise PlaceError(str(error)) from error
     rules = study.config.eligibility
-    _refuse(refusal(person, entered, facts, rules, practice=practice))
+    _refuse(enrolment_refusal(person, entered, facts, rules, practice=practice))
     return run, facts if is_news(person, facts, rules.ask) else None
 
 
@@ -167,7 +169,7 @@ def join(study: StudyFolder, participant_id: str, facts: Facts, clock: Clock) ->
     nothing is recorded. A correction is recorded whatever it says; whether to exclude is then for people to decide.
     """
     _refuse_wrong_facts(study, facts)
-    registered = register.read(study.results)
+    registered = register.read_register(study.results)
     places.place(study.results, participant_id, study.experiments[0], registered)
     reasons = eligible(facts, study.config.eligibility)
     known = participant_id in places.known_codes(study.results, registered)
@@ -204,7 +206,7 @@ def readmit(results: Path, participant_id: str, reason: str, clock: Clock) -> No
 
 
 def _excluded_before(results: Path, participant_id: str) -> str | None:
-    registered = register.read(results)
+    registered = register.read_register(results)
     known = places.known_codes(results, registered)
     places.check_code(participant_id)
     places.check_case(results, participant_id, known)

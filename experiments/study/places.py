@@ -76,7 +76,7 @@ def place(results: Path, participant_id: str, experiment: str, registered: Regis
     `registered` is the folder's register, where it has been read.
     """
     check_code(participant_id)
-    check_case(results, participant_id, known_codes(results, registered or register.read(results)))
+    check_case(results, participant_id, known_codes(results, registered or register.read_register(results)))
     return Place(results=results, participant_id=participant_id, experiment=experiment)
 
 
@@ -105,7 +105,9 @@ HeadOf = Callable[[Path], Head | None]
 """Gives the head of a journal; `None` where nothing in it was acknowledged."""
 
 
-def next_row(setup: Setup[Any], results: Path, registered: Register, head_of: HeadOf = journal.head) -> int | None:
+def row_of_next_run(
+    setup: Setup[Any], results: Path, registered: Register, head_of: HeadOf = journal.head
+) -> int | None:
     """The row of the balancing square that the next run takes; `None` for a random order.
 
     The least used row over the runs of participants who are not excluded, the first such row. So rows are used equally

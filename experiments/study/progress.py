@@ -23,7 +23,7 @@ from experiments.session.history import answered
 from experiments.study import places, register
 from experiments.study.places import Place, PlaceError
 from experiments.study.register import Member, Register
-from experiments.study.study import Next, Participant, RunProgress, by_code, who_is_next
+from experiments.study.study import NextParticipant, Participant, RunProgress, by_code, who_is_next
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -50,7 +50,7 @@ class Overview:
     """
 
     participants: tuple[Participant, ...]
-    next: Next | None
+    next: NextParticipant | None
     orders: dict[str, tuple[str, ...] | None]
     problems: tuple[str, ...]
 
@@ -68,10 +68,10 @@ def open_study(folder: Path) -> StudyFolder:
     beside = Path(os.path.normpath(folder / ".." / "study.toml"))
     if folder.resolve().name == "results" and beside.is_file():
         return _loaded(str(beside), folder)
-    if not ((folder / register.NAME).exists() or places.known_codes(folder, register.read(folder))):
+    if not ((folder / register.REGISTER_FILE).exists() or places.known_codes(folder, register.read_register(folder))):
         raise PlaceError(
-            f"{folder}: neither a study's folder (study.toml) nor a results folder (sub-CODE or {register.NAME}); "
-            "`recoil new STUDY` makes one"
+            f"{folder}: neither a study's folder (study.toml) nor a results folder "
+            f"(sub-CODE or {register.REGISTER_FILE}); `recoil new STUDY` makes one"
         )
     return _loaded("study", folder)
 
@@ -84,7 +84,7 @@ def _loaded(name: str, results: Path) -> StudyFolder:
 
 def overview(study: StudyFolder) -> Overview:
     """How a study stands. What cannot be read is a problem in the list, never an exception."""
-    look = _Look(study, register.read(study.results))
+    look = _Look(study, register.read_register(study.results))
     people = tuple(look.participants())
     next_one = who_is_next(people, study.config, study.experiments)
     orders_ahead = look.orders(next_one)
@@ -97,7 +97,7 @@ def look_at(study: StudyFolder, participant_id: str) -> tuple[Participant, tuple
 
     `PlaceError` if the code breaks a rule; `JournalError` if the register cannot be trusted.
     """
-    look = _Look(study, register.read(study.results))
+    look = _Look(study, register.read_register(study.results))
     if look.registered.problem:
         raise JournalError(look.registered.problem)
     return look.participant(participant_id), tuple(look.problems)
@@ -152,7 +152,7 @@ class _Look:
     def _data(self, path: Path) -> bytes:
         """The bytes of a journal, whose head is kept."""
         try:
-            data = journal.load(path)
+            data = journal.journal_bytes(path)
             self._heads[path] = journal.head_of(path, data)
         except JournalError as error:
             self._heads[path] = error
@@ -166,7 +166,7 @@ class _Look:
             raise seen
         return seen
 
-    def orders(self, next_one: Next | None) -> dict[str, tuple[str, ...] | None]:
+    def orders(self, next_one: NextParticipant | None) -> dict[str, tuple[str, ...] | None]:
         """The methods of who is next, by experiment; `None` where chance decides, or rows cannot be read."""
         if next_one is None:
             return {}
@@ -183,7 +183,7 @@ class _Look:
 
     def _next_methods(self, setup: Setup[Any], participant_id: str) -> tuple[str, ...] | None:
         """The methods of a participant's next run in their order; `None` if chance decides when the run begins."""
-        row, seed = places.next_row(setup, self._study.results, self.registered, self._head), setup.config.seed
+        row, seed = places.row_of_next_run(setup, self._study.results, self.registered, self._head), setup.config.seed
         if row is None and seed is None:
             return None
         return catalogue.experiment(setup).make_plan(setup.config, participant_id, seed or 0, row).methods
@@ -224,6 +224,6 @@ def _practised(where: Place) -> bool:
     practice = replace(where, practice=True)
     for path in practice.folder.glob(f"{practice.journal.stem}*{practice.journal.suffix}"):
         with suppress(JournalError):  # a practice is not analysed, so a broken one is nobody's concern
-            if journal.read(path).finished:
+            if journal.read_journal(path).finished:
                 return True
     return False

@@ -22,10 +22,10 @@ from experiments.config.door import Model
 from experiments.config.models import CODE, Text
 from experiments.config.setup import canonical_json
 from experiments.record import storage
-from experiments.record.journal import JournalError, check_chain, link, parsed
+from experiments.record.journal import JournalError, check_chain, link_of, parsed_line
 from experiments.study.study import Facts
 
-NAME = "participants.jsonl"
+REGISTER_FILE = "participants.jsonl"
 MAX_REASON = 200
 _DAMAGED = "the register was changed or damaged: restore it from a copy, or rename it and enter the participants anew"
 _TRIES, _PAUSE_S = 100, 0.05
@@ -42,15 +42,15 @@ def _plain(text: str) -> str:
     return text
 
 
-Code = Annotated[str, StringConstraints(pattern=f"^{CODE}$")]
-Reason = Annotated[str, Field(max_length=MAX_REASON), AfterValidator(_plain)]
+_Code = Annotated[str, StringConstraints(pattern=f"^{CODE}$")]
+_Reason = Annotated[str, Field(max_length=MAX_REASON), AfterValidator(_plain)]
 
 
 class Joined(Model):
     """Someone takes part, or their facts are corrected."""
 
     kind: Literal["joined"] = "joined"
-    participant_id: Code
+    participant_id: _Code
     facts: Facts
 
 
@@ -58,33 +58,33 @@ class Excluded(Model):
     """Someone does not count: their row of the balancing square is free again, their logs are left out."""
 
     kind: Literal["excluded"] = "excluded"
-    participant_id: Code
-    reason: Reason
+    participant_id: _Code
+    reason: _Reason
 
 
 class Readmitted(Model):
     """Someone who was excluded counts again."""
 
     kind: Literal["readmitted"] = "readmitted"
-    participant_id: Code
-    reason: Reason
+    participant_id: _Code
+    reason: _Reason
 
 
 class SetAside(Model):
     """An unfinished run was set aside, to be started anew: of which experiment, and why."""
 
     kind: Literal["set-aside"] = "set-aside"
-    participant_id: Code
+    participant_id: _Code
     experiment: Text
-    reason: Reason
+    reason: _Reason
 
 
-Entry = Joined | Excluded | Readmitted | SetAside
-_REASON: TypeAdapter[str] = TypeAdapter(Reason)
-_ENTRY: TypeAdapter[Entry] = TypeAdapter(Annotated[Entry, Field(discriminator="kind")])
+RegisterEntry = Joined | Excluded | Readmitted | SetAside
+_REASON: TypeAdapter[str] = TypeAdapter(_Reason)
+_ENTRY: TypeAdapter[RegisterEntry] = TypeAdapter(Annotated[RegisterEntry, Field(discriminator="kind")])
 
 
-def entry(kind: str, participant_id: str, **body: object) -> Entry:
+def entry(kind: str, participant_id: str, **body: object) -> RegisterEntry:
     """A record to append. `RegisterError` names key, value and rule.
 
     >>> entry("excluded", "P03", reason="left-handed").kind
@@ -101,7 +101,7 @@ def check_reason(text: str) -> None:
         raise RegisterError(f"reason {text!r}: {error.errors()[0]['msg'].removeprefix('Value error, ')}") from error
 
 
-def _checked(values: Mapping[str, object]) -> Entry:
+def _checked(values: Mapping[str, object]) -> RegisterEntry:
     try:
         return _ENTRY.validate_python(values)
     except ValidationError as error:
@@ -130,7 +130,7 @@ class Register:
     """
 
     path: Path
-    entries: tuple[tuple[str, Entry], ...] = ()
+    entries: tuple[tuple[str, RegisterEntry], ...] = ()
     whole_bytes: int = 0
     link: str = ""
     problem: str = ""
@@ -150,7 +150,7 @@ class Register:
         return {code: member.excluded for code, member in self.members.items() if member.excluded is not None}
 
 
-def _after(before: Member, utc: str, one: Entry) -> Member:
+def _after(before: Member, utc: str, one: RegisterEntry) -> Member:
     if isinstance(one, Joined):
         return replace(before, facts=one.facts, joined_utc=before.joined_utc or utc)
     if isinstance(one, SetAside):
@@ -158,9 +158,9 @@ def _after(before: Member, utc: str, one: Entry) -> Member:
     return replace(before, excluded=one.reason if isinstance(one, Excluded) else None)
 
 
-def read(results: Path) -> Register:
+def read_register(results: Path) -> Register:
     """The register of a results folder, as far as it can be trusted; an empty one if there is none."""
-    path = results / NAME
+    path = results / REGISTER_FILE
     try:
         data = path.read_bytes()
     except (FileNotFoundError, NotADirectoryError):
@@ -177,14 +177,14 @@ def read(results: Path) -> Register:
 
 
 def _with_line(before: Register, number: int, line: bytes) -> Register:
-    values = parsed(line)
+    values = parsed_line(line)
     check_chain(values, number, before.link)
     utc = values.get("utc")
     if not isinstance(utc, str):
         raise RegisterError(f"utc = {utc!r}: must be the date and time of the record")
     body = {key: value for key, value in values.items() if key not in ("n", "link", "utc")}
     entries = (*before.entries, (utc, _checked(body)))
-    return replace(before, entries=entries, whole_bytes=before.whole_bytes + len(line) + 1, link=link(line))
+    return replace(before, entries=entries, whole_bytes=before.whole_bytes + len(line) + 1, link=link_of(line))
 
 
 def _refuse_problem(register: Register) -> None:
@@ -192,11 +192,11 @@ def _refuse_problem(register: Register) -> None:
         raise RegisterError(register.problem)
 
 
-def append(results: Path, one: Entry, clock: Clock) -> None:
+def append(results: Path, one: RegisterEntry, clock: Clock) -> None:
     """Add a record and return when it is on the disk. `RegisterError` if it cannot be: then nothing was added."""
-    path = results / NAME
+    path = results / REGISTER_FILE
     with _held(path) as descriptor:
-        before = read(results)
+        before = read_register(results)
         _refuse_problem(before)
         _refuse_twin(before, one)
         os.ftruncate(descriptor, before.whole_bytes)  # what was cut off was never acknowledged
@@ -204,7 +204,7 @@ def append(results: Path, one: Entry, clock: Clock) -> None:
         _write(path, descriptor, canonical_json(head | one.model_dump(mode="json")) + b"\n", before.whole_bytes)
 
 
-def _refuse_twin(before: Register, one: Entry) -> None:
+def _refuse_twin(before: Register, one: RegisterEntry) -> None:
     for known in before.members:
         if known != one.participant_id and known.lower() == one.participant_id.lower():
             raise RegisterError(

@@ -11,7 +11,7 @@ from typing import Literal, get_args
 from experiments.config.door import Model
 from experiments.config.models import AgeYears, EligibilityConfig, Fact, Handedness, Sex, StudyConfig
 
-State = Literal["done", "in progress", "open elsewhere", "not begun", "unreadable"]
+RunState = Literal["done", "in progress", "open elsewhere", "not begun", "unreadable"]
 """How a run stands; `open elsewhere`: another process is carrying it out at this moment."""
 
 
@@ -36,7 +36,7 @@ class RunProgress:
     """
 
     experiment: str
-    state: State
+    state: RunState
     answered: int = 0
     planned: int = 0
     last_utc: str = ""
@@ -71,7 +71,7 @@ class Participant:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Next:
+class NextParticipant:
     """Who comes next: a participant with open runs, or a new code for whom all experiments are open."""
 
     participant_id: str
@@ -116,7 +116,9 @@ def unasked(facts: Facts, eligibility: EligibilityConfig) -> tuple[Fact, ...]:
     return tuple(fact for fact in facts.known() if fact not in eligibility.ask)
 
 
-def who_is_next(people: Sequence[Participant], study: StudyConfig, experiments: Sequence[str]) -> Next | None:
+def who_is_next(
+    people: Sequence[Participant], study: StudyConfig, experiments: Sequence[str]
+) -> NextParticipant | None:
     """Who is in progress, else who joined and is not finished, else the next free code; in order of their codes.
 
     `None` when the study has its participants and none of them waits. Who is excluded does not count: a new
@@ -125,11 +127,11 @@ def who_is_next(people: Sequence[Participant], study: StudyConfig, experiments: 
     taking_part = sorted((one for one in people if one.excluded is None), key=lambda one: by_code(one.participant_id))
     waiting = [one for one in taking_part if one.open_runs and not one.is_elsewhere]
     for one in sorted(waiting, key=lambda one: not one.in_progress):  # stable: codes stay in order
-        return Next(participant_id=one.participant_id, new=False, runs=one.open_runs)
+        return NextParticipant(participant_id=one.participant_id, new=False, runs=one.open_runs)
     if len(taking_part) >= study.participants:
         return None
     runs = tuple(RunProgress(experiment=experiment, state="not begun") for experiment in experiments)
-    return Next(participant_id=free_code(study, [one.participant_id for one in people]), new=True, runs=runs)
+    return NextParticipant(participant_id=free_code(study, [one.participant_id for one in people]), new=True, runs=runs)
 
 
 def free_code(study: StudyConfig, taken: Collection[str]) -> str:

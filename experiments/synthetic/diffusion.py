@@ -29,15 +29,15 @@ Bools = NDArray[np.bool_]
 Draw = Callable[[int], Floats]
 """So many numbers strictly between 0 and 1."""
 
-CUT = 0.64
+_CUT = 0.64
 """Where the two forms of the series meet (Devroye 2009)."""
 SURE = 30.0
-"""Above this |v| d an exit later than `CUT` has a probability below 1e-100."""
-LARGEST = 1e6
+"""Above this |v| d an exit later than `_CUT` has a probability below 1e-100."""
+_LARGEST = 1e6
 """Drift and boundary above this are refused: nobody is that cautious, and squares stay far from overflow."""
 
-LEVY_TAIL = float(special.ndtr(-1.0 / math.sqrt(CUT)))
-"""P(N < -1/sqrt(CUT)): 1/N^2 is then below `CUT`."""
+LEVY_TAIL = float(special.ndtr(-1.0 / math.sqrt(_CUT)))
+"""P(N < -1/sqrt(CUT)): 1/N^2 is then below `_CUT`."""
 
 
 class Draws(Protocol):
@@ -79,10 +79,10 @@ class Diffusion:
     lapses: Lapses = Lapses()
 
     def __post_init__(self) -> None:
-        if not abs(self.drift) <= LARGEST:
-            raise ValueError(f"drift is {self.drift}; it must be within {LARGEST:g} 1/sqrt(s)")
-        if not 0.0 < self.boundary <= LARGEST:
-            raise ValueError(f"boundary is {self.boundary}; it must be above 0 and at most {LARGEST:g} sqrt(s)")
+        if not abs(self.drift) <= _LARGEST:
+            raise ValueError(f"drift is {self.drift}; it must be within {_LARGEST:g} 1/sqrt(s)")
+        if not 0.0 < self.boundary <= _LARGEST:
+            raise ValueError(f"boundary is {self.boundary}; it must be above 0 and at most {_LARGEST:g} sqrt(s)")
         if not 0.0 <= self.start <= 1.0:
             raise ValueError(f"start is {self.start}; it must be 0 to 1")
         if not 0.0 <= self.non_decision_s <= 3_600.0:
@@ -222,30 +222,30 @@ def exit_times(drift: Floats, half_width: Floats, draw: Draw) -> Floats:
 
 
 def late_shares(c: Floats) -> Floats:
-    """The share of proposals that lie beyond `CUT`: p / (p + q) of Polson, Scott & Windle, both times exp(c)."""
+    """The share of proposals that lie beyond `_CUT`: p / (p + q) of Polson, Scott & Windle, both times exp(c)."""
     near = np.minimum(c, SURE)
-    rate, root = math.pi**2 / 8.0 + near * near / 2.0, math.sqrt(2.0 * CUT)
-    p = math.pi / (2.0 * rate) * np.exp(near - rate * CUT)
-    above = np.exp(2.0 * near) * special.erfc((1.0 + CUT * near) / root)
-    share = p / (p + special.erfc((1.0 - CUT * near) / root) + above)
+    rate, root = math.pi**2 / 8.0 + near * near / 2.0, math.sqrt(2.0 * _CUT)
+    p = math.pi / (2.0 * rate) * np.exp(near - rate * _CUT)
+    above = np.exp(2.0 * near) * special.erfc((1.0 + _CUT * near) / root)
+    share = p / (p + special.erfc((1.0 - _CUT * near) / root) + above)
     return np.where(c > SURE, 0.0, share)
 
 
 def _proposed(c: Floats, late_share: Floats, draw: Draw) -> Floats:
     late = draw(c.size) < late_share
-    slow, fast = ~late & (c * CUT < 1.0), ~late & (c * CUT >= 1.0)
+    slow, fast = ~late & (c * _CUT < 1.0), ~late & (c * _CUT >= 1.0)
     x = np.empty_like(c)
     rate = math.pi**2 / 8.0 + c[late] ** 2 / 2.0
-    x[late] = CUT - np.log(draw(rate.size)) / rate
+    x[late] = _CUT - np.log(draw(rate.size)) / rate
     x[slow] = _early_slow(c[slow], draw)
     x[fast] = _early_fast(c[fast], draw)
     return x
 
 
 def _early_slow(c: Floats, draw: Draw) -> Floats:
-    """Inverse Gaussian numbers of mean 1/c and shape 1 given that they are below `CUT`, for means above `CUT`.
+    """Inverse Gaussian numbers of mean 1/c and shape 1 given that they are below `_CUT`, for means above `_CUT`.
 
-    1/N^2 below `CUT`, tilted by exp(-c^2 x / 2): at least 0.45 of the proposals are taken.
+    1/N^2 below `_CUT`, tilted by exp(-c^2 x / 2): at least 0.45 of the proposals are taken.
     """
     x, wanting = np.empty_like(c), np.arange(c.size)
     while wanting.size:
@@ -257,7 +257,7 @@ def _early_slow(c: Floats, draw: Draw) -> Floats:
 
 
 def _early_fast(c: Floats, draw: Draw) -> Floats:
-    """The same for means below `CUT`, where at least 0.6 of the proposals are.
+    """The same for means below `_CUT`, where at least 0.6 of the proposals are.
 
     Michael, Schucany & Haas 1976, Am. Stat. 30, 88; the smaller root without cancellation.
     """
@@ -268,7 +268,7 @@ def _early_fast(c: Floats, draw: Draw) -> Floats:
         root = mean / (1.0 + h + np.sqrt(h * (2.0 + h)))
         smaller = draw(wanting.size) * (mean + root) <= mean
         proposed = np.where(smaller, root, mean * mean / root)
-        taken = proposed <= CUT
+        taken = proposed <= _CUT
         x[wanting[taken]] = proposed[taken]
         wanting = wanting[~taken]
     return x
@@ -286,7 +286,7 @@ def _accepted(x: Floats, u: Floats) -> Bools:
         n += 1
         here = x[wanting]
         size = n * (n + 1)
-        term = (2 * n + 1) * np.exp(np.where(here <= CUT, -2.0 * size / here, -size * math.pi**2 * here / 2.0))
+        term = (2 * n + 1) * np.exp(np.where(here <= _CUT, -2.0 * size / here, -size * math.pi**2 * here / 2.0))
         total[wanting] += -term if n % 2 else term
         below = u[wanting] < total[wanting]
         told = (term == 0.0) | (below if n % 2 else ~below)

@@ -41,7 +41,7 @@ class Appeal(Model):
     criterion_sd: Spread = 1.9
 
 
-class Draws(Protocol):
+class NormalDraws(Protocol):
     """What is asked of a random stream (`experiments.design.streams.Stream`)."""
 
     def normal(self) -> float:
@@ -57,7 +57,7 @@ def jnd_in_sds() -> float:
     return math.sqrt(2.0) * NormalDist().inv_cdf(0.75)
 
 
-def felt_ratings(law: Appeal, scale: Scale, strengths: Mapping[str, float], draws: Draws) -> dict[str, float]:
+def felt_ratings(law: Appeal, scale: Scale, strengths: Mapping[str, float], draws: NormalDraws) -> dict[str, float]:
     """One person's ratings of methods of these strengths (at least 0), kept to the scale and its grain.
 
     Two draws a method are always made, in the order of their names, so a change of one number moves no other value.

@@ -7,32 +7,37 @@ from typing import Annotated
 
 import typer
 
-from analysis.report.terminal import AsJson, FixedSeed, end, in_text, progress, show
+from analysis.report.terminal import AsJsonOption, FixedSeedOption, WorkersOption, end, in_text, progress, show
 
-Config = Annotated[str | None, typer.Argument(help="Config whose gun is meant; else the shipped gun.")]
-Gun = Annotated[str | None, typer.Option(help="Config of a gun, instead of CONFIG.")]
-Range = "FROM-TO"
-Friction = Annotated[str | None, typer.Option(metavar=Range, help="Damper friction in N; from the gun's own on.")]
-Voltage = Annotated[str | None, typer.Option(metavar=Range, help="Voltage in V; 0-24 unless given.")]
-Pulse = Annotated[str | None, typer.Option(metavar=Range, help="Pulse in s, or one value; 0.002-0.02 unless given.")]
-RateAbove = Annotated[float, typer.Option(metavar="HZ", help="Shots a second that a proposed design must keep up.")]
-Grid = Annotated[int, typer.Option(help="Values of friction and of voltage; of the pulse a fifth as many.")]
-Workers = Annotated[int | None, typer.Option(min=1, help="Processes; as many as cores unless given.")]
+ConfigOrGunArgument = Annotated[str | None, typer.Argument(help="Config whose gun is meant; else the shipped gun.")]
+GunOption = Annotated[str | None, typer.Option(help="Config of a gun, instead of CONFIG.")]
+_RANGE = "FROM-TO"
+FrictionOption = Annotated[
+    str | None, typer.Option(metavar=_RANGE, help="Damper friction in N; from the gun's own on.")
+]
+VoltageOption = Annotated[str | None, typer.Option(metavar=_RANGE, help="Voltage in V; 0-24 unless given.")]
+PulseOption = Annotated[
+    str | None, typer.Option(metavar=_RANGE, help="Pulse in s, or one value; 0.002-0.02 unless given.")
+]
+RateAboveOption = Annotated[
+    float, typer.Option(metavar="HZ", help="Shots a second that a proposed design must keep up.")
+]
+GridOption = Annotated[int, typer.Option(help="Values of friction and of voltage; of the pulse a fifth as many.")]
 
 
 def design(
-    config: Config = None,
+    config: ConfigOrGunArgument = None,
     *,
-    gun: Gun = None,
-    friction: Friction = None,
-    voltage: Voltage = None,
-    pulse: Pulse = None,
-    rate_above: RateAbove = 5.0,
-    grid: Grid = 40,
-    seed: FixedSeed = 1,
-    workers: Workers = None,
+    gun: GunOption = None,
+    friction: FrictionOption = None,
+    voltage: VoltageOption = None,
+    pulse: PulseOption = None,
+    rate_above: RateAboveOption = 5.0,
+    grid: GridOption = 40,
+    seed: FixedSeedOption = 1,
+    workers: WorkersOption = None,
     out: Annotated[Path, typer.Option(help="Folder for design.json, figures and report.")] = Path("results/design"),
-    as_json: AsJson = False,
+    as_json: AsJsonOption = False,
 ) -> None:
     """Which damper, voltage and pulse would be felt best, and where a direction begins to be felt. Predictions."""
     from analysis.predict.design_search import run as feature

@@ -8,7 +8,17 @@ from typing import Annotated
 import typer
 from typer.core import TyperGroup
 
-from analysis.report.terminal import AsJson, FixedSeed, GunConfig, end, in_text, progress, say, show, tracked
+from analysis.report.terminal import (
+    AsJsonOption,
+    FixedSeedOption,
+    GunConfigOption,
+    end,
+    in_text,
+    progress,
+    say,
+    show,
+    tracked,
+)
 
 
 class _PerceptUnlessNamed(TyperGroup):
@@ -28,31 +38,35 @@ app = typer.Typer(
     rich_markup_mode=None,
 )
 
-Paper = Annotated[str, typer.Option(help="Published numbers: file, or the name of a shipped one.")]
-Rates = Annotated[
+PaperOption = Annotated[str, typer.Option(help="Published numbers: file, or the name of a shipped one.")]
+RatesOption = Annotated[
     str | None, typer.Option(metavar="NAME=SHARE,...", help="Forward rates by method instead of a paper's.")
 ]
-Trials = Annotated[int | None, typer.Option(min=1, max=10**9, help="Forward trials behind each of --rates (140).")]
-Spread = Annotated[
+TrialsOption = Annotated[
+    int | None, typer.Option(min=1, max=10**9, help="Forward trials behind each of --rates (140).")
+]
+SpreadOption = Annotated[
     float, typer.Option(metavar="FACTOR", help="People differ by so many times the assumed spread; 0: all alike.")
 ]
-Studies = Annotated[int, typer.Option(min=0, max=10_000_000, help="Simulated studies to judge the fit by; 0: none.")]
+StudiesOption = Annotated[
+    int, typer.Option(min=0, max=10_000_000, help="Simulated studies to judge the fit by; 0: none.")
+]
 
 
 @app.command()
 def percept(
     *,
-    paper: Paper = "paper",
-    rates: Rates = None,
-    trials: Trials = None,
-    gun: GunConfig = "gun",
-    spread: Spread = 0.0,
-    studies: Studies = 10_000,
-    seed: FixedSeed = 1,
+    paper: PaperOption = "paper",
+    rates: RatesOption = None,
+    trials: TrialsOption = None,
+    gun: GunConfigOption = "gun",
+    spread: SpreadOption = 0.0,
+    studies: StudiesOption = 10_000,
+    seed: FixedSeedOption = 1,
     out: Annotated[Path, typer.Option(help="Folder for fit.json, percept.toml, figures and report.")] = Path(
         "results/fit"
     ),
-    as_json: AsJson = False,
+    as_json: AsJsonOption = False,
 ) -> None:
     """The percept fitted to forward rates, what they cannot tell, and studies of it against what else is published."""
     from analysis.predict.fit import percept as feature
@@ -75,7 +89,7 @@ def times(
     bias: Annotated[bool, typer.Option("--bias/--no-bias", help="Fit the start, or hold it at one half.")] = True,
     profile: Annotated[bool, typer.Option("--profile", help="Likelihood intervals as well; slower.")] = False,
     out: Annotated[Path, typer.Option(help="Folder for fit.json, figure and report.")] = Path("results/fit-times"),
-    as_json: AsJson = False,
+    as_json: AsJsonOption = False,
 ) -> None:
     """The diffusion model (drift, boundary, start, non-decision time) fitted to people's own response times."""
     from analysis.predict.fit import times as feature

@@ -9,9 +9,9 @@ from typing import Annotated, Any
 import typer
 
 from analysis.report.terminal import (
-    AsJson,
-    FixedSeed,
-    GunConfig,
+    AsJsonOption,
+    FixedSeedOption,
+    GunConfigOption,
     end,
     in_text,
     progress,
@@ -19,44 +19,44 @@ from analysis.report.terminal import (
     show,
 )
 
-Method = Annotated[str | None, typer.Option(help="Rendering method of the gun.")]
-Changes = Annotated[list[str] | None, typer.Option("--set", metavar="KEY=VALUE", help="Change a parameter.")]
-Fidelity = Annotated[str | None, typer.Option(help="Model to use; full unless given.")]
-SceneName = Annotated[
+MethodOption = Annotated[str | None, typer.Option(help="Rendering method of the gun.")]
+ChangesOption = Annotated[list[str] | None, typer.Option("--set", metavar="KEY=VALUE", help="Change a parameter.")]
+FidelityOption = Annotated[str | None, typer.Option(help="Model to use; full unless given.")]
+SceneOption = Annotated[
     str | None, typer.Option(help="Pick the cheapest model for a use: session, figure, sweep, percept.")
 ]
-Needs = Annotated[list[str] | None, typer.Option(metavar="OUTPUT=ERROR", help="The same for a use of your own.")]
-Trace = Annotated[Path | None, typer.Option(help="Write the shot over time as CSV.")]
-Plot = Annotated[Path | None, typer.Option(help="Write Figure 5's panels as PNG and SVG.")]
-Audit = Annotated[bool, typer.Option("--audit", help="Where energy and momentum went.")]
-HandWords = Annotated[
+NeedsOption = Annotated[list[str] | None, typer.Option(metavar="OUTPUT=ERROR", help="The same for a use of your own.")]
+TraceOption = Annotated[Path | None, typer.Option(help="Write the shot over time as CSV.")]
+PlotOption = Annotated[Path | None, typer.Option(help="Write Figure 5's panels as PNG and SVG.")]
+AuditOption = Annotated[bool, typer.Option("--audit", help="Where energy and momentum went.")]
+HandOption = Annotated[
     str | None, typer.Option(metavar="KEY=VALUE,...", help="The gun in a hand; `assumed` for the usual one.")
 ]
-Stiffness = Annotated[float | None, typer.Option(metavar="N/m", help="A stop that gives way.")]
-Vary = Annotated[
+StiffnessOption = Annotated[float | None, typer.Option(metavar="N/m", help="A stop that gives way.")]
+VaryOption = Annotated[
     list[str] | None,
     typer.Option(metavar="KEY=VALUES", help="FROM:TO:COUNT, log:FROM:TO:COUNT or A,B,C; with --table."),
 ]
-TableFile = Annotated[Path | None, typer.Option(metavar="FILE.parquet|.csv", help="Shots over all of --vary.")]
-Yes = Annotated[bool, typer.Option("--yes", help="Also more than ten million of them.")]
+TableFileOption = Annotated[Path | None, typer.Option(metavar="FILE.parquet|.csv", help="Shots over all of --vary.")]
+YesOption = Annotated[bool, typer.Option("--yes", help="Also more than ten million of them.")]
 
 
 def simulate(
-    method: Method = None,
-    gun: GunConfig = "gun",
-    changes: Changes = None,
-    fidelity: Fidelity = None,
-    scene: SceneName = None,
-    need: Needs = None,
-    trace: Trace = None,
-    plot: Plot = None,
-    audit: Audit = False,
-    hand: HandWords = None,
-    contact_stiffness: Stiffness = None,
-    vary: Vary = None,
-    table: TableFile = None,
-    yes: Yes = False,
-    as_json: AsJson = False,
+    method: MethodOption = None,
+    gun: GunConfigOption = "gun",
+    changes: ChangesOption = None,
+    fidelity: FidelityOption = None,
+    scene: SceneOption = None,
+    need: NeedsOption = None,
+    trace: TraceOption = None,
+    plot: PlotOption = None,
+    audit: AuditOption = False,
+    hand: HandOption = None,
+    contact_stiffness: StiffnessOption = None,
+    vary: VaryOption = None,
+    table: TableFileOption = None,
+    yes: YesOption = False,
+    as_json: AsJsonOption = False,
 ) -> None:
     """One shot by the model (summary, trace, figure), a table of shots over parameters that vary, or a vibration."""
     from analysis.predict.simulate import run as feature
@@ -75,12 +75,12 @@ def simulate(
         table=table,
         yes=yes,
     )
-    found = feature.simulate(request, progress, say)
+    found = feature.simulated(request, progress, say)
     show(found, "\n".join(map(in_text, feature.sections(found))), as_json)
 
 
 def twin(
-    gun: GunConfig = "gun",
+    gun: GunConfigOption = "gun",
     link: Annotated[Path | None, typer.Option(help="A path that leads to its pseudo-terminal and stays.")] = None,
     tcp: Annotated[int | None, typer.Option(min=0, max=65535, help="A TCP port of this machine instead.")] = None,
     speed: Annotated[float, typer.Option(help="So many times faster than the world.")] = 1.0,
@@ -89,8 +89,8 @@ def twin(
     trouble: Annotated[
         list[str] | None, typer.Option(metavar="NAME=VALUE", help="latency_s=0.005, lose=0.01, unplug=0.1, ...")
     ] = None,
-    seed: FixedSeed = 1,
-    as_json: AsJson = False,
+    seed: FixedSeedOption = 1,
+    as_json: AsJsonOption = False,
 ) -> None:
     """The gun's twin on a pseudo-terminal, until interrupted: prints its port, to be given to --gun."""
     from recoil import twin as feature
@@ -114,13 +114,13 @@ def doctor(
         typer.Option(help="Config of the gun, with the limit of its line's round trip (serial.round_trip_limit_s)."),
     ] = "gun",
     out: Annotated[Path | None, typer.Option(metavar="FILE.json", help="Keep the result.")] = None,
-    as_json: AsJson = False,
+    as_json: AsJsonOption = False,
 ) -> None:
     """The rig's self-test: what was measured, and what to do about what is not good."""
     from recoil import doctor as feature
 
     found = feature.examine(results, gun, gun_config, progress)
-    show(found, feature.as_text(found.checks), as_json)
+    show(found, feature.examination_text(found.checks), as_json)
     if out:
         feature.keep(found, out)
     raise end(exceptions=found.verdict == "fails")
@@ -129,10 +129,10 @@ def doctor(
 def bench(
     parts: Annotated[list[str] | None, typer.Argument(metavar="PART...", help="What to measure; else all.")] = None,
     out: Annotated[Path, typer.Option(help="Folder for bench.json and the report.")] = Path("results/bench"),
-    seed: FixedSeed = 1,
+    seed: FixedSeedOption = 1,
     repeats: Annotated[int, typer.Option(min=1, help="Runs, of whose times the median is told.")] = 7,
     batch: Annotated[int, typer.Option(min=1, help="Shots of a batch.")] = 200_000,
-    as_json: AsJson = False,
+    as_json: AsJsonOption = False,
 ) -> None:
     """Measure our own methods: error rates of the post-hoc tests, error against time of a simulated shot."""
     from analysis.predict import bench as feature

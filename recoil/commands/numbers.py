@@ -9,8 +9,8 @@ from typing import Annotated
 import typer
 
 from analysis.report.terminal import (
-    AsJson,
-    FixedSeed,
+    AsJsonOption,
+    FixedSeedOption,
     end,
     progress,
     say,
@@ -30,13 +30,13 @@ def reproduce(
     out: Annotated[Path, typer.Option(help="Folder for logs, statistics, figures and report.")] = Path(
         "results/reproduction"
     ),
-    seed: FixedSeed = 1,
+    seed: FixedSeedOption = 1,
     study: Annotated[str, typer.Option(help="Config of a study, or the name of a shipped one.")] = "study",
     observer: Annotated[
         ObserverName | None,
         typer.Option(help="Who answers: rebuilt from the published numbers where they fit, or drawn by the configs."),
     ] = None,
-    as_json: AsJson = False,
+    as_json: AsJsonOption = False,
 ) -> None:
     """Both experiments with synthetic participants on the simulated gun: logs, statistics, figures, report."""
     from analysis.predict.reproduction import reproduce as feature
@@ -44,7 +44,7 @@ def reproduce(
     loaded = feature.prepared(study, seed, observer.value if observer else None)
     with progress("reproduce", len(loaded.runs) + 3) as tell:
         done = feature.reproduce(loaded, out, tell)
-    show(done.statistics, f"{feature.as_text(done.comparison)}\n\nReport: {out / 'report.html'}", as_json)
+    show(done.statistics, f"{feature.comparison_text(done.comparison)}\n\nReport: {out / 'report.html'}", as_json)
 
 
 def analyze(
@@ -58,7 +58,7 @@ def analyze(
     ] = None,
     paper: Annotated[Path | None, typer.Option(help="Published numbers to compare with.")] = None,
     codebook: Annotated[Path | None, typer.Option(metavar="CODES.toml", help="Codes of free descriptions.")] = None,
-    as_json: AsJson = False,
+    as_json: AsJsonOption = False,
 ) -> None:
     """Statistics, tables, figures and report of any number of logs."""
     from analysis.summary import analyze as feature
@@ -79,7 +79,7 @@ def bids(
     free_text: Annotated[
         bool, typer.Option("--free-text", help="With comments and notes; they might say who someone is.")
     ] = False,
-    as_json: AsJson = False,
+    as_json: AsJsonOption = False,
 ) -> None:
     """The logs as a BIDS data set of behavioural runs; an earlier export is replaced."""
     from analysis.archive.bids_export import export as feature
@@ -96,12 +96,12 @@ def audit(
     paper: Annotated[str, typer.Argument(metavar="PAPER", help="A paper's file, or a shipped one.")] = "paper",
     out: Annotated[Path, typer.Option(help="Folder for audit.json and the report.")] = Path("results/audit"),
     *,
-    as_json: AsJson = False,
+    as_json: AsJsonOption = False,
 ) -> None:
     """Are the published numbers attainable and consistent? Each with its proof; exit code 1 if one is not."""
     from analysis.paper.audit import command as feature
 
-    audited = feature.examine(paper)
+    audited = feature.audit_file(paper)
     feature.write(audited, out)
     show(audited.as_json(), f"{audited.as_text()}\n\nReport: {out / 'report.html'}", as_json)
     raise end(exceptions=audited.exceptions)

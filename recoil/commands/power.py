@@ -7,38 +7,47 @@ from typing import Annotated
 
 import typer
 
-from analysis.report.terminal import AsJson, Config, FixedSeed, in_text, progress, show
+from analysis.report.terminal import (
+    AsJsonOption,
+    ConfigArgument,
+    FixedSeedOption,
+    WorkersOption,
+    in_text,
+    progress,
+    show,
+)
 
-Participants = Annotated[str | None, typer.Option(metavar="N,N-N", help="How many people, such as 8,10,14-20.")]
-TrialsList = Annotated[
+ParticipantsOption = Annotated[str | None, typer.Option(metavar="N,N-N", help="How many people, such as 8,10,14-20.")]
+TrialsListOption = Annotated[
     str | None, typer.Option(metavar="N,N-N", help="Trials of a method; the config's own unless given.")
 ]
-Methods = Annotated[list[str] | None, typer.Option(metavar="NAME,NAME", help="Compare these alone; may come again.")]
-Effect = Annotated[
+MethodsOption = Annotated[
+    list[str] | None, typer.Option(metavar="NAME,NAME", help="Compare these alone; may come again.")
+]
+EffectOption = Annotated[
     str | None, typer.Option(metavar="FACTOR,FACTOR", help="Factors on what people feel; 1 is the config.")
 ]
-Simulated = Annotated[int, typer.Option(min=1, max=10_000_000, help="Simulated studies of each design.")]
-Null = Annotated[bool, typer.Option("--null", help="People who feel no difference: false positives.")]
-Workers = Annotated[int | None, typer.Option(min=1, help="Processes; as many as cores unless given.")]
-Scheduler = Annotated[str | None, typer.Option(metavar="ADDRESS", help="Work on this Dask cluster instead.")]
+SimulatedOption = Annotated[int, typer.Option(min=1, max=10_000_000, help="Simulated studies of each design.")]
+NullOption = Annotated[bool, typer.Option("--null", help="People who feel no difference: false positives.")]
+SchedulerOption = Annotated[str | None, typer.Option(metavar="ADDRESS", help="Work on this Dask cluster instead.")]
 
 
 def power(
-    config: Config,
+    config: ConfigArgument,
     *,
-    participants: Participants = None,
-    trials: TrialsList = None,
-    methods: Methods = None,
-    effect: Effect = None,
-    studies: Simulated = 10_000,
+    participants: ParticipantsOption = None,
+    trials: TrialsListOption = None,
+    methods: MethodsOption = None,
+    effect: EffectOption = None,
+    studies: SimulatedOption = 10_000,
     target: Annotated[float, typer.Option(help="Power that a design is to reach.")] = 0.8,
-    null: Null = False,
-    seed: FixedSeed = 1,
+    null: NullOption = False,
+    seed: FixedSeedOption = 1,
     paper: Annotated[str, typer.Option(help="Published numbers whose pattern may recur.")] = "paper",
-    workers: Workers = None,
-    scheduler: Scheduler = None,
+    workers: WorkersOption = None,
+    scheduler: SchedulerOption = None,
     out: Annotated[Path, typer.Option(help="Folder for power.json, figures and report.")] = Path("results/power"),
-    as_json: AsJson = False,
+    as_json: AsJsonOption = False,
 ) -> None:
     """Simulated power and precision: how many people and trials does it take, and what does it cost?"""
     from analysis.predict.power import run as feature

@@ -10,15 +10,15 @@ from typing import Annotated
 import typer
 
 from analysis.report.terminal import (
-    AsJson,
-    Seed,
+    AsJsonOption,
+    SeedOption,
     end,
     say,
     show,
 )
 
 
-class ScreenName(StrEnum):
+class ScreenChoice(StrEnum):
     """Where a run takes place."""
 
     terminal = "terminal"
@@ -28,57 +28,57 @@ class ScreenName(StrEnum):
 
 def check(
     configs: Annotated[list[str], typer.Argument(metavar="CONFIG...", help="Files or names of shipped configs.")],
-    seed: Seed = None,
+    seed: SeedOption = None,
     participants: Annotated[int, typer.Option(min=1, max=999, help="Show the orders of so many.")] = 14,
-    as_json: AsJson = False,
+    as_json: AsJsonOption = False,
 ) -> None:
     """Validate configs; print design, orders, duration, drive and limits. Nothing is run."""
     from analysis.predict import check as feature
 
     found = [feature.check(name, seed, participants) for name in configs]
-    show(found if len(found) > 1 else found[0], "\n\n".join(map(feature.as_text, found)), as_json)
+    show(found if len(found) > 1 else found[0], "\n\n".join(map(feature.check_text, found)), as_json)
 
 
-Participant = Annotated[
+ParticipantOption = Annotated[
     str | None, typer.Option(help="Participant's code, 1 to 32 letters and digits; without: the start window.")
 ]
-GunAddress = Annotated[str, typer.Option(help="`simulated` or `serial:PORT`.")]
-Screen = Annotated[ScreenName, typer.Option(help="Where the run takes place.")]
-Results = Annotated[Path, typer.Option(help="Folder for the logs.")]
-Resume = Annotated[bool, typer.Option("--resume", help="Go on with an unfinished run.")]
-Fresh = Annotated[bool, typer.Option("--fresh", help="Set an unfinished run aside and start anew.")]
-WhyFresh = Annotated[str, typer.Option(help="With --fresh: why, for the register; never a name.")]
-Visual = Annotated[bool, typer.Option("--visual", help="A synthetic participant works the console.")]
-OwnScreen = Annotated[
+GunAddressOption = Annotated[str, typer.Option(help="`simulated` or `serial:PORT`.")]
+ScreenOption = Annotated[ScreenChoice, typer.Option(help="Where the run takes place.")]
+ResultsOption = Annotated[Path, typer.Option(help="Folder for the logs.")]
+ResumeOption = Annotated[bool, typer.Option("--resume", help="Go on with an unfinished run.")]
+FreshOption = Annotated[bool, typer.Option("--fresh", help="Set an unfinished run aside and start anew.")]
+WhyFreshOption = Annotated[str, typer.Option(help="With --fresh: why, for the register; never a name.")]
+VisualOption = Annotated[bool, typer.Option("--visual", help="A synthetic participant works the console.")]
+OwnScreenOption = Annotated[
     bool, typer.Option("--participant-screen", help="The participant rates on a screen of their own (PsychoPy).")
 ]
-OwnKeys = Annotated[
+OwnKeysOption = Annotated[
     bool, typer.Option("--participant-keys", help="The participant answers with keys of their own (PsychoPy).")
 ]
-Noise = Annotated[
+NoiseOption = Annotated[
     bool, typer.Option("--noise", help="Masking white noise through the participant's headphones (PsychoPy).")
 ]
-Monitor = Annotated[
+MonitorOption = Annotated[
     int | None, typer.Option(min=0, help="The participant's screen: 0 is the first; without: the last of several.")
 ]
 
 
 def run(
     config: Annotated[str, typer.Argument(help="File or name of a shipped config.")],
-    participant: Participant = None,
-    gun: GunAddress = "simulated",
-    screen: Screen = ScreenName.terminal,
-    results: Results = Path("results"),
-    seed: Seed = None,
-    resume: Resume = False,
-    fresh: Fresh = False,
-    reason: WhyFresh = "",
-    visual: Visual = False,
-    participant_screen: OwnScreen = False,
-    participant_keys: OwnKeys = False,
-    noise: Noise = False,
-    participant_monitor: Monitor = None,
-    as_json: AsJson = False,
+    participant: ParticipantOption = None,
+    gun: GunAddressOption = "simulated",
+    screen: ScreenOption = ScreenChoice.terminal,
+    results: ResultsOption = Path("results"),
+    seed: SeedOption = None,
+    resume: ResumeOption = False,
+    fresh: FreshOption = False,
+    reason: WhyFreshOption = "",
+    visual: VisualOption = False,
+    participant_screen: OwnScreenOption = False,
+    participant_keys: OwnKeysOption = False,
+    noise: NoiseOption = False,
+    participant_monitor: MonitorOption = None,
+    as_json: AsJsonOption = False,
 ) -> None:
     """One run: a participant doing one experiment."""
     from experiments.load import load_setup
@@ -115,7 +115,7 @@ def study(
     exclude: Annotated[str | None, typer.Option(metavar="CODE", help="Exclude a participant; needs --reason.")] = None,
     readmit: Annotated[str | None, typer.Option(metavar="CODE", help="Take an exclusion back; needs --reason.")] = None,
     reason: Annotated[str | None, typer.Option(help="Why; never a name.")] = None,
-    as_json: AsJson = False,
+    as_json: AsJsonOption = False,
 ) -> None:
     """The participants of a study: done, in progress, excluded, and who comes next in which orders."""
     from recoil import study as feature
@@ -125,11 +125,13 @@ def study(
     found, notes = feature.study(folder, feature.change(options, facts, reason))
     for message in (*notes, *found.overview.problems):
         say(f"recoil: {message}")
-    show(feature.as_json(found), feature.as_text(found), as_json)
+    show(feature.study_json(found), feature.study_text(found), as_json)
     raise end(exceptions=bool(found.overview.problems))
 
 
-def rebuild(journals: Annotated[list[Path], typer.Argument(metavar="JOURNAL...")], as_json: AsJson = False) -> None:
+def rebuild(
+    journals: Annotated[list[Path], typer.Argument(metavar="JOURNAL...")], as_json: AsJsonOption = False
+) -> None:
     """Make the CSV again from its journal, byte for byte."""
     from recoil.session import rebuild_tables
 

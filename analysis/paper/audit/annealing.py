@@ -12,14 +12,14 @@ from dataclasses import dataclass
 from math import exp
 from random import Random
 
-from analysis.paper.audit.lattices import Rows, distance, within
+from analysis.paper.audit.lattices import Rows, distance, within_rows
 
 _HOT, _COLD = 1.0, 0.002
 """Temperatures at the start and at the end, in rows out of order; found by trial on data that existed."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Order:
+class ColumnOrder:
     """In so many rows column `one` is above `other`, or tied with it; None: in any number of them."""
 
     one: int
@@ -28,14 +28,16 @@ class Order:
     tied: int | None = None
 
 
-class Table:
+class AnnealedRows:
     """Rows under way. `fixed` columns change by exchanges alone; numbers stay in `0..top`."""
 
-    def __init__(self, columns: Sequence[list[int]], top: int, fixed: Sequence[bool], orders: Sequence[Order]) -> None:
+    def __init__(
+        self, columns: Sequence[list[int]], top: int, fixed: Sequence[bool], orders: Sequence[ColumnOrder]
+    ) -> None:
         self._columns, self._top, self._fixed, self._orders = columns, top, fixed, orders
         self._n, self._k = len(columns[0]), len(columns)
         self._sums = [sum(row) for row in zip(*columns, strict=True)]
-        self._w = within(self.rows)
+        self._w = within_rows(self.rows)
         self._of = [[order for order in orders if j in (order.one, order.other)] for j in range(self._k)]
         self._above = {order: sum(self._sign(order, row) > 0 for row in range(self._n)) for order in orders}
         self._tied = {order: sum(self._sign(order, row) == 0 for row in range(self._n)) for order in orders}
@@ -113,5 +115,5 @@ class Table:
             elif sign == 0:
                 self._tied[order] += step
 
-    def _sign(self, order: Order, row: int) -> int:
+    def _sign(self, order: ColumnOrder, row: int) -> int:
         return self._columns[order.one][row] - self._columns[order.other][row]

@@ -11,18 +11,19 @@ from typing import Annotated, Any, ClassVar, Literal
 
 from pydantic import AfterValidator, Field
 
-from analysis.paper.audit.freedom import Design, degrees_of_freedom
+from analysis.paper.audit.freedom import ComparisonDesign, degrees_of_freedom
 from analysis.paper.audit.means import grim, percent_of_count
 from analysis.paper.audit.p_values import Sides, Statistic, binomial_p, p_against_statistic
-from analysis.paper.audit.printed import read
+from analysis.paper.audit.printed import read_printed
 from analysis.paper.audit.spreads import debit, grimmer
 from analysis.paper.audit.totals import Bound, Term, total
-from analysis.paper.audit.tukey_pattern import Comparison, tukey_pattern
+from analysis.paper.audit.tukey_pattern import ClaimedComparison, tukey_pattern
 from analysis.paper.audit.variance_ratios import between_f, repeated_f
-from analysis.paper.audit.words import Result
+from analysis.paper.audit.words import CheckResult
+from analysis.paper.paper import AtLeastOne
 from experiments.config.door import Model
 
-CHECKS: Mapping[str, Callable[..., Result]] = MappingProxyType(
+CHECKS: Mapping[str, Callable[..., CheckResult]] = MappingProxyType(
     {
         "grim": grim,
         "percent": percent_of_count,
@@ -41,13 +42,12 @@ CHECKS: Mapping[str, Callable[..., Result]] = MappingProxyType(
 
 
 def _is_printed(text: str) -> str:
-    read(text)
+    read_printed(text)
     return text
 
 
 PrintedText = Annotated[str, AfterValidator(_is_printed)]
 """A number or a bound as printed: "28.45", ".205", "< .001", "64.3%"."""
-Count = Annotated[int, Field(ge=1)]
 
 
 class Claim(Model):
@@ -62,7 +62,7 @@ class Claim(Model):
     about: list[str] = Field(default_factory=list)
     not_arguments: ClassVar[frozenset[str]] = frozenset({"place", "quote", "note", "about", "kind"})
 
-    def run(self) -> Result:
+    def run(self) -> CheckResult:
         """The check of this kind with this claim's numbers; `ValueError` where they make no such claim."""
         return CHECKS[self.kind](**self.arguments())  # type: ignore[attr-defined]
 
@@ -76,9 +76,9 @@ class GrimClaim(Claim):
 
     kind: Literal["grim"]
     mean: PrintedText
-    n: Count
+    n: AtLeastOne
     grain: PrintedText = "1"
-    items: Count = 1
+    items: AtLeastOne = 1
     low: PrintedText | None = None
     high: PrintedText | None = None
 
@@ -89,7 +89,7 @@ class PercentClaim(Claim):
     kind: Literal["percent"]
     percent: PrintedText
     count: Annotated[int, Field(ge=0)]
-    n: Count
+    n: AtLeastOne
 
 
 class GrimmerClaim(GrimClaim):
@@ -105,7 +105,7 @@ class DebitClaim(Claim):
     kind: Literal["debit"]
     mean: PrintedText
     sd: PrintedText
-    n: Count
+    n: AtLeastOne
 
 
 class DfClaim(Claim):
@@ -113,8 +113,8 @@ class DfClaim(Claim):
 
     kind: Literal["df"]
     df: Annotated[list[PrintedText], Field(min_length=1)]
-    design: Design
-    counts: Annotated[list[Count], Field(min_length=1)]
+    design: ComparisonDesign
+    counts: Annotated[list[AtLeastOne], Field(min_length=1)]
 
 
 class PClaim(Claim):
@@ -133,7 +133,7 @@ class BinomialClaim(Claim):
 
     kind: Literal["binomial"]
     p: PrintedText
-    n: Count
+    n: AtLeastOne
     chance: str = "1/2"
     counts: list[int] | None = None
 
@@ -143,8 +143,8 @@ class RepeatedFClaim(Claim):
 
     kind: Literal["repeated-f"]
     F: PrintedText
-    n: Count
-    k: Count
+    n: AtLeastOne
+    k: AtLeastOne
     means: list[PrintedText] | None = None
     grain: PrintedText = "1"
     low: PrintedText | None = None
@@ -158,7 +158,7 @@ class BetweenFClaim(Claim):
 
     kind: Literal["between-f"]
     F: PrintedText
-    sizes: Annotated[list[Count], Field(min_length=2)]
+    sizes: Annotated[list[AtLeastOne], Field(min_length=2)]
     means: list[PrintedText] | None = None
     grain: PrintedText = "1"
     low: PrintedText | None = None
@@ -166,7 +166,7 @@ class BetweenFClaim(Claim):
 
 
 class TukeyPair(Model):
-    """Mean `higher` above mean `lower`, by their places from 0; see `Comparison`."""
+    """Mean `higher` above mean `lower`, by their places from 0; see `ClaimedComparison`."""
 
     higher: int
     lower: int
@@ -179,7 +179,7 @@ class TukeyClaim(Claim):
 
     kind: Literal["tukey"]
     F: PrintedText
-    sizes: Annotated[list[Count], Field(min_length=2)]
+    sizes: Annotated[list[AtLeastOne], Field(min_length=2)]
     comparisons: Annotated[list[TukeyPair], Field(min_length=1)]
     means: list[PrintedText] | None = None
     repeated: bool = True
@@ -189,7 +189,7 @@ class TukeyClaim(Claim):
 
     def arguments(self) -> dict[str, Any]:
         """The check's arguments, the pairs as its own words."""
-        pairs = [Comparison(**pair.model_dump()) for pair in self.comparisons]
+        pairs = [ClaimedComparison(**pair.model_dump()) for pair in self.comparisons]
         return super().arguments() | {"comparisons": pairs}
 
 
@@ -220,9 +220,9 @@ class StatedClaim(Claim):
     printed: PrintedText
     unit: str = ""
 
-    def run(self) -> Result:
+    def run(self) -> CheckResult:
         """Undecided: there is nothing to check it against."""
-        return Result(
+        return CheckResult(
             check="stated",
             printed=f"{self.printed} {self.unit}".strip(),
             verdict="undecided",
@@ -237,9 +237,9 @@ class UnpublishedClaim(Claim):
     kind: Literal["unpublished"]
     quantity: str
 
-    def run(self) -> Result:
+    def run(self) -> CheckResult:
         """Not published."""
-        return Result(
+        return CheckResult(
             check="unpublished",
             printed="",
             verdict="not published",

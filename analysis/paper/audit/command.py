@@ -8,9 +8,9 @@ from pathlib import Path
 from typing import Any
 
 from analysis.paper.audit import audit
-from analysis.paper.audit.page import as_json, as_text, counts, page
+from analysis.paper.audit.page import counts, findings_json, findings_text, sections
 from analysis.paper.audit.paper_file import PaperFile, load_paper_file
-from analysis.paper.audit.run import Finding
+from analysis.paper.audit.run import AuditFinding
 from analysis.report.page import write_page
 from experiments.config.door import ConfigError
 from experiments.config.setup import sha256
@@ -24,7 +24,7 @@ class Audited:
     """A paper with what was found of its numbers."""
 
     paper: PaperFile
-    findings: tuple[Finding, ...]
+    findings: tuple[AuditFinding, ...]
     source: Path
 
     @property
@@ -37,13 +37,13 @@ class Audited:
         return {
             "paper": self.paper.paper.model_dump(),
             "verdicts": counts(self.findings),
-            "findings": as_json(self.findings),
+            "findings": findings_json(self.findings),
             "versions": {"file": self.source.name, "sha256": self._sha256, **provenance()},
         }
 
     def as_text(self) -> str:
         """The terminal's table."""
-        return as_text(self.findings)
+        return findings_text(self.findings)
 
     @property
     def origin(self) -> list[tuple[str, str]]:
@@ -58,7 +58,7 @@ class Audited:
         return sha256(self.paper.model_dump(mode="json"))
 
 
-def examine(name: str) -> Audited:
+def audit_file(name: str) -> Audited:
     """The audit of a paper's file, or of a shipped one. `ConfigError` if it cannot be used."""
     source = find(name)
     paper = load_paper_file(source)
@@ -77,4 +77,4 @@ def write(audited: Audited, out: Path) -> None:
     text = json.dumps(audited.as_json(), indent=1, ensure_ascii=False) + "\n"
     storage.write_whole(out / "audit.json", text.encode())
     title = f"Audit: {audited.paper.paper.title or audited.source.stem}"
-    write_page(out, title, page(audited.findings, audited.origin))
+    write_page(out, title, sections(audited.findings, audited.origin))

@@ -21,7 +21,7 @@ from analysis.paper.audit.claims import (
 )
 from analysis.paper.audit.means import scale_of
 from analysis.paper.audit.paper_file import PaperFile
-from analysis.paper.audit.printed import Rounding, read
+from analysis.paper.audit.printed import Rounding, read_printed
 from analysis.paper.paper import Participants, PublishedDirection, PublishedExperiment, PublishedPreference
 from analysis.paper.published import named_in
 
@@ -74,7 +74,7 @@ def _direction(paper: PublishedDirection) -> Iterator[Claim]:
         counts = _counts(paper.means[claim.method], n) if forward else None
         yield BinomialClaim(
             place=place, quote=f"{claim.method}, {claim.direction}: p = {claim.p}", kind="binomial", p=claim.p, n=n,
-            counts=counts, note="pooled over participants", about=[named_in("direction", published.binomial_p(claim))],
+            counts=counts, note="pooled over participants", about=[named_in("direction", published.one_half_p(claim))],
         )  # fmt: skip
     for method in paper.methods:
         yield UnpublishedClaim(place="Fig. 8(a)", quote=method, kind="unpublished", quantity=f"SD, {method}")
@@ -85,7 +85,7 @@ def _direction(paper: PublishedDirection) -> Iterator[Claim]:
 
 def _counts(percent: str, n: int) -> list[int]:
     """The counts of n that print as a percentage."""
-    return list(scale_of("1", "0", "1").sums(read(f"{percent}%").interval(Rounding.ANY), n))
+    return list(scale_of("1", "0", "1").sums(read_printed(f"{percent}%").interval(Rounding.ANY), n))
 
 
 def _protocol(paper: PublishedDirection) -> Iterator[Claim]:

@@ -7,16 +7,16 @@ from fractions import Fraction
 from typing import Literal
 
 from analysis.paper.audit.means import check_count
-from analysis.paper.audit.printed import PrintedNumber, Rounding, decimal, read
-from analysis.paper.audit.words import NONE_EXISTS, Attempt, Found, Result, decide, listed
+from analysis.paper.audit.printed import PrintedNumber, Rounding, decimal, read_printed
+from analysis.paper.audit.words import NONE_EXISTS, Attempt, CheckResult, DataExistence, judge_readings, listed
 
-Design = Literal["between", "repeated", "one sample", "paired", "two samples", "correlation", "contingency"]
+ComparisonDesign = Literal["between", "repeated", "one sample", "paired", "two samples", "correlation", "contingency"]
 Freedom = tuple[Fraction, ...]
 _SOURCE = "Winer 1971, Statistical Principles in Experimental Design; Greenhouse & Geisser 1959; Welch 1947"
 
 
 _COUNTS = {"repeated": 2, "two samples": 2, "contingency": 2, "one sample": 1, "paired": 1, "correlation": 1}
-_DF: dict[Design, Callable[[Sequence[int]], list[int]]] = {
+_DF: dict[ComparisonDesign, Callable[[Sequence[int]], list[int]]] = {
     "between": lambda sizes: [len(sizes) - 1, sum(sizes) - len(sizes)],
     "repeated": lambda counts: [counts[1] - 1, (counts[0] - 1) * (counts[1] - 1)],
     "two samples": lambda sizes: [sum(sizes) - 2],
@@ -27,7 +27,7 @@ _DF: dict[Design, Callable[[Sequence[int]], list[int]]] = {
 }
 
 
-def degrees_of_freedom(df: Sequence[str], design: Design, counts: Sequence[int]) -> Result:
+def degrees_of_freedom(df: Sequence[str], design: ComparisonDesign, counts: Sequence[int]) -> CheckResult:
     """Are these the degrees of freedom of this design?
 
     `counts`: "between" the size of each group, df (k - 1, N - k); "repeated" participants n and conditions k, df
@@ -40,14 +40,14 @@ def degrees_of_freedom(df: Sequence[str], design: Design, counts: Sequence[int])
     >>> degrees_of_freedom(["2", "26"], "repeated", [14, 3]).verdict
     'attainable'
     """
-    printed = [read(text) for text in df]
+    printed = [read_printed(text) for text in df]
     expected = expected_df(design, counts)
     if len(printed) != len(expected):
         raise ValueError(f"a {design} design has {len(expected)} degrees of freedom, not {len(printed)}")
     others = [(name, _same(printed, other)) for name, other in _readings(design, counts)]
     others += [(name, test) for name, test in _corrections(printed, design, counts)]
-    decision = decide(_same(printed, expected), others)
-    return Result(
+    decision = judge_readings(_same(printed, expected), others)
+    return CheckResult(
         check="df",
         printed=f"({', '.join(number.text for number in printed)})",
         verdict=decision.verdict,
@@ -62,7 +62,7 @@ def degrees_of_freedom(df: Sequence[str], design: Design, counts: Sequence[int])
     )
 
 
-def expected_df(design: Design, counts: Sequence[int]) -> Freedom:
+def expected_df(design: ComparisonDesign, counts: Sequence[int]) -> Freedom:
     """The degrees of freedom of a design without any correction; `ValueError` if the counts make none."""
     if (len(counts) < 2) if design == "between" else (len(counts) != _COUNTS[design]):
         raise ValueError(f"a {design} design cannot be made of the counts {listed(counts)}")
@@ -75,14 +75,14 @@ def expected_df(design: Design, counts: Sequence[int]) -> Freedom:
 
 
 def _same(printed: Sequence[PrintedNumber], values: Freedom) -> Attempt:
-    def attempt(rounding: Rounding) -> Found:
+    def attempt(rounding: Rounding) -> DataExistence:
         fits = all(n.interval(rounding).holds(value) for n, value in zip(printed, values, strict=True))
-        return Found(True, (values,)) if fits else NONE_EXISTS
+        return DataExistence(True, (values,)) if fits else NONE_EXISTS
 
     return attempt
 
 
-def _readings(design: Design, counts: Sequence[int]) -> Iterator[tuple[str, Freedom]]:
+def _readings(design: ComparisonDesign, counts: Sequence[int]) -> Iterator[tuple[str, Freedom]]:
     """Other whole degrees of freedom that the same data could have been given."""
     if design == "repeated":
         yield from _repeated_readings(*counts)
@@ -110,7 +110,7 @@ def _between_readings(sizes: Sequence[int]) -> Iterator[tuple[str, Freedom]]:
 
 
 def _corrections(
-    printed: Sequence[PrintedNumber], design: Design, counts: Sequence[int]
+    printed: Sequence[PrintedNumber], design: ComparisonDesign, counts: Sequence[int]
 ) -> Iterator[tuple[str, Attempt]]:
     if design == "repeated":
         yield "Greenhouse-Geisser or Huynh-Feldt correction", _corrected(printed, counts[0], counts[1])
@@ -121,24 +121,24 @@ def _corrections(
 def _corrected(printed: Sequence[PrintedNumber], n: int, k: int) -> Attempt:
     """Both df times an epsilon from 1 / (k - 1) to 1: is there one that prints so?"""
 
-    def attempt(rounding: Rounding) -> Found:
+    def attempt(rounding: Rounding) -> DataExistence:
         first, second = (number.interval(rounding) for number in printed)
         mapped = second.mapped(lambda df: df / (n - 1))
         ends = [x for x in (first.low, first.high, mapped.low, mapped.high, Fraction(1), Fraction(k - 1)) if x]
         middles = [(a + b) / 2 for a in ends for b in ends]
         fits = (x for x in middles if 1 <= x <= k - 1 and first.holds(x) and mapped.holds(x))
         df = next(fits, None)
-        return NONE_EXISTS if df is None else Found(True, ((df, df * (n - 1)),))
+        return NONE_EXISTS if df is None else DataExistence(True, ((df, df * (n - 1)),))
 
     return attempt
 
 
 def _welch(printed: PrintedNumber, low: int, high: int) -> Attempt:
-    def attempt(rounding: Rounding) -> Found:
+    def attempt(rounding: Rounding) -> DataExistence:
         interval = printed.interval(rounding)
         ends = [x for x in (interval.low, interval.high, Fraction(low), Fraction(high)) if x is not None]
         fits = (x for a in ends for b in ends if interval.holds(x := (a + b) / 2) and low <= x <= high)
         df = next(fits, None)
-        return NONE_EXISTS if df is None else Found(True, ((df,),))
+        return NONE_EXISTS if df is None else DataExistence(True, ((df,),))
 
     return attempt

@@ -39,7 +39,7 @@ def effect(columns: Sequence[int]) -> int:
     return len(columns) * sum(c * c for c in columns) - sum(columns) ** 2
 
 
-def within(rows: Rows) -> int:
+def within_rows(rows: Rows) -> int:
     """W = sum over rows and pairs of columns of the squared difference."""
     return sum(len(row) * sum(y * y for y in row) - sum(row) ** 2 for row in rows)
 
@@ -83,7 +83,7 @@ def greatest_within(columns: Sequence[int], n: int, levels: Levels) -> int | Non
     return k * levels.top * total - -(-total * total // n)
 
 
-def find(columns: Sequence[int], n: int, targets: range, levels: Levels) -> Rows | bool | None:
+def find_rows(columns: Sequence[int], n: int, targets: range, levels: Levels) -> Rows | bool | None:
     """Rows with these column sums and W in `targets`; False if it is proved that there are none, else None."""
     if not targets:
         return False
@@ -93,7 +93,7 @@ def find(columns: Sequence[int], n: int, targets: range, levels: Levels) -> Rows
         if not hits:
             return False
         targets = range(hits[0], hits[0] + 1)
-    return search(columns, n, targets, levels)
+    return search_rows(columns, n, targets, levels)
 
 
 def affordable(n: int, k: int, levels: Levels) -> bool:
@@ -108,7 +108,7 @@ def affordable(n: int, k: int, levels: Levels) -> bool:
 def every_sum(n: int, k: int, top: int) -> dict[tuple[int, ...], int]:
     """All column sums of n rows of k numbers in 0..top; the bits of each say which W it can have."""
     sums = {(0,) * k: 1}
-    choices = [(row, within((row,))) for row in product(range(top + 1), repeat=k)]
+    choices = [(row, within_rows((row,))) for row in product(range(top + 1), repeat=k)]
     for _ in range(n):
         grown: dict[tuple[int, ...], int] = {}
         for columns, bits in sums.items():
@@ -119,7 +119,7 @@ def every_sum(n: int, k: int, top: int) -> dict[tuple[int, ...], int]:
     return sums
 
 
-def search(columns: Sequence[int], n: int, targets: range, levels: Levels, seed: int = 0) -> Rows | None:
+def search_rows(columns: Sequence[int], n: int, targets: range, levels: Levels, seed: int = 0) -> Rows | None:
     """Rows with these column sums and W in `targets`, by small steps that keep the sums; None if none was met."""
     random = Random(seed)  # noqa: S311 a search, no secret
     if levels.top is not None and any(not 0 <= c <= n * levels.top for c in columns):
@@ -148,7 +148,7 @@ class _Table:
     def __init__(self, rows: list[list[int]], levels: Levels) -> None:
         self.rows, self.levels = rows, levels
         self.sums = [sum(row) for row in rows]
-        self.w = within(tuple(tuple(row) for row in rows))
+        self.w = within_rows(tuple(tuple(row) for row in rows))
 
     def step(self, targets: range, random: Random) -> None:
         """Move a whole amount from one row to another in a column, if that brings W nearer, or by chance."""

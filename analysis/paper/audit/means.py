@@ -6,14 +6,14 @@ from dataclasses import dataclass
 from fractions import Fraction
 from math import ceil, floor
 
-from analysis.paper.audit.printed import Interval, PrintedNumber, Rounding, decimal, read
-from analysis.paper.audit.words import NONE_EXISTS, Attempt, Found, Result, Witness, decide, listed
+from analysis.paper.audit.printed import Interval, PrintedNumber, Rounding, decimal, read_printed
+from analysis.paper.audit.words import NONE_EXISTS, Attempt, CheckResult, DataExistence, Witness, judge_readings, listed
 
 _GRIM = "Brown & Heathers 2017, Social Psychological and Personality Science 8, 363"
 
 
 @dataclass(frozen=True, slots=True)
-class Scale:
+class AnswerScale:
     """Values are `origin` plus whole multiples of `grain`, from `low` to `high` multiples (None: no end)."""
 
     grain: Fraction
@@ -38,24 +38,24 @@ class Scale:
         return (None if self.low is None else n * self.low, None if self.high is None else n * self.high)
 
 
-def scale_of(grain: str, low: str | None = None, high: str | None = None, items: int = 1) -> Scale:
+def scale_of(grain: str, low: str | None = None, high: str | None = None, items: int = 1) -> AnswerScale:
     """A scale in steps of `grain` from `low` to `high`, a score being the mean of `items` answers.
 
     `ValueError` if the grain is not above 0, or the ends are not whole steps apart or in the wrong order.
     """
-    step = read(grain).value / items
+    step = read_printed(grain).value / items
     if step <= 0 or items < 1:
         raise ValueError(f"grain must be above 0 and items at least 1, not {grain} and {items}")
-    origin = read(low).value if low is not None else Fraction(0)
-    top = None if high is None else (read(high).value - origin) / step
+    origin = read_printed(low).value if low is not None else Fraction(0)
+    top = None if high is None else (read_printed(high).value - origin) / step
     if top is not None and (top.denominator != 1 or (low is not None and top < 0)):
         raise ValueError(f"the scale {low} to {high} is no whole number of steps of {grain}")
-    return Scale(step, origin, None if low is None else 0, None if top is None else int(top))
+    return AnswerScale(step, origin, None if low is None else 0, None if top is None else int(top))
 
 
 def grim(
     mean: str, n: int, *, grain: str = "1", items: int = 1, low: str | None = None, high: str | None = None
-) -> Result:
+) -> CheckResult:
     """Can n scores in steps of `grain` have this mean? Exact: mean = low + grain K / (n items), K whole.
 
     `mean` is text as printed, with a percent sign for a percentage (the scores are then shares: grain "1" for yes and
@@ -65,11 +65,11 @@ def grim(
     >>> grim("5.19", 28).verdict, grim("5.21", 28).verdict
     ('not attainable', 'attainable')
     """
-    printed, scale = read(mean), scale_of(grain, low, high, items)
+    printed, scale = read_printed(mean), scale_of(grain, low, high, items)
     check_count(n)
-    decision = decide(_means_attempt(printed, n, scale))
+    decision = judge_readings(_means_attempt(printed, n, scale))
     below, above = nearest(printed.value, scale.grain / n, scale.origin, scale.ends(n))
-    return Result(
+    return CheckResult(
         check="grim",
         printed=printed.text,
         verdict=decision.verdict,
@@ -91,15 +91,15 @@ def check_count(n: int, name: str = "n") -> None:
         raise ValueError(f"{name} must be at least 1, not {n}")
 
 
-def _means_attempt(printed: PrintedNumber, n: int, scale: Scale) -> Attempt:
-    def attempt(rounding: Rounding) -> Found:
+def _means_attempt(printed: PrintedNumber, n: int, scale: AnswerScale) -> Attempt:
+    def attempt(rounding: Rounding) -> DataExistence:
         sums = scale.sums(printed.interval(rounding), n)
-        return Found(True, even_spread(sums[len(sums) // 2], n, scale)) if sums else NONE_EXISTS
+        return DataExistence(True, even_spread(sums[len(sums) // 2], n, scale)) if sums else NONE_EXISTS
 
     return attempt
 
 
-def even_spread(total: int, n: int, scale: Scale) -> Witness:
+def even_spread(total: int, n: int, scale: AnswerScale) -> Witness:
     """So many scores with the sum `total`, as equal as can be."""
     base, more = divmod(total, n)
     return (tuple(scale.value(base + (i < more)) for i in range(n)),)
@@ -120,7 +120,7 @@ def nearest(
     )
 
 
-def percent_of_count(percent: str, count: int, n: int) -> Result:
+def percent_of_count(percent: str, count: int, n: int) -> CheckResult:
     """Is `percent` what `count` of `n` is? Exact: 100 count / n.
 
     Reading that can rescue: out of fewer than n, as when some did not answer. The proof names the counts of n, if any,
@@ -133,12 +133,12 @@ def percent_of_count(percent: str, count: int, n: int) -> Result:
     check_count(n)
     if not 0 <= count <= n:
         raise ValueError(f"count must lie in 0..{n}, not {count}")
-    printed = read(percent if "%" in percent else f"{percent}%")
+    printed = read_printed(percent if "%" in percent else f"{percent}%")
     others = [(f"out of {m} instead of {n}", _share_attempt(printed, count, m)) for m in _bases(printed, count, n)]
-    decision = decide(_share_attempt(printed, count, n), others)
-    fitting = list(Scale(Fraction(1), low=0, high=1).sums(printed.interval(Rounding.ANY), n))
+    decision = judge_readings(_share_attempt(printed, count, n), others)
+    fitting = list(AnswerScale(Fraction(1), low=0, high=1).sums(printed.interval(Rounding.ANY), n))
     below, above = nearest(printed.value, Fraction(1, n), Fraction(0), (0, n))
-    return Result(
+    return CheckResult(
         check="percent of count",
         printed=f"{count} of {n}, {printed.text}",
         verdict=decision.verdict,
@@ -157,7 +157,7 @@ def percent_of_count(percent: str, count: int, n: int) -> Result:
 
 def _share_attempt(printed: PrintedNumber, count: int, n: int) -> Attempt:
     share = Fraction(count, n)
-    return lambda rounding: Found(True, ((share,),)) if printed.interval(rounding).holds(share) else NONE_EXISTS
+    return lambda rounding: DataExistence(True, ((share,),)) if printed.interval(rounding).holds(share) else NONE_EXISTS
 
 
 def _bases(printed: PrintedNumber, count: int, n: int) -> list[int]:

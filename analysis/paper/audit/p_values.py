@@ -13,8 +13,8 @@ import numpy as np
 from scipy import special
 
 from analysis.paper.audit.means import check_count
-from analysis.paper.audit.printed import Interval, PrintedNumber, Rounding, decimal, read
-from analysis.paper.audit.words import NONE_EXISTS, UNKNOWN, Attempt, Found, Result, decide, listed
+from analysis.paper.audit.printed import Interval, PrintedNumber, Rounding, decimal, read_printed
+from analysis.paper.audit.words import NONE_EXISTS, UNKNOWN, Attempt, CheckResult, DataExistence, judge_readings, listed
 from analysis.stats.studentized_range import studentized_range_sf
 
 Statistic = Literal["t", "F", "chi2", "r", "z", "Q", "q"]
@@ -118,7 +118,7 @@ _SOURCE = "Nuijten et al. 2016, Behavior Research Methods 48, 1205"
 
 def p_against_statistic(
     statistic: Statistic, value: str, df: Sequence[str], p: str, *, sides: Sides = "two-sided"
-) -> Result:
+) -> CheckResult:
     """Can the statistic, unrounded, have this p-value or one within this bound ("< .001")?
 
     `statistic`: t(df), F(df1, df2), chi2(df), r(df), z(), Q(df) of a meta-analysis, Tukey's q(k, df); all values that
@@ -129,7 +129,7 @@ def p_against_statistic(
     >>> p_against_statistic("t", "2.20", ["28"], ".036").verdict
     'attainable'
     """
-    number, printed, freedom = read(value), read(p), [read(text).value for text in df]
+    number, printed, freedom = read_printed(value), read_printed(p), [read_printed(text).value for text in df]
     check_df(statistic, freedom)
     if number.relation != "=":
         raise ValueError(f"the statistic must be a number, not the bound {number.text}")
@@ -139,9 +139,9 @@ def p_against_statistic(
 
     other: Sides = "one-sided" if sides == "two-sided" else "two-sided"
     others = [(f"{other} p", p_attempt(printed, at(other)))] if statistic in SIDED else []
-    decision = decide(p_attempt(printed, at(sides)), others)
+    decision = judge_readings(p_attempt(printed, at(sides)), others)
     outer, _ = at(sides)(Rounding.HALF_UP)
-    return Result(
+    return CheckResult(
         check="p against statistic",
         printed=f"{statistic}({', '.join(df)}) = {number.text}, p {_shown(printed)}",
         verdict=decision.verdict,
@@ -162,14 +162,14 @@ def p_against_statistic(
 def p_attempt(printed: PrintedNumber, values: PFromRange) -> Attempt:
     """Does the p range of a rounding meet what prints as `printed`? A proof on both sides of the margin."""
 
-    def attempt(rounding: Rounding) -> Found:
+    def attempt(rounding: Rounding) -> DataExistence:
         outer, inner = values(rounding)
         claimed = printed.interval(rounding)
         if not outer.meets(claimed) or _empty(claimed):
             return NONE_EXISTS
         if inner is not None and inner.meets(claimed):
-            return Found(True)
-        return Found(True) if _within(outer, claimed) else UNKNOWN
+            return DataExistence(True)
+        return DataExistence(True) if _within(outer, claimed) else UNKNOWN
 
     return attempt
 
@@ -193,13 +193,13 @@ def _small(interval: Interval) -> str:
 
 
 Bounds = tuple[Fraction, Fraction]
-Rule = Callable[[int, Fraction], list[Bounds]]
+_PValueRule = Callable[[int, Fraction], list[Bounds]]
 """The p-values of all counts 0..n, each between two bounds (equal where exact)."""
 _NEAR_TIE = 1 + Fraction(1, 10**7)
 _MARGIN = Fraction(1, 10**9)
 
 
-def binomial_p(p: str, n: int, *, chance: str = "1/2", counts: Sequence[int] | None = None) -> Result:
+def binomial_p(p: str, n: int, *, chance: str = "1/2", counts: Sequence[int] | None = None) -> CheckResult:
     """Which counts of n give this p-value against `chance`? The printed p stands if one of `counts` (all) does.
 
     Exact: the sum of all probabilities not above that of the count. Readings: near ties of 1e-7 counted (R), the
@@ -211,17 +211,17 @@ def binomial_p(p: str, n: int, *, chance: str = "1/2", counts: Sequence[int] | N
     (('counts of 140 that give p', '62, 78'),)
     """
     check_count(n)
-    printed, share = read(p), Fraction(chance)
+    printed, share = read_printed(p), Fraction(chance)
     if not 0 < share < 1:
         raise ValueError(f"chance must lie between 0 and 1, not {chance}")
     asked = list(range(n + 1)) if counts is None else list(counts)
     if any(not 0 <= count <= n for count in asked):
         raise ValueError(f"counts must lie in 0..{n}, not {listed(asked)}")
     plain, *others = ((name, _rule_attempt(printed, rule(n, share), asked)) for name, rule in RULES)
-    decision = decide(plain[1], others)
+    decision = judge_readings(plain[1], others)
     exact = [low for low, _ in small_probabilities(n, share)]
     fitting = [k for k in range(n + 1) if printed.interval(Rounding.ANY).holds(exact[k])]
-    return Result(
+    return CheckResult(
         check="binomial p",
         printed=f"p = {printed.text}",
         verdict=decision.verdict,
@@ -242,12 +242,12 @@ def _asked(counts: Sequence[int] | None, n: int) -> str:
 
 
 def _rule_attempt(printed: PrintedNumber, values: list[Bounds], counts: Sequence[int]) -> Attempt:
-    def attempt(rounding: Rounding) -> Found:
+    def attempt(rounding: Rounding) -> DataExistence:
         interval, unsure = printed.interval(rounding), False
         for count in counts:
             low, high = values[count]
             if interval.holds(low) and interval.holds(high):
-                return Found(True, ((Fraction(count),),))
+                return DataExistence(True, ((Fraction(count),),))
             unsure |= low < high and interval.meets(Interval(low, high))
         return UNKNOWN if unsure else NONE_EXISTS
 
@@ -290,7 +290,7 @@ def _upper(n: int, chance: Fraction) -> list[Bounds]:
     return [(high, high) for _, high in tails(n, chance)]
 
 
-def _normal(correction: Fraction) -> Rule:
+def _normal(correction: Fraction) -> _PValueRule:
     """2 P(Z > max(0, |k - n p| - correction) / sqrt(n p (1 - p))), between bounds."""
 
     def rule(n: int, chance: Fraction) -> list[Bounds]:
@@ -302,7 +302,7 @@ def _normal(correction: Fraction) -> Rule:
     return rule
 
 
-RULES: tuple[tuple[str, Rule], ...] = (
+RULES: tuple[tuple[str, _PValueRule], ...] = (
     ("sum of the small probabilities", small_probabilities),
     ("sum of the small probabilities, near ties counted", lambda n, p: small_probabilities(n, p, _NEAR_TIE)),
     ("doubled tail", _doubled),

@@ -6,21 +6,21 @@ from collections.abc import Iterator, Sequence
 from fractions import Fraction
 from typing import Any, get_args
 
-from analysis.paper.audit.run import Finding
+from analysis.paper.audit.run import AuditFinding
 from analysis.paper.audit.sentences import ATTENTION, FAIRNESS, nearest_text, sentences
-from analysis.paper.audit.words import Result, Verdict
+from analysis.paper.audit.words import AuditVerdict, CheckResult
 from analysis.report.section import Section, Table
 
 Json = dict[str, Any]
-VERDICTS: tuple[Verdict, ...] = get_args(Verdict)
+_AUDIT_VERDICTS: tuple[AuditVerdict, ...] = get_args(AuditVerdict)
 
 
-def counts(findings: Sequence[Finding]) -> dict[str, int]:
+def counts(findings: Sequence[AuditFinding]) -> dict[str, int]:
     """How many numbers have which verdict, all verdicts named."""
-    return {verdict: sum(finding.result.verdict == verdict for finding in findings) for verdict in VERDICTS}
+    return {verdict: sum(finding.result.verdict == verdict for finding in findings) for verdict in _AUDIT_VERDICTS}
 
 
-def page(findings: Sequence[Finding], origin: Sequence[tuple[str, str]]) -> tuple[Section, ...]:
+def sections(findings: Sequence[AuditFinding], origin: Sequence[tuple[str, str]]) -> tuple[Section, ...]:
     """The sections of the report; `origin` is label and value of where it comes from."""
     asked = [finding for finding in findings if finding.result.verdict in ATTENTION]
     origins = Table(caption="Where this comes from", header=("What", "Value"), rows=tuple(origin))
@@ -33,7 +33,7 @@ def page(findings: Sequence[Finding], origin: Sequence[tuple[str, str]]) -> tupl
     )
 
 
-def _summary(findings: Sequence[Finding]) -> Section:
+def _summary(findings: Sequence[AuditFinding]) -> Section:
     rows = tuple((verdict, str(count), _MEANING[verdict]) for verdict, count in counts(findings).items() if count)
     caption = f"{len(findings)} numbers, each with its verdict"
     return Section(
@@ -52,7 +52,7 @@ _MEANING = {
 }
 
 
-def _questions(asked: Sequence[Finding]) -> Section:
+def _questions(asked: Sequence[AuditFinding]) -> Section:
     rows = tuple(
         (f"{f.place}: “{f.quote}”", f.result.verdict, nearest_text(f.result), "; ".join(f.result.readings) or "none")
         for f in asked
@@ -65,19 +65,19 @@ def _questions(asked: Sequence[Finding]) -> Section:
     )
 
 
-def _all(findings: Sequence[Finding]) -> Section:
+def _all(findings: Sequence[AuditFinding]) -> Section:
     rows = tuple((f"{f.place}: “{f.quote}”", f.result.verdict, _told(f)) for f in findings)
     table = Table(caption="Every number in the file's order", header=("Number", "Verdict", "Why"), rows=rows)
     return Section(title="Every number", tables=(table,))
 
 
-def _told(finding: Finding) -> str:
+def _told(finding: AuditFinding) -> str:
     said = not finding.note or finding.result.verdict == "only under a reading"
     note = "" if said else f" Read as: {finding.note}."
     return " ".join(sentences(finding)) + note
 
 
-def _proofs(findings: Sequence[Finding]) -> Section:
+def _proofs(findings: Sequence[AuditFinding]) -> Section:
     rows = tuple(
         (f"{f.place}: “{f.quote}”", f.result.check, "; ".join(_proof(f.result)), f.result.source)
         for f in findings
@@ -92,7 +92,7 @@ def _proofs(findings: Sequence[Finding]) -> Section:
     )
 
 
-def _proof(result: Result) -> Iterator[str]:
+def _proof(result: CheckResult) -> Iterator[str]:
     if result.step is not None:
         yield f"step {float(result.step):.6g}"
     if nearest := nearest_text(result):
@@ -100,12 +100,12 @@ def _proof(result: Result) -> Iterator[str]:
     yield from (f"{name} {value}" for name, value in result.numbers)
 
 
-def as_json(findings: Sequence[Finding]) -> list[Json]:
+def findings_json(findings: Sequence[AuditFinding]) -> list[Json]:
     """Every finding with all of its proof, fractions exact as text beside their decimal value."""
     return [_finding(finding) for finding in findings]
 
 
-def _finding(finding: Finding) -> Json:
+def _finding(finding: AuditFinding) -> Json:
     result = finding.result
     return {
         "place": finding.place,
@@ -132,7 +132,7 @@ def _exact(value: Fraction | None) -> Json | None:
     return None if value is None else {"exact": str(value), "value": float(value)}
 
 
-def as_text(findings: Sequence[Finding]) -> str:
+def findings_text(findings: Sequence[AuditFinding]) -> str:
     """A line a number, then in full the ones to ask about."""
     verdicts = max(len(finding.result.verdict) for finding in findings) if findings else 0
     places = max((len(finding.place) for finding in findings), default=0)

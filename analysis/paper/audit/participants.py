@@ -11,16 +11,16 @@ from dataclasses import dataclass
 from fractions import Fraction
 from typing import Any
 
-from analysis.paper.audit.annealing import Order
+from analysis.paper.audit.annealing import ColumnOrder
 from analysis.paper.audit.derived import STARS
 from analysis.paper.audit.lattices import Rows, effect
-from analysis.paper.audit.means import Scale, scale_of
+from analysis.paper.audit.means import AnswerScale, scale_of
 from analysis.paper.audit.p_values import binomial_p
-from analysis.paper.audit.printed import Interval, Rounding, read
-from analysis.paper.audit.reconstruct import Column, Constraints, Reconstruction, Sums, reconstruct
+from analysis.paper.audit.printed import Interval, Rounding, read_printed
+from analysis.paper.audit.reconstruct import ColumnSums, ConditionColumn, Constraints, Reconstruction, reconstruct
 from analysis.paper.audit.variance_ratios import repeated_f
-from analysis.paper.audit.words import Result
-from analysis.paper.paper import PublishedDirection, PublishedExperiment, PublishedPreference, TukeyClaim
+from analysis.paper.audit.words import CheckResult
+from analysis.paper.paper import PublishedDirection, PublishedExperiment, PublishedPreference, PublishedTukeyTest
 from analysis.stats.studentized_range import studentized_range_isf
 
 MEAN_SLACK = Fraction(3, 10)
@@ -28,7 +28,7 @@ MEAN_SLACK = Fraction(3, 10)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Rebuilt:
+class RebuiltAnswers:
     """Rows of whole numbers, a column a method in the paper's order; `F` as text of what they give; `search` how."""
 
     rows: Rows
@@ -37,7 +37,7 @@ class Rebuilt:
     search: Reconstruction
 
 
-def forward_counts(paper: PublishedDirection, seed: int) -> Rebuilt:
+def forward_counts(paper: PublishedDirection, seed: int) -> RebuiltAnswers:
     """Correct answers on forward trials: published means, F (or the nearest), Tukey pattern and binomial p.
 
     `ValueError` if no such data were found.
@@ -47,7 +47,7 @@ def forward_counts(paper: PublishedDirection, seed: int) -> Rebuilt:
     means = [f"{paper.means[method]}%" for method in paper.methods]
     found = repeated_f(paper.anova.F, paper.n, len(means), means, grain=_decimal(trials), low="0", high="1")
     wanted, shown = attainable_f(paper.anova.F, found)
-    sums = [scale.sums(read(mean).interval(Rounding.HALF_UP), paper.n) for mean in means]
+    sums = [scale.sums(read_printed(mean).interval(Rounding.HALF_UP), paper.n) for mean in means]
     columns = [_with_binomial(paper, "forward", place, allowed) for place, allowed in enumerate(sums)]
     return _rebuilt(_constraints(paper, scale, columns, wanted), shown, shown != paper.anova.F, seed)
 
@@ -60,13 +60,13 @@ def backward_counts(paper: PublishedDirection, rates: Mapping[str, float], seed:
     trials = paper.protocol.backward_trials_per_session
     nearest = [round(rates[method] * trials * paper.n) for method in paper.methods]
     columns = [_with_binomial(paper, "backward", place, [total]) for place, total in enumerate(nearest)]
-    wanted = Constraints(n=paper.n, top=trials, columns=tuple(Column(sums=sums) for sums in columns))
+    wanted = Constraints(n=paper.n, top=trials, columns=tuple(ConditionColumn(sums=sums) for sums in columns))
     return _found(reconstruct(wanted, seed))
 
 
 def rating_grains(
     paper: PublishedPreference, means: Mapping[str, float], grain: str, person_sd: float, seed: int
-) -> Rebuilt:
+) -> RebuiltAnswers:
     """Ratings in grains above the scale's lower end: published F, Tukey pattern, who is lowest, who gave one score.
 
     `means` and `person_sd` are assumed: no mean is published. `ValueError` if no such data were found.
@@ -75,18 +75,18 @@ def rating_grains(
     slack = int(MEAN_SLACK / scale.grain * paper.n)
     centres = [round((Fraction(str(means[method])) - scale.origin) / scale.grain * paper.n) for method in paper.methods]
     columns = [range(centre - slack, centre + slack + 1) for centre in centres]
-    F = read(paper.anova.F).interval(Rounding.HALF_UP)
+    F = read_printed(paper.anova.F).interval(Rounding.HALF_UP)
     spread = person_sd / float(scale.grain)
     wanted = _constraints(paper, scale, columns, F, orders=_orders(paper), person_sd=spread)
     return _rebuilt(wanted, paper.anova.F, False, seed)
 
 
-def attainable_f(printed: str, found: Result) -> tuple[Interval, str]:
+def attainable_f(printed: str, found: CheckResult) -> tuple[Interval, str]:
     """The F to give: what prints so where it is attainable, else the nearest that is; and its text.
 
     `ValueError` if there is neither.
     """
-    number = read(printed)
+    number = read_printed(printed)
     if found.verdict in {"attainable", "undecided"}:
         return number.interval(Rounding.HALF_UP), printed
     sides = [value for value in (found.below, found.above) if value is not None]
@@ -97,17 +97,17 @@ def attainable_f(printed: str, found: Result) -> tuple[Interval, str]:
     return Interval(nearest, nearest), f"{float(nearest):.{digits}f}"
 
 
-def pattern_holds(paper: PublishedExperiment) -> Callable[[Sums], bool]:
+def pattern_holds(paper: PublishedExperiment) -> Callable[[ColumnSums], bool]:
     """Says of column sums whether they, with the printed F, give the published Tukey pattern, stars included.
 
     q^2 = k (k - 1) F d^2 / A for a difference d of column sums, A as in `repeated_lattice`.
     """
-    k, F = len(paper.methods), float(read(paper.anova.F).value)
+    k, F = len(paper.methods), float(read_printed(paper.anova.F).value)
     df = (paper.n - 1) * (k - 1)
     places = [(paper.methods.index(claim.higher), paper.methods.index(claim.lower)) for claim in paper.tukey]
     bounds = [_q_bounds(claim, k, df) for claim in paper.tukey]
 
-    def holds(sums: Sums) -> bool:
+    def holds(sums: ColumnSums) -> bool:
         a = effect(sums)
         for (higher, lower), (least, most) in zip(places, bounds, strict=True):
             apart = sums[higher] - sums[lower]
@@ -118,7 +118,7 @@ def pattern_holds(paper: PublishedExperiment) -> Callable[[Sums], bool]:
     return holds
 
 
-def _q_bounds(claim: TukeyClaim, k: int, df: int) -> tuple[float, float]:
+def _q_bounds(claim: PublishedTukeyTest, k: int, df: int) -> tuple[float, float]:
     """The q that p must exceed, and the next level's, which a single star says it does not."""
     next_level = STARS.get(claim.p_below)
     least = float(studentized_range_isf(float(claim.p_below), k, df))
@@ -140,19 +140,19 @@ def _with_binomial(paper: PublishedDirection, direction: str, place: int, allowe
     return allowed
 
 
-def _orders(paper: PublishedPreference) -> tuple[Order, ...]:
+def _orders(paper: PublishedPreference) -> tuple[ColumnOrder, ...]:
     """Who is lowest, and who gave one score."""
     index = {method: place for place, method in enumerate(paper.methods)}
     lowest = paper.lowest
     below = [method for method in paper.methods if method != lowest.method]
     one, other = (index[method] for method in paper.same_score.methods)
-    orders = [Order(one=index[method], other=index[lowest.method], above=lowest.participants) for method in below]
-    return (*orders, Order(one=one, other=other, tied=paper.same_score.participants))
+    orders = [ColumnOrder(one=index[method], other=index[lowest.method], above=lowest.participants) for method in below]
+    return (*orders, ColumnOrder(one=one, other=other, tied=paper.same_score.participants))
 
 
 def _constraints(
     paper: PublishedExperiment,
-    scale: Scale,
+    scale: AnswerScale,
     columns: Sequence[Sequence[int]],
     F: Interval,
     **more: Any,
@@ -160,16 +160,16 @@ def _constraints(
     return Constraints(
         n=paper.n,
         top=scale.high or 0,
-        columns=tuple(Column(sums=sums) for sums in columns),
+        columns=tuple(ConditionColumn(sums=sums) for sums in columns),
         F=F,
         accepts=pattern_holds(paper),
         **more,
     )
 
 
-def _rebuilt(wanted: Constraints, F: str, nearest_only: bool, seed: int) -> Rebuilt:
+def _rebuilt(wanted: Constraints, F: str, nearest_only: bool, seed: int) -> RebuiltAnswers:
     search = _found(reconstruct(wanted, seed))
-    return Rebuilt(rows=search.data[0], F=F, nearest_only=nearest_only, search=search)
+    return RebuiltAnswers(rows=search.data[0], F=F, nearest_only=nearest_only, search=search)
 
 
 def _found(search: Reconstruction) -> Reconstruction:

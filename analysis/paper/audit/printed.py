@@ -114,10 +114,10 @@ class PrintedNumber:
         return positive if self.value > 0 else _mirrored(positive)
 
 
-def read(text: str | int) -> PrintedNumber:
+def read_printed(text: str | int) -> PrintedNumber:
     """A printed number such as "28.45", ".205", "< .001", "64.3%"; `ValueError` if it is none.
 
-    >>> read("64.3%").value
+    >>> read_printed("64.3%").value
     Fraction(643, 1000)
     """
     found = _TEXT.match(str(text).strip())

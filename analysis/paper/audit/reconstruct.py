@@ -16,11 +16,11 @@ from itertools import combinations_with_replacement, islice, product
 from math import comb, prod, sqrt
 from random import Random
 
-from analysis.paper.audit.annealing import Order, Table
+from analysis.paper.audit.annealing import AnnealedRows, ColumnOrder
 from analysis.paper.audit.lattices import Levels, Rows, affordable, candidates, distance, every_sum, ratio
-from analysis.paper.audit.means import Scale
+from analysis.paper.audit.means import AnswerScale
 from analysis.paper.audit.power_sums import BudgetError, greatest_squares, least_squares, numbers_with_sums
-from analysis.paper.audit.printed import Interval, Rounding, read
+from analysis.paper.audit.printed import Interval, Rounding, read_printed
 
 _DRAW_STEPS, _EXACT = 3_000, 6
 
@@ -76,7 +76,7 @@ def _exact(n: int, total: int, wanted: range, top: int, random: Random) -> list[
     return None
 
 
-Sums = tuple[int, ...]
+ColumnSums = tuple[int, ...]
 _STEPS, _STEPS_EACH = 8_000, 20
 """Of one start: at most, and for each pair of cells of a column."""
 _DRAWS, _LISTED, _SMALL = 2_000, 5_000, 20_000
@@ -84,7 +84,7 @@ _DRAWS, _LISTED, _SMALL = 2_000, 5_000, 20_000
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Column:
+class ConditionColumn:
     """A condition: the sums its numbers may have, and their variance (with n - 1), None where any will do."""
 
     sums: Sequence[int]
@@ -101,10 +101,10 @@ class Constraints:
 
     n: int
     top: int
-    columns: tuple[Column, ...]
+    columns: tuple[ConditionColumn, ...]
     F: Interval | None = None
-    orders: tuple[Order, ...] = ()
-    accepts: Callable[[Sums], bool] | None = None
+    orders: tuple[ColumnOrder, ...] = ()
+    accepts: Callable[[ColumnSums], bool] | None = None
     person_sd: float = 0.0
 
     @property
@@ -130,11 +130,11 @@ class Reconstruction:
 def printed_constraints(
     n: int,
     means: Sequence[str],
-    scale: Scale,
+    scale: AnswerScale,
     *,
     sds: Sequence[str] | None = None,
     F: str | None = None,
-    orders: Sequence[Order] = (),
+    orders: Sequence[ColumnOrder] = (),
     rounding: Rounding = Rounding.HALF_UP,
 ) -> Constraints:
     """The constraints that printed means, SDs and F make of n participants on a scale with both ends.
@@ -144,15 +144,15 @@ def printed_constraints(
     """
     if scale.low is None or scale.high is None:
         raise ValueError("a reconstruction needs a scale with both ends")
-    spreads = [None] * len(means) if sds is None else [read(sd).interval(rounding).squared() for sd in sds]
+    spreads = [None] * len(means) if sds is None else [read_printed(sd).interval(rounding).squared() for sd in sds]
     columns = tuple(
-        Column(
-            sums=scale.sums(read(mean).interval(rounding), n),
+        ConditionColumn(
+            sums=scale.sums(read_printed(mean).interval(rounding), n),
             variance=None if spread is None else spread.mapped(lambda value: value / scale.grain**2),
         )
         for mean, spread in zip(means, spreads, strict=True)
     )
-    interval = None if F is None else read(F).interval(rounding)
+    interval = None if F is None else read_printed(F).interval(rounding)
     return Constraints(n=n, top=scale.high, columns=columns, F=interval, orders=tuple(orders))
 
 
@@ -199,19 +199,19 @@ def meets(rows: Rows, wanted: Constraints) -> bool:
     )
 
 
-def _spread_fits(values: Sums, column: Column) -> bool:
+def _spread_fits(values: ColumnSums, column: ConditionColumn) -> bool:
     n, total = len(values), sum(values)
     squares = sum(value * value for value in values)
     return column.variance is None or column.variance.holds(Fraction(n * squares - total**2, n * (n - 1)))
 
 
-def _f_fits(rows: Rows, sums: Sums, F: Interval) -> bool:
+def _f_fits(rows: Rows, sums: ColumnSums, F: Interval) -> bool:
     w = sum(len(row) * sum(value * value for value in row) - sum(row) ** 2 for row in rows)
     found = ratio(sums, w, len(rows))
     return found is not None and F.holds(found)
 
 
-def _order_fits(rows: Rows, order: Order) -> bool:
+def _order_fits(rows: Rows, order: ColumnOrder) -> bool:
     above = sum(row[order.one] > row[order.other] for row in rows)
     tied = sum(row[order.one] == row[order.other] for row in rows)
     return order.above in {None, above} and order.tied in {None, tied}
@@ -239,7 +239,7 @@ def _impossible(wanted: Constraints) -> bool:
     return not any(_possible(wanted, sums) and _has_w(wanted, sums) for sums in every)
 
 
-def _has_w(wanted: Constraints, sums: Sums) -> bool:
+def _has_w(wanted: Constraints, sums: ColumnSums) -> bool:
     """False only by proof: these sums have none of the W that F needs."""
     if wanted.F is None or not affordable(wanted.n, len(sums), wanted.levels):
         return True
@@ -247,14 +247,14 @@ def _has_w(wanted: Constraints, sums: Sums) -> bool:
     return any(exact >> w & 1 for w in candidates(sums, wanted.n, wanted.F, wanted.levels))
 
 
-def _possible(wanted: Constraints, sums: Sums) -> bool:
+def _possible(wanted: Constraints, sums: ColumnSums) -> bool:
     """Will the sums do, and is there any W for them that gives F?"""
     if wanted.accepts is not None and not wanted.accepts(sums):
         return False
     return wanted.F is None or bool(candidates(sums, wanted.n, wanted.F, wanted.levels))
 
 
-def _sums(wanted: Constraints, random: Random) -> Iterator[Sums]:
+def _sums(wanted: Constraints, random: Random) -> Iterator[ColumnSums]:
     """Column sums that will do, each start its own; ends where none are met."""
     choices = [list(column.sums) for column in wanted.columns]
     if prod(map(len, choices)) <= _LISTED:
@@ -269,7 +269,7 @@ def _sums(wanted: Constraints, random: Random) -> Iterator[Sums]:
         yield fitting_one
 
 
-def _searched(wanted: Constraints, sums: Sums, random: Random) -> Rows | None:
+def _searched(wanted: Constraints, sums: ColumnSums, random: Random) -> Rows | None:
     """One start: columns that meet their own constraints, then moves that keep them until the joint ones are met."""
     targets = None if wanted.F is None else candidates(sums, wanted.n, wanted.F, wanted.levels)
     people = [random.gauss(0, wanted.person_sd) for _ in range(wanted.n)]
@@ -286,12 +286,12 @@ def _searched(wanted: Constraints, sums: Sums, random: Random) -> Rows | None:
         if values is None:
             return None
         columns.append(values)
-    table = Table(columns, wanted.top, [column.variance is not None for column in wanted.columns], wanted.orders)
+    table = AnnealedRows(columns, wanted.top, [column.variance is not None for column in wanted.columns], wanted.orders)
     steps = min(_STEPS, _STEPS_EACH * wanted.n**2 * len(sums))
     return table.rows if table.anneal(targets, steps, random) else None
 
 
-def _start_sd(wanted: Constraints, sums: Sums, targets: range | None) -> float | None:
+def _start_sd(wanted: Constraints, sums: ColumnSums, targets: range | None) -> float | None:
     """The SD of the error that F implies: MS = (n W - A) / (n k (n - 1)(k - 1))."""
     if not targets:
         return None

@@ -8,10 +8,10 @@ from math import sqrt
 from types import MappingProxyType
 from typing import cast
 
-from analysis.paper.audit.printed import PrintedNumber, decimal, read
-from analysis.paper.audit.run import Finding
-from analysis.paper.audit.words import ROUNDINGS, Result
-from analysis.paper.published import Prediction, Row, Verdict
+from analysis.paper.audit.printed import PrintedNumber, decimal, read_printed
+from analysis.paper.audit.run import AuditFinding
+from analysis.paper.audit.words import ROUNDINGS, CheckResult
+from analysis.paper.published import ComparisonRow, ComparisonVerdict, Prediction
 
 ATTENTION = ("not attainable", "only under a reading")
 """The verdicts that ask something of a paper."""
@@ -23,13 +23,13 @@ FAIRNESS = (
 )
 
 
-def sentences(finding: Finding) -> tuple[str, str]:
+def sentences(finding: AuditFinding) -> tuple[str, str]:
     """What was found, and what follows."""
     said = _SAID[finding.result.verdict](finding)
     return (_capital(said[0]), _capital(said[1]))
 
 
-def nearest_text(result: Result) -> str:
+def nearest_text(result: CheckResult) -> str:
     """The nearest attainable values, in the unit and to the digits of the printed number; empty if there are none.
 
     Where both sides are one value, the number is on the lattice. Spreads are kept as squares, and shown as roots.
@@ -40,16 +40,16 @@ def nearest_text(result: Result) -> str:
     return " and ".join(dict.fromkeys(shown))
 
 
-def _attainable(finding: Finding) -> tuple[str, str]:
+def _attainable(finding: AuditFinding) -> tuple[str, str]:
     result = finding.result
     return f"{_subject(result)} is attainable: {result.reason}.", _why_attainable(result)
 
 
-def _subject(result: Result) -> str:
+def _subject(result: CheckResult) -> str:
     return f"the df {result.printed}" if result.check == "df" else result.printed
 
 
-def _why_attainable(result: Result) -> str:
+def _why_attainable(result: CheckResult) -> str:
     if result.check == "binomial p":
         return f"The {result.numbers[0][0]}: {result.numbers[0][1]}."
     if result.check == "Tukey pattern" and result.numbers:
@@ -59,7 +59,7 @@ def _why_attainable(result: Result) -> str:
     return "It needs no special reading."
 
 
-def _under_a_reading(finding: Finding) -> tuple[str, str]:
+def _under_a_reading(finding: AuditFinding) -> tuple[str, str]:
     result = finding.result
     one = len(result.readings) == 1
     note = f" ({finding.note})" if finding.note else ""
@@ -68,7 +68,7 @@ def _under_a_reading(finding: Finding) -> tuple[str, str]:
     return f"{_refused(result)}.", second
 
 
-def _not_attainable(finding: Finding) -> tuple[str, str]:
+def _not_attainable(finding: AuditFinding) -> tuple[str, str]:
     result = finding.result
     if result.check == "percent of count":
         return f"{_refused(result)}.", _percentage_rescue(result)
@@ -79,7 +79,7 @@ def _not_attainable(finding: Finding) -> tuple[str, str]:
     )
 
 
-def _percentage_rescue(result: Result) -> str:
+def _percentage_rescue(result: CheckResult) -> str:
     share, counts = _number(result, _share(result)), result.numbers[0][1]
     count = "" if counts == "none" else f", or with the percentage as printed the count {counts}"
     return (
@@ -88,12 +88,12 @@ def _percentage_rescue(result: Result) -> str:
     )
 
 
-def _share(result: Result) -> Fraction:
+def _share(result: CheckResult) -> Fraction:
     count, _, rest = result.printed.partition(" of ")
     return Fraction(int(count), int(rest.partition(",")[0]))
 
 
-def _undecided(finding: Finding) -> tuple[str, str]:
+def _undecided(finding: AuditFinding) -> tuple[str, str]:
     result = finding.result
     if result.check == "stated":
         return f"{result.printed} is stated, and {result.reason}.", "It can be neither confirmed nor doubted from here."
@@ -103,14 +103,14 @@ def _undecided(finding: Finding) -> tuple[str, str]:
     )
 
 
-def _not_published(finding: Finding) -> tuple[str, str]:
+def _not_published(finding: AuditFinding) -> tuple[str, str]:
     return (
         f"{finding.result.reason}.",
         "What rests on it cannot be checked, and is assumed by whoever repeats the work.",
     )
 
 
-_SAID: Mapping[str, Callable[[Finding], tuple[str, str]]] = MappingProxyType(
+_SAID: Mapping[str, Callable[[AuditFinding], tuple[str, str]]] = MappingProxyType(
     {
         "attainable": _attainable,
         "only under a reading": _under_a_reading,
@@ -121,7 +121,7 @@ _SAID: Mapping[str, Callable[[Finding], tuple[str, str]]] = MappingProxyType(
 )
 
 
-def _refused(result: Result) -> str:
+def _refused(result: CheckResult) -> str:
     """That the number is not what it would have to be."""
     nearest = nearest_text(result)
     if result.check == "percent of count":
@@ -147,13 +147,13 @@ def _nearest_verb(nearest: str) -> str:
     return f"scores can have {'are' if ' and ' in nearest else 'is'} {nearest}"
 
 
-def _tried(result: Result) -> str:
+def _tried(result: CheckResult) -> str:
     """The readings in a few words."""
     others = [name for name in result.tried if name not in ROUNDINGS]
     return ", ".join(["any rounding, truncation", *others])
 
 
-def _number(result: Result, value: Fraction) -> str:
+def _number(result: CheckResult, value: Fraction) -> str:
     """In the unit and to the digits of the printed number."""
     printed = _printed(result)
     percent = "%" in printed.text
@@ -161,26 +161,26 @@ def _number(result: Result, value: Fraction) -> str:
     return f"{float(value) * (100 if percent else 1):.{digits}f}{' %' if percent else ''}"
 
 
-def _one_digit_more(result: Result, value: Fraction) -> str:
+def _one_digit_more(result: CheckResult, value: Fraction) -> str:
     printed = _printed(result)
     percent = "%" in printed.text
     return decimal(value * (100 if percent else 1), _digits(printed) + 1) + (" %" if percent else "")
 
 
-def _root(result: Result, value: Fraction) -> str:
+def _root(result: CheckResult, value: Fraction) -> str:
     return f"SD {sqrt(value):.{_digits(_printed(result)) + 1}f}"
 
 
-def _printed(result: Result) -> PrintedNumber:
+def _printed(result: CheckResult) -> PrintedNumber:
     """The last number of what is printed, such as the SD of "M = 5.21, SD = 1.60"."""
-    return read(result.printed.rpartition("=")[2].rpartition(",")[2])
+    return read_printed(result.printed.rpartition("=")[2].rpartition(",")[2])
 
 
 def _digits(printed: PrintedNumber) -> int:
     return len(printed.text.strip("% ").partition(".")[2])
 
 
-_UNITS: Mapping[str, Callable[[Result, Fraction], str]] = MappingProxyType(
+_UNITS: Mapping[str, Callable[[CheckResult, Fraction], str]] = MappingProxyType(
     {
         "grim": _one_digit_more,
         "percent of count": _one_digit_more,
@@ -202,39 +202,39 @@ ELSEWHERE = "elsewhere in the paper"
 """Where the numbers stand that no log holds."""
 
 
-def predictions(findings: Sequence[Finding]) -> dict[str, Prediction]:
+def predictions(findings: Sequence[AuditFinding]) -> dict[str, Prediction]:
     """By the name of the number (`quantities.named_in`): verdict, nearest attainable values, and a note on them."""
     return {name: _prediction(finding) for finding in findings for name in finding.about}
 
 
-def _prediction(finding: Finding) -> Prediction:
+def _prediction(finding: AuditFinding) -> Prediction:
     result = finding.result
     if result.verdict not in ATTENTION:
         return Prediction(verdict=result.verdict)
     return Prediction(verdict=result.verdict, nearest=_nearest(result), note=_note(result))
 
 
-def _nearest(result: Result) -> tuple[float, ...]:
+def _nearest(result: CheckResult) -> tuple[float, ...]:
     unit = 100 if "%" in result.printed else 1
     return tuple(float(value) * unit for value in (result.below, result.above) if value is not None)
 
 
-def _note(result: Result) -> str:
+def _note(result: CheckResult) -> str:
     near = nearest_text(result)
     rescued = f"; attainable by {', or '.join(result.readings)}" if result.readings else ""
     return f"not attainable beside the other numbers{f', nearest {near}' if near else ''}{rescued}"
 
 
-def other_rows(findings: Sequence[Finding]) -> Iterator[Row]:
+def other_rows(findings: Sequence[AuditFinding]) -> Iterator[ComparisonRow]:
     """The published numbers that no log holds, each with the audit's verdict."""
     for finding in findings:
         if finding.about or finding.result.verdict == "not published":
             continue
-        yield Row(
+        yield ComparisonRow(
             experiment=ELSEWHERE,
             quantity=f"{finding.place}: {finding.quote}",
             published=finding.result.printed,
             obtained=None,
-            verdict=cast("Verdict", finding.result.verdict),
+            verdict=cast("ComparisonVerdict", finding.result.verdict),
             note=sentences(finding)[0] if finding.result.verdict in ATTENTION else finding.note,
         )

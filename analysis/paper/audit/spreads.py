@@ -7,10 +7,10 @@ from fractions import Fraction
 from functools import partial
 from itertools import islice
 
-from analysis.paper.audit.means import Scale, check_count, scale_of
+from analysis.paper.audit.means import AnswerScale, check_count, scale_of
 from analysis.paper.audit.power_sums import BudgetError, greatest_squares, least_squares, numbers_with_sums
-from analysis.paper.audit.printed import Interval, PrintedNumber, Rounding, decimal, read
-from analysis.paper.audit.words import NONE_EXISTS, UNKNOWN, Attempt, Found, Result, decide, listed
+from analysis.paper.audit.printed import Interval, PrintedNumber, Rounding, decimal, read_printed
+from analysis.paper.audit.words import NONE_EXISTS, UNKNOWN, Attempt, CheckResult, DataExistence, judge_readings, listed
 
 Divisor = Callable[[int], int]
 """What n the sum of squared deviations is divided by to give the square of the printed number."""
@@ -24,7 +24,7 @@ _MOST_SUMS = 20_000
 
 def grimmer(
     mean: str, sd: str, n: int, *, grain: str = "1", items: int = 1, low: str | None = None, high: str | None = None
-) -> Result:
+) -> CheckResult:
     """Can n scores in steps of `grain` have this mean and this standard deviation?
 
     Exact: with scores low + grain y, SD^2 = grain^2 (sum y^2 - (sum y)^2 / n) / (n - 1) for whole y; all pairs of sums
@@ -34,12 +34,12 @@ def grimmer(
     >>> grimmer("7.3", "2.51", 12).readings, grimmer("5.21", "1.6", 28).verdict
     (('the printed SD is a standard error',), 'attainable')
     """
-    means, spread, scale = read(mean), read(sd), scale_of(grain, low, high, items)
+    means, spread, scale = read_printed(mean), read_printed(sd), scale_of(grain, low, high, items)
     check_count(n - 1, "n - 1")
     plain, *others = ((name, _spread_attempt(means, spread, n, scale, by)) for name, by in DIVISORS)
-    decision = decide(plain[1], others)
+    decision = judge_readings(plain[1], others)
     below, above = _nearest_spreads(means, spread, n, scale)
-    return Result(
+    return CheckResult(
         check="grimmer",
         printed=f"M = {means.text}, SD = {spread.text}",
         verdict=decision.verdict,
@@ -55,8 +55,10 @@ def grimmer(
     )
 
 
-def _spread_attempt(means: PrintedNumber, spread: PrintedNumber, n: int, scale: Scale, divisor: Divisor) -> Attempt:
-    def attempt(rounding: Rounding) -> Found:
+def _spread_attempt(
+    means: PrintedNumber, spread: PrintedNumber, n: int, scale: AnswerScale, divisor: Divisor
+) -> Attempt:
+    def attempt(rounding: Rounding) -> DataExistence:
         variances = spread.interval(rounding).squared()
         if variances is None:
             return NONE_EXISTS
@@ -67,7 +69,7 @@ def _spread_attempt(means: PrintedNumber, spread: PrintedNumber, n: int, scale: 
     return attempt
 
 
-def _pairs(sums: range, variances: Interval, n: int, scale: Scale, divisor: int) -> Iterator[tuple[int, int]]:
+def _pairs(sums: range, variances: Interval, n: int, scale: AnswerScale, divisor: int) -> Iterator[tuple[int, int]]:
     """Sums and sums of squares, in grains, that print so; the middle sums first, where data are most likely."""
     for total in sorted(sums, key=lambda value: abs(2 * value - sums[0] - sums[-1])):
         squares = variances.mapped(partial(_sum_of_squares, total, n, divisor, scale.grain))
@@ -82,7 +84,7 @@ def _sum_of_squares(total: int, n: int, divisor: int, grain: Fraction, variance:
     return variance * divisor / grain**2 + Fraction(total**2, n)
 
 
-def _first_witness(pairs: Iterator[tuple[int, int]], n: int, scale: Scale) -> Found:
+def _first_witness(pairs: Iterator[tuple[int, int]], n: int, scale: AnswerScale) -> DataExistence:
     unsure, tried = False, 0
     for tried, (total, squares) in enumerate(pairs, 1):  # noqa: B007 the count outlives the loop
         try:
@@ -91,12 +93,12 @@ def _first_witness(pairs: Iterator[tuple[int, int]], n: int, scale: Scale) -> Fo
             unsure = True
             continue
         if found is not None:
-            return Found(True, (tuple(scale.value(value) for value in found),))
+            return DataExistence(True, (tuple(scale.value(value) for value in found),))
     return UNKNOWN if unsure or tried == _MOST_SUMS else NONE_EXISTS
 
 
 def _nearest_spreads(
-    means: PrintedNumber, spread: PrintedNumber, n: int, scale: Scale
+    means: PrintedNumber, spread: PrintedNumber, n: int, scale: AnswerScale
 ) -> tuple[Fraction | None, Fraction | None]:
     """The nearest attainable squares of the SD on both sides of the printed one, for sums that print the mean."""
     sums = scale.sums(means.interval(Rounding.ANY), n)
@@ -112,7 +114,7 @@ def _nearest_spreads(
     return max(sides[0], default=None), min(sides[1], default=None)
 
 
-def _next_squares(start: int, step: int, n: int, total: int, scale: Scale) -> int | None:
+def _next_squares(start: int, step: int, n: int, total: int, scale: AnswerScale) -> int | None:
     """From `start` on, the first sum of squares that n whole numbers with this sum have."""
     least = least_squares(n, total)
     start = max(start, least) if step > 0 else start
@@ -127,7 +129,7 @@ def _next_squares(start: int, step: int, n: int, total: int, scale: Scale) -> in
     return None
 
 
-def debit(mean: str, sd: str, n: int) -> Result:
+def debit(mean: str, sd: str, n: int) -> CheckResult:
     """Can n answers of 0 or 1 have this mean and this standard deviation?
 
     Exact: K ones give mean K / n and SD^2 = K (n - K) / (n (n - 1)); all K from 0 to n are tried. Readings: SD with n,
@@ -137,13 +139,13 @@ def debit(mean: str, sd: str, n: int) -> Result:
     >>> debit("0.44", "0.50", 1683).verdict, debit("0.35", "0.18", 20).verdict
     ('attainable', 'not attainable')
     """
-    means, spread = read(mean), read(sd)
+    means, spread = read_printed(mean), read_printed(sd)
     check_count(n - 1, "n - 1")
     plain, *others = ((name, _binary_attempt(means, spread, n, by)) for name, by in DIVISORS)
-    decision = decide(plain[1], others)
-    ones = Scale(Fraction(1), low=0, high=1).sums(means.interval(Rounding.ANY), n)
+    decision = judge_readings(plain[1], others)
+    ones = AnswerScale(Fraction(1), low=0, high=1).sums(means.interval(Rounding.ANY), n)
     squares = sorted(_binary_variance(k, n, n - 1) for k in ones)
-    return Result(
+    return CheckResult(
         check="debit",
         printed=f"M = {means.text}, SD = {spread.text}",
         verdict=decision.verdict,
@@ -164,11 +166,11 @@ def _binary_variance(ones: int, n: int, divisor: int) -> Fraction:
 
 
 def _binary_attempt(means: PrintedNumber, spread: PrintedNumber, n: int, divisor: Divisor) -> Attempt:
-    def attempt(rounding: Rounding) -> Found:
+    def attempt(rounding: Rounding) -> DataExistence:
         variances = spread.interval(rounding).squared()
-        ones = Scale(Fraction(1), low=0, high=1).sums(means.interval(rounding), n)
+        ones = AnswerScale(Fraction(1), low=0, high=1).sums(means.interval(rounding), n)
         fitting = (k for k in ones if variances and variances.holds(_binary_variance(k, n, divisor(n))))
         k = next(fitting, None)
-        return NONE_EXISTS if k is None else Found(True, ((Fraction(1),) * k + (Fraction(0),) * (n - k),))
+        return NONE_EXISTS if k is None else DataExistence(True, ((Fraction(1),) * k + (Fraction(0),) * (n - k),))
 
     return attempt

@@ -8,8 +8,8 @@ from fractions import Fraction
 from math import prod
 from typing import Literal
 
-from analysis.paper.audit.printed import Interval, Rounding, decimal, read
-from analysis.paper.audit.words import NONE_EXISTS, Attempt, Found, Result, decide
+from analysis.paper.audit.printed import Interval, Rounding, decimal, read_printed
+from analysis.paper.audit.words import NONE_EXISTS, Attempt, CheckResult, DataExistence, judge_readings
 
 Bound = Literal["equals", "at least", "at most"]
 _BOUNDS = {"equals": "that", "at least": "at least that", "at most": "at most that"}
@@ -23,7 +23,7 @@ class Term:
     over: Sequence[int | str] = ()
 
 
-def total(printed: str, terms: Sequence[Term], bound: Bound = "equals") -> Result:
+def total(printed: str, terms: Sequence[Term], bound: Bound = "equals") -> CheckResult:
     """Is the printed number what the terms add up to, or at least, or at most that?
 
     Exact interval arithmetic: every factor may be any value that prints so; the printed total must meet the sums.
@@ -33,13 +33,13 @@ def total(printed: str, terms: Sequence[Term], bound: Bound = "equals") -> Resul
     >>> total("30", [Term(times=[4, 5]), Term(times=[10])]).verdict
     'attainable'
     """
-    number = read(printed)
+    number = read_printed(printed)
     if not terms:
         raise ValueError("a total needs at least one term")
-    decision = decide(_attempt(number.text, terms, bound))
+    decision = judge_readings(_attempt(number.text, terms, bound))
     sums = [_sum(terms, rounding) for rounding in (Rounding.HALF_UP, Rounding.ANY)]
     middle = sum((_value(term) for term in terms), Fraction(0))
-    return Result(
+    return CheckResult(
         check="total",
         printed=number.text,
         verdict=decision.verdict,
@@ -56,13 +56,13 @@ def total(printed: str, terms: Sequence[Term], bound: Bound = "equals") -> Resul
 
 
 def _attempt(text: str, terms: Sequence[Term], bound: Bound) -> Attempt:
-    def attempt(rounding: Rounding) -> Found:
-        claimed, whole = read(text).interval(rounding), _sum(terms, rounding)
+    def attempt(rounding: Rounding) -> DataExistence:
+        claimed, whole = read_printed(text).interval(rounding), _sum(terms, rounding)
         if bound == "at least":
             whole = Interval(whole.low, None, whole.low_closed, False)
         elif bound == "at most":
             whole = Interval(None, whole.high, False, whole.high_closed)
-        return Found(True) if claimed.meets(whole) else NONE_EXISTS
+        return DataExistence(True) if claimed.meets(whole) else NONE_EXISTS
 
     return attempt
 
@@ -93,7 +93,7 @@ def _product(term: Term, rounding: Rounding) -> Interval:
 
 def _factor(value: int | str, rounding: Rounding) -> Interval:
     """The values of a factor, those below 0 left out."""
-    number = read(value)
+    number = read_printed(value)
     if number.value < 0 or number.relation != "=":
         raise ValueError(f"a factor must be a number not below 0, not {number.text}")
     if isinstance(value, int):
@@ -112,8 +112,8 @@ def _ends(interval: Interval) -> tuple[Fraction, Fraction]:
 
 def _value(term: Term) -> Fraction:
     """The term at the printed digits."""
-    return prod((read(v).value for v in term.times), start=Fraction(1)) / prod(
-        (read(v).value for v in term.over), start=Fraction(1)
+    return prod((read_printed(v).value for v in term.times), start=Fraction(1)) / prod(
+        (read_printed(v).value for v in term.over), start=Fraction(1)
     )
 
 

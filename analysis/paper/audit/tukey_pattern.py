@@ -15,10 +15,10 @@ from math import isqrt
 import numpy as np
 
 from analysis.paper.audit.lattices import column_choices
-from analysis.paper.audit.means import Scale, check_count, scale_of
+from analysis.paper.audit.means import AnswerScale, check_count, scale_of
 from analysis.paper.audit.p_values import p_range
-from analysis.paper.audit.printed import Interval, PrintedNumber, Rounding, read
-from analysis.paper.audit.words import NONE_EXISTS, UNKNOWN, Attempt, Found, Result, decide
+from analysis.paper.audit.printed import Interval, PrintedNumber, Rounding, read_printed
+from analysis.paper.audit.words import NONE_EXISTS, UNKNOWN, Attempt, CheckResult, DataExistence, judge_readings
 from analysis.stats.studentized_range import studentized_range_isf
 
 OWN_ERROR = "each pair's own error term"
@@ -33,7 +33,7 @@ Adjust = Callable[[Interval, int, int], tuple[Interval, Interval | None]]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Comparison:
+class ClaimedComparison:
     """Mean `higher` is said to be above mean `lower` (places from 0) with `p`, such as "< .05".
 
     Stars also say that p is not below the next level: `p_at_least`.
@@ -50,8 +50,8 @@ class _Pattern:
     F: PrintedNumber
     means: tuple[PrintedNumber, ...] | None
     sizes: tuple[int, ...]
-    scale: Scale | None
-    comparisons: tuple[Comparison, ...]
+    scale: AnswerScale | None
+    comparisons: tuple[ClaimedComparison, ...]
     df: int
 
     @property
@@ -62,14 +62,14 @@ class _Pattern:
 def tukey_pattern(
     F: str,
     sizes: Sequence[int],
-    comparisons: Sequence[Comparison],
+    comparisons: Sequence[ClaimedComparison],
     means: Sequence[str] | None = None,
     *,
     repeated: bool = True,
     grain: str | None = None,
     low: str | None = None,
     high: str | None = None,
-) -> Result:
+) -> CheckResult:
     """Do these means, with the error term that F implies, give this pattern of Tukey tests?
 
     `sizes`: values a mean, equal if `repeated` (error df (n - 1)(k - 1), else N - k). With `grain` the means are those
@@ -84,9 +84,9 @@ def tukey_pattern(
     pattern = replace(pattern, scale=scale)
     plain = _attempt(pattern, _tukey)
     others = [(name, _attempt(pattern, adjust)) for name, adjust in _OTHERS]
-    decision = decide(plain, [*others, (OWN_ERROR, _own_error(pattern))] if repeated else others)
-    pooled = decide(plain).verdict
-    return Result(
+    decision = judge_readings(plain, [*others, (OWN_ERROR, _own_error(pattern))] if repeated else others)
+    pooled = judge_readings(plain).verdict
+    return CheckResult(
         check="Tukey pattern",
         printed="; ".join(f"{c.higher + 1} above {c.lower + 1}: p {c.p}" for c in pattern.comparisons),
         verdict=decision.verdict,
@@ -103,7 +103,7 @@ def tukey_pattern(
 def _checked(
     F: str,
     sizes: Sequence[int],
-    comparisons: Sequence[Comparison],
+    comparisons: Sequence[ClaimedComparison],
     means: Sequence[str] | None,
     repeated: bool,
 ) -> _Pattern:
@@ -120,12 +120,12 @@ def _checked(
             raise ValueError(f"a comparison must be of two of the means 0..{k - 1}, not {c.higher} and {c.lower}")
     df = (sizes[0] - 1) * (k - 1) if repeated else sum(sizes) - k
     check_count(df, "error df")
-    printed = None if means is None else tuple(map(read, means))
-    return _Pattern(read(F), printed, tuple(sizes), None, tuple(comparisons), df)
+    printed = None if means is None else tuple(map(read_printed, means))
+    return _Pattern(read_printed(F), printed, tuple(sizes), None, tuple(comparisons), df)
 
 
 def _attempt(pattern: _Pattern, adjust: Adjust) -> Attempt:
-    def attempt(rounding: Rounding) -> Found:
+    def attempt(rounding: Rounding) -> DataExistence:
         F = pattern.F.interval(rounding)
         boxes = _boxes(pattern, rounding)
         if boxes is not None and not any(_box_possible(pattern, box, F, adjust, rounding) for box in boxes):
@@ -137,7 +137,7 @@ def _attempt(pattern: _Pattern, adjust: Adjust) -> Attempt:
             solved = boxes is not None and adjust is _tukey
             values = [pattern.F.value, *_solved(pattern, point, F, rounding)] if solved else around
             if any(_point_fits(pattern, point, value, adjust, rounding) for value in values if value > 0):
-                return Found(True, (point,))
+                return DataExistence(True, (point,))
         return UNKNOWN
 
     return attempt
@@ -171,7 +171,7 @@ def _inside(F: Interval, value: Fraction) -> list[Fraction]:
 def _own_error(pattern: _Pattern) -> Attempt:
     """Each pair on its own error, which is not printed: settled only where a mean is not above the other."""
 
-    def attempt(rounding: Rounding) -> Found:
+    def attempt(rounding: Rounding) -> DataExistence:
         boxes = _boxes(pattern, rounding)
         ordered = boxes is None or any(_in_order(pattern, box) for box in boxes)
         return UNKNOWN if ordered else NONE_EXISTS
@@ -245,9 +245,9 @@ def _point_fits(pattern: _Pattern, point: Point, F: Fraction, adjust: Adjust, ro
     return True
 
 
-def _claims(c: Comparison, rounding: Rounding) -> list[Interval]:
-    bound = [] if c.p_at_least is None else [Interval(read(c.p_at_least).value, None)]
-    return [read(c.p).interval(rounding), *bound]
+def _claims(c: ClaimedComparison, rounding: Rounding) -> list[Interval]:
+    bound = [] if c.p_at_least is None else [Interval(read_printed(c.p_at_least).value, None)]
+    return [read_printed(c.p).interval(rounding), *bound]
 
 
 def _apart(one: Interval, other: Interval) -> tuple[Fraction, Fraction]:
@@ -257,7 +257,7 @@ def _apart(one: Interval, other: Interval) -> tuple[Fraction, Fraction]:
 
 
 def _shares(
-    pattern: _Pattern, box: Box, c: Comparison, apart: tuple[Fraction, Fraction]
+    pattern: _Pattern, box: Box, c: ClaimedComparison, apart: tuple[Fraction, Fraction]
 ) -> tuple[Fraction, Fraction | None]:
     """Least and greatest q^2 / F; None where the effect can be nothing. SS_effect = sum n_i n_j (m_i - m_j)^2 / N."""
     sizes = pattern.sizes

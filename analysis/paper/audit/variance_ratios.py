@@ -17,9 +17,18 @@ from random import Random
 from analysis.paper.audit import lattices as between
 from analysis.paper.audit import lattices as repeated
 from analysis.paper.audit.lattices import Levels, Rows, column_choices
-from analysis.paper.audit.means import Scale, check_count, scale_of
-from analysis.paper.audit.printed import Interval, PrintedNumber, Rounding, decimal, read
-from analysis.paper.audit.words import NONE_EXISTS, UNKNOWN, Attempt, Decision, Found, Result, Witness, decide
+from analysis.paper.audit.means import AnswerScale, check_count, scale_of
+from analysis.paper.audit.printed import Interval, PrintedNumber, Rounding, decimal, read_printed
+from analysis.paper.audit.words import (
+    NONE_EXISTS,
+    UNKNOWN,
+    Attempt,
+    CheckResult,
+    DataExistence,
+    JudgedReadings,
+    Witness,
+    judge_readings,
+)
 
 _STEPS, _STARTS, _MARGIN = 1_500, 8, 1e-9
 
@@ -102,7 +111,7 @@ class _Claim:
     F: PrintedNumber
     means: tuple[PrintedNumber, ...] | None
     sizes: tuple[int, ...]
-    scale: Scale
+    scale: AnswerScale
 
     @property
     def levels(self) -> Levels:
@@ -129,7 +138,7 @@ def repeated_f(
     high: str | None = None,
     transforms: Sequence[str] = (),
     other_grains: Sequence[str] = (),
-) -> Result:
+) -> CheckResult:
     """Can n participants in k conditions, scores in steps of `grain`, have these means and this repeated-measures F?
 
     Exact: F = (n - 1) A / (n W - A) with A = k sum C^2 - T^2 of the column sums C, and W the sum of squared differences
@@ -148,7 +157,7 @@ def repeated_f(
     for step in other_grains:
         free = _claimed(F, None, (n,) * k, scale_of(step, low, high))
         others.append((f"scores in steps of {step} with other means", _attempt(free, _repeated(free))))
-    decision = decide(_attempt(claim, _repeated(claim)), others)
+    decision = judge_readings(_attempt(claim, _repeated(claim)), others)
     return _result("repeated-measures F", claim, decision, _neighbours(claim, _w_steps))
 
 
@@ -160,7 +169,7 @@ def between_f(
     grain: str = "1",
     low: str | None = None,
     high: str | None = None,
-) -> Result:
+) -> CheckResult:
     """Can groups of these sizes, scores in steps of `grain`, have these means and this between-subjects F?
 
     Exact: F = ((B - T^2 / N) / (k - 1)) / ((S - B) / (N - k)), B = sum C^2 / n of the groups' sums C, and S, the sum of
@@ -174,11 +183,11 @@ def between_f(
     claim = _claimed(F, means, tuple(sizes), scale_of(grain, low, high))
     equal = len(set(sizes)) == 1 and claim.n > 1
     others = [("error term of a repeated-measures design", _attempt(claim, _repeated(claim)))] if equal else []
-    decision = decide(_attempt(claim, _between(claim)), others)
+    decision = judge_readings(_attempt(claim, _between(claim)), others)
     return _result("between-subjects F", claim, decision, _neighbours(claim, _s_steps))
 
 
-def _claimed(F: str, means: Sequence[str] | None, sizes: tuple[int, ...], scale: Scale) -> _Claim:
+def _claimed(F: str, means: Sequence[str] | None, sizes: tuple[int, ...], scale: AnswerScale) -> _Claim:
     check_count(len(sizes) - 1, "number of groups less 1")
     for size in sizes:
         check_count(size, "each group")
@@ -187,16 +196,16 @@ def _claimed(F: str, means: Sequence[str] | None, sizes: tuple[int, ...], scale:
         raise ValueError("a scale needs both ends or none")
     if means is not None and len(means) != len(sizes):
         raise ValueError(f"{len(sizes)} means are needed, not {len(means)}")
-    printed = read(F)
+    printed = read_printed(F)
     if printed.relation != "=":
         raise ValueError(f"F must be a number, not the bound {printed.text}")
-    return _Claim(printed, None if means is None else tuple(map(read, means)), sizes, scale)
+    return _Claim(printed, None if means is None else tuple(map(read_printed, means)), sizes, scale)
 
 
 def _repeated(claim: _Claim) -> Search:
     def search(columns: Sequence[int], F: Interval) -> tuple[tuple[int, ...], ...] | bool | None:
         targets = repeated.candidates(columns, claim.n, F, claim.levels)
-        return repeated.find(columns, claim.n, targets, claim.levels)
+        return repeated.find_rows(columns, claim.n, targets, claim.levels)
 
     return search
 
@@ -217,7 +226,7 @@ def _transformed(claim: _Claim, name: str) -> Search:
 
 
 def _attempt(claim: _Claim, search: Search) -> Attempt:
-    def attempt(rounding: Rounding) -> Found:
+    def attempt(rounding: Rounding) -> DataExistence:
         F = claim.F.interval(rounding)
         if F.high is not None and F.high < 0:
             return NONE_EXISTS
@@ -227,13 +236,13 @@ def _attempt(claim: _Claim, search: Search) -> Attempt:
             if found is None:
                 complete = False
             elif found is not False and found is not True:
-                return Found(True, _in_data_units(found, claim.scale))
+                return DataExistence(True, _in_data_units(found, claim.scale))
         return NONE_EXISTS if complete else UNKNOWN
 
     return attempt
 
 
-def _in_data_units(rows: tuple[tuple[int, ...], ...], scale: Scale) -> Witness:
+def _in_data_units(rows: tuple[tuple[int, ...], ...], scale: AnswerScale) -> Witness:
     return tuple(tuple(scale.value(value) for value in row) for row in rows)
 
 
@@ -281,7 +290,7 @@ def _w_steps(claim: _Claim, sums: tuple[int, ...]) -> Iterator[tuple[Fraction, i
         for w in places:
             F = repeated.ratio(sums, w, claim.n)
             on_side = F is not None and (F - value) * side >= 0
-            if F is not None and on_side and repeated.find(sums, claim.n, range(w, w + 1), claim.levels):
+            if F is not None and on_side and repeated.find_rows(sums, claim.n, range(w, w + 1), claim.levels):
                 yield F, side
                 break
 
@@ -304,9 +313,11 @@ def _s_steps(claim: _Claim, sums: tuple[int, ...]) -> Iterator[tuple[Fraction, i
                 break
 
 
-def _result(check: str, claim: _Claim, decision: Decision, sides: tuple[Fraction | None, Fraction | None]) -> Result:
+def _result(
+    check: str, claim: _Claim, decision: JudgedReadings, sides: tuple[Fraction | None, Fraction | None]
+) -> CheckResult:
     means = "unprinted means" if claim.means is None else f"means {', '.join(m.text for m in claim.means)}"
-    return Result(
+    return CheckResult(
         check=check,
         printed=f"F = {claim.F.text}",
         verdict=decision.verdict,

@@ -8,11 +8,13 @@ from dataclasses import dataclass, fields
 import numpy as np
 from numpy.typing import NDArray
 
-from analysis.predict.design_search.rates import Floats, predict, rates
-from analysis.predict.design_search.shots import HOME, Layer
+from analysis.predict.design_search.rates import predict, rates
+from analysis.predict.design_search.shots import Layer
 from analysis.predict.design_search.space import Space
 from analysis.predict.fit.percept_model import PerceptFit
+from analysis.stats.arrays import FloatArray
 from device.limits import TRAIN_LIMITS, broken_limit
+from device.physics.equations import HOME
 from device.physics.shot import rates_of_periods_Hz
 
 
@@ -23,16 +25,16 @@ class Designs:
     `limit` is the place in `TRAIN_LIMITS` of what a steady train at the bound would break, -1 for nothing.
     """
 
-    friction_N: Floats
-    voltage_V: Floats
-    pulse_s: Floats
+    friction_N: FloatArray
+    voltage_V: FloatArray
+    pulse_s: FloatArray
     status: NDArray[np.int8]
-    shooting_rate_Hz: Floats
-    evidence: Floats
-    predicted: Floats
-    ci_low: Floats
-    ci_high: Floats
-    by_summary: Floats  # the prediction from the summary alone, to be compared with
+    shooting_rate_Hz: FloatArray
+    evidence: FloatArray
+    predicted: FloatArray
+    ci_low: FloatArray
+    ci_high: FloatArray
+    by_summary: FloatArray  # the prediction from the summary alone, to be compared with
     limit: NDArray[np.int8]
 
     def __len__(self) -> int:
@@ -68,13 +70,13 @@ def designs_of(space: Space, by_pulse: Mapping[float, Layer], fit: PerceptFit, r
     )
 
 
-def joined(one: Designs, other: Designs) -> Designs:
+def joined_designs(one: Designs, other: Designs) -> Designs:
     """The designs of both, one after the other."""
     names = [field.name for field in fields(Designs)]
     return Designs(**{name: np.concatenate([getattr(one, name), getattr(other, name)]) for name in names})
 
 
-def best(designs: Designs, rate_Hz: float) -> int | None:
+def best_design(designs: Designs, rate_Hz: float) -> int | None:
     """The design felt best that shoots at `rate_Hz` or faster; of equals the one that heats the coil least."""
     allowed = np.flatnonzero(designs.proposable & (designs.shooting_rate_Hz >= rate_Hz))
     if not allowed.size:

@@ -14,10 +14,11 @@ import numpy as np
 from scipy import special
 from scipy.optimize import brentq
 
-from analysis.predict.design_search.rates import Floats, evidences, logits, rates
+from analysis.predict.design_search.rates import evidences, logits, rates
 from analysis.predict.design_search.shots import Layer, shot_of
 from analysis.predict.design_search.space import Space
 from analysis.predict.fit.percept_model import FITTED, PAPER_RATES, PerceptFit, fit_percept
+from analysis.stats.arrays import FloatArray
 from device.methods import Method
 from device.parameters import GunParameters
 from device.physics import simulate
@@ -25,7 +26,7 @@ from experiments.design.streams import generator
 from experiments.synthetic.diffusion import People
 from experiments.synthetic.percept import Percept, PerceptParameters, evidence, forward_rates
 
-LEVEL = 0.75
+THRESHOLD_SHARE = 0.75
 """Halfway between guessing and certainty: the usual threshold of a choice between two."""
 DRAWS = 2000
 INSIDE = 0.95
@@ -36,18 +37,18 @@ _CLOSE_V = 1e-3
 class Band:
     """Between which voltages 95 % of the drawn contours lie over their whole length, and at each friction alone."""
 
-    low_V: Floats
-    high_V: Floats
-    alone_low_V: Floats
-    alone_high_V: Floats
+    low_V: FloatArray
+    high_V: FloatArray
+    alone_low_V: FloatArray
+    alone_high_V: FloatArray
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Contour:
     """The contour, voltages over the frictions; `lasting`: every higher voltage of the sweep is felt as well."""
 
-    voltage_V: Floats
-    interpolated_V: Floats  # from the grid alone, as the band and the alternatives have it
+    voltage_V: FloatArray
+    interpolated_V: FloatArray  # from the grid alone, as the band and the alternatives have it
     lasting: tuple[bool, ...]
     band: Band
 
@@ -69,14 +70,14 @@ def contour_of(space: Space, layer: Layer, fit: PerceptFit, seed: int) -> Contou
     )
 
 
-def crossings(found: Floats, volts: Floats) -> Floats:
+def crossings(found: FloatArray, volts: FloatArray) -> FloatArray:
     """Where each row (frictions, voltages) of rates first reaches the level, linear between two voltages."""
     return np.array([_crossing(row, volts) for row in found])
 
 
-def _crossing(row: Floats, volts: Floats) -> float:
+def _crossing(row: FloatArray, volts: FloatArray) -> float:
     some = np.flatnonzero(np.isfinite(row))
-    reached = np.flatnonzero(np.isfinite(row) & (row >= LEVEL))
+    reached = np.flatnonzero(np.isfinite(row) & (row >= THRESHOLD_SHARE))
     if not some.size:
         return math.nan
     if not reached.size:
@@ -85,13 +86,13 @@ def _crossing(row: Floats, volts: Floats) -> float:
     if at == some[0]:
         return -math.inf
     before = some[some < at][-1]
-    share = (LEVEL - row[before]) / (row[at] - row[before])
+    share = (THRESHOLD_SHARE - row[before]) / (row[at] - row[before])
     return float(volts[before] + share * (volts[at] - volts[before]))
 
 
-def _lasts(row: Floats) -> bool:
-    reached = np.flatnonzero(row >= LEVEL)
-    return bool(reached.size) and bool(np.all(row[reached[0] :][np.isfinite(row[reached[0] :])] >= LEVEL))
+def _lasts(row: FloatArray) -> bool:
+    reached = np.flatnonzero(row >= THRESHOLD_SHARE)
+    return bool(reached.size) and bool(np.all(row[reached[0] :][np.isfinite(row[reached[0] :])] >= THRESHOLD_SHARE))
 
 
 def rate_at(gun: GunParameters, parameters: PerceptParameters) -> float:
@@ -101,7 +102,7 @@ def rate_at(gun: GunParameters, parameters: PerceptParameters) -> float:
     return float(rates(np.array(numbers), parameters)[0]) if numbers else math.nan
 
 
-def _solved(gun: GunParameters, volts: Floats, rough_V: float, parameters: PerceptParameters) -> float:
+def _solved(gun: GunParameters, volts: FloatArray, rough_V: float, parameters: PerceptParameters) -> float:
     """The crossing to a millivolt by shots of its own, within the two voltages of the grid around it."""
     if not math.isfinite(rough_V):
         return rough_V
@@ -109,7 +110,7 @@ def _solved(gun: GunParameters, volts: Floats, rough_V: float, parameters: Perce
     low, high = float(volts[max(place - 1, 0)]), float(volts[place])
 
     def above(voltage_V: float) -> float:
-        return rate_at(replace(gun, voltage_V=voltage_V), parameters) - LEVEL
+        return rate_at(replace(gun, voltage_V=voltage_V), parameters) - THRESHOLD_SHARE
 
     ends = above(low), above(high)
     if not ends[0] * ends[1] < 0.0:
@@ -117,7 +118,7 @@ def _solved(gun: GunParameters, volts: Floats, rough_V: float, parameters: Perce
     return float(brentq(above, low, high, xtol=_CLOSE_V))
 
 
-def drawn_contours(felt: Floats, volts: Floats, fit: PerceptFit, seed: int, draws: int = DRAWS) -> Floats:
+def drawn_contours(felt: FloatArray, volts: FloatArray, fit: PerceptFit, seed: int, draws: int = DRAWS) -> FloatArray:
     """Contours (draws, frictions) of numbers drawn from the fit: normal, on logarithms and for the start on its logit.
 
     Only the fitted numbers vary: the assumed ones and the model are held.
@@ -135,7 +136,7 @@ def drawn_contours(felt: Floats, volts: Floats, fit: PerceptFit, seed: int, draw
     return found
 
 
-def _root(covariance: Floats) -> Floats:
+def _root(covariance: FloatArray) -> FloatArray:
     """A square root of a covariance, which may be singular or 0; NaN if the fit has none."""
     if not np.isfinite(covariance).all():
         return np.full_like(covariance, math.nan)
@@ -143,7 +144,7 @@ def _root(covariance: Floats) -> Floats:
     return np.asarray(vectors * np.sqrt(np.maximum(values, 0.0)))
 
 
-def band_of(contours: Floats, inside: float = INSIDE) -> Band:
+def band_of(contours: FloatArray, inside: float = INSIDE) -> Band:
     """The global rank envelope of drawn contours (draws, frictions), and quantiles of each friction alone.
 
     A contour's depth is its most extreme rank over the frictions; the envelope is between the k-th lowest and k-th
@@ -161,7 +162,7 @@ def band_of(contours: Floats, inside: float = INSIDE) -> Band:
     return Band(low_V=low, high_V=high, alone_low_V=alone_low, alone_high_V=alone_high)
 
 
-def _depth(contours: Floats, inside: float) -> int:
+def _depth(contours: FloatArray, inside: float) -> int:
     """The largest depth that the share `inside` of the contours has; equals count as the deepest of them."""
     ordered = np.sort(contours, axis=0)
     depths = np.full(len(contours), len(contours))
@@ -186,7 +187,7 @@ class Alternative:
     name: str
     parameters: PerceptParameters
     deviance: float
-    voltage_V: Floats
+    voltage_V: FloatArray
 
 
 def base_parameters() -> list[tuple[str, PerceptParameters]]:
@@ -205,7 +206,7 @@ def alternatives(methods: dict[str, Method], layer: Layer, voltage_V: tuple[floa
         yield Alternative(name=name, parameters=other.parameters, deviance=other.deviance, voltage_V=found)
 
 
-def unbiased(layer: Layer, voltage_V: tuple[float, ...], fit: PerceptFit) -> Floats:
+def unbiased(layer: Layer, voltage_V: tuple[float, ...], fit: PerceptFit) -> FloatArray:
     """The contour of the mean over both directions, so that no bias helps."""
     best = fit.parameters
     return crossings(both_ways(layer.felt[best.leak_s], best), np.array(voltage_V))
@@ -224,7 +225,7 @@ def _rate(percept: Percept | None, parameters: PerceptParameters) -> float:
     return float(forward_rates(evidence(percept, parameters), parameters.start, People()))
 
 
-def both_ways(felt: Floats, parameters: PerceptParameters) -> Floats:
+def both_ways(felt: FloatArray, parameters: PerceptParameters) -> FloatArray:
     """The mean share of right answers to a forward and to a backward shot."""
     evidence = evidences(felt, parameters.exponent, parameters.sensitivity, parameters.confusion)
     forward = special.expit(logits(evidence, parameters.start))

@@ -111,7 +111,7 @@ def _others(critical: Critical, friction_N: float) -> Iterator[str]:
     place = critical.friction_N.index(friction_N) if friction_N in critical.friction_N else None
     for volts in (*(one.voltage_V for one in critical.alternatives), critical.both_directions_V):
         known = place is not None and np.isfinite(volts[place])
-        yield f"{apa.number(float(volts[place]), 1)} V" if known else apa.NONE
+        yield f"{apa.number(float(volts[place]), 1)} V" if known else apa.NO_NUMBER
 
 
 FRONT_ROWS = 12

@@ -6,14 +6,12 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 from scipy import special
 
 from analysis.predict.fit.percept_model import FITTED, PerceptFit
+from analysis.stats.arrays import FloatArray
 from experiments.synthetic.percept import PerceptParameters
-
-Floats = NDArray[np.float64]
-Bools = NDArray[np.bool_]
 
 REACH = float(special.ndtri(0.975))
 _STEP = 1e-4
@@ -23,13 +21,13 @@ _STEP = 1e-4
 class Predicted:
     """Shares of right answers to a forward shot with their 95 % limits, and the evidence; NaN where nothing is felt."""
 
-    evidence: Floats
-    rate: Floats
-    ci_low: Floats
-    ci_high: Floats
+    evidence: FloatArray
+    rate: FloatArray
+    ci_low: FloatArray
+    ci_high: FloatArray
 
 
-def evidences(felt: Floats, exponent: float, sensitivity: ArrayLike, confusion: ArrayLike) -> Floats:
+def evidences(felt: FloatArray, exponent: float, sensitivity: ArrayLike, confusion: ArrayLike) -> FloatArray:
     """`experiments.synthetic.percept.evidence` for arrays (..., 3) of first, reaction, second."""
     first, reaction, second = np.moveaxis(np.power(felt, exponent), -1, 0)
     strongest = np.maximum(first, reaction)
@@ -38,7 +36,7 @@ def evidences(felt: Floats, exponent: float, sensitivity: ArrayLike, confusion: 
     return np.asarray(np.asarray(sensitivity) * (first - reaction) * np.where(strongest == 0.0, 0.0, share))
 
 
-def logits(evidence: Floats, start: ArrayLike) -> Floats:
+def logits(evidence: FloatArray, start: ArrayLike) -> FloatArray:
     """The log odds of "forward" from the evidence A and the start w.
 
     logit P = 2 A w + log((1 - exp(-2 A w)) / (1 - exp(-2 A (1 - w)))) for A > 0, its mirror for A < 0; it neither
@@ -53,12 +51,12 @@ def logits(evidence: Floats, start: ArrayLike) -> Floats:
     return np.where(size < 1e-12, special.logit(w), found)
 
 
-def rates(felt: Floats, parameters: PerceptParameters) -> Floats:
+def rates(felt: FloatArray, parameters: PerceptParameters) -> FloatArray:
     """The predicted share of right answers to a forward shot."""
     return np.asarray(special.expit(_logit_of(felt, parameters)))
 
 
-def predict(felt: Floats, fit: PerceptFit) -> Predicted:
+def predict(felt: FloatArray, fit: PerceptFit) -> Predicted:
     """The rates with the fit's uncertainty: the delta method on the logit, as `percept_fit.predicted_rate`."""
     best = fit.parameters
     centre = _logit_of(felt, best)
@@ -70,13 +68,13 @@ def predict(felt: Floats, fit: PerceptFit) -> Predicted:
     return Predicted(evidence=evidence, rate=rate, ci_low=low, ci_high=high)
 
 
-def _logit_of(felt: Floats, parameters: PerceptParameters, name: str = "", factor: float = 1.0) -> Floats:
+def _logit_of(felt: FloatArray, parameters: PerceptParameters, name: str = "", factor: float = 1.0) -> FloatArray:
     values = {one: getattr(parameters, one) * (factor if one == name else 1.0) for one in FITTED}
     found = evidences(felt, parameters.exponent, values["sensitivity"], values["confusion"])
     return logits(found, values["start"])
 
 
-def _slope(felt: Floats, parameters: PerceptParameters, name: str) -> Floats:
+def _slope(felt: FloatArray, parameters: PerceptParameters, name: str) -> FloatArray:
     """The derivative of the logit by the logarithm of a fitted number."""
     up, down = (_logit_of(felt, parameters, name, math.exp(step)) for step in (_STEP, -_STEP))
     return (up - down) / (2.0 * _STEP)

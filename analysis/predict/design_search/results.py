@@ -8,11 +8,20 @@ from dataclasses import dataclass, fields, replace
 import numpy as np
 
 from analysis.predict.design_search.choice import Designs
-from analysis.predict.design_search.critical import DRAWS, INSIDE, LEVEL, Alternative, Contour, unbiased, under
-from analysis.predict.design_search.rates import Floats, predict
+from analysis.predict.design_search.critical import (
+    DRAWS,
+    INSIDE,
+    THRESHOLD_SHARE,
+    Alternative,
+    Contour,
+    unbiased,
+    under,
+)
+from analysis.predict.design_search.rates import predict
 from analysis.predict.design_search.shots import Layer
 from analysis.predict.design_search.space import Space
 from analysis.predict.fit.percept_model import PAPER_TRIALS, Fitted, PerceptFit, predicted_rate
+from analysis.stats.arrays import FloatArray
 from device.limits import (
     MAX_COIL_C,
     MAX_DUTY,
@@ -98,10 +107,10 @@ class Plane:
 
     pulse_s: float
     status: tuple[tuple[str, ...], ...]
-    predicted: Floats
-    ci_low: Floats
-    ci_high: Floats
-    shooting_rate_Hz: Floats
+    predicted: FloatArray
+    ci_low: FloatArray
+    ci_high: FloatArray
+    shooting_rate_Hz: FloatArray
     limit_of_voltage: tuple[str | None, ...]
 
 
@@ -111,12 +120,12 @@ class ContourBand:
 
     inside: float
     draws: int
-    low_V: Floats
-    high_V: Floats
+    low_V: FloatArray
+    high_V: FloatArray
     reached_low: tuple[str, ...]
     reached_high: tuple[str, ...]
-    each_friction_low_V: Floats
-    each_friction_high_V: Floats
+    each_friction_low_V: FloatArray
+    each_friction_high_V: FloatArray
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -126,7 +135,7 @@ class OtherContour:
     name: str
     parameters: PerceptParameters
     deviance: float
-    voltage_V: Floats
+    voltage_V: FloatArray
     reached: tuple[str, ...]
 
 
@@ -137,15 +146,15 @@ class Critical:
     level: float
     pulse_s: float
     friction_N: tuple[float, ...]
-    voltage_V: Floats
+    voltage_V: FloatArray
     reached: tuple[str, ...]
     lasting: tuple[bool, ...]
     interpolation_error_V: float | None
     band: ContourBand
     alternatives: tuple[OtherContour, ...]
-    both_directions_V: Floats
+    both_directions_V: FloatArray
     status: tuple[tuple[str, ...], ...]
-    predicted: Floats
+    predicted: FloatArray
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -281,7 +290,7 @@ def critical_of(
     """The contour with band and alternatives."""
     band = contour.band
     return Critical(
-        level=LEVEL,
+        level=THRESHOLD_SHARE,
         pulse_s=layer.pulse_s,
         friction_N=space.friction_N,
         voltage_V=contour.voltage_V,
@@ -314,7 +323,7 @@ def critical_of(
     )
 
 
-def _reached(voltages_V: Floats) -> tuple[str, ...]:
+def _reached(voltages_V: FloatArray) -> tuple[str, ...]:
     return tuple(reached(voltage_V) for voltage_V in voltages_V.tolist())
 
 
@@ -327,7 +336,7 @@ def reached(voltage_V: float) -> str:
     return REACHED
 
 
-def _apart(one: Floats, other: Floats) -> float | None:
+def _apart(one: FloatArray, other: FloatArray) -> float | None:
     """The largest difference where both are finite."""
     known = np.isfinite(one) & np.isfinite(other)
     return float(np.abs(one[known] - other[known]).max()) if known.any() else None
@@ -349,7 +358,7 @@ def percept_behind(fit: PerceptFit, summary_error: Sequence[float]) -> PerceptBe
     )
 
 
-def assumptions(space: Space, rate_Hz: float) -> tuple[str, ...]:
+def search_assumptions(space: Space, rate_Hz: float) -> tuple[str, ...]:
     """What the predictions rest on."""
     gun = space.gun
     return (

@@ -12,13 +12,12 @@ from pathlib import Path
 
 import numpy as np
 
-from analysis.predict.design_search.choice import Designs, best, designs_of, front, joined, summary_error
+from analysis.predict.design_search.choice import Designs, best_design, designs_of, front, joined_designs, summary_error
 from analysis.predict.design_search.critical import LEAKS, Alternative, Contour, alternatives, contour_of
 from analysis.predict.design_search.page import in_short, sections
 from analysis.predict.design_search.results import (
     DesignSearch,
     SweptAxes,
-    assumptions,
     best_of,
     counted,
     critical_of,
@@ -26,6 +25,7 @@ from analysis.predict.design_search.results import (
     own_of,
     percept_behind,
     plane_of,
+    search_assumptions,
 )
 from analysis.predict.design_search.shots import Layer, layers, rows_of, simulate_rows
 from analysis.predict.design_search.space import DesignRequest, Space, make_space
@@ -44,7 +44,7 @@ from experiments.record.provenance import provenance
 PASSES = 3
 """Closer looks, each around the best of the one before and at half its distances."""
 
-Workers = Callable[[], AbstractContextManager[RunPieces]]
+OpenWorkers = Callable[[], AbstractContextManager[RunPieces]]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -59,18 +59,18 @@ class Searched:
     layers: dict[float, Layer]
 
 
-def search(space: Space, fit: PerceptFit, rate_Hz: float, workers: Workers, progress: Progress) -> Searched:
+def search(space: Space, fit: PerceptFit, rate_Hz: float, workers: OpenWorkers, progress: Progress) -> Searched:
     """Sweep the space, then look closer around the best design that shoots at `rate_Hz` or faster."""
     by_pulse = _swept(space, workers, progress)
     designs = designs_of(space, by_pulse, fit, rate_Hz)
-    chosen = best(designs, rate_Hz)
+    chosen = best_design(designs, rate_Hz)
     if chosen is None:
         return Searched(designs=designs, chosen=None, layers=by_pulse)
     for number in range(PASSES):
         around = closer(space, designs, chosen, 0.5**number)
         found = _simulated(around, around.pulse_s, _here, progress, f"closer look {number + 1}")
-        designs = joined(designs, designs_of(around, found, fit, rate_Hz))
-        chosen = best(designs, rate_Hz) or chosen
+        designs = joined_designs(designs, designs_of(around, found, fit, rate_Hz))
+        chosen = best_design(designs, rate_Hz) or chosen
     pulse_s = float(designs.pulse_s[chosen])
     if pulse_s not in by_pulse:
         by_pulse |= _simulated(space, (pulse_s,), workers, progress, "map")
@@ -104,14 +104,14 @@ def _here() -> AbstractContextManager[RunPieces]:
     return on_processes(1)
 
 
-def _swept(space: Space, workers: Workers, progress: Progress) -> dict[float, Layer]:
+def _swept(space: Space, workers: OpenWorkers, progress: Progress) -> dict[float, Layer]:
     rows = rows_of(space, space.pulses_s, LEAKS)
     with workers() as run, progress("sweep", len(rows)) as tell:
         return layers(space, rows, simulate_rows(rows, run, tell))
 
 
 def _simulated(
-    space: Space, pulses_s: tuple[float, ...], workers: Workers, progress: Progress, name: str
+    space: Space, pulses_s: tuple[float, ...], workers: OpenWorkers, progress: Progress, name: str
 ) -> dict[float, Layer]:
     rows = rows_of(space, pulses_s, LEAKS[:1])
     with workers() as run, progress(name, len(rows)) as tell:
@@ -184,7 +184,7 @@ def _results(request: DesignRequest, found: _Found) -> DesignSearch:
         map=plane_of(space, found.search.layers[map_pulse_s], fit, rate_Hz),
         critical=critical_of(space, found.search.layers[space.gun.pulse_s], fit, found.contour, found.others),
         percept=percept_behind(fit, summary_error(designs)),
-        assumptions=assumptions(space, rate_Hz),
+        assumptions=search_assumptions(space, rate_Hz),
         provenance=provenance(),
     )
 

@@ -12,15 +12,13 @@ from numpy.typing import NDArray
 
 from analysis.predict.design_search.space import Space
 from analysis.predict.jobs import RunPieces
+from analysis.stats.arrays import FloatArray
 from device.parameters import GunParameters
 from device.physics import ShotSummary, simulate, simulate_batch
-from device.physics.equations import COIL, FREE, STATUSES, pack
+from device.physics.equations import COIL, FREE, HOME, STATUSES, pack
 from device.physics.traces import segments
 from experiments.synthetic.percept import Percept, percept_of_course, percept_of_summary
 
-Floats = NDArray[np.float64]
-
-HOME = STATUSES.index("home")
 COIL_POINTS, FREE_POINTS = 8, 32
 """Points of the force in each stretch of a shot, within and outside the coil.
 
@@ -47,9 +45,9 @@ class Layer:
 
     pulse_s: float
     status: NDArray[np.int8]
-    period_s: Floats  # from one shot to the next: the magnet is home and the pulse over
-    felt: dict[float, Floats]
-    by_summary: Floats
+    period_s: FloatArray  # from one shot to the next: the magnet is home and the pulse over
+    felt: dict[float, FloatArray]
+    by_summary: FloatArray
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

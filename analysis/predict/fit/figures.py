@@ -23,7 +23,7 @@ from analysis.report.figures.style import (
     wrapped,
 )
 
-Numbers = Sequence[float]
+_Numbers = Sequence[float]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -42,10 +42,10 @@ class RateCurve:
     """A predicted rate over friction; `low` and `high` empty without a band."""
 
     name: str
-    friction_N: Numbers
-    rate: Numbers
-    low: Numbers = ()
-    high: Numbers = ()
+    friction_N: _Numbers
+    rate: _Numbers
+    low: _Numbers = ()
+    high: _Numbers = ()
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -54,7 +54,7 @@ class SimulatedSpread:
 
     title: str
     x_label: str
-    cases: Mapping[str, tuple[Numbers, Numbers]]
+    cases: Mapping[str, tuple[_Numbers, _Numbers]]
     published: Mapping[str, float]
 
 
@@ -68,11 +68,11 @@ class TimesPanel:
     method: str
     instruction: str
     trials: int
-    right_s: Numbers
-    wrong_s: Numbers
-    grid_s: Numbers
-    together: tuple[Numbers, Numbers]
-    each: tuple[Numbers, Numbers]
+    right_s: _Numbers
+    wrong_s: _Numbers
+    grid_s: _Numbers
+    together: tuple[_Numbers, _Numbers]
+    each: tuple[_Numbers, _Numbers]
 
 
 def figure_percept(curves: Sequence[RateCurve], points: Sequence[RatePoint], path_stem: Path) -> tuple[Path, ...]:
@@ -149,7 +149,7 @@ def _draw_times(axes: Axes, panel: TimesPanel) -> None:
     axes.set_ylim(0.0, 102.0)
 
 
-def _thinned(times_s: Numbers, trials: int) -> tuple[list[float], list[float]]:
+def _thinned(times_s: _Numbers, trials: int) -> tuple[list[float], list[float]]:
     """At most 20 of the rising times, with the share of all trials answered by then, in percent."""
     step = max(1, len(times_s) // 20)
     places = range(step - 1, len(times_s), step)
@@ -202,6 +202,6 @@ def _draw_spread(axes: Axes, spread: SimulatedSpread) -> None:
     axes.set_title(spread.title, loc="left")
 
 
-def _densities(edges: Numbers, counts: Numbers) -> list[float]:
+def _densities(edges: _Numbers, counts: _Numbers) -> list[float]:
     total = float(sum(counts)) or 1.0
     return [count / total / (edges[i + 1] - edges[i]) for i, count in enumerate(counts)]

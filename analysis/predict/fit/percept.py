@@ -9,7 +9,7 @@ from pathlib import Path
 from analysis.predict.fit.percept_model import PerceptFit, PerceptPeak, best_percept, fit_percept
 from analysis.predict.fit.percept_request import PerceptRequest, PerceptTask, read_request
 from analysis.predict.fit.percept_results import FittedPercept, fitted_percept
-from analysis.predict.fit.percept_sections import assumptions, config_text, in_short, sections
+from analysis.predict.fit.percept_sections import config_text, fit_assumptions, in_short, sections
 from analysis.predict.fit.studies import MAIN, PERCENTILES, Histograms, Judgement, cases_of, judge, pieces_of
 from analysis.report.page import write_page
 from analysis.report.serial import as_json
@@ -34,7 +34,7 @@ def percept(request: PerceptRequest, out: Path, progress: Progress) -> FittedPer
         fit = fit_percept(task.rates, task.methods, trials=task.trials, people=task.people)
         tell("percept")
         others = [_other(task, fit, changed, tell) for changed in OTHERS]
-        found = fitted_percept(task, fit, others, assumptions(fit.parameters, task.people))
+        found = fitted_percept(task, fit, others, fit_assumptions(fit.parameters, task.people))
         tell("predictions")
         judged, histograms = _judged(task, request, fit, tell) if pieces else (None, [])
     found = replace(found, judged=judged)

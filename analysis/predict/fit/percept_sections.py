@@ -26,7 +26,7 @@ OUTSIDE = 0.05
 UNITS = {"sensitivity": "log odds per N^n", "confusion": "", "start": "z/a"}
 
 
-def assumptions(parameters: PerceptParameters, people: People) -> tuple[str, ...]:
+def fit_assumptions(parameters: PerceptParameters, people: People) -> tuple[str, ...]:
     """What the numbers rest on."""
     return (
         f"Assumed, not fitted: exponent {parameters.exponent:g} (Stevens 1975, muscle force) and leak "

@@ -16,8 +16,9 @@ from analysis.paper.published import rounds_to
 from analysis.paper.recurrence import WHOLE_PATTERN, Recurrence, answers_recur, recurs, share_of, wilson_interval
 from analysis.predict.fit.percept_model import FITTED, PerceptPeak, best_percept
 from analysis.predict.fit.percept_request import ASSUMED_SPREAD, scaled_spread
-from analysis.predict.synthetic_studies import Counts, Felt, Floats, felt_counts, piece_sizes
+from analysis.predict.synthetic_studies import Counts, Felt, felt_counts, piece_sizes
 from analysis.stats.anova import rm_anova
+from analysis.stats.arrays import FloatArray
 from analysis.stats.binomial import binomial_test
 from device.methods import Method
 from device.words import DIRECTIONS
@@ -182,7 +183,7 @@ def _trials(published: PublishedDirection) -> tuple[int, int]:
     return protocol.forward_trials_per_session, protocol.backward_trials_per_session
 
 
-_Quantity = tuple[str, tuple[str, float, float], Floats, bool]
+_Quantity = tuple[str, tuple[str, float, float], FloatArray, bool]
 """Name; the published number as text with the bounds of what prints alike; simulated values; whether it was fitted."""
 
 
@@ -209,7 +210,7 @@ def _printed(text: str) -> tuple[str, float, float]:
     return text, float(text) - half, float(text) + half
 
 
-def place_of(quantity: str, published: tuple[str, float, float], values: Floats, fitted: bool) -> PublishedPlace:
+def place_of(quantity: str, published: tuple[str, float, float], values: FloatArray, fitted: bool) -> PublishedPlace:
     """The place of a published number among simulated values; it is text with the bounds of what prints alike.
 
     A value that is undefined or infinite (nothing varies within people) counts as above.
@@ -257,7 +258,7 @@ def _recurs(claim: str, held: Recurrence, fitted: bool) -> RecurringClaim:
     return RecurringClaim(claim=claim, share=found.share, ci_low=found.ci_low, ci_high=found.ci_high, fitted=fitted)
 
 
-def _histogram(values: Floats) -> tuple[tuple[float, ...], tuple[float, ...]]:
+def _histogram(values: FloatArray) -> tuple[tuple[float, ...], tuple[float, ...]]:
     """Of whole numbers one bin each, of others so many between the 0.1 and 99.9 percent points."""
     finite = values[np.isfinite(values)]
     if (finite == np.rint(finite)).all():

@@ -18,7 +18,7 @@ from analysis.report.page import write_page
 from analysis.report.serial import as_json
 from analysis.report.terminal import Progress
 from analysis.times.fit import fit, profile
-from analysis.times.likelihood import Range, Trials
+from analysis.times.likelihood import LapseRange, Trials
 from analysis.times.own_trials import REFUSALS, OwnTrials, own_trials
 from analysis.times.people import FEWEST_TRIALS, as_trials, fit_people
 from experiments.config.door import ConfigError
@@ -63,7 +63,7 @@ def times(request: TimesRequest, out: Path, track: Track, progress: Progress) ->
     return found, logs.problems
 
 
-def lapse_range(text: str) -> bool | Range:
+def lapse_range(text: str) -> bool | LapseRange:
     """Lapses as `fit` takes them. `ConfigError` for what is neither `none`, `data` nor two rising times in s.
 
     >>> lapse_range("none"), lapse_range("0.2-3")
@@ -98,7 +98,7 @@ def _own(paths: Sequence[Path], logs: Logs) -> OwnTrials:
 
 
 def _fitted(
-    own: OwnTrials, trials: Trials, lapses: bool | Range, request: TimesRequest, tell: Callable[[str], None]
+    own: OwnTrials, trials: Trials, lapses: bool | LapseRange, request: TimesRequest, tell: Callable[[str], None]
 ) -> FittedTimes:
     names = np.unique(np.array(own.people)[own.person]).tolist()
 

@@ -11,7 +11,7 @@ from analysis.logs.reading import Logs
 from analysis.stats.arrays import FloatArray
 from analysis.times.ez import EZ, ez, ez_people
 from analysis.times.fit import DiffusionFit, Estimate
-from analysis.times.likelihood import Range, Trials
+from analysis.times.likelihood import LapseRange, Trials
 from analysis.times.own_trials import REFUSALS, OwnTrials
 from analysis.times.people import MeanEstimate, PeopleFit, mean_estimate
 from experiments.record.provenance import provenance
@@ -23,7 +23,7 @@ class FittedTimes:
 
     own: OwnTrials
     trials: Trials
-    lapse_range_s: Range | None
+    lapse_range_s: LapseRange | None
     together: DiffusionFit
     profiles: dict[str, tuple[float, float]]
     each: PeopleFit | None

@@ -115,7 +115,7 @@ def _profiles(profiles: dict[str, tuple[float, float]]) -> list[Table]:
 
 
 def _mean_cells(mean: MeanEstimate | None) -> list[str]:
-    return [apa.NONE] * 3 if mean is None else [apa.number(mean.value, 3), _interval(mean), apa.number(mean.sd, 3)]
+    return [apa.NO_NUMBER] * 3 if mean is None else [apa.number(mean.value, 3), _interval(mean), apa.number(mean.sd, 3)]
 
 
 def _unit(name: str) -> str:
@@ -240,7 +240,7 @@ def _people(found: TimesFit) -> Section:
     rows = []
     for who, one in list(found.each.items())[:SHOWN_PEOPLE]:
         own = {estimate.name: _with_interval(estimate, 2) for estimate in one.estimates}
-        rows.append((who, str(one.trials), *(own.get(name, apa.NONE) for name in names)))
+        rows.append((who, str(one.trials), *(own.get(name, apa.NO_NUMBER) for name in names)))
     more = len(found.each) - len(rows)
     return Section(
         title="Person by person",

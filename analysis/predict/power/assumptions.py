@@ -10,7 +10,7 @@ from experiments.direction.config import DirectionConfig, Rates
 from experiments.preference.config import PreferenceConfig, Ratings
 
 
-def assumptions(grid: Grid) -> list[str]:
+def grid_assumptions(grid: Grid) -> list[str]:
     """What the numbers rest on."""
     config, null = grid.config, grid.request.null
     if isinstance(config, PreferenceConfig):

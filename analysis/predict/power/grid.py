@@ -86,7 +86,7 @@ def method_sets_of(asked: tuple[str, ...], config: DrawnConfig) -> list[tuple[st
     return list(dict.fromkeys(sets))
 
 
-def trials_of(asked: str | None, config: DrawnConfig) -> list[int]:
+def trials_per_method(asked: str | None, config: DrawnConfig) -> list[int]:
     """The trials of one method: the config's own unless some are named."""
     if isinstance(config, PreferenceConfig):
         if asked is not None:
@@ -225,7 +225,7 @@ def make_grid(request: PowerRequest) -> Grid:
     designs = [
         (_varied(config, methods, trials), StudyDesign(participants=n, trials=trials, methods=methods, effect=effect))
         for methods in method_sets_of(request.methods, config)
-        for trials in trials_of(request.trials, config)
+        for trials in trials_per_method(request.trials, config)
         for effect in effects
         for n in participants
     ]
@@ -299,5 +299,5 @@ def _reference(config: DrawnConfig, published: PublishedExperiment | None) -> Gr
     """The paper's own number of people with the config's trials and effects."""
     if published is None:
         return None
-    trials = next(iter(trials_of(None, config)))
+    trials = next(iter(trials_per_method(None, config)))
     return _cell(config, StudyDesign(participants=published.n, trials=trials, methods=config.design.methods))

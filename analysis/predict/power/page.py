@@ -6,7 +6,7 @@ from collections.abc import Callable, Iterable, Iterator, Sequence
 from pathlib import Path
 from typing import Literal, TypeVar
 
-from analysis.paper.recurrence import Share
+from analysis.paper.recurrence import ShareOfStudies
 from analysis.predict.power.figures import Curve, FalsePositives, Panel, figure_false_positives, figure_power
 from analysis.predict.power.planned import ALL_PAIRS, ANOVA, ANY_PAIR
 from analysis.predict.power.results import PATTERN, DesignPower, Power, PublishedPattern, Reached, Smallest
@@ -57,12 +57,12 @@ def claim_name(claim: str) -> str:
     return "the paper's whole pattern" if claim == PATTERN else claim
 
 
-def share_cell(share: Share | None) -> str:
+def share_cell(share: ShareOfStudies | None) -> str:
     """A share with its interval, in percent."""
-    return apa.NONE if share is None else f"{apa.number(100.0 * share.share, 1)} {_bounds(share)}"
+    return apa.NO_NUMBER if share is None else f"{apa.number(100.0 * share.share, 1)} {_bounds(share)}"
 
 
-def _bounds(share: Share | PublishedPattern) -> str:
+def _bounds(share: ShareOfStudies | PublishedPattern) -> str:
     return apa.interval(100.0 * share.ci_low, 100.0 * share.ci_high, 1)
 
 
@@ -139,7 +139,7 @@ def _smallest(found: Power) -> Section:
 
 def _reached(found: Power, row: Smallest | None) -> str:
     if row is None:
-        return apa.NONE
+        return apa.NO_NUMBER
     if row.design is None:
         return f"none (at most {apa.percent(row.most)})"
     return _design_name(row.design, with_trials=_varies(found, "trials"))
@@ -192,8 +192,8 @@ def _table(caption: str, corner: str, rows: Sequence[tuple[str, ...]], group: Se
     return Table(caption=caption, header=header, rows=(hours, *rows))
 
 
-def _percent(share: Share | None) -> str:
-    return apa.NONE if share is None else apa.number(100.0 * share.share, 1)
+def _percent(share: ShareOfStudies | None) -> str:
+    return apa.NO_NUMBER if share is None else apa.number(100.0 * share.share, 1)
 
 
 def _half_width(design: DesignPower, measure: str) -> str:

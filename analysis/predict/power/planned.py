@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy import special
 
-from analysis.paper.recurrence import SIGNIFICANT, Recurrence, Share, share_of
+from analysis.paper.recurrence import SIGNIFICANT, Recurrence, ShareOfStudies, share_of
 from analysis.stats.anova import check_scores, rm_anova
 from analysis.stats.arrays import FloatArray
 from analysis.stats.binomial import binomial_test
@@ -152,7 +152,7 @@ class Precision:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Option:
+class DesignOption:
     """A design to choose from: what it costs, the lower end of the share that it reaches, and whether it may be run."""
 
     lab_hours: float
@@ -183,7 +183,7 @@ def merged(tallies: Sequence[Tally]) -> Tally:
     )
 
 
-def shares(tally: Tally) -> tuple[Share, ...]:
+def shares(tally: Tally) -> tuple[ShareOfStudies, ...]:
     """The share of each claim."""
     return tuple(share_of(claim, held, tally.studies) for claim, held in tally.held.items())
 
@@ -202,13 +202,13 @@ def precisions(tally: Tally) -> tuple[Precision, ...]:
     return tuple(rows)
 
 
-def smallest(options: Sequence[Option], target: float) -> int | None:
+def smallest(options: Sequence[DesignOption], target: float) -> int | None:
     """The place of the cheapest allowed option whose share is at least `target` even at its interval's lower end.
 
     Cheapest is fewest hours in the lab, then fewest participants; `None` if none reaches it.
 
-    >>> few = Option(lab_hours=4, participants=8, ci_low=0.7, allowed=True)
-    >>> many = Option(lab_hours=7, participants=14, ci_low=0.9, allowed=True)
+    >>> few = DesignOption(lab_hours=4, participants=8, ci_low=0.7, allowed=True)
+    >>> many = DesignOption(lab_hours=7, participants=14, ci_low=0.9, allowed=True)
     >>> smallest([many, few], 0.8), smallest([many, few], 0.95)
     (0, None)
     """

@@ -5,9 +5,9 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 
-from analysis.paper.recurrence import SIGNIFICANT, WHOLE_PATTERN, Share
+from analysis.paper.recurrence import SIGNIFICANT, WHOLE_PATTERN, ShareOfStudies
 from analysis.predict.power.grid import Grid, GridCell
-from analysis.predict.power.planned import Option, Precision, Tally, merged, precisions, shares, smallest
+from analysis.predict.power.planned import DesignOption, Precision, Tally, merged, precisions, shares, smallest
 from analysis.predict.power.studies import PUBLISHED
 from experiments.record.provenance import provenance
 
@@ -26,10 +26,10 @@ class DesignPower:
     duration_s: float
     lab_hours: float
     too_long: str
-    claims: tuple[Share, ...]
+    claims: tuple[ShareOfStudies, ...]
     precision: tuple[Precision, ...]
 
-    def share_of(self, claim: str) -> Share | None:
+    def share_of(self, claim: str) -> ShareOfStudies | None:
         """The share of studies in which a claim held; `None` if it is none of this design's."""
         return next((share for share in self.claims if share.claim == claim), None)
 
@@ -69,7 +69,7 @@ class PublishedPattern:
     share: float
     ci_low: float
     ci_high: float
-    claims: tuple[Share, ...]
+    claims: tuple[ShareOfStudies, ...]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -157,8 +157,8 @@ def _smallest(designs: Sequence[DesignPower], target: float) -> Iterator[Smalles
             )
 
 
-def _option(design: DesignPower, share: Share) -> Option:
-    return Option(
+def _option(design: DesignPower, share: ShareOfStudies) -> DesignOption:
+    return DesignOption(
         lab_hours=design.lab_hours,
         participants=design.participants,
         ci_low=share.ci_low,
@@ -166,7 +166,7 @@ def _option(design: DesignPower, share: Share) -> Option:
     )
 
 
-def _reached(design: DesignPower, share: Share) -> Reached:
+def _reached(design: DesignPower, share: ShareOfStudies) -> Reached:
     return Reached(
         participants=design.participants,
         trials=design.trials,

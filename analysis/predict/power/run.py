@@ -11,7 +11,7 @@ from dataclasses import asdict, dataclass
 from pathlib import Path
 
 from analysis.predict.jobs import RunPieces, cores, on_cluster, on_processes
-from analysis.predict.power.assumptions import assumptions
+from analysis.predict.power.assumptions import grid_assumptions
 from analysis.predict.power.grid import Grid, PowerRequest, make_grid
 from analysis.predict.power.page import in_short, sections
 from analysis.predict.power.planned import Tally
@@ -46,7 +46,7 @@ def power(request: PowerRequest, where: Where, out: Path, progress: Progress) ->
     with _workers(where) as run, progress("power", len(chunks)) as tell:
         storage.make_folder(out)
         tallies = _tallies(chunks, run, kept, tell)
-    found = power_of(grid, iter(tallies), assumptions(grid))
+    found = power_of(grid, iter(tallies), grid_assumptions(grid))
     storage.write_whole(out / "power.json", as_json(found))
     write_page(out, f"Simulated power: {grid.config.title}", sections(found, out / "figures"))
     kept.unlink(missing_ok=True)
@@ -56,7 +56,7 @@ def power(request: PowerRequest, where: Where, out: Path, progress: Progress) ->
 def simulated_power(request: PowerRequest) -> Power:
     """What `power` finds, worked out in this process; nothing is written."""
     grid = make_grid(request)
-    return power_of(grid, map(run_chunk, grid.chunks()), assumptions(grid))
+    return power_of(grid, map(run_chunk, grid.chunks()), grid_assumptions(grid))
 
 
 def job_of(grid: Grid) -> str:

@@ -13,13 +13,13 @@ from analysis.predict.power.planned import Findings, Tally, analysed_directions,
 from analysis.predict.synthetic_studies import (
     Counts,
     Felt,
-    Floats,
     direction_counts,
     felt_counts,
     preference_scores,
     published_claims,
     scaled_means,
 )
+from analysis.stats.arrays import FloatArray
 from device.words import DIRECTIONS
 from experiments.config.setup import canonical_json
 from experiments.design.streams import generator
@@ -101,7 +101,7 @@ def _ratings(config: PreferenceConfig, design: StudyDesign, chunk: Chunk, draws:
     return _with_published(found, scores, (0, 0), chunk)
 
 
-def _with_published(found: Findings, answers: Counts | Floats, trials: tuple[int, int], chunk: Chunk) -> Findings:
+def _with_published(found: Findings, answers: Counts | FloatArray, trials: tuple[int, int], chunk: Chunk) -> Findings:
     """With the published claims, if there are any of these methods, and their whole pattern."""
     if chunk.published is None:
         return found

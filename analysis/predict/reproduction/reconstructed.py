@@ -10,7 +10,7 @@ from fractions import Fraction
 from typing import Any
 
 from analysis.paper.audit.lattices import Rows
-from analysis.paper.audit.participants import MEAN_SLACK, Rebuilt, backward_counts, forward_counts, rating_grains
+from analysis.paper.audit.participants import MEAN_SLACK, RebuiltAnswers, backward_counts, forward_counts, rating_grains
 from analysis.paper.paper import Paper, PublishedDirection, PublishedExperiment, PublishedPreference
 from experiments.catalogue import CATALOGUE
 from experiments.config.door import ConfigError
@@ -136,7 +136,7 @@ def _preference(
     )
 
 
-def _f_words(paper: PublishedExperiment, rebuilt: Rebuilt) -> str:
+def _f_words(paper: PublishedExperiment, rebuilt: RebuiltAnswers) -> str:
     found = f"({rebuilt.search.succeeded} of {rebuilt.search.starts} starts of the search succeeded)"
     if rebuilt.nearest_only:
         return f"and F = {rebuilt.F}, the nearest attainable to the published {paper.anova.F} {found}"

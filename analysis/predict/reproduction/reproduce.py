@@ -15,10 +15,10 @@ from typing import Any, Literal
 from analysis.logs.reading import Logs, read_logs
 from analysis.paper.audit import audit
 from analysis.paper.audit.paper_file import load_paper_file
-from analysis.paper.audit.run import Finding
+from analysis.paper.audit.run import AuditFinding
 from analysis.paper.audit.sentences import ATTENTION, ELSEWHERE, other_rows, predictions
 from analysis.paper.paper import Paper, PublishedExperiment, load_paper
-from analysis.paper.published import Row
+from analysis.paper.published import ComparisonRow
 from analysis.paper.recurrence import PatternOdds
 from analysis.predict.reproduction.reconstructed import answers_table, misfit, reconstructed_people, table_name
 from analysis.predict.simulate.shot import shot_panel
@@ -63,7 +63,7 @@ class ReproducedStudy:
     answering: tuple[Setup[Any], ...]
     seed: int
     paper: Paper | None
-    findings: tuple[Finding, ...] = ()
+    findings: tuple[AuditFinding, ...] = ()
     notes: tuple[str, ...] = ()
 
     @property
@@ -93,7 +93,7 @@ class Reproduced:
     """The statistics of a reproduction, and every published number beside what was obtained."""
 
     statistics: StudyStatistics
-    comparison: tuple[Row, ...]
+    comparison: tuple[ComparisonRow, ...]
 
 
 def prepared(name: str, seed: int, observer: Observer | None = None) -> ReproducedStudy:
@@ -135,7 +135,7 @@ def reproduce(study: ReproducedStudy, out: Path, tell: Tell) -> Reproduced:
     return Reproduced(statistics=statistics, comparison=comparison)
 
 
-def as_text(comparison: tuple[Row, ...]) -> str:
+def comparison_text(comparison: tuple[ComparisonRow, ...]) -> str:
     """Every published number with its verdict, for the terminal."""
     if not comparison:
         return "No published numbers to compare with."
@@ -146,7 +146,7 @@ def as_text(comparison: tuple[Row, ...]) -> str:
     return "\n".join([*lines, *([""] if notes else []), *notes])
 
 
-def _cells(row: Row) -> tuple[str, str, str, str]:
+def _cells(row: ComparisonRow) -> tuple[str, str, str, str]:
     apart = row.experiment == ELSEWHERE
     name = row.quantity if apart else f"{row.experiment}: {row.quantity}"
     return row.verdict, _shortened(row.published, 20), "" if apart else obtained_text(row), _shortened(name, 72)
@@ -156,12 +156,12 @@ def _shortened(text: str, most: int) -> str:
     return text if len(text) <= most else f"{text[: most - 1]}…"
 
 
-def _remarkable(row: Row) -> bool:
+def _remarkable(row: ComparisonRow) -> bool:
     """Does the verdict call for its reason?"""
     return bool(row.note) and row.verdict in {"differs", "differs as predicted", *ATTENTION}
 
 
-def _compared(study: ReproducedStudy, statistics: StudyStatistics) -> Iterator[Row]:
+def _compared(study: ReproducedStudy, statistics: StudyStatistics) -> Iterator[ComparisonRow]:
     """Every published number: those that logs hold beside the obtained, the others with the audit's verdict."""
     if study.paper is not None:
         yield from compare(statistics, study.paper, predictions(study.findings))
@@ -214,7 +214,7 @@ def _report(
     logs: Logs,
     statistics: StudyStatistics,
     odds: tuple[PatternOdds, ...],
-    comparison: tuple[Row, ...],
+    comparison: tuple[ComparisonRow, ...],
 ) -> ReportData:
     people = "synthetic, reconstructed from the published numbers" if study.reconstructed else "synthetic"
     return ReportData(

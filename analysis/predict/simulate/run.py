@@ -30,7 +30,7 @@ from device.vibration import VibrationParameters
 from experiments.config.door import ConfigError
 from experiments.load import find, load_gun
 
-__all__ = ["ModelRequest", "SimulateRequest", "sections", "simulate"]
+__all__ = ["ModelRequest", "SimulateRequest", "sections", "simulated"]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -82,7 +82,7 @@ class SimulateRequest:
 AnySimulated = SimulatedShot | SimulatedVibration | Sweep
 
 
-def simulate(request: SimulateRequest, progress: Progress, tell: Callable[[str], None]) -> AnySimulated:
+def simulated(request: SimulateRequest, progress: Progress, tell: Callable[[str], None]) -> AnySimulated:
     """What was asked for; trace, figure and table are written. `ConfigError` for whatever cannot be."""
     config = load_gun(find(request.gun))
     rendering = config.rendering(request.method) if request.method in config.methods else None

@@ -12,13 +12,13 @@ from numpy.typing import NDArray
 
 from analysis.report.figures.style import BLACK, INK
 
-Floats = NDArray[np.float64]
+_Floats = NDArray[np.float64]
 
 MANY = 200
 """More people than this are drawn as histograms: points and lines would be a grey wall."""
 
 
-def places(people: int, half_width: float, gap: float = 0.0) -> Floats:
+def places(people: int, half_width: float, gap: float = 0.0) -> _Floats:
     """Where a column's people stand, left and right of its centre, which `gap` keeps free for a whisker.
 
     >>> places(4, 0.2, 0.1).tolist()
@@ -31,8 +31,8 @@ def places(people: int, half_width: float, gap: float = 0.0) -> Floats:
 def draw_points(
     axes: Axes,
     centres: Sequence[float],
-    values: Floats,
-    where: Floats,
+    values: _Floats,
+    where: _Floats,
     markers: Sequence[str],
 ) -> None:
     """A point a person and column, joined from column to column; `values` (people, columns), NaN for none."""
@@ -64,7 +64,7 @@ def draw_points(
 def draw_histogram(
     axes: Axes,
     centre: float,
-    values: Floats,
+    values: _Floats,
     *,
     bin_width: float,
     half_width: float,

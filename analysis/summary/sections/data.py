@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 from analysis.logs.reading import Problem
-from analysis.paper.published import Row
+from analysis.paper.published import ComparisonRow
 from analysis.paper.recurrence import PatternOdds
 from analysis.report.figures.shot import ShotPanel
 from analysis.report.section import Section
@@ -27,7 +27,7 @@ class ReportData:
     title: str
     statistics: StudyStatistics
     problems: tuple[Problem, ...] = ()
-    comparison: tuple[Row, ...] | None = None
+    comparison: tuple[ComparisonRow, ...] | None = None
     odds: tuple[PatternOdds, ...] = ()
     panels: tuple[ShotPanel, ...] = ()
     files: tuple[Path, ...] = ()

@@ -9,7 +9,7 @@ from itertools import islice
 from analysis.report import apa
 from analysis.report.figures.style import display_name
 from analysis.report.section import LISTED, SHOWN, Section, Table
-from analysis.summary.results import DirectionStatistics, Interval, Pair, WithinStatistics
+from analysis.summary.results import ConfidenceInterval, DirectionStatistics, Pair, WithinStatistics
 from analysis.summary.sections.pictures import directions_picture, response_times_picture
 from analysis.times.response_times import ResponseTimes
 
@@ -63,7 +63,7 @@ def means_table(found: WithinStatistics, scale: float, digits: int, unit: str) -
     )
 
 
-def _interval_cell(ends: Pair | Interval, scale: float, digits: int) -> str:
+def _interval_cell(ends: Pair | ConfidenceInterval, scale: float, digits: int) -> str:
     return apa.interval(scale * ends.ci_low, scale * ends.ci_high, digits)
 
 
@@ -85,16 +85,16 @@ def _direction_row(found: DirectionStatistics, method: str) -> tuple[str, ...]:
         display_name(method),
         mean_sd(found.means[method], found.sds[method], 100.0, 1, " %"),
         mean_sd(backward.means.get(method), backward.sds.get(method), 100.0, 1, " %"),
-        *((mean_sd(one.mean, one.sd, 1.0, 2, "") for one in measures) if measures else (apa.NONE, apa.NONE)),
-        f"{apa.number(time.median)} (n = {time.n:,})" if time.n else apa.NONE,
+        *((mean_sd(one.mean, one.sd, 1.0, 2, "") for one in measures) if measures else (apa.NO_NUMBER, apa.NO_NUMBER)),
+        f"{apa.number(time.median)} (n = {time.n:,})" if time.n else apa.NO_NUMBER,
     )
 
 
 def mean_sd(mean: float | None, sd: float | None, scale: float, digits: int, unit: str) -> str:
     """`mean unit (SD)`; a dash for what is undefined."""
     if mean is None or math.isnan(mean):
-        return apa.NONE
-    spread = apa.NONE if sd is None else apa.number(scale * sd, digits)
+        return apa.NO_NUMBER
+    spread = apa.NO_NUMBER if sd is None else apa.number(scale * sd, digits)
     return f"{apa.number(scale * mean, digits)}{unit} ({spread})"
 
 

@@ -23,7 +23,7 @@ from analysis.summary.sections.trade import CONDITIONAL_ACCURACY, QUANTILE_PROBA
 from analysis.times.response_times import TimeSpread
 
 FIGURE_5, FIGURE_8 = "figure-5", "figure-8"
-DIRECTIONS, RESPONSE_TIMES = "figure-directions", "figure-response-times"
+_DIRECTIONS_FIGURE, _TIMES_FIGURE = "figure-directions", "figure-response-times"
 
 _PANELS = " (a), sensitivity d′ (b) and criterion c (c)"
 _LINES = ", the absence of bias, and the d′ of somebody who is always right (log-linear correction)"
@@ -36,9 +36,9 @@ def write_figures(folder: Path, report: ReportData) -> None:
     if statistics.analysed:
         figure_8(statistics, folder / FIGURE_8)
     if direction is not None and direction.n:
-        figure_directions(direction, folder / DIRECTIONS)
+        figure_directions(direction, folder / _DIRECTIONS_FIGURE)
         if direction.response_times.n:
-            figure_response_times(direction, folder / RESPONSE_TIMES)
+            figure_response_times(direction, folder / _TIMES_FIGURE)
         _write_trade(folder, direction)
     if report.panels:
         figure_5(report.panels, folder / FIGURE_5)
@@ -93,7 +93,7 @@ def directions_picture(found: DirectionStatistics) -> Picture:
     )
     rates = "; ".join(_rates_words(found, method) for method in found.methods)
     alt = f"Dot plot of the mean correct rates with everybody's values and a line at chance, 50 %. {rates}."
-    return Picture(stem=DIRECTIONS, caption=caption, alt=alt)
+    return Picture(stem=_DIRECTIONS_FIGURE, caption=caption, alt=alt)
 
 
 def _direction_crowd(n: int) -> str:
@@ -127,7 +127,7 @@ def response_times_picture(found: DirectionStatistics) -> Picture | None:
     )
     spreads = "; ".join(_spread_words(method, spread) for method, spread in times.methods.items() if spread)
     alt = f"Cumulative distributions and box plots of the response times. {spreads}."
-    return Picture(stem=RESPONSE_TIMES, caption=caption, alt=alt)
+    return Picture(stem=_TIMES_FIGURE, caption=caption, alt=alt)
 
 
 def _spread_words(method: str, spread: TimeSpread) -> str:

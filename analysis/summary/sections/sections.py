@@ -6,7 +6,7 @@ import os
 from pathlib import Path
 
 from analysis.logs.reading import Problem
-from analysis.paper.published import AUDITED, Row
+from analysis.paper.published import AUDITED, ComparisonRow
 from analysis.paper.recurrence import PatternOdds
 from analysis.report import apa
 from analysis.report.figures.shot import ShotPanel
@@ -92,7 +92,7 @@ def _excluded(statistics: StudyStatistics, experiment: str) -> int:
     return sum(entry.experiment == experiment for entry in statistics.excluded)
 
 
-def _verdicts(comparison: tuple[Row, ...]) -> Section:
+def _verdicts(comparison: tuple[ComparisonRow, ...]) -> Section:
     experiments = dict.fromkeys(row.experiment for row in comparison)
     return Section(
         title="Published and obtained",
@@ -101,7 +101,7 @@ def _verdicts(comparison: tuple[Row, ...]) -> Section:
     )
 
 
-def _agreement(comparison: tuple[Row, ...]) -> str:
+def _agreement(comparison: tuple[ComparisonRow, ...]) -> str:
     words = ("agrees", "differs", "differs as predicted", "not obtained")
     agrees, differs, predicted, missing = (sum(row.verdict == verdict for row in comparison) for verdict in words)
     told = f"{agrees} published numbers and claims agree, {differs} differ"
@@ -110,7 +110,7 @@ def _agreement(comparison: tuple[Row, ...]) -> str:
     return told + " A number agrees if it rounds to the printed digits, a bound or an order if it is true here."
 
 
-def _audited(comparison: tuple[Row, ...]) -> tuple[str, ...]:
+def _audited(comparison: tuple[ComparisonRow, ...]) -> tuple[str, ...]:
     """What the audit's column says, where there is one."""
     if not any(row.audit for row in comparison):
         return ()
@@ -120,7 +120,7 @@ def _audited(comparison: tuple[Row, ...]) -> tuple[str, ...]:
     )
 
 
-def _verdict_table(experiment: str, comparison: tuple[Row, ...]) -> Table:
+def _verdict_table(experiment: str, comparison: tuple[ComparisonRow, ...]) -> Table:
     rows = [row for row in comparison if row.experiment == experiment]
     if any(row.verdict in AUDITED for row in rows):
         header: tuple[str, ...] = ("Quantity", "Published", "Verdict", "Note")
@@ -132,8 +132,8 @@ def _verdict_table(experiment: str, comparison: tuple[Row, ...]) -> Table:
         header=(*header, *(("Audit",) if audited else ()), "Note"),
         rows=tuple(
             (
-                *(named(row.quantity), row.published or apa.NONE, obtained_text(row), row.verdict),
-                *((row.audit or apa.NONE,) if audited else ()),
+                *(named(row.quantity), row.published or apa.NO_NUMBER, obtained_text(row), row.verdict),
+                *((row.audit or apa.NO_NUMBER,) if audited else ()),
                 row.note,
             )
             for row in rows
@@ -141,14 +141,14 @@ def _verdict_table(experiment: str, comparison: tuple[Row, ...]) -> Table:
     )
 
 
-def obtained_text(row: Row) -> str:
+def obtained_text(row: ComparisonRow) -> str:
     """The obtained number with as many decimals as are printed; two where nothing is printed.
 
-    >>> obtained_text(Row(experiment="", quantity="", published="55.7 %", obtained=61.43, verdict="differs"))
+    >>> obtained_text(ComparisonRow(experiment="", quantity="", published="55.7 %", obtained=61.43, verdict="differs"))
     '61.4 %'
     """
     if row.obtained is None:
-        return apa.NONE
+        return apa.NO_NUMBER
     if row.published.startswith("<"):
         return apa.p_cell(row.obtained)
     digits, _, unit = row.published.partition(" ")

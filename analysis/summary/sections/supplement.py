@@ -148,7 +148,7 @@ def bayes_cell(factor: float | None) -> str:
     ('12.80', '> 1000', '< 0.001', '–')
     """
     if factor is None:
-        return apa.NONE
+        return apa.NO_NUMBER
     if factor > _LARGE:
         return f"> {_LARGE:.0f}"
     return f"< {1.0 / _LARGE:g}" if factor < 1.0 / _LARGE else apa.number(factor, 2 if factor >= 0.1 else 3)

@@ -70,7 +70,7 @@ def _counted(one: Mean, digits: int) -> tuple[str, str]:
 def _mean(one: Mean, digits: int, scale: float = 1.0) -> str:
     """`mean [low, high]`; a dash for what is undefined, and no interval from one participant."""
     if one.mean is None:
-        return apa.NONE
+        return apa.NO_NUMBER
     mean = apa.number(scale * one.mean, digits)
     return mean if one.ci_low is None else f"{mean} {_ends(one, digits, scale)}"
 
@@ -153,12 +153,12 @@ def _digits(name: str) -> int:
 
 def _of_each(one: Mean | None, digits: int) -> tuple[str, str, str, str]:
     if one is None:
-        return "0", apa.NONE, apa.NONE, apa.NONE
+        return "0", apa.NO_NUMBER, apa.NO_NUMBER, apa.NO_NUMBER
     return f"{one.people:,}", apa.number(one.mean, digits), _ends(one, digits), apa.number(one.sd, digits)
 
 
 def _of_all(one: Parameter | None, digits: int) -> tuple[str, str]:
-    return (apa.NONE, apa.NONE) if one is None else (apa.number(one.value, digits), _ends(one, digits))
+    return (apa.NO_NUMBER, apa.NO_NUMBER) if one is None else (apa.number(one.value, digits), _ends(one, digits))
 
 
 def _parameter(name: str) -> str:

@@ -13,7 +13,7 @@ from collections.abc import Callable
 from dataclasses import asdict
 from typing import NoReturn
 
-from experiments.doctor.figures import Seen
+from experiments.doctor.figures import ProgramFigures
 
 OPTIONAL = ("PyQt6", "Xlib", "psychopy", "sounddevice")
 
@@ -22,7 +22,7 @@ class Absent(Exception):  # noqa: N818 - that something is not there is no error
     """This machine does not have what the program looks at; the message says what is missing."""
 
 
-def answer(look: Callable[[], Seen]) -> NoReturn:
+def answer(look: Callable[[], ProgramFigures]) -> NoReturn:
     """Look, answer, and end at once: no library's last acts are waited for."""
     with os.fdopen(os.dup(1), "w", encoding="utf-8") as said:
         os.dup2(2, 1)  # what libraries print goes to the errors
@@ -31,7 +31,7 @@ def answer(look: Callable[[], Seen]) -> NoReturn:
     os._exit(0)
 
 
-def _answer(look: Callable[[], Seen]) -> dict[str, object]:
+def _answer(look: Callable[[], ProgramFigures]) -> dict[str, object]:
     try:
         return {"figures": asdict(look())}
     except Absent as absent:

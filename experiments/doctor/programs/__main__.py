@@ -5,13 +5,13 @@ from __future__ import annotations
 import sys
 from importlib import import_module
 
-from experiments.doctor.figures import Seen
+from experiments.doctor.figures import ProgramFigures
 from experiments.doctor.programs import answer
 
 
-def look() -> Seen:
+def look() -> ProgramFigures:
     """Import what the program needs, which may fail, and look."""
-    found: Seen = import_module(f"experiments.doctor.programs.{sys.argv[1]}").look()
+    found: ProgramFigures = import_module(f"experiments.doctor.programs.{sys.argv[1]}").look()
     return found
 
 

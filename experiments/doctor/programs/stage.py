@@ -5,13 +5,13 @@ from __future__ import annotations
 import time
 from typing import Any
 
-from experiments.doctor.figures import Stage, percentile
+from experiments.doctor.figures import PsychoPyStage, percentile
 from experiments.screens.participant.stage import load_toolkit, writable_home
 
 FRAMES = 60
 
 
-def look() -> Stage:
+def look() -> PsychoPyStage:
     """Import PsychoPy, open a window, draw some frames."""
     with writable_home():
         start_s = time.monotonic()
@@ -21,7 +21,7 @@ def look() -> Stage:
         opened_s = time.monotonic()
         frame_s = _frame_s(window)
         window.close()
-    return Stage(
+    return PsychoPyStage(
         version=toolkit.version,
         import_s=imported_s - start_s,
         opened_s=opened_s - imported_s,

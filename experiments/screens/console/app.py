@@ -47,7 +47,7 @@ GUN_LOOK_S = 0.2
 """How often the gun's state is looked at."""
 SWITCH_S = 0.0005
 """How soon a thread gets its turn: an answer is not to wait for its journal while the window is painted."""
-END_S = 1.5
+_END_S = 1.5
 """How long a run may take to end in order when the display is lost."""
 
 
@@ -174,10 +174,10 @@ class Console:
             self.window.close()
 
     def _lose_display(self) -> None:
-        """End the run in order although nobody sees it; within `END_S`."""
+        """End the run in order although nobody sees it; within `_END_S`."""
         if self.live is not None:
             self.live.offer(events.DisplayLost())
-        self._thread.join(END_S)
+        self._thread.join(_END_S)
 
     # in the run's thread
 

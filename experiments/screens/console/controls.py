@@ -11,7 +11,7 @@ from typing import Any, Literal, Protocol
 from device.words import Direction
 from experiments.clock import Clock
 from experiments.design.plan import Trial
-from experiments.live_run import LiveRun, Verdict
+from experiments.live_run import EventVerdict, LiveRun
 from experiments.preference.config import RatingScale
 from experiments.screens.console.keys import (
     BY_NAME,
@@ -27,7 +27,7 @@ from experiments.screens.console.participant_link import ParticipantSide
 from experiments.screens.texts import FLAG_RULE, short_place, typed_line, typed_number
 from experiments.session import events
 from experiments.session.events import Event, Hand, Press
-from experiments.session.history import Value, trial_at, value
+from experiments.session.history import Value, entered_value, trial_at
 from experiments.session.judging import REARM_HELD_S
 from experiments.session.remarks import flag_word
 from experiments.session.states import EMERGENCY, Position, State
@@ -220,7 +220,7 @@ class Controls:
         """Have an event judged, and say what there is to say of it."""
         self._say(self._live.offer(event, press))
 
-    def _say(self, verdict: Verdict) -> None:
+    def _say(self, verdict: EventVerdict) -> None:
         if verdict.text:
             self._view.say(verdict.text, "wait" if verdict.taken else "bad")
 
@@ -308,7 +308,7 @@ class Controls:
     def entered_so_far(self) -> str:
         """What the open correction says now, to be typed over."""
         entry = self.drawn.correcting
-        said = None if entry is None else value(self._live.history, entry)
+        said = None if entry is None else entered_value(self._live.history, entry)
         return "" if said is None else f"{said:g}" if isinstance(said, float) else said
 
     # lines

@@ -11,7 +11,7 @@ from experiments.design.plan import Trial
 from experiments.screens import texts
 from experiments.screens.console.view import About, GunSeen, Seen
 from experiments.session import steps
-from experiments.session.history import done, entries, together
+from experiments.session.history import done, entries, of_one_set
 from experiments.session.remarks import AnswerCorrected, DescriptionCorrected, Flagged, Noted, RatingCorrected, Remark
 from experiments.session.states import Position, State
 from experiments.session.steps import Outcome, Step, trial_of
@@ -41,7 +41,7 @@ def trials_done(seen: Seen) -> list[TrialCount]:
     if seen.about.rated_last:
         return [_count("felt", trials, felt), _count("rated", trials, _rated(seen))]
     session = [trial for trial in trials if trial.session == here.session]
-    parts = {"set": [trial for trial in session if together(trial, here)], "session": session, "experiment": trials}
+    parts = {"set": [trial for trial in session if of_one_set(trial, here)], "session": session, "experiment": trials}
     return [_count(what, trials, felt) for what, trials in parts.items()]
 
 
@@ -197,7 +197,7 @@ def marks(seen: Seen) -> list[str]:
 
 
 def _about(step: Step | None, word: Outcome | Remark) -> Trial | None:
-    return word.trial if isinstance(word, steps.Repeat) or (step is None and hasattr(word, "trial")) else None
+    return word.trial if isinstance(word, steps.Repeated) or (step is None and hasattr(word, "trial")) else None
 
 
 def _same_set(one: Trial, other: Trial) -> bool:
@@ -216,7 +216,7 @@ def _mark(word: Outcome | Remark) -> str:
             return f"Trial {word.trial.trial}: rating corrected to {texts.value_text(word.rating)}"
         case DescriptionCorrected():
             return f"Trial {word.trial.trial}: description corrected"
-        case steps.Repeat():
+        case steps.Repeated():
             return f"Trial {word.trial.trial}: to be presented again ({word.reason})"
         case _:
             return ""

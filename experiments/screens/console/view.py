@@ -15,7 +15,7 @@ from experiments.design.plan import Plan, Trial
 from experiments.live_run import LiveRun
 from experiments.screens import texts
 from experiments.screens.console.keys import Name, shown_key
-from experiments.session.history import History, trial_at, value
+from experiments.session.history import History, entered_value, trial_at
 from experiments.session.remarks import Remark
 from experiments.session.states import Position, State
 from experiments.session.steps import Ask, Describe, Outcome, Prepare, Present, Rate, Rest, Step
@@ -156,7 +156,7 @@ def typed_there(about: About, position: Position) -> bool:
     return about.participant_rates and asked and isinstance(position.step, Rate | Describe)
 
 
-def code(plan: Plan, trial: Trial) -> str:
+def method_code(plan: Plan, trial: Trial) -> str:
     """The name under which the experimenter meets a method: A, B, C in the order of the run."""
     return f"Method {chr(ord('A') + plan.methods.index(trial.method))}"
 
@@ -164,7 +164,7 @@ def code(plan: Plan, trial: Trial) -> str:
 def method_text(about: About, trial: Trial) -> str:
     """The method's name where its damper is set by hand, else its code."""
     method = about.setup.gun.methods[trial.method]
-    return method.label if method.damper else code(about.plan, trial)
+    return method.label if method.damper else method_code(about.plan, trial)
 
 
 def where_text(seen: Seen) -> str:
@@ -311,7 +311,7 @@ def _correcting(seen: Seen) -> Instruction:
     return Instruction(
         title=f"Correct the {entry.what}",
         damper=texts.place_text(seen.about.plan, entry.trial),
-        detail=f"It was entered as {texts.value_text(value(seen.told, entry))}. {how}\n"
+        detail=f"It was entered as {texts.value_text(entered_value(seen.told, entry))}. {how}\n"
         f"{further} goes further back, Esc leaves it.",
         mood="ask",
     )
