@@ -19,6 +19,7 @@ from experiments.screens.console.keys import BOUNCE_S, BY_NAME
 from tests import watched_participant
 from tests.at_runs import RUN, words
 from tests.waiting import PATIENCE_S, wait_for
+from tests.warm_start import warm
 from tests.watched_console import Look, Watch
 
 READY = all(map(shutil.which, ("Xvfb", "openbox")))
@@ -101,9 +102,9 @@ class AtDisplay:
     def __init__(self, words: Sequence[object], folder: Path, display: str, **environment: str) -> None:
         variables = {"DISPLAY": display, "HOME": str(folder), "QT_QPA_PLATFORM": "xcb", **environment}
         self.process = subprocess.Popen(
-            [str(word) for word in words],
+            warm(*words),
             cwd=folder,
-            env=os.environ | {"PYTHONPATH": str(Path(__file__).parent.parent)} | variables,
+            env=os.environ | variables,
             stdout=subprocess.PIPE,
             stderr=subprocess.STDOUT,
             text=True,

@@ -14,7 +14,6 @@ from experiments.session import events
 from experiments.session.events import ACTS, Event
 from experiments.session.states import TABLE, No, State
 from tests.at_display import AtConsole, middle, records, remarks
-from tests.conftest import RECOIL
 from tests.watched_console import Watch
 
 S = State
@@ -50,7 +49,7 @@ def short_configs(folder: Path) -> Path:
 
 
 def words(configs: Path, experiment: str, *more: object) -> list[object]:
-    run = [RECOIL, "run", configs / f"{experiment}.toml", "--screen", "console", "--results", "results"]
+    run = ["run", configs / f"{experiment}.toml", "--screen", "console", "--results", "results"]
     return [*run, "--seed", 1, "--participant", "P01", *more]
 
 

@@ -11,8 +11,9 @@ from dataclasses import replace
 import pytest
 
 from experiments.screens.participant.link import ParticipantError, ParticipantLink
-from experiments.screens.participant.messages import AskDescription, AskDirection, AskRating, Look
+from experiments.screens.participant.messages import AskDescription, AskDirection, AskRating, Look, arguments
 from tests.waiting import PATIENCE_S, wait_for
+from tests.warm_start import warm
 
 pytestmark = [
     pytest.mark.skipif(shutil.which("Xvfb") is None, reason="Xvfb is not installed: a window needs a display"),
@@ -138,7 +139,8 @@ def started(display, home, look=LOOK):
     with pytest.MonkeyPatch.context() as environment:
         environment.setenv("DISPLAY", display)
         environment.setenv("HOME", str(home))
-        return ParticipantLink.start(look)
+        program = warm("-m", "experiments.screens.participant", *arguments(look))
+        return ParticipantLink.start(look, command=program)
 
 
 @pytest.fixture(scope="module")

@@ -8,7 +8,6 @@ from pathlib import Path
 from experiments.record.journal import read_journal
 from experiments.record.replay import history
 from experiments.session.steps import Answered
-from tests.conftest import RECOIL
 
 DIRECTION = "results/sub-P01/sub-P01_task-direction"
 PREFERENCE = "results/sub-P01/sub-P01_task-preference"
@@ -17,7 +16,7 @@ RUN = "Recoil – P01"
 
 def words(configs: Path, experiment: str, *more: object) -> list[object]:
     config = configs / f"{experiment}.toml"
-    return [RECOIL, "run", config, "--screen", "console", "--results", "results", "--seed", 1, *more]
+    return ["run", config, "--screen", "console", "--results", "results", "--seed", 1, *more]
 
 
 def rows(folder: Path, stem: str, kind: str) -> list[dict[str, str]]:

@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+import fcntl
 import os
 import platform
 import re
+import shutil
 import subprocess
 import sys
+import tempfile
 from collections.abc import Callable, Iterator
 from pathlib import Path
 
@@ -14,13 +17,27 @@ import pytest
 from hypothesis import settings
 
 from experiments.load import shipped_folder
-from tests.forked_commands import forked
+from tests import warm_start
 from tests.waiting import PATIENCE_S
 
 pytest.register_assert_rewrite("tests.at_controls", "tests.experimenters")
 
 settings.register_profile("recoil", deadline=None, derandomize=True)
 settings.load_profile("recoil")
+
+
+def pytest_configure(config: pytest.Config) -> None:
+    """Name the place of the server of `tests/warm_start.py`, one for all workers; it starts when it is first asked."""
+    if not hasattr(config, "workerinput"):
+        os.environ[warm_start.OWNER] = str(os.getpid())
+        os.environ[warm_start.FOLDER] = tempfile.mkdtemp(prefix="recoil-tests-")
+
+
+def pytest_unconfigure(config: pytest.Config) -> None:
+    """Forget that place."""
+    if not hasattr(config, "workerinput"):
+        shutil.rmtree(os.environ[warm_start.FOLDER])
+
 
 RECOIL = Path(sys.executable).with_name("recoil")
 
@@ -35,9 +52,33 @@ def recoil(tmp_path: Path) -> Recoil:
     environment = {key: value for key, value in os.environ.items() if key in ("PATH", "LANG", "LC_ALL", "TMPDIR")}
 
     def call(*words: object) -> subprocess.CompletedProcess[str]:
-        return forked([str(word) for word in words], tmp_path, environment | {"HOME": str(home)}, PATIENCE_S)
+        return subprocess.run(
+            warm_start.warm(*words),
+            cwd=tmp_path,
+            env=environment | {"HOME": str(home)},
+            capture_output=True,
+            text=True,
+            check=False,
+            timeout=PATIENCE_S,
+        )
 
     return call
+
+
+@pytest.fixture(scope="session")
+def reproduction() -> Path:
+    """What `recoil reproduce` leaves, made once for all tests, which only read it; what it said lies beside it."""
+    place = Path(os.environ[warm_start.FOLDER]) / "reproduction"
+    place.mkdir(exist_ok=True)
+    said = place / "said.txt"
+    with (place / "lock").open("w") as lock:
+        fcntl.flock(lock, fcntl.LOCK_EX)  # another worker may be making it
+        if not said.exists():
+            done = subprocess.run(
+                warm_start.warm("reproduce", "--out", "out"), cwd=place, check=True, capture_output=True
+            )
+            said.write_bytes(done.stdout)
+    return place / "out"
 
 
 @pytest.fixture

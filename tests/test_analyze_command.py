@@ -18,9 +18,10 @@ from analysis.logs.files import study_names
 from analysis.logs.reading import read_logs
 from analysis.summary.summary import summarize
 from analysis.summary.tables_out import MAX_NAME, short_names
-from tests.conftest import RECOIL, Recoil
+from tests.conftest import Recoil
 from tests.log_files import METHODS, trial_rows, trials_path, write_rows, write_study
 from tests.waiting import PATIENCE_S, wait_for
+from tests.warm_start import warm
 
 EXAMPLES = Path(__file__).parent.parent / "configs" / "examples"
 
@@ -148,7 +149,7 @@ def test_an_interrupt_among_the_logs_ends_with_130(tmp_path: Path) -> None:
             held.append(os.open(endless, os.O_WRONLY | os.O_NONBLOCK))
         return bool(held)
 
-    words = [str(RECOIL), "analyze", str(tmp_path), str(endless), "--out", str(tmp_path / "out")]
+    words = warm("analyze", tmp_path, endless, "--out", tmp_path / "out")
     with subprocess.Popen(words, stderr=subprocess.DEVNULL, stdout=subprocess.DEVNULL) as running:
         wait_for(is_read)
         running.send_signal(signal.SIGINT)

@@ -10,8 +10,7 @@ from pathlib import Path
 import pytest
 
 from experiments.load import shipped_folder
-from tests.conftest import RECOIL, Recoil, refused
-from tests.waiting import PATIENCE_S, wait_for
+from tests.conftest import Recoil, refused
 
 TABLE = "results/sub-P01/sub-P01_task-direction_trials.csv"
 JOURNAL = "results/sub-P01/sub-P01_task-direction_journal.jsonl"
@@ -235,17 +234,3 @@ def test_balanced_orders_take_each_row_of_the_square_in_turn(recoil: Recoil, tmp
         journal = tmp_path / f"results/sub-P{number}/sub-P{number}_task-preference_journal.jsonl"
         rows.append(json.loads(journal.read_text().splitlines()[0])["plan"]["order_row"])
     assert rows == [0, 1, 2, 0, 1, 2]
-
-
-def test_a_terminated_run_stops_at_a_whole_record_and_can_be_gone_on_with(recoil: Recoil, tmp_path: Path) -> None:
-    words = [RECOIL, "reproduce", "--out", tmp_path / "out"]
-    process = subprocess.Popen(words, stderr=subprocess.PIPE, stdout=subprocess.PIPE, text=True)
-    wait_for(lambda: list((tmp_path / "out").glob("logs/*/*_journal.jsonl")) or process.poll() is not None)
-    assert process.poll() is None
-    process.terminate()
-    _, said = process.communicate(timeout=PATIENCE_S)
-    assert process.returncode == 130
-    assert "Traceback" not in said
-    assert "interrupted" in said
-    assert recoil("reproduce", "--out", "out").returncode == 0
-    assert len(list((tmp_path / "out" / "logs").glob("*/*.csv"))) == 28

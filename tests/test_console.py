@@ -14,7 +14,7 @@ import pytest
 
 from tests.at_display import AtConsole, AtDisplay, needs_display, records, remarks, virtual_display
 from tests.at_runs import DIRECTION, PREFERENCE, RUN, answers, rows, words
-from tests.conftest import RECOIL
+from tests.warm_start import warm
 
 pytest.importorskip("PyQt6")
 pytestmark = needs_display
@@ -214,9 +214,9 @@ def test_a_synthetic_participant_at_the_console_answers_as_in_data_mode(
         ) as screen:
             code, said = screen.end()
             assert code == 0, said
-        data = [RECOIL, "run", quick_configs / f"{experiment}.toml", "--participant", "P01", "--seed", "1"]
+        data = ["run", quick_configs / f"{experiment}.toml", "--participant", "P01", "--seed", "1"]
         data += ["--screen", "synthetic", "--results", "data"]
-        subprocess.run(data, cwd=tmp_path, check=True, capture_output=True)
+        subprocess.run(warm(*data), cwd=tmp_path, check=True, capture_output=True)
         stem = DIRECTION if experiment == "direction" else PREFERENCE
         column = "response" if experiment == "direction" else "rating"
         seen = [row[column] for row in rows(tmp_path, stem, kind)]

@@ -257,7 +257,7 @@ def test_a_key_that_is_held_for_the_test_shot_counts_as_let_go_when_another_wind
 def participant_pid(screen: AtConsole) -> int:
     """The participant's process: the console's child that runs its program."""
     found = subprocess.run(
-        ["pgrep", "-P", str(screen.process.pid), "-f", "watched_participant"],
+        ["pgrep", "-f", f"tests.watched_participant {screen.watch.pages}"],
         capture_output=True,
         text=True,
         check=True,

@@ -13,8 +13,8 @@ from experiments.record.journal import read_journal
 from experiments.record.replay import history
 from experiments.session.steps import Answered
 from tests.at_display import AtDisplay, needs_display, virtual_display
-from tests.conftest import RECOIL
 from tests.felt_configs import felt_text, written
+from tests.warm_start import warm
 
 pytest.importorskip("PyQt6")
 pytestmark = needs_display
@@ -42,9 +42,9 @@ def test_data_mode_and_the_console_give_the_same_answers_in_the_same_times(tmp_p
     breaks = {"between_sets_s": 0.0, "between_sessions_s": 0.0, "max_trials_without_break": 60}
     methods = {"methods": '["asymmetric-1", "asymmetric-2"]', "non_decision_s": 0.2, "guard_s": 0.0}
     config = written(tmp_path, felt_text(("speed", "accuracy"), **short, **breaks, **methods))
-    words = [RECOIL, "run", config, "--participant", "P01", "--seed", "3"]
+    words = ["run", config, "--participant", "P01", "--seed", "3"]
     data = [*words, "--screen", "synthetic", "--results", tmp_path / "data"]
-    subprocess.run(data, cwd=tmp_path, check=True, capture_output=True)
+    subprocess.run(warm(*data), cwd=tmp_path, check=True, capture_output=True)
     seen = [*words, "--screen", "console", "--visual", "--results", tmp_path / "seen"]
     with AtDisplay(seen, tmp_path, display) as screen:
         code, said = screen.end()
@@ -61,7 +61,7 @@ def test_data_mode_and_the_console_give_the_same_answers_in_the_same_times(tmp_p
 
 def test_numbers_that_make_nobody_end_the_console_with_one_message(tmp_path: Path, display: str) -> None:
     config = written(tmp_path, felt_text(sensitivity=1e6))
-    words = [RECOIL, "run", config, "--participant", "P01", "--seed", "3", "--screen", "console", "--visual"]
+    words = ["run", config, "--participant", "P01", "--seed", "3", "--screen", "console", "--visual"]
     with AtDisplay([*words, "--results", tmp_path / "seen"], tmp_path, display) as screen:
         code, said = screen.end()
     assert code == 2

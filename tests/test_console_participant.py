@@ -16,7 +16,7 @@ import pytest
 
 from tests.at_display import AtConsole, AtDisplay, needs_display, records, remarks, virtual_display, wait_for
 from tests.at_runs import DIRECTION, PREFERENCE, RUN, rows, words
-from tests.conftest import RECOIL
+from tests.warm_start import warm
 
 pytestmark = [
     needs_display,
@@ -274,8 +274,10 @@ def test_a_synthetic_participant_rates_on_the_participants_screen_as_in_data_mod
     with AtDisplay(run, tmp_path, display) as screen:
         code, said = screen.end()
     assert code == 0, said
-    data = [RECOIL, "run", quick_configs / "preference.toml", "--participant", "P01", "--seed", "1"]
-    subprocess.run([*data, "--screen", "synthetic", "--results", "data"], cwd=tmp_path, check=True, capture_output=True)
+    data = ["run", quick_configs / "preference.toml", "--participant", "P01", "--seed", "1"]
+    subprocess.run(
+        warm(*data, "--screen", "synthetic", "--results", "data"), cwd=tmp_path, check=True, capture_output=True
+    )
     seen = rows(tmp_path, PREFERENCE, "ratings")
     expected = rows(tmp_path, re.sub("^results", "data", PREFERENCE), "ratings")
     for column in ("rating", "rating_by", "comment"):

@@ -26,8 +26,9 @@ from device.physics.shot import highest_rate_Hz
 from device.words import Pulse
 from experiments.config.door import ConfigError
 from experiments.synthetic.percept import PerceptParameters
-from tests.conftest import RECOIL, Recoil
+from tests.conftest import Recoil
 from tests.waiting import PATIENCE_S, wait_for
+from tests.warm_start import warm
 
 PAPER = GunParameters()
 
@@ -211,7 +212,7 @@ def test_a_range_is_read_as_typed() -> None:
 
 
 def test_an_interrupted_search_ends_with_130_and_without_a_traceback(tmp_path: Path) -> None:
-    words: list[str | Path] = [RECOIL, "design", "--grid", "60", "--workers", "1", "--out", tmp_path / "out"]
+    words = warm("design", "--grid", 60, "--workers", 1, "--out", tmp_path / "out")
     with subprocess.Popen(words, stderr=subprocess.PIPE) as running:
         wait_for((tmp_path / "out").exists)
         running.send_signal(signal.SIGINT)

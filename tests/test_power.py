@@ -25,6 +25,7 @@ from experiments.load import load_setup, shipped_folder
 from tests.conftest import RECOIL, Recoil
 from tests.power_files import files
 from tests.waiting import PATIENCE_S, wait_for
+from tests.warm_start import warm
 
 SMALL = ("--participants", "8,14", "--effect", "0.75,1", "--studies", "300")
 CONFIG = load_setup("direction").config
@@ -35,7 +36,7 @@ def done(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """The small grid, on one process; in the environment of `recoil`, which has no settings of git."""
     folder = tmp_path_factory.mktemp("power")
     environment = {"PATH": os.environ["PATH"], "HOME": str(folder)}
-    words = [RECOIL, "power", "direction", *SMALL, "--workers", "1", "--out", folder / "out"]
+    words = warm("power", "direction", *SMALL, "--workers", "1", "--out", folder / "out")
     subprocess.run(words, check=True, capture_output=True, env=environment)
     return folder / "out"
 
@@ -124,8 +125,7 @@ def test_two_dask_workers_give_the_same_bytes_as_one_process(
 
 
 def test_an_interrupted_job_goes_on_where_it_was(tmp_path: Path) -> None:
-    words = [RECOIL, "power", "direction", "--participants", "14", "--effect", "1", "--studies", "60000"]
-    words += ["--workers", "1", "--out"]
+    words = warm("power", "direction", "--participants", 14, "--effect", 1, "--studies", 60000, "--workers", 1, "--out")
     whole, cut = tmp_path / "whole", tmp_path / "cut"
     subprocess.run([*words, whole], check=True, capture_output=True)
     with subprocess.Popen([*words, cut], stderr=subprocess.PIPE) as running:

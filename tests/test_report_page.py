@@ -10,7 +10,6 @@ from pathlib import Path
 import pytest
 from PIL import Image
 
-from tests.conftest import RECOIL
 from tests.waiting import PATIENCE_S
 
 BROWSER = next(filter(None, map(shutil.which, ("chromium", "chromium-browser", "google-chrome"))), None)
@@ -25,10 +24,8 @@ MEASURE = """<script>addEventListener("load", () => {
 
 
 @pytest.fixture(scope="module")
-def page(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    folder = tmp_path_factory.mktemp("page")
-    subprocess.run([RECOIL, "reproduce", "--out", "out"], cwd=folder, check=True, capture_output=True)
-    return folder / "out" / "report.html"
+def page(reproduction: Path) -> Path:
+    return reproduction / "report.html"
 
 
 def browse(page: Path, folder: Path, *words: str) -> str:

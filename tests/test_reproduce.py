@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import json
+import shutil
 import subprocess
+from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -17,19 +19,11 @@ from analysis.predict.reproduction import reproduce
 from analysis.predict.synthetic_studies import direction_counts, preference_scores
 from experiments.design.streams import generator
 from experiments.load import load_setup
-from tests.conftest import RECOIL
+from tests.waiting import PATIENCE_S, wait_for
+from tests.warm_start import warm
 
 EXPERIMENTS = ("direction", "preference")
 METHODS = ["vibration", "asymmetric-1", "asymmetric-2"]
-
-
-@pytest.fixture(scope="module")
-def reproduction(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """`recoil reproduce` in an empty folder; what it printed lies beside it."""
-    folder = tmp_path_factory.mktemp("reproduction")
-    done = subprocess.run([RECOIL, "reproduce", "--out", "out"], cwd=folder, check=True, capture_output=True)
-    (folder / "said.txt").write_bytes(done.stdout)
-    return folder / "out"
 
 
 def statistics(folder: Path) -> dict[str, dict[str, object]]:
@@ -53,21 +47,20 @@ def test_it_leaves_28_logs_with_their_journals_and_a_report(reproduction: Path) 
         assert (reproduction / name).stat().st_size > 0
 
 
-def test_every_table_rebuilt_from_its_journal_is_the_same_byte_for_byte(reproduction: Path) -> None:
-    journals = sorted(reproduction.glob("logs/sub-*/*_journal.jsonl"))
-    before = {path: path.read_bytes() for path in reproduction.glob("logs/sub-*/*.csv")}
+def test_every_table_rebuilt_from_its_journal_is_the_same_byte_for_byte(reproduction: Path, tmp_path: Path) -> None:
+    shutil.copytree(reproduction / "logs", tmp_path / "logs")
+    journals = sorted(tmp_path.glob("logs/sub-*/*_journal.jsonl"))
+    before = {path: path.read_bytes() for path in tmp_path.glob("logs/sub-*/*.csv")}
     for path in before:
         path.unlink()
-    subprocess.run([RECOIL, "rebuild", *journals], check=True, capture_output=True)
-    assert before == {path: path.read_bytes() for path in reproduction.glob("logs/sub-*/*.csv")}
+    subprocess.run(warm("rebuild", *journals), check=True, capture_output=True)
+    assert before == {path: path.read_bytes() for path in tmp_path.glob("logs/sub-*/*.csv")}
 
 
 def test_analyze_on_the_tables_alone_gives_the_same_numbers(reproduction: Path, tmp_path: Path) -> None:
     for table in reproduction.glob("logs/sub-*/*.csv"):
         (tmp_path / table.name).write_bytes(table.read_bytes())
-    done = subprocess.run(
-        [RECOIL, "analyze", tmp_path, "--out", tmp_path / "analysis"], check=False, capture_output=True
-    )
+    done = subprocess.run(warm("analyze", tmp_path, "--out", tmp_path / "analysis"), check=False, capture_output=True)
     assert done.returncode == 0
     assert statistics(tmp_path / "analysis") == statistics(reproduction)
 
@@ -126,14 +119,14 @@ def test_every_published_number_carries_its_verdict_on_the_page_and_on_the_termi
 
 
 def test_the_tables_of_reconstructed_answers_seat_the_same_people_again(reproduction: Path, tmp_path: Path) -> None:
-    subprocess.run([RECOIL, "configs", "--copy", tmp_path], check=True, capture_output=True)
+    subprocess.run(warm("configs", "--copy", tmp_path), check=True, capture_output=True)
     for name in EXPERIMENTS:
         config, table = tmp_path / f"{name}.toml", f"reconstructed_{name}.csv"
         text = config.read_text(encoding="utf-8")
         drawn = next(f'observer = "{word}"' for word in ("rates", "ratings") if f'observer = "{word}"' in text)
         config.write_text(text.replace(drawn, f'observer = "table"\ntable = "{table}"'), encoding="utf-8")
         (tmp_path / table).write_bytes((reproduction / table).read_bytes())
-    words = [RECOIL, "reproduce", "--study", tmp_path / "study.toml", "--out", tmp_path / "out"]
+    words = warm("reproduce", "--study", tmp_path / "study.toml", "--out", tmp_path / "out")
     subprocess.run(words, check=True, capture_output=True)
     ours = statistics(reproduction)
     assert {name: statistics(tmp_path / "out")[name]["anova"] for name in EXPERIMENTS} == {
@@ -154,41 +147,46 @@ def test_participants_drawn_by_the_configs_stay_an_option() -> None:
     ]
 
 
-def test_the_same_seed_gives_the_same_answers_and_another_seed_others(reproduction: Path, tmp_path: Path) -> None:
-    for seed in (1, 2):
-        words = [RECOIL, "reproduce", "--seed", str(seed), "--out", tmp_path / str(seed)]
-        subprocess.run(words, check=True, capture_output=True)
-    assert statistics(tmp_path / "1") == statistics(reproduction)
-    assert statistics(tmp_path / "2") != statistics(reproduction)
-
-
-def test_an_interrupted_reproduction_goes_on_and_ends_as_an_unbroken_one(reproduction: Path, tmp_path: Path) -> None:
-    words = [RECOIL, "reproduce", "--out", tmp_path / "out"]
-    process = subprocess.Popen(words, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
-    while len(list(tmp_path.glob("out/logs/sub-*/*.csv"))) < 5:
-        assert process.poll() is None
-    process.kill()
-    process.wait()
+def test_a_killed_and_then_terminated_reproduction_ends_as_an_unbroken_one(reproduction: Path, tmp_path: Path) -> None:
+    words = warm("reproduce", "--out", tmp_path / "out")
+    tables = partial(tmp_path.glob, "out/logs/sub-*/*.csv")
+    with subprocess.Popen(words, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL) as killed:
+        wait_for(lambda: len(list(tables())) >= 5 or killed.poll() is not None)
+        killed.kill()
+    before = len(list(tables()))
+    with subprocess.Popen(words, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True) as terminated:
+        wait_for(lambda: len(list(tables())) > before or terminated.poll() is not None)
+        terminated.terminate()
+        _, said = terminated.communicate(timeout=PATIENCE_S)
+    assert terminated.returncode == 130
+    assert "Traceback" not in said
+    assert "interrupted" in said
+    assert len(list(tables())) < 28
     subprocess.run(words, check=True, capture_output=True)
-    ours, whole = statistics(tmp_path / "out"), statistics(reproduction)
-    assert ours == whole
+    assert len(list(tables())) == 28
+    assert statistics(tmp_path / "out") == statistics(reproduction)
 
 
-def test_another_study_in_the_folder_is_set_aside_and_a_strangers_folder_is_refused(tmp_path: Path) -> None:
+def test_another_seed_gives_other_answers_and_the_study_before_is_set_aside(tmp_path: Path) -> None:
     quick = tmp_path / "quick"
-    subprocess.run([RECOIL, "configs", "--copy", quick], check=True, capture_output=True)
+    subprocess.run(warm("configs", "--copy", quick), check=True, capture_output=True)
     study = quick / "study.toml"
     study.write_text(study.read_text().replace("participants = 14", "participants = 2").replace("2000", "10"))
     for seed in ("1", "2"):
-        words = [RECOIL, "reproduce", "--study", study, "--out", tmp_path / "out", "--seed", seed]
+        words = warm("reproduce", "--study", study, "--out", tmp_path / "out", "--seed", seed)
         subprocess.run(words, check=True, capture_output=True)
     assert (tmp_path / "out.aside-1" / "report.html").exists()
     assert (tmp_path / "out" / "report.html").exists()
+    assert statistics(tmp_path / "out") != statistics(tmp_path / "out.aside-1")
     assert "the study has 2 participants, the paper 14" in (tmp_path / "out" / "report.md").read_text(encoding="utf-8")
-    asked = [RECOIL, "reproduce", "--study", study, "--out", tmp_path / "no", "--observer", "reconstructed"]
+    asked = warm("reproduce", "--study", study, "--out", tmp_path / "no", "--observer", "reconstructed")
     refused = subprocess.run(asked, check=False, capture_output=True, text=True)
     assert (refused.returncode, "the study has 2 participants" in refused.stderr) == (2, True)
-    done = subprocess.run([RECOIL, "reproduce", "--out", quick], check=False, capture_output=True, text=True)
+
+
+def test_a_strangers_folder_is_refused(tmp_path: Path) -> None:
+    (tmp_path / "theirs").touch()
+    done = subprocess.run(warm("reproduce", "--out", tmp_path), check=False, capture_output=True, text=True)
     assert done.returncode == 2
     assert "is no reproduction" in done.stderr
 

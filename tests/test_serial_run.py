@@ -15,10 +15,10 @@ from experiments.session.steps import Failed
 from experiments.study.places import PlaceError
 from recoil.session import check_pace
 from recoil.twin import troubles_of
-from tests.conftest import RECOIL
 from tests.serial_runs import SPEED, TROUBLES, check, hasty, of_trains, one_run, resumed, rows, run_all, timings_of
 from tests.twins import Troubles, a_twin
 from tests.waiting import PATIENCE_S, wait_for
+from tests.warm_start import warm
 
 
 def test_two_hundred_trials_on_a_bad_line_are_each_done_once_or_marked_and_offered_again(tmp_path, quick_configs):
@@ -53,7 +53,7 @@ def test_trains_on_a_bad_line_are_whole_and_never_too_soon(tmp_path, quick_confi
 @pytest.fixture
 def plugged(tmp_path):
     """The command `recoil twin` in a process of its own; gives what to say to --gun."""
-    command = [str(RECOIL), "twin", "--json", "--link", str(tmp_path / "port"), "--speed", "40"]
+    command = warm("twin", "--json", "--link", tmp_path / "port", "--speed", 40)
     with subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True) as program:
         text = ""
         while not text.rstrip().endswith("}"):
@@ -111,7 +111,7 @@ def test_a_run_that_is_killed_leaves_the_gun_disarmed(tmp_path, quick_configs, n
     )
     (quick_configs / "preference.toml").write_text(quick)
     with a_twin(tmp_path, speed=1.0) as (twin, socket):
-        command = [str(RECOIL), *map(str, words), "--gun", f"serial:{socket.address}"]
+        command = warm(*words, "--gun", f"serial:{socket.address}")
         program = subprocess.Popen(command, cwd=tmp_path, stderr=subprocess.DEVNULL)
         try:
             wait_for(lambda: len(twin.body.ledger) >= 2 and twin._core.machine.state != "DISARMED")

@@ -22,7 +22,6 @@ from experiments.study.register import read_register
 from recoil.config_files import new_study
 from tests import watched_start
 from tests.at_display import HAND_S, AtDisplay, last_record, needs_display
-from tests.conftest import RECOIL
 from tests.watched_start import wait_for
 
 pytest.importorskip("PyQt6")
@@ -74,7 +73,7 @@ def started(folder: Path, display: str, *more: object) -> Iterator[tuple[AtDispl
     """The start window under the eye: the program at the display, and what the eye saw."""
     eye = folder / "eye.jsonl"
     eye.unlink(missing_ok=True)
-    command = [RECOIL, "run", folder / "pilot" / "direction.toml", "--screen", "console", "--results", LONG, *more]
+    command = ["run", folder / "pilot" / "direction.toml", "--screen", "console", "--results", LONG, *more]
     with AtDisplay(watched_start.words(eye, command), folder, display) as screen:
         screen.focus_on("start")
         yield screen, eye
@@ -198,7 +197,7 @@ def test_a_signal_ends_the_start_window(number: signal.Signals, pilot: Path, dis
 
 
 def test_a_signal_ends_the_question_of_an_unfinished_run(pilot: Path, display: str) -> None:
-    command = [RECOIL, "run", pilot / "pilot" / "direction.toml", "--screen", "console", "--participant", "P01"]
+    command = ["run", pilot / "pilot" / "direction.toml", "--screen", "console", "--participant", "P01"]
     before = (pilot / LONG / "sub-P01" / "sub-P01_task-direction_journal.jsonl").read_bytes()
     with AtDisplay([*command, "--results", LONG], pilot, display) as screen:
         screen.focus_on("unfinished")
@@ -321,7 +320,7 @@ def test_what_was_asked_for_is_ticked_and_a_screen_that_is_not_there_is_refused(
         assert look["ticked"] == ["rates on their own screen", "answers with own keys", "hears masking noise"]
         screen.keys.press("q", "Control_L")
         assert screen.end()[0] == 0
-    command = [RECOIL, "run", pilot / "pilot" / "direction.toml", "--screen", "console", "--participant-monitor", 7]
+    command = ["run", pilot / "pilot" / "direction.toml", "--screen", "console", "--participant-monitor", 7]
     with AtDisplay(command, pilot, display) as screen:
         code, said = screen.end()
     assert code == 2

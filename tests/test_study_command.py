@@ -18,8 +18,9 @@ from experiments.run import RunRequest, run
 from experiments.screens.synthetic import synthetic_screen
 from experiments.study.register import append, entry
 from recoil.config_files import new_study
-from tests.conftest import RECOIL, Recoil, refused
+from tests.conftest import Recoil, refused
 from tests.waiting import PATIENCE_S
+from tests.warm_start import warm
 
 RIGHT = ("--age", 25, "--sex", "female", "--handedness", "right")
 
@@ -139,10 +140,10 @@ def test_a_journal_cut_off_is_read_and_left_as_it_is(recoil: Recoil, pilot: Path
 
 
 def test_looking_while_a_run_writes_disturbs_neither(recoil: Recoil, pilot: Path) -> None:
-    words = [RECOIL, "run", "direction.toml", "--participant", "P01", "--screen", "synthetic"]
+    words = ["run", "direction.toml", "--participant", "P01", "--screen", "synthetic"]
     for number in range(1, 4):
-        words[4] = f"P{number:02d}"
-        running = subprocess.Popen([str(word) for word in words], cwd=pilot, stdout=subprocess.DEVNULL)
+        words[3] = f"P{number:02d}"
+        running = subprocess.Popen(warm(*words), cwd=pilot, stdout=subprocess.DEVNULL)
         while running.poll() is None:
             assert all(one[1] == "not begun" for one in states(told(recoil)).values())
         assert running.returncode == 0
@@ -334,7 +335,7 @@ def test_a_folder_that_is_no_study_is_refused(recoil: Recoil, tmp_path: Path) ->
 
 
 def test_consoles_that_join_people_at_once_all_find_them_there(recoil: Recoil, pilot: Path) -> None:
-    words = [str(RECOIL), "study", "pilot", *map(str, RIGHT), "--join"]
+    words = warm("study", "pilot", *RIGHT, "--join")
     environment = {**os.environ, "COLUMNS": "120"}
     started = [
         subprocess.Popen([*words, f"P{n:02d}"], cwd=pilot.parent, env=environment, stdout=subprocess.DEVNULL)

@@ -14,8 +14,8 @@ import pytest
 from analysis.predict.simulate import sweep
 from device.physics import GunParameters, simulate
 from experiments.config.door import ConfigError
-from tests.conftest import RECOIL
 from tests.waiting import PATIENCE_S, wait_for
+from tests.warm_start import warm
 
 GUN = GunParameters()
 
@@ -188,7 +188,7 @@ def test_an_interrupted_table_leaves_nothing_and_ends_with_130(tmp_path):
     part = tmp_path / ".shots.parquet.part"
     words = ("--vary", "friction_N=0.1:1.2:3000", "--vary", "voltage_V=12:24:3000", "--table", "shots.parquet")
     process = subprocess.Popen(
-        [RECOIL, "simulate", *words], cwd=tmp_path, stderr=subprocess.PIPE, text=True, env=os.environ
+        warm("simulate", *words), cwd=tmp_path, stderr=subprocess.PIPE, text=True, env=os.environ
     )
     wait_for(lambda: part.exists() or process.poll() is not None)
     assert process.poll() is None

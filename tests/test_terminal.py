@@ -11,11 +11,11 @@ from typing import Any
 import pytest
 
 from tests.at_terminal import DAMPER, FIRES, AtTerminal
-from tests.conftest import RECOIL
+from tests.warm_start import warm
 
 
-def run(configs: Path, experiment: str, *more: object) -> list[object]:
-    return [RECOIL, "run", configs / f"{experiment}.toml", "--participant", "P01", "--results", "results", *more]
+def run(configs: Path, experiment: str, *more: object) -> list[str]:
+    return warm("run", configs / f"{experiment}.toml", "--participant", "P01", "--results", "results", *more)
 
 
 def rows(folder: Path, name: str) -> list[dict[str, str]]:

@@ -52,7 +52,7 @@ class Watch:
 
     def words(self, command: list[object]) -> list[object]:
         """A `recoil` command, to be carried out under the eye."""
-        return [sys.executable, "-m", "tests.watched_console", json.dumps(asdict(self)), *command[1:]]
+        return ["-m", "tests.watched_console", json.dumps(asdict(self)), *command]
 
     def looks(self) -> list[Look]:
         """What stood in the windows, from the first look to the last."""

@@ -10,10 +10,12 @@ import sys
 from pathlib import Path
 from typing import Any
 
+from tests.warm_start import warm
+
 
 def words(file: Path, own: list[str]) -> list[str]:
     """The participant's program, to be carried out under the eye."""
-    return [sys.executable, "-m", "tests.watched_participant", str(file), *own]
+    return warm("-m", "tests.watched_participant", file, *own)
 
 
 def pages(file: Path) -> list[str]:

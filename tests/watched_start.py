@@ -18,7 +18,7 @@ LOOK_MS = 20
 
 def words(file: Path, command: list[object]) -> list[object]:
     """A `recoil` command, to be carried out under the eye."""
-    return [sys.executable, "-m", "tests.watched_start", file, *command[1:]]
+    return ["-m", "tests.watched_start", file, *command]
 
 
 def seen(file: Path) -> list[dict[str, Any]]:
