@@ -20,7 +20,7 @@ from experiments.load import shipped_folder
 from tests import warm_start
 from tests.waiting import PATIENCE_S
 
-pytest.register_assert_rewrite("tests.at_controls", "tests.experimenters")
+pytest.register_assert_rewrite("tests.at_controls", "tests.brute_force", "tests.experimenters", "tests.kills")
 
 settings.register_profile("recoil", deadline=None, derandomize=True)
 settings.load_profile("recoil")

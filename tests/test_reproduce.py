@@ -2,14 +2,12 @@
 
 from __future__ import annotations
 
-import json
 import shutil
 import subprocess
 from functools import partial
 from pathlib import Path
 
 import numpy as np
-import pandas as pd
 import pytest
 from scipy.stats import studentized_range
 from statsmodels.stats.anova import AnovaRM
@@ -19,25 +17,11 @@ from analysis.predict.reproduction import reproduce
 from analysis.predict.synthetic_studies import direction_counts, preference_scores
 from experiments.design.streams import generator
 from experiments.load import load_setup
+from tests.reproduced import EXPERIMENTS, scores, statistics
 from tests.waiting import PATIENCE_S, wait_for
 from tests.warm_start import warm
 
-EXPERIMENTS = ("direction", "preference")
 METHODS = ["vibration", "asymmetric-1", "asymmetric-2"]
-
-
-def statistics(folder: Path) -> dict[str, dict[str, object]]:
-    return json.loads((folder / "statistics.json").read_text())
-
-
-def scores(reproduction: Path, experiment: str) -> pd.DataFrame:
-    """One score a participant and method, long."""
-    logs = read_logs([reproduction / "logs"])
-    if experiment == "preference":
-        return logs.ratings.rename(columns={"rating": "score"})[["participant_id", "method", "score"]]
-    forward = logs.trials[logs.trials.direction == "forward"]
-    means = forward.groupby(["participant_id", "method"]).correct.mean().astype(float)
-    return means.rename("score").reset_index()
 
 
 def test_it_leaves_28_logs_with_their_journals_and_a_report(reproduction: Path) -> None:

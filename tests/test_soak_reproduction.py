@@ -18,8 +18,7 @@ from statsmodels.stats.anova import AnovaRM
 from experiments.direction.session import make_plan
 from experiments.load import load_setup
 from experiments.record.journal import JournalError, read_journal
-from tests import test_durability as durability
-from tests import test_reproduce as reproduction
+from tests import kills, reproduced
 from tests.conftest import RECOIL, Soak
 
 pytestmark = pytest.mark.soak
@@ -50,15 +49,15 @@ def test_28_logs_rebuilt_and_analysed_alike(out: Path, tmp_path: Path, soak: Soa
     for path, data in tables.items():
         (tmp_path / path.name).write_bytes(data)
     subprocess.run([RECOIL, "analyze", tmp_path, "--out", tmp_path / "again"], check=True, capture_output=True)
-    equal = reproduction.statistics(tmp_path / "again") == reproduction.statistics(out)
+    equal = reproduced.statistics(tmp_path / "again") == reproduced.statistics(out)
     soak("`recoil analyze` on the tables alone: statistics.json", "equal" if equal else "differs", "equal", "all keys")
     assert (same, len(tables), equal) == (28, 28, True)
 
 
-@pytest.mark.parametrize("experiment", reproduction.EXPERIMENTS)
+@pytest.mark.parametrize("experiment", reproduced.EXPERIMENTS)
 def test_statistics_against_other_programs(out: Path, soak: Soak, experiment: str) -> None:
-    table = reproduction.scores(out, experiment)
-    ours = reproduction.statistics(out)[experiment]
+    table = reproduced.scores(out, experiment)
+    ours = reproduced.statistics(out)[experiment]
     theirs = AnovaRM(table, "score", "participant_id", within=["method"]).fit().anova_table["F Value"].iloc[0]
     error = abs(ours["anova"]["F"] / theirs - 1)
     soak(f"{experiment}: F(2, 26), relative difference from AnovaRM", f"{error:.1e}", "1e-10", "statsmodels")
@@ -124,12 +123,12 @@ def test_200_kills(quick_configs: Path, tmp_path: Path, soak: Soak) -> None:
         folder = tmp_path / str(kill)
         folder.mkdir()
         begun = kill % 5 > 0
-        acknowledged += durability.check_killed_run(quick_configs, folder, moments.uniform(0, 4), begun=begun)
+        acknowledged += kills.check_killed_run(quick_configs, folder, moments.uniform(0, 4), begun=begun)
     soak("acknowledged answers lost over 200 `kill -9`", 0, "0", f"{acknowledged} were acknowledged, random moments")
 
 
 def test_the_trace_of_a_run(quick_configs: Path, tmp_path: Path, soak: Soak) -> None:
-    durability.test_the_system_calls_show_a_sync_before_each_acknowledgement(quick_configs, tmp_path)
+    kills.check_syncs(kills.traced_run(quick_configs, tmp_path))
     soak("acknowledgements without a sync before them", 0, "0", "strace; the folder's sync at creation as well")
 
 
@@ -149,7 +148,7 @@ def test_a_journal_cut_at_every_byte(out: Path, tmp_path: Path, soak: Soak) -> N
 
 
 def test_a_full_disk(quick_configs: Path, tmp_path: Path, soak: Soak) -> None:
-    durability.test_a_full_disk_stops_the_run_at_the_last_safe_answer(quick_configs, tmp_path)
+    kills.check_full_disk(quick_configs, tmp_path)
     soak("answers lost on a full disk", 0, "0", "64 KiB tmpfs, then resumed")
 
 
