@@ -14,6 +14,7 @@ from experiments.session import events
 from experiments.session.events import ACTS, Event
 from experiments.session.states import TABLE, No, State
 from tests.at_display import AtConsole, middle, records, remarks
+from tests.waiting import wait_for
 from tests.watched_console import Watch
 
 S = State
@@ -228,6 +229,8 @@ def carry_out(cell: Cell, action: Action, screen: AtConsole) -> Happened:
         cell.watch.go_on.touch()
     now = screen.ready() if not now.ended else now
     now = screen.heard()
+    due = written + len(expected_remarks(cell.state, action))  # the run may be slower to write than the window to show
+    wait_for(lambda: len(remarks(cell.journal)) >= due, lambda: f"only {remarks(cell.journal)[written:]} are written")
     after = remarks(cell.journal)[written:]
     return Happened(
         before=before.state,

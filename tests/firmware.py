@@ -411,12 +411,13 @@ FAST = 10
 
 
 def logs_of(recoil: Recoil, folder: Path, config: Path, gun: str) -> tuple[list[dict[str, str]], list[dict]]:
-    """A run's table but for its times, and how each shot in its journal came about."""
+    """A run's table but for times and for how many shots a train had time for, and how each shot came about."""
     words = ("--participant", "P01", "--screen", "synthetic", "--seed", 3, "--json", "--results", folder)
     done = recoil("run", config, *words, "--gun", gun)
     assert done.returncode == 0, done.stderr
     paths = {key: config.parent.parent / path for key, path in json.loads(done.stdout).items()}
-    return rows(paths["table"]), timings_of(read_journal(paths["journal"]))
+    table = [{key: cell for key, cell in row.items() if key != "shots"} for row in rows(paths["table"])]
+    return table, timings_of(read_journal(paths["journal"]))
 
 
 def driven(chip: Emulated) -> list[int]:

@@ -226,7 +226,7 @@ def test_a_synthetic_participant_at_the_console_answers_as_in_data_mode(
 def test_without_a_display_the_console_says_so(quick_configs: Path, tmp_path: Path) -> None:
     environment = {key: value for key, value in os.environ.items() if key not in ("DISPLAY", "QT_QPA_PLATFORM")}
     done = subprocess.run(
-        [str(word) for word in words(quick_configs, "direction", "--participant", "P01")],
+        warm(*words(quick_configs, "direction", "--participant", "P01")),
         cwd=tmp_path,
         env=environment,
         capture_output=True,

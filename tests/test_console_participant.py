@@ -290,7 +290,7 @@ def test_where_there_is_no_x_the_synthetic_rating_is_refused_with_one_message(
     environment = {key: value for key, value in os.environ.items() if key != "DISPLAY"}
     run = words(quick_configs, "preference", "--participant", "P01", "--visual", "--participant-screen")
     done = subprocess.run(
-        [str(word) for word in run],
+        warm(*run),
         cwd=tmp_path,
         env=environment | {"QT_QPA_PLATFORM": "offscreen"},
         capture_output=True,

@@ -300,6 +300,7 @@ def test_starting_anew_from_the_window_keeps_the_reason(pilot: Path, display: st
         wait_for(eye, having("P01 stopped direction on ", "Go on with it"))
         screen.keys.press("n", "Control_L")  # without a reason the line for it gets the keys
         screen.keys.type("loose")
+        wait_for(eye, lambda look: "loose" in look["texts"])
         time.sleep(HAND_S)
         screen.keys.press("n", "Control_L")
         wait_until(lambda: len(list(folder.glob("*journal*.jsonl"))) == 2)
