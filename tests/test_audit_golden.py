@@ -2,35 +2,13 @@
 
 from __future__ import annotations
 
-import tomllib
-from collections.abc import Iterator
-from pathlib import Path
 from typing import Any
 
 import pytest
 
-from analysis.paper.audit import CheckResult, Rounding, debit, grim, grimmer, p_against_statistic, read_printed
+from analysis.paper.audit import Rounding, debit, grim, grimmer, p_against_statistic, read_printed
 from analysis.paper.audit.means import scale_of
-
-GOLDEN = Path(__file__).parent / "golden" / "audit"
-SCRUTINY: dict[str, Any] = tomllib.loads((GOLDEN / "scrutiny.toml").read_text(encoding="utf-8"))
-STATCHECK: dict[str, Any] = tomllib.loads((GOLDEN / "statcheck.toml").read_text(encoding="utf-8"))
-TIES = {Rounding.HALF_UP.value, Rounding.HALF_EVEN.value, Rounding.HALF_DOWN.value}
-
-
-def rounded_either_way(result: CheckResult) -> bool:
-    """Attainable when a tie may fall either way: scrutiny's default."""
-    return result.verdict == "attainable" or bool(TIES & set(result.readings))
-
-
-def rows(kind: str, *columns: str) -> list[Any]:
-    return list(_rows(kind, *columns))
-
-
-def _rows(kind: str, *columns: str) -> Iterator[Any]:
-    for block in SCRUTINY[kind]:
-        for row in zip(*(block[column] for column in columns), strict=True):
-            yield pytest.param(block, *row, id=f"{block['source']}: {row[0]}")
+from tests.golden_audit import rounded_either_way, rows, statcheck_cases
 
 
 @pytest.mark.parametrize(("block", "mean", "n", "consistent"), rows("grim", "mean", "n", "consistent"))
@@ -53,13 +31,6 @@ def test_grimmer_agrees_with_scrutiny(_: object, mean: str, sd: str, n: int, con
 @pytest.mark.parametrize(("_", "mean", "sd", "n", "consistent"), rows("debit", "mean", "sd", "n", "consistent"))
 def test_debit_agrees_with_scrutiny(_: object, mean: str, sd: str, n: int, consistent: bool) -> None:
     assert rounded_either_way(debit(mean, sd, n)) == consistent
-
-
-def statcheck_cases() -> Iterator[Any]:
-    for block in STATCHECK["cases"]:
-        sides = block.get("sides", "two-sided")
-        for row in zip(*(block[key] for key in ("statistic", "value", "df", "p", "error")), strict=True):
-            yield pytest.param(sides, *row, id=f"{block['source']}: {row[0]} = {row[1]}, p {row[3]}")
 
 
 @pytest.mark.parametrize(("sides", "statistic", "value", "df", "p", "error"), list(statcheck_cases()))

@@ -2,10 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from fractions import Fraction
 from itertools import combinations_with_replacement, product
-from math import isqrt
 from pathlib import Path
 from random import Random
 
@@ -22,68 +20,16 @@ from analysis.paper.audit.reconstruct import ConditionColumn, Constraints, meets
 from analysis.paper.paper import Paper, load_paper
 from analysis.stats.binomial import binomial_test
 from tests.exact import exact_rm_F
+from tests.summarised_data import DESIGNS, MEANS, cases, summarised
 
 METHODS = ["vibration", "asymmetric-1", "asymmetric-2"]
 ASSUMED = {"vibration": 0.479, "asymmetric-1": 0.793, "asymmetric-2": 0.929}
-MEANS = {"vibration": 2.4, "asymmetric-1": 6.0, "asymmetric-2": 7.8}
-Rows = tuple[tuple[int, ...], ...]
-DESIGNS = [(1, True), (2, False), (3, False), (4, False), (2, True), (3, True), (4, True)]
 """Conditions, and whether SDs are printed beside the means and F."""
 
 
 @pytest.fixture(scope="module")
 def paper() -> Paper:
     return load_paper(Path(__file__).parent.parent / "configs" / "paper.toml")
-
-
-def half_up(value: Fraction, digits: int = 2) -> str:
-    """A number not below 0 as printed, by whole numbers alone."""
-    units = (2 * value * 10**digits + 1) // 2
-    return f"{units // 10**digits}.{units % 10**digits:0{digits}d}"
-
-
-def root_half_up(square: Fraction, digits: int = 2) -> str:
-    """The root of a square as printed: half the root of four squares, by whole numbers alone."""
-    scaled = square * 4 * 100**digits
-    units = (isqrt(scaled.numerator // scaled.denominator) + 1) // 2
-    return f"{units // 10**digits}.{units % 10**digits:0{digits}d}"
-
-
-def sample(random: Random, k: int) -> tuple[Rows, int]:
-    """Whole numbers that somebody might have answered: at random, or of people who differ."""
-    n, top = random.randint(5, 30), random.choice((4, 6, 10, 20, 100))
-    if random.random() < 0.5:
-        return tuple(tuple(random.randint(0, top) for _ in range(k)) for _ in range(n)), top
-    centres, people = [random.uniform(0.2, 0.8) * top for _ in range(k)], [random.gauss(0, top / 6) for _ in range(n)]
-    cells = ((min(max(round(random.gauss(c + p, top / 6)), 0), top) for c in centres) for p in people)
-    return tuple(map(tuple, cells)), top
-
-
-def summarised(rows: Rows, top: int, *, with_sds: bool) -> Constraints | None:
-    """What a paper would print of a sample, to two decimals; None where its F is undefined."""
-    n, k, columns = len(rows), len(rows[0]), list(zip(*rows, strict=True))
-    means = [half_up(Fraction(sum(column), n)) for column in columns]
-    squares = [Fraction(n * sum(x * x for x in column) - sum(column) ** 2, n * (n - 1)) for column in columns]
-    F = None
-    if k > 1:
-        a = k * sum(sum(c) ** 2 for c in columns) - sum(map(sum, columns)) ** 2
-        w = sum(k * sum(x * x for x in row) - sum(row) ** 2 for row in rows)
-        if n * w <= a:
-            return None
-        F = half_up(Fraction((n - 1) * a, n * w - a))
-    sds = [root_half_up(square) for square in squares] if with_sds else None
-    return printed_constraints(n, means, scale_of("1", "0", str(top)), sds=sds, F=F)
-
-
-def cases(k: int, with_sds: bool, count: int, seed: int = 5) -> Iterator[Constraints]:
-    random = Random(seed)
-    while count:
-        rows, top = sample(random, k)
-        wanted = summarised(rows, top, with_sds=with_sds)
-        if wanted is not None:
-            assert meets(rows, wanted), rows
-            count -= 1
-            yield wanted
 
 
 @pytest.mark.parametrize(("k", "with_sds"), DESIGNS)

@@ -16,8 +16,8 @@ from analysis.paper.audit.participants import forward_counts, rating_grains
 from analysis.paper.audit.reconstruct import meets, reconstruct
 from analysis.paper.paper import load_paper
 from tests import brute_force as brute
-from tests import test_audit_golden as golden
-from tests import test_audit_reconstruct as rebuilt
+from tests import golden_audit as golden
+from tests import summarised_data as rebuilt
 from tests.conftest import Soak
 
 pytestmark = pytest.mark.soak
