@@ -25,8 +25,8 @@ from experiments.record.provenance import provenance
 from experiments.record.replay import RunPosition
 from experiments.runner import carry_out, gun_name
 from experiments.session.steps import Answered, Rated, Session
-from experiments.study import places, register
-from experiments.study.places import Place, PlaceError
+from experiments.study import folders, register
+from experiments.study.folders import Place, PlaceError
 from experiments.study.register import Register
 from experiments.train import Desk
 
@@ -113,7 +113,7 @@ def run(request: RunRequest, make_screen: MakeScreen, clock: Clock) -> Finished:
     setup = request.setup
     drives = {one.method: one.drive for one in check_limits(setup)}
     registered = register.read_register(request.results)
-    place = places.place(request.results, request.participant_id, setup.config.experiment, registered)
+    place = folders.place(request.results, request.participant_id, setup.config.experiment, registered)
     place = replace(place, practice=request.practice)
     if not place.journal.exists():
         request = replace(request, anew_reason="")
@@ -180,7 +180,7 @@ def _before(where: Place, request: RunRequest, clock: Clock) -> Contents | None:
         return contents
     os.close(hold_journal(where.journal))  # refused while another run is at it
     _record_reason(where, request.anew_reason, clock)
-    places.set_aside(where)
+    folders.set_aside(where)
     return None
 
 
@@ -202,7 +202,7 @@ def _refuse_finished(where: Place, contents: Contents | None) -> None:
 def _new_plan(request: RunRequest, place: Place, registered: Register) -> Plan:
     setup, seed = request.setup, resolve_seed(request)
     if not request.practice:
-        row = places.row_of_next_run(setup, place.results, registered)
+        row = folders.row_of_next_run(setup, place.results, registered)
         return experiment(setup).make_plan(setup.config, place.participant_id, seed, row)
     plan = experiment(setup).make_practice(setup.config, place.participant_id, seed)
     if plan is None:

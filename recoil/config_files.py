@@ -20,7 +20,7 @@ from experiments.config.toml_text import toml_text
 from experiments.load import load_setup, shipped_folder
 from experiments.record import journal, storage
 from experiments.record.journal import JournalError
-from experiments.study.places import PlaceError
+from experiments.study.folders import PlaceError
 
 
 def copy_began_with(path: Path, folder: Path) -> list[Path]:

@@ -19,7 +19,7 @@ from experiments.record import storage
 from experiments.run import Again, Finished, ParticipantOptions, RunRequest, ScreenName, run
 from experiments.screens.synthetic import synthetic_screen
 from experiments.screens.terminal import TerminalScreen
-from experiments.study.places import Place, PlaceError, check_code, place, set_aside_file
+from experiments.study.folders import Place, PlaceError, check_code, place, set_aside_file
 
 
 def run_session(request: RunRequest) -> Place:

@@ -13,7 +13,7 @@ from device.twin.core import IDENTITY
 from device.twin.ports import Pty, Socket, Tcp, Troubles
 from device.twin.twin import Make, Twin
 from experiments.load import find, load_gun
-from experiments.study.places import PlaceError
+from experiments.study.folders import PlaceError
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

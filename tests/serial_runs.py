@@ -23,7 +23,7 @@ from experiments.record.replay import history
 from experiments.run import RunRequest
 from experiments.screens.synthetic import synthetic_screen
 from experiments.session.steps import Answered, Failed, Fired
-from experiments.study.places import Place, place
+from experiments.study.folders import Place, place
 from tests.journals import raw
 from tests.twins import Troubles
 

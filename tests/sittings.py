@@ -23,7 +23,7 @@ from experiments.screens.synthetic import SyntheticScreen, synthetic_screen
 from experiments.session.remarks import Remark
 from experiments.session.states import Position, State
 from experiments.session.steps import Outcome, Step, step_record
-from experiments.study.places import Place, place
+from experiments.study.folders import Place, place
 from experiments.train import Desk
 
 SETUPS = {name: load_setup(name) for name in ("direction", "preference")}

@@ -70,7 +70,7 @@ from experiments.session.steps import (
     Step,
     step_record,
 )
-from experiments.study.places import PlaceError
+from experiments.study.folders import PlaceError
 from recoil.doctor import examination_text
 from tests.conftest import RECOIL, Recoil
 from tests.kills import can_mount, in_small_disk

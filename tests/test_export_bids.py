@@ -22,7 +22,7 @@ from experiments.load import load_setup, shipped_folder
 from experiments.record import columns
 from experiments.run import RunRequest, run
 from experiments.screens.synthetic import synthetic_screen
-from experiments.study.places import PlaceError
+from experiments.study.folders import PlaceError
 from experiments.study.register import append, entry
 from recoil.config_files import new_study
 from tests.conftest import RECOIL, Recoil, refused

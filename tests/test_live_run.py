@@ -32,7 +32,7 @@ from experiments.session.remarks import (
 )
 from experiments.session.states import EMERGENCY, State
 from experiments.session.steps import Failed, FireShot, Interrupted, Prepare, Presented, Rated, Repeated, trial_of
-from experiments.study.places import place
+from experiments.study.folders import place
 from tests.at_controls import (
     DIRECTION,
     GUARD_S,

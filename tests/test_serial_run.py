@@ -12,7 +12,7 @@ from device.wire import errors
 from experiments.record.journal import read_journal
 from experiments.record.replay import history
 from experiments.session.steps import Failed
-from experiments.study.places import PlaceError
+from experiments.study.folders import PlaceError
 from recoil.session import check_pace
 from recoil.twin import troubles_of
 from tests.conftest import RECOIL

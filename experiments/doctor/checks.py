@@ -27,7 +27,7 @@ from experiments.doctor.figures import DoctorFinding, ProgramFigures
 from experiments.doctor.verdicts import Latencies, latencies, pooled
 from experiments.record import journal
 from experiments.record.journal import JournalError
-from experiments.study.places import PlaceError
+from experiments.study.folders import PlaceError
 
 DEADLINE_S = 20.0
 PSYCHOPY_DEADLINE_S = 60.0

@@ -19,7 +19,7 @@ from experiments.doctor.figures import Adapter, Appends, GunLine, Machine, Ticks
 from experiments.record import storage
 from experiments.record.provenance import recoil_version
 from experiments.runner import gun_name
-from experiments.study.places import PlaceError
+from experiments.study.folders import PlaceError
 
 PACKAGES = ("numpy", "scipy", "PyQt6", "psychopy")
 READINGS = 20_000

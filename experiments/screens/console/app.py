@@ -41,7 +41,7 @@ from experiments.session.events import Hand
 from experiments.session.remarks import Noted, Remark
 from experiments.session.states import Position
 from experiments.session.steps import Outcome, Step
-from experiments.study.places import PlaceError
+from experiments.study.folders import PlaceError
 
 GUN_LOOK_S = 0.2
 """How often the gun's state is looked at."""

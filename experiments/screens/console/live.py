@@ -34,8 +34,7 @@ from experiments.screens.console.widgets import WHY, Option, QuestionBox, TextLi
 from experiments.screens.console.windows import FreshShortcuts, let_go, signals_to
 from experiments.screens.participant.link import ParticipantError, ParticipantLink
 from experiments.screens.participant.messages import Look, NoiseIs
-from experiments.study.places import PlaceError
-from experiments.study.progress import StudyFolder, progress_of
+from experiments.study.folders import PlaceError, StudyFolder, progress_of
 
 _NO_HANDS = "--visual --participant-screen rates by synthetic events, which only an X display takes"
 

@@ -34,8 +34,7 @@ from experiments.screens.console.windows import (
     type_scale,
 )
 from experiments.study import enrolment
-from experiments.study.places import PlaceError
-from experiments.study.progress import Overview, StudyFolder, overview
+from experiments.study.folders import Overview, PlaceError, StudyFolder, overview
 from experiments.study.study import Participant, RunProgress
 
 _NAME = "start"
