@@ -17,8 +17,7 @@ from experiments.design.plan import Trial
 from experiments.live_run import Held, RunStopped
 from experiments.record.replay import RunPosition
 from experiments.session import events
-from experiments.session.history import trial_at
-from experiments.session.remarks import TestShot
+from experiments.session.history import TestShot, trial_at
 from experiments.session.states import State
 from experiments.session.steps import (
     Answered,

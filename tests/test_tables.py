@@ -14,7 +14,7 @@ from experiments.preference.session import rows as preference_rows
 from experiments.record import columns
 from experiments.record.columns import guard, unguard
 from experiments.record.tables import Row, table_bytes
-from experiments.session.remarks import AnswerCorrected
+from experiments.session.history import AnswerCorrected
 from experiments.session.steps import (
     Answered,
     Ask,

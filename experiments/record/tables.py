@@ -7,14 +7,15 @@ import io
 from collections.abc import Iterable
 
 from experiments.record import columns
-from experiments.session.history import TrialHistory, is_attempt
-from experiments.session.remarks import (
+from experiments.session.history import (
     AnswerCorrected,
     DescriptionCorrected,
     Flagged,
     Noted,
     RatingCorrected,
     Remark,
+    TrialHistory,
+    is_attempt,
 )
 from experiments.session.steps import Answered, Described, Failed, Fired, Interrupted, Outcome, Presented, Rated
 
