@@ -13,8 +13,7 @@ from device.methods import drive_of, rendering_of
 from device.parameters import GunParameters
 from device.words import Drive
 from experiments.config.door import ConfigError
-from experiments.config.gun import GunConfig
-from experiments.config.setup import Setup
+from experiments.config.setup import GunConfig, Setup
 from experiments.preference.config import PreferenceConfig
 
 

@@ -9,9 +9,8 @@ from typing import Any
 
 from experiments.catalogue import CATALOGUE
 from experiments.config.door import ConfigError, checked, load, read_toml
-from experiments.config.gun import GunConfig
 from experiments.config.models import ExperimentConfig, StudyConfig
-from experiments.config.setup import Setup
+from experiments.config.setup import GunConfig, Setup
 
 
 def shipped_folder() -> Path:

@@ -10,7 +10,7 @@ from device.physics.shot import highest_rate_Hz
 from device.physics.traces import energy_balance
 from device.simulated import SimulatedGun
 from device.words import Pulse, Shot
-from experiments.config.gun import GunConfig
+from experiments.config.setup import GunConfig
 from tests.shot_trains import train
 
 BACK = GunParameters(return_friction_N=1.12)
