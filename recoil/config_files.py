@@ -15,8 +15,7 @@ from pathlib import Path
 from typing import Any
 
 from experiments.catalogue import CATALOGUE
-from experiments.config.door import ConfigError
-from experiments.config.toml_text import toml_text
+from experiments.config.door import ConfigError, toml_text
 from experiments.load import load_setup, shipped_folder
 from experiments.record import journal, storage
 from experiments.record.journal import JournalError
