@@ -24,8 +24,7 @@ from device.words import (
 )
 
 if TYPE_CHECKING:
-    from device.methods import Method
-    from device.parameters import GunParameters
+    from device.methods import GunParameters, Method
 
 __all__ = [
     "DeviceError",
@@ -75,8 +74,10 @@ def _serial(address: str, parameters: GunParameters | Mapping[str, Method] | Non
 
 
 def _methods(parameters: GunParameters | Mapping[str, Method] | None) -> Mapping[str, Method]:
-    from device.methods import paper_methods  # noqa: PLC0415 - importing the words alone stays cheap
-    from device.parameters import GunParameters  # noqa: PLC0415
+    from device.methods import (
+        GunParameters,  # noqa: PLC0415
+        paper_methods,  # noqa: PLC0415 - importing the words alone stays cheap
+    )
 
     if isinstance(parameters, Mapping):
         return parameters

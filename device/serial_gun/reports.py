@@ -12,8 +12,7 @@ from dataclasses import dataclass
 from typing import Final
 
 from device.limits import Load, load_of
-from device.methods import Method, Rendering, rendering_of
-from device.parameters import GunParameters
+from device.methods import GunParameters, Method, Rendering, rendering_of
 from device.serial_gun.clocks import MAX_DRIFT, HostTime
 from device.serial_gun.commands import Contradiction, CutShort, Reply
 from device.wire.records import METHOD_NAME, Setting, ShotRecord, StatusRecord, Way

@@ -19,8 +19,7 @@ from analysis.predict.design_search.shots import Layer, shot_of
 from analysis.predict.design_search.space import Space
 from analysis.predict.fit.percept_model import FITTED, PAPER_RATES, PerceptFit, fit_percept
 from analysis.stats.arrays import FloatArray
-from device.methods import Method
-from device.parameters import GunParameters
+from device.methods import GunParameters, Method
 from device.physics import simulate
 from experiments.design.streams import generator
 from experiments.synthetic.diffusion import People
