@@ -13,8 +13,7 @@ from device.methods import paper_methods
 from device.serial_gun.opening import open_serial
 from device.twin.ports import Pty
 from device.twin.twin import Make, Twin
-from device.wire.frame import Frame, Garbled, Splitter, decode, encode
-from device.wire.records import Setting, ShotRecord
+from device.wire.records import Frame, Garbled, Setting, ShotRecord, Splitter, decode, encode
 from device.words import ShotTiming
 from tests.twins import PATIENT_S, Pair, host_clock, plugged_in
 

@@ -16,7 +16,7 @@ from hypothesis import strategies as st
 
 from device.wire import errors
 from device.wire.errors import TEXTS, message
-from device.wire.frame import Frame, encode
+from device.wire.records import Frame, encode
 from tests.firmware import CORES, built, one_after_the_other, told
 from tests.twin_scripts import transcript
 

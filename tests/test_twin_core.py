@@ -4,8 +4,7 @@ import pytest
 
 from device.twin.core import Core
 from device.twin.machine import REFUSED, DriveEvent
-from device.wire.frame import Frame, decode, encode, following
-from device.wire.records import ShotRecord, refusal_in
+from device.wire.records import Frame, ShotRecord, decode, encode, following, refusal_in
 from tests.twin_hosts import PULSE, READY, Hand, Strict
 
 

@@ -8,7 +8,7 @@ from hypothesis import strategies as st
 
 from device.twin.machine import LATE_EFFECT_US
 from device.wire import errors
-from device.wire.frame import MAX_LINE
+from device.wire.records import MAX_LINE
 from tests.twin_hosts import Hand, Strict
 from tests.twin_scripts import MAX_LATE_US, random_script, transcript
 

@@ -10,19 +10,24 @@ from hypothesis import strategies as st
 
 from device import LinkError
 from device.wire import errors, records
-from device.wire.frame import (
+from device.wire.records import (
     LAST_NUMBER,
     MAX_BODY,
     MAX_LINE,
     Frame,
     Garbled,
+    Named,
+    Refusal,
+    Setting,
+    ShotRecord,
     Splitter,
+    StatusRecord,
     decode,
     encode,
     following,
     is_newer,
+    refusal_in,
 )
-from device.wire.records import Named, Refusal, Setting, ShotRecord, StatusRecord, refusal_in
 
 BODIES = st.text(st.characters(min_codepoint=0x20, max_codepoint=0x7E), min_size=1, max_size=MAX_BODY)
 FRAMES = st.builds(Frame, number=st.integers(1, LAST_NUMBER), body=BODIES)

@@ -8,8 +8,7 @@ from collections.abc import Callable
 from dataclasses import dataclass, field
 from typing import Literal
 
-from device.wire.frame import Garbled
-from device.wire.records import refusal_in
+from device.wire.records import Garbled, refusal_in
 from device.words import LinkError
 
 CommandOutcome = Literal["done", "refused", "timed out", "garbled", "disconnected"]

@@ -25,8 +25,7 @@ from device.serial_gun.commands import (
 )
 from device.serial_gun.port import OpenPort, Port, SerialPort
 from device.wire import errors
-from device.wire.frame import Frame, Garbled, Splitter, decode, encode, following
-from device.wire.records import WIRE_VERSION, Named, named_value
+from device.wire.records import WIRE_VERSION, Frame, Garbled, Named, Splitter, decode, encode, following, named_value
 from device.words import LinkError
 
 PATIENCE_S = 0.25

@@ -11,8 +11,7 @@ from device.methods import Method
 from device.serial_gun.gun import SerialGun
 from device.serial_gun.link import Link
 from device.serial_gun.port import OpenPort, SerialPort
-from device.wire.frame import Splitter
-from device.wire.records import Named
+from device.wire.records import Named, Splitter
 from device.words import LinkError
 
 SCHEME = "serial:"

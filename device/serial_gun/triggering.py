@@ -30,8 +30,7 @@ from device.serial_gun.reports import (
     check_times,
 )
 from device.wire import errors
-from device.wire.frame import Garbled
-from device.wire.records import ShotRecord, StatusRecord
+from device.wire.records import Garbled, ShotRecord, StatusRecord
 from device.words import LimitError, LinkError
 
 TRIES = 4

@@ -11,8 +11,18 @@ from typing import Final
 from device.twin.machine import Carried, DriveEvent, StateMachine
 from device.wire import errors
 from device.wire.errors import message
-from device.wire.frame import Frame, Garbled, Splitter, decode, encode, is_newer
-from device.wire.records import WIRE_VERSION, Named, Setting, whole_number
+from device.wire.records import (
+    WIRE_VERSION,
+    Frame,
+    Garbled,
+    Named,
+    Setting,
+    Splitter,
+    decode,
+    encode,
+    is_newer,
+    whole_number,
+)
 
 QUEUE_SIZE: Final = 16
 WATCHDOG_MS: Final = 30_000
