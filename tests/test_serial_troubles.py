@@ -9,9 +9,8 @@ import pytest
 
 from device import LimitError, LinkError
 from device.limits import DriveHistory
-from device.serial_gun.commands import Disconnected
+from device.serial_gun.line import Disconnected, SerialPort
 from device.serial_gun.link import KEEP_ALIVE_S, WATCHDOG_S, Link
-from device.serial_gun.port import SerialPort
 from device.twin.twin import BUSY_US
 from tests.forger import a_lying_pair
 from tests.twins import SLOW, Troubles, a_pair, a_shot, a_twin, disarmings_of, said

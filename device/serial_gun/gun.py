@@ -8,7 +8,7 @@ from collections.abc import Callable, Mapping
 
 from device.limits import DriveHistory, planned_start_s
 from device.methods import Method
-from device.serial_gun.commands import CommandRefused, Disconnected, TimedOut, Unsure
+from device.serial_gun.line import CommandRefused, Disconnected, TimedOut, Unsure
 from device.serial_gun.link import Link
 from device.serial_gun.reports import MAX_UNCERTAINTY_S, ShotOrder, ShotRequest, asked, ready_s, report
 from device.serial_gun.triggering import TRIES, Arming, Triggering, ask_again, standing

@@ -11,19 +11,23 @@ from collections import deque
 from collections.abc import Callable
 from contextlib import suppress
 
-from device.serial_gun.clocks import Clocks, Exchange, HostTime
-from device.serial_gun.commands import (
+from device.serial_gun.line import (
     CalledOff,
+    Clocks,
     Disconnected,
+    Exchange,
     Forgotten,
+    HostTime,
+    OpenPort,
     Pending,
     PendingCommand,
+    Port,
     Reply,
+    SerialPort,
     TimedOut,
     Waiting,
     WrongVersion,
 )
-from device.serial_gun.port import OpenPort, Port, SerialPort
 from device.wire import errors
 from device.wire.records import WIRE_VERSION, Frame, Garbled, Named, Splitter, decode, encode, following, named_value
 from device.words import LinkError

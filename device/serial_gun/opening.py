@@ -9,8 +9,8 @@ from dataclasses import dataclass
 
 from device.methods import Method
 from device.serial_gun.gun import SerialGun
+from device.serial_gun.line import OpenPort, SerialPort
 from device.serial_gun.link import Link
-from device.serial_gun.port import OpenPort, SerialPort
 from device.wire.records import Named, Splitter
 from device.words import LinkError
 

@@ -10,7 +10,7 @@ import time
 from collections.abc import Callable
 from typing import TypeVar
 
-from device.serial_gun.commands import (
+from device.serial_gun.line import (
     CalledOff,
     CommandRefused,
     Contradiction,
