@@ -68,7 +68,7 @@ def open_gun(
 
 
 def _serial(address: str, parameters: GunParameters | Mapping[str, Method] | None, clock: Callable[[], float]) -> Gun:
-    from device.serial_gun.opening import open_serial  # noqa: PLC0415 - pyserial and the physics wait until they are wanted
+    from device.serial_gun.gun import open_serial  # noqa: PLC0415 - pyserial and the physics wait until they are wanted
 
     return open_serial(address, _methods(parameters), clock)
 

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from device.serial_gun.opening import speed_of
+from device.serial_gun.gun import speed_of
 from experiments.catalogue import rebuild
 from experiments.clock import Clock, RealClock, VirtualClock
 from experiments.config.setup import Setup

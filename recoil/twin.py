@@ -8,7 +8,7 @@ from dataclasses import dataclass, fields, replace
 from pathlib import Path
 from typing import Any
 
-from device.serial_gun.opening import MAX_SPEED
+from device.serial_gun.gun import MAX_SPEED
 from device.twin.core import IDENTITY
 from device.twin.ports import Pty, Socket, Tcp, Troubles
 from device.twin.twin import Make, Twin

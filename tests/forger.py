@@ -10,7 +10,7 @@ from random import Random
 from typing import Any
 
 from device.methods import paper_methods
-from device.serial_gun.opening import open_serial
+from device.serial_gun.gun import open_serial
 from device.twin.ports import Pty
 from device.twin.twin import Make, Twin
 from device.wire.records import Frame, Garbled, Setting, ShotRecord, Splitter, decode, encode

@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import Any
 
 from device import LinkError
-from device.serial_gun.opening import speed_of
+from device.serial_gun.gun import speed_of
 from device.serial_gun.reports import WAYS
 from device.twin.twin import Rendered, Twin
 from experiments import run as runs

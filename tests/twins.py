@@ -14,8 +14,7 @@ import pytest
 from device import Pulse, Shot
 from device.methods import paper_methods
 from device.serial_gun import link
-from device.serial_gun.gun import SerialGun
-from device.serial_gun.opening import open_serial
+from device.serial_gun.gun import SerialGun, open_serial
 from device.twin.machine import BOOT_REST_US
 from device.twin.ports import Pty, Socket, Tcp, Troubles
 from device.twin.twin import Make, Twin

@@ -13,7 +13,7 @@ from itertools import pairwise
 from pathlib import Path
 
 from device import open_gun
-from device.serial_gun.opening import speed_of
+from device.serial_gun.gun import speed_of
 from experiments.clock import RealClock
 from experiments.doctor.figures import Adapter, Appends, GunLine, Machine, Ticks, spread
 from experiments.record import storage
