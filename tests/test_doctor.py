@@ -28,13 +28,17 @@ from experiments.config.setup import sha256
 from experiments.design.plan import Trial
 from experiments.doctor import verdicts
 from experiments.doctor.checks import (
+    APPENDS,
     Check,
     ProgramReply,
+    adapters,
+    appends,
     carry_out_check,
     cause,
     checks,
     no_display,
     run_child,
+    ticks,
     within_seconds,
 )
 from experiments.doctor.figures import (
@@ -53,7 +57,6 @@ from experiments.doctor.figures import (
     percentile,
     spread,
 )
-from experiments.doctor.measures import APPENDS, adapters, appends, ticks
 from experiments.doctor.verdicts import Latencies, latencies, pooled
 from experiments.load import find, load_gun
 from experiments.record.journal import Journal, Record
