@@ -17,8 +17,8 @@ from experiments.clock import Clock, date_text
 from experiments.config.setup import Setup
 from experiments.design.plan import Plan
 from experiments.design.streams import draw_seed
-from experiments.limits import check_limits
 from experiments.live_run import LiveRun, RunStopped, Screen
+from experiments.load import check_limits
 from experiments.record import replay, storage
 from experiments.record.journal import Contents, Journal, JournalError, begun, hold_journal, read_journal
 from experiments.record.provenance import provenance

@@ -7,7 +7,7 @@ from typing import Any, NamedTuple
 
 from device import Identity, Shot, ShotReport, open_gun
 from device.words import GunStatus
-from experiments import catalogue, limits
+from experiments import catalogue, load
 from experiments.catalogue import table
 from experiments.clock import Clock, VirtualClock
 from experiments.config.setup import Setup
@@ -120,7 +120,7 @@ class Sitting(NamedTuple):
         desk = Desk(
             gun=self.gun,
             gun_name="simulated",
-            drives={one.method: one.drive for one in limits.check_limits(self.setup)},
+            drives={one.method: one.drive for one in load.check_limits(self.setup)},
             journal=self.journal,
             clock=self.clock,
             live=live,
