@@ -23,12 +23,11 @@ from experiments.record import replay, storage
 from experiments.record.journal import Contents, Journal, JournalError, begun, hold_journal, read_journal
 from experiments.record.provenance import provenance
 from experiments.record.replay import RunPosition
-from experiments.runner import carry_out, gun_name
+from experiments.runner import Desk, carry_out, gun_name
 from experiments.session.steps import Answered, Rated, Session
 from experiments.study import folders, register
 from experiments.study.folders import Place, PlaceError
 from experiments.study.register import Register
-from experiments.train import Desk
 
 Again = Literal["ask", "resume", "fresh"]
 """What to do with an unfinished run: refuse and say what is there, go on with it, or set it aside."""

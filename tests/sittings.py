@@ -18,13 +18,12 @@ from experiments.record import replay, storage
 from experiments.record.journal import Journal, read_journal
 from experiments.record.replay import RunPosition
 from experiments.run import RunRequest, run
-from experiments.runner import carry_out
+from experiments.runner import Desk, carry_out
 from experiments.screens.synthetic import SyntheticScreen, synthetic_screen
 from experiments.session.history import Remark
 from experiments.session.states import Position, State
 from experiments.session.steps import Outcome, Step, step_record
 from experiments.study.folders import Place, place
-from experiments.train import Desk
 
 SETUPS = {name: load_setup(name) for name in ("direction", "preference")}
 
