@@ -5,7 +5,7 @@ from __future__ import annotations
 import sys
 from collections.abc import Iterator
 
-from experiments.record.columns import FILE_SUFFIX, TABLES, Column
+from experiments.record.tables import FILE_SUFFIX, TABLES, Column
 
 _HEAD = """# Data dictionary
 

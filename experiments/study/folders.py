@@ -20,7 +20,7 @@ from experiments.config.models import CODE, StudyConfig
 from experiments.config.setup import Setup
 from experiments.design import plan
 from experiments.load import load_setup, load_study
-from experiments.record import columns, journal, replay, storage
+from experiments.record import journal, replay, storage, tables
 from experiments.record.journal import Contents, Head, JournalError
 from experiments.session.history import answered
 from experiments.study import register
@@ -62,7 +62,7 @@ class Place:
     @property
     def table(self) -> Path:
         """The table made from it."""
-        return self.folder / f"{self.stem}_{columns.FILE_SUFFIX[self.experiment]}.csv"
+        return self.folder / f"{self.stem}_{tables.FILE_SUFFIX[self.experiment]}.csv"
 
 
 def is_code(text: str) -> bool:
