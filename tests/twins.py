@@ -16,8 +16,7 @@ from device.methods import paper_methods
 from device.serial_gun import link
 from device.serial_gun.gun import SerialGun, open_serial
 from device.twin.machine import BOOT_REST_US
-from device.twin.ports import Pty, Socket, Tcp, Troubles
-from device.twin.twin import Make, Twin
+from device.twin.twin import Make, Pty, Socket, Tcp, Troubles, Twin
 
 PULSE = Pulse(voltage_V=16.0, pulse_s=0.010)
 
