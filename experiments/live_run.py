@@ -20,8 +20,9 @@ from experiments.design.plan import Plan, Trial
 from experiments.record.journal import Journal, JournalGone
 from experiments.session import events, judging
 from experiments.session.events import DISARMS, TYPED, Event, Press
-from experiments.session.history import History, Remark, remark_record
+from experiments.session.history import History
 from experiments.session.judging import Moment, refused, remark_of
+from experiments.session.remarks import Remark, remark_record
 from experiments.session.states import ARMED, Position, State, entered
 from experiments.session.steps import Outcome, Step
 

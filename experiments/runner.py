@@ -22,7 +22,8 @@ from experiments.live_run import Held, LiveRun, RunStopped
 from experiments.record.journal import Journal
 from experiments.record.replay import RunPosition
 from experiments.session import events
-from experiments.session.history import TestShot, trial_at
+from experiments.session.history import trial_at
+from experiments.session.remarks import TestShot
 from experiments.session.states import State
 from experiments.session.steps import (
     Answered,

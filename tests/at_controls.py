@@ -34,7 +34,7 @@ from experiments.screens.console.keys import Name, Presses
 from experiments.screens.console.view import About, Ended, GunSeen, Seen
 from experiments.session import events
 from experiments.session.events import Press
-from experiments.session.history import AnswerCorrected, Remark
+from experiments.session.remarks import AnswerCorrected, Remark
 from experiments.session.states import Position, State
 from experiments.session.steps import Answered, FireShot, Outcome, Step
 from experiments.study.folders import Place, place

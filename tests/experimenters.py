@@ -22,7 +22,8 @@ from experiments.record.replay import history
 from experiments.screens.console.keys import KEY_COMMANDS, Name
 from experiments.session import events
 from experiments.session.events import ACTS
-from experiments.session.history import AnswerCorrected, DescriptionCorrected, RatingCorrected, Refused, is_attempt
+from experiments.session.history import is_attempt
+from experiments.session.remarks import AnswerCorrected, DescriptionCorrected, RatingCorrected, Refused
 from experiments.session.states import ARMED, State
 from experiments.session.steps import Answered, Described, Rated
 from tests.at_controls import GUARD_S, Offered, Sitting, WatchedGun, gated, kept, remarks, tells_correctness

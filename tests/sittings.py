@@ -20,7 +20,7 @@ from experiments.record.replay import RunPosition
 from experiments.run import RunRequest, run
 from experiments.runner import Desk, carry_out
 from experiments.screens.synthetic import SyntheticScreen, synthetic_screen
-from experiments.session.history import Remark
+from experiments.session.remarks import Remark
 from experiments.session.states import Position, State
 from experiments.session.steps import Outcome, Step, step_record
 from experiments.study.folders import Place, place

@@ -17,7 +17,7 @@ from experiments.design.plan import Plan, Trial
 from experiments.screens.console import progress, view, widgets
 from experiments.screens.console.progress import RunTiming, clock_text, end_text, remaining_s, trials_done
 from experiments.screens.console.view import About, Ended, GunSeen, ParticipantSeen, Seen
-from experiments.session.history import AnswerCorrected, Flagged, Noted
+from experiments.session.remarks import AnswerCorrected, Flagged, Noted
 from experiments.session.states import Position, State
 from experiments.session.steps import Answered, Ask, Describe, Prepare, Present, Presented, Rate, Rated, Repeated, Rest
 from tests.at_controls import DIRECTION, PREFERENCE, sat_at, tells_correctness

@@ -17,11 +17,11 @@ from experiments.record import storage
 from experiments.record.replay import history
 from experiments.screens.texts import again_text
 from experiments.session import events
-from experiments.session import history as words
+from experiments.session import remarks as words
 from experiments.session.events import Event, Press
-from experiments.session.history import (
+from experiments.session.history import Entry
+from experiments.session.remarks import (
     AnswerCorrected,
-    Entry,
     Flagged,
     Halted,
     HaltReason,

@@ -16,7 +16,7 @@ from experiments.record.journal import Journal, read_journal
 from experiments.run import RunRequest, run
 from experiments.runner import MAX_FAILURES
 from experiments.screens.synthetic import SyntheticScreen, synthetic_screen
-from experiments.session.history import Remark
+from experiments.session.remarks import Remark
 from experiments.session.steps import Outcome, Step
 from experiments.study.folders import place
 from tests.journals import raw

@@ -2,6 +2,7 @@ import csv
 import io
 
 import pytest
+from experiments.record.columns import guard, unguard
 from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
@@ -12,8 +13,8 @@ from experiments.load import load_setup
 from experiments.preference.session import make_plan as preference_plan
 from experiments.preference.session import rows as preference_rows
 from experiments.record import tables
-from experiments.record.tables import Row, guard, table_bytes, unguard
-from experiments.session.history import AnswerCorrected
+from experiments.record.tables import Row, table_bytes
+from experiments.session.remarks import AnswerCorrected
 from experiments.session.steps import (
     Answered,
     Ask,

@@ -12,7 +12,8 @@ from experiments.design.plan import Plan, Trial, method_order
 from experiments.design.streams import Stream
 from experiments.direction.config import Breaks, Design, DirectionConfig
 from experiments.record.tables import Row, presentation
-from experiments.session.history import AnswerCorrected, History, TrialHistory, by_trial
+from experiments.session.history import History, TrialHistory, by_trial
+from experiments.session.remarks import AnswerCorrected
 from experiments.session.steps import Answered, Ask, Fired, FireShot, Prepare, Presenter, Rest, Session, Step
 
 

@@ -9,7 +9,8 @@ from experiments.design.plan import Plan, Trial, method_order
 from experiments.design.streams import Stream
 from experiments.preference.config import PreferenceConfig
 from experiments.record.tables import Row, presentation
-from experiments.session.history import DescriptionCorrected, History, RatingCorrected, TrialHistory, by_trial
+from experiments.session.history import History, TrialHistory, by_trial
+from experiments.session.remarks import DescriptionCorrected, RatingCorrected
 from experiments.session.steps import (
     Describe,
     Described,

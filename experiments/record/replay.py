@@ -6,7 +6,8 @@ from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 from experiments.record.journal import Contents, JournalError, Record, read_as
-from experiments.session.history import REMARK, Halted, History, Remark, TestShot
+from experiments.session.history import History
+from experiments.session.remarks import REMARK, Halted, Remark, TestShot
 from experiments.session.states import EMERGENCY
 from experiments.session.steps import (
     OUTCOME,

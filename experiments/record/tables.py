@@ -11,15 +11,14 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 from typing import Literal
 
-from experiments.session.history import (
+from experiments.session.history import TrialHistory, is_attempt
+from experiments.session.remarks import (
     AnswerCorrected,
     DescriptionCorrected,
     Flagged,
     Noted,
     RatingCorrected,
     Remark,
-    TrialHistory,
-    is_attempt,
 )
 from experiments.session.steps import Answered, Described, Failed, Fired, Interrupted, Outcome, Presented, Rated
 

@@ -15,8 +15,8 @@ from experiments.design.plan import Plan
 from experiments.live_run import LiveRun
 from experiments.session import events
 from experiments.session.events import Event
-from experiments.session.history import Remark
 from experiments.session.judging import REARM_HELD_S
+from experiments.session.remarks import Remark
 from experiments.session.states import EMERGENCY, Position, State
 from experiments.session.steps import Ask, Outcome, Present, Rate, Rest, Step
 

@@ -29,7 +29,8 @@ from experiments.screens.texts import (
 )
 from experiments.session import events
 from experiments.session.events import Event, Press
-from experiments.session.history import Entry, Remark, entered_value, flag_word
+from experiments.session.history import Entry, entered_value
+from experiments.session.remarks import Remark, flag_word
 from experiments.session.states import Position, State
 from experiments.session.steps import Ask, Describe, Outcome, Prepare, Rate, Rest, Step
 

@@ -8,8 +8,9 @@ from __future__ import annotations
 import unicodedata
 
 from experiments.design.plan import Plan, Trial
-from experiments.session import history, steps
-from experiments.session.history import MAX_FLAG, Entry, History, Remark, Value, entered_value, is_attempt, of_one_set
+from experiments.session import remarks, steps
+from experiments.session.history import Entry, History, Value, entered_value, is_attempt, of_one_set
+from experiments.session.remarks import MAX_FLAG, Remark
 from experiments.session.steps import Outcome, Prepare, Step, trial_of
 
 FLAG_RULE = f"A flag is a word of at most {MAX_FLAG} letters, digits and hyphens."
@@ -110,19 +111,19 @@ def _rested_text(word: Outcome | Remark) -> str:
 
 def _remark_text(plan: Plan, remark: Outcome | Remark) -> str:
     match remark:
-        case history.AnswerCorrected():
+        case remarks.AnswerCorrected():
             return f"Saved. Trial {remark.trial.trial} corrected to {value_text(remark.response)}."
-        case history.RatingCorrected():
+        case remarks.RatingCorrected():
             return f"Saved. {ordinal(plan, remark.trial)} corrected to {value_text(remark.rating)}."
-        case history.DescriptionCorrected():
+        case remarks.DescriptionCorrected():
             return f"Saved. {ordinal(plan, remark.trial)}: description corrected."
-        case history.Flagged():
+        case remarks.Flagged():
             return f"Saved. Trial {remark.trial.trial} flagged {remark.flag}."
-        case history.Noted(trial=Trial()):  # one without a trial is the program's own
+        case remarks.Noted(trial=Trial()):  # one without a trial is the program's own
             return "Saved. Note."
-        case history.HaltReason():
+        case remarks.HaltReason():
             return "Saved. Reason of the emergency stop."
-        case history.TestShot():
+        case remarks.TestShot():
             return f"Test shot failed: {remark.cause}." if remark.cause else "The test shot was fired; the run goes on."
         case _:
             return ""

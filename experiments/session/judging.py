@@ -8,25 +8,19 @@ from dataclasses import dataclass, replace
 from experiments.design.plan import Plan, Trial
 from experiments.session import events
 from experiments.session.events import ACTS, OWN_HAND_EVENTS, Event, Press
-from experiments.session.history import (
+from experiments.session.history import Entry, History, entered_value, entries, fits, repeatable, trial_at
+from experiments.session.remarks import (
     AnswerCorrected,
     Continued,
     DescriptionCorrected,
-    Entry,
     Flagged,
     Halted,
     HaltReason,
-    History,
     Noted,
     Paused,
     RatingCorrected,
     Refused,
     Remark,
-    entered_value,
-    entries,
-    fits,
-    repeatable,
-    trial_at,
 )
 from experiments.session.states import No, Position, State, after, why_after
 

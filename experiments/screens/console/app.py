@@ -38,7 +38,7 @@ from experiments.screens.console.windows import finish_tone, hear_of_loss, on_lo
 from experiments.screens.synthetic import synthetic_participant_of
 from experiments.session import events
 from experiments.session.events import Hand
-from experiments.session.history import Noted, Remark
+from experiments.session.remarks import Noted, Remark
 from experiments.session.states import Position
 from experiments.session.steps import Outcome, Step
 from experiments.study.folders import PlaceError

@@ -11,17 +11,8 @@ from experiments.design.plan import Trial
 from experiments.screens import texts
 from experiments.screens.console.view import About, GunSeen, Seen
 from experiments.session import steps
-from experiments.session.history import (
-    AnswerCorrected,
-    DescriptionCorrected,
-    Flagged,
-    Noted,
-    RatingCorrected,
-    Remark,
-    done,
-    entries,
-    of_one_set,
-)
+from experiments.session.history import done, entries, of_one_set
+from experiments.session.remarks import AnswerCorrected, DescriptionCorrected, Flagged, Noted, RatingCorrected, Remark
 from experiments.session.states import Position, State
 from experiments.session.steps import Outcome, Step, trial_of
 

@@ -15,7 +15,8 @@ from experiments.design.plan import Plan, Trial
 from experiments.live_run import LiveRun
 from experiments.screens import texts
 from experiments.screens.console.keys import Name, shown_key
-from experiments.session.history import History, Remark, entered_value, trial_at
+from experiments.session.history import History, entered_value, trial_at
+from experiments.session.remarks import Remark
 from experiments.session.states import Position, State
 from experiments.session.steps import Ask, Describe, Outcome, Prepare, Present, Rate, Rest, Step
 

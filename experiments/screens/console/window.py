@@ -38,7 +38,7 @@ from experiments.screens.console.windows import Keyboard, remember, scaled_sheet
 from experiments.screens.participant.messages import Theme
 from experiments.screens.texts import saved_text
 from experiments.session.events import Press
-from experiments.session.history import Halted
+from experiments.session.remarks import Halted
 from experiments.session.states import Position
 from experiments.session.steps import Failed, Rested
 

@@ -1,0 +1,156 @@
+"""What is said about a run beside its steps: corrections, flags, notes, pauses. They change no step, only the table.
+
+The old value of a correction stays in the journal; the table shows the last one.
+"""
+
+from __future__ import annotations
+
+from dataclasses import asdict, dataclass
+from typing import Annotated, Literal
+
+from pydantic import Field, TypeAdapter
+
+from device.words import Direction
+from experiments.config.setup import without_blank_instruction
+from experiments.design.plan import Trial
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class AnswerCorrected:
+    """The answer to a trial was entered wrongly; this is what the participant had said."""
+
+    trial: Trial
+    response: Direction
+    kind: Literal["answer-corrected"] = "answer-corrected"
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class RatingCorrected:
+    """A rating was entered wrongly; `None` is no answer."""
+
+    trial: Trial
+    rating: float | None
+    kind: Literal["rating-corrected"] = "rating-corrected"
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class DescriptionCorrected:
+    """A description was entered wrongly; these were the participant's words."""
+
+    trial: Trial
+    comment: str
+    kind: Literal["description-corrected"] = "description-corrected"
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Flagged:
+    """A trial is marked, with a word such as `noise` or `late`."""
+
+    trial: Trial
+    flag: Annotated[str, Field(pattern=r"^[a-z][a-z0-9-]{0,31}$")]
+    kind: Literal["flagged"] = "flagged"
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Noted:
+    """The experimenter's words on a trial, or on the run if no trial is named."""
+
+    trial: Trial | None
+    text: str
+    kind: Literal["noted"] = "noted"
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Paused:
+    """The run was paused by the experimenter, or for the cause that is named."""
+
+    cause: str = ""
+    kind: Literal["paused"] = "paused"
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Continued:
+    """The run went on after a pause of so many seconds."""
+
+    paused_s: float
+    kind: Literal["continued"] = "continued"
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Refused:
+    """Something was pressed that would have carried the run on, and was not taken; why."""
+
+    event: str
+    state: str
+    because: str
+    by: Literal["experimenter", "participant"]
+    kind: Literal["refused"] = "refused"
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Halted:
+    """The emergency stop: from here on this run arms and fires no more. `by` is at whose screen."""
+
+    by: Literal["experimenter", "participant"]
+    kind: Literal["halted"] = "halted"
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class HaltReason:
+    """Why there was an emergency stop."""
+
+    text: str
+    kind: Literal["halt-reason"] = "halt-reason"
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class TestShot:
+    """A shot that nobody judged, after a key was held for so long: the gun may be armed again after an emergency stop.
+
+    `held_s` is `None` where words were typed instead. Empty `cause`: it was fired, at a time on the host's monotonic
+    clock.
+    """
+
+    method: str
+    held_s: float | None
+    cause: str = ""
+    pulse_start_s: float | None = None
+    motion: str = ""
+    kind: Literal["test-shot"] = "test-shot"
+
+
+Remark = (
+    AnswerCorrected
+    | RatingCorrected
+    | DescriptionCorrected
+    | Flagged
+    | Noted
+    | Paused
+    | Continued
+    | Refused
+    | Halted
+    | HaltReason
+    | TestShot
+)
+
+MAX_FLAG = 32
+
+
+def flag_word(typed: str) -> str | None:
+    """The flag that was typed, as it is kept; `None` if it is no word.
+
+    >>> flag_word("Door slam"), flag_word("9 lives"), flag_word("-")
+    ('door-slam', None, None)
+    """
+    flag = "-".join(typed.lower().split())
+    plain = flag.isascii() and flag.replace("-", "").isalnum() and flag[0].isalpha()
+    return flag if plain and len(flag) <= MAX_FLAG else None
+
+
+REMARK: TypeAdapter[Remark] = TypeAdapter(Annotated[Remark, Field(discriminator="kind")])
+"""Reads the remark that a record holds."""
+
+
+def remark_record(remark: Remark) -> dict[str, object]:
+    """A remark as plain JSON values."""
+    return asdict(remark, dict_factory=without_blank_instruction)
