@@ -74,10 +74,7 @@ def _serial(address: str, parameters: GunParameters | Mapping[str, Method] | Non
 
 
 def _methods(parameters: GunParameters | Mapping[str, Method] | None) -> Mapping[str, Method]:
-    from device.methods import (
-        GunParameters,  # noqa: PLC0415
-        paper_methods,  # noqa: PLC0415 - importing the words alone stays cheap
-    )
+    from device.methods import GunParameters, paper_methods  # noqa: PLC0415 - importing the words alone stays cheap
 
     if isinstance(parameters, Mapping):
         return parameters

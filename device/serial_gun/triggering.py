@@ -10,6 +10,7 @@ import time
 from collections.abc import Callable
 from typing import TypeVar
 
+from device.serial_gun import reports
 from device.serial_gun.line import (
     CalledOff,
     CommandRefused,
@@ -21,14 +22,6 @@ from device.serial_gun.line import (
     Unsure,
 )
 from device.serial_gun.link import PATIENCE_S, Link
-from device.serial_gun.reports import (
-    BelievedShot,
-    ShotOrder,
-    check_not_fired,
-    check_record,
-    check_standing,
-    check_times,
-)
 from device.wire import errors
 from device.wire.records import Garbled, ShotRecord, StatusRecord
 from device.words import LimitError, LinkError
@@ -56,7 +49,7 @@ def standing(link: Link) -> tuple[Reply, StatusRecord]:
     """How the gun stands. `Contradiction`: as it cannot stand."""
     reply, found = _read(link, "STAT?", StatusRecord.parse)
     try:
-        check_standing(found)
+        reports.check_standing(found)
     except Contradiction as error:
         raise Contradiction(f"the gun's answer to STAT? is not believed: {error}") from error
     return reply, found
@@ -156,7 +149,7 @@ class Triggering:
     def __init__(self, link: Link, arming: Arming, clock: Callable[[], float], speed: float) -> None:
         self._link, self._arming, self._clock, self._speed = link, arming, clock, speed
 
-    def fire(self, order: ShotOrder) -> BelievedShot:
+    def fire(self, order: reports.ShotOrder) -> reports.BelievedShot:
         """The shot as it was told of and is believed. Only one that was surely not fired is triggered again.
 
         `LimitError`, `LinkError`: it was not fired. `Unsure`: it was, or may have been.
@@ -181,19 +174,19 @@ class Triggering:
         self._arming.disarm()
         raise TimedOut(f"not fired: {trouble}, {TRIES} times")
 
-    def _trigger(self, order: ShotOrder) -> Reply:
+    def _trigger(self, order: reports.ShotOrder) -> Reply:
         before_us = max(order.at_us, self._link.gun_us(self._clock())) + round(LATEST_S * self._speed * 1e6)
         trigger = f"TRIG {order.mark},{order.at_us},{before_us}"
         return self._link.ask(
             trigger, self._patience_s(order), lambda: self._arming.stands(order.disarms, order.session)
         )
 
-    def _patience_s(self, order: ShotOrder) -> float:
+    def _patience_s(self, order: reports.ShotOrder) -> float:
         """How long from now on a shot may take to end, in seconds of the real world."""
         ahead_s = 0.0 if order.at_s is None else max(order.at_s - self._clock(), 0.0)
         return PATIENCE_S + (ahead_s + order.wanted.setting.length_us / 1e6) / self._speed
 
-    def _look(self, order: ShotOrder, trouble: LinkError) -> tuple[Reply, ShotRecord] | None:
+    def _look(self, order: reports.ShotOrder, trouble: LinkError) -> tuple[Reply, ShotRecord] | None:
         """The record of a shot whose answer was lost, when it has ended; None if it was surely not fired."""
         end_s, stopped = time.monotonic() + self._patience_s(order), False
         while True:
@@ -206,12 +199,12 @@ class Triggering:
                 self._arming.disarm()
                 stopped = True
 
-    def _last_shot(self, order: ShotOrder, trouble: LinkError) -> tuple[Reply, ShotRecord]:
+    def _last_shot(self, order: reports.ShotOrder, trouble: LinkError) -> tuple[Reply, ShotRecord]:
         """What the gun says of its last shot, if it still knows. `Unsure`: it does not, or it contradicts itself."""
         try:
             reply, record = last_shot(self._link)
             if self._link.boot == order.boot:
-                check_not_fired(record, order)
+                reports.check_not_fired(record, order)
                 return reply, record
         except Contradiction as error:
             raise self._disbelieved(order, error) from error
@@ -219,7 +212,7 @@ class Triggering:
             trouble = error
         raise self._lost(order, trouble)
 
-    def _refused(self, error: CommandRefused, order: ShotOrder) -> LinkError:
+    def _refused(self, error: CommandRefused, order: reports.ShotOrder) -> LinkError:
         """A trigger that came too late, and may be written again. Raises what any other refusal means."""
         if error.code == errors.TOO_LATE:
             return error
@@ -246,7 +239,7 @@ class Triggering:
             )
         return Disconnected(f"not fired: {error}")
 
-    def _why_not(self, order: ShotOrder) -> str:
+    def _why_not(self, order: reports.ShotOrder) -> str:
         """Why a shot was called off, or cut short: a disarming, a fault of the driver, the line, or the watchdog."""
         if self._arming.disarms != order.disarms:
             return "the gun was disarmed meanwhile"
@@ -258,10 +251,10 @@ class Triggering:
             return self._link.why_lost
         return f"the driver reports fault {found.fault}" if found.fault else "the gun does not say why"
 
-    def _believed(self, reply: Reply, record: ShotRecord, order: ShotOrder, tries: int) -> BelievedShot:
+    def _believed(self, reply: Reply, record: ShotRecord, order: reports.ShotOrder, tries: int) -> reports.BelievedShot:
         """What is told of a shot, if it is believed."""
         try:
-            check_record(record, order)
+            reports.check_record(record, order)
             return self._told(reply, record, order, tries)
         except Contradiction as error:
             raise self._disbelieved(order, error) from error
@@ -270,14 +263,16 @@ class Triggering:
         except LinkError as error:
             raise self._lost(order, error) from error
 
-    def _told(self, reply: Reply, record: ShotRecord, order: ShotOrder, tries: int) -> BelievedShot:
+    def _told(self, reply: Reply, record: ShotRecord, order: reports.ShotOrder, tries: int) -> reports.BelievedShot:
         """A record's times on the host's clock. A clock that was misread is learnt anew before they are disbelieved."""
         trouble = Contradiction()
         for _ in range(CLOCK_TRIES):
             accepted, start, end = self._link.host(record.accepted_us, record.start_us, record.end_us)
-            told = BelievedShot(reply=reply, record=record, tries=tries, accepted=accepted, start=start, end=end)
+            told = reports.BelievedShot(
+                reply=reply, record=record, tries=tries, accepted=accepted, start=start, end=end
+            )
             try:
-                check_times(told, order, self._speed)
+                reports.check_times(told, order, self._speed)
             except Contradiction as error:
                 trouble = error
                 ask_again(self._link, "TIME?")
@@ -285,13 +280,13 @@ class Triggering:
                 return told
         raise trouble
 
-    def _disbelieved(self, order: ShotOrder, why: Contradiction) -> Unsure:
+    def _disbelieved(self, order: reports.ShotOrder, why: Contradiction) -> Unsure:
         return self._unsure(order, f"the shot may have been fired, and the gun's record is not believed: {why}")
 
-    def _lost(self, order: ShotOrder, why: LinkError) -> Unsure:
+    def _lost(self, order: reports.ShotOrder, why: LinkError) -> Unsure:
         return self._unsure(order, f"the shot may have been fired: {why}, and the gun cannot tell any more")
 
-    def _unsure(self, order: ShotOrder, what: str) -> Unsure:
+    def _unsure(self, order: reports.ShotOrder, what: str) -> Unsure:
         """The error of a shot that was, or may have been, fired. The gun is disarmed, lest it still be."""
         self._arming.disarm()
         return Unsure(f"{what}; the gun's COUNT was {order.count} before it")

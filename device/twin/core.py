@@ -9,27 +9,15 @@ from collections.abc import Callable
 from typing import Final
 
 from device.twin.machine import Carried, DriveEvent, StateMachine
-from device.wire import errors
+from device.wire import errors, records
 from device.wire.errors import message
-from device.wire.records import (
-    WIRE_VERSION,
-    Frame,
-    Garbled,
-    Named,
-    Setting,
-    Splitter,
-    decode,
-    encode,
-    is_newer,
-    whole_number,
-)
 
 QUEUE_SIZE: Final = 16
 WATCHDOG_MS: Final = 30_000
 """At boot, for a hand at a terminal; `SerialGun` asks for a shorter one."""
 MIN_WATCHDOG_MS, MAX_WATCHDOG_MS = 100, 60_000
 
-IDENTITY: Final = Named(model="haptic-gun", serial="TWIN-1", wire=WIRE_VERSION, firmware="1.0.0")
+IDENTITY: Final = records.Named(model="haptic-gun", serial="TWIN-1", wire=records.WIRE_VERSION, firmware="1.0.0")
 
 Said = str | int | None
 """What a command comes to: an answer, an error's number, or nothing to say but that it is done."""
@@ -39,12 +27,12 @@ class Core:
     """One gun from its boot at `now_us` on. Calls come with times that never run back; `board` carries drives out."""
 
     def __init__(
-        self, identity: Named = IDENTITY, now_us: int = 0, board: Callable[[DriveEvent], Carried] | None = None
+        self, identity: records.Named = IDENTITY, now_us: int = 0, board: Callable[[DriveEvent], Carried] | None = None
     ) -> None:
         self.machine = StateMachine(now_us, board)
         self.strict = False
         self._identity = identity
-        self._splitter = Splitter()
+        self._splitter = records.Splitter()
         self._errors: list[int] = []
         self._out = bytearray()
         self._last = 0  # sequence number
@@ -110,8 +98,8 @@ class Core:
 
     def _take_frame(self, line: bytes, now_us: int) -> None:
         try:
-            frame = decode(line, "host")
-        except Garbled:
+            frame = records.decode(line, "host")
+        except records.Garbled:
             if line == b"*IDN?":
                 self._say(self._identity.text())
             else:
@@ -121,15 +109,15 @@ class Core:
             self._enter(frame, now_us)
         elif not self.strict:
             self._send(frame.number, f"ERR {message(errors.NO_SESSION)}")
-        elif is_newer(frame.number, self._last):
+        elif records.is_newer(frame.number, self._last):
             self._last, self._heard_us = frame.number, now_us
             self._answer(frame, now_us)
 
-    def _enter(self, frame: Frame, now_us: int) -> None:
+    def _enter(self, frame: records.Frame, now_us: int) -> None:
         """A session of the strict mode begins: disarmed, numbered from this frame on. It tells the token before."""
         try:
-            token = whole_number(frame.body.removeprefix("SYST:STRI "))
-        except Garbled:
+            token = records.whole_number(frame.body.removeprefix("SYST:STRI "))
+        except records.Garbled:
             self._send(frame.number, f"ERR {message(errors.BAD_TYPE)}")
             return
         self._pending = 0
@@ -137,7 +125,7 @@ class Core:
         self._send(frame.number, f"STRI {self._token}")
         self.strict, self._token, self._last, self._heard_us = True, token, frame.number, now_us
 
-    def _answer(self, frame: Frame, now_us: int) -> None:
+    def _answer(self, frame: records.Frame, now_us: int) -> None:
         if frame.body == "SYST:PLAI":
             self._abort(now_us)
             self._send(frame.number, "OK")
@@ -172,9 +160,9 @@ class Core:
             return errors.NOT_ALLOWED if parameters else self._simple(header, now_us)
         try:
             return self._with(
-                header, rest, [] if header == "CONF" else [whole_number(text) for text in parameters], now_us
+                header, rest, [] if header == "CONF" else [records.whole_number(text) for text in parameters], now_us
             )
-        except Garbled:
+        except records.Garbled:
             return errors.BAD_TYPE if header in _WITH else errors.UNDEFINED
 
     def _simple(self, header: str, now_us: int) -> Said:
@@ -213,7 +201,9 @@ class Core:
     def _with(self, header: str, rest: str, numbers: list[int], now_us: int) -> Said:
         match header:
             case "CONF":
-                return (self.machine.configure(Setting.parse(rest)) if rest else errors.MISSING_PARAMETER) or None
+                return (
+                    self.machine.configure(records.Setting.parse(rest)) if rest else errors.MISSING_PARAMETER
+                ) or None
             case "TRIG" if len(numbers) <= 3:
                 mark, at_us, before_us = [*numbers, 0, 0, 0][:3]
                 return self.machine.trigger(mark, at_us, before_us, now_us) or None
@@ -237,7 +227,7 @@ class Core:
             self._out.extend(f"{said}\n".encode("ascii"))
 
     def _send(self, sequence: int, body: str) -> None:
-        self._out.extend(encode(Frame(number=sequence, body=body), "gun"))
+        self._out.extend(records.encode(records.Frame(number=sequence, body=body), "gun"))
 
     def _queue(self, error: int) -> None:
         if len(self._errors) < QUEUE_SIZE:

@@ -10,7 +10,7 @@ import time
 from collections import deque
 from collections.abc import Callable, Mapping
 from contextlib import suppress
-from dataclasses import dataclass, field, fields, replace
+from dataclasses import dataclass, fields, replace
 from pathlib import Path
 from random import Random
 from threading import Event, Thread
@@ -47,10 +47,10 @@ class Troubles:
     replug_s: float = 0.3
 
     def __post_init__(self) -> None:
-        for field in fields(self):
-            value, most = getattr(self, field.name), 60.0 if field.name.endswith("_s") else 1.0
+        for name in (one.name for one in fields(self)):
+            value, most = getattr(self, name), 60.0 if name.endswith("_s") else 1.0
             if not 0 <= value <= most:
-                raise ValueError(f"{field.name} is {value}; it must be 0 to {most:g}")
+                raise ValueError(f"{name} is {value}; it must be 0 to {most:g}")
 
     @property
     def unplugs(self) -> bool:
@@ -296,7 +296,7 @@ class Make:
     identity: Named = IDENTITY
     speed: float = 1.0
     drift_ppm: float = 0.0
-    troubles: Troubles = field(default_factory=Troubles)
+    troubles: Troubles = Troubles()
     seed: int = 1
 
 

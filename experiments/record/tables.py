@@ -11,15 +11,8 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 from typing import Literal
 
+from experiments.session import remarks
 from experiments.session.history import TrialHistory, is_attempt
-from experiments.session.remarks import (
-    AnswerCorrected,
-    DescriptionCorrected,
-    Flagged,
-    Noted,
-    RatingCorrected,
-    Remark,
-)
 from experiments.session.steps import Answered, Described, Failed, Fired, Interrupted, Outcome, Presented, Rated
 
 ColumnType = Literal["text", "level", "integer", "number", "flag"]
@@ -165,7 +158,7 @@ Row = dict[str, object]
 def presentation(events: TrialHistory, shown: type[Fired | Presented]) -> Row:
     """How a trial was presented: attempts, flags, note, onset of the last stimulus, gun. Empty if it never was."""
     attempts = sum(is_attempt(step, word) for step, word in events.items)
-    notes = "; ".join(remark.text for remark in events.all(Noted))
+    notes = "; ".join(remark.text for remark in events.all(remarks.Noted))
     row: Row = {"attempts": attempts or None, "flags": " ".join(_flags(events)), "note": notes}
     stimulus = events.last(shown)
     return row | ({"onset_utc": stimulus.onset_utc, "gun": stimulus.gun} if stimulus else {})
@@ -180,14 +173,14 @@ def _flags(events: TrialHistory) -> list[str]:
         "repeated": events.repeated,
         "corrected": any(_is_corrected(events, given) for given in _CORRECTIONS),
     }
-    own = [remark.flag for remark in events.all(Flagged)]
+    own = [remark.flag for remark in events.all(remarks.Flagged)]
     return list(dict.fromkeys([flag for flag, there in found.items() if there] + own))
 
 
-_CORRECTIONS: dict[type[Outcome], type[Remark]] = {
-    Answered: AnswerCorrected,
-    Rated: RatingCorrected,
-    Described: DescriptionCorrected,
+_CORRECTIONS: dict[type[Outcome], type[remarks.Remark]] = {
+    Answered: remarks.AnswerCorrected,
+    Rated: remarks.RatingCorrected,
+    Described: remarks.DescriptionCorrected,
 }
 
 

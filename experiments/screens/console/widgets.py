@@ -10,37 +10,8 @@ from dataclasses import dataclass
 from math import ceil
 from string import Template
 
+from PyQt6 import QtGui, QtWidgets
 from PyQt6.QtCore import QEvent, QPointF, QRectF, QSize, Qt
-from PyQt6.QtGui import (
-    QColor,
-    QKeyEvent,
-    QKeySequence,
-    QPainter,
-    QPaintEvent,
-    QPen,
-    QPolygonF,
-    QResizeEvent,
-    QShortcut,
-    QTextOption,
-    QWheelEvent,
-)
-from PyQt6.QtWidgets import (
-    QBoxLayout,
-    QCheckBox,
-    QComboBox,
-    QFrame,
-    QHBoxLayout,
-    QLabel,
-    QLineEdit,
-    QListWidget,
-    QPushButton,
-    QSizePolicy,
-    QStyle,
-    QStyleOptionButton,
-    QTextEdit,
-    QVBoxLayout,
-    QWidget,
-)
 
 from experiments.screens.participant.messages import Theme
 from experiments.study.register import MAX_REASON, RegisterError, check_reason
@@ -169,23 +140,23 @@ Slot = Callable[[], object]
 NO_FOCUS = Qt.FocusPolicy.NoFocus
 
 
-def text_label(name: str, text: str = "", *, wrap: bool = True) -> QLabel:
+def text_label(name: str, text: str = "", *, wrap: bool = True) -> QtWidgets.QLabel:
     """A label in the style of its name."""
-    made = QLabel(text)
+    made = QtWidgets.QLabel(text)
     made.setObjectName(name)
     made.setWordWrap(wrap)
     made.setTextFormat(Qt.TextFormat.PlainText)
     return made
 
 
-def set_mood(widget: QWidget, mood: str) -> None:
+def set_mood(widget: QtWidgets.QWidget, mood: str) -> None:
     """Give a label the colour of a mood; drawn anew only if it changes."""
     if widget.property("mood") != mood:
         widget.setProperty("mood", mood)
         restyle(widget)
 
 
-def restyle(widget: QWidget) -> None:
+def restyle(widget: QtWidgets.QWidget) -> None:
     """Have a widget drawn anew after a property that the style knows has changed."""
     style = widget.style()
     if style is not None:
@@ -193,7 +164,7 @@ def restyle(widget: QWidget) -> None:
         style.polish(widget)
 
 
-def button(parent: QWidget, text: str, key: str, slot: Slot, *, name: str = "") -> QPushButton:
+def button(parent: QtWidgets.QWidget, text: str, key: str, slot: Slot, *, name: str = "") -> QtWidgets.QPushButton:
     """A button that shows its key, and the key. Both do the same, and only while the button is there to be seen."""
     made = _button(f"{text}  [{key.replace('Return', 'Enter')}]", text, slot, name)
 
@@ -201,14 +172,14 @@ def button(parent: QWidget, text: str, key: str, slot: Slot, *, name: str = "") 
         if made.isVisible():
             slot()
 
-    shortcut = QShortcut(QKeySequence(key), parent)
+    shortcut = QtGui.QShortcut(QtGui.QKeySequence(key), parent)
     shortcut.setAutoRepeat(False)
     shortcut.activated.connect(pressed)
     return made
 
 
-def _button(shown: str, spoken: str, slot: Slot, name: str) -> QPushButton:
-    made = QPushButton(shown)
+def _button(shown: str, spoken: str, slot: Slot, name: str) -> QtWidgets.QPushButton:
+    made = QtWidgets.QPushButton(shown)
     made.setObjectName(name)
     made.setAccessibleName(spoken)
     made.setFocusPolicy(Qt.FocusPolicy.TabFocus)
@@ -216,48 +187,48 @@ def _button(shown: str, spoken: str, slot: Slot, name: str) -> QPushButton:
     return made
 
 
-def panel(*widgets: QWidget) -> QFrame:
+def panel(*widgets: QtWidgets.QWidget) -> QtWidgets.QFrame:
     """A framed column."""
-    frame = QFrame()
+    frame = QtWidgets.QFrame()
     frame.setObjectName("panel")
-    _fill(QVBoxLayout(frame), widgets)
+    _fill(QtWidgets.QVBoxLayout(frame), widgets)
     return frame
 
 
-def row(*widgets: QWidget) -> QWidget:
+def row(*widgets: QtWidgets.QWidget) -> QtWidgets.QWidget:
     """Widgets side by side."""
-    return _plain(QHBoxLayout(), widgets)
+    return _plain(QtWidgets.QHBoxLayout(), widgets)
 
 
-def column(*widgets: QWidget) -> QWidget:
+def column(*widgets: QtWidgets.QWidget) -> QtWidgets.QWidget:
     """Widgets below each other."""
-    return _plain(QVBoxLayout(), widgets)
+    return _plain(QtWidgets.QVBoxLayout(), widgets)
 
 
-def _plain(layout: QBoxLayout, widgets: Sequence[QWidget]) -> QWidget:
-    made = QWidget()
+def _plain(layout: QtWidgets.QBoxLayout, widgets: Sequence[QtWidgets.QWidget]) -> QtWidgets.QWidget:
+    made = QtWidgets.QWidget()
     made.setLayout(layout)
     layout.setContentsMargins(0, 0, 0, 0)
     _fill(layout, widgets)
     return made
 
 
-def _fill(layout: QBoxLayout, widgets: Sequence[QWidget]) -> None:
+def _fill(layout: QtWidgets.QBoxLayout, widgets: Sequence[QtWidgets.QWidget]) -> None:
     for widget in widgets:
         layout.addWidget(widget)
 
 
-def quiet_list() -> QListWidget:
+def quiet_list() -> QtWidgets.QListWidget:
     """A list that is only looked at; long lines go on below."""
-    made = QListWidget()
+    made = QtWidgets.QListWidget()
     made.setWordWrap(True)
     made.setHorizontalScrollBarPolicy(Qt.ScrollBarPolicy.ScrollBarAlwaysOff)
     made.setFocusPolicy(Qt.FocusPolicy.NoFocus)
-    made.setSelectionMode(QListWidget.SelectionMode.SingleSelection)
+    made.setSelectionMode(QtWidgets.QListWidget.SelectionMode.SingleSelection)
     return made
 
 
-class TextLines(QTextEdit):
+class TextLines(QtWidgets.QTextEdit):
     """Text to read and to copy. A word that is too long, such as a path, is broken; a text that is too long scrolls."""
 
     def __init__(self, name: str, text: str = "", most_lines: int = 4) -> None:
@@ -266,10 +237,10 @@ class TextLines(QTextEdit):
         self.setObjectName(name)
         self.setReadOnly(True)
         self.setFocusPolicy(Qt.FocusPolicy.NoFocus)
-        self.setFrameShape(QFrame.Shape.NoFrame)
-        self.setWordWrapMode(QTextOption.WrapMode.WrapAtWordBoundaryOrAnywhere)
+        self.setFrameShape(QtWidgets.QFrame.Shape.NoFrame)
+        self.setWordWrapMode(QtGui.QTextOption.WrapMode.WrapAtWordBoundaryOrAnywhere)
         self.setHorizontalScrollBarPolicy(Qt.ScrollBarPolicy.ScrollBarAlwaysOff)
-        self.setSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Fixed)
+        self.setSizePolicy(QtWidgets.QSizePolicy.Policy.Expanding, QtWidgets.QSizePolicy.Policy.Fixed)
         self.say(text)
 
     def say(self, text: str, mood: str = "") -> None:
@@ -279,7 +250,7 @@ class TextLines(QTextEdit):
         set_mood(self, mood)
         self._fit()
 
-    def resizeEvent(self, event: QResizeEvent | None) -> None:  # noqa: N802 - Qt's name
+    def resizeEvent(self, event: QtGui.QResizeEvent | None) -> None:  # noqa: N802 - Qt's name
         """Take the height that the text needs at this width."""
         super().resizeEvent(event)
         self._fit()
@@ -302,22 +273,22 @@ class TextLines(QTextEdit):
         self.setFixedHeight(min(needed, most) if self.toPlainText() else 0)
 
 
-class TickBox(QCheckBox):
+class TickBox(QtWidgets.QCheckBox):
     """A box that shows a tick when it is ticked: colour alone does not say it."""
 
-    def paintEvent(self, event: QPaintEvent | None) -> None:  # noqa: N802 - Qt's name
+    def paintEvent(self, event: QtGui.QPaintEvent | None) -> None:  # noqa: N802 - Qt's name
         """The box as its style has it, with the tick on top."""
         super().paintEvent(event)
         style = self.style()
         if not self.isChecked() or style is None:
             return
-        option = QStyleOptionButton()
+        option = QtWidgets.QStyleOptionButton()
         self.initStyleOption(option)
-        box = QRectF(style.subElementRect(QStyle.SubElement.SE_CheckBoxIndicator, option, self))
-        painter = QPainter(self)
-        painter.setRenderHint(QPainter.RenderHint.Antialiasing)
-        painter.setPen(QPen(QColor(colour("dark", "ground")), box.width() / 7))
-        painter.drawPolyline(QPolygonF([_at(box, 0.22, 0.52), _at(box, 0.43, 0.74), _at(box, 0.79, 0.28)]))
+        box = QRectF(style.subElementRect(QtWidgets.QStyle.SubElement.SE_CheckBoxIndicator, option, self))
+        painter = QtGui.QPainter(self)
+        painter.setRenderHint(QtGui.QPainter.RenderHint.Antialiasing)
+        painter.setPen(QtGui.QPen(QtGui.QColor(colour("dark", "ground")), box.width() / 7))
+        painter.drawPolyline(QtGui.QPolygonF([_at(box, 0.22, 0.52), _at(box, 0.43, 0.74), _at(box, 0.79, 0.28)]))
         painter.end()
 
 
@@ -325,26 +296,26 @@ def _at(box: QRectF, across: float, down: float) -> QPointF:
     return QPointF(box.left() + across * box.width(), box.top() + down * box.height())
 
 
-class ListBox(QComboBox):
+class ListBox(QtWidgets.QComboBox):
     """One of several. The wheel that scrolls the form does not turn it, nor does its longest entry widen the form."""
 
     def __init__(self, entries: Sequence[str]) -> None:
         super().__init__()
         self.addItems(entries)
-        self.setSizeAdjustPolicy(QComboBox.SizeAdjustPolicy.AdjustToMinimumContentsLengthWithIcon)
+        self.setSizeAdjustPolicy(QtWidgets.QComboBox.SizeAdjustPolicy.AdjustToMinimumContentsLengthWithIcon)
         self.setMinimumContentsLength(10)
-        self.setSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Fixed)
+        self.setSizePolicy(QtWidgets.QSizePolicy.Policy.Expanding, QtWidgets.QSizePolicy.Policy.Fixed)
 
-    def wheelEvent(self, event: QWheelEvent | None) -> None:  # noqa: N802 - Qt's name
+    def wheelEvent(self, event: QtGui.QWheelEvent | None) -> None:  # noqa: N802 - Qt's name
         """Leave the wheel to what is scrolled."""
         if event is not None:
             event.ignore()
 
 
-class LineEdit(QLineEdit):
+class LineEdit(QtWidgets.QLineEdit):
     """A line of text. Enter goes on to the next field, and a held Enter no further."""
 
-    def keyPressEvent(self, event: QKeyEvent | None) -> None:  # noqa: N802 - Qt's name
+    def keyPressEvent(self, event: QtGui.QKeyEvent | None) -> None:  # noqa: N802 - Qt's name
         """Take a key."""
         if event is None:
             return
@@ -371,13 +342,13 @@ class Option:
     do: Callable[[str], None]
 
 
-class QuestionBox(QFrame):
+class QuestionBox(QtWidgets.QFrame):
     """Asks one thing, until it is answered or taken back."""
 
     def __init__(self, text: str, answers: tuple[Option, ...], *, reason: str = "") -> None:
         super().__init__()
         self.setObjectName("panel")
-        down = QVBoxLayout(self)
+        down = QtWidgets.QVBoxLayout(self)
         self.text = TextLines("question")
         self.text.say(text, "ask")
         down.addWidget(self.text)
@@ -387,12 +358,12 @@ class QuestionBox(QFrame):
         self.reason.setAccessibleName(reason)
         self.reason.setVisible(bool(reason))
         down.addWidget(self.reason)
-        across = QHBoxLayout()
+        across = QtWidgets.QHBoxLayout()
         for answer in answers:
             across.addWidget(self._button(answer))
         down.addLayout(across)
 
-    def _button(self, answer: Option) -> QWidget:
+    def _button(self, answer: Option) -> QtWidgets.QWidget:
         return button(self, answer.text, answer.key, lambda: answer.do(self.reason.text().strip()))
 
 

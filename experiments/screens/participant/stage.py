@@ -21,16 +21,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from experiments.screens.participant.messages import (
-    PALETTES,
-    EmergencyPressed,
-    Focused,
-    FromParticipant,
-    Look,
-    Noise,
-    NoiseIs,
-    Unasked,
-)
+from experiments.screens.participant import messages
 
 _NO_WINDOW = 1
 """Up to this X means nobody, or whoever is under the pointer."""
@@ -120,7 +111,7 @@ class Page:
     def motion(self, name: str) -> None:
         """A key that moves something went down, or is held."""
 
-    def outcome(self) -> FromParticipant | None:
+    def outcome(self) -> messages.FromParticipant | None:
         """What it comes to: a message to say, or nothing yet."""
         return None
 
@@ -147,8 +138,8 @@ def half_width(width_px: int, height_px: int) -> float:
 class Stage:
     """The open window with one page on it."""
 
-    def __init__(self, toolkit: Toolkit, look: Look) -> None:
-        self.toolkit, self.look, self.palette = toolkit, look, PALETTES[look.theme]
+    def __init__(self, toolkit: Toolkit, look: messages.Look) -> None:
+        self.toolkit, self.look, self.palette = toolkit, look, messages.PALETTES[look.theme]
         self.window = _open(toolkit, look, self.palette.ground)
         self.width_px, self.height_px = (int(pixels) for pixels in self.window.clientSize)
         self.half_width = half_width(self.width_px, self.height_px)
@@ -157,7 +148,7 @@ class Stage:
         self.drawn_s = 0.0
         """When the page was drawn last; 0 if it was not yet."""
         self._closed = False
-        self.unasked: deque[Unasked] = deque()
+        self.unasked: deque[messages.Unasked] = deque()
         """What is to be said without a question."""
         self._font_files = [str(path) for path in sorted(toolkit.fonts.glob("NotoSans-*.ttf"))]
         self._handlers = _Handlers(self)  # pyglet holds them weakly
@@ -247,7 +238,7 @@ class Stage:
         self.window.close()
 
 
-def _open(toolkit: Toolkit, look: Look, ground: str) -> Any:
+def _open(toolkit: Toolkit, look: messages.Look, ground: str) -> Any:
     window = toolkit.visual.Window(
         size=(look.width_px, look.height_px),
         screen=look.screen,
@@ -270,10 +261,10 @@ class _Handlers:
         self._names = stage.toolkit.key
 
     def on_activate(self) -> None:
-        self._stage.unasked.append(Focused(on=True))
+        self._stage.unasked.append(messages.Focused(on=True))
 
     def on_deactivate(self) -> None:
-        self._stage.unasked.append(Focused(on=False))
+        self._stage.unasked.append(messages.Focused(on=False))
 
     def on_close(self) -> bool:
         self._stage.note_closed()
@@ -294,7 +285,7 @@ class _Handlers:
     def on_key_press(self, symbol: int, modifiers: int) -> bool:
         name = self._names.symbol_string(symbol)
         if name == EMERGENCY_KEY:
-            self._stage.unasked.append(EmergencyPressed())
+            self._stage.unasked.append(messages.EmergencyPressed())
             return True
         if self._stage.page is None:
             return False
@@ -404,18 +395,18 @@ class MaskingNoise:
     def __init__(self) -> None:
         self._sound: Any = None
 
-    def turn(self, asked: Noise) -> NoiseIs:
+    def turn(self, asked: messages.Noise) -> messages.NoiseIs:
         """Turn it on or off."""
         self.stop()
         if not asked.on:
-            return NoiseIs(on=False, message="", ask=asked.ask)
+            return messages.NoiseIs(on=False, message="", ask=asked.ask)
         try:
             self._sound = _playing(asked.level)
         except (KeyboardInterrupt, SystemExit):
             raise
         except BaseException as error:  # noqa: BLE001 - PsychoPy raises plain Exception, and some that derive from BaseException alone
-            return NoiseIs(on=False, message=_why_not(error), ask=asked.ask)
-        return NoiseIs(on=True, message="", ask=asked.ask)
+            return messages.NoiseIs(on=False, message=_why_not(error), ask=asked.ask)
+        return messages.NoiseIs(on=True, message="", ask=asked.ask)
 
     def stop(self) -> None:
         """Silence."""
