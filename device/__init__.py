@@ -24,7 +24,8 @@ from device.words import (
 )
 
 if TYPE_CHECKING:
-    from device.methods import GunParameters, Method
+    from device.methods import Method
+    from device.parameters import GunParameters
 
 __all__ = [
     "DeviceError",
@@ -74,7 +75,8 @@ def _serial(address: str, parameters: GunParameters | Mapping[str, Method] | Non
 
 
 def _methods(parameters: GunParameters | Mapping[str, Method] | None) -> Mapping[str, Method]:
-    from device.methods import GunParameters, paper_methods  # noqa: PLC0415 - importing the words alone stays cheap
+    from device.methods import paper_methods  # noqa: PLC0415 - importing the words alone stays cheap
+    from device.parameters import GunParameters  # noqa: PLC0415
 
     if isinstance(parameters, Mapping):
         return parameters

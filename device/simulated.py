@@ -5,7 +5,8 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 
 from device.limits import DriveHistory, Load, load_of, planned_start_s
-from device.methods import GunParameters, Method, Rendering, rendering_of
+from device.methods import Method, Rendering, rendering_of
+from device.parameters import GunParameters
 from device.words import Drive, GunState, GunStatus, Identity, LimitError, LinkError, Shot, ShotReport
 
 MODEL_VERSION = "1"

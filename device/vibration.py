@@ -23,7 +23,7 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import NDArray
 
-from device.methods import VibrationParameters
+from device.parameters import VibrationParameters
 
 __all__ = ["RESIDUAL", "Vibration", "VibrationParameters", "solved", "waveform"]
 

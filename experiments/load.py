@@ -11,7 +11,8 @@ from typing import Any
 
 from device import LimitError
 from device.limits import MAX_SHOTS_PER_MINUTE, DriveHistory, Load, load_of
-from device.methods import GunParameters, drive_of, rendering_of
+from device.methods import drive_of, rendering_of
+from device.parameters import GunParameters
 from device.words import Drive
 from experiments.catalogue import CATALOGUE
 from experiments.config.door import ConfigError, checked, load, read_toml

@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
     from analysis.logs.reading import read_logs
-    from device.methods import GunParameters
+    from device.parameters import GunParameters
     from device.physics import simulate
     from device.words import RecoilError
     from recoil.api import analyze, audit, load_config, plan, power, run_synthetic
@@ -37,7 +37,7 @@ __all__ = [
 ]
 
 _HOMES = {
-    "GunParameters": "device.methods",
+    "GunParameters": "device.parameters",
     "RecoilError": "device.words",
     "read_logs": "analysis.logs.reading",
     "simulate": "device.physics",

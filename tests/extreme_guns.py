@@ -5,7 +5,7 @@ import math
 
 import numpy as np
 
-from device.methods import DriveOff, Emf
+from device.parameters import DriveOff, Emf
 from device.physics import GunParameters, simulate
 from device.physics.equations import CONTINUES, pack
 from device.physics.traces import segments

@@ -13,7 +13,7 @@ from itertools import pairwise
 from scipy.optimize import brentq
 
 from device.limits import TICKS
-from device.methods import GunParameters
+from device.parameters import GunParameters
 from device.physics.equations import HORIZON_S, ShotResult, ShotState, StepSeries, pack
 from device.physics.shot import ShotSummary, shoot_on, simulate, summary_from
 

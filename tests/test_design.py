@@ -21,7 +21,7 @@ from analysis.predict.fit.percept_model import PAPER_RATES
 from analysis.report.serial import plain
 from analysis.report.terminal import in_text
 from device.limits import DriveHistory, load_of
-from device.methods import GunParameters
+from device.parameters import GunParameters
 from device.physics.shot import highest_rate_Hz
 from device.words import Pulse
 from experiments.config.door import ConfigError

@@ -27,7 +27,8 @@ from device.limits import (
     load_of,
     steady_coil_C,
 )
-from device.methods import GunParameters, paper_methods
+from device.methods import paper_methods
+from device.parameters import GunParameters
 from device.physics import simulate, trace
 from device.physics.equations import HOME
 from device.words import LimitError, Pulse

@@ -2,7 +2,8 @@
 
 import pytest
 
-from device.methods import GunParameters, rendering_of, settle_s
+from device.methods import rendering_of, settle_s
+from device.parameters import GunParameters
 from device.physics import simulate, trace
 from device.physics.hand import HandMechanics, compliant_collision, rigid_collision, simulate_held
 from device.physics.shot import highest_rate_Hz

@@ -11,7 +11,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from analysis.predict.fit.percept_model import PAPER_RATES, PerceptFit, fit_percept, predicted_rate
-from device.methods import GunParameters, VibrationParameters, paper_methods
+from device.methods import paper_methods
+from device.parameters import GunParameters, VibrationParameters
 from device.physics import simulate, trace
 from experiments.synthetic.diffusion import Diffusion, Lapses, People, upper_probabilities
 from experiments.synthetic.percept import (

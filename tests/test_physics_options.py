@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from device.methods import damper_friction
+from device.parameters import damper_friction
 from device.physics import GunParameters, hand, simulate
 from device.physics.hand import HandMechanics, compliant_collision, rigid_collision, simulate_held
 from device.physics.traces import energy_balance

@@ -11,7 +11,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from device.methods import DriveOff
+from device.parameters import DriveOff
 from device.physics import FIDELITIES, SCENES, GunParameters, Scene, choose_model, simulate
 from device.physics.hand import compliant_collision, rigid_collision
 from device.physics.scenes import COSTS, FRICTION_N, NEAR, NEEDED, choose_contact, stated_error

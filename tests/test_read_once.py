@@ -9,7 +9,7 @@ from typing import Any
 import pytest
 
 from device import open_gun
-from device.methods import GunParameters, VibrationParameters
+from device.parameters import GunParameters, VibrationParameters
 from experiments import catalogue
 from experiments.clock import VirtualClock
 from experiments.load import load_setup

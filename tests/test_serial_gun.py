@@ -7,7 +7,8 @@ import pytest
 
 from device import Effect, LimitError, LinkError, Pulse, open_gun
 from device.limits import AMBIENT_C, DriveHistory
-from device.methods import GunParameters, VibrationParameters, paper_methods
+from device.methods import paper_methods
+from device.parameters import GunParameters, VibrationParameters
 from device.serial_gun.reports import FLOORS_US, asked
 from device.simulated import SimulatedGun
 from device.twin import machine

@@ -15,7 +15,7 @@ import pytest
 
 from analysis.predict.design_search.critical import THRESHOLD_SHARE, rate_at
 from analysis.predict.jobs import cores
-from device.methods import GunParameters
+from device.parameters import GunParameters
 from device.physics.shot import highest_rate_Hz
 from experiments.synthetic.percept import PerceptParameters
 from tests.conftest import RECOIL, Soak

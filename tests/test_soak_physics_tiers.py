@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from device.methods import DriveOff, Emf
+from device.parameters import DriveOff, Emf
 from device.physics import FIDELITIES, GunParameters, simulate_batch
 from device.physics.scenes import FRICTION_N, NEAR, OUTPUTS, stated_error
 from tests.conftest import Soak

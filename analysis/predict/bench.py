@@ -15,7 +15,8 @@ from analysis.report.section import Section, Table, origin_table
 from analysis.report.serial import as_json
 from analysis.report.terminal import Progress
 from analysis.stats import operating
-from device.methods import FRICTION_I_N, FRICTION_II_N, DriveOff, GunParameters
+from device.methods import FRICTION_I_N, FRICTION_II_N
+from device.parameters import DriveOff, GunParameters
 from device.physics import FIDELITIES, simulate, simulate_batch
 from device.physics.scenes import OUTPUTS, stated_error
 from experiments.record import storage

@@ -11,7 +11,7 @@ from analysis.report.section import Section
 from analysis.report.serial import OPTIONAL, plain
 from analysis.report.terminal import in_text
 from device.limits import MAX_COIL_C, MAX_DUTY, MAX_SHOTS_PER_MINUTE
-from device.methods import GunParameters
+from device.parameters import GunParameters
 from device.physics import simulate
 from device.words import MAX_PULSE_S, MAX_VOLTAGE_V, Pulse
 from experiments import catalogue

@@ -10,7 +10,7 @@ recoil; the collision with the stop is apart from it.
 
 from __future__ import annotations
 
-from device.methods import DriveOff, Emf, GunParameters
+from device.parameters import DriveOff, Emf, GunParameters
 from device.physics.batch import ShotBatch, compiled_simulator, simulate_batch
 from device.physics.equations import FIDELITIES, Status
 from device.physics.scenes import SCENES, Scene, choose_model

@@ -20,7 +20,7 @@ from typing import Any, cast, get_type_hints
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from device.methods import ABOVE_ZERO, GunParameters
+from device.parameters import ABOVE_ZERO, GunParameters
 from device.physics.equations import (
     CLOSED_FORM,
     INVALID,

@@ -14,7 +14,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field
 from typing import Literal, NamedTuple
 
-from device.methods import GunParameters
+from device.parameters import GunParameters
 
 ORDER = 24
 """Of the Taylor series. Measured: orders 20 to 28 take the same time within 15 %, 24 the least."""

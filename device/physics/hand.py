@@ -18,7 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.integrate import solve_ivp
 
-from device.methods import GunParameters
+from device.parameters import GunParameters
 
 _RTOL, _ATOL = 1e-10, 1e-13
 _MAX_PHASES = 200

@@ -22,7 +22,7 @@ from typing import Literal
 import numpy as np
 from numpy.typing import ArrayLike
 
-from device.methods import DriveOff, Emf, GunParameters
+from device.parameters import DriveOff, Emf, GunParameters
 from device.physics.equations import model_number
 
 OUTPUTS = (

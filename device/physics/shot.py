@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from device.limits import TICKS
-from device.methods import GunParameters
+from device.parameters import GunParameters
 from device.physics.equations import (
     BALLISTIC,
     BREAK_AWAY,

@@ -16,7 +16,7 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import NDArray
 
-from device.methods import GunParameters
+from device.parameters import GunParameters
 from device.physics.equations import (
     BREAK_AWAY,
     COIL,

@@ -12,7 +12,8 @@ from typing import Generic, Literal, Self, TypeVar
 
 from pydantic import Field, PrivateAttr, model_validator
 
-from device.methods import GunParameters, Method, VibrationParameters, damper_friction
+from device.methods import Method
+from device.parameters import GunParameters, VibrationParameters, damper_friction
 from experiments.config.door import Model
 from experiments.config.models import ExperimentConfig, Text
 

@@ -27,7 +27,8 @@ from numpy.polynomial.hermite_e import hermegauss
 from numpy.typing import ArrayLike
 from pydantic import Field
 
-from device.methods import GunParameters, Method
+from device.methods import Method
+from device.parameters import GunParameters
 from experiments.config.door import Model
 from experiments.config.models import InnerShare
 from experiments.synthetic.diffusion import Diffusion, Floats, Lapses, People, upper_probabilities

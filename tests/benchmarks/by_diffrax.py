@@ -6,7 +6,7 @@ import math
 from collections.abc import Callable
 from typing import Any
 
-from device.methods import DriveOff, GunParameters
+from device.parameters import DriveOff, GunParameters
 from tests.benchmarks.problem import Outputs, Peer, PeerError, Shoot, break_away
 
 _TOLERANCES = (1e-4, 1e-7, 1e-10, 1e-12)

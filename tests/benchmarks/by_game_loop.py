@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Any
 
-from device.methods import DriveOff, GunParameters
+from device.parameters import DriveOff, GunParameters
 from tests.benchmarks.problem import Outputs, Peer, PeerError, Shoot
 
 _PLAIN = (1e-3, 1e-4, 1e-5)

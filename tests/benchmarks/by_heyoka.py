@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Any
 
-from device.methods import DriveOff, GunParameters
+from device.parameters import DriveOff, GunParameters
 from tests.benchmarks.problem import Outputs, Peer, PeerError, Shoot, break_away, force_on_hand
 
 _TOLERANCES = (1e-6, 1e-9, 1e-12, 2.2e-16)

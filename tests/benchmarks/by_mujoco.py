@@ -10,7 +10,7 @@ from __future__ import annotations
 import math
 from typing import Any
 
-from device.methods import DriveOff, GunParameters
+from device.parameters import DriveOff, GunParameters
 from tests.benchmarks.problem import Outputs, Peer, PeerError, Shoot, break_away
 
 _SETTINGS = (("implicitfast", 1e-3), ("implicitfast", 1e-4), ("implicitfast", 1e-5), ("RK4", 1e-3), ("RK4", 1e-4))

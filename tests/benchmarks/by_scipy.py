@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from device.methods import DriveOff, GunParameters
+from device.parameters import DriveOff, GunParameters
 from tests.benchmarks.problem import Outputs, Peer, PeerError, Shoot, break_away, force_on_hand
 
 State = Sequence[float]

@@ -13,7 +13,7 @@ from collections import Counter
 from collections.abc import Callable
 from typing import Any
 
-from device.methods import DriveOff
+from device.parameters import DriveOff
 from device.physics.equations import Constants, model_number, pack
 from device.physics.shot import interpret
 from tests.benchmarks.problem import guns

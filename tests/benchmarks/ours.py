@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from analysis.predict.jobs import cores
-from device.methods import DriveOff, GunParameters
+from device.parameters import DriveOff, GunParameters
 from device.physics import FIDELITIES, ShotSummary, compiled_simulator, simulate, simulate_batch
 from device.physics.scenes import FRICTION_N, NEAR, OUTPUTS
 from tests.benchmarks.problem import Outputs, Peer, guns

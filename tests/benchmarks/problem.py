@@ -8,7 +8,8 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
-from device.methods import FRICTION_I_N, FRICTION_II_N, DriveOff, GunParameters
+from device.methods import FRICTION_I_N, FRICTION_II_N
+from device.parameters import DriveOff, GunParameters
 from device.physics.scenes import OUTPUTS
 
 Outputs = tuple[float, ...]

@@ -11,7 +11,7 @@ from importlib.util import find_spec
 from itertools import repeat
 from typing import Any
 
-from device.methods import DriveOff
+from device.parameters import DriveOff
 from tests.benchmarks.ours import Contender, Ready, one_at_a_time
 from tests.benchmarks.problem import errors, reference
 

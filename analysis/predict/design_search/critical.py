@@ -19,7 +19,8 @@ from analysis.predict.design_search.shots import Layer, shot_of
 from analysis.predict.design_search.space import Space
 from analysis.predict.fit.percept_model import FITTED, PAPER_RATES, PerceptFit, fit_percept
 from analysis.stats.arrays import FloatArray
-from device.methods import GunParameters, Method
+from device.methods import Method
+from device.parameters import GunParameters
 from device.physics import simulate
 from experiments.design.streams import generator
 from experiments.synthetic.diffusion import People

@@ -31,7 +31,7 @@ from device.limits import (
     load_of,
     steady_coil_C,
 )
-from device.methods import GunParameters
+from device.parameters import GunParameters
 from device.physics import simulate
 from device.physics.equations import STATUSES
 from device.physics.shot import highest_rate_Hz, rates_of_periods_Hz

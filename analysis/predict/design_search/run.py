@@ -35,7 +35,8 @@ from analysis.report.page import write_page
 from analysis.report.serial import as_json
 from analysis.report.terminal import Progress
 from device.limits import TRAIN_LIMITS
-from device.methods import GunParameters, Method, paper_methods
+from device.methods import Method, paper_methods
+from device.parameters import GunParameters
 from device.physics.equations import STATUSES
 from experiments.record import storage
 from experiments.record.provenance import provenance

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from analysis.predict.design_search.space import Space
 from analysis.predict.jobs import RunPieces
 from analysis.stats.arrays import FloatArray
-from device.methods import GunParameters
+from device.parameters import GunParameters
 from device.physics import ShotSummary, simulate, simulate_batch
 from device.physics.equations import COIL, FREE, HOME, STATUSES, pack
 from device.physics.traces import segments

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from device.limits import MAX_SHOTS_PER_MINUTE
-from device.methods import GunParameters
+from device.parameters import GunParameters
 from device.words import MAX_PULSE_S, MAX_VOLTAGE_V
 from experiments.config.door import ConfigError
 from experiments.config.setup import GunConfig

@@ -10,7 +10,7 @@ import numpy as np
 from analysis.predict.fit.percept_model import Fitted, PerceptFit, PerceptPeak, predicted_rate
 from analysis.predict.fit.percept_request import PerceptTask
 from analysis.predict.fit.studies import Judgement
-from device.methods import GunParameters
+from device.parameters import GunParameters
 from experiments.record.provenance import provenance
 from experiments.synthetic.diffusion import People
 from experiments.synthetic.percept import Percept, PerceptParameters, evidence, forward_rates, percept_of, percepts_of

@@ -28,7 +28,7 @@ from analysis.summary.results import StudyStatistics
 from analysis.summary.sections.data import ReportData
 from analysis.summary.sections.sections import obtained_text, write_report
 from analysis.summary.summary import summarize
-from device.methods import GunParameters
+from device.parameters import GunParameters
 from experiments.catalogue import rebuild
 from experiments.clock import VirtualClock
 from experiments.config.door import ConfigError

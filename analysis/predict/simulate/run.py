@@ -24,7 +24,7 @@ from analysis.predict.simulate.sweep import Sweep, SweepRequest, axis_of, interp
 from analysis.predict.simulate.sweep import sections as sweep_sections
 from analysis.report.section import Section
 from analysis.report.terminal import Progress
-from device.methods import GunParameters
+from device.parameters import GunParameters
 from device.physics.traces import energy_balance
 from device.vibration import VibrationParameters
 from experiments.config.door import ConfigError

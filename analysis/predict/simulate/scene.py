@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike
 
 from analysis.report.section import Section
 from analysis.report.serial import OPTIONAL
-from device.methods import GunParameters
+from device.parameters import GunParameters
 from device.physics.scenes import COLLISION, NEEDED, SCENES, ModelChoice, Scene, choose_contact, choose_model
 from experiments.config.door import ConfigError
 

@@ -17,7 +17,7 @@ from analysis.predict.simulate.scene import ScenePick, scene_section
 from analysis.report.figures.shot import ShotPanel, VibrationPanel, figure_5, figure_vibration
 from analysis.report.section import Section
 from analysis.report.serial import OPTIONAL
-from device.methods import GunParameters
+from device.parameters import GunParameters
 from device.physics import ShotSummary, simulate, trace
 from device.physics.hand import (
     Collision,

@@ -28,7 +28,7 @@ from analysis.predict.simulate.shot import PARAMETER_KINDS
 from analysis.report.section import Section
 from analysis.report.serial import OPTIONAL, as_json
 from analysis.report.terminal import Progress
-from device.methods import GunParameters
+from device.parameters import GunParameters
 from device.physics import FIDELITIES, ShotBatch, simulate_batch
 from device.physics.equations import STATUSES
 from experiments.config.door import ConfigError
