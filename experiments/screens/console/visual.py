@@ -19,7 +19,7 @@ from experiments.session.steps import Ask, Rate, on_scale
 if TYPE_CHECKING:
     from experiments.screens.xkeys import Hands  # Linux alone has it
 
-_LOOK_MS = 10
+_WATCH_MS = 10
 AGAIN_S = 0.5
 """A key that was refused, because it came too soon, is pressed again after so long."""
 BREAK_REASON = "synthetic participant"
@@ -36,7 +36,7 @@ class VisualParticipant:
         self._timer.timeout.connect(self._look)
 
     def __enter__(self) -> Self:
-        self._timer.start(_LOOK_MS)
+        self._timer.start(_WATCH_MS)
         return self
 
     def __exit__(self, *_: object) -> None:
