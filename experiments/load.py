@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import Any
 
 from device import LimitError
-from device.limits import MAX_SHOTS_PER_MINUTE, DriveHistory, Load, load_of
+from device.limits import MAX_SHOTS_PER_MINUTE, DriveHistory, Load
 from device.methods import drive_of, rendering_of
 from device.parameters import GunParameters
 from device.words import Drive
@@ -100,10 +100,11 @@ def _answer_rows(table: Path, lines: Any, columns: tuple[str, ...]) -> Iterator[
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class MethodLimits:
-    """How a method is driven, and how soon its next shot may follow."""
+    """How a method is driven, what a shot asks of the coil, and how soon the next may follow."""
 
     method: str
     drive: Drive
+    load: Load
     settle_s: float
 
 
@@ -124,7 +125,7 @@ def check_methods(gun: GunConfig, methods: tuple[str, ...], source: Path) -> lis
             raise ConfigError(f"{source}: methods.{name}: {error}") from error
         if isinstance(method, GunParameters) and rendering.motion == "no-break-away":
             raise ConfigError(f"{source}: methods.{name}: {_never_moves(method)}")
-        found.append(MethodLimits(method=name, drive=drive, settle_s=rendering.settle_s))
+        found.append(MethodLimits(method=name, drive=drive, load=rendering.load, settle_s=rendering.settle_s))
     return found
 
 
@@ -149,10 +150,10 @@ def _check_repetition(setup: Setup[Any], methods: list[MethodLimits]) -> None:
         return
     every_s, shots = setup.config.stimulus.repeat_every_s, setup.config.fatigue.max_shots_per_trial
     for method in methods:
-        load, history = _load(setup, method), DriveHistory()
+        history = DriveHistory()
         try:
             for start_s in (shot * every_s for shot in range(min(shots, _ENOUGH_SHOTS))):
-                history = history.record(load, start_s, start_s + method.settle_s)
+                history = history.record(method.load, start_s, start_s + method.settle_s)
         except LimitError as error:
             raise ConfigError(
                 f"{setup.source}: stimulus.repeat_every_s = {every_s:g}: {method.method} needs {method.settle_s:.4g} s "
@@ -163,8 +164,3 @@ def _check_repetition(setup: Setup[Any], methods: list[MethodLimits]) -> None:
 
 _ENOUGH_SHOTS = 2 * MAX_SHOTS_PER_MINUTE
 """A train that keeps the limits for so long keeps them for ever, but for the coil, which is warm by then as well."""
-
-
-def _load(setup: Setup[Any], method: MethodLimits) -> Load:
-    parameters = setup.gun.rendering(method.method)
-    return load_of(method.drive, parameters.resistance_ohm if isinstance(parameters, GunParameters) else 0.0)

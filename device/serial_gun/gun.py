@@ -80,7 +80,7 @@ class SerialGun:
                 raise LimitError("the gun is disarmed; arm it before it may fire")
             wanted = asked(shot, self._methods)
             now_s = self._clock()
-            self._history.check(wanted.load, planned_start_s(now_s, at_s))
+            self._history.check(wanted.rendering.load, planned_start_s(now_s, at_s))
             self._know_the_clock()
             boot, count = self._count()
             self._configure(wanted)
@@ -192,8 +192,8 @@ class SerialGun:
 
     def _spend(self, wanted: ShotRequest, start_s: float) -> None:
         """Take a shot into account that was fired, or may have been."""
-        start_s = max(start_s, self._history.earliest_s(wanted.load))
-        self._history = self._history.record(wanted.load, start_s, start_s + wanted.rest_s)
+        start_s = max(start_s, self._history.earliest_s(wanted.rendering.load))
+        self._history = self._history.record(wanted.rendering.load, start_s, start_s + wanted.rest_s)
 
 
 SCHEME = "serial:"

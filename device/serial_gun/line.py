@@ -177,7 +177,7 @@ def _outcome(waiting: Waiting) -> Reply | LinkError:
     if reply is None:
         return waiting.trouble or TimedOut(f"no answer to {waiting.header} within its time")
     no = refusal_in(reply.body)
-    return reply if no is None else CommandRefused(no.code, f"the gun refused {waiting.header}: {no.reason}")
+    return reply if no is None else CommandRefused(no[0], f"the gun refused {waiting.header}: {no[1]}")
 
 
 MAX_DRIFT = 1e-3

@@ -28,7 +28,7 @@ from device.serial_gun.line import (
     Waiting,
     WrongVersion,
 )
-from device.wire import errors
+from device.wire.errors import WireError, message
 from device.wire.records import WIRE_VERSION, Frame, Garbled, Named, Splitter, decode, encode, following, named_value
 from device.words import LinkError
 
@@ -45,7 +45,7 @@ FIRST_EXCHANGES = 8
 SILENT_S = 2.0
 """After so long without a word from the gun the line is closed and opened again."""
 _MAX_WATCHDOG_MS, _MIN_WATCHDOG_MS = 60_000, 100
-_NO_SESSION = f"ERR {errors.message(errors.NO_SESSION)}"
+_NO_SESSION = f"ERR {message(WireError.NO_SESSION)}"
 
 
 class Link:

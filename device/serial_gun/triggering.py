@@ -22,7 +22,7 @@ from device.serial_gun.line import (
     Unsure,
 )
 from device.serial_gun.link import PATIENCE_S, Link
-from device.wire import errors
+from device.wire.errors import WireError
 from device.wire.records import Garbled, ShotRecord, StatusRecord
 from device.words import LimitError, LinkError
 
@@ -137,9 +137,9 @@ LATEST_S = 0.15
 CLOCK_TRIES = 3
 """So often are a shot's times judged, the clock learnt again in between."""
 
-_LIMITS = {errors.DUTY, errors.RATE, errors.HOT, errors.OUT_OF_RANGE}
-_STOPPED = {errors.CANCELLED, errors.DISARMED, errors.FAULT}
-_DOUBLED = {errors.ALREADY_FIRED, errors.BUSY}
+_LIMITS = {WireError.DUTY, WireError.RATE, WireError.HOT, WireError.OUT_OF_RANGE}
+_STOPPED = {WireError.CANCELLED, WireError.DISARMED, WireError.FAULT}
+_DOUBLED = {WireError.ALREADY_FIRED, WireError.BUSY}
 """The line doubled the trigger: it was fired, or is being fired, and what came of it is lost."""
 
 
@@ -214,7 +214,7 @@ class Triggering:
 
     def _refused(self, error: CommandRefused, order: reports.ShotOrder) -> LinkError:
         """A trigger that came too late, and may be written again. Raises what any other refusal means."""
-        if error.code == errors.TOO_LATE:
+        if error.code == WireError.TOO_LATE:
             return error
         if error.code in _DOUBLED:
             raise self._unsure(order, f"the shot was fired, and its answer was lost ({error})") from error
@@ -233,7 +233,7 @@ class Triggering:
                 f"not fired: the gun was switched on or reset {found.clock_us / 1e6:.1f} s ago, and fires nothing in "
                 "its first second, because what was driven before is not known"
             )
-        if error.code == errors.MAGNET_NOT_HOME:
+        if error.code == WireError.MAGNET_NOT_HOME:
             return LimitError(
                 f"not fired: its magnet was not home, by the gun's own clock ({max(left_s, 0):.3f} s to go)"
             )

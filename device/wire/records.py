@@ -249,22 +249,14 @@ class StatusRecord:
         )
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Refusal:
-    """A gun's no: the number and the text of its error."""
-
-    code: int
-    reason: str
-
-
-def refusal_in(text: str) -> Refusal | None:
-    """The refusal that an answer is, or None if it is another answer.
+def refusal_in(text: str) -> tuple[int, str] | None:
+    """The number and the text of the error that an answer is, or None if it is another answer.
 
     >>> refusal_in('ERR 101,"Disarmed"')
-    Refusal(code=101, reason='Disarmed')
+    (101, 'Disarmed')
     """
     found = _ERROR.fullmatch(text)
-    return None if found is None else Refusal(code=int(found[1]), reason=found[2])
+    return None if found is None else (int(found[1]), found[2])
 
 
 def whole_number(text: str) -> int:

@@ -156,13 +156,9 @@ def of_link(found: figures.GunLine, limit_s: float) -> figures.DoctorFinding:
     """The gun and the way to it, whose 95th percentile is to keep a limit."""
     measured = f"{found.gun}, {found.state}; round trip {_tail(found.round_trip_ms)}"
     if found.fault is not None or found.state != "disarmed":
-        return figures.DoctorFinding(
-            check="gun",
-            verdict="fails",
-            measured=measured if found.fault is None else f"{measured}; fault: {found.fault}",
-            advice="switch off the gun's power, remove the cause, and look again before anybody holds it",
-            figures=found,
-        )
+        advice = "switch off the gun's power, remove the cause, and look again before anybody holds it"
+        measured += "" if found.fault is None else f"; fault: {found.fault}"
+        return figures.DoctorFinding(check="gun", verdict="fails", measured=measured, advice=advice, figures=found)
     advice = (
         f"95th percentile above the limit of {1000 * limit_s:g} ms (the gun's serial.round_trip_limit_s): set the USB "
         "adapter's latency timer to 1 ms, see below; close other programs"
@@ -180,20 +176,12 @@ def of_adapters(found: Sequence[figures.Adapter]) -> figures.DoctorFinding:
     """The latency timers of USB serial adapters, where the system shows them."""
     if not found:
         measured = "this system shows no USB serial adapter with a latency timer"
-        return figures.DoctorFinding(
-            check="USB adapter",
-            verdict="not there",
-            measured=measured,
-            advice="nothing, unless the gun is on a USB serial port",
-        )
+        advice = "nothing, unless the gun is on a USB serial port"
+        return figures.DoctorFinding(check="USB adapter", verdict="not there", measured=measured, advice=advice)
     slow = [adapter for adapter in found if adapter.latency_ms > MAX_ADAPTER_MS]
-    return figures.DoctorFinding(
-        check="USB adapter",
-        verdict="warning" if slow else "good",
-        measured=", ".join(f"{adapter.name}: latency timer {adapter.latency_ms} ms" for adapter in found),
-        advice="; ".join(f"echo {MAX_ADAPTER_MS} | sudo tee {adapter.setting}" for adapter in slow),
-        figures=figures.Adapters(adapters=tuple(found)),
-    )
+    measured = ", ".join(f"{adapter.name}: latency timer {adapter.latency_ms} ms" for adapter in found)
+    advice = "; ".join(f"echo {MAX_ADAPTER_MS} | sudo tee {adapter.setting}" for adapter in slow)
+    return _judged("USB adapter", measured, advice, figures.Adapters(adapters=tuple(found)))
 
 
 def of_seen(found: figures.ProgramFigures) -> figures.DoctorFinding:
@@ -258,9 +246,7 @@ def of_keys(found: figures.Keys) -> figures.DoctorFinding:
     if came == 0:
         measured = f"none of {found.injected} injected keys came to the window"
         advice = "leave the doctor's window in front, keep your hands off, and look again"
-        return figures.DoctorFinding(
-            check="keyboard", verdict="warning", measured=measured, advice=advice, figures=found
-        )
+        return _judged("keyboard", measured, advice, found)
     event, painted = figures.spread(found.to_event_ms), figures.spread(found.to_painted_ms)
     measured = f"{came} of {found.injected} keys; to the event {_short(event)}; until painted {_short(painted)}"
     advice = "" if came == found.injected else "some keys went elsewhere: leave the doctor's window in front"
@@ -279,22 +265,13 @@ def of_latencies(found: Latencies) -> tuple[figures.DoctorFinding, figures.Docto
 
 def _latency(check: str, values: Sequence[float], bound: float, what: str, trials: int) -> figures.DoctorFinding:
     if not values:
-        return figures.DoctorFinding(
-            check=check,
-            verdict="not there",
-            measured="no console runs here",
-            advice="look again after a run with --screen console, with the same --results",
-        )
+        advice = "look again after a run with --screen console, with the same --results"
+        return figures.DoctorFinding(check=check, verdict="not there", measured="no console runs here", advice=advice)
     found = figures.spread(values)
     measured = f"{_short(found)}, worst {_ms(found.worst)}; {found.n} {what} in {trials} trials"
-    slow = found.p99 > bound
-    return figures.DoctorFinding(
-        check=check,
-        verdict="warning" if slow else "good",
-        measured=measured,
-        advice=f"more than {bound:g} ms: close other programs; see the disk and display above" if slow else "",
-        figures=figures.ConsoleLatency(ms=found, bound_ms=bound, trials=trials),
-    )
+    advice = f"more than {bound:g} ms: close other programs; see the disk and display above"
+    latency = figures.ConsoleLatency(ms=found, bound_ms=bound, trials=trials)
+    return _judged(check, measured, advice if found.p99 > bound else "", latency)
 
 
 def of_absent(check: str, reason: str) -> figures.DoctorFinding:

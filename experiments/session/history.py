@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from types import UnionType
 from typing import Literal, TypeVar
 
 from experiments.design.plan import Plan, Trial
@@ -158,27 +159,23 @@ def repeatable(history: History, step: steps.Step | None, here: Trial) -> Trial 
     """
     if isinstance(step, steps.Ask | steps.Rate):
         return step.trial
-    rated = {steps.trial_of(one) for one, word in history if isinstance(word, steps.Rated)}
-    shown = [steps.trial_of(one) for one, word in history if isinstance(word, steps.Answered | steps.Presented)]
-    return next((trial for trial in reversed(shown) if trial and of_one_set(trial, here) and trial not in rated), None)
+    rated, shown = _trials(history, steps.Rated), _trials(history, steps.Answered | steps.Presented)
+    return next((trial for trial in reversed(shown) if of_one_set(trial, here) and trial not in rated), None)
 
 
 def done(history: History) -> set[Trial]:
     """The trials that were answered, or felt until next."""
-    return {
-        trial
-        for step, word in history
-        if isinstance(word, steps.Answered | steps.Presented) and (trial := steps.trial_of(step))
-    }
+    return set(_trials(history, steps.Answered | steps.Presented))
 
 
 def answered(history: History) -> set[Trial]:
     """The trials that were answered or rated, whatever became of the answer."""
-    return {
-        trial
-        for step, word in history
-        if isinstance(word, steps.Answered | steps.Rated) and (trial := steps.trial_of(step))
-    }
+    return set(_trials(history, steps.Answered | steps.Rated))
+
+
+def _trials(history: History, outcomes: type[steps.Outcome] | UnionType) -> list[Trial]:
+    """The trials that came to such outcomes, in order."""
+    return [trial for step, word in history if isinstance(word, outcomes) and (trial := steps.trial_of(step))]
 
 
 def of_one_set(one: Trial, other: Trial) -> bool:

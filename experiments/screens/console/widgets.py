@@ -19,53 +19,37 @@ from experiments.study.register import MAX_REASON, RegisterError, check_reason
 MOODS = ("act", "ask", "rest", "wait", "good", "bad")
 """What a line is about, which chooses its colour; the words say it as well."""
 
-_SHARED = {
-    "stop": "#b3261e",
-    "stop_text": "#ffffff",
-    "practice": "#5b2a86",
-    "practice_text": "#ffffff",
-    "simulated": "#ffb000",
-    "simulated_text": "#000000",
+_COLOURS = {
+    "stop": ("#b3261e", "#b3261e"),
+    "stop_text": ("#ffffff", "#ffffff"),
+    "practice": ("#5b2a86", "#5b2a86"),
+    "practice_text": ("#ffffff", "#ffffff"),
+    "simulated": ("#ffb000", "#ffb000"),
+    "simulated_text": ("#000000", "#000000"),
+    "ground": ("#101418", "#ffffff"),
+    "panel": ("#1b2229", "#f0f3f6"),
+    "line": ("#4a5764", "#7a8794"),
+    "filled": ("#34414d", "#c3ccd5"),
+    "text": ("#f2f5f7", "#10161c"),
+    "quiet": ("#b9c4ce", "#3c4852"),
+    "dim": ("#8593a1", "#66727e"),
+    "act": ("#8fd0ff", "#00497a"),
+    "ask": ("#ffd479", "#6b4300"),
+    "rest": ("#9fe0b5", "#0b5028"),
+    "wait": ("#c8d0d8", "#3c4852"),
+    "good": ("#9fe0b5", "#0b5028"),
+    "bad": ("#ffb3a7", "#8c1d18"),
 }
-_COLOURS: dict[Theme, dict[str, str]] = {
-    "dark": _SHARED
-    | {
-        "ground": "#101418",
-        "panel": "#1b2229",
-        "line": "#4a5764",
-        "filled": "#34414d",
-        "text": "#f2f5f7",
-        "quiet": "#b9c4ce",
-        "dim": "#8593a1",
-        "act": "#8fd0ff",
-        "ask": "#ffd479",
-        "rest": "#9fe0b5",
-        "wait": "#c8d0d8",
-        "good": "#9fe0b5",
-        "bad": "#ffb3a7",
-    },
-    "light": _SHARED
-    | {
-        "ground": "#ffffff",
-        "panel": "#f0f3f6",
-        "line": "#7a8794",
-        "filled": "#c3ccd5",
-        "text": "#10161c",
-        "quiet": "#3c4852",
-        "dim": "#66727e",
-        "act": "#00497a",
-        "ask": "#6b4300",
-        "rest": "#0b5028",
-        "wait": "#3c4852",
-        "good": "#0b5028",
-        "bad": "#8c1d18",
-    },
-}
+"""Each by what it is for, in the dark theme and in the light one."""
 
 
 def colour(theme: Theme, name: str) -> str:
     """A colour by what it is for."""
-    return _COLOURS[theme][name]
+    return _COLOURS[name][theme == "light"]
+
+
+def _colours(theme: Theme) -> dict[str, str]:
+    return {name: colour(theme, name) for name in _COLOURS}
 
 
 _SHEET = Template("""
@@ -121,13 +105,13 @@ def sheet(theme: Theme) -> str:
     """The Qt style sheet of a theme, in the sizes of the window that it was designed for."""
     # labels that have a colour by their name are named, or that colour would win over the mood's
     moods = _moods(theme, [f"QLabel{name}" for name in ("", "#saved", "#quiet", "#title", "#damper")])
-    return _SHEET.substitute(_COLOURS[theme], moods=moods)
+    return _SHEET.substitute(_colours(theme), moods=moods)
 
 
 def start_sheet() -> str:
     """The same of the windows before a run, which are dark."""
     moods = _moods("dark", ["QTextEdit", "QLabel#gun", "QLabel#count"])
-    return sheet("dark") + _START_SHEET.substitute(_COLOURS["dark"], moods=moods)
+    return sheet("dark") + _START_SHEET.substitute(_colours("dark"), moods=moods)
 
 
 def _moods(theme: Theme, kinds: Sequence[str]) -> str:

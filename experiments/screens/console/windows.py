@@ -182,21 +182,9 @@ _NAMES = {
     QtCore.Qt.Key.Key_F12: "F12",
 }
 _PLACES = {
-    24: "Q",
-    26: "E",
-    27: "R",
-    28: "T",
-    29: "Y",
-    30: "U",
-    33: "P",
-    39: "S",
-    41: "F",
-    42: "G",
-    46: "L",
-    53: "X",
-    56: "B",
-    57: "N",
-    58: "M",
+    first + place: letter
+    for first, row in ((24, "QWERTYUIOP"), (38, "ASDFGHJKL"), (52, "ZXCVBNM"))
+    for place, letter in enumerate(row)
 }
 """Letters by X's number of their place on the keyboard, for alphabets that have others there."""
 
