@@ -8,6 +8,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from math import ceil
+from pathlib import Path
 from string import Template
 
 from PyQt6 import QtGui, QtWidgets
@@ -48,76 +49,23 @@ def colour(theme: Theme, name: str) -> str:
     return _COLOURS[name][theme == "light"]
 
 
-def _colours(theme: Theme) -> dict[str, str]:
-    return {name: colour(theme, name) for name in _COLOURS}
-
-
-_SHEET = Template("""
-    QWidget { background: $ground; color: $text; font-size: 17px; font-family: "DejaVu Sans", "Noto Sans"; }
-    $moods
-    QLabel#band[mood="practice"] { background: $practice; color: $practice_text; }
-    QLabel#band[mood="simulated"] { background: $simulated; color: $simulated_text; }
-    QFrame#panel { background: $panel; border: 1px solid $line; border-radius: 8px; }
-    QFrame#panel QLabel, QFrame#panel QCheckBox, QWidget#form { background: transparent; }
-    QLabel#place { font-size: 22px; color: $quiet; }
-    QLabel#band { font-size: 20px; font-weight: bold; padding: 4px 10px; border-radius: 4px; }
-    QLabel#quiet { font-size: 18px; color: $quiet; }
-    QLabel#saved { font-size: 22px; color: $good; }
-    QPushButton { background: $panel; border: 2px solid $line; border-radius: 8px; padding: 6px 4px; font-size: 16px; }
-    QPushButton:focus { border: 3px solid $act; }
-    QPushButton:hover { border-color: $act; }
-    QPushButton:disabled, QPushButton[dim="yes"] { color: $dim; border-style: dashed; }
-    QPushButton#large { font-size: 26px; font-weight: bold; padding: 8px 4px; }
-    QPushButton#stop { background: $stop; color: $stop_text; font-weight: bold; font-size: 22px; padding: 14px 6px; }
-    QLineEdit, QDoubleSpinBox, QSpinBox, QComboBox { background: $panel; border: 2px solid $line; border-radius: 6px;
-        padding: 8px; font-size: 24px; }
-    QLineEdit:focus, QDoubleSpinBox:focus, QSpinBox:focus, QComboBox:focus { border: 3px solid $act; }
-    QProgressBar { border: 1px solid $line; border-radius: 6px; text-align: center; background: $panel; color: $text;
-        min-height: 24px; }
-    QProgressBar::chunk { background: $filled; }
-    QCheckBox::indicator { width: 22px; height: 22px; border: 2px solid $line; border-radius: 4px; }
-    QCheckBox::indicator:checked { background: $act; }
-    QCheckBox:focus { color: $act; }
-    QListWidget, QTableWidget, QPlainTextEdit { background: $panel; border: 1px solid $line; font-size: 19px; }
-    QPlainTextEdit { font-family: "DejaVu Sans Mono", monospace; }
-    QListWidget::item:selected, QTableWidget::item:selected { background: $act; color: $ground; }
-    QHeaderView::section { background: $ground; color: $quiet; border: none; padding: 6px; }
-""")
-_START_SHEET = Template("""
-    QTextEdit { background: transparent; border: none; font-size: 19px; }
-    QTextEdit#place { font-size: 22px; color: $quiet; }
-    QLabel#title { font-size: 56px; font-weight: bold; }
-    QTextEdit#detail { font-size: 26px; }
-    QTextEdit#saved, QTextEdit#question { font-size: 22px; }
-    QLabel#gun { font-size: 22px; font-weight: bold; }
-    QLabel#count { font-size: 160px; font-weight: bold; color: $ask; }
-    QPushButton#stop { font-size: 34px; padding: 26px; }
-    QScrollArea { background: transparent; }
-    QTableWidget::item { padding: 3px 8px; }
-    QScrollBar { background: transparent; border: none; width: 14px; height: 14px; }
-    QScrollBar::handle { background: $line; border-radius: 5px; min-height: 30px; }
-    QScrollBar::add-line, QScrollBar::sub-line { width: 0px; height: 0px; }
-    $moods
-""")
-
-
 def sheet(theme: Theme) -> str:
     """The Qt style sheet of a theme, in the sizes of the window that it was designed for."""
     # labels that have a colour by their name are named, or that colour would win over the mood's
-    moods = _moods(theme, [f"QLabel{name}" for name in ("", "#saved", "#quiet", "#title", "#damper")])
-    return _SHEET.substitute(_colours(theme), moods=moods)
+    return _styled("console.qss", theme, [f"QLabel{name}" for name in ("", "#saved", "#quiet", "#title", "#damper")])
 
 
 def start_sheet() -> str:
     """The same of the windows before a run, which are dark."""
-    moods = _moods("dark", ["QTextEdit", "QLabel#gun", "QLabel#count"])
-    return sheet("dark") + _START_SHEET.substitute(_colours("dark"), moods=moods)
+    return sheet("dark") + _styled("start.qss", "dark", ["QTextEdit", "QLabel#gun", "QLabel#count"])
 
 
-def _moods(theme: Theme, kinds: Sequence[str]) -> str:
-    """Some kinds of widgets in the colour of each mood."""
+def _styled(file: str, theme: Theme, kinds: Sequence[str]) -> str:
+    """A style sheet beside this module in the colours of a theme, some kinds of widgets in the colour of each mood."""
     selectors = {mood: ", ".join(f'{kind}[mood="{mood}"]' for kind in kinds) for mood in MOODS}
-    return "\n".join(f"{selector} {{ color: {colour(theme, mood)}; }}" for mood, selector in selectors.items())
+    moods = "\n".join(f"{selector} {{ color: {colour(theme, mood)}; }}" for mood, selector in selectors.items())
+    template = Template(Path(__file__).with_name(file).read_text(encoding="utf-8"))
+    return template.substitute({name: colour(theme, name) for name in _COLOURS}, moods=moods)
 
 
 Slot = Callable[[], object]
@@ -150,7 +98,11 @@ def restyle(widget: QtWidgets.QWidget) -> None:
 
 def button(parent: QtWidgets.QWidget, text: str, key: str, slot: Slot, *, name: str = "") -> QtWidgets.QPushButton:
     """A button that shows its key, and the key. Both do the same, and only while the button is there to be seen."""
-    made = _button(f"{text}  [{key.replace('Return', 'Enter')}]", text, slot, name)
+    made = QtWidgets.QPushButton(f"{text}  [{key.replace('Return', 'Enter')}]")
+    made.setObjectName(name)
+    made.setAccessibleName(text)
+    made.setFocusPolicy(Qt.FocusPolicy.TabFocus)
+    made.clicked.connect(lambda _: slot())
 
     def pressed() -> None:
         if made.isVisible():
@@ -159,15 +111,6 @@ def button(parent: QtWidgets.QWidget, text: str, key: str, slot: Slot, *, name: 
     shortcut = QtGui.QShortcut(QtGui.QKeySequence(key), parent)
     shortcut.setAutoRepeat(False)
     shortcut.activated.connect(pressed)
-    return made
-
-
-def _button(shown: str, spoken: str, slot: Slot, name: str) -> QtWidgets.QPushButton:
-    made = QtWidgets.QPushButton(shown)
-    made.setObjectName(name)
-    made.setAccessibleName(spoken)
-    made.setFocusPolicy(Qt.FocusPolicy.TabFocus)
-    made.clicked.connect(lambda _: slot())
     return made
 
 
