@@ -217,7 +217,7 @@ class _Runner:
         if time_s is None:
             raise TypeError("an answer without a time")
         own = drawn_s is not None or isinstance(answer, events.ParticipantKey)
-        paused = self._live.paused_between(self._onset_s, self._onset_s + time_s)
+        paused = self._live.moment.paused_between(self._onset_s, self._onset_s + time_s)
         return steps.Answered(
             response=answer.response,
             response_time_s=time_s,
@@ -274,7 +274,7 @@ class _Runner:
                 raise Unforeseen(other)
 
     def _repeat(self, reason: str) -> steps.Repeated:
-        trial = self._live.repeated()
+        trial = self._live.moment.repeatable
         if trial is None:
             raise TypeError("a repeat of no trial was taken")
         return steps.Repeated(trial=trial, reason=reason)

@@ -459,10 +459,10 @@ def test_flags_and_notes_go_to_the_trial_that_they_were_opened_for(tmp_path: Pat
         sitting.to(S.ASKING)
         sitting.press("G")  # the line of a flag, and then of a note, is open while the participant answers
         sitting.window.fields["line"] = "noise"
-        first = sitting.live.trial
+        first = sitting.live.moment.trial
         assert sitting.live.offer(own_key(sitting))
         sitting.settle()
-        assert sitting.live.trial != first
+        assert sitting.live.moment.trial != first
         sitting.press("Enter")
         sitting.live.offer(events.Note(text="a dog barked", trial=first))
         sitting.live.offer(events.Flag(flag="late"))

@@ -244,9 +244,9 @@ class Controls:
             self._participant.restart()
 
     def _nothing_to(self, name: keys.Name) -> str:
-        if name == "repeat" and self._live.repeated() is None:
+        if name == "repeat" and self._live.moment.repeatable is None:
             return "There is no trial of this set to repeat now."
-        if name == "undo" and not self._live.undoable:
+        if name == "undo" and self._live.moment.further_back is None:
             return "There is nothing to undo in this set."
         return ""
 
@@ -314,7 +314,8 @@ class Controls:
         elif name == "stop" and self.drawn.base is State.HALTED:
             self._offer(events.Stop(reason=EMERGENCY))
         else:
-            trial = (self._live.repeated() if name == "repeat" else None) or self._live.trial
+            moment = self._live.moment
+            trial = (moment.repeatable if name == "repeat" else None) or moment.trial
             self._enter = lambda line, press: self._line(name, trial, line, press)
             self._view.open_line(f"{_question(name, trial, self._live)}  (Enter saves, Esc leaves it)")
 

@@ -325,7 +325,7 @@ class VisualParticipant:
             return
         position, now_s = window.drawn, self._clock.now()
         done = position.serial == self._done and now_s - self._done_s < AGAIN_S
-        if not done and window.live.ready_at_s(now_s) and not self._thinks(position, now_s):
+        if not done and window.live.moment.is_ready(now_s) and not self._thinks(position, now_s):
             self._done, self._done_s = position.serial, now_s
             self._press(window, position)
 

@@ -143,7 +143,7 @@ class Stage:
         self.window = _open(toolkit, look, self.palette.ground)
         self.width_px, self.height_px = (int(pixels) for pixels in self.window.clientSize)
         self.half_width = half_width(self.width_px, self.height_px)
-        self.page: Page | None = None
+        self.page = Page()
         self._focus = Focus(self.window.winHandle)
         self.drawn_s = 0.0
         """When the page was drawn last; 0 if it was not yet."""
@@ -166,8 +166,7 @@ class Stage:
         `keep_keys`: until the next one to type on the keys stay, so that no key goes to another window meanwhile.
         """
         self.window.winHandle.dispatch_events()
-        if self.page is not None:
-            self.page.leave()
+        self.page.leave()
         self.page = page
         self.window.mouseVisible = page.pointer
         if page.typed:
@@ -182,7 +181,7 @@ class Stage:
         if self._closed:
             raise WindowClosed("the participant's window was closed")
         now_s = self.toolkit.now()
-        if self.page is not None and now_s - self.drawn_s >= self.page.redraw_s:
+        if now_s - self.drawn_s >= self.page.redraw_s:
             self.drawn_s = now_s
             self.page.draw()
             self.window.flip()
@@ -271,15 +270,14 @@ class _Handlers:
         return True
 
     def on_mouse_press(self, x: int, y: int, button: int, _: int) -> None:
-        if self._stage.page is not None and button == 1:
+        if button == 1:
             self._stage.page.pressed(*self._stage.at(x, y))
 
     def on_mouse_drag(self, x: int, y: int, *_: int) -> None:
-        if self._stage.page is not None:
-            self._stage.page.dragged(self._stage.at(x, y)[0])
+        self._stage.page.dragged(self._stage.at(x, y)[0])
 
     def on_mouse_release(self, _x: int, _y: int, button: int, _: int) -> None:
-        if self._stage.page is not None and button == 1:
+        if button == 1:
             self._stage.page.released()
 
     def on_key_press(self, symbol: int, modifiers: int) -> bool:
@@ -287,13 +285,10 @@ class _Handlers:
         if name == EMERGENCY_KEY:
             self._stage.unasked.append(messages.EmergencyPressed())
             return True
-        if self._stage.page is None:
-            return False
         return self._stage.page.key(name, bool(modifiers & self._names.MOD_CTRL))
 
     def on_text_motion(self, motion: int) -> None:
-        if self._stage.page is not None:
-            self._stage.page.motion(self._names.motion_string(motion))
+        self._stage.page.motion(self._names.motion_string(motion))
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
