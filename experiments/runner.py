@@ -143,13 +143,7 @@ class _Runner:
             self._desk.journal.append("outcome", body=steps.step_record(outcome), **self._shown())
             self._live.keep(step, outcome)
             self._count(outcome)
-            step = self._send(outcome)
-
-    def _send(self, outcome: steps.Outcome) -> steps.Step | None:
-        try:
-            return self._session.send(outcome)
-        except StopIteration:
-            return None
+            step = steps.advance(self._session, outcome)
 
     def _shown(self) -> dict[str, float]:
         """When the step was painted, where that is known."""

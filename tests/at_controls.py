@@ -431,8 +431,8 @@ class PaperWindow:
     def other_theme(self) -> None:
         pass
 
-    def shut(self) -> None:
-        pass
+    def close(self) -> bool:
+        return True
 
 
 @dataclass

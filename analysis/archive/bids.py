@@ -22,7 +22,7 @@ from analysis.logs.frames import Cell
 from analysis.logs.reading import Logs
 from experiments.record import tables
 from experiments.record.tables import Column
-from experiments.study.register import Member
+from experiments.study.study import Member
 
 ANSWERED_BY = {"direction": "response_source", "preference": "rating_by"}
 """The column that says whose hand gave the answer; empty where there is none."""

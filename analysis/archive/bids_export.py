@@ -20,7 +20,8 @@ from experiments.record import storage
 from experiments.record.provenance import recoil_version
 from experiments.study import folders, register
 from experiments.study.folders import PlaceError
-from experiments.study.register import Member, RegisterError
+from experiments.study.register import RegisterError
+from experiments.study.study import Member
 
 _AT_FDCWD, _RENAME_EXCHANGE = -100, 2
 """Linux's words for exchanging two names at once: renameat2(2)."""

@@ -50,8 +50,7 @@ class SerialGun:
     def identify(self) -> Identity:
         """Who answered. `LinkError` after `close`."""
         self._is_open()
-        named = self.link.named
-        if named is None:
+        if (named := self.link.named) is None:
             raise Disconnected("the gun never said who it is")
         return Identity(model=named.model, version=named.firmware, serial=named.serial)
 

@@ -173,8 +173,7 @@ class Pending:
 
 def _outcome(waiting: Waiting) -> Reply | LinkError:
     """The answer, or the trouble that there was instead."""
-    reply = waiting.reply
-    if reply is None:
+    if (reply := waiting.reply) is None:
         return waiting.trouble or TimedOut(f"no answer to {waiting.header} within its time")
     no = refusal_in(reply.body)
     return reply if no is None else CommandRefused(no[0], f"the gun refused {waiting.header}: {no[1]}")

@@ -16,6 +16,7 @@ import tempfile
 import threading
 import time
 from collections.abc import Callable, Iterator, Mapping
+from concurrent.futures import Future, wait
 from contextlib import closing, contextmanager, suppress
 from dataclasses import dataclass
 from functools import partial
@@ -255,29 +256,23 @@ PUT_AWAY_S = 2.0
 
 def within_seconds(seconds: float, work: Callable[[], _Result]) -> _Result:
     """The result of some work, or what it raises. `TimeoutError` if it takes longer; it is then left to itself."""
-    results: list[_Result] = []
-    errors: list[Exception] = []
-    done = threading.Event()  # not `join`: once interrupted, it takes the thread for ended
+    done: Future[_Result] = Future()
 
     def carry_out() -> None:
         try:
-            results.append(work())
+            done.set_result(work())
         except Exception as error:  # noqa: BLE001 - raised again where it is waited for
-            errors.append(error)
-        finally:
-            done.set()
+            done.set_exception(error)
 
     try:
         threading.Thread(target=carry_out, daemon=True, name="check").start()
-        done.wait(seconds)
+        wait([done], seconds)
     except KeyboardInterrupt:
-        done.wait(PUT_AWAY_S)  # so that it can close and remove what it opened
+        wait([done], PUT_AWAY_S)  # so that it can close and remove what it opened
         raise
-    if errors:
-        raise errors[0]
-    if not results:
+    if not done.done():
         raise TimeoutError(f"did not end within {seconds:g} s")
-    return results[0]
+    return done.result()
 
 
 _ROOT = Path(__file__).parents[2]

@@ -64,7 +64,7 @@ def replay(session: steps.Session, contents: Contents) -> RunPosition:
     step = next(session, None)
     for number, (recorded, outcome) in enumerate(outcomes(before), start=1):
         _compare(contents, number, step, recorded)
-        step = _send(session, outcome)
+        step = steps.advance(session, outcome)
     return RunPosition(step=step, history=before, halted=_halted(contents))
 
 
@@ -84,20 +84,13 @@ def go_on(
     felt = isinstance(step, steps.Ask) or (announced and isinstance(step, steps.FireShot | steps.Present))
     outcome = steps.Interrupted(presented=felt)
     append("outcome", body=steps.step_record(outcome))
-    return replace(position, step=_send(session, outcome), history=[*position.history, (step, outcome)])
+    return replace(position, step=steps.advance(session, outcome), history=[*position.history, (step, outcome)])
 
 
 def _last_step_is_open(contents: Contents) -> bool:
     """Whether the last step has no outcome; a stop or a resumption may stand behind it."""
     kinds = [line.kind for line in contents.records if line.kind in ("step", "outcome")]
     return bool(kinds) and kinds[-1] == "step"
-
-
-def _send(session: steps.Session, outcome: steps.Outcome) -> steps.Step | None:
-    try:
-        return session.send(outcome)
-    except StopIteration:
-        return None
 
 
 def _compare(contents: Contents, number: int, planned: steps.Step | None, recorded: steps.Step) -> None:

@@ -24,8 +24,8 @@ from experiments.record import journal, replay, storage, tables
 from experiments.record.journal import Contents, Head, JournalError
 from experiments.session.history import answered
 from experiments.study import register
-from experiments.study.register import Member, Register
-from experiments.study.study import NextParticipant, Participant, RunProgress, by_code, who_is_next
+from experiments.study.register import Register
+from experiments.study.study import Member, NextParticipant, Participant, RunProgress, by_code, who_is_next
 
 _CODE = re.compile(CODE)
 

@@ -55,7 +55,7 @@ class View(Protocol):
     def other_theme(self) -> None:
         """Change the colours."""
 
-    def shut(self) -> None:
+    def close(self) -> bool:
         """Close the window of a run that has ended."""
 
 
@@ -192,7 +192,7 @@ class Controls:
 
     def _after_end(self, name: keys.Name) -> None:
         if name == "stop":
-            self._view.shut()
+            self._view.close()
         else:
             self._view.say("The run has ended: Q closes the window.", "wait")
 

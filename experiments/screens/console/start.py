@@ -154,8 +154,7 @@ class StartWindow(QtWidgets.QWidget):
     def resizeEvent(self, event: QResizeEvent | None) -> None:  # noqa: N802 - Qt's name
         """Have the type grow with the window."""
         super().resizeEvent(event)
-        scale = windows.type_scale(self.width(), self.height())
-        if scale != self._scale:
+        if (scale := windows.type_scale(self.width(), self.height())) != self._scale:
             self._scale = scale
             self.setStyleSheet(windows.scaled_sheet(start_sheet(), scale))
 

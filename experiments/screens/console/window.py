@@ -103,10 +103,10 @@ class ConsoleWindow(QtWidgets.QMainWindow):
         """A live run is there, and who works it."""
         self.live, self.controls = live, controls
 
-    def take(self, message: view.Message) -> None:  # noqa: C901 - one case a message
+    def take(self, message: view.Message) -> None:
         """Take a message from the run, show it, and say when it was painted."""
         match message:
-            case view.Began():
+            case view.Began() | view.Shown():
                 self._arrive()
             case view.Saved():
                 self._acknowledge(message)
@@ -118,8 +118,6 @@ class ConsoleWindow(QtWidgets.QMainWindow):
                 self._last(message.text, message.mood)
             case view.Ended():
                 self._end(message)
-            case view.Shown():
-                self._arrive()
         self.refresh()
         if isinstance(message, view.Shown | view.Began) and self.live is not None:
             self.repaint()
@@ -248,8 +246,7 @@ class ConsoleWindow(QtWidgets.QMainWindow):
     def showEvent(self, event: QShowEvent | None) -> None:  # noqa: N802 - Qt's name
         """Hear the keys before any widget does."""
         super().showEvent(event)
-        handle = self.windowHandle()
-        if handle is not None:
+        if (handle := self.windowHandle()) is not None:
             handle.removeEventFilter(self._keyboard)
             handle.installEventFilter(self._keyboard)
 
@@ -327,10 +324,6 @@ class ConsoleWindow(QtWidgets.QMainWindow):
         """Change the colours."""
         self.theme = "light" if self.theme == "dark" else "dark"
         self._restyle()
-
-    def shut(self) -> None:
-        """Close the window of a run that has ended."""
-        self.close()
 
     def closeEvent(self, event: QCloseEvent | None) -> None:  # noqa: N802 - Qt's name
         """Closing the window of a live run asks why it stops; once it has ended, the window goes."""
