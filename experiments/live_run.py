@@ -94,7 +94,7 @@ class LiveRun:
         history: History = (),
     ) -> None:
         self.plan, self.clock, self.guard_s = plan, clock, guard_s
-        self.gun, self._journal, self._screen = gun, journal, screen
+        self.gun, self.journal, self._screen = gun, journal, screen
         self._history = list(history)
         self._position = Position(since_s=clock.now())
         self._painted_s: float | None = None
@@ -272,7 +272,7 @@ class LiveRun:
     def _submit(self, remark: Remark) -> Future[None] | None:
         """Have a remark written; `None` if the journal is closed, as the run has just ended."""
         try:
-            written = self._journal.submit("remark", body=remark_record(remark))
+            written = self.journal.submit("remark", body=remark_record(remark))
         except RuntimeError:
             return None
         self._history.append((None, remark))

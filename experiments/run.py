@@ -137,9 +137,7 @@ def run(request: RunRequest, make_screen: MakeScreen, clock: Clock) -> Finished:
                 guard_s=setup.config.console.guard_s,
                 history=position.history,
             )
-            desk = Desk(
-                gun=gun, gun_name=gun_name(gun.identify()), drives=drives, journal=journal, clock=clock, live=live
-            )
+            desk = Desk(live=live, gun_name=gun_name(gun.identify()), drives=drives)
             screen.begin(live)
             return Finished(plan=plan, place=place, saved=_to_the_end(session, desk, position, place))
 
@@ -275,7 +273,7 @@ def _to_the_end(session: Session, desk: Desk, position: RunPosition, place: Plac
     except (KeyboardInterrupt, RunStopped) as stop:
         why = str(stop) or "interrupted"
         desk.live.end(why)
-        desk.journal.append("stopped", reason=why)
+        desk.live.journal.append("stopped", reason=why)
         saved = _write_table(place, read_journal(place.journal))
         if isinstance(stop, RunStopped):
             stop.saved = saved
@@ -285,7 +283,7 @@ def _to_the_end(session: Session, desk: Desk, position: RunPosition, place: Plac
         raise
     desk.live.end("")
     contents = read_journal(place.journal)
-    desk.journal.append("finished", table_sha256=hashlib.sha256(table(contents)).hexdigest())
+    desk.live.journal.append("finished", table_sha256=hashlib.sha256(table(contents)).hexdigest())
     return _write_table(place, contents)
 
 

@@ -16,10 +16,8 @@ from typing import Literal
 
 from device import DeviceError, Gun, LimitError, Shot, ShotReport
 from device.words import Drive, Identity
-from experiments.clock import Clock
 from experiments.design.plan import Trial
 from experiments.live_run import Held, LiveRun, RunStopped
-from experiments.record.journal import Journal
 from experiments.record.replay import RunPosition
 from experiments.session import events, steps
 from experiments.session.history import trial_at
@@ -29,28 +27,25 @@ from experiments.session.states import State
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Desk:
-    """All that carries steps out: gun and how each method drives it, journal, clock, and the live run."""
+    """All that carries steps out: the live run with its gun, what that is called, and how each method drives it."""
 
-    gun: Gun
+    live: LiveRun
     gun_name: str
     drives: Mapping[str, Drive]
-    journal: Journal
-    clock: Clock
-    live: LiveRun
 
 
 class Train:
     """A stimulus of several shots: each in the journal before the next is asked for."""
 
     def __init__(self, step: steps.Present, desk: Desk) -> None:
-        self._step, self._desk = step, desk
+        self._step, self._desk, self._live = step, desk, desk.live
         self._onset_utc, self._onset_s = "", math.nan
         self.shots = 0
 
     def began(self, onset_utc: str, first: ShotReport) -> None:
         """Take the first shot; `next` counts after the least exposure."""
         self._onset_utc, self._onset_s = onset_utc, first.pulse_start_s
-        self._desk.live.stimulus_begins(first.pulse_start_s, least_s=self._step.least_exposure_s)
+        self._live.stimulus_begins(first.pulse_start_s, least_s=self._step.least_exposure_s)
         self.fired(first)
 
     def fired(self, report: ShotReport) -> None:
@@ -65,12 +60,12 @@ class Train:
             motion=report.motion,
             timing=report.timing,
         )
-        self._desk.journal.append("shot", body=steps.step_record(shot))
+        self._live.journal.append("shot", body=steps.step_record(shot))
 
     def due_s(self) -> float:
         """The next shot's tick, whole microseconds after the first; later if the magnet is not home by then."""
         tick_s = self._onset_s + self.shots * round(self._step.repeat_every_s * 1e6) / 1e6
-        return max(tick_s, self._desk.gun.status().ready_at_s)
+        return max(tick_s, self._live.gun.status().ready_at_s)
 
     def presented(self, ended_by: Literal["next", "limit"]) -> steps.Presented:
         """The stimulus as it was felt to its end."""
@@ -89,7 +84,7 @@ class Train:
         return steps.Interrupted(presented=True, cause="pause", shots=self.shots, exposure_s=self._exposure_s())
 
     def _exposure_s(self) -> float:
-        return self._desk.clock.now() - self._onset_s
+        return self._live.clock.now() - self._onset_s
 
 
 MAX_FAILURES = 3
@@ -119,7 +114,7 @@ def carry_out(session: steps.Session, desk: Desk, position: RunPosition) -> None
         raise RunStopped(desk.live.stay_halted()) from stop
     finally:
         session.close()
-        disarm(desk.gun)
+        disarm(desk.live.gun)
 
 
 class _Runner:
@@ -138,9 +133,9 @@ class _Runner:
         if position.halted:
             self._rearm(trial_at(self._live.plan, position.history, step))
         while step is not None:
-            self._desk.journal.append("step", body=steps.step_record(step))
+            self._live.journal.append("step", body=steps.step_record(step))
             outcome = self._do(step)
-            self._desk.journal.append("outcome", body=steps.step_record(outcome), **self._shown())
+            self._live.journal.append("outcome", body=steps.step_record(outcome), **self._shown())
             self._live.keep(step, outcome)
             self._count(outcome)
             step = steps.advance(self._session, outcome)
@@ -221,7 +216,7 @@ class _Runner:
         )
 
     def _rest(self, step: steps.Rest) -> steps.Rested | steps.Repeated:
-        start_s = self._desk.clock.now()
+        start_s = self._live.clock.now()
         self._live.enter(State.RESTING, step, until_s=start_s + step.duration_s)
         while True:
             match self._live.wait():
@@ -237,7 +232,7 @@ class _Runner:
                     raise Unforeseen(other)
 
     def _rested(self, start_s: float, reason: str) -> steps.Rested:
-        return steps.Rested(rested_s=round(self._desk.clock.now() - start_s, 6), cut_reason=reason)
+        return steps.Rested(rested_s=round(self._live.clock.now() - start_s, 6), cut_reason=reason)
 
     def _rate(self, step: steps.Rate) -> steps.Rated | steps.Repeated:
         self._live.enter(State.RATING, step)
@@ -330,7 +325,7 @@ class DeskGun:
         except DeviceError as error:
             return self._failed(error, felt=asked and not isinstance(error, LimitError))
         finally:
-            disarm(self._desk.gun)
+            disarm(self._live.gun)
         self._live.stimulus_begins(report.pulse_start_s)
         return steps.Fired(
             gun=self._desk.gun_name,
@@ -360,7 +355,7 @@ class DeskGun:
         except DeviceError as error:
             return self._failed(error, felt=train.shots > 0 or (asked and not isinstance(error, LimitError)))
         finally:
-            disarm(self._desk.gun)
+            disarm(self._live.gun)
         return train.presented("next") if isinstance(event, events.Next) else train.interrupted()
 
     def _get_ready(self, state: State, step: steps.FireShot | steps.Present) -> None:
@@ -374,23 +369,23 @@ class DeskGun:
                 self._live.stimulus_begins(None)
             self._arm()
         except RunStopped:
-            self._desk.journal.append("outcome", body=steps.step_record(steps.Interrupted(presented=False)))
+            self._live.journal.append("outcome", body=steps.step_record(steps.Interrupted(presented=False)))
             raise
 
     def _arm(self) -> None:
         """Arm the gun, and wait until its magnet is home. Raises as `allow_shot`."""
         self._live.settle()
         self._live.allow_shot()
-        self._desk.gun.arm()
-        self._live.sleep(self._desk.gun.status().ready_at_s)
+        self._live.gun.arm()
+        self._live.sleep(self._live.gun.status().ready_at_s)
 
     def _first(self, trial: Trial) -> tuple[str, ShotReport]:
         """The first shot of a stimulus, and its date and time."""
-        return self._desk.clock.utc(), self._shoot(trial)
+        return self._live.clock.utc(), self._shoot(trial)
 
     def _shoot(self, trial: Trial, at_s: float | None = None) -> ShotReport:
         shot = Shot(method=trial.method, direction=trial.direction, drive=self._desk.drives[trial.method])
-        return self._desk.gun.fire(shot, at_s)
+        return self._live.gun.fire(shot, at_s)
 
     def _failed(self, error: DeviceError, *, felt: bool) -> steps.Failed | steps.Interrupted:
         """What became of a stimulus at which the gun failed; a pause that disarmed it is no fault of the gun's."""
@@ -410,7 +405,7 @@ class DeskGun:
             self._live.remark(TestShot(method=trial.method, held_s=held_s, cause=cause))
             return False
         finally:
-            disarm(self._desk.gun)
+            disarm(self._live.gun)
         fired = TestShot(method=trial.method, held_s=held_s, pulse_start_s=report.pulse_start_s, motion=report.motion)
         self._live.remark(fired)
         return True

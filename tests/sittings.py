@@ -116,14 +116,8 @@ class Sitting(NamedTuple):
         live = LiveRun(
             plan=self.plan, gun=self.gun, journal=self.journal, clock=self.clock, screen=self.screen, guard_s=0.25
         )
-        desk = Desk(
-            gun=self.gun,
-            gun_name="simulated",
-            drives={one.method: one.drive for one in load.check_limits(self.setup)},
-            journal=self.journal,
-            clock=self.clock,
-            live=live,
-        )
+        drives = {one.method: one.drive for one in load.check_limits(self.setup)}
+        desk = Desk(live=live, gun_name="simulated", drives=drives)
         self.screen.begin(live)
         with self.journal:
             carry_out(going, desk, RunPosition(step=next(going)))

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 
 from device.limits import DriveHistory, planned_start_s
 from device.methods import Method
-from device.serial_gun.line import CommandRefused, Disconnected, OpenPort, SerialPort, TimedOut, Unsure
+from device.serial_gun.line import CommandRefused, Disconnected, SerialPort, TimedOut, Unsure
 from device.serial_gun.link import Link
 from device.serial_gun.reports import MAX_UNCERTAINTY_S, ShotOrder, ShotRequest, asked, ready_s, report
 from device.serial_gun.triggering import TRIES, Arming, Triggering, ask_again, standing
@@ -244,13 +244,13 @@ def system_ports() -> list[str]:
     return sorted(port.device for port in list_ports.comports())
 
 
-def find_gun(ports: Iterable[str], serial: str | None = None, open_port: OpenPort = SerialPort) -> str:
+def find_gun(ports: Iterable[str], serial: str | None = None) -> str:
     """The port at which a gun answers, the one with this serial number if it is given.
 
     `LinkError` names what was found if that is no gun or more than one. Each port is sent `*IDN?` and nothing else.
     """
     looked = list(ports)
-    found = {port: named for port in looked if (named := probe(port, open_port)) and serial in {None, named.serial}}
+    found = {port: named for port in looked if (named := probe(port)) and serial in {None, named.serial}}
     if len(found) == 1:
         return next(iter(found))
     if found:
@@ -263,10 +263,10 @@ def find_gun(ports: Iterable[str], serial: str | None = None, open_port: OpenPor
     )
 
 
-def probe(port: str, open_port: OpenPort = SerialPort) -> Named | None:
+def probe(port: str) -> Named | None:
     """Who answers at a port, if it is a gun."""
     try:
-        line = open_port(port)
+        line = SerialPort(port)
     except LinkError:  # in use, or not ours to open
         return None
     try:

@@ -149,10 +149,8 @@ class Form(QtWidgets.QFrame):
         scroll.setFrameShape(QtWidgets.QFrame.Shape.NoFrame)
         scroll.setFocusPolicy(Qt.FocusPolicy.NoFocus)
         scroll.setHorizontalScrollBarPolicy(Qt.ScrollBarPolicy.ScrollBarAlwaysOff)
-        down = QtWidgets.QVBoxLayout(self)
-        for part in (widgets.text_label("quiet", _HOW_TO_START), self.remark):
-            down.addWidget(part)
-        down.addWidget(scroll, 1)
+        how = widgets.text_label("quiet", _HOW_TO_START)
+        widgets.fill(QtWidgets.QVBoxLayout(self), how, self.remark, (scroll, 1), margins=None)
 
     def _rows(self) -> list[tuple[str, QtWidgets.QWidget]]:
         rows: list[tuple[str, QtWidgets.QWidget]] = [("Experiment", self.experiment), ("Code", self.code)]

@@ -215,9 +215,7 @@ class Unfinished(QDialog):
         )
         self.question = QuestionBox(_text(found), answers, reason=f"to start anew: {WHY}")
         self.said = TextLines("saved")
-        down = QVBoxLayout(self)
-        down.addWidget(self.question)
-        down.addWidget(self.said)
+        widgets.fill(QVBoxLayout(self), self.question, self.said, margins=None)
         self.setMinimumWidth(720)
         for button in self.findChildren(QPushButton):
             button.setAutoDefault(False)

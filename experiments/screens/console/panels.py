@@ -55,10 +55,7 @@ class TextPage(QtWidgets.QWidget):
         self._text = QtWidgets.QPlainTextEdit()
         self._text.setReadOnly(True)
         self._text.setFocusPolicy(widgets.NO_FOCUS)
-        down = QtWidgets.QVBoxLayout(self)
-        down.setContentsMargins(10, 6, 10, 6)
-        for widget in (self._title, self._text, self.said):
-            down.addWidget(widget)
+        widgets.fill(QtWidgets.QVBoxLayout(self), self._title, self._text, self.said, margins=(10, 6, 10, 6))
 
     def put(self, title: str, lines: list[str]) -> None:
         """Show lines of text."""
@@ -230,8 +227,7 @@ class Slots(QtWidgets.QWidget):
         self, left: Sequence[QtWidgets.QWidget], middle: Sequence[QtWidgets.QWidget], right: Sequence[QtWidgets.QWidget]
     ) -> None:
         super().__init__()
-        across = QtWidgets.QHBoxLayout(self)
-        across.setContentsMargins(0, 0, 0, 0)
+        across = widgets.fill(QtWidgets.QHBoxLayout(self))
         self._widgets = [*left, *middle, *right]
         for place_of in (left, middle, right):
             place = QtWidgets.QWidget()
@@ -279,11 +275,8 @@ class Buttons:
         self.slots = Slots(*([self._large[name] for name in names] for names in (_LEFT, _MIDDLE, _RIGHT)))
         self._row = {name: CommandButton(name, mouse) for name in _ROW}
         self.row = QtWidgets.QWidget()
-        across = QtWidgets.QHBoxLayout(self.row)
-        across.setContentsMargins(10, 0, 10, 2)
-        for button in self._row.values():
-            across.addWidget(button, 2)
-        across.addWidget(CommandButton("emergency", mouse, "stop"), 5)
+        row = [*((button, 2) for button in self._row.values()), (CommandButton("emergency", mouse, "stop"), 5)]
+        widgets.fill(QtWidgets.QHBoxLayout(self.row), *row, margins=(10, 0, 10, 2))
 
     def put(self, position: Position, *, over: bool, letters: bool, idle: Callable[[Name], bool]) -> None:
         """Show what can be done now, and which of the keys below do nothing.
@@ -364,9 +357,8 @@ class SidePanel(QtWidgets.QWidget):
         self._coming, self._answers = widgets.quiet_list(), widgets.quiet_list()
         self._strip = Strip()
         self._strip.setVisible(about.setup.config.console.response_times)
-        down = QtWidgets.QVBoxLayout(self)
-        down.setContentsMargins(0, 0, 0, 0)
-        for widget in (
+        widgets.fill(
+            QtWidgets.QVBoxLayout(self),
             widgets.panel(self._gun, self._focus),
             widgets.panel(self._times),
             widgets.text_label("quiet", "Coming next"),
@@ -374,8 +366,7 @@ class SidePanel(QtWidgets.QWidget):
             widgets.text_label("quiet", "Answers of this set"),
             self._answers,
             self._strip,
-        ):
-            down.addWidget(widget)
+        )
         for lines in (self._coming, self._answers):
             lines.setMinimumHeight(1)
 
@@ -401,10 +392,7 @@ class Bars(QtWidgets.QWidget):
     def __init__(self, about: About) -> None:
         super().__init__()
         self._bars = [QtWidgets.QProgressBar() for _ in range(2 if about.rated_last else 3)]
-        across = QtWidgets.QHBoxLayout(self)
-        across.setContentsMargins(0, 0, 0, 0)
-        for bar in self._bars:
-            across.addWidget(bar)
+        widgets.fill(QtWidgets.QHBoxLayout(self), *self._bars)
 
     def put(self, seen: Seen) -> None:
         """Show what is so now."""

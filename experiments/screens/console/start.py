@@ -55,27 +55,16 @@ class StartWindow(QtWidgets.QWidget):
         self.pages = QtWidgets.QStackedWidget()
         for page in (self._page(), self.shots):
             self.pages.addWidget(page)
-        down, top = QtWidgets.QVBoxLayout(self), QtWidgets.QHBoxLayout()
-        top.addWidget(
-            TextLines("place", f"{self._study.config.title} · {self._study.results.resolve()}", most_lines=3), 1
-        )
-        top.addWidget(self._gun())
-        down.addLayout(top)
-        down.addWidget(self.pages, 1)
+        place = TextLines("place", f"{self._study.config.title} · {self._study.results.resolve()}", most_lines=3)
+        top = widgets.fill(QtWidgets.QHBoxLayout(), (place, 1), self._gun())
+        widgets.fill(QtWidgets.QVBoxLayout(self), top, (self.pages, 1), margins=None)
         self._connect()
 
     def _page(self) -> QtWidgets.QWidget:
-        down = QtWidgets.QVBoxLayout(page := QtWidgets.QWidget())
-        down.setContentsMargins(0, 0, 0, 0)
-        middle, left, self._foot = QtWidgets.QHBoxLayout(), QtWidgets.QVBoxLayout(), QtWidgets.QVBoxLayout()
-        left.addWidget(self.table, 1)
-        left.addLayout(self._foot)
-        middle.addLayout(left, 3)
-        middle.addWidget(self.form, 2)
-        down.addWidget(self.next)
-        down.addLayout(middle, 1)
-        down.addWidget(self.saved)
-        down.addLayout(self._buttons(page))
+        page, self._foot = QtWidgets.QWidget(), QtWidgets.QVBoxLayout()
+        left = widgets.fill(QtWidgets.QVBoxLayout(), (self.table, 1), self._foot)
+        middle = widgets.fill(QtWidgets.QHBoxLayout(), (left, 3), (self.form, 2))
+        widgets.fill(QtWidgets.QVBoxLayout(page), self.next, (middle, 1), self.saved, self._buttons(page))
         return page
 
     def _gun(self) -> QtWidgets.QWidget:

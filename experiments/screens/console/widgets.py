@@ -10,6 +10,7 @@ from dataclasses import dataclass
 from math import ceil
 from pathlib import Path
 from string import Template
+from typing import TypeVar
 
 from PyQt6 import QtGui, QtWidgets
 from PyQt6.QtCore import QEvent, QPointF, QRectF, QSize, Qt
@@ -114,35 +115,36 @@ def button(parent: QtWidgets.QWidget, text: str, key: str, slot: Slot, *, name: 
     return made
 
 
+_Box = TypeVar("_Box", bound=QtWidgets.QBoxLayout)
+Part = QtWidgets.QWidget | QtWidgets.QLayout
+
+
+def fill(
+    layout: _Box, *parts: Part | tuple[Part, int], margins: tuple[int, int, int, int] | None = (0, 0, 0, 0)
+) -> _Box:
+    """Put widgets and layouts into a layout, each with its stretch where it has one. No margins: those of the style."""
+    if margins is not None:
+        layout.setContentsMargins(*margins)
+    for part, stretch in (part if isinstance(part, tuple) else (part, 0) for part in parts):
+        if isinstance(part, QtWidgets.QWidget):
+            layout.addWidget(part, stretch)
+        else:
+            layout.addLayout(part, stretch)
+    return layout
+
+
 def panel(*widgets: QtWidgets.QWidget) -> QtWidgets.QFrame:
     """A framed column."""
     frame = QtWidgets.QFrame()
     frame.setObjectName("panel")
-    _fill(QtWidgets.QVBoxLayout(frame), widgets)
+    fill(QtWidgets.QVBoxLayout(frame), *widgets, margins=None)
     return frame
-
-
-def row(*widgets: QtWidgets.QWidget) -> QtWidgets.QWidget:
-    """Widgets side by side."""
-    return _plain(QtWidgets.QHBoxLayout(), widgets)
 
 
 def column(*widgets: QtWidgets.QWidget) -> QtWidgets.QWidget:
     """Widgets below each other."""
-    return _plain(QtWidgets.QVBoxLayout(), widgets)
-
-
-def _plain(layout: QtWidgets.QBoxLayout, widgets: Sequence[QtWidgets.QWidget]) -> QtWidgets.QWidget:
-    made = QtWidgets.QWidget()
-    made.setLayout(layout)
-    layout.setContentsMargins(0, 0, 0, 0)
-    _fill(layout, widgets)
+    fill(QtWidgets.QVBoxLayout(made := QtWidgets.QWidget()), *widgets)
     return made
-
-
-def _fill(layout: QtWidgets.QBoxLayout, widgets: Sequence[QtWidgets.QWidget]) -> None:
-    for widget in widgets:
-        layout.addWidget(widget)
 
 
 def quiet_list() -> QtWidgets.QListWidget:
@@ -275,20 +277,15 @@ class QuestionBox(QtWidgets.QFrame):
     def __init__(self, text: str, answers: tuple[Option, ...], *, reason: str = "") -> None:
         super().__init__()
         self.setObjectName("panel")
-        down = QtWidgets.QVBoxLayout(self)
         self.text = TextLines("question")
         self.text.say(text, "ask")
-        down.addWidget(self.text)
         self.reason = LineEdit()
         self.reason.setMaxLength(MAX_REASON)
         self.reason.setPlaceholderText(reason)
         self.reason.setAccessibleName(reason)
         self.reason.setVisible(bool(reason))
-        down.addWidget(self.reason)
-        across = QtWidgets.QHBoxLayout()
-        for answer in answers:
-            across.addWidget(self._button(answer))
-        down.addLayout(across)
+        across = fill(QtWidgets.QHBoxLayout(), *map(self._button, answers))
+        fill(QtWidgets.QVBoxLayout(self), self.text, self.reason, across, margins=None)
 
     def _button(self, answer: Option) -> QtWidgets.QWidget:
         return button(self, answer.text, answer.key, lambda: answer.do(self.reason.text().strip()))

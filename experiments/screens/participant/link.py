@@ -21,7 +21,7 @@ from typing import IO, Self, TypeVar
 from pydantic import ValidationError
 
 from device.words import RecoilError
-from experiments.clock import Clock, RealClock
+from experiments.clock import RealClock
 from experiments.screens.participant import messages
 from experiments.screens.participant.messages import line
 
@@ -90,8 +90,8 @@ _Given = TypeVar("_Given", messages.RatingGiven, messages.DescriptionGiven, mess
 class ParticipantLink:
     """The participant's screen, as a console sees it. Use it as a context manager, or `close` it."""
 
-    def __init__(self, command: Sequence[str], clock: Clock) -> None:
-        self._clock = clock
+    def __init__(self, command: Sequence[str]) -> None:
+        self._clock = RealClock()
         self._mail = Mailbox()
         self._asking = threading.RLock()
         self._page = threading.Lock()
@@ -107,17 +107,10 @@ class ParticipantLink:
             raise ParticipantError(f"the participant's screen cannot be started: {error}") from error
 
     @classmethod
-    def start(
-        cls, look: messages.Look | None = None, *, clock: Clock | None = None, command: Sequence[str] | None = None
-    ) -> Self:
+    def start(cls, look: messages.Look | None = None, *, command: Sequence[str] | None = None) -> Self:
         """Start the program and return at once; its window takes seconds to open. `command` is another program."""
-        program = command or (
-            sys.executable,
-            "-m",
-            "experiments.screens.participant",
-            *messages.arguments(look or messages.Look()),
-        )
-        return cls(program, clock or RealClock())
+        own = (sys.executable, "-m", "experiments.screens.participant", *messages.arguments(look or messages.Look()))
+        return cls(command or own)
 
     @property
     def failure(self) -> str | None:

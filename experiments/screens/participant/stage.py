@@ -219,7 +219,7 @@ class Stage:
             color=color,
         )
 
-    def panel(self, box: TextBox, fill: str, line: str | None = None) -> Any:
+    def panel(self, box: TextBox, fill: str) -> Any:
         """A filled rectangle; its box's place is its middle."""
         return self.toolkit.visual.Rect(
             self.window,
@@ -227,7 +227,7 @@ class Stage:
             height=box.height,
             pos=(box.x, box.y),
             fillColor=fill,
-            lineColor=line,
+            lineColor=None,
             lineWidth=2,
         )
 
