@@ -13,7 +13,7 @@ import threading
 from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
-from typing import Any, NoReturn
+from typing import Any, NoReturn, get_args
 
 import numpy as np
 import pytest
@@ -42,11 +42,11 @@ from experiments.doctor.checks import (
     within_seconds,
 )
 from experiments.doctor.figures import (
-    DOCTOR_VERDICTS,
     Adapter,
     Appends,
     Display,
     DoctorFinding,
+    DoctorVerdict,
     GunLine,
     Keys,
     Machine,
@@ -263,7 +263,7 @@ def test_without_console_runs_it_says_so() -> None:
     assert {finding.measured for finding in verdicts.of_latencies(Latencies())} == {"no console runs here"}
 
 
-@given(st.lists(st.sampled_from(DOCTOR_VERDICTS)))
+@given(st.lists(st.sampled_from(get_args(DoctorVerdict))))
 def test_the_worst_verdict_counts_and_what_is_not_there_does_no_harm(found: list[Any]) -> None:
     there = [("good", "warning", "fails").index(verdict) for verdict in found if verdict != "not there"]
     assert verdicts.overall(found) == ("good", "warning", "fails")[max(there, default=0)]

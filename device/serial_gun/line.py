@@ -13,12 +13,10 @@ import threading
 from collections import deque
 from collections.abc import Callable
 from dataclasses import dataclass, field
-from typing import Literal, Protocol, TypeVar
+from typing import Protocol, TypeVar
 
-from device.wire.records import Garbled, refusal_in
+from device.wire.records import refusal_in
 from device.words import LinkError
-
-CommandOutcome = Literal["done", "refused", "timed out", "garbled", "disconnected"]
 
 
 class TimedOut(LinkError):  # noqa: N818 - outcomes, as they are named in the log
@@ -65,28 +63,6 @@ class CommandRefused(LinkError):  # noqa: N818
         self.code = code
 
 
-OUTCOMES: dict[type[LinkError], CommandOutcome] = {
-    CommandRefused: "refused",
-    TimedOut: "timed out",
-    Garbled: "garbled",
-    Disconnected: "disconnected",
-}
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class PendingCommand:
-    """One command as it went: its number, when it was written and when it ended, on the host's clock, and how."""
-
-    number: int
-    body: str
-    written_s: float
-    ended_s: float
-    outcome: CommandOutcome
-
-
-KEPT_COMMANDS = 10_000
-
-
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Reply:
     """An answer: when its command was written and it was read, on the host's clock; in which session of the link."""
@@ -119,9 +95,7 @@ class Waiting:
 class Pending:
     """Commands on their way, for one thread that writes at a time, one that reads, and any that wait."""
 
-    def __init__(self, clock: Callable[[], float]) -> None:
-        self.log: deque[PendingCommand] = deque(maxlen=KEPT_COMMANDS)
-        self._clock = clock
+    def __init__(self) -> None:
         self._waiting: dict[int, Waiting] = {}
         self._lock = threading.Lock()
 
@@ -153,30 +127,13 @@ class Pending:
             }
 
     def outcome(self, waiting: Waiting) -> Reply:
-        """The answer of a command, which goes into the log. `LinkError`: its other outcomes, by their type."""
+        """The answer of a command. `LinkError`: its other outcomes, by their type."""
         self.take(waiting.number)
-        found = _outcome(waiting)
-        reply = waiting.reply
-        self.log.append(
-            PendingCommand(
-                number=waiting.number,
-                body=waiting.body,
-                written_s=waiting.written_s,
-                ended_s=reply.received_s if reply else self._clock(),
-                outcome="done" if isinstance(found, Reply) else OUTCOMES.get(type(found), "disconnected"),
-            )
-        )
-        if isinstance(found, LinkError):
-            raise found
-        return found
-
-
-def _outcome(waiting: Waiting) -> Reply | LinkError:
-    """The answer, or the trouble that there was instead."""
-    if (reply := waiting.reply) is None:
-        return waiting.trouble or TimedOut(f"no answer to {waiting.header} within its time")
-    no = refusal_in(reply.body)
-    return reply if no is None else CommandRefused(no[0], f"the gun refused {waiting.header}: {no[1]}")
+        if waiting.reply is None:
+            raise waiting.trouble or TimedOut(f"no answer to {waiting.header} within its time")
+        if (no := refusal_in(waiting.reply.body)) is not None:
+            raise CommandRefused(no[0], f"the gun refused {waiting.header}: {no[1]}")
+        return waiting.reply
 
 
 MAX_DRIFT = 1e-3
@@ -215,11 +172,6 @@ class Clocks:
     def known(self) -> bool:
         """Whether there was any exchange."""
         return bool(self._recent)
-
-    @property
-    def drift_ppm(self) -> float:
-        """How much faster the host's clock runs than the gun's, in millionths; the middle of what is possible."""
-        return (sum(self._rate) / 2 - 1) * 1e6
 
     def add(self, exchange: Exchange) -> None:
         """Learn from an exchange. One that contradicts those before takes their place: a clock was set."""

@@ -7,7 +7,6 @@ from __future__ import annotations
 
 import threading
 import time
-from collections import deque
 from collections.abc import Callable
 from contextlib import suppress
 
@@ -20,7 +19,6 @@ from device.serial_gun.line import (
     HostTime,
     OpenPort,
     Pending,
-    PendingCommand,
     Port,
     Reply,
     SerialPort,
@@ -67,7 +65,7 @@ class Link:
         self._lock = threading.RLock()
         self._port: Port | None = None
         self._splitter = Splitter()
-        self._pending = Pending(clock)
+        self._pending = Pending()
         self._number = int(time.monotonic() * 1e3) % 0xFFFF
         self._token = 0
         self._written_s = self._heard_s = 0.0
@@ -90,16 +88,6 @@ class Link:
                 trouble = self._trouble or TimedOut(f"the gun did not answer within {patience_s:g} s")
                 self.close()
                 raise trouble
-
-    @property
-    def commands(self) -> deque[PendingCommand]:
-        """The last commands as they went, but for the questions that nobody waits for."""
-        return self._pending.log
-
-    @property
-    def is_up(self) -> bool:
-        """Whether the gun is there, in a session of the strict mode."""
-        return self._up.is_set()
 
     @property
     def silent_for_s(self) -> float:
@@ -126,12 +114,6 @@ class Link:
     def _check_clocks(self) -> None:
         if not self._clocks.known:
             raise Disconnected("the gun was reset, and its new clock is not known yet")
-
-    @property
-    def drift_ppm(self) -> float:
-        """How much faster the host's clock runs than the gun's, in millionths."""
-        with self._lock:
-            return self._clocks.drift_ppm
 
     def ask(self, body: str, patience_s: float = PATIENCE_S, allowed: Callable[[], bool] = lambda: True) -> Reply:
         """Write a command and wait for its answer. `LinkError`: its other outcomes, by their type.
