@@ -138,7 +138,7 @@ class _Runner:
             self._live.journal.append("outcome", body=steps.step_record(outcome), **self._shown())
             self._live.keep(step, outcome)
             self._count(outcome)
-            step = steps.advance(self._session, outcome)
+            step = steps.step_after(self._session, outcome)
 
     def _shown(self) -> dict[str, float]:
         """When the step was painted, where that is known."""

@@ -2,7 +2,6 @@ import csv
 import io
 
 import pytest
-from experiments.record.columns import guard, unguard
 from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
@@ -13,7 +12,7 @@ from experiments.load import load_setup
 from experiments.preference.session import make_plan as preference_plan
 from experiments.preference.session import rows as preference_rows
 from experiments.record import tables
-from experiments.record.tables import Row, table_bytes
+from experiments.record.tables import Row, guard, table_bytes, unguard
 from experiments.session.remarks import AnswerCorrected
 from experiments.session.steps import (
     Answered,

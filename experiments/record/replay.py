@@ -64,7 +64,7 @@ def replay(session: steps.Session, contents: Contents) -> RunPosition:
     step = next(session, None)
     for number, (recorded, outcome) in enumerate(outcomes(before), start=1):
         _compare(contents, number, step, recorded)
-        step = steps.advance(session, outcome)
+        step = steps.step_after(session, outcome)
     return RunPosition(step=step, history=before, halted=_halted(contents))
 
 
@@ -84,7 +84,7 @@ def go_on(
     felt = isinstance(step, steps.Ask) or (announced and isinstance(step, steps.FireShot | steps.Present))
     outcome = steps.Interrupted(presented=felt)
     append("outcome", body=steps.step_record(outcome))
-    return replace(position, step=steps.advance(session, outcome), history=[*position.history, (step, outcome)])
+    return replace(position, step=steps.step_after(session, outcome), history=[*position.history, (step, outcome)])
 
 
 def _last_step_is_open(contents: Contents) -> bool:
