@@ -827,7 +827,7 @@ def test_the_test_shot_is_owed_also_if_the_process_died(resumed: bool, tmp_path:
 
 def wait_for_the_disk(sitting: Sitting) -> None:
     """Wait until what was written is on the disk."""
-    sitting.live._journal.append("remark", body={"kind": "noted", "trial": None, "text": "now"})
+    sitting.live.journal.append("remark", body={"kind": "noted", "trial": None, "text": "now"})
 
 
 def test_an_emergency_stop_during_the_test_shot_owes_another_one(tmp_path: Path) -> None:

@@ -9,7 +9,7 @@ from zoneinfo import ZoneInfo
 import pytest
 
 from experiments.clock import date_text, time_text
-from experiments.screens.console.form import cell_text, coming_text, note_text, remark, stopped_text
+from experiments.screens.console.people import cell_text, coming_text, note_text, remark, stopped_text
 from experiments.study.folders import Overview
 from experiments.study.study import NextParticipant, Participant, RunProgress, RunState
 from tests.people import ORDER, someone
@@ -135,7 +135,7 @@ def test_who_comes_next_is_said_and_otherwise_why_nobody_does() -> None:
 def test_the_sentences_of_the_start_window_need_no_window() -> None:
     import ast
 
-    import experiments.screens.console.form as module
+    import experiments.screens.console.people as module
 
     tree = ast.parse(Path(module.__file__).read_text(encoding="utf-8"))
     assert not [node for node in ast.walk(tree) if isinstance(node, ast.ImportFrom) and "PyQt6" in str(node.module)]

@@ -24,7 +24,7 @@ from experiments.live_run import RunStopped
 from experiments.load import load_setup, load_study
 from experiments.record.journal import JournalError
 from experiments.run import Again, Finished, RunRequest, UnfinishedRun
-from experiments.screens.console import form, widgets
+from experiments.screens.console import people, widgets
 from experiments.screens.console.app import Console, application
 from experiments.screens.console.form import Opening, monitors
 from experiments.screens.console.participant_link import WAIT, ParticipantSide
@@ -235,7 +235,7 @@ class Unfinished(QDialog):
 
 def _text(found: UnfinishedRun) -> str:
     try:
-        return form.stopped_text(found.where.participant_id, progress_of(found.where, found.contents))
+        return people.stopped_text(found.where.participant_id, progress_of(found.where, found.contents))
     except JournalError as error:
         return str(error)
 

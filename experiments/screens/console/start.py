@@ -13,7 +13,7 @@ from experiments.clock import Clock
 from experiments.config.setup import Setup
 from experiments.record.journal import JournalError
 from experiments.run import Again, RunRequest
-from experiments.screens.console import form, widgets, windows
+from experiments.screens.console import people, widgets, windows
 from experiments.screens.console.form import Form, Opening, PeopleTable
 from experiments.screens.console.shot_check import ShotPage
 from experiments.screens.console.widgets import WHY, Option, QuestionBox, TextLines, start_sheet, unfit
@@ -104,12 +104,12 @@ class StartWindow(QtWidgets.QWidget):
         """Look at the study, and show how it stands."""
         self._seen: Overview = overview(self._study)
         self.table.show_people(self._seen.participants)
-        self.next.say(form.coming_text(self._seen))
+        self.next.say(people.coming_text(self._seen))
 
     def _say_first(self, opening: Opening) -> None:
         entered, bad = self.form.entered(), [*filter(None, [opening.said]), *self._seen.problems]
         code, experiment = entered.participant_id, entered.experiment
-        named = form.named_text(opening.named, code, self._person(code), experiment)
+        named = people.named_text(opening.named, code, self._person(code), experiment)
         self.say("\n".join([*bad, *filter(None, [named])]), "bad" if bad else "ask")
 
     def _propose(self, participant_id: str) -> None:
@@ -134,7 +134,7 @@ class StartWindow(QtWidgets.QWidget):
     def _show_choice(self) -> None:
         code, experiment = self.form.participant_id, self.form.experiment.currentText()
         person = self._person(code)
-        self.form.remark.say(*form.remark(code, person, experiment, self._study.experiments))
+        self.form.remark.say(*people.remark(code, person, experiment, self._study.experiments))
         out = person is not None and person.excluded is not None
         self.exclude_button.setText(f"{'Readmit…' if out else 'Exclude…'}  [Alt+E]")
         self.shots.choose(self._setup())
@@ -241,7 +241,7 @@ class StartWindow(QtWidgets.QWidget):
             Option(text="Set it aside, start anew", key="Ctrl+N", do=lambda why: self._begin_again("fresh", why)),
             self._leave_it(),
         )
-        text = f"{form.stopped_text(self.form.participant_id, run)} Go on there, or set it aside and start anew?"
+        text = f"{people.stopped_text(self.form.participant_id, run)} Go on there, or set it aside and start anew?"
         self._ask(QuestionBox(text, answers, reason=f"to start anew: {WHY}"))
 
     def _begin_again(self, again: Again, reason: str) -> None:

@@ -1,0 +1,99 @@
+"""How participants stand, in the sentences of the start window. Pure."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+
+from experiments.clock import date_text
+from experiments.study.enrolment import left_to_do, passed_over, run_of
+from experiments.study.folders import Overview, is_code
+from experiments.study.study import Participant, RunProgress
+
+_CELL = {"done": "done", "not begun": "–", "unreadable": "cannot be read"}
+
+
+def cell_text(run: RunProgress) -> str:
+    """A run in the table of participants."""
+    practice = ["practice done"] if run.practised else []
+    if run.state in _CELL:
+        return "\n".join([_CELL[run.state], *practice])
+    counts = f", {run.answered} of {run.planned}" if run.planned else ""
+    return "\n".join([f"{run.state}{counts}", *([date_text(run.last_utc)] if run.last_utc else []), *practice])
+
+
+def note_text(person: Participant) -> str:
+    """What the table says of somebody beside their runs."""
+    return "" if person.excluded is None else f"excluded: {person.excluded}"
+
+
+def stopped_text(code: str, run: RunProgress) -> str:
+    """When an unfinished run stopped, and how far it had come."""
+    when, counts = date_text(run.last_utc), f"{run.answered} of {run.planned}"
+    return f"{code} stopped {run.experiment} on {when} with {counts} trials answered."
+
+
+def coming_text(seen: Overview) -> str:
+    """Who comes next."""
+    if seen.next is not None:
+        new = " (new)" if seen.next.new else ""
+        return f"Next: {seen.next.participant_id}{new}, {' and '.join(run.experiment for run in seen.next.runs)}"
+    taking_part = [one for one in seen.participants if one.excluded is None]
+    elsewhere = [one.participant_id for one in taking_part if one.is_elsewhere]
+    if elsewhere:
+        return f"Nobody waits; at another console now: {', '.join(elsewhere)}."
+    done = all(run.state == "done" for one in taking_part for run in one.runs)
+    return "Everyone has done everything." if done else "Nobody can be named next: see what cannot be read."
+
+
+def named_text(named: str, code: str, person: Participant | None, experiment: str) -> str:
+    """Why another experiment is chosen than the one that was named when the program was started."""
+    if not code or named in ("", experiment):
+        return ""
+    if person is not None and run_of(person, named).state == "done":
+        return f"{named} was named, but {code} has done it: {experiment} is chosen."
+    return f"{named} was named, but {code} comes to {experiment} first: {experiment} is chosen."
+
+
+def remark(code: str, person: Participant | None, experiment: str, experiments: Sequence[str]) -> tuple[str, str]:
+    """What there is to know before somebody does an experiment, and a word that chooses the colour."""
+    return next(_remarks(code, person, experiment, experiments))
+
+
+def _remarks(
+    code: str, person: Participant | None, experiment: str, experiments: Sequence[str]
+) -> Iterator[tuple[str, str]]:
+    """What could be said, the most important first."""
+    if not code:
+        yield "Who comes? Choose them in the table, or type a code.", "act"
+        return
+    if person is not None:
+        yield from _hindrances(person, experiment, experiments)
+    before = passed_over(person, experiment, experiments)
+    if before:
+        first = " and ".join(before)
+        yield f"Order broken: {first} comes before {experiment} in this study, and {code} has not done it.", "ask"
+    if person is None:
+        yield (f"{code} is new.", "good") if is_code(code) else (f"{code} is no code: letters and digits only.", "bad")
+    else:
+        yield _progress(person, experiment), "good"
+
+
+def _hindrances(person: Participant, experiment: str, experiments: Sequence[str]) -> Iterator[tuple[str, str]]:
+    code, run = person.participant_id, run_of(person, experiment)
+    if person.excluded is not None:
+        yield f"{code} is excluded: {person.excluded}.", "bad"
+    if person.is_elsewhere:
+        yield f"{code} sits at another console.", "bad"
+    if run.state == "unreadable":
+        yield f"The journal of {code}'s {experiment} cannot be read.", "bad"
+    if run.state == "done":
+        left = left_to_do(person, experiments)
+        yield f"{code} has done {experiment if left else 'everything'}.", "bad"
+
+
+def _progress(person: Participant, experiment: str) -> str:
+    code, run = person.participant_id, run_of(person, experiment)
+    if run.state == "in progress":
+        return stopped_text(code, run)
+    done = [one.experiment for one in person.runs if one.state == "done"]
+    return f"{code} has done {' and '.join(done)}." if done else f"{code} has not begun."
