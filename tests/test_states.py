@@ -27,8 +27,8 @@ from experiments.session.states import (
     change_of,
     entered,
 )
-from experiments.session.states_page import page
 from experiments.session.steps import Rest
+from tests.states_page import page
 
 S = State
 Stack = tuple[State, ...]
