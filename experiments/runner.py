@@ -123,8 +123,7 @@ class _Runner:
     def __init__(self, session: steps.Session, desk: Desk) -> None:
         self._session, self._desk, self._live = session, desk, desk.live
         self._stimulus = DeskGun(desk)
-        self._failures = 0
-        self._onset_s = math.nan
+        self._failures, self._onset_s = 0, math.nan
         self._damper = ""
         """As it was set in this sitting; unknown at its beginning."""
 

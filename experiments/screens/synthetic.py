@@ -44,8 +44,7 @@ class SyntheticScreen:
 
     def __init__(self, config: ExperimentConfig, observer: Any, clock: Clock) -> None:
         self._timing: Any = getattr(config, "timing", None)
-        self._observer = observer
-        self._clock = clock
+        self._observer, self._clock = observer, clock
         self._live: LiveRun | None = None
         self._begun: tuple[int, float] = (0, 0.0)
 

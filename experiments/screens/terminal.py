@@ -217,8 +217,7 @@ class TerminalScreen:
 
     def _closed(self) -> None:
         """Nobody sees or types anything any more. Stopped beside: whoever shows may hold what the run waits for."""
-        live = self._live
-        if live is not None and not self._gone:
+        if (live := self._live) is not None and not self._gone:
             self._gone = True
             stop = events.Stop(reason="the terminal was closed")
             threading.Thread(target=live.offer, args=(stop,), daemon=True).start()

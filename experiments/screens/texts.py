@@ -35,11 +35,10 @@ def place_text(plan: Plan, trial: Trial) -> str:
 
 def short_place(trial: Trial, here: Trial) -> str:
     """Where a trial stands that is looked at from another: its set and session are named where they differ."""
-    place = f"trial {trial.trial}"
     if of_one_set(trial, here):
-        return place
-    place += f" of set {trial.set}"
-    return place if trial.session == here.session else f"{place}, session {trial.session}"
+        return f"trial {trial.trial}"
+    session = "" if trial.session == here.session else f", session {trial.session}"
+    return f"trial {trial.trial} of set {trial.set}{session}"
 
 
 def again_text(told: History, step: Prepare) -> str:

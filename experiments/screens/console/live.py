@@ -30,7 +30,7 @@ from experiments.screens.console.form import Opening, monitors
 from experiments.screens.console.participant_link import WAIT, ParticipantSide
 from experiments.screens.console.start import choose_run
 from experiments.screens.console.view import THANK_PARTICIPANT
-from experiments.screens.console.widgets import WHY, Option, QuestionBox, TextLines, start_sheet, unfit
+from experiments.screens.console.widgets import WHY, Option, QuestionBox, TextLines, start_sheet
 from experiments.screens.console.window import ConsoleWindow
 from experiments.screens.console.windows import FreshShortcuts, let_go, signals_to
 from experiments.screens.participant.link import ParticipantError, ParticipantLink
@@ -221,12 +221,8 @@ class Unfinished(QDialog):
             button.setAutoDefault(False)
 
     def _fresh(self, reason: str) -> None:
-        wrong = unfit(reason)
-        if not wrong:
+        if self.question.takes(reason, self.said.say):
             self._decide("fresh", reason)
-            return
-        self.said.say(wrong, "bad")
-        self.question.reason.setFocus()
 
     def _decide(self, again: Again, reason: str) -> None:
         self.decided = replace(self._request, again=again, anew_reason=reason)
@@ -410,8 +406,7 @@ class Rater:
 
     def rate(self, step: Rate, rating: float) -> None:
         """Click the rating and confirm it. A page that asks for a description takes the same for an empty one."""
-        place = self._place()
-        if place is not None:
+        if (place := self._place()) is not None:
             x_px, y_px = _spot(step, rating, width_px=place[2], height_px=place[3])
             self._hands.click(place[0] + x_px, place[1] + y_px)
             self._confirm()

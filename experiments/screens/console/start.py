@@ -16,7 +16,7 @@ from experiments.run import Again, RunRequest
 from experiments.screens.console import people, widgets, windows
 from experiments.screens.console.form import Form, Opening, PeopleTable
 from experiments.screens.console.shot_check import ShotPage
-from experiments.screens.console.widgets import WHY, Option, QuestionBox, TextLines, start_sheet, unfit
+from experiments.screens.console.widgets import WHY, Option, QuestionBox, TextLines, start_sheet
 from experiments.study import enrolment
 from experiments.study.folders import Overview, PlaceError, StudyFolder, overview
 from experiments.study.study import Participant, RunProgress
@@ -255,13 +255,8 @@ class StartWindow(QtWidgets.QWidget):
             self._start()
 
     def _is_reason(self, reason: str) -> bool:
-        """Whether a reason can be kept; if not, it is said why, and its line gets the keys."""
-        wrong = unfit(reason)
-        if wrong:
-            self.say(wrong, "bad")
-            if self.question is not None:
-                self.question.reason.setFocus()
-        return not wrong
+        """Whether a reason can be kept, as the question that is open says."""
+        return self.question is not None and self.question.takes(reason, self.say)
 
     def _leave(
         self, code: str, *, again: Again = "ask", reason: str = "", practice: bool = False, training: bool = False

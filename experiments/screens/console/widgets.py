@@ -290,13 +290,12 @@ class QuestionBox(QtWidgets.QFrame):
     def _button(self, answer: Option) -> QtWidgets.QWidget:
         return button(self, answer.text, answer.key, lambda: answer.do(self.reason.text().strip()))
 
-
-def unfit(reason: str) -> str:
-    """Why a reason cannot be kept, in one sentence; empty if it can."""
-    if not reason:
-        return "Type why, first."
-    try:
-        check_reason(reason)
-    except RegisterError as error:
-        return f"{error}."
-    return ""
+    def takes(self, reason: str, say: Callable[[str, str], None]) -> bool:
+        """Whether a reason can be kept; if not, it is said why in one sentence, and its line gets the keys."""
+        try:
+            check_reason(reason)
+        except RegisterError as error:
+            say(f"{error}." if reason else "Type why, first.", "bad")
+            self.reason.setFocus()
+            return False
+        return True
