@@ -10,7 +10,7 @@ import pytest
 from device import LinkError
 from device.limits import DriveHistory
 from device.methods import paper_methods
-from device.serial_gun.line import Contradiction, CutShort, HostTime, Reply
+from device.serial_gun.lines import Contradiction, CutShort, HostTime, Reply
 from device.serial_gun.reports import (
     MAX_UNCERTAINTY_S,
     BelievedShot,

@@ -4,7 +4,7 @@ from random import Random
 
 import pytest
 
-from device.serial_gun.line import Clocks, Exchange
+from device.serial_gun.lines import Clocks, Exchange
 
 GUN_BOOT_S = 1234.5
 

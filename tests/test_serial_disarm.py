@@ -9,7 +9,7 @@ import pytest
 
 from device import LimitError, LinkError
 from device.serial_gun import triggering
-from device.serial_gun.line import CalledOff
+from device.serial_gun.lines import CalledOff
 from tests.forger import a_lying_pair
 from tests.twins import Troubles, a_pair, a_shot, is_up, said
 from tests.waiting import wait_for

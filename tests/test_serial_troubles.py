@@ -9,7 +9,7 @@ import pytest
 
 from device import LimitError, LinkError
 from device.limits import DriveHistory
-from device.serial_gun.line import Disconnected, SerialPort
+from device.serial_gun.lines import Disconnected, SerialPort
 from device.serial_gun.link import KEEP_ALIVE_S, WATCHDOG_S, Link
 from device.twin.twin import BUSY_US
 from tests.forger import a_lying_pair

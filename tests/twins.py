@@ -13,7 +13,7 @@ import pytest
 
 from device import Pulse, Shot
 from device.methods import paper_methods
-from device.serial_gun import line, link
+from device.serial_gun import lines, link
 from device.serial_gun.gun import SerialGun, open_serial
 from device.twin.machine import BOOT_REST_US
 from device.twin.twin import Make, Pty, Socket, Tcp, Troubles, Twin
@@ -37,15 +37,15 @@ class Command:
     received_s: float | None = None
 
 
-_OUTCOMES = {line.CommandRefused: "refused", line.TimedOut: "timed out", Garbled: "garbled"}
+_OUTCOMES = {lines.CommandRefused: "refused", lines.TimedOut: "timed out", Garbled: "garbled"}
 
 
 @contextmanager
 def noted_commands() -> Iterator[list[Command]]:
     """The commands of guns on a line from now on, in the order of their ends."""
-    commands, outcome = list[Command](), line.Pending.outcome
+    commands, outcome = list[Command](), lines.Pending.outcome
 
-    def noted(pending: line.Pending, waiting: line.Waiting) -> line.Reply:
+    def noted(pending: lines.Pending, waiting: lines.Waiting) -> lines.Reply:
         about = {"body": waiting.body, "written_s": waiting.written_s}
         try:
             reply = outcome(pending, waiting)
@@ -56,7 +56,7 @@ def noted_commands() -> Iterator[list[Command]]:
         return reply
 
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(line.Pending, "outcome", noted)
+        patch.setattr(lines.Pending, "outcome", noted)
         yield commands
 
 
@@ -69,7 +69,7 @@ def is_up(gun: SerialGun) -> bool:
     """Whether a gun is there, in a session of the strict mode."""
     try:
         gun.link.wait_up(0.0)
-    except line.Disconnected:
+    except lines.Disconnected:
         return False
     return True
 

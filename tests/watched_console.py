@@ -227,7 +227,7 @@ def write_down(watch: Watch, call: dict[str, Any]) -> None:
 
 def watch_lines(watch: Watch) -> None:
     """From now on it is written down when a gun's line has taken the bytes of `ABOR`."""
-    from device.serial_gun.line import SerialPort
+    from device.serial_gun.lines import SerialPort
 
     write = SerialPort.write
 

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 
 from device.limits import DriveHistory, planned_start_s
 from device.methods import Method
-from device.serial_gun.line import CommandRefused, Disconnected, SerialPort, TimedOut, Unsure
+from device.serial_gun.lines import CommandRefused, Disconnected, SerialPort, TimedOut, Unsure
 from device.serial_gun.link import Link
 from device.serial_gun.reports import MAX_UNCERTAINTY_S, ShotOrder, ShotRequest, asked, ready_s, report
 from device.serial_gun.triggering import TRIES, Arming, Triggering, ask_again, standing

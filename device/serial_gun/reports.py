@@ -12,7 +12,7 @@ from dataclasses import dataclass
 from typing import Final
 
 from device.methods import Method, Rendering, rendering_of
-from device.serial_gun.line import MAX_DRIFT, Contradiction, CutShort, HostTime, Reply
+from device.serial_gun.lines import MAX_DRIFT, Contradiction, CutShort, HostTime, Reply
 from device.wire.records import METHOD_NAME, Setting, ShotRecord, StatusRecord, Way
 from device.words import Direction, Drive, Effect, LimitError, Pulse, Shot, ShotReport, ShotTiming
 

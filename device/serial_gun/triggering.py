@@ -10,17 +10,7 @@ import time
 from collections.abc import Callable
 from typing import TypeVar
 
-from device.serial_gun import reports
-from device.serial_gun.line import (
-    CalledOff,
-    CommandRefused,
-    Contradiction,
-    CutShort,
-    Disconnected,
-    Reply,
-    TimedOut,
-    Unsure,
-)
+from device.serial_gun import lines, reports
 from device.serial_gun.link import PATIENCE_S, Link
 from device.wire.errors import WireError
 from device.wire.records import Garbled, ShotRecord, StatusRecord
@@ -33,34 +23,34 @@ RECONNECT_S = 5.0
 _T = TypeVar("_T")
 
 
-def ask_again(link: Link, body: str, allowed: Callable[[], bool] = lambda: True) -> Reply:
+def ask_again(link: Link, body: str, allowed: Callable[[], bool] = lambda: True) -> lines.Reply:
     """Ask what may be asked again, until there is an answer; the last trouble if there is none."""
-    trouble: LinkError = TimedOut("no answer")
+    trouble: LinkError = lines.TimedOut("no answer")
     for _ in range(TRIES):
         link.wait_up(RECONNECT_S)
         try:
             return link.ask(body, allowed=allowed)
-        except (TimedOut, Garbled, Disconnected) as error:
+        except (lines.TimedOut, Garbled, lines.Disconnected) as error:
             trouble = error
     raise trouble
 
 
-def standing(link: Link) -> tuple[Reply, StatusRecord]:
+def standing(link: Link) -> tuple[lines.Reply, StatusRecord]:
     """How the gun stands. `Contradiction`: as it cannot stand."""
     reply, found = _read(link, "STAT?", StatusRecord.parse)
     try:
         reports.check_standing(found)
-    except Contradiction as error:
-        raise Contradiction(f"the gun's answer to STAT? is not believed: {error}") from error
+    except lines.Contradiction as error:
+        raise lines.Contradiction(f"the gun's answer to STAT? is not believed: {error}") from error
     return reply, found
 
 
-def last_shot(link: Link) -> tuple[Reply, ShotRecord]:
+def last_shot(link: Link) -> tuple[lines.Reply, ShotRecord]:
     """What the gun says of the last shot that it accepted."""
     return _read(link, "SHOT?", ShotRecord.parse)
 
 
-def _read(link: Link, question: str, parse: Callable[[str], _T]) -> tuple[Reply, _T]:
+def _read(link: Link, question: str, parse: Callable[[str], _T]) -> tuple[lines.Reply, _T]:
     """An answer as the record that it is. One that cannot be read is asked for again."""
     trouble = Garbled()
     for _ in range(TRIES):
@@ -102,14 +92,14 @@ class Arming:
         """Arm, unless it was disarmed since. `LinkError`: it was, or the gun does not answer, or has a fault."""
         try:
             session = ask_again(self._link, "ARM", lambda: self.disarms == disarms).session
-        except (CommandRefused, CalledOff):
+        except (lines.CommandRefused, lines.CalledOff):
             raise
         except LinkError:  # it may be armed, and its answer lost
             self.disarm()
             raise
         with self._lock:
             if self.disarms != disarms:
-                raise CalledOff("ARM was called off: the gun was disarmed meanwhile")
+                raise lines.CalledOff("ARM was called off: the gun was disarmed meanwhile")
             self.session = session
 
     def disarm(self) -> None:
@@ -121,7 +111,7 @@ class Arming:
         for _ in range(TRIES):
             try:
                 self._link.ask("ABOR")
-            except (TimedOut, Garbled):
+            except (lines.TimedOut, Garbled):
                 continue
             except LinkError:
                 break
@@ -159,12 +149,12 @@ class Triggering:
             try:
                 reply = self._trigger(order)
                 record = ShotRecord.parse(reply.body)
-            except CalledOff as error:
-                raise Disconnected(f"not fired: {self._why_not(order)}") from error
-            except CommandRefused as error:
+            except lines.CalledOff as error:
+                raise lines.Disconnected(f"not fired: {self._why_not(order)}") from error
+            except lines.CommandRefused as error:
                 trouble = self._refused(error, order)
                 ask_again(self._link, "TIME?")  # too late by a clock that may have been misread
-            except (TimedOut, Garbled, Disconnected) as error:
+            except (lines.TimedOut, Garbled, lines.Disconnected) as error:
                 trouble = error
                 found = self._look(order, error)
                 if found is not None:
@@ -172,9 +162,9 @@ class Triggering:
             else:
                 return self._believed(reply, record, order, tries)
         self._arming.disarm()
-        raise TimedOut(f"not fired: {trouble}, {TRIES} times")
+        raise lines.TimedOut(f"not fired: {trouble}, {TRIES} times")
 
-    def _trigger(self, order: reports.ShotOrder) -> Reply:
+    def _trigger(self, order: reports.ShotOrder) -> lines.Reply:
         before_us = max(order.at_us, self._link.gun_us(self._clock())) + round(LATEST_S * self._speed * 1e6)
         trigger = f"TRIG {order.mark},{order.at_us},{before_us}"
         return self._link.ask(
@@ -186,7 +176,7 @@ class Triggering:
         ahead_s = 0.0 if order.at_s is None else max(order.at_s - self._clock(), 0.0)
         return PATIENCE_S + (ahead_s + order.wanted.setting.length_us / 1e6) / self._speed
 
-    def _look(self, order: reports.ShotOrder, trouble: LinkError) -> tuple[Reply, ShotRecord] | None:
+    def _look(self, order: reports.ShotOrder, trouble: LinkError) -> tuple[lines.Reply, ShotRecord] | None:
         """The record of a shot whose answer was lost, when it has ended; None if it was surely not fired."""
         end_s, stopped = time.monotonic() + self._patience_s(order), False
         while True:
@@ -199,32 +189,32 @@ class Triggering:
                 self._arming.disarm()
                 stopped = True
 
-    def _last_shot(self, order: reports.ShotOrder, trouble: LinkError) -> tuple[Reply, ShotRecord]:
+    def _last_shot(self, order: reports.ShotOrder, trouble: LinkError) -> tuple[lines.Reply, ShotRecord]:
         """What the gun says of its last shot, if it still knows. `Unsure`: it does not, or it contradicts itself."""
         try:
             reply, record = last_shot(self._link)
             if self._link.boot == order.boot:
                 reports.check_not_fired(record, order)
                 return reply, record
-        except Contradiction as error:
+        except lines.Contradiction as error:
             raise self._disbelieved(order, error) from error
         except LinkError as error:
             trouble = error
         raise self._lost(order, trouble)
 
-    def _refused(self, error: CommandRefused, order: reports.ShotOrder) -> LinkError:
+    def _refused(self, error: lines.CommandRefused, order: reports.ShotOrder) -> LinkError:
         """A trigger that came too late, and may be written again. Raises what any other refusal means."""
         if error.code == WireError.TOO_LATE:
             return error
         if error.code in _DOUBLED:
             raise self._unsure(order, f"the shot was fired, and its answer was lost ({error})") from error
         if error.code in _STOPPED:
-            raise Disconnected(f"not fired: {self._why_not(order)}") from error
+            raise lines.Disconnected(f"not fired: {self._why_not(order)}") from error
         if error.code in _LIMITS:
             raise LimitError(f"{error}; not fired") from error
         raise self._too_soon(error) from error
 
-    def _too_soon(self, error: CommandRefused) -> LinkError | LimitError:
+    def _too_soon(self, error: lines.CommandRefused) -> LinkError | LimitError:
         """A gun that was switched on just now fires nothing in its first second, and none before its magnet is home."""
         found = standing(self._link)[1]
         left_s = (found.ready_us - found.clock_us) / 1e6
@@ -237,7 +227,7 @@ class Triggering:
             return LimitError(
                 f"not fired: its magnet was not home, by the gun's own clock ({max(left_s, 0):.3f} s to go)"
             )
-        return Disconnected(f"not fired: {error}")
+        return lines.Disconnected(f"not fired: {error}")
 
     def _why_not(self, order: reports.ShotOrder) -> str:
         """Why a shot was called off, or cut short: a disarming, a fault of the driver, the line, or the watchdog."""
@@ -251,21 +241,25 @@ class Triggering:
             return self._link.why_lost
         return f"the driver reports fault {found.fault}" if found.fault else "the gun does not say why"
 
-    def _believed(self, reply: Reply, record: ShotRecord, order: reports.ShotOrder, tries: int) -> reports.BelievedShot:
+    def _believed(
+        self, reply: lines.Reply, record: ShotRecord, order: reports.ShotOrder, tries: int
+    ) -> reports.BelievedShot:
         """What is told of a shot, if it is believed."""
         try:
             reports.check_record(record, order)
             return self._told(reply, record, order, tries)
-        except Contradiction as error:
+        except lines.Contradiction as error:
             raise self._disbelieved(order, error) from error
-        except CutShort as error:
+        except lines.CutShort as error:
             raise self._unsure(order, f"{error} ({self._why_not(order)})") from error
         except LinkError as error:
             raise self._lost(order, error) from error
 
-    def _told(self, reply: Reply, record: ShotRecord, order: reports.ShotOrder, tries: int) -> reports.BelievedShot:
+    def _told(
+        self, reply: lines.Reply, record: ShotRecord, order: reports.ShotOrder, tries: int
+    ) -> reports.BelievedShot:
         """A record's times on the host's clock. A clock that was misread is learnt anew before they are disbelieved."""
-        trouble = Contradiction()
+        trouble = lines.Contradiction()
         for _ in range(CLOCK_TRIES):
             accepted, start, end = self._link.host(record.accepted_us, record.start_us, record.end_us)
             told = reports.BelievedShot(
@@ -273,20 +267,20 @@ class Triggering:
             )
             try:
                 reports.check_times(told, order, self._speed)
-            except Contradiction as error:
+            except lines.Contradiction as error:
                 trouble = error
                 ask_again(self._link, "TIME?")
             else:
                 return told
         raise trouble
 
-    def _disbelieved(self, order: reports.ShotOrder, why: Contradiction) -> Unsure:
+    def _disbelieved(self, order: reports.ShotOrder, why: lines.Contradiction) -> lines.Unsure:
         return self._unsure(order, f"the shot may have been fired, and the gun's record is not believed: {why}")
 
-    def _lost(self, order: reports.ShotOrder, why: LinkError) -> Unsure:
+    def _lost(self, order: reports.ShotOrder, why: LinkError) -> lines.Unsure:
         return self._unsure(order, f"the shot may have been fired: {why}, and the gun cannot tell any more")
 
-    def _unsure(self, order: reports.ShotOrder, what: str) -> Unsure:
+    def _unsure(self, order: reports.ShotOrder, what: str) -> lines.Unsure:
         """The error of a shot that was, or may have been, fired. The gun is disarmed, lest it still be."""
         self._arming.disarm()
-        return Unsure(f"{what}; the gun's COUNT was {order.count} before it")
+        return lines.Unsure(f"{what}; the gun's COUNT was {order.count} before it")
