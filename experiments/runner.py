@@ -1,4 +1,4 @@
-"""A stimulus of several shots, and the desk that steps are carried out at.
+"""The one loop that carries steps out: it tells the journal, waits for what the live run takes, and drives the gun.
 
 Console, terminal and synthetic participant differ only in the `Screen` that is shown the run and offers events to it.
 The gun is armed for a stimulus alone, and disarmed behind it. Whether a shot may be fired is looked at after the gun

@@ -1,4 +1,7 @@
-"""The real gun, or its twin: the `Gun` over a serial line. A shot is fired once, or the error says what may be so."""
+"""The real gun, or its twin: the `Gun` over a serial line. A shot is fired once, or the error says what may be so.
+
+The port is named in the address, or found by what answers.
+"""
 
 from __future__ import annotations
 

@@ -1,4 +1,7 @@
-"""Where the twin is plugged in, a pseudo-terminal or a TCP port, and the troubles to order on the way of the bytes."""
+"""The twin: the firmware's core on a hardware of physics, plugged in, on a clock of its own.
+
+It is plugged in at a pseudo-terminal or a TCP port; troubles can be ordered on the way of the bytes.
+"""
 
 from __future__ import annotations
 

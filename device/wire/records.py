@@ -2,7 +2,7 @@
 
 A line ends with LF; a frame is a line of the strict mode, with a sequence number and a CRC-32 (`PROTOCOL.md`).
 
-Each reads itself with `parse`, which gives a record or raises `Garbled`, and writes itself with `text`.
+Each record reads itself with `parse`, which gives a record or raises `Garbled`, and writes itself with `text`.
 """
 
 from __future__ import annotations

@@ -1,4 +1,7 @@
-"""The door for TOML: file and model come to a frozen value, or to a message with file, line, key, value and rule."""
+"""The door for TOML: file and model come to a frozen value, or to a message with file, line, key, value and rule.
+
+Plain values are written as TOML here as well, so that reading it gives the very same ones.
+"""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Machine, clock, disk and the gun's link, measured in this process.
+"""The checks in their order, and what they measure in this process. Each has a deadline; none stops another.
 
 Work that may hang is waited for no longer than its deadline. What could crash runs in a child program, which is asked
 for figures: its crash or silence is an answer.

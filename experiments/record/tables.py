@@ -1,6 +1,7 @@
-"""The columns of the log tables, once: names, types, levels, meaning, and how text is kept from becoming a formula.
+"""The log tables: their columns, once, with names, types, levels and meaning, and their rows from a journal. Pure.
 
 Everything that writes, reads or describes a log takes its columns from here; the data dictionary is printed from it.
+A table can be made again byte for byte; no text in it becomes a formula.
 """
 
 from __future__ import annotations

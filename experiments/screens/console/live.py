@@ -1,4 +1,4 @@
-"""Runs at the console with what belongs to them: the start window, the participant's own screen, a synthetic one."""
+"""Runs at the console with what belongs to them: the start window, the participant's own screen, a synthetic participant."""
 
 from __future__ import annotations
 
