@@ -1,7 +1,4 @@
-"""The twin: the firmware's core on a hardware of physics, plugged in, on a clock of its own.
-
-It is plugged in at a pseudo-terminal or a TCP port; troubles can be ordered on the way of the bytes.
-"""
+"""The twin: the firmware's core on a hardware of physics, on a clock of its own, plugged in; and troubles to order."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Runs at the console with what belongs to them: the start window, the participant's own screen, a synthetic participant."""
+"""Runs at the console with what belongs to them: start window, participant's screen, synthetic participant."""
 
 from __future__ import annotations
 
