@@ -61,17 +61,16 @@ def open_gun(
     """
     if not isinstance(address, str):
         raise ValueError(f'address is {address!r}; it must be text: "simulated" or "serial:PORT"')
+    # pyserial and the physics wait until they are wanted
     if address.startswith("serial:"):
-        return _serial(address, parameters, clock)
+        from device.serial_gun.gun import open_serial  # noqa: PLC0415
+
+        return open_serial(address, _methods(parameters), clock)
     if address != "simulated":
         raise ValueError(f'address is {address!r}; it must be "simulated" or "serial:PORT"')
-    return _simulated(parameters, clock)
+    from device.simulated import SimulatedGun  # noqa: PLC0415
 
-
-def _serial(address: str, parameters: GunParameters | Mapping[str, Method] | None, clock: Callable[[], float]) -> Gun:
-    from device.serial_gun.opening import open_serial  # noqa: PLC0415 - pyserial and the physics wait until they are wanted
-
-    return open_serial(address, _methods(parameters), clock)
+    return SimulatedGun(_methods(parameters), clock)
 
 
 def _methods(parameters: GunParameters | Mapping[str, Method] | None) -> Mapping[str, Method]:
@@ -83,9 +82,3 @@ def _methods(parameters: GunParameters | Mapping[str, Method] | None) -> Mapping
     if not isinstance(parameters, GunParameters | None):
         raise ValueError(f"parameters is {parameters!r}; it must be a gun, or rendering methods by name")
     return paper_methods() if parameters is None else paper_methods(parameters)
-
-
-def _simulated(parameters: GunParameters | Mapping[str, Method] | None, clock: Callable[[], float]) -> Gun:
-    from device.simulated import SimulatedGun  # noqa: PLC0415 - the heavy imports wait until they are wanted
-
-    return SimulatedGun(_methods(parameters), clock)

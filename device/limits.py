@@ -11,17 +11,7 @@ import math
 from dataclasses import dataclass
 from itertools import chain
 
-from device.words import (
-    MAX_PULSE_S,
-    MAX_VOLTAGE_V,
-    Drive,
-    Effect,
-    LimitError,
-    Pulse,
-    is_finite,
-    is_whole_number,
-    shown,
-)
+from device import words
 
 MAX_DUTY = 0.10
 """Of any second: the paper's drive, 10 ms in 100 ms."""
@@ -54,8 +44,8 @@ class Load:
 
     def __post_init__(self) -> None:
         for name, value in (("on_s", self.on_s), ("heat_J", self.heat_J)):
-            if not (is_finite(value) and value >= 0):
-                raise LimitError(f"{name} is {shown(value)}; it must be a finite number of at least 0")
+            if not (words.is_finite(value) and value >= 0):
+                raise words.LimitError(f"{name} is {words.shown(value)}; it must be a finite number of at least 0")
 
 
 def planned_start_s(now_s: float, at_s: float | None) -> float:
@@ -65,19 +55,21 @@ def planned_start_s(now_s: float, at_s: float | None) -> float:
         return now_s
     _tick("at_s", at_s)
     if at_s - now_s > MAX_AHEAD_S:
-        raise LimitError(f"at_s is {at_s - now_s:.6f} s ahead; it must be at most {MAX_AHEAD_S:g} s ahead")
+        raise words.LimitError(f"at_s is {at_s - now_s:.6f} s ahead; it must be at most {MAX_AHEAD_S:g} s ahead")
     return max(now_s, at_s)
 
 
-def load_of(drive: Drive, resistance_ohm: float) -> Load:
+def load_of(drive: words.Drive, resistance_ohm: float) -> Load:
     """The load of a drive. Heat is V^2/R over the pulse, an upper bound; a vibration does not use the coil."""
-    if not isinstance(drive, Pulse | Effect):
-        raise LimitError(f"drive is {drive!r}; it must be a Pulse or an Effect")
-    if isinstance(drive, Effect):
+    if not isinstance(drive, words.Pulse | words.Effect):
+        raise words.LimitError(f"drive is {drive!r}; it must be a Pulse or an Effect")
+    if isinstance(drive, words.Effect):
         return Load(on_s=0.0, heat_J=0.0)
-    if not (is_finite(resistance_ohm) and resistance_ohm > 0):
-        shown_ohm = shown(resistance_ohm)
-        raise LimitError(f"resistance_ohm is {shown_ohm}; it must be finite and above 0 to estimate the coil's heat")
+    if not (words.is_finite(resistance_ohm) and resistance_ohm > 0):
+        shown_ohm = words.shown(resistance_ohm)
+        raise words.LimitError(
+            f"resistance_ohm is {shown_ohm}; it must be finite and above 0 to estimate the coil's heat"
+        )
     return Load(on_s=drive.pulse_s, heat_J=drive.voltage_V**2 / resistance_ohm * drive.pulse_s)
 
 
@@ -96,10 +88,12 @@ class DriveHistory:
 
     def __post_init__(self) -> None:
         ticks = (self.warmth_tick, *(() if self.ready_tick is None else (self.ready_tick,)), *chain(*self.pulses))
-        if not all(map(is_whole_number, ticks)):
-            raise LimitError("a history of shots counts in whole microseconds")
-        if not (is_finite(self.warmth_K) and self.warmth_K >= 0):
-            raise LimitError(f"warmth_K is {shown(self.warmth_K)}; it must be a finite number of at least 0")
+        if not all(map(words.is_whole_number, ticks)):
+            raise words.LimitError("a history of shots counts in whole microseconds")
+        if not (words.is_finite(self.warmth_K) and self.warmth_K >= 0):
+            raise words.LimitError(
+                f"warmth_K is {words.shown(self.warmth_K)}; it must be a finite number of at least 0"
+            )
 
     def earliest_s(self, load: Load) -> float:
         """The earliest time at which `load` may start, -inf if nothing was fired yet, inf if never.
@@ -116,7 +110,7 @@ class DriveHistory:
             return
         time, limit = max(broken)
         allowed = f"the earliest allowed time is {time:.6f} s" if time < math.inf else "it is never allowed"
-        raise LimitError(f"shot at {at_s:.6f} s of {load.on_s:g} s and {load.heat_J:.3g} J: {limit}; {allowed}")
+        raise words.LimitError(f"shot at {at_s:.6f} s of {load.on_s:g} s and {load.heat_J:.3g} J: {limit}; {allowed}")
 
     def record(self, load: Load, at_s: float, ready_s: float) -> DriveHistory:
         """The history after `load` started at `at_s`, with the magnet home at `ready_s`. `LimitError` as `check`."""
@@ -185,8 +179,8 @@ class DriveHistory:
 
 
 def _tick(name: str, time_s: float) -> int:
-    if not is_finite(time_s):
-        raise LimitError(f"{name} is {shown(time_s)}; it must be a finite time in seconds")
+    if not words.is_finite(time_s):
+        raise words.LimitError(f"{name} is {words.shown(time_s)}; it must be a finite time in seconds")
     return round(time_s * TICKS)
 
 
@@ -195,8 +189,8 @@ def _on_ticks(load: Load) -> int:
     return math.ceil(load.on_s * TICKS - 1e-6)
 
 
-BEYOND_VOLTAGE = f"voltage above {MAX_VOLTAGE_V:g} V"
-BEYOND_PULSE = f"pulse above {1e3 * MAX_PULSE_S:g} ms"
+BEYOND_VOLTAGE = f"voltage above {words.MAX_VOLTAGE_V:g} V"
+BEYOND_PULSE = f"pulse above {1e3 * words.MAX_PULSE_S:g} ms"
 BEYOND_DUTY = f"driven for more than {100 * MAX_DUTY:g} % of a second"
 BEYOND_HEAT = f"coil above {MAX_COIL_C:g} °C in the end"
 TRAIN_LIMITS = (BEYOND_VOLTAGE, BEYOND_PULSE, BEYOND_DUTY, BEYOND_HEAT)
@@ -205,11 +199,11 @@ TRAIN_LIMITS = (BEYOND_VOLTAGE, BEYOND_PULSE, BEYOND_DUTY, BEYOND_HEAT)
 
 def broken_limit(voltage_V: float, pulse_s: float, resistance_ohm: float, rate_Hz: float) -> str | None:
     """The first of `TRAIN_LIMITS` that a steady train of such pulses would break; None if it may go on for ever."""
-    if voltage_V > MAX_VOLTAGE_V:
+    if voltage_V > words.MAX_VOLTAGE_V:
         return BEYOND_VOLTAGE
-    if pulse_s > MAX_PULSE_S:
+    if pulse_s > words.MAX_PULSE_S:
         return BEYOND_PULSE
-    load = load_of(Pulse(voltage_V=voltage_V, pulse_s=pulse_s), resistance_ohm)
+    load = load_of(words.Pulse(voltage_V=voltage_V, pulse_s=pulse_s), resistance_ohm)
     if _fullest_second(load, rate_Hz) > _DUTY_TICKS:
         return BEYOND_DUTY
     return BEYOND_HEAT if steady_coil_C(load, rate_Hz) > MAX_COIL_C else None

@@ -5,8 +5,9 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 from functools import lru_cache
 
+from device.limits import Load, load_of
 from device.parameters import GunParameters, VibrationParameters
-from device.words import Drive, Effect, LimitError, Pulse, is_finite, shown
+from device.words import Drive, Effect, LimitError, Pulse
 
 Method = GunParameters | VibrationParameters
 
@@ -20,14 +21,15 @@ _PAPER_GUN = GunParameters()
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Rendering:
-    """What the model says of one shot: the motion's status (`rendered` for a vibration) and its length."""
+    """What the model says of one shot: the motion's status (`rendered` for a vibration), and what it asks of the coil.
+
+    `settle_s` are the seconds from the onset of the pulse until the next shot may start: when the magnet is back at its
+    stop, and never before the end of the pulse; for a vibration its duration.
+    """
 
     motion: str
     settle_s: float
-
-    def __post_init__(self) -> None:
-        if not (is_finite(self.settle_s) and self.settle_s >= 0):
-            raise ValueError(f"settle_s is {shown(self.settle_s)}; it must be a finite number of at least 0")
+    load: Load
 
 
 def paper_methods(gun: GunParameters = _PAPER_GUN) -> dict[str, Method]:
@@ -48,20 +50,14 @@ def drive_of(method: Method) -> Drive:
     return Pulse(voltage_V=method.voltage_V, pulse_s=method.pulse_s)
 
 
-def settle_s(method: Method, drive: Drive | None = None) -> float:
-    """Seconds from the onset of the pulse until the next shot may start, by the model.
+def rendering_of(method: Method, drive: Drive | None = None) -> Rendering:
+    """What the model says of one shot of the method, driven by `drive` or by its own.
 
-    That is when the magnet is back at its stop, and never before the end of the pulse; for a vibration its duration.
     `LimitError`: the shot would never bring the magnet home, or the drive is not of the method's kind.
     """
-    return rendering_of(method, drive).settle_s
-
-
-def rendering_of(method: Method, drive: Drive | None = None) -> Rendering:
-    """What the model says of one shot of the method, driven by `drive` or by its own. Raises as `settle_s` does."""
     drive = drive_of(method) if drive is None else drive
     if isinstance(method, VibrationParameters) and isinstance(drive, Effect):
-        return Rendering(motion="rendered", settle_s=method.duration_s)
+        return Rendering(motion="rendered", settle_s=method.duration_s, load=load_of(drive, 0.0))
     if isinstance(method, GunParameters) and isinstance(drive, Pulse):
         return _shot(replace(method, voltage_V=drive.voltage_V, pulse_s=drive.pulse_s))
     wanted = "an Effect" if isinstance(method, VibrationParameters) else "a Pulse"
@@ -78,4 +74,5 @@ def _shot(gun: GunParameters) -> Rendering:
             f"drive of {gun.voltage_V:g} V for {gun.pulse_s:g} s at friction_N {gun.friction_N:g}: the model's magnet "
             f"does not come home ({summary.status}), so no shot could follow; lower the friction or change the pulse"
         )
-    return Rendering(motion=summary.status, settle_s=max(summary.reset_end_s or 0.0, gun.pulse_s))
+    load = load_of(Pulse(voltage_V=gun.voltage_V, pulse_s=gun.pulse_s), gun.resistance_ohm)
+    return Rendering(motion=summary.status, settle_s=max(summary.reset_end_s or 0.0, gun.pulse_s), load=load)

@@ -4,9 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 
-from device.limits import DriveHistory, Load, load_of, planned_start_s
+from device.limits import DriveHistory, planned_start_s
 from device.methods import Method, Rendering, rendering_of
-from device.parameters import GunParameters
 from device.words import Drive, GunState, GunStatus, Identity, LimitError, LinkError, Shot, ShotReport
 
 MODEL_VERSION = "1"
@@ -18,7 +17,7 @@ class SimulatedGun:
 
     def __init__(self, methods: Mapping[str, Method], clock: Callable[[], float]) -> None:
         self._methods = dict(methods)
-        self._rendered: dict[tuple[str, Drive], tuple[Rendering, Load]] = {}
+        self._rendered: dict[tuple[str, Drive], Rendering] = {}
         self._clock = clock
         self._history = DriveHistory()
         self._born_s = clock()
@@ -47,16 +46,16 @@ class SimulatedGun:
             raise LimitError("the gun is disarmed; arm it before it may fire")
         if not isinstance(shot, Shot):
             raise LimitError(f"shot is {shot!r}; it must be a Shot")
-        rendering, load = self._render(shot)
+        rendering = self._render(shot)
         now_s = self._clock()
         onset_s = planned_start_s(now_s, at_s)
-        self._history = self._history.record(load, onset_s, onset_s + rendering.settle_s)
+        self._history = self._history.record(rendering.load, onset_s, onset_s + rendering.settle_s)
         self._shots += 1
         return ShotReport(
             shot=shot,
             requested_s=now_s,
             pulse_start_s=onset_s,
-            pulse_end_s=onset_s + (load.on_s or rendering.settle_s),
+            pulse_end_s=onset_s + (rendering.load.on_s or rendering.settle_s),
             home_predicted_s=onset_s + rendering.settle_s,
             motion=rendering.motion,
         )
@@ -85,20 +84,15 @@ class SimulatedGun:
             return "disarmed"
         return "armed" if self._history.is_ready(now_s) else "resetting"
 
-    def _render(self, shot: Shot) -> tuple[Rendering, Load]:
-        """What the model says of a shot, and what it costs: the same for every shot of a method and drive."""
+    def _render(self, shot: Shot) -> Rendering:
+        """What the model says of a shot: the same for every shot of a method and drive."""
         if shot.method not in self._methods:
             raise LimitError(f"method is {shot.method!r}; this gun renders {', '.join(self._methods)}")
         kind = (shot.method, shot.drive)
         if kind not in self._rendered:
-            method = self._methods[shot.method]
-            self._rendered[kind] = rendering_of(method, shot.drive), _load(method, shot)
+            self._rendered[kind] = rendering_of(self._methods[shot.method], shot.drive)
         return self._rendered[kind]
 
     def _is_open(self) -> None:
         if self._closed:
             raise LinkError("the gun is closed; open it again")
-
-
-def _load(method: Method, shot: Shot) -> Load:
-    return load_of(shot.drive, method.resistance_ohm if isinstance(method, GunParameters) else 0.0)

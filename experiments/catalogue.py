@@ -25,9 +25,8 @@ from experiments.preference.session import make_plan as preference_plan
 from experiments.preference.session import rows as preference_rows
 from experiments.preference.session import session as preference_session
 from experiments.record import replay
-from experiments.record.columns import FILE_SUFFIX
 from experiments.record.journal import Contents, JournalError, read_journal
-from experiments.record.tables import Row, table_bytes
+from experiments.record.tables import FILE_SUFFIX, Row, table_bytes
 from experiments.session.history import History
 from experiments.session.steps import Session
 

@@ -16,7 +16,7 @@ from typing import Protocol
 from device import DeviceError, Gun, GunStatus
 from device.words import RecoilError
 from experiments.clock import Clock
-from experiments.design.plan import Plan, Trial
+from experiments.design.plan import Plan
 from experiments.record.journal import Journal, JournalGone
 from experiments.session import events, judging
 from experiments.session.events import DISARMS, TYPED, Event, Press
@@ -94,7 +94,7 @@ class LiveRun:
         history: History = (),
     ) -> None:
         self.plan, self.clock, self.guard_s = plan, clock, guard_s
-        self.gun, self._journal, self._screen = gun, journal, screen
+        self.gun, self.journal, self._screen = gun, journal, screen
         self._history = list(history)
         self._position = Position(since_s=clock.now())
         self._painted_s: float | None = None
@@ -118,20 +118,19 @@ class LiveRun:
             return tuple(self._history)
 
     @property
-    def trial(self) -> Trial:
-        """The trial at hand: that of an open correction, else that of the step, else the last one."""
+    def moment(self) -> Moment:
+        """What is so now, to judge by."""
         with self._news:
-            return self._moment().trial
-
-    def ready_at_s(self, now_s: float) -> bool:
-        """Whether a press at a time would be late enough for what stands there."""
-        with self._news:
-            return self._moment().is_ready(now_s)
-
-    def paused_between(self, from_s: float, to_s: float) -> bool:
-        """Whether the run was paused at any time between two."""
-        with self._news:
-            return self._moment().paused_between(from_s, to_s)
+            began_s = self._position.paused_s
+            return Moment(
+                plan=self.plan,
+                history=tuple(self._history),
+                position=self._position,
+                now_s=self.clock.now(),
+                painted_s=self._painted_s,
+                guard_s=self.guard_s,
+                pauses=[*self._pauses, *([] if began_s is None else [(began_s, math.inf)])],
+            )
 
     def painted(self, serial: int, at_s: float) -> None:
         """Take when a position was painted: from then on, and the guard time later, it can be worked."""
@@ -143,13 +142,13 @@ class LiveRun:
     def offer(self, event: Event, press: Press | None = None) -> EventVerdict:
         """Have an event judged, and taken if it may be. Never waits. `press`: by the experimenter's hand."""
         with self._news:
-            moment = self._moment()
+            moment = self.moment
             meant, text = judging.meant(moment, event)
             refusal = judging.event_refusal(moment, meant, press)
             if not refusal:
                 self._take(meant, moment)
             before, position = moment.position, self._position
-            kept = refused(meant, before, refusal) if refusal else remark_of(meant, before, position, self.trial)
+            kept = refused(meant, before, refusal) if refusal else remark_of(meant, before, position, self.moment.trial)
             written = None if kept is None else self._submit(kept)
         if kept is not None and written is not None:  # outside: who shows it may wait for this lock
             written.add_done_callback(lambda done: self._written(kept, done))
@@ -273,37 +272,11 @@ class LiveRun:
     def _submit(self, remark: Remark) -> Future[None] | None:
         """Have a remark written; `None` if the journal is closed, as the run has just ended."""
         try:
-            written = self._journal.submit("remark", body=remark_record(remark))
+            written = self.journal.submit("remark", body=remark_record(remark))
         except RuntimeError:
             return None
         self._history.append((None, remark))
         return written
-
-    # judging
-
-    def _moment(self) -> Moment:
-        """What is so now, to judge by."""
-        began_s = self._position.paused_s
-        return Moment(
-            plan=self.plan,
-            history=self._history,
-            position=self._position,
-            now_s=self.clock.now(),
-            painted_s=self._painted_s,
-            guard_s=self.guard_s,
-            pauses=self._pauses if began_s is None else [*self._pauses, (began_s, math.inf)],
-        )
-
-    def repeated(self) -> Trial | None:
-        """The trial that would be presented again now, if there is one."""
-        with self._news:
-            return self._moment().repeatable
-
-    @property
-    def undoable(self) -> bool:
-        """Whether there is anything to undo in the set at hand."""
-        with self._news:
-            return self._moment().further_back is not None
 
     # keeping
 

@@ -17,18 +17,17 @@ from experiments.clock import Clock, date_text
 from experiments.config.setup import Setup
 from experiments.design.plan import Plan
 from experiments.design.streams import draw_seed
-from experiments.limits import check_limits
 from experiments.live_run import LiveRun, RunStopped, Screen
+from experiments.load import check_limits
 from experiments.record import replay, storage
 from experiments.record.journal import Contents, Journal, JournalError, begun, hold_journal, read_journal
 from experiments.record.provenance import provenance
 from experiments.record.replay import RunPosition
-from experiments.runner import carry_out, gun_name
+from experiments.runner import Desk, carry_out, gun_name
 from experiments.session.steps import Answered, Rated, Session
-from experiments.study import places, register
-from experiments.study.places import Place, PlaceError
+from experiments.study import folders, register
+from experiments.study.folders import Place, PlaceError
 from experiments.study.register import Register
-from experiments.train import Desk
 
 Again = Literal["ask", "resume", "fresh"]
 """What to do with an unfinished run: refuse and say what is there, go on with it, or set it aside."""
@@ -113,7 +112,7 @@ def run(request: RunRequest, make_screen: MakeScreen, clock: Clock) -> Finished:
     setup = request.setup
     drives = {one.method: one.drive for one in check_limits(setup)}
     registered = register.read_register(request.results)
-    place = places.place(request.results, request.participant_id, setup.config.experiment, registered)
+    place = folders.place(request.results, request.participant_id, setup.config.experiment, registered)
     place = replace(place, practice=request.practice)
     if not place.journal.exists():
         request = replace(request, anew_reason="")
@@ -138,9 +137,7 @@ def run(request: RunRequest, make_screen: MakeScreen, clock: Clock) -> Finished:
                 guard_s=setup.config.console.guard_s,
                 history=position.history,
             )
-            desk = Desk(
-                gun=gun, gun_name=gun_name(gun.identify()), drives=drives, journal=journal, clock=clock, live=live
-            )
+            desk = Desk(live=live, gun_name=gun_name(gun.identify()), drives=drives)
             screen.begin(live)
             return Finished(plan=plan, place=place, saved=_to_the_end(session, desk, position, place))
 
@@ -180,7 +177,7 @@ def _before(where: Place, request: RunRequest, clock: Clock) -> Contents | None:
         return contents
     os.close(hold_journal(where.journal))  # refused while another run is at it
     _record_reason(where, request.anew_reason, clock)
-    places.set_aside(where)
+    folders.set_aside(where)
     return None
 
 
@@ -202,7 +199,7 @@ def _refuse_finished(where: Place, contents: Contents | None) -> None:
 def _new_plan(request: RunRequest, place: Place, registered: Register) -> Plan:
     setup, seed = request.setup, resolve_seed(request)
     if not request.practice:
-        row = places.row_of_next_run(setup, place.results, registered)
+        row = folders.row_of_next_run(setup, place.results, registered)
         return experiment(setup).make_plan(setup.config, place.participant_id, seed, row)
     plan = experiment(setup).make_practice(setup.config, place.participant_id, seed)
     if plan is None:
@@ -276,7 +273,7 @@ def _to_the_end(session: Session, desk: Desk, position: RunPosition, place: Plac
     except (KeyboardInterrupt, RunStopped) as stop:
         why = str(stop) or "interrupted"
         desk.live.end(why)
-        desk.journal.append("stopped", reason=why)
+        desk.live.journal.append("stopped", reason=why)
         saved = _write_table(place, read_journal(place.journal))
         if isinstance(stop, RunStopped):
             stop.saved = saved
@@ -286,7 +283,7 @@ def _to_the_end(session: Session, desk: Desk, position: RunPosition, place: Plac
         raise
     desk.live.end("")
     contents = read_journal(place.journal)
-    desk.journal.append("finished", table_sha256=hashlib.sha256(table(contents)).hexdigest())
+    desk.live.journal.append("finished", table_sha256=hashlib.sha256(table(contents)).hexdigest())
     return _write_table(place, contents)
 
 

@@ -10,43 +10,82 @@ the line nor this machine delays them. Each is in the journal before the next is
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Literal
 
 from device import DeviceError, Gun, LimitError, Shot, ShotReport
-from device.words import Identity
+from device.words import Drive, Identity
 from experiments.design.plan import Trial
-from experiments.live_run import Held, RunStopped
+from experiments.live_run import Held, LiveRun, RunStopped
 from experiments.record.replay import RunPosition
-from experiments.session import events
+from experiments.session import events, steps
 from experiments.session.history import trial_at
 from experiments.session.remarks import TestShot
 from experiments.session.states import State
-from experiments.session.steps import (
-    Answered,
-    Ask,
-    Close,
-    Closed,
-    Describe,
-    Described,
-    Failed,
-    Fired,
-    FireShot,
-    Interrupted,
-    Outcome,
-    Prepare,
-    Prepared,
-    Present,
-    Presented,
-    Rate,
-    Rated,
-    Repeated,
-    Rest,
-    Rested,
-    Session,
-    Step,
-    on_scale,
-    step_record,
-)
-from experiments.train import Desk, Train
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Desk:
+    """All that carries steps out: the live run with its gun, what that is called, and how each method drives it."""
+
+    live: LiveRun
+    gun_name: str
+    drives: Mapping[str, Drive]
+
+
+class Train:
+    """A stimulus of several shots: each in the journal before the next is asked for."""
+
+    def __init__(self, step: steps.Present, desk: Desk) -> None:
+        self._step, self._desk, self._live = step, desk, desk.live
+        self._onset_utc, self._onset_s = "", math.nan
+        self.shots = 0
+
+    def began(self, onset_utc: str, first: ShotReport) -> None:
+        """Take the first shot; `next` counts after the least exposure."""
+        self._onset_utc, self._onset_s = onset_utc, first.pulse_start_s
+        self._live.stimulus_begins(first.pulse_start_s, least_s=self._step.least_exposure_s)
+        self.fired(first)
+
+    def fired(self, report: ShotReport) -> None:
+        """Have a shot on the disk."""
+        self.shots += 1
+        shot = steps.TrainShot(
+            shot=self.shots,
+            requested_s=report.requested_s,
+            pulse_start_s=report.pulse_start_s,
+            pulse_end_s=report.pulse_end_s,
+            home_predicted_s=report.home_predicted_s,
+            motion=report.motion,
+            timing=report.timing,
+        )
+        self._live.journal.append("shot", body=steps.step_record(shot))
+
+    def due_s(self) -> float:
+        """The next shot's tick, whole microseconds after the first; later if the magnet is not home by then."""
+        tick_s = self._onset_s + self.shots * round(self._step.repeat_every_s * 1e6) / 1e6
+        return max(tick_s, self._live.gun.status().ready_at_s)
+
+    def presented(self, ended_by: Literal["next", "limit"]) -> steps.Presented:
+        """The stimulus as it was felt to its end."""
+        return steps.Presented(
+            gun=self._desk.gun_name,
+            onset_utc=self._onset_utc,
+            shots=self.shots,
+            exposure_s=self._exposure_s(),
+            ended_by=ended_by,
+        )
+
+    def interrupted(self) -> steps.Interrupted:
+        """The stimulus as it was felt until a pause ended it."""
+        if not self.shots:
+            return steps.Interrupted(presented=False, cause="pause")
+        return steps.Interrupted(presented=True, cause="pause", shots=self.shots, exposure_s=self._exposure_s())
+
+    def _exposure_s(self) -> float:
+        return self._live.clock.now() - self._onset_s
+
 
 MAX_FAILURES = 3
 """Failures of the gun in a row after which a run stops and can be resumed."""
@@ -61,7 +100,7 @@ def gun_name(identity: Identity) -> str:
     return identity.model if identity.model == identity.serial else f"{identity.model}:{identity.serial}"
 
 
-def carry_out(session: Session, desk: Desk, position: RunPosition) -> None:
+def carry_out(session: steps.Session, desk: Desk, position: RunPosition) -> None:
     """Carry out a session from where it stands to its end.
 
     `RunStopped`, `JournalError` and interrupts pass through; whatever happens, the gun is disarmed. After an emergency
@@ -75,17 +114,16 @@ def carry_out(session: Session, desk: Desk, position: RunPosition) -> None:
         raise RunStopped(desk.live.stay_halted()) from stop
     finally:
         session.close()
-        disarm(desk.gun)
+        disarm(desk.live.gun)
 
 
 class _Runner:
     """A session that is being carried out, and what one step leaves to the next."""
 
-    def __init__(self, session: Session, desk: Desk) -> None:
+    def __init__(self, session: steps.Session, desk: Desk) -> None:
         self._session, self._desk, self._live = session, desk, desk.live
         self._stimulus = DeskGun(desk)
-        self._failures = 0
-        self._onset_s = math.nan
+        self._failures, self._onset_s = 0, math.nan
         self._damper = ""
         """As it was set in this sitting; unknown at its beginning."""
 
@@ -94,52 +132,46 @@ class _Runner:
         if position.halted:
             self._rearm(trial_at(self._live.plan, position.history, step))
         while step is not None:
-            self._desk.journal.append("step", body=step_record(step))
+            self._live.journal.append("step", body=steps.step_record(step))
             outcome = self._do(step)
-            self._desk.journal.append("outcome", body=step_record(outcome), **self._shown())
+            self._live.journal.append("outcome", body=steps.step_record(outcome), **self._shown())
             self._live.keep(step, outcome)
             self._count(outcome)
-            step = self._send(outcome)
-
-    def _send(self, outcome: Outcome) -> Step | None:
-        try:
-            return self._session.send(outcome)
-        except StopIteration:
-            return None
+            step = steps.step_after(self._session, outcome)
 
     def _shown(self) -> dict[str, float]:
         """When the step was painted, where that is known."""
         return {} if self._live.shown_s is None else {"shown_s": self._live.shown_s}
 
-    def _count(self, outcome: Outcome) -> None:
-        if isinstance(outcome, Prepared):
+    def _count(self, outcome: steps.Outcome) -> None:
+        if isinstance(outcome, steps.Prepared):
             return
-        self._failures = self._failures + 1 if isinstance(outcome, Failed) else 0
-        if isinstance(outcome, Failed) and self._failures == MAX_FAILURES:
+        self._failures = self._failures + 1 if isinstance(outcome, steps.Failed) else 0
+        if isinstance(outcome, steps.Failed) and self._failures == MAX_FAILURES:
             raise RunStopped(f"the gun failed {MAX_FAILURES} times in a row, last: {outcome.cause}")
 
-    def _do(self, step: Step) -> Outcome:  # noqa: C901 - one case a step
+    def _do(self, step: steps.Step) -> steps.Outcome:  # noqa: C901 - one case a step
         match step:
-            case Prepare():
+            case steps.Prepare():
                 return self._prepare(step)
-            case FireShot():
+            case steps.FireShot():
                 return self._fired(step)
-            case Ask():
+            case steps.Ask():
                 return self._ask(step)
-            case Rest():
+            case steps.Rest():
                 return self._rest(step)
-            case Present():
+            case steps.Present():
                 return self._stimulus.present(step)
-            case Rate():
+            case steps.Rate():
                 return self._rate(step)
-            case Describe():
+            case steps.Describe():
                 return self._describe(step)
-            case Close():
+            case steps.Close():
                 return self._close(step)
 
     # steps that wait for a person
 
-    def _prepare(self, step: Prepare) -> Prepared | Repeated:
+    def _prepare(self, step: steps.Prepare) -> steps.Prepared | steps.Repeated:
         to_be_set = step.damper not in ("", self._damper)
         if to_be_set:
             self._damper = ""  # it may be set by now, or not: known again when that is said
@@ -149,13 +181,13 @@ class _Runner:
                 case events.DamperSet():
                     self._damper = step.damper
                 case events.Fire():
-                    return Prepared(damper=step.damper or None)
+                    return steps.Prepared(damper=step.damper or None)
                 case events.Repeat(reason=reason):
                     return self._repeat(reason)
                 case other:
                     raise Unforeseen(other)
 
-    def _ask(self, step: Ask) -> Answered | Repeated:
+    def _ask(self, step: steps.Ask) -> steps.Answered | steps.Repeated:
         self._live.enter(State.ASKING, step)
         match self._live.wait():
             case events.Answer() | events.ParticipantKey() as answer:
@@ -165,7 +197,7 @@ class _Runner:
             case other:
                 raise Unforeseen(other)
 
-    def _answered(self, answer: events.Answer | events.ParticipantKey) -> Answered:
+    def _answered(self, answer: events.Answer | events.ParticipantKey) -> steps.Answered:
         """The answer with its time, which is the participant's own only by their own key, and without a pause."""
         drawn_s = answer.response_time_s if isinstance(answer, events.Answer) else None
         key_time_s = None if answer.at_s is None else round(answer.at_s - self._onset_s, 6)
@@ -173,8 +205,8 @@ class _Runner:
         if time_s is None:
             raise TypeError("an answer without a time")
         own = drawn_s is not None or isinstance(answer, events.ParticipantKey)
-        paused = self._live.paused_between(self._onset_s, self._onset_s + time_s)
-        return Answered(
+        paused = self._live.moment.paused_between(self._onset_s, self._onset_s + time_s)
+        return steps.Answered(
             response=answer.response,
             response_time_s=time_s,
             response_source=answer.by,
@@ -182,8 +214,8 @@ class _Runner:
             key_time_s=key_time_s if drawn_s is not None else None,
         )
 
-    def _rest(self, step: Rest) -> Rested | Repeated:
-        start_s = self._desk.clock.now()
+    def _rest(self, step: steps.Rest) -> steps.Rested | steps.Repeated:
+        start_s = self._live.clock.now()
         self._live.enter(State.RESTING, step, until_s=start_s + step.duration_s)
         while True:
             match self._live.wait():
@@ -198,48 +230,48 @@ class _Runner:
                 case other:
                     raise Unforeseen(other)
 
-    def _rested(self, start_s: float, reason: str) -> Rested:
-        return Rested(rested_s=round(self._desk.clock.now() - start_s, 6), cut_reason=reason)
+    def _rested(self, start_s: float, reason: str) -> steps.Rested:
+        return steps.Rested(rested_s=round(self._live.clock.now() - start_s, 6), cut_reason=reason)
 
-    def _rate(self, step: Rate) -> Rated | Repeated:
+    def _rate(self, step: steps.Rate) -> steps.Rated | steps.Repeated:
         self._live.enter(State.RATING, step)
         match self._live.wait():
             case events.Rating(rating=rating, by=by) | events.ParticipantRated(rating=rating, by=by):
-                return Rated(rating=None if rating is None else _kept(rating, step), rating_by=by)
+                return steps.Rated(rating=None if rating is None else _kept(rating, step), rating_by=by)
             case events.Repeat(reason=reason):
                 return self._repeat(reason)
             case other:
                 raise Unforeseen(other)
 
-    def _describe(self, step: Describe) -> Described:
+    def _describe(self, step: steps.Describe) -> steps.Described:
         self._live.enter(State.DESCRIBING, step)
         match self._live.wait():
             case events.Description(text=text) | events.ParticipantDescribed(text=text):
-                return Described(comment=text)
+                return steps.Described(comment=text)
             case other:
                 raise Unforeseen(other)
 
-    def _close(self, step: Close) -> Closed | Repeated:
+    def _close(self, step: steps.Close) -> steps.Closed | steps.Repeated:
         self._live.enter(State.CLOSING, step)
         match self._live.wait():
             case events.Finish():
-                return Closed()
+                return steps.Closed()
             case events.Repeat(reason=reason):
                 return self._repeat(reason)
             case other:
                 raise Unforeseen(other)
 
-    def _repeat(self, reason: str) -> Repeated:
-        trial = self._live.repeated()
+    def _repeat(self, reason: str) -> steps.Repeated:
+        trial = self._live.moment.repeatable
         if trial is None:
             raise TypeError("a repeat of no trial was taken")
-        return Repeated(trial=trial, reason=reason)
+        return steps.Repeated(trial=trial, reason=reason)
 
     # the gun
 
-    def _fired(self, step: FireShot) -> Fired | Failed | Interrupted:
+    def _fired(self, step: steps.FireShot) -> steps.Fired | steps.Failed | steps.Interrupted:
         outcome = self._stimulus.fire(step)
-        if isinstance(outcome, Fired):
+        if isinstance(outcome, steps.Fired):
             self._onset_s = outcome.pulse_start_s
         return outcome
 
@@ -255,8 +287,8 @@ class _Runner:
                     raise Unforeseen(other)
 
 
-def _kept(rating: float, step: Rate) -> float:
-    return on_scale(rating, step)
+def _kept(rating: float, step: steps.Rate) -> float:
+    return steps.on_scale(rating, step)
 
 
 LEAD_S = 0.03
@@ -280,7 +312,7 @@ class DeskGun:
     def __init__(self, desk: Desk) -> None:
         self._desk, self._live = desk, desk.live
 
-    def fire(self, step: FireShot) -> Fired | Failed | Interrupted:
+    def fire(self, step: steps.FireShot) -> steps.Fired | steps.Failed | steps.Interrupted:
         """One shot, armed for it alone."""
         asked = False
         try:
@@ -288,13 +320,13 @@ class DeskGun:
             asked = True
             onset_utc, report = self._first(step.trial)
         except Held:
-            return Interrupted(presented=False, cause="pause")
+            return steps.Interrupted(presented=False, cause="pause")
         except DeviceError as error:
             return self._failed(error, felt=asked and not isinstance(error, LimitError))
         finally:
-            disarm(self._desk.gun)
+            disarm(self._live.gun)
         self._live.stimulus_begins(report.pulse_start_s)
-        return Fired(
+        return steps.Fired(
             gun=self._desk.gun_name,
             onset_utc=onset_utc,
             requested_s=report.requested_s,
@@ -305,7 +337,7 @@ class DeskGun:
             timing=report.timing,
         )
 
-    def present(self, step: Present) -> Presented | Failed | Interrupted:
+    def present(self, step: steps.Present) -> steps.Presented | steps.Failed | steps.Interrupted:
         """Shots at whole multiples of the interval since the first, until next is said."""
         train, asked = Train(step, self._desk), False
         try:
@@ -322,10 +354,10 @@ class DeskGun:
         except DeviceError as error:
             return self._failed(error, felt=train.shots > 0 or (asked and not isinstance(error, LimitError)))
         finally:
-            disarm(self._desk.gun)
+            disarm(self._live.gun)
         return train.presented("next") if isinstance(event, events.Next) else train.interrupted()
 
-    def _get_ready(self, state: State, step: FireShot | Present) -> None:
+    def _get_ready(self, state: State, step: steps.FireShot | steps.Present) -> None:
         """Enter a state in which the gun fires, and arm it. Raises as `allow_shot`.
 
         If the run ends before the shot, it is on the disk that nothing was felt.
@@ -336,31 +368,31 @@ class DeskGun:
                 self._live.stimulus_begins(None)
             self._arm()
         except RunStopped:
-            self._desk.journal.append("outcome", body=step_record(Interrupted(presented=False)))
+            self._live.journal.append("outcome", body=steps.step_record(steps.Interrupted(presented=False)))
             raise
 
     def _arm(self) -> None:
         """Arm the gun, and wait until its magnet is home. Raises as `allow_shot`."""
         self._live.settle()
         self._live.allow_shot()
-        self._desk.gun.arm()
-        self._live.sleep(self._desk.gun.status().ready_at_s)
+        self._live.gun.arm()
+        self._live.sleep(self._live.gun.status().ready_at_s)
 
     def _first(self, trial: Trial) -> tuple[str, ShotReport]:
         """The first shot of a stimulus, and its date and time."""
-        return self._desk.clock.utc(), self._shoot(trial)
+        return self._live.clock.utc(), self._shoot(trial)
 
     def _shoot(self, trial: Trial, at_s: float | None = None) -> ShotReport:
         shot = Shot(method=trial.method, direction=trial.direction, drive=self._desk.drives[trial.method])
-        return self._desk.gun.fire(shot, at_s)
+        return self._live.gun.fire(shot, at_s)
 
-    def _failed(self, error: DeviceError, *, felt: bool) -> Failed | Interrupted:
+    def _failed(self, error: DeviceError, *, felt: bool) -> steps.Failed | steps.Interrupted:
         """What became of a stimulus at which the gun failed; a pause that disarmed it is no fault of the gun's."""
         if isinstance(self._live.taken(), events.Pause | events.ParticipantLost):
-            return Interrupted(presented=felt, cause="pause")
+            return steps.Interrupted(presented=felt, cause="pause")
         lost = events.GunFault if isinstance(error, LimitError) else events.LinkLost
         self._live.offer(lost(cause=str(error)))
-        return Failed(cause=str(error), presented=felt)
+        return steps.Failed(cause=str(error), presented=felt)
 
     def test_shot(self, trial: Trial, held_s: float | None) -> bool:
         """Fire a shot that nobody judges; whether it was fired."""
@@ -372,7 +404,7 @@ class DeskGun:
             self._live.remark(TestShot(method=trial.method, held_s=held_s, cause=cause))
             return False
         finally:
-            disarm(self._desk.gun)
+            disarm(self._live.gun)
         fired = TestShot(method=trial.method, held_s=held_s, pulse_start_s=report.pulse_start_s, motion=report.motion)
         self._live.remark(fired)
         return True

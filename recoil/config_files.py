@@ -15,12 +15,11 @@ from pathlib import Path
 from typing import Any
 
 from experiments.catalogue import CATALOGUE
-from experiments.config.door import ConfigError
-from experiments.config.toml_text import toml_text
+from experiments.config.door import ConfigError, toml_text
 from experiments.load import load_setup, shipped_folder
 from experiments.record import journal, storage
 from experiments.record.journal import JournalError
-from experiments.study.places import PlaceError
+from experiments.study.folders import PlaceError
 
 
 def copy_began_with(path: Path, folder: Path) -> list[Path]:

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from device.serial_gun.opening import speed_of
+from device.serial_gun.gun import speed_of
 from experiments.catalogue import rebuild
 from experiments.clock import Clock, RealClock, VirtualClock
 from experiments.config.setup import Setup
@@ -19,7 +19,7 @@ from experiments.record import storage
 from experiments.run import Again, Finished, ParticipantOptions, RunRequest, ScreenName, run
 from experiments.screens.synthetic import synthetic_screen
 from experiments.screens.terminal import TerminalScreen
-from experiments.study.places import Place, PlaceError, check_code, place, set_aside_file
+from experiments.study.folders import Place, PlaceError, check_code, place, set_aside_file
 
 
 def run_session(request: RunRequest) -> Place:

@@ -12,8 +12,7 @@ from analysis.report.section import Section, Table
 from analysis.report.terminal import with_tables
 from experiments.clock import RealClock, date_text
 from experiments.study import enrolment
-from experiments.study.places import PlaceError
-from experiments.study.progress import Overview, StudyFolder, open_study, overview
+from experiments.study.folders import Overview, PlaceError, StudyFolder, open_study, overview
 from experiments.study.study import Facts, Participant, RunProgress, eligible
 
 _OPTIONS = {"age_years": "--age", "sex": "--sex", "handedness": "--handedness"}

@@ -8,12 +8,11 @@ from dataclasses import dataclass, fields, replace
 from pathlib import Path
 from typing import Any
 
-from device.serial_gun.opening import MAX_SPEED
+from device.serial_gun.gun import MAX_SPEED
 from device.twin.core import IDENTITY
-from device.twin.ports import Pty, Socket, Tcp, Troubles
-from device.twin.twin import Make, Twin
+from device.twin.twin import Make, Pty, Socket, Tcp, Troubles, Twin
 from experiments.load import find, load_gun
-from experiments.study.places import PlaceError
+from experiments.study.folders import PlaceError
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

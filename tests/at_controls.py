@@ -37,7 +37,7 @@ from experiments.session.events import Press
 from experiments.session.remarks import AnswerCorrected, Remark
 from experiments.session.states import Position, State
 from experiments.session.steps import Answered, FireShot, Outcome, Step
-from experiments.study.places import Place, place
+from experiments.study.folders import Place, place
 from tests.waiting import PATIENCE_S, wait_for
 
 MOST_DEEDS = 2000
@@ -431,8 +431,8 @@ class PaperWindow:
     def other_theme(self) -> None:
         pass
 
-    def shut(self) -> None:
-        pass
+    def close(self) -> bool:
+        return True
 
 
 @dataclass

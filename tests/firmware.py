@@ -25,8 +25,7 @@ import serial
 from device.serial_gun.reports import WAYS
 from device.twin.core import IDENTITY
 from device.twin.machine import LATE_PULSE_US
-from device.wire.frame import LAST_NUMBER, Frame, encode
-from device.wire.records import ShotRecord, StatusRecord
+from device.wire.records import LAST_NUMBER, Frame, ShotRecord, StatusRecord, encode
 from experiments.record.journal import read_journal
 from tests.conftest import Recoil
 from tests.serial_runs import rows, timings_of

@@ -10,11 +10,9 @@ from random import Random
 from typing import Any
 
 from device.methods import paper_methods
-from device.serial_gun.opening import open_serial
-from device.twin.ports import Pty
-from device.twin.twin import Make, Twin
-from device.wire.frame import Frame, Garbled, Splitter, decode, encode
-from device.wire.records import Setting, ShotRecord
+from device.serial_gun.gun import open_serial
+from device.twin.twin import Make, Pty, Twin
+from device.wire.records import Frame, Garbled, Setting, ShotRecord, Splitter, decode, encode
 from device.words import ShotTiming
 from tests.twins import PATIENT_S, Pair, host_clock, plugged_in
 

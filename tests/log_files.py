@@ -1,4 +1,4 @@
-"""Valid logs for tests: rows as text, in the layout of `experiments.record.columns`, and a writer."""
+"""Valid logs for tests: rows as text, in the layout of `experiments.record.tables`, and a writer."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from pathlib import Path
 
 import numpy as np
 
-from experiments.record import columns
+from experiments.record import tables
 
 METHODS = ("vibration", "asymmetric-1", "asymmetric-2")
 FORWARD_RATES = {"vibration": 0.557, "asymmetric-1": 0.793, "asymmetric-2": 0.929}
@@ -66,7 +66,7 @@ def rating_rows(code: str = "P01", seed: int = 1, methods: tuple[str, ...] = MET
 
 def write_rows(path: Path, rows: list[TextRow], header: list[str] | None = None) -> Path:
     """`rows` under `header` (all columns of the table unless given) as RFC 4180."""
-    names = header or columns.names(rows[0]["experiment"])
+    names = header or tables.names(rows[0]["experiment"])
     path.parent.mkdir(parents=True, exist_ok=True)
     with path.open("w", encoding="utf-8", newline="") as stream:
         writer = csv.DictWriter(stream, names, restval="", extrasaction="ignore", lineterminator="\r\n")

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 
 from analysis.logs.files import BadLogError
 from analysis.logs.rules import cell_fault, cell_value, experiment_of
-from experiments.record import columns
+from experiments.record import tables
 
 Cell = str | int | float | None
 Row = dict[str, Cell]
@@ -50,8 +50,8 @@ def _row(experiment: str, header: list[str], line: int, cells: list[str]) -> Row
         raise BadLogError(f"has {len(cells)} fields (rule: {len(header)}, as in the header)", line)
     given = dict(zip(header, cells, strict=True))
     row: Row = {}
-    for column in columns.TABLES[experiment]:
-        text = given.get(column.name, columns.MISSING)
+    for column in tables.TABLES[experiment]:
+        text = given.get(column.name, tables.MISSING)
         if fault := cell_fault(column, text):
             raise BadLogError(fault, line, column.name)
         row[column.name] = cell_value(column, text)

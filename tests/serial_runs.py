@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import Any
 
 from device import LinkError
-from device.serial_gun.opening import speed_of
+from device.serial_gun.gun import speed_of
 from device.serial_gun.reports import WAYS
 from device.twin.twin import Rendered, Twin
 from experiments import run as runs
@@ -23,7 +23,7 @@ from experiments.record.replay import history
 from experiments.run import RunRequest
 from experiments.screens.synthetic import synthetic_screen
 from experiments.session.steps import Answered, Failed, Fired
-from experiments.study.places import Place, place
+from experiments.study.folders import Place, place
 from tests.journals import raw
 from tests.twins import Troubles
 

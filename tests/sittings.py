@@ -7,7 +7,7 @@ from typing import Any, NamedTuple
 
 from device import Identity, Shot, ShotReport, open_gun
 from device.words import GunStatus
-from experiments import catalogue, limits
+from experiments import catalogue, load
 from experiments.catalogue import table
 from experiments.clock import Clock, VirtualClock
 from experiments.config.setup import Setup
@@ -18,13 +18,12 @@ from experiments.record import replay, storage
 from experiments.record.journal import Journal, read_journal
 from experiments.record.replay import RunPosition
 from experiments.run import RunRequest, run
-from experiments.runner import carry_out
+from experiments.runner import Desk, carry_out
 from experiments.screens.synthetic import SyntheticScreen, synthetic_screen
 from experiments.session.remarks import Remark
 from experiments.session.states import Position, State
 from experiments.session.steps import Outcome, Step, step_record
-from experiments.study.places import Place, place
-from experiments.train import Desk
+from experiments.study.folders import Place, place
 
 SETUPS = {name: load_setup(name) for name in ("direction", "preference")}
 
@@ -117,14 +116,8 @@ class Sitting(NamedTuple):
         live = LiveRun(
             plan=self.plan, gun=self.gun, journal=self.journal, clock=self.clock, screen=self.screen, guard_s=0.25
         )
-        desk = Desk(
-            gun=self.gun,
-            gun_name="simulated",
-            drives={one.method: one.drive for one in limits.check_limits(self.setup)},
-            journal=self.journal,
-            clock=self.clock,
-            live=live,
-        )
+        drives = {one.method: one.drive for one in load.check_limits(self.setup)}
+        desk = Desk(live=live, gun_name="simulated", drives=drives)
         self.screen.begin(live)
         with self.journal:
             carry_out(going, desk, RunPosition(step=next(going)))

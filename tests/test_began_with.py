@@ -17,7 +17,7 @@ from experiments.load import load_setup, shipped_folder
 from experiments.record.journal import JournalError, read_journal
 from experiments.run import RunRequest, run
 from experiments.screens.synthetic import synthetic_screen
-from experiments.study.places import PlaceError
+from experiments.study.folders import PlaceError
 from recoil.config_files import copy_began_with
 from tests.conftest import Recoil
 

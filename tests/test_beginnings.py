@@ -32,8 +32,7 @@ from experiments.study.enrolment import (
     readmit,
     typed_facts,
 )
-from experiments.study.places import PlaceError
-from experiments.study.progress import StudyFolder, open_study
+from experiments.study.folders import PlaceError, StudyFolder, open_study
 from experiments.study.study import Facts, Participant, RunState
 from tests.people import ORDER, someone
 

@@ -17,7 +17,7 @@ from experiments.record.journal import Contents, read_journal
 from experiments.record.replay import history
 from experiments.run import RunRequest
 from experiments.session.steps import Answered, Ask, Failed, Fired, FireShot
-from experiments.study.places import place
+from experiments.study.folders import place
 from tests.at_controls import short_direction
 from tests.faulty_console import PATIENCE_S, SLOW_SYNC_S, child
 

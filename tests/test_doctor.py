@@ -13,7 +13,7 @@ import threading
 from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
-from typing import Any, NoReturn
+from typing import Any, NoReturn, get_args
 
 import numpy as np
 import pytest
@@ -28,21 +28,25 @@ from experiments.config.setup import sha256
 from experiments.design.plan import Trial
 from experiments.doctor import verdicts
 from experiments.doctor.checks import (
+    APPENDS,
     Check,
     ProgramReply,
+    adapters,
+    appends,
     carry_out_check,
     cause,
     checks,
     no_display,
     run_child,
+    ticks,
     within_seconds,
 )
 from experiments.doctor.figures import (
-    DOCTOR_VERDICTS,
     Adapter,
     Appends,
     Display,
     DoctorFinding,
+    DoctorVerdict,
     GunLine,
     Keys,
     Machine,
@@ -53,7 +57,6 @@ from experiments.doctor.figures import (
     percentile,
     spread,
 )
-from experiments.doctor.measures import APPENDS, adapters, appends, ticks
 from experiments.doctor.verdicts import Latencies, latencies, pooled
 from experiments.load import find, load_gun
 from experiments.record.journal import Journal, Record
@@ -70,7 +73,7 @@ from experiments.session.steps import (
     Step,
     step_record,
 )
-from experiments.study.places import PlaceError
+from experiments.study.folders import PlaceError
 from recoil.doctor import examination_text
 from tests.conftest import RECOIL, Recoil
 from tests.kills import can_mount, in_small_disk
@@ -260,7 +263,7 @@ def test_without_console_runs_it_says_so() -> None:
     assert {finding.measured for finding in verdicts.of_latencies(Latencies())} == {"no console runs here"}
 
 
-@given(st.lists(st.sampled_from(DOCTOR_VERDICTS)))
+@given(st.lists(st.sampled_from(get_args(DoctorVerdict))))
 def test_the_worst_verdict_counts_and_what_is_not_there_does_no_harm(found: list[Any]) -> None:
     there = [("good", "warning", "fails").index(verdict) for verdict in found if verdict != "not there"]
     assert verdicts.overall(found) == ("good", "warning", "fails")[max(there, default=0)]

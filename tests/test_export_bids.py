@@ -19,10 +19,10 @@ from analysis.archive import bids_export as feature
 from analysis.logs.reading import read_logs
 from experiments.clock import RealClock, VirtualClock
 from experiments.load import load_setup, shipped_folder
-from experiments.record import columns
+from experiments.record import tables
 from experiments.run import RunRequest, run
 from experiments.screens.synthetic import synthetic_screen
-from experiments.study.places import PlaceError
+from experiments.study.folders import PlaceError
 from experiments.study.register import append, entry
 from recoil.config_files import new_study
 from tests.conftest import RECOIL, Recoil, refused
@@ -225,8 +225,8 @@ def test_a_studys_title_is_the_data_sets_name(tmp_path: Path) -> None:
 
 
 def test_every_column_and_level_of_the_logs_has_its_words() -> None:
-    assert set(bids.TASKS) == set(bids.ANSWERED_BY) == set(columns.TABLES)
-    for column in (column for table in columns.TABLES.values() for column in table):
+    assert set(bids.TASKS) == set(bids.ANSWERED_BY) == set(tables.TABLES)
+    for column in (column for table in tables.TABLES.values() for column in table):
         described = bids.described(column, column.name)
         assert described["LongName"]
         assert described["Description"]

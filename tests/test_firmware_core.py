@@ -14,9 +14,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from device.wire import errors
-from device.wire.errors import TEXTS, message
-from device.wire.frame import Frame, encode
+from device.wire.errors import WireError, message
+from device.wire.records import Frame, encode
 from tests.firmware import CORES, built, one_after_the_other, told
 from tests.twin_scripts import transcript
 
@@ -47,7 +46,9 @@ def test_a_hundred_random_scripts_have_the_twins_transcript(core):
 
 def test_these_scripts_meet_every_error_that_the_gun_knows():
     answers = said(transcript(one_after_the_other(range(100))))
-    assert {code for code in TEXTS if message(code) in answers} == set(TEXTS) - {errors.QUEUE_OVERFLOW}  # the next
+    assert {code for code in WireError if message(code) in answers} == set(WireError) - {
+        WireError.QUEUE_OVERFLOW
+    }  # the next
 
 
 @pytest.mark.parametrize("core", CORES)

@@ -2,7 +2,7 @@
 
 import pytest
 
-from device.methods import rendering_of, settle_s
+from device.methods import rendering_of
 from device.parameters import GunParameters
 from device.physics import simulate, trace
 from device.physics.hand import HandMechanics, compliant_collision, rigid_collision, simulate_held
@@ -10,7 +10,7 @@ from device.physics.shot import highest_rate_Hz
 from device.physics.traces import energy_balance
 from device.simulated import SimulatedGun
 from device.words import Pulse, Shot
-from experiments.config.gun import GunConfig
+from experiments.config.setup import GunConfig
 from tests.shot_trains import train
 
 BACK = GunParameters(return_friction_N=1.12)
@@ -60,7 +60,7 @@ def test_a_recorded_gun_reads_back_as_itself():
 
 def test_the_simulated_gun_waits_for_the_braked_magnet():
     expected = simulate(GunParameters(return_friction_N=1.12))
-    assert settle_s(BACK) == rendering_of(BACK).settle_s == expected.reset_end_s
+    assert rendering_of(BACK).settle_s == expected.reset_end_s
     gun = SimulatedGun({"soft": BACK}, lambda: 0.0)
     gun.arm()
     report = gun.fire(Shot(method="soft", direction="forward", drive=Pulse(voltage_V=16.0, pulse_s=0.010)))

@@ -32,7 +32,7 @@ from experiments.session.remarks import (
 )
 from experiments.session.states import EMERGENCY, State
 from experiments.session.steps import Failed, FireShot, Interrupted, Prepare, Presented, Rated, Repeated, trial_of
-from experiments.study.places import place
+from experiments.study.folders import place
 from tests.at_controls import (
     DIRECTION,
     GUARD_S,
@@ -459,10 +459,10 @@ def test_flags_and_notes_go_to_the_trial_that_they_were_opened_for(tmp_path: Pat
         sitting.to(S.ASKING)
         sitting.press("G")  # the line of a flag, and then of a note, is open while the participant answers
         sitting.window.fields["line"] = "noise"
-        first = sitting.live.trial
+        first = sitting.live.moment.trial
         assert sitting.live.offer(own_key(sitting))
         sitting.settle()
-        assert sitting.live.trial != first
+        assert sitting.live.moment.trial != first
         sitting.press("Enter")
         sitting.live.offer(events.Note(text="a dog barked", trial=first))
         sitting.live.offer(events.Flag(flag="late"))
@@ -827,7 +827,7 @@ def test_the_test_shot_is_owed_also_if_the_process_died(resumed: bool, tmp_path:
 
 def wait_for_the_disk(sitting: Sitting) -> None:
     """Wait until what was written is on the disk."""
-    sitting.live._journal.append("remark", body={"kind": "noted", "trial": None, "text": "now"})
+    sitting.live.journal.append("remark", body={"kind": "noted", "trial": None, "text": "now"})
 
 
 def test_an_emergency_stop_during_the_test_shot_owes_another_one(tmp_path: Path) -> None:

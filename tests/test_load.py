@@ -9,8 +9,7 @@ import pytest
 from analysis.predict.check import check
 from device.words import Pulse
 from experiments.config.door import ConfigError, line_of, read_toml
-from experiments.limits import check_limits
-from experiments.load import find, load_gun, load_setup, load_study, shipped_folder
+from experiments.load import check_limits, find, load_gun, load_setup, load_study, shipped_folder
 
 EXPERIMENTS = ("direction", "preference")
 DIRECTION, PREFERENCE, GUN = "direction.toml", "preference.toml", "gun.toml"

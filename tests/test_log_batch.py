@@ -19,7 +19,7 @@ from analysis.logs.frames import joined
 from analysis.logs.reading import read_logs
 from analysis.logs.rules import check_logs
 from analysis.logs.texts import TEXT, TextTable, arrow_tables, csv_tables, decimals, records, text_tables
-from experiments.record import columns
+from experiments.record import tables
 from tests.log_files import TextRow, rating_rows, trial_rows, trials_path, write_rows, write_study
 from tests.plain_rules import Table, check_table
 
@@ -51,7 +51,7 @@ def _spoilt(draw: st.DrawFn) -> bytes:
     """A valid file of either experiment, changed in a few cells, rows, columns or bytes."""
     make = draw(st.sampled_from([trial_rows, rating_rows]))
     rows = make("P01", draw(st.integers(1, 3)))
-    header = columns.names(rows[0]["experiment"])
+    header = tables.names(rows[0]["experiment"])
     for _ in range(draw(st.integers(0, 3))):
         row, name = draw(st.sampled_from(rows)), draw(st.sampled_from(header))
         row[name] = draw(st.sampled_from(ODD_CELLS))
@@ -154,7 +154,7 @@ def test_a_folder_read_by_the_csv_module_alone_gives_equal_tables_and_problems(
 
 
 def _file(rows: Rows, line_end: str = "\r\n") -> bytes:
-    return _bytes(rows, columns.names(rows[0]["experiment"]), line_end)
+    return _bytes(rows, tables.names(rows[0]["experiment"]), line_end)
 
 
 def _taken(contents: list[bytes]) -> set[int]:
@@ -172,7 +172,7 @@ def test_logs_as_recoil_writes_them_are_read_by_arrow(line_end: str) -> None:
 def test_quoted_notes_are_read_by_arrow_and_come_back_as_they_were() -> None:
     rows = trial_rows()
     said = 'he said "no",\r\nthen left; \'=1'
-    rows[3]["note"] = columns.guard(said)
+    rows[3]["note"] = tables.guard(said)
     rows[9]["response"] = "left"
     good, bad = _file([row | {"response": row["direction"], "correct": "1"} for row in rows]), _file(rows)
     assert _taken([good, bad, _file(trial_rows())]) == {0, 1, 2}
@@ -219,7 +219,7 @@ def test_a_byte_order_mark_in_a_row_is_no_code(tmp_path: Path) -> None:
 def test_cells_too_long_for_the_csv_module_are_refused(name: str) -> None:
     rows = trial_rows()
     rows[3][name] = "x" * (csv.field_size_limit() + 1)
-    header = [*columns.names("direction"), "mood"]
+    header = [*tables.names("direction"), "mood"]
     contents = [_bytes(rows, header), _bytes(trial_rows(), header)]
     assert _taken(contents) == {1}
     assert "field limit" in text_tables(dict(enumerate(contents)))[1][0].message

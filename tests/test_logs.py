@@ -9,7 +9,7 @@ import pytest
 
 from analysis.logs.reading import read_logs
 from experiments.clock import RealClock
-from experiments.record import columns
+from experiments.record import tables
 from experiments.study import register
 from tests.log_files import TextRow, rating_rows, ratings_path, trial_rows, trials_path, write_rows, write_study
 
@@ -35,7 +35,7 @@ def test_a_study_is_read_whole_with_numbers_as_numbers(tmp_path: Path) -> None:
     assert logs.problems == ()
     assert len(logs.files) == 6
     assert (len(logs.trials), len(logs.ratings)) == (180, 9)
-    assert list(logs.trials.columns) == [*columns.names("direction"), "study"]
+    assert list(logs.trials.columns) == [*tables.names("direction"), "study"]
     assert logs.trials["correct"].isin([0, 1]).all()
     assert logs.ratings["rating"].between(0.0, 10.0).all()
 
@@ -53,7 +53,7 @@ def test_practice_is_not_data(tmp_path: Path) -> None:
 
 
 def test_unknown_columns_are_kept_out_and_missing_optional_ones_are_empty(tmp_path: Path) -> None:
-    header = [name for name in columns.names("direction") if name != "gun"]
+    header = [name for name in tables.names("direction") if name != "gun"]
     rows = [{**row, "mood": "good"} for row in trial_rows()]
     write_rows(trials_path(tmp_path, "P01"), rows, [*header, "mood"])
     logs = read_logs([tmp_path])
@@ -74,7 +74,7 @@ def test_a_rating_of_zero_is_a_rating_and_an_empty_one_is_missing(tmp_path: Path
 def test_text_comes_back_as_it_was_said(tmp_path: Path) -> None:
     said = '=SUM("a",1)\nsecond line, with a comma'
     rows = rating_rows()
-    rows[0]["comment"] = columns.guard(said)
+    rows[0]["comment"] = tables.guard(said)
     write_rows(ratings_path(tmp_path, "P01"), rows)
     assert read_logs([tmp_path]).ratings["comment"][0] == said
 

@@ -1,6 +1,6 @@
 import pytest
 
-from device.methods import drive_of, paper_methods, rendering_of, settle_s
+from device.methods import drive_of, paper_methods, rendering_of
 from device.physics import GunParameters, simulate
 from device.vibration import VibrationParameters
 from device.words import Effect, LimitError, Pulse
@@ -33,14 +33,14 @@ def test_a_method_beyond_the_supply_can_be_simulated_but_not_commanded():
 
 
 def test_the_next_shot_waits_for_the_magnet_and_a_vibration_for_its_end():
-    assert settle_s(METHODS["asymmetric-2"]) == simulate(GunParameters(friction_N=1.12)).reset_end_s
-    assert settle_s(METHODS["vibration"]) == 0.024
+    assert rendering_of(METHODS["asymmetric-2"]).settle_s == simulate(GunParameters(friction_N=1.12)).reset_end_s
+    assert rendering_of(METHODS["vibration"]).settle_s == 0.024
 
 
 def test_another_drive_has_another_settling_time():
     weak = Pulse(voltage_V=8.0, pulse_s=0.010)
     expected = simulate(GunParameters(friction_N=1.12, voltage_V=8.0)).reset_end_s
-    assert settle_s(METHODS["asymmetric-2"], weak) == expected
+    assert rendering_of(METHODS["asymmetric-2"], weak).settle_s == expected
 
 
 def test_a_pulse_that_moves_nothing_settles_with_its_end():
@@ -51,11 +51,11 @@ def test_a_pulse_that_moves_nothing_settles_with_its_end():
 
 def test_a_shot_that_leaves_the_magnet_out_is_refused():
     with pytest.raises(LimitError, match=r"friction_N 1.7.*stuck"):
-        settle_s(GunParameters(friction_N=1.7))
+        rendering_of(GunParameters(friction_N=1.7))
 
 
 def test_a_drive_of_the_other_kind_is_refused():
     with pytest.raises(LimitError, match="driven by an Effect"):
-        settle_s(METHODS["vibration"], Pulse(voltage_V=16.0, pulse_s=0.010))
+        rendering_of(METHODS["vibration"], Pulse(voltage_V=16.0, pulse_s=0.010))
     with pytest.raises(LimitError, match="driven by a Pulse"):
-        settle_s(METHODS["asymmetric-1"], Effect(effect=1))
+        rendering_of(METHODS["asymmetric-1"], Effect(effect=1))

@@ -10,7 +10,7 @@ import pytest
 
 from experiments.clock import date_text, time_text
 from experiments.screens.console.people import cell_text, coming_text, note_text, remark, stopped_text
-from experiments.study.progress import Overview
+from experiments.study.folders import Overview
 from experiments.study.study import NextParticipant, Participant, RunProgress, RunState
 from tests.people import ORDER, someone
 

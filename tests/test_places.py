@@ -6,7 +6,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from experiments.design.plan import Plan
-from experiments.study.places import (
+from experiments.study.folders import (
     Place,
     PlaceError,
     journals,

@@ -11,7 +11,7 @@ from experiments.direction.session import make_practice
 from experiments.load import load_setup
 from experiments.run import RunRequest, run
 from experiments.screens.synthetic import synthetic_screen
-from experiments.study.places import PlaceError
+from experiments.study.folders import PlaceError
 
 DIRECTION, PREFERENCE = load_setup("direction"), load_setup("preference")
 

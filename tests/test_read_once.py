@@ -17,7 +17,7 @@ from experiments.run import RunRequest, UnfinishedRun, run
 from experiments.screens.synthetic import synthetic_screen
 from experiments.study import register
 from experiments.study.enrolment import exclude
-from experiments.study.progress import StudyFolder, look_at, open_study, overview
+from experiments.study.folders import StudyFolder, look_at, open_study, overview
 from recoil.config_files import new_study
 from tests.traced_trial import MOST, traced
 

@@ -16,7 +16,7 @@ from hypothesis import strategies as st
 from experiments.clock import VirtualClock
 from experiments.record import storage
 from experiments.study import register
-from experiments.study.places import PlaceError, known_codes, place
+from experiments.study.folders import PlaceError, known_codes, place
 from experiments.study.register import (
     REGISTER_FILE,
     Register,

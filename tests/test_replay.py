@@ -23,7 +23,7 @@ from experiments.run import Again, RunRequest, run
 from experiments.screens.synthetic import synthetic_screen
 from experiments.session.states import EMERGENCY
 from experiments.study import register
-from experiments.study.places import PlaceError, place
+from experiments.study.folders import PlaceError, place
 from experiments.study.register import RegisterError
 from tests.journals import raw
 

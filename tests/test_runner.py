@@ -18,7 +18,7 @@ from experiments.runner import MAX_FAILURES
 from experiments.screens.synthetic import SyntheticScreen, synthetic_screen
 from experiments.session.remarks import Remark
 from experiments.session.steps import Outcome, Step
-from experiments.study.places import place
+from experiments.study.folders import place
 from tests.journals import raw
 from tests.sittings import SETUPS, TroubledGun, resumed_rows, sitting
 

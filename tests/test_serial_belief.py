@@ -10,8 +10,7 @@ import pytest
 from device import LinkError
 from device.limits import DriveHistory
 from device.methods import paper_methods
-from device.serial_gun.clocks import HostTime
-from device.serial_gun.commands import Contradiction, CutShort, Reply
+from device.serial_gun.lines import Contradiction, CutShort, HostTime, Reply
 from device.serial_gun.reports import (
     MAX_UNCERTAINTY_S,
     BelievedShot,
@@ -24,7 +23,7 @@ from device.serial_gun.reports import (
 )
 from device.wire.records import ShotRecord, StatusRecord
 from experiments.record.journal import read_journal
-from experiments.study.places import place
+from experiments.study.folders import place
 from tests.forger import FORGERIES, ShotLiar, a_lying_pair, a_lying_twin
 from tests.serial_runs import SPEED, check, hasty, run_all, timings_of
 from tests.twins import Troubles, a_pair, a_shot

@@ -4,7 +4,7 @@ from random import Random
 
 import pytest
 
-from device.serial_gun.clocks import Clocks, Exchange
+from device.serial_gun.lines import Clocks, Exchange
 
 GUN_BOOT_S = 1234.5
 
@@ -43,7 +43,8 @@ def test_the_bound_holds_at_every_moment_of_an_hour_and_the_drift_is_found():
             at_s = exchange.received_s + draw.random() * 0.3
             found = clocks.host(gun_us(at_s, 42.0))
             assert abs(found.time_s - at_s) <= found.uncertainty_s + 2e-6
-    assert clocks.drift_ppm == pytest.approx(-42.0, abs=5.0)
+    ticks = clocks.gun_us(3_000.0) - clocks.gun_us(2_000.0)
+    assert 1e15 / ticks - 1e6 == pytest.approx(-42.0, abs=5.0)
 
 
 def test_a_lopsided_line_does_not_deceive_the_bound():

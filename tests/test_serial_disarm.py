@@ -9,9 +9,9 @@ import pytest
 
 from device import LimitError, LinkError
 from device.serial_gun import triggering
-from device.serial_gun.commands import CalledOff
+from device.serial_gun.lines import CalledOff
 from tests.forger import a_lying_pair
-from tests.twins import Troubles, a_pair, a_shot, said
+from tests.twins import Troubles, a_pair, a_shot, is_up, said
 from tests.waiting import wait_for
 
 ENDS_S = 30.0
@@ -127,13 +127,13 @@ def test_an_arming_that_never_arrived_is_not_asked_for_again_after_the_line_was_
 def test_who_waits_for_a_gun_that_is_gone_does_not_arm_it_after_a_disarming(tmp_path):
     with a_pair(tmp_path, Troubles(replug_s=1.5), speed=1.0) as pair:
         pair.twin.order(pair.twin.unplug)
-        wait_for(lambda: not pair.gun.link.is_up)
+        wait_for(lambda: not is_up(pair.gun))
         turn = watched_turn(pair.gun)
         arming = Doing(pair.gun.arm)
         wait_for(lambda: turn.wait_for_it == 1)
         pair.gun.disarm()
         assert isinstance(arming.ended(), CalledOff)
-        wait_for(lambda: pair.gun.link.is_up)
+        wait_for(lambda: is_up(pair.gun))
         assert state(pair) == "DISARMED"
 
 
@@ -162,7 +162,7 @@ def test_a_disarming_between_the_answer_to_an_arming_and_its_note_counts(tmp_pat
             pair.gun.arm()
         with pytest.raises(LimitError, match="the gun is disarmed"):
             pair.gun.fire(a_shot())
-        assert said(pair.gun, "ARM", "ABOR", "TRIG") == ["ARM", "ABOR"]
+        assert said(pair, "ARM", "ABOR", "TRIG") == ["ARM", "ABOR"]
 
 
 def test_a_shot_that_was_asked_for_before_a_disarming_is_not_fired_on_a_later_arming(tmp_path):
@@ -176,7 +176,7 @@ def test_a_shot_that_was_asked_for_before_a_disarming_is_not_fired_on_a_later_ar
         pair.gun._turn = Watched(pair.gun._turn, as_another_thread_would)
         with pytest.raises(LimitError, match="the gun is disarmed"):
             pair.gun.fire(a_shot())
-        assert said(pair.gun, "TRIG") == []
+        assert said(pair, "TRIG") == []
         assert pair.gun.fire(a_shot()).timing.gun_count == 1  # asked for after it
 
 

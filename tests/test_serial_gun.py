@@ -42,7 +42,7 @@ def test_it_is_born_disarmed_and_says_who_it_is(pair):
 @pytest.mark.parametrize("tcp", [False, True])
 def test_a_shot_is_reported_on_the_hosts_clock_to_within_its_bound(tmp_path, tcp):
     with a_pair(tmp_path, Troubles(jitter_s=0.005), speed=1.0, tcp=tcp, drift_ppm=80.0) as pair:
-        wait_for(lambda: len(pair.gun.link.commands) >= 10)
+        wait_for(lambda: len(pair.commands) >= 10)
         for _ in range(40):
             with_jitter = pair.gun.link.ask("TIME?")
             assert with_jitter.received_s > with_jitter.written_s
@@ -97,10 +97,10 @@ def test_a_trains_shots_are_whole_ticks_of_the_guns_clock_apart_and_never_too_so
 def test_a_shot_too_far_ahead_is_refused_before_a_byte_is_written(slow_pair, ahead_s, rule):
     pair = slow_pair
     pair.ready()
-    pair.gun.link.commands.clear()
+    pair.commands.clear()
     with pytest.raises(LimitError, match=rule):
         pair.gun.fire(a_shot(), pair.clock() + ahead_s + 0.5)  # five seconds of the world
-    assert said(pair.gun, "CONF", "TRIG") == []
+    assert said(pair, "CONF", "TRIG") == []
 
 
 def test_a_shot_that_waits_and_whose_answer_is_lost_is_looked_for_until_it_has_ended(slow_pair):
@@ -135,17 +135,17 @@ def test_a_shot_that_waits_and_whose_answer_is_lost_is_looked_for_until_it_has_e
 )
 def test_what_is_beyond_a_limit_is_refused_before_a_byte_is_written(pair, shot, message):
     pair.ready()
-    pair.gun.link.commands.clear()
+    pair.commands.clear()
     with pytest.raises(LimitError, match=message):
         pair.gun.fire(shot())
-    assert said(pair.gun, "CONF", "TRIG") == []
+    assert said(pair, "CONF", "TRIG") == []
     assert pair.twin.body.ledger == []
 
 
 def test_too_soon_and_too_hot_are_refused_before_a_byte_is_written(slow_pair):
     slow_pair.ready()
     report = slow_pair.gun.fire(a_shot("asymmetric-1"))
-    slow_pair.gun.link.commands.clear()
+    slow_pair.commands.clear()
     slow_pair.gun._clock = lambda: report.pulse_end_s
     with pytest.raises(LimitError, match="not home yet"):
         slow_pair.gun.fire(a_shot("asymmetric-2"))
@@ -153,7 +153,7 @@ def test_too_soon_and_too_hot_are_refused_before_a_byte_is_written(slow_pair):
     assert slow_pair.gun.status().coil_temperature_C == pytest.approx(85.0, abs=1.0)
     with pytest.raises(LimitError, match="limit 80 degC"):
         slow_pair.gun.fire(a_shot("asymmetric-2", drive=Pulse(voltage_V=24.0, pulse_s=0.020)))
-    assert said(slow_pair.gun, "CONF", "TRIG") == []
+    assert said(slow_pair, "CONF", "TRIG") == []
     assert len(slow_pair.twin.body.ledger) == 1
 
 
@@ -189,10 +189,10 @@ def test_disarming_from_another_thread_cuts_a_shot_that_waits(slow_pair):
 def test_every_command_has_its_outcome_and_its_time(pair):
     pair.ready()
     pair.gun.fire(a_shot())
-    for command in pair.gun.link.commands:
+    for command in pair.commands:
         assert command.outcome == "done"
-        assert command.ended_s >= command.written_s
-    assert said(pair.gun, "CONF") == ["CONF asymmetric-2,FORW,PULS,16000,10000,211005"]
+        assert command.received_s >= command.written_s
+    assert said(pair, "CONF") == ["CONF asymmetric-2,FORW,PULS,16000,10000,211005"]
 
 
 def test_a_closed_gun_is_disarmed_and_its_port_free(pair):

@@ -9,7 +9,7 @@ from dataclasses import replace
 import pytest
 
 from device import LinkError, open_gun
-from device.serial_gun.opening import find_gun, parse
+from device.serial_gun.gun import find_gun, parse
 from device.twin.core import IDENTITY
 from tests.twins import a_twin
 
@@ -21,7 +21,7 @@ def test_a_gun_of_another_version_is_refused_by_name(tmp_path):
 
 
 def test_a_gun_is_found_by_what_answers_not_by_the_order_of_ports(tmp_path, monkeypatch):
-    monkeypatch.setattr("device.serial_gun.opening.PROBE_S", 1.5)  # a busy machine is no silent gun
+    monkeypatch.setattr("device.serial_gun.gun.PROBE_S", 1.5)  # a busy machine is no silent gun
     for name in ("a", "b", "c"):
         (tmp_path / name).mkdir()
     silent, deaf = os.openpty()
@@ -46,7 +46,7 @@ def test_a_gun_is_found_by_what_answers_not_by_the_order_of_ports(tmp_path, monk
     "babble", [b"\x00\xff<0001 \n", b"Recoil,a,b,wire 1\n", b"<0001 OK~00000000\n" * 50, b"A" * 3000]
 )
 def test_a_port_that_babbles_is_a_link_error_in_the_end(babble, monkeypatch):
-    monkeypatch.setattr("device.serial_gun.opening.OPEN_S", 1.5)
+    monkeypatch.setattr("device.serial_gun.gun.OPEN_S", 1.5)
     peer, port = os.openpty()
     tty.setraw(port)
     os.set_blocking(peer, False)

@@ -8,11 +8,11 @@ from dataclasses import replace
 
 import pytest
 
-from device.wire import errors
+from device.wire.errors import WireError
 from experiments.record.journal import read_journal
 from experiments.record.replay import history
 from experiments.session.steps import Failed
-from experiments.study.places import PlaceError
+from experiments.study.folders import PlaceError
 from recoil.session import check_pace
 from recoil.twin import troubles_of
 from tests.serial_runs import SPEED, TROUBLES, check, hasty, of_trains, one_run, resumed, rows, run_all, timings_of
@@ -122,7 +122,7 @@ def test_a_run_that_is_killed_leaves_the_gun_disarmed(tmp_path, quick_configs, n
             program.kill()
             program.wait()
         wait_for(lambda: twin._core.machine.state == "DISARMED")
-        left_to_the_watchdog = errors.WATCHDOG in twin._core._errors
+        left_to_the_watchdog = WireError.WATCHDOG in twin._core._errors
         assert left_to_the_watchdog == (number == signal.SIGKILL)
         assert twin._core.machine.due_us() is None  # nothing comes any more
 

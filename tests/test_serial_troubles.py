@@ -9,12 +9,11 @@ import pytest
 
 from device import LimitError, LinkError
 from device.limits import DriveHistory
-from device.serial_gun.commands import Disconnected
+from device.serial_gun.lines import Disconnected, SerialPort
 from device.serial_gun.link import KEEP_ALIVE_S, WATCHDOG_S, Link
-from device.serial_gun.port import SerialPort
 from device.twin.twin import BUSY_US
 from tests.forger import a_lying_pair
-from tests.twins import SLOW, Troubles, a_pair, a_shot, a_twin, disarmings_of, said
+from tests.twins import SLOW, Troubles, a_pair, a_shot, a_twin, disarmings_of, is_up, said
 from tests.waiting import PATIENCE_S, wait_for
 
 ALL = Troubles(lose=0.02, double=0.02, corrupt=0.02, partial=0.02, jitter_s=0.002)
@@ -47,13 +46,13 @@ def test_disarming_a_gun_that_is_gone_waits_for_its_watchdog(tmp_path):
         pair.gun.arm()
         disarmings = disarmings_of(pair.twin)
         pair.twin.order(pair.twin.unplug)
-        wait_for(lambda: not pair.gun.link.is_up)
+        wait_for(lambda: not is_up(pair.gun))
         written_s = pair.gun.link._written_s
         pair.gun.disarm()
         assert time.monotonic() - written_s > pair.gun.link.watchdog_s
         wait_for(lambda: disarmings)
         assert pair.twin._core.machine.state == "DISARMED"
-        assert not pair.gun.link.is_up
+        assert not is_up(pair.gun)
 
 
 def away(pair):
@@ -74,7 +73,7 @@ def test_a_gun_whose_watchdog_disarmed_it_in_a_train_says_why_it_does_not_fire(t
         assert re.fullmatch(AWAY, pair.gun.status().fault)
         with pytest.raises(Disconnected, match=f"not fired: {AWAY}"):
             pair.gun.fire(a_shot())
-        assert len(said(pair.gun, "TRIG")) == 1
+        assert len(said(pair, "TRIG")) == 1
         pair.gun.disarm()
         assert pair.gun.status().fault is None
         pair.ready()
@@ -165,7 +164,7 @@ def test_unplugged_between_shots_it_goes_on_after_replugging(tmp_path, tcp):
         pair.gun.fire(a_shot())
         session = pair.gun.link.session
         pair.twin.order(pair.twin.unplug)
-        wait_for(lambda: not pair.gun.link.is_up or pair.gun.link.session != session)
+        wait_for(lambda: not is_up(pair.gun) or pair.gun.link.session != session)
         time.sleep(0.3 / pair.speed)  # the magnet is home
         with pytest.raises(Disconnected, match="not fired"):
             pair.gun.fire(a_shot())
@@ -206,7 +205,7 @@ def test_a_gun_that_is_reset_in_mid_shot_cannot_tell_and_the_error_says_so(tmp_p
         with pytest.raises(LinkError, match="may have been fired"):
             pair.gun.fire(a_shot())
         pair.gun.disarm()
-        wait_for(lambda: pair.gun.link.is_up)
+        wait_for(lambda: is_up(pair.gun))
         assert pair.gun.status().shots == 0
         assert len(pair.twin.body.ledger) == 1
         pair.gun.arm()
@@ -235,7 +234,8 @@ def test_a_reset_is_not_forgotten_when_the_first_greeting_after_it_breaks_off(tm
         session = link.session
         twin.order(twin.reset)
         link.drop("to see the greeting break off")
-        wait_for(lambda: link.is_up and link.session != session)
+        wait_for(lambda: link.session != session)
+        link.wait_up(5.0)
         assert len(opened) == 3
         assert not link.remembers
         link.close()
@@ -259,7 +259,7 @@ def test_a_trigger_that_was_held_up_does_not_fire_late(tmp_path):
             pair.twin._hangs_until_s = 0.0
 
         def said():
-            return list(pair.gun.link.commands)
+            return list(pair.commands)
 
         pair.ready()
         pair.gun.fire(a_shot())  # so that it is set already
@@ -296,4 +296,4 @@ def test_on_a_bad_line_every_shot_is_done_once_or_marked(tmp_path):
             assert abs(true.start_s - report.pulse_start_s) <= report.timing.uncertainty_s + 5e-6
             assert true.way == {"forward": "FORW", "backward": "BACK"}[way]
         assert len(done) > 40
-        assert {command.outcome for command in pair.gun.link.commands} >= {"done", "garbled"}
+        assert {command.outcome for command in pair.commands} >= {"done", "garbled"}

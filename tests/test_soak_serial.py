@@ -8,8 +8,8 @@ from random import Random
 
 import pytest
 
+from device.serial_gun.gun import MAX_SPEED
 from device.serial_gun.link import WATCHDOG_S
-from device.serial_gun.opening import MAX_SPEED
 from experiments.record.journal import read_journal
 from tests.forger import ShotLiar, a_lying_twin
 from tests.serial_runs import SPEED, TROUBLES, check, hasty, of_trains, one_run, run_all

@@ -34,7 +34,7 @@ from analysis.times.likelihood import trials_of
 from analysis.times.own_trials import ordered, own_trials, quantiles
 from analysis.times.people import MOST_PEOPLE, as_trials, fit_people, sampled_fit
 from experiments.design.streams import generator
-from experiments.record import columns
+from experiments.record import tables
 from tests.decisions import decide_all
 from tests.log_files import METHODS, TextRow, trial_rows, trials_path, write_many, write_rows
 
@@ -255,7 +255,7 @@ def test_single_times_that_are_nobodys_own_are_counted_by_reason(tmp_path: Path)
 
 
 def test_a_log_without_the_column_is_one_without_instructions(tmp_path: Path) -> None:
-    header = [name for name in columns.names("direction") if name != "instruction"]
+    header = [name for name in tables.names("direction") if name != "instruction"]
     for code in ("P01", "P02", "P03"):
         write_rows(trials_path(tmp_path / "old", code), trial_rows(code), header)
         told = [row | {"instruction": ("neutral", "")[k % 2]} for k, row in enumerate(trial_rows(code))]

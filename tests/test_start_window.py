@@ -32,8 +32,7 @@ from experiments.screens.console.live import study_of
 from experiments.screens.console.start import StartWindow
 from experiments.screens.synthetic import synthetic_screen
 from experiments.study import enrolment, register
-from experiments.study.places import place
-from experiments.study.progress import StudyFolder, open_study
+from experiments.study.folders import StudyFolder, open_study, place
 from experiments.study.register import read_register
 from experiments.study.study import Facts
 from recoil.config_files import new_study

@@ -18,7 +18,7 @@ from experiments.config.models import EligibilityConfig, Handedness, Sex, StudyC
 from experiments.config.setup import Setup
 from experiments.design.plan import Plan
 from experiments.load import load_setup, load_study, shipped_folder
-from experiments.study.places import place, row_of_next_run, used_rows
+from experiments.study.folders import place, row_of_next_run, used_rows
 from experiments.study.register import append, entry, read_register
 from experiments.study.study import (
     Facts,

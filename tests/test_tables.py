@@ -11,9 +11,8 @@ from experiments.direction.session import rows as direction_rows
 from experiments.load import load_setup
 from experiments.preference.session import make_plan as preference_plan
 from experiments.preference.session import rows as preference_rows
-from experiments.record import columns
-from experiments.record.columns import guard, unguard
-from experiments.record.tables import Row, table_bytes
+from experiments.record import tables
+from experiments.record.tables import Row, guard, table_bytes, unguard
 from experiments.session.remarks import AnswerCorrected
 from experiments.session.steps import (
     Answered,
@@ -82,7 +81,7 @@ def test_a_negative_number_gets_no_apostrophe() -> None:
 
 
 def test_text_is_guarded_in_every_text_column_and_in_no_other() -> None:
-    for experiment, table in columns.TABLES.items():
+    for experiment, table in tables.TABLES.items():
         [row] = read(table_bytes(experiment, [{column.name: "=1" for column in table}]))
         assert {name for name, cell in row.items() if cell == "'=1"} == {c.name for c in table if c.type == "text"}
         assert {name for name, cell in row.items() if cell == "=1"} == {c.name for c in table if c.type != "text"}
@@ -96,7 +95,7 @@ def test_lines_end_with_cr_lf_and_the_first_one_names_the_columns(experiment: st
     data = table_bytes(experiment, [{}, {}])
     assert data.endswith(b"\r\n")
     assert data.count(b"\r\n") == data.count(b"\n") == 3
-    assert data.split(b"\r\n")[0].decode() == ",".join(columns.names(experiment))
+    assert data.split(b"\r\n")[0].decode() == ",".join(tables.names(experiment))
 
 
 def test_quotes_are_doubled_and_line_ends_stay_within_quotes() -> None:
@@ -116,11 +115,11 @@ def test_missing_is_empty_and_0_stays_0() -> None:
 
 
 def test_the_columns_of_the_contract_come_in_its_order() -> None:
-    assert columns.names("direction")[:13] == [
+    assert tables.names("direction")[:13] == [
         "participant_id", "experiment", "session", "method", "set", "trial", "direction", "response", "correct",
         "response_time_s", "response_source", "response_time_valid", "attempts",
     ]  # fmt: skip
-    assert columns.names("preference")[:7] == [
+    assert tables.names("preference")[:7] == [
         "participant_id", "experiment", "trial", "method", "rating", "rating_by", "comment"
     ]  # fmt: skip
 

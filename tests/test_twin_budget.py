@@ -7,7 +7,7 @@ import pytest
 from device import limits, words
 from device.twin import machine
 from device.twin.machine import DUTY_US, Budget
-from device.wire import errors
+from device.wire.errors import WireError, message
 from device.wire.records import Setting
 from tests.twin_hosts import PULSE, READY, Hand
 
@@ -24,17 +24,17 @@ def spent(*settings: Setting) -> Budget:
 
 def test_five_pulses_of_20_ms_fill_a_second() -> None:
     assert 5 * STRONG.length_us == DUTY_US
-    assert spent(*[STRONG] * 4).refusal(STRONG, 200_000) == errors.NO_DEVICE_ERROR
-    assert spent(*[STRONG] * 5).refusal(STRONG, 250_000) == errors.DUTY
+    assert spent(*[STRONG] * 4).refusal(STRONG, 200_000) == WireError.NO_DEVICE_ERROR
+    assert spent(*[STRONG] * 5).refusal(STRONG, 250_000) == WireError.DUTY
 
 
 def test_a_vibration_in_between_hides_no_earlier_pulse() -> None:
-    assert spent(*[STRONG] * 4, EFFECT).refusal(STRONG, 250_000) == errors.NO_DEVICE_ERROR
-    assert spent(*[STRONG] * 4, EFFECT, STRONG).refusal(STRONG, 300_000) == errors.DUTY
+    assert spent(*[STRONG] * 4, EFFECT).refusal(STRONG, 250_000) == WireError.NO_DEVICE_ERROR
+    assert spent(*[STRONG] * 4, EFFECT, STRONG).refusal(STRONG, 300_000) == WireError.DUTY
 
 
 def test_what_lies_a_second_back_counts_no_more() -> None:
-    assert spent(*[STRONG] * 5).refusal(STRONG, 1_000_000) == errors.NO_DEVICE_ERROR
+    assert spent(*[STRONG] * 5).refusal(STRONG, 1_000_000) == WireError.NO_DEVICE_ERROR
 
 
 def shots_until(hand, code, every_us):
@@ -43,7 +43,7 @@ def shots_until(hand, code, every_us):
             hand.say("", every_us)
         (answer,) = [text for text in [*hand.say("TRIG"), *hand.say("SYST:ERR?")] if '"' in text]
         if not answer.startswith("0,"):
-            assert answer == errors.message(code)
+            assert answer == message(code)
             return shot
     raise AssertionError
 
@@ -52,9 +52,9 @@ def test_ten_pulses_of_10_ms_a_second_and_no_more():
     hand = Hand()
     hand.say("CONF a,FORW,PULS,1000,10000,50000", READY)
     hand.say("ARM")
-    assert shots_until(hand, errors.DUTY, 50_000) == 10
+    assert shots_until(hand, WireError.DUTY, 50_000) == 10
     hand.say("TRIG", 499_999)
-    assert hand.error() == errors.message(errors.DUTY)
+    assert hand.error() == message(WireError.DUTY)
     hand.say("TRIG", 1)  # the second that ends with the new pulse now begins with the first one's end
     assert hand.error() == '0,"No error"'
 
@@ -63,7 +63,7 @@ def test_three_hundred_shots_a_minute_and_no_more():
     hand = Hand()
     hand.say("CONF a,FORW,EFF,1,10000,10000", READY)
     hand.say("ARM")
-    assert shots_until(hand, errors.RATE, 100_000) == 300
+    assert shots_until(hand, WireError.RATE, 100_000) == 300
     assert hand.now_us == READY + 300 * 100_000
 
 
@@ -72,7 +72,7 @@ def test_the_coil_stays_below_80_degrees_and_cools_as_the_host_thinks_or_slower(
     hand.say("CONF a,FORW,PULS,24000,20000,210000", READY)
     hand.say("ARM")
     history, load = limits.DriveHistory(), limits.load_of(words.Pulse(voltage_V=24.0, pulse_s=0.020), 2.9)
-    for shot in range(shots_until(hand, errors.HOT, 210_000)):
+    for shot in range(shots_until(hand, WireError.HOT, 210_000)):
         start_s = 1.0 + 0.21 * shot
         history = history.record(load, start_s, start_s)
     assert hand.standing().coil_mC / 1000 == pytest.approx(history.coil_celsius(hand.now_us / 1e6), abs=0.05)

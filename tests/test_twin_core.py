@@ -4,8 +4,7 @@ import pytest
 
 from device.twin.core import Core
 from device.twin.machine import REFUSED, DriveEvent
-from device.wire.frame import Frame, decode, encode, following
-from device.wire.records import ShotRecord, refusal_in
+from device.wire.records import Frame, ShotRecord, decode, encode, following, refusal_in
 from tests.twin_hosts import PULSE, READY, Hand, Strict
 
 
@@ -201,7 +200,7 @@ def test_the_table_of_states_is_kept(command, state):
         gun.core.fail(1, gun.now_us)
     assert gun.standing().state == state
     (answer,) = gun.say({"CONF": PULSE, "ARM": "ARM", "TRIG": "TRIG 2"}[command])
-    assert refusal_in(answer).code == REFUSED[command, state]
+    assert refusal_in(answer)[0] == REFUSED[command, state]
     assert gun.standing().state == state
 
 
@@ -243,4 +242,4 @@ def test_what_is_beyond_a_range_is_refused_and_changes_nothing(strict, text):
     ],
 )
 def test_what_is_no_command_is_refused_by_its_number(strict, text, code):
-    assert [refusal_in(answer).code for answer in strict.say(text)] == [code]
+    assert [refusal_in(answer)[0] for answer in strict.say(text)] == [code]

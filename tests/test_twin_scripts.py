@@ -7,8 +7,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from device.twin.machine import LATE_EFFECT_US
-from device.wire import errors
-from device.wire.frame import MAX_LINE
+from device.wire.errors import WireError, message
+from device.wire.records import MAX_LINE
 from tests.twin_hosts import Hand, Strict
 from tests.twin_scripts import MAX_LATE_US, random_script, transcript
 
@@ -49,8 +49,8 @@ def test_a_script_gives_the_same_transcript_again_and_reaches_every_error():
         lines = list(transcript(random_script(seed)))
         assert seed > 3 or lines == list(transcript(random_script(seed)))
         for out in (bytes.fromhex(line.split()[2]) for line in lines if line.startswith("out")):
-            seen |= {code for code in errors.TEXTS if errors.message(code).encode() in out}
-    assert seen >= set(errors.TEXTS) - {errors.QUEUE_OVERFLOW}
+            seen |= {code for code in WireError if message(code).encode() in out}
+    assert seen >= set(WireError) - {WireError.QUEUE_OVERFLOW}
 
 
 @given(st.lists(st.tuples(st.binary(max_size=400), st.integers(0, 3_000_000)), max_size=8), st.booleans())

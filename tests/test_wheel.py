@@ -32,7 +32,11 @@ def test_the_wheel_holds_the_four_packages_and_the_configs_and_nothing_else(whee
         "experiments",
         "recoil",
     }
-    for name in ("experiments/shipped_configs/direction.toml", "analysis/report/templates/report.html.j2"):
+    for name in (
+        "experiments/shipped_configs/direction.toml",
+        "analysis/report/templates/report.html.j2",
+        "experiments/screens/console/console.qss",
+    ):
         assert name in names
 
 

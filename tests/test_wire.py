@@ -9,20 +9,25 @@ from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
 from device import LinkError
-from device.wire import errors, records
-from device.wire.frame import (
+from device.wire import records
+from device.wire.errors import WireError, message
+from device.wire.records import (
     LAST_NUMBER,
     MAX_BODY,
     MAX_LINE,
     Frame,
     Garbled,
+    Named,
+    Setting,
+    ShotRecord,
     Splitter,
+    StatusRecord,
     decode,
     encode,
     following,
     is_newer,
+    refusal_in,
 )
-from device.wire.records import Named, Refusal, Setting, ShotRecord, StatusRecord, refusal_in
 
 BODIES = st.text(st.characters(min_codepoint=0x20, max_codepoint=0x7E), min_size=1, max_size=MAX_BODY)
 FRAMES = st.builds(Frame, number=st.integers(1, LAST_NUMBER), body=BODIES)
@@ -134,9 +139,9 @@ def test_a_record_comes_back_from_its_text_and_fits_a_frame(record):
     Frame(number=1, body=record.text())
 
 
-@pytest.mark.parametrize("code", errors.TEXTS)
+@pytest.mark.parametrize("code", WireError)
 def test_every_error_is_read_back_as_a_refusal(code):
-    assert refusal_in(f"ERR {errors.message(code)}") == Refusal(code=code, reason=errors.TEXTS[code])
+    assert refusal_in(f"ERR {message(code)}") == (code, code.text)
 
 
 @given(st.binary(max_size=3000), st.lists(st.integers(0, 3000), max_size=10))

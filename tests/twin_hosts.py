@@ -3,8 +3,7 @@
 from __future__ import annotations
 
 from device.twin.core import Core
-from device.wire.frame import Frame, Splitter, decode, encode, following
-from device.wire.records import ShotRecord, StatusRecord
+from device.wire.records import Frame, ShotRecord, Splitter, StatusRecord, decode, encode, following
 
 PULSE = "CONF asymmetric-1,FORW,PULS,16000,10000,211000"
 READY = 1_000_000

@@ -24,7 +24,7 @@ from typing import Final
 
 from device.twin.core import Core
 from device.twin.machine import Board, DriveEvent
-from device.wire.frame import Frame, encode, following
+from device.wire.records import Frame, encode, following
 
 
 def transcript(script: Iterable[str]) -> Iterator[str]:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
@@ -13,12 +13,12 @@ import pytest
 
 from device import Pulse, Shot
 from device.methods import paper_methods
-from device.serial_gun import link
-from device.serial_gun.gun import SerialGun
-from device.serial_gun.opening import open_serial
+from device.serial_gun import lines, link
+from device.serial_gun.gun import SerialGun, open_serial
 from device.twin.machine import BOOT_REST_US
-from device.twin.ports import Pty, Socket, Tcp, Troubles
-from device.twin.twin import Make, Twin
+from device.twin.twin import Make, Pty, Socket, Tcp, Troubles, Twin
+from device.wire.records import Garbled
+from device.words import LinkError
 
 PULSE = Pulse(voltage_V=16.0, pulse_s=0.010)
 
@@ -27,9 +27,51 @@ def a_shot(method: str = "asymmetric-2", direction: Any = "forward", drive: Any 
     return Shot(method=method, direction=direction, drive=drive)
 
 
-def said(gun: SerialGun, *headers: str) -> list[str]:
+@dataclass(frozen=True, kw_only=True)
+class Command:
+    """A command that is over: how it ended, and when it was answered, if it was."""
+
+    body: str
+    written_s: float
+    outcome: str
+    received_s: float | None = None
+
+
+_OUTCOMES = {lines.CommandRefused: "refused", lines.TimedOut: "timed out", Garbled: "garbled"}
+
+
+@contextmanager
+def noted_commands() -> Iterator[list[Command]]:
+    """The commands of guns on a line from now on, in the order of their ends."""
+    commands, outcome = list[Command](), lines.Pending.outcome
+
+    def noted(pending: lines.Pending, waiting: lines.Waiting) -> lines.Reply:
+        about = {"body": waiting.body, "written_s": waiting.written_s}
+        try:
+            reply = outcome(pending, waiting)
+        except LinkError as error:
+            commands.append(Command(**about, outcome=_OUTCOMES.get(type(error), "disconnected")))
+            raise
+        commands.append(Command(**about, outcome="done", received_s=reply.received_s))
+        return reply
+
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(lines.Pending, "outcome", noted)
+        yield commands
+
+
+def said(pair: Pair, *headers: str) -> list[str]:
     """The commands that begin so, as far as they are over, in the order of their ends."""
-    return [command.body for command in gun.link.commands if command.body.split()[0] in headers]
+    return [command.body for command in pair.commands if command.body.split()[0] in headers]
+
+
+def is_up(gun: SerialGun) -> bool:
+    """Whether a gun is there, in a session of the strict mode."""
+    try:
+        gun.link.wait_up(0.0)
+    except lines.Disconnected:
+        return False
+    return True
 
 
 def disarmings_of(twin: Twin) -> list[float]:
@@ -47,12 +89,13 @@ def disarmings_of(twin: Twin) -> list[float]:
 
 @dataclass(frozen=True, kw_only=True)
 class Pair:
-    """A twin and the gun that drives it; `clock` is both's."""
+    """A twin and the gun that drives it; `clock` is both's, `commands` are the gun's."""
 
     twin: Twin
     gun: SerialGun
     socket: Socket
     speed: float
+    commands: list[Command] = field(default_factory=list)
 
     def clock(self) -> float:
         return time.monotonic() * self.speed
@@ -106,11 +149,11 @@ def a_twin(
 
 @contextmanager
 def a_pair(folder: Path, troubles: Troubles | None = None, *, speed: float = 20.0, **more: Any) -> Iterator[Pair]:
-    with a_twin(folder, troubles, speed=speed, **more) as (twin, socket):
+    with a_twin(folder, troubles, speed=speed, **more) as (twin, socket), noted_commands() as commands:
         address = f"serial:{socket.address}?speed={speed:g}"
         gun = open_serial(address, paper_methods(), host_clock(speed))
         try:
-            yield Pair(twin=twin, gun=gun, socket=socket, speed=speed)
+            yield Pair(twin=twin, gun=gun, socket=socket, speed=speed, commands=commands)
         finally:
             gun.close()
 
@@ -126,6 +169,7 @@ __all__ = [
     "a_twin",
     "disarmings_of",
     "host_clock",
+    "is_up",
     "plugged_in",
     "said",
 ]

@@ -140,8 +140,8 @@ def _run(window: Any) -> dict[str, Any]:
         "state": str(drawn.state),
         "base": str(drawn.base),
         "serial": drawn.serial,
-        "trial": live.trial.trial,
-        "ready": drawn.serial == live.position.serial and live.ready_at_s(now_s) and in_time,
+        "trial": live.moment.trial.trial,
+        "ready": drawn.serial == live.position.serial and live.moment.is_ready(now_s) and in_time,
         "ended": window.ended is not None,
         "line": window.controls.typing.line,
         "typed": window.typed("line" if window.controls.typing.line else field_at(drawn) or "number"),
@@ -227,7 +227,7 @@ def write_down(watch: Watch, call: dict[str, Any]) -> None:
 
 def watch_lines(watch: Watch) -> None:
     """From now on it is written down when a gun's line has taken the bytes of `ABOR`."""
-    from device.serial_gun.port import SerialPort
+    from device.serial_gun.lines import SerialPort
 
     write = SerialPort.write
 

@@ -20,9 +20,9 @@ import pandas as pd
 
 from analysis.logs.frames import Cell
 from analysis.logs.reading import Logs
-from experiments.record import columns
-from experiments.record.columns import Column
-from experiments.study.register import Member
+from experiments.record import tables
+from experiments.record.tables import Column
+from experiments.study.study import Member
 
 ANSWERED_BY = {"direction": "response_source", "preference": "rating_by"}
 """The column that says whose hand gave the answer; empty where there is none."""
@@ -243,7 +243,7 @@ def runs_of(logs: Logs) -> Runs:
 
 
 def _runs(experiment: str, table: pd.DataFrame) -> Iterator[Run]:
-    names = columns.names(experiment)
+    names = tables.names(experiment)
     plain = table[names].astype(object).where(table[names].notna(), None)
     for code, rows in plain.groupby("participant_id", sort=False):
         cells = rows.itertuples(index=False, name=None)
@@ -305,7 +305,7 @@ def _path(run: Run) -> str:
 
 def _exported(experiment: str, free_text: bool) -> list[Column]:
     left_out = _IN_THE_NAME if free_text else (*_IN_THE_NAME, *_FREE_TEXT)
-    return [column for column in columns.TABLES[experiment] if column.name not in left_out]
+    return [column for column in tables.TABLES[experiment] if column.name not in left_out]
 
 
 def _name(column: Column) -> str:
@@ -346,7 +346,7 @@ def _cell(column: Column, value: Cell) -> str:
     if isinstance(value, float):
         return repr(float(value))
     text = one_line(str(value))
-    return (columns.guard(text) if column.type == "text" else text) or NOT_AVAILABLE
+    return (tables.guard(text) if column.type == "text" else text) or NOT_AVAILABLE
 
 
 def one_line(text: str) -> str:

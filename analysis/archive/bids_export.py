@@ -18,9 +18,10 @@ from analysis.logs.reading import Logs, Track, read_logs
 from experiments.load import load_study
 from experiments.record import storage
 from experiments.record.provenance import recoil_version
-from experiments.study import places, register
-from experiments.study.places import PlaceError
-from experiments.study.register import Member, RegisterError
+from experiments.study import folders, register
+from experiments.study.folders import PlaceError
+from experiments.study.register import RegisterError
+from experiments.study.study import Member
 
 _AT_FDCWD, _RENAME_EXCHANGE = -100, 2
 """Linux's words for exchanging two names at once: renameat2(2)."""
@@ -161,7 +162,7 @@ def _replace(target: Path, part: Path) -> None:
     if not target.exists():
         part.rename(target)
     elif not _exchange(target, part):  # in two steps: killed between them, the old one is there under another name
-        aside = places.set_aside_file(target)
+        aside = folders.set_aside_file(target)
         part.rename(target)
         shutil.rmtree(aside)
 

@@ -28,7 +28,7 @@ from pydantic import AfterValidator, Field, model_validator
 from analysis.logs.files import BadLogError
 from analysis.logs.texts import CsvRecord
 from experiments.config.door import Model
-from experiments.record import columns
+from experiments.record import tables
 
 ShortText = Annotated[str, Field(min_length=1, max_length=500)]
 MEASURES = {"direction": ("method", "direction", "response"), "preference": ("method", "rating")}
@@ -149,7 +149,7 @@ class ColumnMap(Model):
         if lacking:
             raise ValueError(f"columns.{lacking[0]} is missing (rule: a {self.experiment} log has it)")
         if self.columns.response_time is not None and self.response_time is None:
-            raise ValueError('response_time.unit is missing (rule: "s" or "ms" if columns.response_time is given)')
+            raise ValueError('response_time.unit is missing (rule: "s" or "ms" if tables.response_time is given)')
         return self
 
     @model_validator(mode="after")
@@ -194,7 +194,7 @@ def read_mapped(content: bytes, file_name: str, mapping: ColumnMap) -> list[Mapp
 def is_recoils(content: bytes) -> bool:
     """Whether a file has the header of one of Recoil's own tables, so that no map is needed."""
     header = set(content.partition(b"\n")[0].decode("utf-8-sig", errors="replace").strip().split(","))
-    return any({one.name for one in table if one.required} <= header for table in columns.TABLES.values())
+    return any({one.name for one in table if one.required} <= header for table in tables.TABLES.values())
 
 
 def _records_or_fault(code: str, lines: Sequence[_Line], mapping: ColumnMap) -> tuple[CsvRecord, ...] | BadLogError:
@@ -231,7 +231,7 @@ def _cells(header: list[str], cells: list[str], line: int, mapping: ColumnMap) -
     if len(cells) != len(header):
         raise BadLogError(f"has {len(cells)} fields (rule: {len(header)}, as in the header)", line)
     return {
-        name: columns.MISSING if cell.strip() in mapping.text.missing else cell.strip()
+        name: tables.MISSING if cell.strip() in mapping.text.missing else cell.strip()
         for name, cell in zip(header, cells, strict=True)
     }
 
@@ -250,7 +250,7 @@ def _wanted(lines: Iterator[_Line], mapping: ColumnMap) -> list[_Line]:
 
 
 def _skips(skip: Skip, cell: str) -> bool:
-    return cell in skip.values or (skip.empty and cell == columns.MISSING)
+    return cell in skip.values or (skip.empty and cell == tables.MISSING)
 
 
 def _participant(line: _Line, file_name: str, mapping: ColumnMap) -> str:
@@ -270,10 +270,9 @@ def _records(code: str, lines: Sequence[_Line], mapping: ColumnMap) -> tuple[Csv
     make = _trial if mapping.experiment == "direction" else _rating
     rows = [make(line, mapping) | _common(code, line, mapping) for line in lines]
     _number(rows, mapping)
-    header = columns.names(mapping.experiment)
+    header = tables.names(mapping.experiment)
     return tuple(
-        (line.number, [row.get(name, columns.MISSING) for name in header])
-        for line, row in zip(lines, rows, strict=True)
+        (line.number, [row.get(name, tables.MISSING) for name in header]) for line, row in zip(lines, rows, strict=True)
     )
 
 
@@ -281,7 +280,7 @@ def _common(code: str, line: _Line, mapping: ColumnMap) -> _Row:
     named = mapping.columns.model_dump(exclude_none=True)
     row: _Row = {name: line.cells[named[name]] for name in ("session", "set", "trial") if name in named}
     texts: _Row = {
-        name: columns.guard(line.cells[named[name]]) for name in ("flags", "note", "comment") if name in named
+        name: tables.guard(line.cells[named[name]]) for name in ("flags", "note", "comment") if name in named
     }
     row |= texts
     method = line.cells[mapping.columns.method]
@@ -300,10 +299,10 @@ def _trial(line: _Line, mapping: ColumnMap) -> _Row:
     return {
         "direction": direction,
         "response": response,
-        "correct": str(int(response == direction)) if response else columns.MISSING,
+        "correct": str(int(response == direction)) if response else tables.MISSING,
         "response_time_s": time,
-        "response_source": mapping.response_source if response else columns.MISSING,
-        "response_time_valid": _valid(mapping) if time else columns.MISSING,
+        "response_source": mapping.response_source if response else tables.MISSING,
+        "response_time_valid": _valid(mapping) if time else tables.MISSING,
         "instruction": _instruction(line, mapping),
     }
 
@@ -315,7 +314,7 @@ def _valid(mapping: ColumnMap) -> str:
 
 def _instruction(line: _Line, mapping: ColumnMap) -> str:
     """The instruction; one that the map does not name keeps its name."""
-    cell = line.cells[mapping.columns.instruction] if mapping.columns.instruction else columns.MISSING
+    cell = line.cells[mapping.columns.instruction] if mapping.columns.instruction else tables.MISSING
     return mapping.values.instruction.get(cell, cell)
 
 
@@ -327,14 +326,14 @@ def _rating(line: _Line, mapping: ColumnMap) -> _Row:
             rule = f"(rule: {scale.scale_min:g} to {scale.scale_max:g}, as the map says)"
             raise BadLogError(f"rating {cell} is out of range {rule}", line.number, mapping.columns.rating)
         cell = repr(10.0 * (value - scale.scale_min) / (scale.scale_max - scale.scale_min))
-    return {"rating": cell, "rating_by": mapping.response_source if cell else columns.MISSING}
+    return {"rating": cell, "rating_by": mapping.response_source if cell else tables.MISSING}
 
 
 def _translated(line: _Line, name: str, mapping: ColumnMap) -> str:
     """What a cell of the column means; `BadLogError` if the map does not say."""
     column, known = getattr(mapping.columns, name), getattr(mapping.values, name)
     cell = line.cells[column]
-    if cell == columns.MISSING or cell in known or cell in ("forward", "backward"):
+    if cell == tables.MISSING or cell in known or cell in ("forward", "backward"):
         return str(known.get(cell, cell))
     rule = f"(rule: one of {', '.join([*known, 'forward', 'backward'])}; values.{name} says what they mean)"
     raise BadLogError(f"{cell!r} is not allowed {rule}", line.number, column)
@@ -342,7 +341,7 @@ def _translated(line: _Line, name: str, mapping: ColumnMap) -> str:
 
 def _seconds(line: _Line, mapping: ColumnMap) -> str:
     if mapping.columns.response_time is None or mapping.response_time is None:
-        return columns.MISSING
+        return tables.MISSING
     cell = line.cells[mapping.columns.response_time].replace(mapping.text.decimal, ".")
     value = _number_in(cell)
     return repr(value / 1000.0) if value is not None and mapping.response_time.unit == "ms" else cell

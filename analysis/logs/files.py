@@ -12,10 +12,10 @@ from dataclasses import dataclass
 from pathlib import Path, PurePath
 
 from device.words import RecoilError
-from experiments.record import columns
+from experiments.record import tables
 
-ENDINGS = tuple(f"_{suffix}.csv" for suffix in columns.FILE_SUFFIX.values())
-_BEHIND_STEM = re.compile(rf"(_({'|'.join(columns.FILE_SUFFIX.values())}))?\.[^.]*$")
+ENDINGS = tuple(f"_{suffix}.csv" for suffix in tables.FILE_SUFFIX.values())
+_BEHIND_STEM = re.compile(rf"(_({'|'.join(tables.FILE_SUFFIX.values())}))?\.[^.]*$")
 _CODE = re.compile(r"sub-([^_]+)_")
 _READ_ONLY = os.O_RDONLY | getattr(os, "O_BINARY", 0)
 _PIECE_BYTES = 1 << 16

@@ -12,8 +12,8 @@ import pyarrow as pa
 from numpy.typing import NDArray
 
 from analysis.logs.texts import TEXT, Texts, has_many_values, is_category
-from experiments.record import columns
-from experiments.record.columns import Column
+from experiments.record import tables
+from experiments.record.tables import Column
 
 STUDY = "study"
 
@@ -69,7 +69,7 @@ def joined(experiment: str, blocks: Iterable[Block], studies: Mapping[int, str])
     order = order[known[order]]
     chosen_rows = None if np.array_equal(order, np.arange(len(log))) else _rows_of(order, rows)
     made: dict[str, Any] = {}
-    for column in columns.TABLES[experiment]:
+    for column in tables.TABLES[experiment]:
         made[column.name] = _made(column, [block.columns[column.name] for block in mine], chosen_rows)
     made[STUDY] = _studies([studies[number] for number in log[order].tolist()], rows[order], set(studies.values()))
     if len(set(studies.values())) > 1:

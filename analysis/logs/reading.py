@@ -16,7 +16,7 @@ from analysis.logs.files import ENDINGS, BadLogError, Problem, code_in_name, fin
 from analysis.logs.frames import Block, joined
 from analysis.logs.rules import Log, check_logs
 from analysis.logs.texts import TextTable, table_of_records, text_tables
-from experiments.record import columns
+from experiments.record import tables
 from experiments.study import register
 
 __all__ = ["Logs", "Problem", "Track", "read_logs"]
@@ -35,7 +35,7 @@ Track = Callable[[Sequence[Path]], Iterable[Path]]
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Logs:
-    """The rows of all good files, with the columns of `experiments.record.columns` and the study; empty cells are NA.
+    """The rows of all good files, with the columns of `experiments.record.tables` and the study; empty cells are NA.
 
     With several studies a participant is `study/code`: the same code in another study is another person.
     """
@@ -215,7 +215,7 @@ def _mapped(batch: _Batch, first: int, logs: Sequence[MappedLog], mapping: Colum
             batch.logs[number] = log.records
         else:
             records[number] = log.records
-    return table_of_records(columns.names(mapping.experiment), records)
+    return table_of_records(tables.names(mapping.experiment), records)
 
 
 def _exclusions(results: str) -> dict[str, str]:

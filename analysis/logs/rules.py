@@ -20,8 +20,8 @@ from analysis.logs.files import BadLogError
 from analysis.logs.frames import Block, Cell, Cells, Coded, chosen
 from analysis.logs.texts import Texts, TextTable, decimals, few, has_many_values, unguarded
 from analysis.stats.arrays import BoolArray
-from experiments.record import columns
-from experiments.record.columns import Column
+from experiments.record import tables
+from experiments.record.tables import Column
 
 Integers = NDArray[np.int64]
 
@@ -104,7 +104,7 @@ def check_logs(
     if not sum(texts.rows):
         raise BadLogError("has a header but no rows (rule: one row a planned trial)", 1)
     rows = np.array(texts.rows, dtype=np.int64)
-    parsed = {column.name: _parsed(column, texts.column(column.name)) for column in columns.TABLES[experiment]}
+    parsed = {column.name: _parsed(column, texts.column(column.name)) for column in tables.TABLES[experiment]}
     cells = {name: values for name, (values, _) in parsed.items()}
     table = _Table(texts=texts, cells=cells, first=np.cumsum(rows) - rows)
     wrong = np.concatenate([list(texts.ragged), *(odd for _, odd in parsed.values())]).astype(np.int64)
@@ -147,7 +147,7 @@ def _rules(table: _Table, experiment: str, codes_in_names: Mapping[int, str | No
 
 def experiment_of(header: Sequence[str]) -> str:
     """Which table the header is of: the one that shares most columns with it. `BadLogError`: none, or not all of it."""
-    shared = {name: len(set(header) & set(columns.names(name))) for name in columns.TABLES}
+    shared = {name: len(set(header) & set(tables.names(name))) for name in tables.TABLES}
     experiment = max(shared, key=lambda name: shared[name])
     if shared[experiment] < 4:
         raise BadLogError(
@@ -158,7 +158,7 @@ def experiment_of(header: Sequence[str]) -> str:
     for name in header:
         if header.count(name) > 1:
             raise BadLogError(f"column {name!r} stands {header.count(name)} times in the header (rule: once)", 1, name)
-    required = [column.name for column in columns.TABLES[experiment] if column.required]
+    required = [column.name for column in tables.TABLES[experiment] if column.required]
     for name in (*required, *_MEASURES[experiment]):
         if name not in header:
             raise BadLogError(f"column {name!r} is missing (rule: a {experiment} table has it)", 1, name)
@@ -167,7 +167,7 @@ def experiment_of(header: Sequence[str]) -> str:
 
 def cell_fault(column: Column, text: str) -> str:
     """Why a column may not hold a text; empty if it may."""
-    if text == columns.MISSING:
+    if text == tables.MISSING:
         return "the cell is empty (rule: a value is required)" if column.required else ""
     if column.type == "integer" and not _INTEGER.fullmatch(text):
         return f"{_shown(text)} is not a whole number of at most 15 digits"
@@ -180,13 +180,13 @@ def cell_fault(column: Column, text: str) -> str:
 
 def cell_value(column: Column, text: str) -> Cell:
     """The value of a text that a column may hold; `None` for an empty one."""
-    if text == columns.MISSING:
+    if text == tables.MISSING:
         return None
     if column.type == "number":
         return float(text)
     if column.type in ("integer", "flag"):
         return int(text)
-    return columns.unguard(text) if column.type == "text" else text
+    return tables.unguard(text) if column.type == "text" else text
 
 
 def _parsed(column: Column, texts: Texts) -> tuple[Cells, Integers]:
@@ -225,8 +225,8 @@ def _say_cell(table: _Table, experiment: str, row: int) -> BadLogError:
     if row in table.texts.ragged:
         rule = f"(rule: {len(table.texts.header)}, as in the header)"
         return table.fault(f"has {table.texts.ragged[row]} fields {rule}", row, None)
-    texts = ((column, table.texts.column(column.name)[row].as_py()) for column in columns.TABLES[experiment])
-    faults = ((column.name, cell_fault(column, text or columns.MISSING)) for column, text in texts)
+    texts = ((column, table.texts.column(column.name)[row].as_py()) for column in tables.TABLES[experiment])
+    faults = ((column.name, cell_fault(column, text or tables.MISSING)) for column, text in texts)
     name, message = next((name, message) for name, message in faults if message)
     return table.fault(message, row, name)
 

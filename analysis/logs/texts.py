@@ -19,8 +19,8 @@ import pyarrow.csv
 from numpy.typing import NDArray
 
 from analysis.logs.files import BadLogError
-from experiments.record import columns
-from experiments.record.columns import Column
+from experiments.record import tables
+from experiments.record.tables import Column
 
 Texts = Any
 """An Arrow array of texts, null for an empty cell. Arrow ships no types."""
@@ -46,7 +46,7 @@ def has_many_values(column: Column) -> bool:
     return column.type == "number" or (column.type == "text" and not is_category(column))
 
 
-_MANY = {column.name for table in columns.TABLES.values() for column in table if has_many_values(column)}
+_MANY = {column.name for table in tables.TABLES.values() for column in table if has_many_values(column)}
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -157,7 +157,7 @@ def _arrow_table(files: Sequence[_Plain]) -> pa.Table | None:
             ),
             pa.csv.ConvertOptions(
                 column_types={name: TEXT if name in _MANY else _FEW for name in names},
-                null_values=[columns.MISSING],
+                null_values=[tables.MISSING],
                 strings_can_be_null=True,
             ),
         )
@@ -184,7 +184,7 @@ def csv_tables(contents: Mapping[int, bytes]) -> tuple[list[TextTable], dict[int
 def table_of_records(header: Sequence[str], logs: Mapping[int, Sequence[CsvRecord]]) -> TextTable:
     """Records of numbered logs as a table."""
     cells = [row for rows in logs.values() for _, row in rows]
-    empty = [columns.MISSING] * len(header)
+    empty = [tables.MISSING] * len(header)
     ragged = {at: len(row) for at, row in enumerate(cells) if len(row) != len(header)}
     whole = [empty if at in ragged else row for at, row in enumerate(cells)]
     return TextTable(
@@ -236,7 +236,7 @@ def _text(content: bytes) -> str:
 def few(cells: pa.DictionaryArray) -> tuple[NDArray[np.int32], list[str]]:
     """For every cell the number of its text, and these texts; the last is the empty cell's, whether there is one."""
     texts = cells.dictionary.to_pylist()
-    return cells.indices.fill_null(len(texts)).to_numpy(), [*texts, columns.MISSING]
+    return cells.indices.fill_null(len(texts)).to_numpy(), [*texts, tables.MISSING]
 
 
 def decimals(cells: Texts) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
@@ -248,6 +248,6 @@ def decimals(cells: Texts) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
 
 
 def unguarded(cells: Texts) -> Texts:
-    """The texts without the guard against formulas (`columns.unguard`)."""
+    """The texts without the guard against formulas (`tables.unguard`)."""
     guarded = pc.starts_with(cells, "'")
     return pc.if_else(guarded, pc.utf8_slice_codeunits(cells, 1), cells) if pc.any(guarded).as_py() else cells

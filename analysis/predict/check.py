@@ -21,8 +21,7 @@ from experiments.config.setup import Setup
 from experiments.design.plan import next_row
 from experiments.direction.config import Design, DirectionConfig
 from experiments.direction.synthetic import model_parameters
-from experiments.limits import MethodLimits, check_limits, check_methods
-from experiments.load import find, load_gun, load_setup, load_study
+from experiments.load import MethodLimits, check_limits, check_methods, find, load_gun, load_setup, load_study
 from experiments.screens.synthetic import synthetic_participant_of
 from experiments.synthetic.model_based import NEUTRAL, rates_by_instruction
 from experiments.synthetic.percept import percepts_of

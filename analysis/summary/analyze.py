@@ -25,7 +25,7 @@ from experiments.config.door import ConfigError, load
 from experiments.config.setup import sha256
 from experiments.record import storage
 from experiments.record.provenance import provenance
-from experiments.study.places import PlaceError
+from experiments.study.folders import PlaceError
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

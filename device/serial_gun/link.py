@@ -7,26 +7,12 @@ from __future__ import annotations
 
 import threading
 import time
-from collections import deque
 from collections.abc import Callable
 from contextlib import suppress
 
-from device.serial_gun.clocks import Clocks, Exchange, HostTime
-from device.serial_gun.commands import (
-    CalledOff,
-    Disconnected,
-    Forgotten,
-    Pending,
-    PendingCommand,
-    Reply,
-    TimedOut,
-    Waiting,
-    WrongVersion,
-)
-from device.serial_gun.port import OpenPort, Port, SerialPort
-from device.wire import errors
-from device.wire.frame import Frame, Garbled, Splitter, decode, encode, following
-from device.wire.records import WIRE_VERSION, Named, named_value
+from device.serial_gun import lines
+from device.wire.errors import WireError, message
+from device.wire.records import WIRE_VERSION, Frame, Garbled, Named, Splitter, decode, encode, following, named_value
 from device.words import LinkError
 
 PATIENCE_S = 0.25
@@ -42,14 +28,18 @@ FIRST_EXCHANGES = 8
 SILENT_S = 2.0
 """After so long without a word from the gun the line is closed and opened again."""
 _MAX_WATCHDOG_MS, _MIN_WATCHDOG_MS = 60_000, 100
-_NO_SESSION = f"ERR {errors.message(errors.NO_SESSION)}"
+_NO_SESSION = f"ERR {message(WireError.NO_SESSION)}"
 
 
 class Link:
     """The line to the gun at the address that `find` gives each time it connects; `clock` is the host's."""
 
     def __init__(
-        self, find: Callable[[], str], clock: Callable[[], float], speed: float = 1.0, open_port: OpenPort = SerialPort
+        self,
+        find: Callable[[], str],
+        clock: Callable[[], float],
+        speed: float = 1.0,
+        open_port: lines.OpenPort = lines.SerialPort,
     ) -> None:
         self.named: Named | None = None
         self.session = 0  # counts the greetings; each disarms the gun
@@ -60,11 +50,11 @@ class Link:
         self._watchdog_ms = round(min(max(1000 * WATCHDOG_S * speed, _MIN_WATCHDOG_MS), _MAX_WATCHDOG_MS))
         self.watchdog_s = self._watchdog_ms / 1000 / speed
         self._keep_alive_s = min(KEEP_ALIVE_S, self.watchdog_s / 6)
-        self._clocks = Clocks()
+        self._clocks = lines.Clocks()
         self._lock = threading.RLock()
-        self._port: Port | None = None
+        self._port: lines.Port | None = None
         self._splitter = Splitter()
-        self._pending = Pending(clock)
+        self._pending = lines.Pending()
         self._number = int(time.monotonic() * 1e3) % 0xFFFF
         self._token = 0
         self._written_s = self._heard_s = 0.0
@@ -84,19 +74,9 @@ class Link:
         end_s = time.monotonic() + patience_s
         while not self._up.wait(0.005):
             if self._failed.is_set() or time.monotonic() > end_s:
-                trouble = self._trouble or TimedOut(f"the gun did not answer within {patience_s:g} s")
+                trouble = self._trouble or lines.TimedOut(f"the gun did not answer within {patience_s:g} s")
                 self.close()
                 raise trouble
-
-    @property
-    def commands(self) -> deque[PendingCommand]:
-        """The last commands as they went, but for the questions that nobody waits for."""
-        return self._pending.log
-
-    @property
-    def is_up(self) -> bool:
-        """Whether the gun is there, in a session of the strict mode."""
-        return self._up.is_set()
 
     @property
     def silent_for_s(self) -> float:
@@ -106,9 +86,9 @@ class Link:
     def wait_up(self, patience_s: float) -> None:
         """Wait until the gun is there. `Disconnected`: it does not come back."""
         if self._closing.is_set() or not self._up.wait(patience_s):
-            raise Disconnected(f"the gun is not there ({self._trouble or 'no answer'})")
+            raise lines.Disconnected(f"the gun is not there ({self._trouble or 'no answer'})")
 
-    def host(self, *gun_us: int) -> list[HostTime]:
+    def host(self, *gun_us: int) -> list[lines.HostTime]:
         """Times on the gun's clock, on the host's, all by one map. `Disconnected`: the gun with this clock is gone."""
         with self._lock:
             self._check_clocks()
@@ -122,31 +102,25 @@ class Link:
 
     def _check_clocks(self) -> None:
         if not self._clocks.known:
-            raise Disconnected("the gun was reset, and its new clock is not known yet")
+            raise lines.Disconnected("the gun was reset, and its new clock is not known yet")
 
-    @property
-    def drift_ppm(self) -> float:
-        """How much faster the host's clock runs than the gun's, in millionths."""
-        with self._lock:
-            return self._clocks.drift_ppm
-
-    def ask(self, body: str, patience_s: float = PATIENCE_S, allowed: Callable[[], bool] = lambda: True) -> Reply:
+    def ask(self, body: str, patience_s: float = PATIENCE_S, allowed: Callable[[], bool] = lambda: True) -> lines.Reply:
         """Write a command and wait for its answer. `LinkError`: its other outcomes, by their type.
 
         `allowed` is asked while nobody else can write: a command that is not allowed then is `CalledOff`.
         """
         with self._lock:
             if not self._up.is_set():
-                raise Disconnected(f"the gun is not there ({self._trouble or 'no answer'})")
+                raise lines.Disconnected(f"the gun is not there ({self._trouble or 'no answer'})")
             if not allowed():
-                raise CalledOff(f"{body.split(maxsplit=1)[0]} was called off: the gun was disarmed meanwhile")
+                raise lines.CalledOff(f"{body.split(maxsplit=1)[0]} was called off: the gun was disarmed meanwhile")
             waiting = self._write(body)
         waiting.ended.wait(patience_s)
         return self._pending.outcome(waiting)
 
     def drop(self, why: str) -> None:
         """Let go of the line; the thread connects again, and that disarms the gun."""
-        self._lose(Disconnected(why))
+        self._lose(lines.Disconnected(why))
 
     def close(self) -> None:
         """Leave the gun disarmed in its plain mode, and let go for good."""
@@ -158,7 +132,7 @@ class Link:
         for thread in (self._thread, self._keeper):
             if thread.is_alive():
                 thread.join()
-        self._lose(Disconnected("the line is closed"))
+        self._lose(lines.Disconnected("the line is closed"))
 
     def _run(self) -> None:
         while not self._closing.is_set():
@@ -169,7 +143,7 @@ class Link:
                     self._look_after()
             except LinkError as error:
                 self._lose(error)
-                fatal = isinstance(error, WrongVersion) or self._port is None
+                fatal = isinstance(error, lines.WrongVersion) or self._port is None
                 self._let_go()
                 if self.session == 0 and fatal:
                     self._failed.set()
@@ -192,7 +166,7 @@ class Link:
         with self._lock:
             self._token = token
             if not same:
-                self._clocks = Clocks()
+                self._clocks = lines.Clocks()
         for _ in range(FIRST_EXCHANGES):
             self._greet("TIME?")
         with self._lock:
@@ -209,9 +183,9 @@ class Link:
             return ""
         if not self.remembers:
             return f"the gun does not know its last session any more, so it was reset ({ended})"
-        return ended.alone if isinstance(ended, Forgotten) else f"the line was lost ({ended})"
+        return ended.alone if isinstance(ended, lines.Forgotten) else f"the line was lost ({ended})"
 
-    def _introduce(self, port: Port) -> None:
+    def _introduce(self, port: lines.Port) -> None:
         """See who is there, in the plain language that every version speaks; a wrong version must say so twice."""
         said = list[bytes]()
         for _ in range(GREETING_TRIES):
@@ -222,24 +196,24 @@ class Link:
                 self._pump()
             try:
                 self._check(Named.parse(self._plain.decode("latin-1")))
-            except (Garbled, WrongVersion):
+            except (Garbled, lines.WrongVersion):
                 said.append(self._plain)
                 if len(said) > 1 and said[-1] == said[-2] != b"":
                     raise
                 continue
             return
-        raise TimedOut("nobody there says that it is a gun")
+        raise lines.TimedOut("nobody there says that it is a gun")
 
     def _check(self, named: Named) -> None:
         if named.wire != WIRE_VERSION:
-            raise WrongVersion(
+            raise lines.WrongVersion(
                 f"{named.model} {named.serial} (firmware {named.firmware}) speaks version {named.wire} of the wire, "
                 f"this Recoil version {WIRE_VERSION}; flash the firmware of this Recoil (device/firmware)"
             )
         if self.named is not None and named.serial != self.named.serial:
             raise LinkError(f"another gun is there now: {named.serial}, not {self.named.serial}")
 
-    def _greet(self, body: str) -> Reply:
+    def _greet(self, body: str) -> lines.Reply:
         """Ask from the thread that reads. What is asked here may be asked again."""
         trouble: LinkError | None = None
         for _ in range(GREETING_TRIES):
@@ -249,17 +223,17 @@ class Link:
                 self._pump()
             try:
                 return self._pending.outcome(waiting)
-            except (TimedOut, Garbled) as error:
+            except (lines.TimedOut, Garbled) as error:
                 trouble = error
-        raise trouble or TimedOut("no answer")
+        raise trouble or lines.TimedOut("no answer")
 
-    def _write(self, body: str) -> Waiting:
+    def _write(self, body: str) -> lines.Waiting:
         with self._lock:
             if self._port is None or self._broken:
-                raise Disconnected(f"the gun is not there ({self._trouble or 'no answer'})")
+                raise lines.Disconnected(f"the gun is not there ({self._trouble or 'no answer'})")
             self._number = following(self._number)
             now_s = time.monotonic()
-            waiting = Waiting(
+            waiting = lines.Waiting(
                 number=self._number,
                 body=body,
                 written_s=self._clock(),
@@ -281,7 +255,7 @@ class Link:
         """Read what is there, and hand the answers out."""
         port = self._port
         if port is None or self._broken:
-            raise Disconnected(str(self._trouble or "the line is gone"))
+            raise lines.Disconnected(str(self._trouble or "the line is gone"))
         data = port.read()
         received_s = self._clock()
         for line in self._splitter.feed(data):
@@ -301,21 +275,25 @@ class Link:
             return
         waiting = self._pending.take(frame.number)
         if frame.body == _NO_SESSION:
-            raise Forgotten(self._alone(waiting))
+            raise lines.Forgotten(self._alone(waiting))
         if waiting is None:  # its deadline has passed
             return
-        waiting.reply = Reply(body=frame.body, written_s=waiting.written_s, received_s=received_s, session=self.session)
+        waiting.reply = lines.Reply(
+            body=frame.body, written_s=waiting.written_s, received_s=received_s, session=self.session
+        )
         self._learn(waiting, waiting.reply)
         waiting.ended.set()
 
-    def _learn(self, waiting: Waiting, reply: Reply) -> None:
+    def _learn(self, waiting: lines.Waiting, reply: lines.Reply) -> None:
         if waiting.body != "TIME?" or not reply.body.startswith("TIME "):
             return
-        exchange = Exchange(sent_s=reply.written_s, gun_us=named_value(reply.body, "TIME"), received_s=reply.received_s)
+        exchange = lines.Exchange(
+            sent_s=reply.written_s, gun_us=named_value(reply.body, "TIME"), received_s=reply.received_s
+        )
         with self._lock:
             self._clocks.add(exchange)
 
-    def _alone(self, waiting: Waiting | None) -> str:
+    def _alone(self, waiting: lines.Waiting | None) -> str:
         """How the gun came to hear nothing for its watchdog's time, as the first frame after it shows."""
         watchdog_ms, gap_ms = 1000 * self.watchdog_s, 1000 * waiting.gap_s if waiting else 0.0
         if gap_ms > watchdog_ms / 2:
@@ -332,7 +310,7 @@ class Link:
         """Notice a gun that says nothing any more, and forget questions for the time that nobody answered."""
         now_s = time.monotonic()
         if now_s - self._heard_s > max(SILENT_S, 2 * self.watchdog_s):
-            raise Disconnected("the gun says nothing any more")
+            raise lines.Disconnected("the gun says nothing any more")
         self._pending.forget("TIME?", now_s - SILENT_S)
 
     def _keep_alive(self) -> None:
@@ -353,7 +331,7 @@ class Link:
                 self._ended_by = trouble
             self._up.clear()
             self._trouble, self._broken = trouble, True
-        self._pending.end_all(Disconnected(str(trouble)))
+        self._pending.end_all(lines.Disconnected(str(trouble)))
 
     def _let_go(self) -> None:
         with self._lock:

@@ -11,11 +11,8 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Final
 
-from device.limits import Load, load_of
 from device.methods import Method, Rendering, rendering_of
-from device.parameters import GunParameters
-from device.serial_gun.clocks import MAX_DRIFT, HostTime
-from device.serial_gun.commands import Contradiction, CutShort, Reply
+from device.serial_gun.lines import MAX_DRIFT, Contradiction, CutShort, HostTime, Reply
 from device.wire.records import METHOD_NAME, Setting, ShotRecord, StatusRecord, Way
 from device.words import Direction, Drive, Effect, LimitError, Pulse, Shot, ShotReport, ShotTiming
 
@@ -27,12 +24,11 @@ _MILLI, _MICRO = 1e3, 1e6
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ShotRequest:
-    """A shot in whole millivolts and microseconds, what the model says of it, and what it asks of the coil."""
+    """A shot in whole millivolts and microseconds, and what the model says of it."""
 
     shot: Shot
     setting: Setting
     rendering: Rendering
-    load: Load
 
     @property
     def rest_s(self) -> float:
@@ -67,14 +63,12 @@ def asked(shot: Shot, methods: Mapping[str, Method]) -> ShotRequest:
         raise LimitError(f"method is {shot.method!r}; this gun renders {', '.join(methods)}")
     if METHOD_NAME.fullmatch(shot.method) is None:
         raise LimitError(f"method is {shot.method!r}; on the wire it must be 1 to 24 of a-z, 0-9 and -")
-    method = methods[shot.method]
     drive = _sayable(shot.drive)
-    rendering = rendering_of(method, drive)
+    rendering = rendering_of(methods[shot.method], drive)
     return ShotRequest(
         shot=Shot(method=shot.method, direction=shot.direction, drive=drive),
         setting=_setting(shot, drive, rendering),
         rendering=rendering,
-        load=load_of(drive, method.resistance_ohm if isinstance(method, GunParameters) else 0.0),
     )
 
 

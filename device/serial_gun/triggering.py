@@ -10,28 +10,10 @@ import time
 from collections.abc import Callable
 from typing import TypeVar
 
-from device.serial_gun.commands import (
-    CalledOff,
-    CommandRefused,
-    Contradiction,
-    CutShort,
-    Disconnected,
-    Reply,
-    TimedOut,
-    Unsure,
-)
+from device.serial_gun import lines, reports
 from device.serial_gun.link import PATIENCE_S, Link
-from device.serial_gun.reports import (
-    BelievedShot,
-    ShotOrder,
-    check_not_fired,
-    check_record,
-    check_standing,
-    check_times,
-)
-from device.wire import errors
-from device.wire.frame import Garbled
-from device.wire.records import ShotRecord, StatusRecord
+from device.wire.errors import WireError
+from device.wire.records import Garbled, ShotRecord, StatusRecord
 from device.words import LimitError, LinkError
 
 TRIES = 4
@@ -41,34 +23,34 @@ RECONNECT_S = 5.0
 _T = TypeVar("_T")
 
 
-def ask_again(link: Link, body: str, allowed: Callable[[], bool] = lambda: True) -> Reply:
+def ask_again(link: Link, body: str, allowed: Callable[[], bool] = lambda: True) -> lines.Reply:
     """Ask what may be asked again, until there is an answer; the last trouble if there is none."""
-    trouble: LinkError = TimedOut("no answer")
+    trouble: LinkError = lines.TimedOut("no answer")
     for _ in range(TRIES):
         link.wait_up(RECONNECT_S)
         try:
             return link.ask(body, allowed=allowed)
-        except (TimedOut, Garbled, Disconnected) as error:
+        except (lines.TimedOut, Garbled, lines.Disconnected) as error:
             trouble = error
     raise trouble
 
 
-def standing(link: Link) -> tuple[Reply, StatusRecord]:
+def standing(link: Link) -> tuple[lines.Reply, StatusRecord]:
     """How the gun stands. `Contradiction`: as it cannot stand."""
     reply, found = _read(link, "STAT?", StatusRecord.parse)
     try:
-        check_standing(found)
-    except Contradiction as error:
-        raise Contradiction(f"the gun's answer to STAT? is not believed: {error}") from error
+        reports.check_standing(found)
+    except lines.Contradiction as error:
+        raise lines.Contradiction(f"the gun's answer to STAT? is not believed: {error}") from error
     return reply, found
 
 
-def last_shot(link: Link) -> tuple[Reply, ShotRecord]:
+def last_shot(link: Link) -> tuple[lines.Reply, ShotRecord]:
     """What the gun says of the last shot that it accepted."""
     return _read(link, "SHOT?", ShotRecord.parse)
 
 
-def _read(link: Link, question: str, parse: Callable[[str], _T]) -> tuple[Reply, _T]:
+def _read(link: Link, question: str, parse: Callable[[str], _T]) -> tuple[lines.Reply, _T]:
     """An answer as the record that it is. One that cannot be read is asked for again."""
     trouble = Garbled()
     for _ in range(TRIES):
@@ -110,14 +92,14 @@ class Arming:
         """Arm, unless it was disarmed since. `LinkError`: it was, or the gun does not answer, or has a fault."""
         try:
             session = ask_again(self._link, "ARM", lambda: self.disarms == disarms).session
-        except (CommandRefused, CalledOff):
+        except (lines.CommandRefused, lines.CalledOff):
             raise
         except LinkError:  # it may be armed, and its answer lost
             self.disarm()
             raise
         with self._lock:
             if self.disarms != disarms:
-                raise CalledOff("ARM was called off: the gun was disarmed meanwhile")
+                raise lines.CalledOff("ARM was called off: the gun was disarmed meanwhile")
             self.session = session
 
     def disarm(self) -> None:
@@ -129,7 +111,7 @@ class Arming:
         for _ in range(TRIES):
             try:
                 self._link.ask("ABOR")
-            except (TimedOut, Garbled):
+            except (lines.TimedOut, Garbled):
                 continue
             except LinkError:
                 break
@@ -145,9 +127,9 @@ LATEST_S = 0.15
 CLOCK_TRIES = 3
 """So often are a shot's times judged, the clock learnt again in between."""
 
-_LIMITS = {errors.DUTY, errors.RATE, errors.HOT, errors.OUT_OF_RANGE}
-_STOPPED = {errors.CANCELLED, errors.DISARMED, errors.FAULT}
-_DOUBLED = {errors.ALREADY_FIRED, errors.BUSY}
+_LIMITS = {WireError.DUTY, WireError.RATE, WireError.HOT, WireError.OUT_OF_RANGE}
+_STOPPED = {WireError.CANCELLED, WireError.DISARMED, WireError.FAULT}
+_DOUBLED = {WireError.ALREADY_FIRED, WireError.BUSY}
 """The line doubled the trigger: it was fired, or is being fired, and what came of it is lost."""
 
 
@@ -157,7 +139,7 @@ class Triggering:
     def __init__(self, link: Link, arming: Arming, clock: Callable[[], float], speed: float) -> None:
         self._link, self._arming, self._clock, self._speed = link, arming, clock, speed
 
-    def fire(self, order: ShotOrder) -> BelievedShot:
+    def fire(self, order: reports.ShotOrder) -> reports.BelievedShot:
         """The shot as it was told of and is believed. Only one that was surely not fired is triggered again.
 
         `LimitError`, `LinkError`: it was not fired. `Unsure`: it was, or may have been.
@@ -167,12 +149,12 @@ class Triggering:
             try:
                 reply = self._trigger(order)
                 record = ShotRecord.parse(reply.body)
-            except CalledOff as error:
-                raise Disconnected(f"not fired: {self._why_not(order)}") from error
-            except CommandRefused as error:
+            except lines.CalledOff as error:
+                raise lines.Disconnected(f"not fired: {self._why_not(order)}") from error
+            except lines.CommandRefused as error:
                 trouble = self._refused(error, order)
                 ask_again(self._link, "TIME?")  # too late by a clock that may have been misread
-            except (TimedOut, Garbled, Disconnected) as error:
+            except (lines.TimedOut, Garbled, lines.Disconnected) as error:
                 trouble = error
                 found = self._look(order, error)
                 if found is not None:
@@ -180,21 +162,21 @@ class Triggering:
             else:
                 return self._believed(reply, record, order, tries)
         self._arming.disarm()
-        raise TimedOut(f"not fired: {trouble}, {TRIES} times")
+        raise lines.TimedOut(f"not fired: {trouble}, {TRIES} times")
 
-    def _trigger(self, order: ShotOrder) -> Reply:
+    def _trigger(self, order: reports.ShotOrder) -> lines.Reply:
         before_us = max(order.at_us, self._link.gun_us(self._clock())) + round(LATEST_S * self._speed * 1e6)
         trigger = f"TRIG {order.mark},{order.at_us},{before_us}"
         return self._link.ask(
             trigger, self._patience_s(order), lambda: self._arming.stands(order.disarms, order.session)
         )
 
-    def _patience_s(self, order: ShotOrder) -> float:
+    def _patience_s(self, order: reports.ShotOrder) -> float:
         """How long from now on a shot may take to end, in seconds of the real world."""
         ahead_s = 0.0 if order.at_s is None else max(order.at_s - self._clock(), 0.0)
         return PATIENCE_S + (ahead_s + order.wanted.setting.length_us / 1e6) / self._speed
 
-    def _look(self, order: ShotOrder, trouble: LinkError) -> tuple[Reply, ShotRecord] | None:
+    def _look(self, order: reports.ShotOrder, trouble: LinkError) -> tuple[lines.Reply, ShotRecord] | None:
         """The record of a shot whose answer was lost, when it has ended; None if it was surely not fired."""
         end_s, stopped = time.monotonic() + self._patience_s(order), False
         while True:
@@ -207,32 +189,32 @@ class Triggering:
                 self._arming.disarm()
                 stopped = True
 
-    def _last_shot(self, order: ShotOrder, trouble: LinkError) -> tuple[Reply, ShotRecord]:
+    def _last_shot(self, order: reports.ShotOrder, trouble: LinkError) -> tuple[lines.Reply, ShotRecord]:
         """What the gun says of its last shot, if it still knows. `Unsure`: it does not, or it contradicts itself."""
         try:
             reply, record = last_shot(self._link)
             if self._link.boot == order.boot:
-                check_not_fired(record, order)
+                reports.check_not_fired(record, order)
                 return reply, record
-        except Contradiction as error:
+        except lines.Contradiction as error:
             raise self._disbelieved(order, error) from error
         except LinkError as error:
             trouble = error
         raise self._lost(order, trouble)
 
-    def _refused(self, error: CommandRefused, order: ShotOrder) -> LinkError:
+    def _refused(self, error: lines.CommandRefused, order: reports.ShotOrder) -> LinkError:
         """A trigger that came too late, and may be written again. Raises what any other refusal means."""
-        if error.code == errors.TOO_LATE:
+        if error.code == WireError.TOO_LATE:
             return error
         if error.code in _DOUBLED:
             raise self._unsure(order, f"the shot was fired, and its answer was lost ({error})") from error
         if error.code in _STOPPED:
-            raise Disconnected(f"not fired: {self._why_not(order)}") from error
+            raise lines.Disconnected(f"not fired: {self._why_not(order)}") from error
         if error.code in _LIMITS:
             raise LimitError(f"{error}; not fired") from error
         raise self._too_soon(error) from error
 
-    def _too_soon(self, error: CommandRefused) -> LinkError | LimitError:
+    def _too_soon(self, error: lines.CommandRefused) -> LinkError | LimitError:
         """A gun that was switched on just now fires nothing in its first second, and none before its magnet is home."""
         found = standing(self._link)[1]
         left_s = (found.ready_us - found.clock_us) / 1e6
@@ -241,13 +223,13 @@ class Triggering:
                 f"not fired: the gun was switched on or reset {found.clock_us / 1e6:.1f} s ago, and fires nothing in "
                 "its first second, because what was driven before is not known"
             )
-        if error.code == errors.MAGNET_NOT_HOME:
+        if error.code == WireError.MAGNET_NOT_HOME:
             return LimitError(
                 f"not fired: its magnet was not home, by the gun's own clock ({max(left_s, 0):.3f} s to go)"
             )
-        return Disconnected(f"not fired: {error}")
+        return lines.Disconnected(f"not fired: {error}")
 
-    def _why_not(self, order: ShotOrder) -> str:
+    def _why_not(self, order: reports.ShotOrder) -> str:
         """Why a shot was called off, or cut short: a disarming, a fault of the driver, the line, or the watchdog."""
         if self._arming.disarms != order.disarms:
             return "the gun was disarmed meanwhile"
@@ -259,40 +241,46 @@ class Triggering:
             return self._link.why_lost
         return f"the driver reports fault {found.fault}" if found.fault else "the gun does not say why"
 
-    def _believed(self, reply: Reply, record: ShotRecord, order: ShotOrder, tries: int) -> BelievedShot:
+    def _believed(
+        self, reply: lines.Reply, record: ShotRecord, order: reports.ShotOrder, tries: int
+    ) -> reports.BelievedShot:
         """What is told of a shot, if it is believed."""
         try:
-            check_record(record, order)
+            reports.check_record(record, order)
             return self._told(reply, record, order, tries)
-        except Contradiction as error:
+        except lines.Contradiction as error:
             raise self._disbelieved(order, error) from error
-        except CutShort as error:
+        except lines.CutShort as error:
             raise self._unsure(order, f"{error} ({self._why_not(order)})") from error
         except LinkError as error:
             raise self._lost(order, error) from error
 
-    def _told(self, reply: Reply, record: ShotRecord, order: ShotOrder, tries: int) -> BelievedShot:
+    def _told(
+        self, reply: lines.Reply, record: ShotRecord, order: reports.ShotOrder, tries: int
+    ) -> reports.BelievedShot:
         """A record's times on the host's clock. A clock that was misread is learnt anew before they are disbelieved."""
-        trouble = Contradiction()
+        trouble = lines.Contradiction()
         for _ in range(CLOCK_TRIES):
             accepted, start, end = self._link.host(record.accepted_us, record.start_us, record.end_us)
-            told = BelievedShot(reply=reply, record=record, tries=tries, accepted=accepted, start=start, end=end)
+            told = reports.BelievedShot(
+                reply=reply, record=record, tries=tries, accepted=accepted, start=start, end=end
+            )
             try:
-                check_times(told, order, self._speed)
-            except Contradiction as error:
+                reports.check_times(told, order, self._speed)
+            except lines.Contradiction as error:
                 trouble = error
                 ask_again(self._link, "TIME?")
             else:
                 return told
         raise trouble
 
-    def _disbelieved(self, order: ShotOrder, why: Contradiction) -> Unsure:
+    def _disbelieved(self, order: reports.ShotOrder, why: lines.Contradiction) -> lines.Unsure:
         return self._unsure(order, f"the shot may have been fired, and the gun's record is not believed: {why}")
 
-    def _lost(self, order: ShotOrder, why: LinkError) -> Unsure:
+    def _lost(self, order: reports.ShotOrder, why: LinkError) -> lines.Unsure:
         return self._unsure(order, f"the shot may have been fired: {why}, and the gun cannot tell any more")
 
-    def _unsure(self, order: ShotOrder, what: str) -> Unsure:
+    def _unsure(self, order: reports.ShotOrder, what: str) -> lines.Unsure:
         """The error of a shot that was, or may have been, fired. The gun is disarmed, lest it still be."""
         self._arming.disarm()
-        return Unsure(f"{what}; the gun's COUNT was {order.count} before it")
+        return lines.Unsure(f"{what}; the gun's COUNT was {order.count} before it")

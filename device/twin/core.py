@@ -9,17 +9,15 @@ from collections.abc import Callable
 from typing import Final
 
 from device.twin.machine import Carried, DriveEvent, StateMachine
-from device.wire import errors
-from device.wire.errors import message
-from device.wire.frame import Frame, Garbled, Splitter, decode, encode, is_newer
-from device.wire.records import WIRE_VERSION, Named, Setting, whole_number
+from device.wire import records
+from device.wire.errors import WireError, message
 
 QUEUE_SIZE: Final = 16
 WATCHDOG_MS: Final = 30_000
 """At boot, for a hand at a terminal; `SerialGun` asks for a shorter one."""
 MIN_WATCHDOG_MS, MAX_WATCHDOG_MS = 100, 60_000
 
-IDENTITY: Final = Named(model="haptic-gun", serial="TWIN-1", wire=WIRE_VERSION, firmware="1.0.0")
+IDENTITY: Final = records.Named(model="haptic-gun", serial="TWIN-1", wire=records.WIRE_VERSION, firmware="1.0.0")
 
 Said = str | int | None
 """What a command comes to: an answer, an error's number, or nothing to say but that it is done."""
@@ -29,12 +27,12 @@ class Core:
     """One gun from its boot at `now_us` on. Calls come with times that never run back; `board` carries drives out."""
 
     def __init__(
-        self, identity: Named = IDENTITY, now_us: int = 0, board: Callable[[DriveEvent], Carried] | None = None
+        self, identity: records.Named = IDENTITY, now_us: int = 0, board: Callable[[DriveEvent], Carried] | None = None
     ) -> None:
         self.machine = StateMachine(now_us, board)
         self.strict = False
         self._identity = identity
-        self._splitter = Splitter()
+        self._splitter = records.Splitter()
         self._errors: list[int] = []
         self._out = bytearray()
         self._last = 0  # sequence number
@@ -61,7 +59,7 @@ class Core:
         self._run_due(now_us)
         if self.machine.fail(fault, now_us):
             self._answer_trigger()
-        self._queue(errors.FAULT)
+        self._queue(WireError.FAULT)
         return self._taken()
 
     def _taken(self) -> tuple[bytes, list[DriveEvent]]:
@@ -82,7 +80,7 @@ class Core:
                     self._answer_ended()
             else:
                 self._abort(time_us)
-                self._queue(errors.WATCHDOG)
+                self._queue(WireError.WATCHDOG)
                 self.strict = False
 
     def _take(self, line: bytes | None, now_us: int) -> None:
@@ -92,7 +90,7 @@ class Core:
         elif self.strict:
             self._send(0, "NAK")
         elif line is None:
-            self._queue(errors.OVERRUN)
+            self._queue(WireError.OVERRUN)
         else:
             said = self._do(_text(line), now_us)
             self._heard_us = self._heard_us if isinstance(said, int) else now_us
@@ -100,8 +98,8 @@ class Core:
 
     def _take_frame(self, line: bytes, now_us: int) -> None:
         try:
-            frame = decode(line, "host")
-        except Garbled:
+            frame = records.decode(line, "host")
+        except records.Garbled:
             if line == b"*IDN?":
                 self._say(self._identity.text())
             else:
@@ -110,24 +108,24 @@ class Core:
         if frame.body.startswith("SYST:STRI "):
             self._enter(frame, now_us)
         elif not self.strict:
-            self._send(frame.number, f"ERR {message(errors.NO_SESSION)}")
-        elif is_newer(frame.number, self._last):
+            self._send(frame.number, f"ERR {message(WireError.NO_SESSION)}")
+        elif records.is_newer(frame.number, self._last):
             self._last, self._heard_us = frame.number, now_us
             self._answer(frame, now_us)
 
-    def _enter(self, frame: Frame, now_us: int) -> None:
+    def _enter(self, frame: records.Frame, now_us: int) -> None:
         """A session of the strict mode begins: disarmed, numbered from this frame on. It tells the token before."""
         try:
-            token = whole_number(frame.body.removeprefix("SYST:STRI "))
-        except Garbled:
-            self._send(frame.number, f"ERR {message(errors.BAD_TYPE)}")
+            token = records.whole_number(frame.body.removeprefix("SYST:STRI "))
+        except records.Garbled:
+            self._send(frame.number, f"ERR {message(WireError.BAD_TYPE)}")
             return
         self._pending = 0
         self._abort(now_us)
         self._send(frame.number, f"STRI {self._token}")
         self.strict, self._token, self._last, self._heard_us = True, token, frame.number, now_us
 
-    def _answer(self, frame: Frame, now_us: int) -> None:
+    def _answer(self, frame: records.Frame, now_us: int) -> None:
         if frame.body == "SYST:PLAI":
             self._abort(now_us)
             self._send(frame.number, "OK")
@@ -159,13 +157,13 @@ class Core:
         header, blank, rest = text.partition(" ")
         parameters = rest.split(",") if blank else []
         if header in _WITHOUT:
-            return errors.NOT_ALLOWED if parameters else self._simple(header, now_us)
+            return WireError.NOT_ALLOWED if parameters else self._simple(header, now_us)
         try:
             return self._with(
-                header, rest, [] if header == "CONF" else [whole_number(text) for text in parameters], now_us
+                header, rest, [] if header == "CONF" else [records.whole_number(text) for text in parameters], now_us
             )
-        except Garbled:
-            return errors.BAD_TYPE if header in _WITH else errors.UNDEFINED
+        except records.Garbled:
+            return WireError.BAD_TYPE if header in _WITH else WireError.UNDEFINED
 
     def _simple(self, header: str, now_us: int) -> Said:
         match header:
@@ -194,22 +192,24 @@ class Core:
                 return self.machine.shot.text()
             case "CONF?":
                 setting = self.machine.setting
-                return errors.NOT_CONFIGURED if setting is None else f"CONF {setting.text()}"
+                return WireError.NOT_CONFIGURED if setting is None else f"CONF {setting.text()}"
             case "SYST:WATC?":
                 return f"WATC {self._watchdog_us // 1000}"
             case _:
-                return message(self._errors.pop(0) if self._errors else errors.NO_DEVICE_ERROR)
+                return message(self._errors.pop(0) if self._errors else WireError.NO_DEVICE_ERROR)
 
     def _with(self, header: str, rest: str, numbers: list[int], now_us: int) -> Said:
         match header:
             case "CONF":
-                return (self.machine.configure(Setting.parse(rest)) if rest else errors.MISSING_PARAMETER) or None
+                return (
+                    self.machine.configure(records.Setting.parse(rest)) if rest else WireError.MISSING_PARAMETER
+                ) or None
             case "TRIG" if len(numbers) <= 3:
                 mark, at_us, before_us = [*numbers, 0, 0, 0][:3]
                 return self.machine.trigger(mark, at_us, before_us, now_us) or None
             case "SYST:WATC" if len(numbers) == 1:
                 if not MIN_WATCHDOG_MS <= numbers[0] <= MAX_WATCHDOG_MS:
-                    return errors.OUT_OF_RANGE
+                    return WireError.OUT_OF_RANGE
                 self._watchdog_us = 1000 * numbers[0]
                 return None
             case _:
@@ -227,13 +227,13 @@ class Core:
             self._out.extend(f"{said}\n".encode("ascii"))
 
     def _send(self, sequence: int, body: str) -> None:
-        self._out.extend(encode(Frame(number=sequence, body=body), "gun"))
+        self._out.extend(records.encode(records.Frame(number=sequence, body=body), "gun"))
 
     def _queue(self, error: int) -> None:
         if len(self._errors) < QUEUE_SIZE:
             self._errors.append(error)
         else:
-            self._errors[-1] = errors.QUEUE_OVERFLOW
+            self._errors[-1] = WireError.QUEUE_OVERFLOW
 
 
 _WITHOUT: Final = frozenset(
@@ -244,8 +244,8 @@ _WITH: Final = frozenset(("CONF", "TRIG", "SYST:WATC"))
 
 def _wrong_count(header: str, count: int) -> int:
     if header not in _WITH:
-        return errors.UNDEFINED
-    return errors.MISSING_PARAMETER if count == 0 else errors.NOT_ALLOWED
+        return WireError.UNDEFINED
+    return WireError.MISSING_PARAMETER if count == 0 else WireError.NOT_ALLOWED
 
 
 def _text(line: bytes) -> str:

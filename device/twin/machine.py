@@ -12,7 +12,7 @@ from collections.abc import Callable
 from dataclasses import dataclass, replace
 from typing import Final, Literal
 
-from device.wire import errors
+from device.wire.errors import WireError
 from device.wire.records import Setting, ShotRecord, StatusRecord, WireState
 
 MAX_MILLIVOLTS: Final = 24_000
@@ -62,12 +62,12 @@ class Budget:
     def refusal(self, setting: Setting, start_us: int) -> int:
         """The error that forbids a shot at `start_us`, or 0."""
         if len(self._pulses) == MAX_SHOTS and start_us < self._pulses[0][0] + MINUTE_US:
-            return errors.RATE
+            return WireError.RATE
         if self._driven_too_long(_driven_us(setting), start_us):
-            return errors.DUTY
+            return WireError.DUTY
         if self._warmth_at(start_us) + _heat_nanojoules(setting) > MAX_WARMTH_NJ:
-            return errors.HOT
-        return errors.NO_DEVICE_ERROR
+            return WireError.HOT
+        return WireError.NO_DEVICE_ERROR
 
     def spend(self, setting: Setting, start_us: int) -> None:
         """Take a shot into account. A pulse that is cut short counts in full."""
@@ -115,15 +115,15 @@ MAX_MARK: Final = 0xFFFF_FFFF
 
 Guarded = Literal["CONF", "ARM", "TRIG"]
 REFUSED: Final[dict[tuple[Guarded, WireState], int]] = {
-    ("CONF", "WAITING"): errors.BUSY,
-    ("CONF", "FIRING"): errors.BUSY,
-    ("ARM", "WAITING"): errors.BUSY,
-    ("ARM", "FIRING"): errors.BUSY,
-    ("ARM", "FAULT"): errors.FAULT,
-    ("TRIG", "DISARMED"): errors.DISARMED,
-    ("TRIG", "WAITING"): errors.BUSY,
-    ("TRIG", "FIRING"): errors.BUSY,
-    ("TRIG", "FAULT"): errors.FAULT,
+    ("CONF", "WAITING"): WireError.BUSY,
+    ("CONF", "FIRING"): WireError.BUSY,
+    ("ARM", "WAITING"): WireError.BUSY,
+    ("ARM", "FIRING"): WireError.BUSY,
+    ("ARM", "FAULT"): WireError.FAULT,
+    ("TRIG", "DISARMED"): WireError.DISARMED,
+    ("TRIG", "WAITING"): WireError.BUSY,
+    ("TRIG", "FIRING"): WireError.BUSY,
+    ("TRIG", "FAULT"): WireError.FAULT,
 }
 """What is refused in which state; everything else is taken. ABOR, *RST and questions are taken in every state."""
 
@@ -163,7 +163,7 @@ class Carried:
     """How the board carried a drive out: when, or the error for which it did not."""
 
     at_us: int
-    error: int = errors.NO_DEVICE_ERROR
+    error: int = WireError.NO_DEVICE_ERROR
 
 
 @dataclass(slots=True, kw_only=True)
@@ -177,8 +177,8 @@ class Board:
         """What becomes of a drive."""
         at_us = drive.time_us + self.late_us
         if self.dead:
-            return Carried(at_us=at_us, error=errors.FAULT)
-        return Carried(at_us=at_us, error=errors.TOO_LATE if drive.is_over(at_us) else errors.NO_DEVICE_ERROR)
+            return Carried(at_us=at_us, error=WireError.FAULT)
+        return Carried(at_us=at_us, error=WireError.TOO_LATE if drive.is_over(at_us) else WireError.NO_DEVICE_ERROR)
 
 
 class StateMachine:
@@ -193,7 +193,7 @@ class StateMachine:
         self.setting: Setting | None = None
         self.shot: ShotRecord = NO_SHOT
         self.drives: list[DriveEvent] = []
-        self.never = errors.NO_DEVICE_ERROR
+        self.never: int = WireError.NO_DEVICE_ERROR
         self._board = board or Board()
         self._fault = 0
         self._ready_us = boot_us + BOOT_REST_US
@@ -213,16 +213,16 @@ class StateMachine:
 
     def configure(self, setting: Setting) -> int:
         """Make the next shots of this. The error, or 0."""
-        error = REFUSED.get(("CONF", self.state), errors.NO_DEVICE_ERROR)
+        error = REFUSED.get(("CONF", self.state), WireError.NO_DEVICE_ERROR)
         if not error and out_of_range(setting):
-            error = errors.OUT_OF_RANGE
+            error = WireError.OUT_OF_RANGE
         if not error:
             self.setting = setting
         return error
 
     def arm(self) -> int:
         """Allow shots. The error, or 0."""
-        error = REFUSED.get(("ARM", self.state), errors.NO_DEVICE_ERROR)
+        error = REFUSED.get(("ARM", self.state), WireError.NO_DEVICE_ERROR)
         if not error:
             self.state = "ARMED"
         return error
@@ -244,23 +244,23 @@ class StateMachine:
             setting=self.setting,
         )
         self.state = "WAITING"
-        return errors.NO_DEVICE_ERROR
+        return WireError.NO_DEVICE_ERROR
 
     def _forbidden(self, mark: int, start_us: int, before_us: int, now_us: int) -> int:
         """The first rule that a trigger breaks, in this order; or 0."""
-        error = REFUSED.get(("TRIG", self.state), errors.NO_DEVICE_ERROR)
+        error = REFUSED.get(("TRIG", self.state), WireError.NO_DEVICE_ERROR)
         if error:
             return error
         if self.setting is None:
-            return errors.NOT_CONFIGURED
+            return WireError.NOT_CONFIGURED
         if mark > MAX_MARK or start_us - now_us > MAX_AHEAD_US:
-            return errors.OUT_OF_RANGE
+            return WireError.OUT_OF_RANGE
         if mark != 0 and mark == self.shot.mark and self.shot.ending != "NONE":
-            return errors.ALREADY_FIRED
+            return WireError.ALREADY_FIRED
         if before_us != 0 and start_us > before_us:
-            return errors.TOO_LATE
+            return WireError.TOO_LATE
         if start_us < self._ready_us:
-            return errors.MAGNET_NOT_HOME if self.shot.count else errors.JUST_BOOTED
+            return WireError.MAGNET_NOT_HOME if self.shot.count else WireError.JUST_BOOTED
         return self._budget.refusal(self.setting, start_us)
 
     def abort(self, now_us: int) -> bool:
@@ -269,7 +269,7 @@ class StateMachine:
         if self.state == "FIRING":
             self._end(now_us)
         elif self.state == "WAITING":
-            self._call_off(errors.CANCELLED)
+            self._call_off(WireError.CANCELLED)
         if self.state != "FAULT":
             self.state = "DISARMED"
         return ended

@@ -2,61 +2,49 @@
 
 from __future__ import annotations
 
-from typing import Final
+from enum import IntEnum
+from typing import Self
 
-NO_DEVICE_ERROR: Final = 0
-BAD_TYPE: Final = -104
-NOT_ALLOWED: Final = -108
-MISSING_PARAMETER: Final = -109
-UNDEFINED: Final = -113
-OUT_OF_RANGE: Final = -222
-QUEUE_OVERFLOW: Final = -350
-OVERRUN: Final = -363
-DISARMED: Final = 101
-MAGNET_NOT_HOME: Final = 102
-DUTY: Final = 103
-RATE: Final = 104
-HOT: Final = 105
-NOT_CONFIGURED: Final = 106
-TOO_LATE: Final = 107
-BUSY: Final = 108
-WATCHDOG: Final = 109
-FAULT: Final = 110
-NO_SESSION: Final = 111
-CANCELLED: Final = 112
-ALREADY_FIRED: Final = 113
-JUST_BOOTED: Final = 114
 
-TEXTS: Final = {
-    NO_DEVICE_ERROR: "No error",
-    BAD_TYPE: "Data type error",
-    NOT_ALLOWED: "Parameter not allowed",
-    MISSING_PARAMETER: "Missing parameter",
-    UNDEFINED: "Undefined header",
-    OUT_OF_RANGE: "Data out of range",
-    QUEUE_OVERFLOW: "Queue overflow",
-    OVERRUN: "Input buffer overrun",
-    DISARMED: "Disarmed",
-    MAGNET_NOT_HOME: "Magnet not home",
-    DUTY: "Duty limit",
-    RATE: "Shots per minute limit",
-    HOT: "Coil too hot",
-    NOT_CONFIGURED: "Not configured",
-    TOO_LATE: "Too late",
-    BUSY: "Busy",
-    WATCHDOG: "Watchdog",
-    FAULT: "Driver fault",
-    NO_SESSION: "No session",
-    CANCELLED: "Cancelled",
-    ALREADY_FIRED: "Already fired",
-    JUST_BOOTED: "Just booted",
-}
+class WireError(IntEnum):
+    """An error by its number, with the `text` that stands behind it on the wire."""
+
+    text: str
+
+    NO_DEVICE_ERROR = 0, "No error"
+    BAD_TYPE = -104, "Data type error"
+    NOT_ALLOWED = -108, "Parameter not allowed"
+    MISSING_PARAMETER = -109, "Missing parameter"
+    UNDEFINED = -113, "Undefined header"
+    OUT_OF_RANGE = -222, "Data out of range"
+    QUEUE_OVERFLOW = -350, "Queue overflow"
+    OVERRUN = -363, "Input buffer overrun"
+    DISARMED = 101, "Disarmed"
+    MAGNET_NOT_HOME = 102, "Magnet not home"
+    DUTY = 103, "Duty limit"
+    RATE = 104, "Shots per minute limit"
+    HOT = 105, "Coil too hot"
+    NOT_CONFIGURED = 106, "Not configured"
+    TOO_LATE = 107, "Too late"
+    BUSY = 108, "Busy"
+    WATCHDOG = 109, "Watchdog"
+    FAULT = 110, "Driver fault"
+    NO_SESSION = 111, "No session"
+    CANCELLED = 112, "Cancelled"
+    ALREADY_FIRED = 113, "Already fired"
+    JUST_BOOTED = 114, "Just booted"
+
+    def __new__(cls, code: int, text: str = "") -> Self:
+        """A number with its text."""
+        one = int.__new__(cls, code)
+        one._value_, one.text = code, text
+        return one
 
 
 def message(code: int) -> str:
     """An error as it stands on the wire.
 
-    >>> message(DISARMED)
+    >>> message(WireError.DISARMED)
     '101,"Disarmed"'
     """
-    return f'{code},"{TEXTS[code]}"'
+    return f'{code},"{WireError(code).text}"'

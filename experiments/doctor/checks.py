@@ -1,4 +1,4 @@
-"""The checks in their order. Each has a deadline; none stops another.
+"""The checks in their order, and what they measure in this process. Each has a deadline; none stops another.
 
 Work that may hang is waited for no longer than its deadline. What could crash runs in a child program, which is asked
 for figures: its crash or silence is an answer.
@@ -7,27 +7,156 @@ for figures: its crash or silence is an answer.
 from __future__ import annotations
 
 import os
+import platform
 import re
+import shutil
 import subprocess
 import sys
 import tempfile
 import threading
+import time
 from collections.abc import Callable, Iterator, Mapping
-from contextlib import suppress
+from concurrent.futures import Future, wait
+from contextlib import closing, contextmanager, suppress
 from dataclasses import dataclass
 from functools import partial
+from importlib import metadata
+from itertools import pairwise
 from pathlib import Path
 from typing import IO, TypeVar
 
 from pydantic import TypeAdapter
 
-from device import DeviceError
-from experiments.doctor import measures, verdicts
-from experiments.doctor.figures import DoctorFinding, ProgramFigures
+from device import DeviceError, open_gun
+from device.serial_gun.gun import speed_of
+from experiments.clock import RealClock
+from experiments.doctor import verdicts
+from experiments.doctor.figures import Adapter, Appends, DoctorFinding, GunLine, Machine, ProgramFigures, Ticks, spread
 from experiments.doctor.verdicts import Latencies, latencies, pooled
-from experiments.record import journal
+from experiments.record import journal, storage
 from experiments.record.journal import JournalError
-from experiments.study.places import PlaceError
+from experiments.record.provenance import recoil_version
+from experiments.runner import gun_name
+from experiments.study.folders import PlaceError
+
+PACKAGES = ("numpy", "scipy", "PyQt6", "psychopy")
+READINGS = 20_000
+SLEEPS = 200
+APPENDS = 200
+ENOUGH_S = 5.0
+"""Repeating something slow ends then, with fewer repetitions."""
+
+_LINE = b"x" * 499 + b"\n"
+"""About as long as a record of a journal."""
+
+
+def machine() -> Machine:
+    """This machine. Packages are looked up, not imported."""
+    versions = {name: _version(name) for name in PACKAGES}
+    return Machine(
+        system=f"{platform.system()} {platform.release()} {platform.machine()}",
+        python=platform.python_version(),
+        cores=os.cpu_count() or 1,
+        versions={"recoil": recoil_version(), **versions},
+    )
+
+
+def _version(package: str) -> str | None:
+    try:
+        return metadata.version(package)
+    except metadata.PackageNotFoundError:
+        return None
+
+
+def ticks() -> Ticks:
+    """The monotonic clock, and how much longer a sleep of 1 ms is."""
+    readings = [time.monotonic() for _ in range(READINGS)]
+    return Ticks(
+        resolution_s=time.get_clock_info("monotonic").resolution,
+        smallest_step_s=min(later - sooner for sooner, later in pairwise(readings) if later > sooner),
+        oversleep_ms=spread([ms - 1.0 for ms in timed_ms(SLEEPS, lambda: time.sleep(0.001))]),
+    )
+
+
+def timed_ms(count: int, act: Callable[[], object]) -> list[float]:
+    """How long an act takes each time, in milliseconds; fewer times if it is slow."""
+    times, end_s = list[float](), time.monotonic() + ENOUGH_S
+    while len(times) < count and (not times or time.monotonic() < end_s):
+        start_s = time.monotonic()
+        act()
+        times.append(1000 * (time.monotonic() - start_s))
+    return times
+
+
+def appends(folder: Path) -> Appends:
+    """Lines appended and synced in a folder, which is made if need be. Leaves nothing. `OSError` if it takes none."""
+    with _folder(folder), _file(folder / f".doctor-{os.getpid()}") as descriptor:
+        times = timed_ms(APPENDS, lambda: _append(descriptor))
+        return Appends(append_ms=spread(times), free_bytes=shutil.disk_usage(folder).free)
+
+
+def _append(descriptor: int) -> None:
+    storage.write_all(descriptor, _LINE)
+    storage.sync(descriptor)
+
+
+@contextmanager
+def _folder(folder: Path) -> Iterator[None]:
+    """A folder that is there meanwhile; what had to be made for it is taken away again."""
+    made = [path for path in (folder, *folder.parents) if not path.exists()]
+    try:
+        storage.make_folder(folder)
+        yield
+    finally:
+        for path in made:
+            with suppress(OSError):  # never made, or somebody put something in it by now
+                path.rmdir()
+
+
+@contextmanager
+def _file(path: Path) -> Iterator[int]:
+    """A new file to append to, gone afterwards."""
+    descriptor = storage.create(path)
+    try:
+        yield descriptor
+    finally:
+        os.close(descriptor)
+        path.unlink(missing_ok=True)
+
+
+ROUND_TRIPS = 200
+ADAPTERS = Path("/sys/bus/usb-serial/devices")
+"""Where Linux shows them; nowhere else."""
+
+
+def gun_line(address: str) -> GunLine:
+    """Ask the gun who it is and how it stands, many times.
+
+    `DeviceError` if it does not answer; `PlaceError` if there is no such form of address.
+    """
+    try:
+        gun = open_gun(address, clock=RealClock(speed_of(address) or 1.0).now)
+    except ValueError as error:
+        raise PlaceError(f"--gun {address}: {error}") from error
+    with closing(gun):
+        name = gun_name(gun.identify())
+        gun.disarm()
+        times = timed_ms(ROUND_TRIPS, gun.status)
+        status = gun.status()
+    return GunLine(gun=name, state=status.state, fault=status.fault, round_trip_ms=spread(times))
+
+
+def adapters(folder: Path = ADAPTERS) -> list[Adapter]:
+    """The USB serial adapters that have a latency timer."""
+    return list(_adapters(folder))
+
+
+def _adapters(folder: Path) -> Iterator[Adapter]:
+    for setting in sorted(folder.glob("*/latency_timer")):
+        with suppress(OSError, ValueError):  # pulled out just now
+            latency_ms = int(setting.read_text(encoding="ascii"))
+            yield Adapter(name=setting.parent.name, setting=str(setting), latency_ms=latency_ms)
+
 
 DEADLINE_S = 20.0
 PSYCHOPY_DEADLINE_S = 60.0
@@ -45,11 +174,11 @@ class Check:
 def checks(results: Path, gun: str, limit_s: float) -> tuple[Check, ...]:
     """What there is to look at, for a results folder and a gun's address; `limit_s` is its line's, there and back."""
     looks: dict[str, Callable[[], tuple[DoctorFinding, ...]]] = {
-        "machine": lambda: (verdicts.of_machine(measures.machine()),),
-        "clock": lambda: (verdicts.of_clock(measures.ticks()),),
+        "machine": lambda: (verdicts.of_machine(machine()),),
+        "clock": lambda: (verdicts.of_clock(ticks()),),
         "disk": partial(_disk, results),
         "gun": partial(_gun, gun, limit_s),
-        "USB adapter": lambda: (verdicts.of_adapters(measures.adapters()),),
+        "USB adapter": lambda: (verdicts.of_adapters(adapters()),),
         "display": partial(_on_display, "display", "display"),
         "PsychoPy": partial(_on_display, "PsychoPy", "stage", PSYCHOPY_DEADLINE_S),
         "sound": _sound,
@@ -82,14 +211,14 @@ def no_display(environment: Mapping[str, str], platform: str) -> str:
 
 def _disk(results: Path) -> tuple[DoctorFinding, ...]:
     try:
-        return (verdicts.of_disk(within_seconds(DEADLINE_S, partial(measures.appends, results))),)
+        return (verdicts.of_disk(within_seconds(DEADLINE_S, partial(appends, results))),)
     except OSError as error:  # a deadline that passed is one as well
         return (verdicts.of_disk_failure(str(results), error.strerror or str(error)),)
 
 
 def _gun(address: str, limit_s: float) -> tuple[DoctorFinding, ...]:
     try:
-        return (verdicts.of_link(within_seconds(DEADLINE_S, partial(measures.gun_line, address)), limit_s),)
+        return (verdicts.of_link(within_seconds(DEADLINE_S, partial(gun_line, address)), limit_s),)
     except (DeviceError, OSError) as error:
         return (verdicts.of_link_failure(str(error)),)
 
@@ -127,29 +256,23 @@ PUT_AWAY_S = 2.0
 
 def within_seconds(seconds: float, work: Callable[[], _Result]) -> _Result:
     """The result of some work, or what it raises. `TimeoutError` if it takes longer; it is then left to itself."""
-    results: list[_Result] = []
-    errors: list[Exception] = []
-    done = threading.Event()  # not `join`: once interrupted, it takes the thread for ended
+    done: Future[_Result] = Future()
 
     def carry_out() -> None:
         try:
-            results.append(work())
+            done.set_result(work())
         except Exception as error:  # noqa: BLE001 - raised again where it is waited for
-            errors.append(error)
-        finally:
-            done.set()
+            done.set_exception(error)
 
     try:
         threading.Thread(target=carry_out, daemon=True, name="check").start()
-        done.wait(seconds)
+        wait([done], seconds)
     except KeyboardInterrupt:
-        done.wait(PUT_AWAY_S)  # so that it can close and remove what it opened
+        wait([done], PUT_AWAY_S)  # so that it can close and remove what it opened
         raise
-    if errors:
-        raise errors[0]
-    if not results:
+    if not done.done():
         raise TimeoutError(f"did not end within {seconds:g} s")
-    return results[0]
+    return done.result()
 
 
 _ROOT = Path(__file__).parents[2]

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Literal, get_args
+from typing import Literal
 
 import numpy as np
 
@@ -156,8 +156,6 @@ Figures = Machine | Ticks | Appends | GunLine | Adapters | ProgramFigures | Cons
 
 DoctorVerdict = Literal["good", "warning", "fails", "not there"]
 """`warning`: works, but not as it should; `fails`: a run would suffer; `not there`: this machine has no such thing."""
-
-DOCTOR_VERDICTS: tuple[DoctorVerdict, ...] = get_args(DoctorVerdict)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -12,25 +12,7 @@ from dataclasses import dataclass
 from itertools import pairwise
 from typing import Literal
 
-from experiments.doctor.figures import (
-    Adapter,
-    Adapters,
-    Appends,
-    ConsoleLatency,
-    Display,
-    DoctorFinding,
-    DoctorVerdict,
-    Figures,
-    GunLine,
-    Keys,
-    Machine,
-    Percentiles,
-    ProgramFigures,
-    PsychoPyStage,
-    Sound,
-    Ticks,
-    spread,
-)
+from experiments.doctor import figures
 from experiments.record.journal import Record, read_as
 from experiments.session.steps import OUTCOME, STEP, Answered, Fired, Outcome, Present
 
@@ -124,7 +106,7 @@ MIN_WIDTH_PX, MIN_HEIGHT_PX = 1024, 720
 INSTALL = 'install the screens: pip install "recoil[gui]"'
 
 
-def of_machine(found: Machine) -> DoctorFinding:
+def of_machine(found: figures.Machine) -> figures.DoctorFinding:
     """The machine itself; a warning if the packages of the screens are not installed."""
     versions = ", ".join(f"{name} {version or 'none'}" for name, version in found.versions.items())
     missing = [name for name, version in found.versions.items() if version is None]
@@ -136,7 +118,7 @@ def of_machine(found: Machine) -> DoctorFinding:
     )
 
 
-def of_clock(found: Ticks) -> DoctorFinding:
+def of_clock(found: figures.Ticks) -> figures.DoctorFinding:
     """The clock that stamps the trials."""
     step_us, sleep = 1e6 * found.smallest_step_s, found.oversleep_ms
     advice = []
@@ -151,7 +133,7 @@ def of_clock(found: Ticks) -> DoctorFinding:
     return _judged("clock", measured, "; ".join(advice), found)
 
 
-def of_disk(found: Appends) -> DoctorFinding:
+def of_disk(found: figures.Appends) -> figures.DoctorFinding:
     """The disk under the results folder."""
     advice = []
     if found.append_ms.p95 > MAX_APPEND_MS:
@@ -164,23 +146,19 @@ def of_disk(found: Appends) -> DoctorFinding:
     return _judged("disk", measured, "; ".join(advice), found)
 
 
-def of_disk_failure(folder: str, reason: str) -> DoctorFinding:
+def of_disk_failure(folder: str, reason: str) -> figures.DoctorFinding:
     """A results folder that takes no records."""
     advice = f"make {folder} a folder that you may write to, with room on its disk, or give another with --results"
-    return DoctorFinding(check="disk", verdict="fails", measured=f"{folder}: {reason}", advice=advice)
+    return figures.DoctorFinding(check="disk", verdict="fails", measured=f"{folder}: {reason}", advice=advice)
 
 
-def of_link(found: GunLine, limit_s: float) -> DoctorFinding:
+def of_link(found: figures.GunLine, limit_s: float) -> figures.DoctorFinding:
     """The gun and the way to it, whose 95th percentile is to keep a limit."""
     measured = f"{found.gun}, {found.state}; round trip {_tail(found.round_trip_ms)}"
     if found.fault is not None or found.state != "disarmed":
-        return DoctorFinding(
-            check="gun",
-            verdict="fails",
-            measured=measured if found.fault is None else f"{measured}; fault: {found.fault}",
-            advice="switch off the gun's power, remove the cause, and look again before anybody holds it",
-            figures=found,
-        )
+        advice = "switch off the gun's power, remove the cause, and look again before anybody holds it"
+        measured += "" if found.fault is None else f"; fault: {found.fault}"
+        return figures.DoctorFinding(check="gun", verdict="fails", measured=measured, advice=advice, figures=found)
     advice = (
         f"95th percentile above the limit of {1000 * limit_s:g} ms (the gun's serial.round_trip_limit_s): set the USB "
         "adapter's latency timer to 1 ms, see below; close other programs"
@@ -188,51 +166,43 @@ def of_link(found: GunLine, limit_s: float) -> DoctorFinding:
     return _judged("gun", measured, advice if found.round_trip_ms.p95 > 1000 * limit_s else "", found)
 
 
-def of_link_failure(reason: str) -> DoctorFinding:
+def of_link_failure(reason: str) -> figures.DoctorFinding:
     """A gun that does not answer."""
     advice = "check power, cable and port; on Linux you must be in the group dialout"
-    return DoctorFinding(check="gun", verdict="fails", measured=reason, advice=advice)
+    return figures.DoctorFinding(check="gun", verdict="fails", measured=reason, advice=advice)
 
 
-def of_adapters(found: Sequence[Adapter]) -> DoctorFinding:
+def of_adapters(found: Sequence[figures.Adapter]) -> figures.DoctorFinding:
     """The latency timers of USB serial adapters, where the system shows them."""
     if not found:
         measured = "this system shows no USB serial adapter with a latency timer"
-        return DoctorFinding(
-            check="USB adapter",
-            verdict="not there",
-            measured=measured,
-            advice="nothing, unless the gun is on a USB serial port",
-        )
+        advice = "nothing, unless the gun is on a USB serial port"
+        return figures.DoctorFinding(check="USB adapter", verdict="not there", measured=measured, advice=advice)
     slow = [adapter for adapter in found if adapter.latency_ms > MAX_ADAPTER_MS]
-    return DoctorFinding(
-        check="USB adapter",
-        verdict="warning" if slow else "good",
-        measured=", ".join(f"{adapter.name}: latency timer {adapter.latency_ms} ms" for adapter in found),
-        advice="; ".join(f"echo {MAX_ADAPTER_MS} | sudo tee {adapter.setting}" for adapter in slow),
-        figures=Adapters(adapters=tuple(found)),
-    )
+    measured = ", ".join(f"{adapter.name}: latency timer {adapter.latency_ms} ms" for adapter in found)
+    advice = "; ".join(f"echo {MAX_ADAPTER_MS} | sudo tee {adapter.setting}" for adapter in slow)
+    return _judged("USB adapter", measured, advice, figures.Adapters(adapters=tuple(found)))
 
 
-def of_seen(found: ProgramFigures) -> DoctorFinding:
+def of_seen(found: figures.ProgramFigures) -> figures.DoctorFinding:
     """What a program of its own saw."""
     match found:
-        case Display():
+        case figures.Display():
             return of_display(found)
-        case PsychoPyStage():
+        case figures.PsychoPyStage():
             return of_stage(found)
-        case Sound():
+        case figures.Sound():
             return of_sound(found)
-        case Keys():
+        case figures.Keys():
             return of_keys(found)
 
 
-def of_display(found: Display) -> DoctorFinding:
+def of_display(found: figures.Display) -> figures.DoctorFinding:
     """The screen that the console is seen on."""
     size = f"{found.width_px} x {found.height_px} at {found.refresh_Hz:.0f} Hz ({found.platform})"
     if found.opened_ms is None:
         advice = "see that the desktop shows windows, then look again"
-        return DoctorFinding(
+        return figures.DoctorFinding(
             check="display", verdict="fails", measured=f"{size}; no window was seen", advice=advice, figures=found
         )
     advice = ""
@@ -243,7 +213,7 @@ def of_display(found: Display) -> DoctorFinding:
     return _judged("display", f"{size}; a window was seen after {found.opened_ms:.0f} ms", advice, found)
 
 
-def of_stage(found: PsychoPyStage) -> DoctorFinding:
+def of_stage(found: figures.PsychoPyStage) -> figures.DoctorFinding:
     """PsychoPy. How fast it draws is information only: without vertical sync it means nothing."""
     measured = (
         f"PsychoPy {found.version} imported in {found.import_s:.1f} s, a window in {found.opened_s:.1f} s; "
@@ -252,7 +222,7 @@ def of_stage(found: PsychoPyStage) -> DoctorFinding:
     return _judged("PsychoPy", measured, "", found)
 
 
-def of_sound(found: Sound) -> DoctorFinding:
+def of_sound(found: figures.Sound) -> figures.DoctorFinding:
     """The device that plays the break's tone and the masking noise."""
     if not found.outputs:
         return no_sound("no output device")
@@ -261,23 +231,23 @@ def of_sound(found: Sound) -> DoctorFinding:
     return _judged("sound", f"{count}, default: {found.default or 'none'}", advice, found)
 
 
-def no_sound(reason: str) -> DoctorFinding:
+def no_sound(reason: str) -> figures.DoctorFinding:
     """A machine that cannot be heard."""
     advice = (
         "the break's tone and masking noise stay silent: connect headphones or loudspeakers "
         "and see that the system lists them"
     )
-    return DoctorFinding(check="sound", verdict="not there", measured=reason, advice=advice)
+    return figures.DoctorFinding(check="sound", verdict="not there", measured=reason, advice=advice)
 
 
-def of_keys(found: Keys) -> DoctorFinding:
+def of_keys(found: figures.Keys) -> figures.DoctorFinding:
     """The way of a key to a Qt window. It begins at the display's server: the keyboard's own delay is not in it."""
     came = len(found.to_event_ms)
     if came == 0:
         measured = f"none of {found.injected} injected keys came to the window"
         advice = "leave the doctor's window in front, keep your hands off, and look again"
-        return DoctorFinding(check="keyboard", verdict="warning", measured=measured, advice=advice, figures=found)
-    event, painted = spread(found.to_event_ms), spread(found.to_painted_ms)
+        return _judged("keyboard", measured, advice, found)
+    event, painted = figures.spread(found.to_event_ms), figures.spread(found.to_painted_ms)
     measured = f"{came} of {found.injected} keys; to the event {_short(event)}; until painted {_short(painted)}"
     advice = "" if came == found.injected else "some keys went elsewhere: leave the doctor's window in front"
     if event.p99 > MAX_KEY_MS:
@@ -285,7 +255,7 @@ def of_keys(found: Keys) -> DoctorFinding:
     return _judged("keyboard", measured, advice, found)
 
 
-def of_latencies(found: Latencies) -> tuple[DoctorFinding, DoctorFinding]:
+def of_latencies(found: Latencies) -> tuple[figures.DoctorFinding, figures.DoctorFinding]:
     """What the console took in the runs of a results folder."""
     return (
         _latency("step to screen", found.step_to_screen_ms, MAX_STEP_TO_SCREEN_MS, "steps", found.trials),
@@ -293,35 +263,26 @@ def of_latencies(found: Latencies) -> tuple[DoctorFinding, DoctorFinding]:
     )
 
 
-def _latency(check: str, values: Sequence[float], bound: float, what: str, trials: int) -> DoctorFinding:
+def _latency(check: str, values: Sequence[float], bound: float, what: str, trials: int) -> figures.DoctorFinding:
     if not values:
-        return DoctorFinding(
-            check=check,
-            verdict="not there",
-            measured="no console runs here",
-            advice="look again after a run with --screen console, with the same --results",
-        )
-    found = spread(values)
+        advice = "look again after a run with --screen console, with the same --results"
+        return figures.DoctorFinding(check=check, verdict="not there", measured="no console runs here", advice=advice)
+    found = figures.spread(values)
     measured = f"{_short(found)}, worst {_ms(found.worst)}; {found.n} {what} in {trials} trials"
-    slow = found.p99 > bound
-    return DoctorFinding(
-        check=check,
-        verdict="warning" if slow else "good",
-        measured=measured,
-        advice=f"more than {bound:g} ms: close other programs; see the disk and display above" if slow else "",
-        figures=ConsoleLatency(ms=found, bound_ms=bound, trials=trials),
-    )
+    advice = f"more than {bound:g} ms: close other programs; see the disk and display above"
+    latency = figures.ConsoleLatency(ms=found, bound_ms=bound, trials=trials)
+    return _judged(check, measured, advice if found.p99 > bound else "", latency)
 
 
-def of_absent(check: str, reason: str) -> DoctorFinding:
+def of_absent(check: str, reason: str) -> figures.DoctorFinding:
     """Something that this machine does not have."""
     advice = INSTALL if reason.endswith("not installed") else _ABSENT[check]
-    return DoctorFinding(check=check, verdict="not there", measured=reason, advice=advice)
+    return figures.DoctorFinding(check=check, verdict="not there", measured=reason, advice=advice)
 
 
-def of_failure(check: str, reason: str) -> DoctorFinding:
+def of_failure(check: str, reason: str) -> figures.DoctorFinding:
     """A check that broke off."""
-    return DoctorFinding(check=check, verdict="fails", measured=reason, advice=_BROKEN.get(check, _REPORT))
+    return figures.DoctorFinding(check=check, verdict="fails", measured=reason, advice=_BROKEN.get(check, _REPORT))
 
 
 _ABSENT = {
@@ -342,22 +303,22 @@ _BROKEN = {
 }
 
 
-def overall(verdicts: Sequence[DoctorVerdict]) -> Literal["good", "warning", "fails"]:
+def overall(verdicts: Sequence[figures.DoctorVerdict]) -> Literal["good", "warning", "fails"]:
     """The worst of the verdicts; what is not there does no harm."""
     return "fails" if "fails" in verdicts else "warning" if "warning" in verdicts else "good"
 
 
-def _judged(check: str, measured: str, advice: str, figures: Figures) -> DoctorFinding:
+def _judged(check: str, measured: str, advice: str, found: figures.Figures) -> figures.DoctorFinding:
     """Good if there is nothing to advise, else a warning."""
-    verdict: DoctorVerdict = "warning" if advice else "good"
-    return DoctorFinding(check=check, verdict=verdict, measured=measured, advice=advice, figures=figures)
+    verdict: figures.DoctorVerdict = "warning" if advice else "good"
+    return figures.DoctorFinding(check=check, verdict=verdict, measured=measured, advice=advice, figures=found)
 
 
-def _tail(of: Percentiles) -> str:
+def _tail(of: figures.Percentiles) -> str:
     return f"median {_ms(of.median)}, 95th percentile {_ms(of.p95)}, worst {_ms(of.worst)} (n = {of.n})"
 
 
-def _short(of: Percentiles) -> str:
+def _short(of: figures.Percentiles) -> str:
     return f"median {_ms(of.median)}, 99th percentile {_ms(of.p99)}"
 
 

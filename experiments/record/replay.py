@@ -6,21 +6,10 @@ from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 from experiments.record.journal import Contents, JournalError, Record, read_as
+from experiments.session import steps
 from experiments.session.history import History
 from experiments.session.remarks import REMARK, Halted, Remark, TestShot
 from experiments.session.states import EMERGENCY
-from experiments.session.steps import (
-    OUTCOME,
-    STEP,
-    Ask,
-    FireShot,
-    Interrupted,
-    Outcome,
-    Present,
-    Session,
-    Step,
-    step_record,
-)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -30,7 +19,7 @@ class RunPosition:
     `halted`: an emergency stop ended it, and no test shot was fired since; one must come before anything else.
     """
 
-    step: Step | None
+    step: steps.Step | None
     history: History = ()
     halted: bool = False
 
@@ -49,51 +38,53 @@ def _halted(contents: Contents) -> bool:
 
 def history(contents: Contents) -> History:
     """All that a journal tells, in order: the steps that were done, each with its outcome, and remarks between them."""
-    found: list[tuple[Step | None, Outcome | Remark]] = []
-    step: Step | None = None
+    found: list[tuple[steps.Step | None, steps.Outcome | Remark]] = []
+    step: steps.Step | None = None
     for line in contents.records:
         if line.kind == "step":
-            step = read_as(STEP, line.body, _place(contents, line))
+            step = read_as(steps.STEP, line.body, _place(contents, line))
         elif line.kind == "remark":
             found.append((None, _remark(contents, line)))
         elif line.kind == "outcome":
             if step is None:
                 raise JournalError(f"{_place(contents, line)}: an outcome without its step; a line was lost")
-            found.append((step, read_as(OUTCOME, line.body, _place(contents, line))))
+            found.append((step, read_as(steps.OUTCOME, line.body, _place(contents, line))))
             step = None
     return found
 
 
-def outcomes(history: History) -> list[tuple[Step, Outcome]]:
+def outcomes(history: History) -> list[tuple[steps.Step, steps.Outcome]]:
     """The steps that were done, each with its outcome."""
     return [(step, outcome) for step, outcome in history if step and not isinstance(outcome, Remark)]
 
 
-def replay(session: Session, contents: Contents) -> RunPosition:
+def replay(session: steps.Session, contents: Contents) -> RunPosition:
     """Send a journal's outcomes into a fresh session. `JournalError` if they are not those of this plan."""
     before = history(contents)
     step = next(session, None)
     for number, (recorded, outcome) in enumerate(outcomes(before), start=1):
         _compare(contents, number, step, recorded)
-        step = _send(session, outcome)
+        step = steps.step_after(session, outcome)
     return RunPosition(step=step, history=before, halted=_halted(contents))
 
 
-def go_on(session: Session, contents: Contents, position: RunPosition, append: Callable[..., None]) -> RunPosition:
+def go_on(
+    session: steps.Session, contents: Contents, position: RunPosition, append: Callable[..., None]
+) -> RunPosition:
     """Where a replayed run goes on.
 
     A step at which the run broke off is given up, told to the journal through `append`, and its trial presented again:
     its stimulus was felt, may have been, or was about to be.
     """
     step, announced = position.step, _last_step_is_open(contents)
-    if step is None or not (announced or isinstance(step, FireShot | Ask | Present)):
+    if step is None or not (announced or isinstance(step, steps.FireShot | steps.Ask | steps.Present)):
         return position
     if not announced:
-        append("step", body=step_record(step))
-    felt = isinstance(step, Ask) or (announced and isinstance(step, FireShot | Present))
-    outcome = Interrupted(presented=felt)
-    append("outcome", body=step_record(outcome))
-    return replace(position, step=_send(session, outcome), history=[*position.history, (step, outcome)])
+        append("step", body=steps.step_record(step))
+    felt = isinstance(step, steps.Ask) or (announced and isinstance(step, steps.FireShot | steps.Present))
+    outcome = steps.Interrupted(presented=felt)
+    append("outcome", body=steps.step_record(outcome))
+    return replace(position, step=steps.step_after(session, outcome), history=[*position.history, (step, outcome)])
 
 
 def _last_step_is_open(contents: Contents) -> bool:
@@ -102,15 +93,8 @@ def _last_step_is_open(contents: Contents) -> bool:
     return bool(kinds) and kinds[-1] == "step"
 
 
-def _send(session: Session, outcome: Outcome) -> Step | None:
-    try:
-        return session.send(outcome)
-    except StopIteration:
-        return None
-
-
-def _compare(contents: Contents, number: int, planned: Step | None, recorded: Step) -> None:
-    if planned is None or step_record(planned) != step_record(recorded):
+def _compare(contents: Contents, number: int, planned: steps.Step | None, recorded: steps.Step) -> None:
+    if planned is None or steps.step_record(planned) != steps.step_record(recorded):
         raise JournalError(
             f"{contents.path}: step {number} is {recorded.kind!r} and does not follow from the plan in line 1; "
             "the journal was changed, or another version of Recoil wrote it"

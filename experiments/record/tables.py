@@ -1,22 +1,157 @@
-"""Log tables made of what a journal holds: pure, so that a table can be made again byte for byte."""
+"""The log tables: their columns, once, with names, types, levels and meaning, and their rows from a journal. Pure.
+
+Everything that writes, reads or describes a log takes its columns from here; the data dictionary is printed from it.
+A table can be made again byte for byte; no text in it becomes a formula.
+"""
 
 from __future__ import annotations
 
 import csv
 import io
 from collections.abc import Iterable
+from dataclasses import dataclass
+from typing import Literal
 
-from experiments.record import columns
+from experiments.session import remarks
 from experiments.session.history import TrialHistory, is_attempt
-from experiments.session.remarks import (
-    AnswerCorrected,
-    DescriptionCorrected,
-    Flagged,
-    Noted,
-    RatingCorrected,
-    Remark,
-)
 from experiments.session.steps import Answered, Described, Failed, Fired, Interrupted, Outcome, Presented, Rated
+
+ColumnType = Literal["text", "level", "integer", "number", "flag"]
+
+MISSING = ""
+"""What an empty cell says: there is none. 0 is a value."""
+
+_FORMULA_STARTS = ("=", "+", "-", "@", "\t", "\r", "'")
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Column:
+    """One column of a log table. `levels` are all values a `level` column may hold; empty where the config decides."""
+
+    name: str
+    type: ColumnType
+    description: str
+    levels: tuple[str, ...] = ()
+    unit: str = ""
+    required: bool = False
+
+
+def _level(name: str, levels: tuple[str, ...], description: str, *, required: bool = False) -> Column:
+    return Column(name=name, type="level", levels=levels, description=description, required=required)
+
+
+def _integer(name: str, description: str, *, required: bool = False) -> Column:
+    return Column(name=name, type="integer", description=description, required=required)
+
+
+def _number(name: str, unit: str, description: str) -> Column:
+    return Column(name=name, type="number", unit=unit, description=description)
+
+
+def _text(name: str, description: str, *, required: bool = False) -> Column:
+    return Column(name=name, type="text", description=description, required=required)
+
+
+def _flag(name: str, description: str) -> Column:
+    return Column(name=name, type="flag", levels=("0", "1"), description=description)
+
+
+_PARTICIPANT = _text("participant_id", "participant's code, letters and digits", required=True)
+_METHOD = _level("method", (), "rendering method, as the config names it", required=True)
+_ATTEMPTS = _integer("attempts", "how often the stimulus was presented; more than 1 after a fault, pause or repeat")
+_FLAGS = _text(
+    "flags",
+    "marks set on the trial, separated by a blank: `device-error`, `interrupted` (the run broke off), `paused`, "
+    "`repeated`, `corrected`, `anticipation` (the participant's key within 0.1 s of the onset), and the experimenter's "
+    "own",
+)
+_NOTE = _text("note", "the experimenter's note")
+_ONSET = _text(
+    "onset_utc",
+    "date and time (UTC, ISO 8601) of the first pulse of the last presentation; empty if none",
+)
+_GUN = _text("gun", "who rendered it: model and serial number of the gun, `simulated` for the simulated one")
+
+TRIALS: tuple[Column, ...] = (
+    _PARTICIPANT,
+    _level("experiment", ("direction",), "which experiment", required=True),
+    _integer("session", "block of trials with one method, 1 to 3 in order of presentation", required=True),
+    _METHOD,
+    _integer("set", "set within the session, from 1", required=True),
+    _integer("trial", "trial within the session, from 1", required=True),
+    _level("direction", ("forward", "backward"), "which way the gun pointed and shot", required=True),
+    _level("response", ("forward", "backward"), "which way the participant said; empty if never answered"),
+    _flag("correct", "1 if the response is the direction, 0 if not; empty without a response"),
+    _number("response_time_s", "s", "time from the onset of the pulse to the answer; empty if there is none"),
+    _level("response_source", ("participant", "experimenter", "synthetic"), "whose hand gave the answer"),
+    _flag(
+        "response_time_valid", "1 if the time is the participant's own; 0 if corrected or by the experimenter's hand"
+    ),
+    _ATTEMPTS,
+    _FLAGS,
+    _NOTE,
+    _ONSET,
+    _GUN,
+    _level(
+        "instruction",
+        (),
+        "what the participant was told for this set (`speed`, `accuracy`, ...), as the config names it; empty if "
+        "nothing. Synthetic observers `rates` and `table` do not heed it, `felt` does",
+    ),
+)
+
+RATINGS: tuple[Column, ...] = (
+    _PARTICIPANT,
+    _level("experiment", ("preference",), "which experiment", required=True),
+    _integer("trial", "order of presentation, from 1", required=True),
+    _METHOD,
+    _number("rating", "", "0 (dislike very much) to 10 (like very much); 0 is a rating, empty means none was given"),
+    _level("rating_by", ("participant", "experimenter", "synthetic"), "whose hand entered the rating"),
+    _text("comment", "the participant's own words"),
+    _integer("shots", "shots presented until the participant said next"),
+    _number("exposure_s", "s", "from the first pulse until the participant said next, at the last presentation"),
+    _number(
+        "earlier_exposure_s",
+        "s",
+        "how long the same trial was felt before, at presentations that a pause ended or that were repeated; empty if "
+        "it was not",
+    ),
+    _ATTEMPTS,
+    _FLAGS,
+    _NOTE,
+    _ONSET,
+    _GUN,
+)
+
+TABLES: dict[str, tuple[Column, ...]] = {"direction": TRIALS, "preference": RATINGS}
+"""The table of each experiment."""
+
+FILE_SUFFIX: dict[str, str] = {"direction": "trials", "preference": "ratings"}
+"""How the table's file name ends: `sub-P01_task-direction_trials.csv`."""
+
+
+def names(experiment: str) -> list[str]:
+    """The header of an experiment's table."""
+    return [column.name for column in TABLES[experiment]]
+
+
+def guard(text: str) -> str:
+    """Text that no spreadsheet takes for a formula: a `'` in front of a leading `=`, `+`, `-`, `@`, tab, CR or `'`.
+
+    >>> guard("=1+1"), guard("'quoted"), guard("plain")
+    ("'=1+1", "''quoted", 'plain')
+    """
+    return f"'{text}" if text.startswith(_FORMULA_STARTS) else text
+
+
+def unguard(cell: str) -> str:
+    """The text that `guard` was given.
+
+    >>> unguard("'=1+1"), unguard("''quoted"), unguard("plain")
+    ('=1+1', "'quoted", 'plain')
+    """
+    return cell.removeprefix("'")
+
 
 Row = dict[str, object]
 
@@ -24,7 +159,7 @@ Row = dict[str, object]
 def presentation(events: TrialHistory, shown: type[Fired | Presented]) -> Row:
     """How a trial was presented: attempts, flags, note, onset of the last stimulus, gun. Empty if it never was."""
     attempts = sum(is_attempt(step, word) for step, word in events.items)
-    notes = "; ".join(remark.text for remark in events.all(Noted))
+    notes = "; ".join(remark.text for remark in events.all(remarks.Noted))
     row: Row = {"attempts": attempts or None, "flags": " ".join(_flags(events)), "note": notes}
     stimulus = events.last(shown)
     return row | ({"onset_utc": stimulus.onset_utc, "gun": stimulus.gun} if stimulus else {})
@@ -39,14 +174,14 @@ def _flags(events: TrialHistory) -> list[str]:
         "repeated": events.repeated,
         "corrected": any(_is_corrected(events, given) for given in _CORRECTIONS),
     }
-    own = [remark.flag for remark in events.all(Flagged)]
+    own = [remark.flag for remark in events.all(remarks.Flagged)]
     return list(dict.fromkeys([flag for flag, there in found.items() if there] + own))
 
 
-_CORRECTIONS: dict[type[Outcome], type[Remark]] = {
-    Answered: AnswerCorrected,
-    Rated: RatingCorrected,
-    Described: DescriptionCorrected,
+_CORRECTIONS: dict[type[Outcome], type[remarks.Remark]] = {
+    Answered: remarks.AnswerCorrected,
+    Rated: remarks.RatingCorrected,
+    Described: remarks.DescriptionCorrected,
 }
 
 
@@ -60,15 +195,15 @@ def table_bytes(experiment: str, rows: Iterable[Row]) -> bytes:
     """The table as RFC 4180 CSV in UTF-8: CRLF, quotes doubled, text guarded, an empty cell for what is missing."""
     text = io.StringIO(newline="")
     writer = csv.writer(text, lineterminator="\r\n")
-    table = columns.TABLES[experiment]
+    table = TABLES[experiment]
     writer.writerow(column.name for column in table)
     writer.writerows([_cell(column, row.get(column.name)) for column in table] for row in rows)
     return text.getvalue().encode()
 
 
-def _cell(column: columns.Column, value: object) -> str:
+def _cell(column: Column, value: object) -> str:
     if value is None:
-        return columns.MISSING
+        return MISSING
     if column.type == "text":
-        return columns.guard(str(value))
+        return guard(str(value))
     return repr(value) if isinstance(value, float) else str(value)

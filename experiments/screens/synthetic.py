@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from typing import Any
 
 from device import GunStatus
@@ -41,18 +40,11 @@ def synthetic_screen(setup: Setup[Any], plan: Plan, clock: Clock) -> SyntheticSc
 
 
 class SyntheticScreen:
-    """Works a run as a person would, in as much time as the config plans for it, in the run's own thread.
+    """Works a run as a person would, in as much time as the config plans for it, in the run's own thread."""
 
-    `tell` is called with each step after its outcome is on the disk: for a progress bar.
-    """
-
-    def __init__(
-        self, config: ExperimentConfig, observer: Any, clock: Clock, tell: Callable[[Step], None] = lambda _: None
-    ) -> None:
+    def __init__(self, config: ExperimentConfig, observer: Any, clock: Clock) -> None:
         self._timing: Any = getattr(config, "timing", None)
-        self._observer = observer
-        self._clock = clock
-        self._tell = tell
+        self._observer, self._clock = observer, clock
         self._live: LiveRun | None = None
         self._begun: tuple[int, float] = (0, 0.0)
 
@@ -119,10 +111,7 @@ class SyntheticScreen:
         return events.Next() if next_at_s <= until_s else None
 
     def acknowledge(self, step: Step | None, word: Outcome | Remark) -> None:
-        """Tell whoever counts."""
-        del word
-        if step is not None:
-            self._tell(step)
+        """Nobody waits for it."""
 
     def trouble(self, text: str) -> None:
         """Nobody reads it."""

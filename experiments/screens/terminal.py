@@ -16,17 +16,7 @@ from typing import TYPE_CHECKING, TextIO
 from device import GunStatus
 from experiments.clock import Clock
 from experiments.live_run import LiveRun
-from experiments.screens.texts import (
-    FLAG_RULE,
-    again_text,
-    ordinal,
-    place_text,
-    read_out_text,
-    saved_text,
-    typed_line,
-    typed_number,
-    value_text,
-)
+from experiments.screens import texts
 from experiments.session import events
 from experiments.session.events import Event, Press
 from experiments.session.history import Entry, entered_value
@@ -100,7 +90,7 @@ class TerminalScreen:
 
     def acknowledge(self, step: Step | None, word: Outcome | Remark) -> None:
         """Say that something is safe; say what the gun failed at."""
-        text = saved_text(self._plan, step, word)
+        text = texts.saved_text(self._plan, step, word)
         if text:
             self._say(f"  {text}")
 
@@ -134,9 +124,9 @@ class TerminalScreen:
                 return f"\n  {step.question} f = {step.forward}, b = {step.backward}: "
             case State.RATING if isinstance(step, Rate):
                 ends = f"{step.minimum:g} = {step.minimum_text}, {step.maximum:g} = {step.maximum_text}"
-                return f"\n{ordinal(self._plan, step.trial)}. {step.question}\n  {ends}; `none` for no answer: "
+                return f"\n{texts.ordinal(self._plan, step.trial)}. {step.question}\n  {ends}; `none` for no answer: "
             case State.DESCRIBING if isinstance(step, Describe):
-                return f"\n  {ordinal(self._plan, step.trial)}. {step.question} "
+                return f"\n  {texts.ordinal(self._plan, step.trial)}. {step.question} "
             case State.RESTING:
                 return f"\nBreak {_between(position)}. (`skip` and a reason ends it early.)\n"
             case State.CLOSING:
@@ -153,15 +143,15 @@ class TerminalScreen:
 
     def _head(self, step: Prepare) -> str:
         told = self._live.history if self._live else ()
-        again = again_text(told, step)
-        return f"\n{place_text(self._plan, step.trial)}.{f' {again}' if again else ''}{read_out_text(self._plan, step)}"
+        place, again = texts.place_text(self._plan, step.trial), texts.again_text(told, step)
+        return f"\n{place}.{f' {again}' if again else ''}{texts.read_out_text(self._plan, step)}"
 
     def _correction(self, entry: Entry) -> str:
         told = self._live.history if self._live else ()
-        was = value_text(entered_value(told, entry))
+        was = texts.value_text(entered_value(told, entry))
         how = {"answer": "f or b", "rating": "a number, or none", "description": "the words"}[entry.what]
         return (
-            f"\n  Correct the {entry.what} of {place_text(self._plan, entry.trial)} (entered: {was}): {how}; "
+            f"\n  Correct the {entry.what} of {texts.place_text(self._plan, entry.trial)} (entered: {was}): {how}; "
             "`undo` goes further back, Enter leaves it: "
         )
 
@@ -170,7 +160,7 @@ class TerminalScreen:
     def _read(self) -> None:
         with suppress(OSError):  # a terminal that vanishes ends like one that is closed
             for line in self._source:
-                self._typed(typed_line(line))
+                self._typed(texts.typed_line(line))
         self._closed()
 
     def _typed(self, line: str) -> None:
@@ -227,8 +217,7 @@ class TerminalScreen:
 
     def _closed(self) -> None:
         """Nobody sees or types anything any more. Stopped beside: whoever shows may hold what the run waits for."""
-        live = self._live
-        if live is not None and not self._gone:
+        if (live := self._live) is not None and not self._gone:
             self._gone = True
             stop = events.Stop(reason="the terminal was closed")
             threading.Thread(target=live.offer, args=(stop,), daemon=True).start()
@@ -255,7 +244,7 @@ def _command(word: str, rest: str) -> Event | str:  # noqa: C901, PLR0911 - one 
             return _HELP
         case "flag":
             flag = flag_word(rest)
-            return events.Flag(flag=flag) if flag else FLAG_RULE
+            return events.Flag(flag=flag) if flag else texts.FLAG_RULE
         case "skip" if not rest:
             return "To end the break early type `skip` and the reason."
         case "repeat" if not rest:
@@ -309,7 +298,7 @@ def _rating(line: str, position: Position) -> Event | str:
         return events.Rating(rating=None)
     if not isinstance(step, Rate):
         return "No rating is asked for."
-    rating = typed_number(line, step.minimum, step.maximum)
+    rating = texts.typed_number(line, step.minimum, step.maximum)
     if rating is None:
         return f"Not a rating: type a number from {step.minimum:g} to {step.maximum:g}."
     return events.Rating(rating=rating)
@@ -331,5 +320,5 @@ def _correction(line: str, position: Position) -> Event | str:
 def _corrected_rating(line: str) -> Event | str:
     if line.lower() == "none":
         return events.Correct(value=None)
-    rating = typed_number(line, -math.inf, math.inf)
+    rating = texts.typed_number(line, -math.inf, math.inf)
     return "Not a rating: type a number." if rating is None else events.Correct(value=rating)

@@ -35,11 +35,10 @@ def place_text(plan: Plan, trial: Trial) -> str:
 
 def short_place(trial: Trial, here: Trial) -> str:
     """Where a trial stands that is looked at from another: its set and session are named where they differ."""
-    place = f"trial {trial.trial}"
     if of_one_set(trial, here):
-        return place
-    place += f" of set {trial.set}"
-    return place if trial.session == here.session else f"{place}, session {trial.session}"
+        return f"trial {trial.trial}"
+    session = "" if trial.session == here.session else f", session {trial.session}"
+    return f"trial {trial.trial} of set {trial.set}{session}"
 
 
 def again_text(told: History, step: Prepare) -> str:
@@ -78,9 +77,13 @@ def entry_text(plan: Plan, told: History, entry: Entry) -> str:
 def saved_text(plan: Plan, step: Step | None, word: Outcome | Remark) -> str:  # noqa: C901, PLR0911 - one case a word
     """That something is on the disk, as it was entered; empty for what needs no answer."""
     trial = trial_of(step)
-    if trial is None:
-        return _rested_text(word) if step is not None else _remark_text(plan, word)
     match word:
+        case steps.Repeated():
+            return f"Saved. Trial {word.trial.trial} is presented again ({word.reason})."
+        case steps.Rested():
+            return "The break is over."
+        case _ if trial is None:
+            return _remark_text(plan, word)
         case steps.Answered():
             return f"Saved. Trial {trial.trial}: {value_text(word.response)}."
         case steps.Rated():
@@ -93,18 +96,6 @@ def saved_text(plan: Plan, step: Step | None, word: Outcome | Remark) -> str:  #
             return f"The gun failed: {word.cause}. The trial is marked and presented again."
         case steps.Interrupted():
             return "The pause ended the stimulus: its trial is presented again." if word.presented else ""
-        case steps.Repeated():
-            return f"Saved. Trial {word.trial.trial} is presented again ({word.reason})."
-        case _:
-            return ""
-
-
-def _rested_text(word: Outcome | Remark) -> str:
-    match word:
-        case steps.Rested():
-            return "The break is over."
-        case steps.Repeated():
-            return f"Saved. Trial {word.trial.trial} is presented again ({word.reason})."
         case _:
             return ""
 

@@ -28,21 +28,26 @@ class Press:
     serial: int
 
 
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Event:
+    """Something that can happen to a live run."""
+
+
 # the experimenter's hand
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class DamperSet:
+class DamperSet(Event):
     """The damper is set as the screen asks for."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Fire:
+class Fire(Event):
     """The gun is in the participant's hand: fire."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Answer:
+class Answer(Event):
     """The participant said which way; `at_s` is when the key for it went down, if there was one.
 
     A synthetic participant's `response_time_s` is drawn, not measured.
@@ -55,12 +60,12 @@ class Answer:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Next:
+class Next(Event):
     """The participant said next."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Rating:
+class Rating(Event):
     """A rating that was told; `None` is no answer."""
 
     rating: float | None
@@ -68,26 +73,26 @@ class Rating:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Description:
+class Description(Event):
     """The participant's words that were told; may be empty."""
 
     text: str
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class EndBreak:
+class EndBreak(Event):
     """The break is to end early."""
 
     reason: str
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Finish:
+class Finish(Event):
     """There is nothing left to correct: the run ends."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Rearm:
+class Rearm(Event):
     """A key was held for so long to go on after an emergency stop: a test shot is fired.
 
     `None`: two words were typed, where no key can be held.
@@ -97,34 +102,34 @@ class Rearm:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Pause:
+class Pause(Event):
     """Hold everything."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class GoOn:
+class GoOn(Event):
     """Go on after a pause."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Undo:
+class Undo(Event):
     """Open the last entry for correction, or the one before."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Correct:
+class Correct(Event):
     """What the participant had said: a direction, a rating (`None`: no answer), or words."""
 
     value: str | float | None
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Leave:
+class Leave(Event):
     """Leave a correction as it was."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Repeat:
+class Repeat(Event):
     """The trial at hand, or the last one, was spoiled and is to be presented again; it is, if another is named."""
 
     reason: str
@@ -132,7 +137,7 @@ class Repeat:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Flag:
+class Flag(Event):
     """Mark a trial with a word: the one at hand if none is named."""
 
     flag: str
@@ -140,7 +145,7 @@ class Flag:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Note:
+class Note(Event):
     """Words on a trial: the one at hand if none is named."""
 
     text: str
@@ -148,21 +153,21 @@ class Note:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Reason:
+class Reason(Event):
     """Why there was an emergency stop, said afterwards."""
 
     text: str
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Stop:
+class Stop(Event):
     """The run is to stop here; it can be resumed."""
 
     reason: str
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class EmergencyStop:
+class EmergencyStop(Event):
     """Disarm, and arm no more in this run. `by` is at whose screen."""
 
     by: Literal["experimenter", "participant"] = "experimenter"
@@ -172,7 +177,7 @@ class EmergencyStop:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class ParticipantKey:
+class ParticipantKey(Event):
     """A key of the participant's own; `step` is the number of the step that asked, `at_s` when it went down.
 
     `typed`: a line or a page was open on the console, which may have been what the key was for.
@@ -186,7 +191,7 @@ class ParticipantKey:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class ParticipantRated:
+class ParticipantRated(Event):
     """A rating on the participant's own screen; `step` is the number of the step that asked."""
 
     rating: float
@@ -195,7 +200,7 @@ class ParticipantRated:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class ParticipantDescribed:
+class ParticipantDescribed(Event):
     """A description on the participant's own screen, may be empty; `step` is the number of the step that asked."""
 
     text: str
@@ -207,80 +212,47 @@ class ParticipantDescribed:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class BreakOver:
+class BreakOver(Event):
     """The time of a break is over."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class GunFault:
+class GunFault(Event):
     """The gun refused."""
 
     cause: str
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class LinkLost:
+class LinkLost(Event):
     """The gun did not answer, or not what it must."""
 
     cause: str
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class ParticipantLost:
+class ParticipantLost(Event):
     """The participant's screen is gone."""
 
     cause: str
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class ParticipantBack:
+class ParticipantBack(Event):
     """The participant's screen is there again."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class DisplayLost:
+class DisplayLost(Event):
     """The display of the console is gone."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class ResultsGone:
+class ResultsGone(Event):
     """The journal is not where it was."""
 
     cause: str
 
-
-Event = (
-    DamperSet
-    | Fire
-    | Answer
-    | Next
-    | Rating
-    | Description
-    | EndBreak
-    | Finish
-    | Rearm
-    | Pause
-    | GoOn
-    | Undo
-    | Correct
-    | Leave
-    | Repeat
-    | Flag
-    | Note
-    | Reason
-    | Stop
-    | EmergencyStop
-    | ParticipantKey
-    | ParticipantRated
-    | ParticipantDescribed
-    | BreakOver
-    | GunFault
-    | LinkLost
-    | ParticipantLost
-    | ParticipantBack
-    | DisplayLost
-    | ResultsGone
-)
 
 _WORDS: dict[type[Event], str] = {
     DamperSet: "damper",

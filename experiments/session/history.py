@@ -4,30 +4,16 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from types import UnionType
 from typing import Literal, TypeVar
 
 from experiments.design.plan import Plan, Trial
+from experiments.session import steps
 from experiments.session.remarks import AnswerCorrected, DescriptionCorrected, RatingCorrected, Remark
-from experiments.session.steps import (
-    Answered,
-    Ask,
-    Described,
-    Failed,
-    FireShot,
-    Interrupted,
-    Outcome,
-    Present,
-    Presented,
-    Rate,
-    Rated,
-    Repeated,
-    Step,
-    trial_of,
-)
 
 Word = TypeVar("Word")
 
-History = Sequence[tuple[Step | None, Outcome | Remark]]
+History = Sequence[tuple[steps.Step | None, steps.Outcome | Remark]]
 """What a journal tells, in order: steps with their outcomes, and remarks, which have no step."""
 
 
@@ -35,11 +21,11 @@ History = Sequence[tuple[Step | None, Outcome | Remark]]
 class TrialHistory:
     """What the journal tells of one trial, in order, and whether it was asked to be repeated."""
 
-    items: list[tuple[Step | None, Outcome | Remark]]
+    items: list[tuple[steps.Step | None, steps.Outcome | Remark]]
     repeated: bool
 
     @property
-    def words(self) -> list[Outcome | Remark]:
+    def words(self) -> list[steps.Outcome | Remark]:
         """The outcomes and remarks, in order."""
         return [word for _, word in self.items]
 
@@ -54,7 +40,7 @@ class TrialHistory:
 
 def by_trial(trials: Sequence[Trial], history: History) -> dict[Trial, TrialHistory]:
     """What the journal tells, by trial."""
-    repeated = {word.trial for _, word in history if isinstance(word, Repeated)}
+    repeated = {word.trial for _, word in history if isinstance(word, steps.Repeated)}
     found = {trial: TrialHistory(items=[], repeated=trial in repeated) for trial in trials}
     for step, word in history:
         trial = _trial(step, word)
@@ -63,14 +49,16 @@ def by_trial(trials: Sequence[Trial], history: History) -> dict[Trial, TrialHist
     return found
 
 
-def _trial(step: Step | None, word: Outcome | Remark) -> Trial | None:
+def _trial(step: steps.Step | None, word: steps.Outcome | Remark) -> Trial | None:
     """The trial that an event is about, if it is about one."""
-    return getattr(word, "trial", None) if step is None else trial_of(step)
+    return getattr(word, "trial", None) if step is None else steps.trial_of(step)
 
 
-def is_attempt(step: Step | None, word: Outcome | Remark) -> bool:
+def is_attempt(step: steps.Step | None, word: steps.Outcome | Remark) -> bool:
     """Whether a stimulus was felt, or may have been: what `attempts` counts."""
-    return isinstance(step, FireShot | Present) and not (isinstance(word, Failed | Interrupted) and not word.presented)
+    return isinstance(step, steps.FireShot | steps.Present) and not (
+        isinstance(word, steps.Failed | steps.Interrupted) and not word.presented
+    )
 
 
 What = Literal["answer", "rating", "description"]
@@ -85,10 +73,10 @@ class Entry:
     what: What
 
 
-def trial_at(plan: Plan, history: History, step: Step | None) -> Trial:
+def trial_at(plan: Plan, history: History, step: steps.Step | None) -> Trial:
     """The trial of a step, else the last one that was, else the first."""
-    steps = (step, *(one for one, _ in reversed(history)))
-    return next((trial for one in steps if (trial := trial_of(one)) is not None), plan.trials[0])
+    backwards = (step, *(one for one, _ in reversed(history)))
+    return next((trial for one in backwards if (trial := steps.trial_of(one)) is not None), plan.trials[0])
 
 
 def entries(history: History, here: Trial) -> list[Entry]:
@@ -100,16 +88,16 @@ def entries(history: History, here: Trial) -> list[Entry]:
     return [entry for entry in dict.fromkeys(found) if of_one_set(entry.trial, here)]
 
 
-def _entry(step: Step | None, word: Outcome | Remark) -> Entry | None:
-    trial = trial_of(step)
+def _entry(step: steps.Step | None, word: steps.Outcome | Remark) -> Entry | None:
+    trial = steps.trial_of(step)
     if trial is None:
         return None
     match word:
-        case Answered():
+        case steps.Answered():
             return Entry(trial=trial, what="answer")
-        case Rated():
+        case steps.Rated():
             return Entry(trial=trial, what="rating")
-        case Described():
+        case steps.Described():
             return Entry(trial=trial, what="description")
         case _:
             return None
@@ -132,7 +120,7 @@ def entered_value(history: History, entry: Entry) -> Value:
     return next((one[0] for one in reversed(said) if one), None)
 
 
-def _value(step: Step | None, word: Outcome | Remark, entry: Entry) -> tuple[Value] | None:
+def _value(step: steps.Step | None, word: steps.Outcome | Remark, entry: Entry) -> tuple[Value] | None:
     if isinstance(word, AnswerCorrected | RatingCorrected | DescriptionCorrected):
         return _corrected(word, entry)
     return _given(word) if _entry(step, word) == entry else None
@@ -152,38 +140,42 @@ def _corrected(word: AnswerCorrected | RatingCorrected | DescriptionCorrected, e
             return None
 
 
-def _given(word: Outcome | Remark) -> tuple[Value] | None:
+def _given(word: steps.Outcome | Remark) -> tuple[Value] | None:
     match word:
-        case Answered():
+        case steps.Answered():
             return (word.response,)
-        case Rated():
+        case steps.Rated():
             return (word.rating,)
-        case Described():
+        case steps.Described():
             return (word.comment,)
         case _:
             return None
 
 
-def repeatable(history: History, step: Step | None, here: Trial) -> Trial | None:
+def repeatable(history: History, step: steps.Step | None, here: Trial) -> Trial | None:
     """The trial that can be presented again: the one that is asked about, else the last of the set.
 
     It can be as long as its rating is not in.
     """
-    if isinstance(step, Ask | Rate):
+    if isinstance(step, steps.Ask | steps.Rate):
         return step.trial
-    rated = {trial_of(one) for one, word in history if isinstance(word, Rated)}
-    shown = [trial_of(one) for one, word in history if isinstance(word, Answered | Presented)]
-    return next((trial for trial in reversed(shown) if trial and of_one_set(trial, here) and trial not in rated), None)
+    rated, shown = _trials(history, steps.Rated), _trials(history, steps.Answered | steps.Presented)
+    return next((trial for trial in reversed(shown) if of_one_set(trial, here) and trial not in rated), None)
 
 
 def done(history: History) -> set[Trial]:
     """The trials that were answered, or felt until next."""
-    return {trial for step, word in history if isinstance(word, Answered | Presented) and (trial := trial_of(step))}
+    return set(_trials(history, steps.Answered | steps.Presented))
 
 
 def answered(history: History) -> set[Trial]:
     """The trials that were answered or rated, whatever became of the answer."""
-    return {trial for step, word in history if isinstance(word, Answered | Rated) and (trial := trial_of(step))}
+    return set(_trials(history, steps.Answered | steps.Rated))
+
+
+def _trials(history: History, outcomes: type[steps.Outcome] | UnionType) -> list[Trial]:
+    """The trials that came to such outcomes, in order."""
+    return [trial for step, word in history if isinstance(word, outcomes) and (trial := steps.trial_of(step))]
 
 
 def of_one_set(one: Trial, other: Trial) -> bool:

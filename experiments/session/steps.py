@@ -275,6 +275,14 @@ def step_record(word: Step | Outcome | TrainShot) -> dict[str, object]:
     return {key: value for key, value in fields.items() if key not in _OPTIONAL_FIELDS or value is not None}
 
 
+def step_after(session: Session, outcome: Outcome) -> Step | None:
+    """The step of a session after an outcome; None at its end."""
+    try:
+        return session.send(outcome)
+    except StopIteration:
+        return None
+
+
 class Scale(Protocol):
     """The ends of a scale, and how fine a rating is kept."""
 

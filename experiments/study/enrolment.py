@@ -12,9 +12,8 @@ from pydantic import ValidationError
 from experiments.clock import Clock
 from experiments.config.models import EligibilityConfig, Fact
 from experiments.record.journal import JournalError
-from experiments.study import places, register
-from experiments.study.places import PlaceError
-from experiments.study.progress import StudyFolder, look_at
+from experiments.study import folders, register
+from experiments.study.folders import PlaceError, StudyFolder, look_at
 from experiments.study.register import RegisterError
 from experiments.study.study import Facts, Participant, RunProgress, eligible, unanswered, unasked
 
@@ -170,9 +169,9 @@ def join(study: StudyFolder, participant_id: str, facts: Facts, clock: Clock) ->
     """
     _refuse_wrong_facts(study, facts)
     registered = register.read_register(study.results)
-    places.place(study.results, participant_id, study.experiments[0], registered)
+    folders.place(study.results, participant_id, study.experiments[0], registered)
     reasons = eligible(facts, study.config.eligibility)
-    known = participant_id in places.known_codes(study.results, registered)
+    known = participant_id in folders.known_codes(study.results, registered)
     if reasons and not known:
         raise PlaceError(
             f"participant {participant_id} is not eligible: {'; '.join(reasons)} (rules: {study.source}); "
@@ -207,9 +206,9 @@ def readmit(results: Path, participant_id: str, reason: str, clock: Clock) -> No
 
 def _excluded_before(results: Path, participant_id: str) -> str | None:
     registered = register.read_register(results)
-    known = places.known_codes(results, registered)
-    places.check_code(participant_id)
-    places.check_case(results, participant_id, known)
+    known = folders.known_codes(results, registered)
+    folders.check_code(participant_id)
+    folders.check_case(results, participant_id, known)
     if participant_id not in known:
         shown = ", ".join(known) or "nobody"
         raise PlaceError(f"participant {participant_id} is not known in {results}; known are {shown}")

@@ -23,7 +23,7 @@ from experiments.config.models import CODE, Text
 from experiments.config.setup import canonical_json
 from experiments.record import storage
 from experiments.record.journal import JournalError, check_chain, link_of, parsed_line
-from experiments.study.study import Facts
+from experiments.study.study import Facts, Member
 
 REGISTER_FILE = "participants.jsonl"
 MAX_REASON = 200
@@ -110,16 +110,6 @@ def _checked(values: Mapping[str, object]) -> RegisterEntry:
         shown = repr(first["input"])
         shown = shown if len(shown) <= 60 else f"{shown[:60]}..."
         raise RegisterError(f"{key} = {shown}: {first['msg'].removeprefix('Value error, ')}") from error
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Member:
-    """What the register says of one code: facts and when they joined, if they did; the reason if excluded."""
-
-    participant_id: str
-    facts: Facts | None = None
-    joined_utc: str = ""
-    excluded: str | None = None
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

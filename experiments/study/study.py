@@ -45,14 +45,20 @@ class RunProgress:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Participant:
-    """Who takes part: facts if they joined, the reason if they are excluded, and one standing an experiment."""
+class Member:
+    """What the register says of one code: facts and when they joined, if they did; the reason if excluded."""
 
     participant_id: str
-    runs: tuple[RunProgress, ...]
     facts: Facts | None = None
     joined_utc: str = ""
     excluded: str | None = None
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Participant(Member):
+    """Who takes part, and how far they are in each experiment."""
+
+    runs: tuple[RunProgress, ...]
 
     @property
     def open_runs(self) -> tuple[RunProgress, ...]:

@@ -18,11 +18,12 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Protocol
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy import special
+
+from experiments.design.streams import Stream
 
 Floats = NDArray[np.float64]
 Bools = NDArray[np.bool_]
@@ -38,16 +39,6 @@ _LARGEST = 1e6
 
 LEVY_TAIL = float(special.ndtr(-1.0 / math.sqrt(_CUT)))
 """P(N < -1/sqrt(CUT)): 1/N^2 is then below `_CUT`."""
-
-
-class Draws(Protocol):
-    """What is asked of a random stream (`experiments.design.streams.Stream`)."""
-
-    def uniform(self) -> float:
-        """A number strictly between 0 and 1."""
-
-    def normal(self) -> float:
-        """A standard normal number."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -136,7 +127,7 @@ class Person:
         )
 
 
-def person(people: People, draws: Draws) -> Person:
+def person(people: People, draws: Stream) -> Person:
     """Somebody, drawn once. The four draws are always made, so one spread's change moves no other value."""
     drift, boundary, non_decision, start = (draws.normal() for _ in range(4))
     return Person(
@@ -147,7 +138,7 @@ def person(people: People, draws: Draws) -> Person:
     )
 
 
-def decide(diffusion: Diffusion, draws: Draws) -> Decision:
+def decide(diffusion: Diffusion, draws: Stream) -> Decision:
     """One decision. The first draw says whether it lapses, the second which answer, the rest how long it takes.
 
     So for one stream the answer changes with the drift only one way: common random numbers for comparing designs.

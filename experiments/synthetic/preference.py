@@ -15,12 +15,13 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 from statistics import NormalDist
-from typing import Annotated, Protocol
+from typing import Annotated
 
 from pydantic import Field
 
 from experiments.config.door import Model
 from experiments.config.models import Spread
+from experiments.design.streams import Stream
 from experiments.session.steps import Scale, on_scale
 
 Points = Annotated[float, Field(ge=-100, le=100)]
@@ -41,13 +42,6 @@ class Appeal(Model):
     criterion_sd: Spread = 1.9
 
 
-class NormalDraws(Protocol):
-    """What is asked of a random stream (`experiments.design.streams.Stream`)."""
-
-    def normal(self) -> float:
-        """A standard normal number."""
-
-
 def jnd_in_sds() -> float:
     """The difference of which 75 % tell the stronger, in SDs of one felt strength.
 
@@ -57,7 +51,7 @@ def jnd_in_sds() -> float:
     return math.sqrt(2.0) * NormalDist().inv_cdf(0.75)
 
 
-def felt_ratings(law: Appeal, scale: Scale, strengths: Mapping[str, float], draws: NormalDraws) -> dict[str, float]:
+def felt_ratings(law: Appeal, scale: Scale, strengths: Mapping[str, float], draws: Stream) -> dict[str, float]:
     """One person's ratings of methods of these strengths (at least 0), kept to the scale and its grain.
 
     Two draws a method are always made, in the order of their names, so a change of one number moves no other value.

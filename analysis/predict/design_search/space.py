@@ -10,7 +10,7 @@ from device.limits import MAX_SHOTS_PER_MINUTE
 from device.parameters import GunParameters
 from device.words import MAX_PULSE_S, MAX_VOLTAGE_V
 from experiments.config.door import ConfigError
-from experiments.config.gun import GunConfig
+from experiments.config.setup import GunConfig
 from experiments.load import find, load_gun, load_setup
 
 LEAST_GRID, MOST_GRID = 4, 200

@@ -23,7 +23,7 @@ from analysis.times.own_trials import REFUSALS, OwnTrials, own_trials
 from analysis.times.people import FEWEST_TRIALS, as_trials, fit_people
 from experiments.config.door import ConfigError
 from experiments.record import storage
-from experiments.study.places import PlaceError
+from experiments.study.folders import PlaceError
 
 __all__ = ["TimesRequest", "in_short", "left_out", "times"]
 

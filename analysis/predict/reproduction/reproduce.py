@@ -40,7 +40,7 @@ from experiments.record.journal import begun
 from experiments.record.provenance import git_commit, provenance, recoil_version
 from experiments.run import RunRequest, run
 from experiments.screens.synthetic import synthetic_screen
-from experiments.study import places
+from experiments.study import folders
 
 MANIFEST = "reproduction.json"
 
@@ -174,9 +174,9 @@ def _claim(study: ReproducedStudy, out: Path) -> None:
     if manifest.is_file():
         if json.loads(manifest.read_text(encoding="utf-8")) == wanted:
             return
-        places.set_aside_file(out)
+        folders.set_aside_file(out)
     elif out.exists() and (not out.is_dir() or any(out.iterdir())):
-        raise places.PlaceError(f"{out}: exists and is no reproduction of a study; choose another --out")
+        raise folders.PlaceError(f"{out}: exists and is no reproduction of a study; choose another --out")
     storage.make_folder(out)
     for setup in study.answering if study.reconstructed else ():
         storage.write_whole(out / table_name(setup), answers_table(setup))
@@ -185,7 +185,7 @@ def _claim(study: ReproducedStudy, out: Path) -> None:
 
 def _take_part(study: ReproducedStudy, setup: Setup[Any], code: str, results: Path) -> None:
     """Have a synthetic participant do an experiment, unless the logs hold it already."""
-    where = places.place(results, code, setup.config.experiment)
+    where = folders.place(results, code, setup.config.experiment)
     if not _finished(where):
         request = RunRequest(setup=setup, participant_id=code, results=results, seed=study.seed, again="resume")
         run(request, synthetic_screen, VirtualClock())
@@ -194,7 +194,7 @@ def _take_part(study: ReproducedStudy, setup: Setup[Any], code: str, results: Pa
         storage.write_whole(table, data)
 
 
-def _finished(where: places.Place) -> bool:
+def _finished(where: folders.Place) -> bool:
     before = begun(where.journal) if where.journal.exists() else None
     return before is not None and before.finished
 

@@ -29,7 +29,7 @@ from device.physics.hand import (
 from device.physics.traces import EnergyBalance
 from device.vibration import Vibration, VibrationParameters, solved, waveform
 from experiments.config.door import ConfigError
-from experiments.config.gun import GunConfig
+from experiments.config.setup import GunConfig
 from experiments.record import storage
 
 USUAL_HAND = "assumed"

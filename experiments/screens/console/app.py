@@ -20,19 +20,9 @@ from experiments.config.setup import Setup
 from experiments.design.plan import Plan
 from experiments.live_run import LiveRun, RunStopped, Screen
 from experiments.run import Finished, RunRequest, run
+from experiments.screens.console import view
 from experiments.screens.console.controls import Controls
 from experiments.screens.console.participant_link import ParticipantSide
-from experiments.screens.console.view import (
-    THANK_PARTICIPANT,
-    About,
-    Began,
-    Ended,
-    GunSeen,
-    Message,
-    Saved,
-    Shown,
-    Trouble,
-)
 from experiments.screens.console.window import ConsoleWindow
 from experiments.screens.console.windows import finish_tone, hear_of_loss, on_loss, open_as_left, signals_to
 from experiments.screens.synthetic import synthetic_participant_of
@@ -41,7 +31,7 @@ from experiments.session.events import Hand
 from experiments.session.remarks import Noted, Remark
 from experiments.session.states import Position
 from experiments.session.steps import Outcome, Step
-from experiments.study.places import PlaceError
+from experiments.study.folders import PlaceError
 
 GUN_LOOK_S = 0.2
 """How often the gun's state is looked at."""
@@ -80,8 +70,8 @@ def _quick_threads() -> Iterator[None]:
 class _Bridge(QObject):
     """Takes what the run's thread tells to Qt's own."""
 
-    opening = pyqtSignal(About)
-    message = pyqtSignal(Message)
+    opening = pyqtSignal(view.About)
+    message = pyqtSignal(view.Message)
 
 
 class Console:
@@ -99,7 +89,7 @@ class Console:
         *,
         participant: ParticipantSide | None = None,
         band: str = "",
-        last: str = THANK_PARTICIPANT,
+        last: str = view.THANK_PARTICIPANT,
     ) -> None:
         application()
         self.clock, self._request = clock, request
@@ -137,21 +127,21 @@ class Console:
 
     # in Qt's own thread
 
-    def _open(self, about: About) -> None:
+    def _open(self, about: view.About) -> None:
         self.window = ConsoleWindow(about, self.clock)
         self.window.closed.connect(self._loop.quit)
         open_as_left(self.window, "run")
         self.window.activateWindow()
         self._opened.set()
 
-    def _take(self, message: Message) -> None:
-        if self.window is not None and isinstance(message, Began):
+    def _take(self, message: view.Message) -> None:
+        if self.window is not None and isinstance(message, view.Began):
             self.window.begin(message.live, self._controls(self.window, message.live))
         if self.window is not None:
             self.window.take(message)
-        if isinstance(message, Ended) and self.window is None:
+        if isinstance(message, view.Ended) and self.window is None:
             self._loop.quit()
-        elif isinstance(message, Ended) and self._closes and self.window is not None:
+        elif isinstance(message, view.Ended) and self._closes and self.window is not None:
             self.window.close()
 
     def _controls(self, window: ConsoleWindow, live: LiveRun) -> Controls:
@@ -196,12 +186,12 @@ class Console:
             if self.participant is not None and self.window is not None:
                 threading.Thread(target=self.participant.close, daemon=True).start()
             reason = None if self._error is None else str(self._error) or type(self._error).__name__
-            self._tell(Ended(reason=reason, saved=saved))
+            self._tell(view.Ended(reason=reason, saved=saved))
 
     def _make_screen(self, setup: Setup[Any], plan: Plan, clock: Clock) -> Screen:
         del clock
         self.observer = synthetic_participant_of(setup, plan) if self._hand == "synthetic" else None
-        about = About(
+        about = view.About(
             setup=setup,
             plan=plan,
             band=self._band,
@@ -228,7 +218,7 @@ class Console:
     def begin(self, live: LiveRun) -> None:
         """Show where the run stands, and look after the gun from now on."""
         self.live = live
-        self._tell(Began(live=live))
+        self._tell(view.Began(live=live))
         if self.participant is not None:
             noise = self.participant.begin(live, self._tell)
             if noise:
@@ -237,7 +227,7 @@ class Console:
 
     def show(self, position: Position) -> None:
         """Have a position shown, on the participant's screen as well."""
-        self._tell(Shown(position=position))
+        self._tell(view.Shown(position=position))
         if self.participant is not None:
             self.participant.follow(position)
 
@@ -246,12 +236,12 @@ class Console:
 
     def acknowledge(self, step: Step | None, word: Outcome | Remark) -> None:
         """Show that it is safe."""
-        self._tell(Saved(step=step, word=word))
+        self._tell(view.Saved(step=step, word=word))
 
     def trouble(self, text: str) -> None:
         """Show what went wrong."""
-        self._tell(Trouble(text=text))
+        self._tell(view.Trouble(text=text))
 
     def gun_seen(self, status: GunStatus | None, fault: str) -> None:
         """Show what the gun itself says."""
-        self._tell(GunSeen(status=status, fault=fault))
+        self._tell(view.GunSeen(status=status, fault=fault))

@@ -13,16 +13,7 @@ from experiments.clock import Clock
 from experiments.design.plan import Trial
 from experiments.live_run import EventVerdict, LiveRun
 from experiments.preference.config import RatingScale
-from experiments.screens.console.keys import (
-    BY_NAME,
-    KEY_COMMANDS,
-    Name,
-    Typing,
-    command_for,
-    field_at,
-    shown_key,
-    why_not,
-)
+from experiments.screens.console import keys
 from experiments.screens.console.participant_link import ParticipantSide
 from experiments.screens.texts import FLAG_RULE, short_place, typed_line, typed_number
 from experiments.session import events
@@ -64,16 +55,16 @@ class View(Protocol):
     def other_theme(self) -> None:
         """Change the colours."""
 
-    def shut(self) -> None:
+    def close(self) -> bool:
         """Close the window of a run that has ended."""
 
 
-_PAGE_COMMANDS: tuple[Name, ...] = ("help", "list", "leave", "emergency", "theme")
+_PAGE_COMMANDS: tuple[keys.Name, ...] = ("help", "list", "leave", "emergency", "theme")
 """What is done while a page covers the run."""
-_HOLDS: tuple[Name, ...] = ("pause", "next")
+_HOLDS: tuple[keys.Name, ...] = ("pause", "next")
 """What makes the gun silent: done from a page as well, which goes. The rest would be done unseen."""
 
-_EVENTS: dict[Name, Event] = {
+_EVENTS: dict[keys.Name, Event] = {
     "fire": events.Fire(),
     "next": events.Next(),
     "damper": events.DamperSet(),
@@ -107,7 +98,7 @@ class Controls:
         self._enter: Callable[[str, Press], bool] | None = None
         self._held: Press | None = None
         self.drawn = live.position
-        self.page: Name | None = None
+        self.page: keys.Name | None = None
         self.ended = False
 
     def draw(self, position: Position) -> None:
@@ -119,24 +110,26 @@ class Controls:
     # keys and buttons
 
     @property
-    def typing(self) -> Typing:
+    def typing(self) -> keys.Typing:
         """What is being typed."""
-        return Typing(line=self._enter is not None, field=field_at(self.drawn) is not None)
+        return keys.Typing(line=self._enter is not None, field=keys.field_at(self.drawn) is not None)
 
     @property
     def covered(self) -> bool:
         """Whether something that is open takes what is typed: a line, or a page."""
         return self._enter is not None or self.page is not None
 
-    def command(self, key: str, *, ctrl: bool) -> Name | None:
+    def command(self, key: str, *, ctrl: bool) -> keys.Name | None:
         """The command that a key is now; `None` if it is none, and so may be text."""
-        return None if key.startswith("#") else command_for(key, ctrl=ctrl, typing=self.typing, position=self.drawn)
+        return (
+            None if key.startswith("#") else keys.command_for(key, ctrl=ctrl, typing=self.typing, position=self.drawn)
+        )
 
     def press(self, at_s: float | None = None) -> Press:
         """A press at this moment, or at an earlier one, for what is on the screen now."""
         return Press(at_s=self._clock.now() if at_s is None else at_s, serial=self.drawn.serial)
 
-    def down(self, name: Name, at_s: float) -> None:
+    def down(self, name: keys.Name, at_s: float) -> None:
         """The key of a command went down."""
         press = self.press(at_s)
         if name == "rearm":
@@ -146,7 +139,7 @@ class Controls:
 
     def up(self, key: str) -> None:
         """A key was let go."""
-        if key == BY_NAME["rearm"].key:
+        if key == keys.BY_NAME["rearm"].key:
             self.let_go()
 
     def hold(self, press: Press) -> None:
@@ -172,7 +165,7 @@ class Controls:
             self._held = None
             self._offer(events.Rearm(held_s=held_s), press)
 
-    def do(self, name: Name, press: Press) -> None:
+    def do(self, name: keys.Name, press: Press) -> None:
         """Carry out a command."""
         match name:
             case "emergency":
@@ -197,13 +190,13 @@ class Controls:
         self.uncover()
         self._view.say("Here is the run again: press again.", "wait")
 
-    def _after_end(self, name: Name) -> None:
+    def _after_end(self, name: keys.Name) -> None:
         if name == "stop":
-            self._view.shut()
+            self._view.close()
         else:
             self._view.say("The run has ended: Q closes the window.", "wait")
 
-    def _run(self, name: Name, press: Press) -> None:
+    def _run(self, name: keys.Name, press: Press) -> None:
         self.uncover()
         if name in _QUESTIONS:
             self._ask_for(name)
@@ -224,19 +217,19 @@ class Controls:
         if verdict.text:
             self._view.say(verdict.text, "wait" if verdict.taken else "bad")
 
-    def idle(self, name: Name) -> str:
+    def idle(self, name: keys.Name) -> str:
         """Why a command does nothing now; empty if it does something."""
         if name in ("help", "list", "theme"):
             return ""
         if self.ended:
             return "" if name == "stop" else "The run has ended."
         if name == "enter":
-            return "" if self.typing.letters else why_not(name, self.drawn)
+            return "" if self.typing.letters else keys.why_not(name, self.drawn)
         if name == "leave" and (self._enter is not None or self.page):
             return ""
         if name == "restart":
             return self._no_restart()
-        return why_not(name, self.drawn) or self._nothing_to(name)
+        return keys.why_not(name, self.drawn) or self._nothing_to(name)
 
     def _no_restart(self) -> str:
         if self._participant is None or not self._participant.lost:
@@ -250,10 +243,10 @@ class Controls:
         else:
             self._participant.restart()
 
-    def _nothing_to(self, name: Name) -> str:
-        if name == "repeat" and self._live.repeated() is None:
+    def _nothing_to(self, name: keys.Name) -> str:
+        if name == "repeat" and self._live.moment.repeatable is None:
             return "There is no trial of this set to repeat now."
-        if name == "undo" and not self._live.undoable:
+        if name == "undo" and self._live.moment.further_back is None:
             return "There is nothing to undo in this set."
         return ""
 
@@ -281,7 +274,7 @@ class Controls:
         if self._enter is not None:
             self._enter_line(press)
             return
-        match field_at(self.drawn):
+        match keys.field_at(self.drawn):
             case "number":
                 self._number(self._view.typed("number"), press)
             case "words":
@@ -313,7 +306,7 @@ class Controls:
 
     # lines
 
-    def _ask_for(self, name: Name) -> None:
+    def _ask_for(self, name: keys.Name) -> None:
         """Ask for the line that a command needs, if it can do anything with it now."""
         refused = self.idle(name)
         if refused:
@@ -321,7 +314,8 @@ class Controls:
         elif name == "stop" and self.drawn.base is State.HALTED:
             self._offer(events.Stop(reason=EMERGENCY))
         else:
-            trial = (self._live.repeated() if name == "repeat" else None) or self._live.trial
+            moment = self._live.moment
+            trial = (moment.repeatable if name == "repeat" else None) or moment.trial
             self._enter = lambda line, press: self._line(name, trial, line, press)
             self._view.open_line(f"{_question(name, trial, self._live)}  (Enter saves, Esc leaves it)")
 
@@ -340,7 +334,7 @@ class Controls:
         self._enter = None
         self._view.close_line()
 
-    def _line(self, name: Name, trial: Trial, text: str, press: Press) -> bool:
+    def _line(self, name: keys.Name, trial: Trial, text: str, press: Press) -> bool:
         """Do what a line was typed for; what comes too late is kept as a note. Whether the line is done with."""
         event = _event_of(name, trial, text)
         if event is None:
@@ -371,7 +365,7 @@ class Controls:
             self.page = None
             self._view.close_page()
 
-    def _open_or_close(self, page: Name) -> None:
+    def _open_or_close(self, page: keys.Name) -> None:
         """Show a page; the key that opened it closes it."""
         if self.page == page:
             self.uncover()
@@ -384,17 +378,17 @@ class Controls:
 
     def help_lines(self) -> list[str]:
         """Every key, what it does, and why it does nothing now."""
-        return [self._help_line(command.name) for command in KEY_COMMANDS]
+        return [self._help_line(command.name) for command in keys.KEY_COMMANDS]
 
-    def _help_line(self, name: Name) -> str:
+    def _help_line(self, name: keys.Name) -> str:
         not_now = self.idle(name)
-        key = shown_key(name, letters=self.typing.letters)
-        return f"{key:<8} {BY_NAME[name].does}{f'   – not now: {not_now}' if not_now else ''}"
+        key = keys.shown_key(name, letters=self.typing.letters)
+        return f"{key:<8} {keys.BY_NAME[name].does}{f'   – not now: {not_now}' if not_now else ''}"
 
 
 # the lines that are typed for a command: what is asked, and which event comes of it
 
-_QUESTIONS: dict[Name, str] = {
+_QUESTIONS: dict[keys.Name, str] = {
     "end break": "Why does the break end early?",
     "repeat": "Why is trial {trial} to be presented again?",
     "flag": "Flag {place} as (a word such as noise or late)",
@@ -404,12 +398,12 @@ _QUESTIONS: dict[Name, str] = {
 }
 
 
-def _question(name: Name, trial: Trial, live: LiveRun) -> str:
+def _question(name: keys.Name, trial: Trial, live: LiveRun) -> str:
     place = short_place(trial, trial_at(live.plan, live.history, live.position.step))
     return _QUESTIONS[name].format(trial=trial.trial, place=place)
 
 
-def _event_of(name: Name, trial: Trial, text: str) -> Event | None:
+def _event_of(name: keys.Name, trial: Trial, text: str) -> Event | None:
     """What a typed text comes to; `None` if it is to be a flag and is none."""
     match name:
         case "end break":
@@ -427,6 +421,6 @@ def _event_of(name: Name, trial: Trial, text: str) -> Event | None:
             return events.Stop(reason=text)
 
 
-def _as_note(name: Name, trial: Trial, text: str) -> events.Note:
+def _as_note(name: keys.Name, trial: Trial, text: str) -> events.Note:
     """What was typed for something that is not done any more."""
     return events.Note(text=f"{'break' if name == 'end break' else name}: {text}", trial=trial)

@@ -6,20 +6,9 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field
 from typing import get_args
 
+from PyQt6 import QtWidgets
 from PyQt6.QtCore import Qt, pyqtSignal
 from PyQt6.QtGui import QGuiApplication, QScreen
-from PyQt6.QtWidgets import (
-    QFormLayout,
-    QFrame,
-    QHeaderView,
-    QLabel,
-    QScrollArea,
-    QSizePolicy,
-    QTableWidget,
-    QTableWidgetItem,
-    QVBoxLayout,
-    QWidget,
-)
 
 from experiments.config.models import Fact, Handedness, Sex
 from experiments.run import ParticipantOptions
@@ -35,7 +24,7 @@ _HOW_TO_START = "Read the code back with the participant, fill in what is asked,
 _AGE_DIGITS = 3
 
 
-class Form(QFrame):
+class Form(QtWidgets.QFrame):
     """The fields. `edited` after any change; `code_edited` after one of the code, `experiment_edited` of the other."""
 
     edited = pyqtSignal()
@@ -56,26 +45,24 @@ class Form(QFrame):
         self._connect()
 
     def _lay_out(self) -> None:
-        form = QFormLayout(fields := QWidget())
+        form = QtWidgets.QFormLayout(fields := QtWidgets.QWidget())
         fields.setObjectName("form")
-        form.setRowWrapPolicy(QFormLayout.RowWrapPolicy.WrapLongRows)
-        form.setFieldGrowthPolicy(QFormLayout.FieldGrowthPolicy.ExpandingFieldsGrow)
+        form.setRowWrapPolicy(QtWidgets.QFormLayout.RowWrapPolicy.WrapLongRows)
+        form.setFieldGrowthPolicy(QtWidgets.QFormLayout.FieldGrowthPolicy.ExpandingFieldsGrow)
         for name, widget in self._rows():
             widget.setAccessibleName(name)
             form.addRow(_field_name(name), widget)
-        scroll = QScrollArea()
+        scroll = QtWidgets.QScrollArea()
         scroll.setWidget(fields)
         scroll.setWidgetResizable(True)
-        scroll.setFrameShape(QFrame.Shape.NoFrame)
+        scroll.setFrameShape(QtWidgets.QFrame.Shape.NoFrame)
         scroll.setFocusPolicy(Qt.FocusPolicy.NoFocus)
         scroll.setHorizontalScrollBarPolicy(Qt.ScrollBarPolicy.ScrollBarAlwaysOff)
-        down = QVBoxLayout(self)
-        for part in (widgets.text_label("quiet", _HOW_TO_START), self.remark):
-            down.addWidget(part)
-        down.addWidget(scroll, 1)
+        how = widgets.text_label("quiet", _HOW_TO_START)
+        widgets.fill(QtWidgets.QVBoxLayout(self), how, self.remark, (scroll, 1), margins=None)
 
-    def _rows(self) -> list[tuple[str, QWidget]]:
-        rows: list[tuple[str, QWidget]] = [("Experiment", self.experiment), ("Code", self.code)]
+    def _rows(self) -> list[tuple[str, QtWidgets.QWidget]]:
+        rows: list[tuple[str, QtWidgets.QWidget]] = [("Experiment", self.experiment), ("Code", self.code)]
         rows += [("Code, read back", self.code_again)]
         rows += [(_FACT_TEXT[fact], widget) for fact, widget in self.facts.items()]
         rows += [("Participant", self.own_screen), ("", self.own_keys), ("", self.noise)]
@@ -141,11 +128,11 @@ class Form(QFrame):
                 widget.setCurrentText(values[fact])
 
 
-def _field_name(name: str) -> QLabel:
+def _field_name(name: str) -> QtWidgets.QLabel:
     """The name of a field, at half its height."""
     made = widgets.text_label("", name, wrap=False)
     made.setAlignment(Qt.AlignmentFlag.AlignVCenter)
-    made.setSizePolicy(QSizePolicy.Policy.Preferred, QSizePolicy.Policy.Expanding)
+    made.setSizePolicy(QtWidgets.QSizePolicy.Policy.Preferred, QtWidgets.QSizePolicy.Policy.Expanding)
     return made
 
 
@@ -185,7 +172,7 @@ class Opening:
     said: str = ""
 
 
-class PeopleTable(QTableWidget):
+class PeopleTable(QtWidgets.QTableWidget):
     """A row a participant, a column an experiment. `person_chosen` with the code of a row that somebody chose."""
 
     person_chosen = pyqtSignal(str)
@@ -195,17 +182,17 @@ class PeopleTable(QTableWidget):
         columns = ["code", *experiments, "note"]
         self.setColumnCount(len(columns))
         self.setHorizontalHeaderLabels(columns)
-        self.setEditTriggers(QTableWidget.EditTrigger.NoEditTriggers)
-        self.setSelectionBehavior(QTableWidget.SelectionBehavior.SelectRows)
-        self.setSelectionMode(QTableWidget.SelectionMode.SingleSelection)
+        self.setEditTriggers(QtWidgets.QTableWidget.EditTrigger.NoEditTriggers)
+        self.setSelectionBehavior(QtWidgets.QTableWidget.SelectionBehavior.SelectRows)
+        self.setSelectionMode(QtWidgets.QTableWidget.SelectionMode.SingleSelection)
         self.setTabKeyNavigation(False)
         self.setMinimumSize(120, 60)
         across, down = self.horizontalHeader(), self.verticalHeader()
         if across is not None and down is not None:
-            across.setSectionResizeMode(QHeaderView.ResizeMode.ResizeToContents)
+            across.setSectionResizeMode(QtWidgets.QHeaderView.ResizeMode.ResizeToContents)
             across.setStretchLastSection(True)
             down.setVisible(False)  # numbers beside codes are no codes
-            down.setSectionResizeMode(QHeaderView.ResizeMode.ResizeToContents)
+            down.setSectionResizeMode(QtWidgets.QHeaderView.ResizeMode.ResizeToContents)
         self.itemSelectionChanged.connect(self._chosen)
         self.cellClicked.connect(self._chosen)  # also the row that was chosen before
 
@@ -216,7 +203,7 @@ class PeopleTable(QTableWidget):
         for line, person in enumerate(seen):
             cells = [person.participant_id, *map(cell_text, person.runs), note_text(person)]
             for column, text in enumerate(cells):
-                self.setItem(line, column, QTableWidgetItem(text))
+                self.setItem(line, column, QtWidgets.QTableWidgetItem(text))
         self.blockSignals(False)
 
     def _chosen(self) -> None:

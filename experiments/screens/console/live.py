@@ -1,4 +1,4 @@
-"""Runs at the console with what belongs to them: the start window, the participant's own screen, a synthetic one."""
+"""Runs at the console with what belongs to them: start window, participant's screen, synthetic participant."""
 
 from __future__ import annotations
 
@@ -10,10 +10,11 @@ from concurrent.futures import Future
 from contextlib import ExitStack
 from dataclasses import replace
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import TYPE_CHECKING, Any, Self, TypeVar
 
 from PyQt6.QtCore import QEventLoop, Qt, QTimer
-from PyQt6.QtGui import QGuiApplication
+from PyQt6.QtGui import QGuiApplication, QWindow
+from PyQt6.QtTest import QTest
 from PyQt6.QtWidgets import QDialog, QLabel, QPushButton, QVBoxLayout
 
 from device.words import RecoilError
@@ -29,13 +30,16 @@ from experiments.screens.console.form import Opening, monitors
 from experiments.screens.console.participant_link import WAIT, ParticipantSide
 from experiments.screens.console.start import choose_run
 from experiments.screens.console.view import THANK_PARTICIPANT
-from experiments.screens.console.visual import Rater, VisualParticipant
-from experiments.screens.console.widgets import WHY, Option, QuestionBox, TextLines, start_sheet, unfit
+from experiments.screens.console.widgets import WHY, Option, QuestionBox, TextLines, start_sheet
+from experiments.screens.console.window import ConsoleWindow
 from experiments.screens.console.windows import FreshShortcuts, let_go, signals_to
 from experiments.screens.participant.link import ParticipantError, ParticipantLink
 from experiments.screens.participant.messages import Look, NoiseIs
-from experiments.study.places import PlaceError
-from experiments.study.progress import StudyFolder, progress_of
+from experiments.screens.participant.pages import spot_px
+from experiments.screens.participant.stage import WINDOW_TITLE
+from experiments.session.states import Position, State
+from experiments.session.steps import Ask, Rate, on_scale
+from experiments.study.folders import PlaceError, StudyFolder, progress_of
 
 _NO_HANDS = "--visual --participant-screen rates by synthetic events, which only an X display takes"
 
@@ -211,20 +215,14 @@ class Unfinished(QDialog):
         )
         self.question = QuestionBox(_text(found), answers, reason=f"to start anew: {WHY}")
         self.said = TextLines("saved")
-        down = QVBoxLayout(self)
-        down.addWidget(self.question)
-        down.addWidget(self.said)
+        widgets.fill(QVBoxLayout(self), self.question, self.said, margins=None)
         self.setMinimumWidth(720)
         for button in self.findChildren(QPushButton):
             button.setAutoDefault(False)
 
     def _fresh(self, reason: str) -> None:
-        wrong = unfit(reason)
-        if not wrong:
+        if self.question.takes(reason, self.said.say):
             self._decide("fresh", reason)
-            return
-        self.said.say(wrong, "bad")
-        self.question.reason.setFocus()
 
     def _decide(self, again: Again, reason: str) -> None:
         self.decided = replace(self._request, again=again, anew_reason=reason)
@@ -280,3 +278,157 @@ def while_shown(text: str, make: Callable[[], Made]) -> Made:
     loop.exec()
     shown.close()
     return made.result()
+
+
+if TYPE_CHECKING:
+    from experiments.screens.xkeys import Hands  # Linux alone has it
+
+_WATCH_MS = 10
+AGAIN_S = 0.5
+"""A key that was refused, because it came too soon, is pressed again after so long."""
+BREAK_REASON = "synthetic participant"
+_KEYS = {"forward": Qt.Key.Key_F, "backward": Qt.Key.Key_B}
+
+
+class VisualParticipant:
+    """Watches a console's window and presses a key at every position that waits, as long as it is open."""
+
+    def __init__(self, console: Console, rater: Rater | None = None) -> None:
+        self._console, self._clock, self._rater = console, console.clock, rater
+        self._done, self._done_s = -1, 0.0
+        self._timer = QTimer()
+        self._timer.timeout.connect(self._look)
+
+    def __enter__(self) -> Self:
+        self._timer.start(_WATCH_MS)
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self._timer.stop()
+
+    def _look(self) -> None:
+        window = self._console.window
+        if window is None or window.live is None or self._answers_there(window):
+            return
+        if not window.isActiveWindow():
+            window.activateWindow()  # keys reach the window that has the focus
+            return
+        if window.ended is not None:
+            self._timer.stop()
+            window.close()
+            return
+        position, now_s = window.drawn, self._clock.now()
+        done = position.serial == self._done and now_s - self._done_s < AGAIN_S
+        if not done and window.live.moment.is_ready(now_s) and not self._thinks(position, now_s):
+            self._done, self._done_s = position.serial, now_s
+            self._press(window, position)
+
+    def _answers_there(self, window: ConsoleWindow) -> bool:
+        """Whether a rating or description is being given on the participant's screen. No answer has no place there."""
+        step = window.drawn.step
+        if self._rater is None or self._console.participant is None:
+            return False
+        asking = self._console.participant.asking  # only then: what comes later would be done to the next question
+        match window.drawn.state:
+            case State.RATING if isinstance(step, Rate) and (rating := self._observer.rate(step.trial)) is not None:
+                if asking:
+                    self._rater.rate(step, rating)
+                return True
+            case State.DESCRIBING:
+                if asking:
+                    self._rater.describe()
+                return True
+            case _:
+                return False
+
+    @property
+    def _observer(self) -> Any:
+        """The observer, which is there once the window is."""
+        return self._console.observer
+
+    def _thinks(self, position: Position, now_s: float) -> bool:
+        """Whether the response time is not over yet."""
+        step = position.step
+        if position.state is not State.ASKING or not isinstance(step, Ask):
+            return False
+        onset_s = position.since_s if position.onset_s is None else position.onset_s
+        return bool(now_s < onset_s + self._observer.answer(step.trial).response_time_s)
+
+    def _press(self, window: ConsoleWindow, position: Position) -> None:
+        step, handle = position.step, window.windowHandle()
+        if handle is None:
+            return
+        match position.state:
+            case State.SETTING:
+                _key(handle, Qt.Key.Key_M)
+            case State.PREPARING | State.TRAIN:
+                _key(handle, Qt.Key.Key_Space)
+            case State.ASKING if isinstance(step, Ask):
+                _key(handle, _KEYS[self._observer.answer(step.trial).response])
+            case State.RESTING:
+                _key(handle, Qt.Key.Key_E)
+                _type(BREAK_REASON, handle)
+            case State.RATING if isinstance(step, Rate):
+                self._rate(self._observer.rate(step.trial), window, handle)
+            case State.DESCRIBING | State.CLOSING:
+                _key(handle, Qt.Key.Key_Return)
+            case _:
+                pass
+
+    def _rate(self, rating: float | None, window: ConsoleWindow, handle: QWindow) -> None:
+        if rating is None:
+            _key(handle, Qt.Key.Key_X, Qt.KeyboardModifier.ControlModifier)
+        else:
+            window.fields.rating.clear()
+            _type(repr(rating), handle)
+
+
+def _key(window: QWindow, key: Qt.Key, modifier: Qt.KeyboardModifier = Qt.KeyboardModifier.NoModifier) -> None:
+    QTest.keyClick(window, key, modifier)  # type: ignore[call-overload] # its stubs take it for a method
+
+
+def _type(text: str, window: QWindow) -> None:
+    for letter in text:
+        QTest.keyClick(window, letter)  # type: ignore[call-overload] # as above
+    _key(window, Qt.Key.Key_Return)
+
+
+RATE_AGAIN_S = 0.2
+"""How long hands wait before they try again: what is done before the page stands is lost, as a person's would be."""
+
+
+class Rater:
+    """Rates on the participant's screen. Whatever it does may be done again, on whichever page stands, to no harm."""
+
+    def __init__(self, hands: Hands) -> None:
+        self._hands = hands
+        self._at_s = 0.0
+
+    def rate(self, step: Rate, rating: float) -> None:
+        """Click the rating and confirm it. A page that asks for a description takes the same for an empty one."""
+        if (place := self._place()) is not None:
+            x_px, y_px = _spot(step, rating, width_px=place[2], height_px=place[3])
+            self._hands.click(place[0] + x_px, place[1] + y_px)
+            self._confirm()
+
+    def describe(self) -> None:
+        """Confirm an empty description. A page that asks for a rating takes none by that, as none is clicked on it."""
+        if self._place() is not None:
+            self._confirm()
+
+    def _place(self) -> tuple[int, int, int, int] | None:
+        """Where the participant's window lies, now that it has the keys; `None` if there is none, or it is too soon."""
+        if time.monotonic() - self._at_s < RATE_AGAIN_S:
+            return None
+        self._at_s = time.monotonic()
+        return self._hands.focus_on(WINDOW_TITLE)
+
+    def _confirm(self) -> None:
+        """With Ctrl, as Enter alone begins a new line of a description."""
+        self._hands.press("Return", "Control_L")
+
+
+def _spot(step: Rate, rating: float, *, width_px: int, height_px: int) -> tuple[int, int]:
+    """Where the rating's grain lies on the window."""
+    kept = on_scale(rating, step)
+    return spot_px((kept - step.minimum) / (step.maximum - step.minimum), width_px, height_px)

@@ -6,38 +6,13 @@ from collections.abc import Callable, Sequence
 from datetime import datetime
 from typing import Protocol
 
+from PyQt6 import QtWidgets
 from PyQt6.QtCore import QPointF, QRectF, Qt
 from PyQt6.QtGui import QMouseEvent, QPainter, QPaintEvent, QResizeEvent, QShowEvent
-from PyQt6.QtWidgets import (
-    QGridLayout,
-    QHBoxLayout,
-    QLabel,
-    QLineEdit,
-    QListWidget,
-    QPlainTextEdit,
-    QProgressBar,
-    QPushButton,
-    QSizePolicy,
-    QStackedWidget,
-    QVBoxLayout,
-    QWidget,
-)
 
-from experiments.screens.console import widgets
+from experiments.screens.console import progress, widgets
 from experiments.screens.console.controls import TextField
 from experiments.screens.console.keys import BY_NAME, Name, field_at, shown_key
-from experiments.screens.console.progress import (
-    RunTiming,
-    answer_lines,
-    clock_text,
-    coming,
-    end_text,
-    focus_text,
-    gun_text,
-    own_times_s,
-    remaining_s,
-    trials_done,
-)
 from experiments.screens.console.view import About, Instruction, Seen
 from experiments.session.events import Press
 from experiments.session.history import Entry
@@ -71,19 +46,16 @@ class Notice:
             _size(label, round(size_px * factor), bold=label is not self.detail)
 
 
-class TextPage(QWidget):
+class TextPage(QtWidgets.QWidget):
     """A page of text that is only looked at, in type that has room for all of it, and below it what was said last."""
 
     def __init__(self) -> None:
         super().__init__()
         self._title, self.said = widgets.text_label("place"), widgets.text_label("saved")
-        self._text = QPlainTextEdit()
+        self._text = QtWidgets.QPlainTextEdit()
         self._text.setReadOnly(True)
         self._text.setFocusPolicy(widgets.NO_FOCUS)
-        down = QVBoxLayout(self)
-        down.setContentsMargins(10, 6, 10, 6)
-        for widget in (self._title, self._text, self.said):
-            down.addWidget(widget)
+        widgets.fill(QtWidgets.QVBoxLayout(self), self._title, self._text, self.said, margins=(10, 6, 10, 6))
 
     def put(self, title: str, lines: list[str]) -> None:
         """Show lines of text."""
@@ -114,7 +86,7 @@ class TextPage(QWidget):
                 return
 
 
-def _size(label: QLabel, size_px: int, *, bold: bool) -> None:
+def _size(label: QtWidgets.QLabel, size_px: int, *, bold: bool) -> None:
     """Give a label's type a size in pixels; the window's style sheet would win over a font."""
     style = f"font-size: {max(8, size_px)}px; font-weight: {'bold' if bold else 'normal'};"
     if label.styleSheet() != style:
@@ -129,8 +101,12 @@ class TextFields:
     """The field of the state at hand, and below it the line for a reason, a note or a flag."""
 
     def __init__(self) -> None:
-        self.rating, self.words, self.line = QLineEdit(), QLineEdit(), QLineEdit()
-        self._fields: dict[TextField, QLineEdit] = {"number": self.rating, "words": self.words, "line": self.line}
+        self.rating, self.words, self.line = QtWidgets.QLineEdit(), QtWidgets.QLineEdit(), QtWidgets.QLineEdit()
+        self._fields: dict[TextField, QtWidgets.QLineEdit] = {
+            "number": self.rating,
+            "words": self.words,
+            "line": self.line,
+        }
         self._ends, self._question = widgets.text_label("quiet"), widgets.text_label("quiet")
         for field, name, how in (
             (self.rating, "rating", "type a number, Enter saves"),
@@ -139,8 +115,8 @@ class TextFields:
         ):
             field.setAccessibleName(name)
             field.setPlaceholderText(how)
-        self.pages = QStackedWidget()
-        for page in (QWidget(), widgets.column(self._ends, self.rating), widgets.column(self.words)):
+        self.pages = QtWidgets.QStackedWidget()
+        for page in (QtWidgets.QWidget(), widgets.column(self._ends, self.rating), widgets.column(self.words)):
             self.pages.addWidget(page)
         self.bar = widgets.column(self._question, self.line)
         self.bar.hide()
@@ -168,18 +144,18 @@ class TextFields:
         typed = "" if name is None else self.typed(name)
         self._drafts = {one: text for one, text in self._drafts.items() if one[1] == number} | {belongs: typed}
 
-    def focus(self, position: Position, otherwise: QWidget) -> None:
+    def focus(self, position: Position, otherwise: QtWidgets.QWidget) -> None:
         """Show the field of a position, and put the cursor into it; an open line keeps the cursor."""
         self.pages.setCurrentIndex((None, "number", "words").index(field_at(position)))
         if self.bar.isHidden():
             self._field(position, otherwise).setFocus()
 
-    def close_line(self, position: Position, otherwise: QWidget) -> None:
+    def close_line(self, position: Position, otherwise: QtWidgets.QWidget) -> None:
         """Take the line away; the cursor goes back to where it was."""
         self._field(position, otherwise).setFocus()
         self.bar.hide()
 
-    def _field(self, position: Position, otherwise: QWidget) -> QWidget:
+    def _field(self, position: Position, otherwise: QtWidgets.QWidget) -> QtWidgets.QWidget:
         name = field_at(position)
         return otherwise if name is None else self._fields[name]
 
@@ -211,7 +187,7 @@ class Mouse(Protocol):
         """It was let go."""
 
 
-class CommandButton(QPushButton):
+class CommandButton(QtWidgets.QPushButton):
     """A button of a command. It never takes the keys, and the second press of a double click is none."""
 
     def __init__(self, name: Name, mouse: Mouse, style: str = "") -> None:
@@ -220,7 +196,7 @@ class CommandButton(QPushButton):
         self.setObjectName(style)
         self.setAccessibleName(BY_NAME[name].text)
         self.setFocusPolicy(Qt.FocusPolicy.NoFocus)
-        self.setSizePolicy(QSizePolicy.Policy.Ignored, QSizePolicy.Policy.Preferred)
+        self.setSizePolicy(QtWidgets.QSizePolicy.Policy.Ignored, QtWidgets.QSizePolicy.Policy.Preferred)
         self.pressed.connect(self._keep)
         if name == "rearm":  # it has to be held
             self.pressed.connect(lambda: mouse.hold(self._press))
@@ -244,17 +220,18 @@ class CommandButton(QPushButton):
             event.accept()
 
 
-class Slots(QWidget):
+class Slots(QtWidgets.QWidget):
     """Three places side by side, each for buttons of its own: what comes after Fire is never where Fire was."""
 
-    def __init__(self, left: Sequence[QWidget], middle: Sequence[QWidget], right: Sequence[QWidget]) -> None:
+    def __init__(
+        self, left: Sequence[QtWidgets.QWidget], middle: Sequence[QtWidgets.QWidget], right: Sequence[QtWidgets.QWidget]
+    ) -> None:
         super().__init__()
-        across = QHBoxLayout(self)
-        across.setContentsMargins(0, 0, 0, 0)
+        across = widgets.fill(QtWidgets.QHBoxLayout(self))
         self._widgets = [*left, *middle, *right]
         for place_of in (left, middle, right):
-            place = QWidget()
-            stack = QGridLayout(place)
+            place = QtWidgets.QWidget()
+            stack = QtWidgets.QGridLayout(place)
             stack.setContentsMargins(0, 0, 0, 0)
             for widget in place_of:
                 policy = widget.sizePolicy()
@@ -264,7 +241,7 @@ class Slots(QWidget):
                 widget.hide()
             across.addWidget(place, 1)
 
-    def show_only(self, shown: set[QWidget]) -> None:
+    def show_only(self, shown: set[QtWidgets.QWidget]) -> None:
         """Show these buttons and hide the others."""
         for widget in self._widgets:
             if widget.isVisibleTo(self) != (widget in shown):
@@ -297,12 +274,9 @@ class Buttons:
         self._large = {name: CommandButton(name, mouse, "large") for name in (*_LEFT, *_MIDDLE, *_RIGHT)}
         self.slots = Slots(*([self._large[name] for name in names] for names in (_LEFT, _MIDDLE, _RIGHT)))
         self._row = {name: CommandButton(name, mouse) for name in _ROW}
-        self.row = QWidget()
-        across = QHBoxLayout(self.row)
-        across.setContentsMargins(10, 0, 10, 2)
-        for button in self._row.values():
-            across.addWidget(button, 2)
-        across.addWidget(CommandButton("emergency", mouse, "stop"), 5)
+        self.row = QtWidgets.QWidget()
+        row = [*((button, 2) for button in self._row.values()), (CommandButton("emergency", mouse, "stop"), 5)]
+        widgets.fill(QtWidgets.QHBoxLayout(self.row), *row, margins=(10, 0, 10, 2))
 
     def put(self, position: Position, *, over: bool, letters: bool, idle: Callable[[Name], bool]) -> None:
         """Show what can be done now, and which of the keys below do nothing.
@@ -335,7 +309,7 @@ LONGEST_S = 3.0
 _DOT_PX, _HIGH_PX = 3.0, 70
 
 
-class Strip(QWidget):
+class Strip(QtWidgets.QWidget):
     """One dot an answer, oldest on the left, 0 s at the bottom."""
 
     def __init__(self) -> None:
@@ -374,7 +348,7 @@ class Strip(QWidget):
         painter.end()
 
 
-class SidePanel(QWidget):
+class SidePanel(QtWidgets.QWidget):
     """The gun, whose the keys are, the time, what comes next, and the answers of the set."""
 
     def __init__(self, about: About) -> None:
@@ -383,9 +357,8 @@ class SidePanel(QWidget):
         self._coming, self._answers = widgets.quiet_list(), widgets.quiet_list()
         self._strip = Strip()
         self._strip.setVisible(about.setup.config.console.response_times)
-        down = QVBoxLayout(self)
-        down.setContentsMargins(0, 0, 0, 0)
-        for widget in (
+        widgets.fill(
+            QtWidgets.QVBoxLayout(self),
             widgets.panel(self._gun, self._focus),
             widgets.panel(self._times),
             widgets.text_label("quiet", "Coming next"),
@@ -393,55 +366,51 @@ class SidePanel(QWidget):
             widgets.text_label("quiet", "Answers of this set"),
             self._answers,
             self._strip,
-        ):
-            down.addWidget(widget)
+        )
         for lines in (self._coming, self._answers):
             lines.setMinimumHeight(1)
 
-    def put(self, seen: Seen, progress: RunTiming) -> None:
+    def put(self, seen: Seen, timing: progress.RunTiming) -> None:
         """Show what is so now."""
         for label, (text, mood) in (
-            (self._gun, gun_text(seen.gun)),
-            (self._focus, focus_text(seen, here=self.isActiveWindow())),
+            (self._gun, progress.gun_text(seen.gun)),
+            (self._focus, progress.focus_text(seen, here=self.isActiveWindow())),
         ):
             label.setText(text)
             label.setVisible(bool(text))
             widgets.set_mood(label, mood)
-        self._times.setText(_times(seen, progress))
-        _fill(self._coming, coming(seen))
-        _fill(self._answers, answer_lines(seen))
+        self._times.setText(_times(seen, timing))
+        _fill(self._coming, progress.coming(seen))
+        _fill(self._answers, progress.answer_lines(seen))
         if self._strip.isVisibleTo(self):
-            self._strip.put(own_times_s(seen))
+            self._strip.put(progress.own_times_s(seen))
 
 
-class Bars(QWidget):
+class Bars(QtWidgets.QWidget):
     """How far the run is, as bars side by side."""
 
     def __init__(self, about: About) -> None:
         super().__init__()
-        self._bars = [QProgressBar() for _ in range(2 if about.rated_last else 3)]
-        across = QHBoxLayout(self)
-        across.setContentsMargins(0, 0, 0, 0)
-        for bar in self._bars:
-            across.addWidget(bar)
+        self._bars = [QtWidgets.QProgressBar() for _ in range(2 if about.rated_last else 3)]
+        widgets.fill(QtWidgets.QHBoxLayout(self), *self._bars)
 
     def put(self, seen: Seen) -> None:
         """Show what is so now."""
-        for bar, one in zip(self._bars, trials_done(seen), strict=True):
+        for bar, one in zip(self._bars, progress.trials_done(seen), strict=True):
             bar.setAccessibleName(one.what)
             bar.setFormat(f"{one.what}: %v of %m")
             bar.setMaximum(one.planned)
             bar.setValue(one.count)
 
 
-def _times(seen: Seen, progress: RunTiming) -> str:
-    elapsed = f"Elapsed {clock_text(progress.elapsed_s(seen.now_s))}"
+def _times(seen: Seen, timing: progress.RunTiming) -> str:
+    elapsed = f"Elapsed {progress.clock_text(timing.elapsed_s(seen.now_s))}"
     if seen.ended is not None or seen.position.base is State.HALTED:
         return elapsed
-    return f"{elapsed}\nEnds {end_text(remaining_s(seen, progress), datetime.now())}"
+    return f"{elapsed}\nEnds {progress.end_text(progress.remaining_s(seen, timing), datetime.now())}"
 
 
-def _fill(shown: QListWidget, lines: list[str]) -> None:
+def _fill(shown: QtWidgets.QListWidget, lines: list[str]) -> None:
     if [item.text() for i in range(shown.count()) if (item := shown.item(i))] != lines:
         shown.clear()
         shown.addItems(lines)

@@ -123,7 +123,7 @@ class ParticipantSide:
 
     def _judged(self, step: Ask, position: Position, wanted: Wanted) -> None:
         onset_s = position.since_s if position.onset_s is None else position.onset_s
-        paused = self._live is not None and self._live.paused_between(onset_s, position.since_s)
+        paused = self._live is not None and self._live.moment.paused_between(onset_s, position.since_s)
         question = messages.AskDirection(
             question=step.question,
             forward=step.forward,

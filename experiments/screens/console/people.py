@@ -6,8 +6,7 @@ from collections.abc import Iterator, Sequence
 
 from experiments.clock import date_text
 from experiments.study.enrolment import left_to_do, passed_over, run_of
-from experiments.study.places import is_code
-from experiments.study.progress import Overview
+from experiments.study.folders import Overview, is_code
 from experiments.study.study import Participant, RunProgress
 
 _CELL = {"done": "done", "not begun": "–", "unreadable": "cannot be read"}

@@ -203,13 +203,9 @@ class ShotPage(QWidget):
         self.call_off_button = widgets.button(self, "Call it off", "Esc", self._escape)
         self.next_button = widgets.button(self, "Next test shot", "Ctrl+T", self.begin)
         self.stop_button = widgets.button(self, "EMERGENCY STOP", "F12", self.emergency_stop, name="stop")
-        down = QVBoxLayout(self)
-        down.setContentsMargins(0, 0, 0, 0)
-        for part in (self.title, self.detail, self.count):
-            down.addWidget(part)
+        down = widgets.fill(QVBoxLayout(self), self.title, self.detail, self.count)
         down.addStretch(1)
-        for button in (self.stop_button, self.call_off_button, self.next_button):
-            down.addWidget(button)
+        widgets.fill(down, self.stop_button, self.call_off_button, self.next_button)
         # its place stays empty: there the second click of a double click on the window's own button falls
         kept = self.next_button.sizePolicy()
         kept.setRetainSizeWhenHidden(True)

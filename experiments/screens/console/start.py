@@ -5,37 +5,20 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Any
 
+from PyQt6 import QtWidgets
 from PyQt6.QtCore import QEventLoop, pyqtSignal
 from PyQt6.QtGui import QCloseEvent, QResizeEvent
-from PyQt6.QtWidgets import (
-    QGridLayout,
-    QHBoxLayout,
-    QPushButton,
-    QStackedWidget,
-    QVBoxLayout,
-    QWidget,
-)
 
 from experiments.clock import Clock
 from experiments.config.setup import Setup
 from experiments.record.journal import JournalError
 from experiments.run import Again, RunRequest
-from experiments.screens.console import people, widgets
+from experiments.screens.console import people, widgets, windows
 from experiments.screens.console.form import Form, Opening, PeopleTable
 from experiments.screens.console.shot_check import ShotPage
-from experiments.screens.console.widgets import WHY, Option, QuestionBox, TextLines, start_sheet, unfit
-from experiments.screens.console.windows import (
-    FreshShortcuts,
-    let_go,
-    open_as_left,
-    remember,
-    scaled_sheet,
-    signals_to,
-    type_scale,
-)
+from experiments.screens.console.widgets import WHY, Option, QuestionBox, TextLines, start_sheet
 from experiments.study import enrolment
-from experiments.study.places import PlaceError
-from experiments.study.progress import Overview, StudyFolder, overview
+from experiments.study.folders import Overview, PlaceError, StudyFolder, overview
 from experiments.study.study import Participant, RunProgress
 
 _NAME = "start"
@@ -43,7 +26,7 @@ SIMULATED = "simulated"
 STOPPED = "The last test shot ended by an emergency stop."
 
 
-class StartWindow(QWidget):
+class StartWindow(QtWidgets.QWidget):
     """A table of the participants, a form for the next one, and the ways to go on. `choice` is what was chosen."""
 
     closed = pyqtSignal()
@@ -69,45 +52,34 @@ class StartWindow(QWidget):
         self.shots = ShotPage(self._opening.gun, self._clock)
         self.table = PeopleTable(self._study.experiments)
         self.next, self.saved = TextLines("detail"), TextLines("saved", most_lines=5)
-        self.pages = QStackedWidget()
+        self.pages = QtWidgets.QStackedWidget()
         for page in (self._page(), self.shots):
             self.pages.addWidget(page)
-        down, top = QVBoxLayout(self), QHBoxLayout()
-        top.addWidget(
-            TextLines("place", f"{self._study.config.title} · {self._study.results.resolve()}", most_lines=3), 1
-        )
-        top.addWidget(self._gun())
-        down.addLayout(top)
-        down.addWidget(self.pages, 1)
+        place = TextLines("place", f"{self._study.config.title} · {self._study.results.resolve()}", most_lines=3)
+        top = widgets.fill(QtWidgets.QHBoxLayout(), (place, 1), self._gun())
+        widgets.fill(QtWidgets.QVBoxLayout(self), top, (self.pages, 1), margins=None)
         self._connect()
 
-    def _page(self) -> QWidget:
-        down = QVBoxLayout(page := QWidget())
-        down.setContentsMargins(0, 0, 0, 0)
-        middle, left, self._foot = QHBoxLayout(), QVBoxLayout(), QVBoxLayout()
-        left.addWidget(self.table, 1)
-        left.addLayout(self._foot)
-        middle.addLayout(left, 3)
-        middle.addWidget(self.form, 2)
-        down.addWidget(self.next)
-        down.addLayout(middle, 1)
-        down.addWidget(self.saved)
-        down.addLayout(self._buttons(page))
+    def _page(self) -> QtWidgets.QWidget:
+        page, self._foot = QtWidgets.QWidget(), QtWidgets.QVBoxLayout()
+        left = widgets.fill(QtWidgets.QVBoxLayout(), (self.table, 1), self._foot)
+        middle = widgets.fill(QtWidgets.QHBoxLayout(), (left, 3), (self.form, 2))
+        widgets.fill(QtWidgets.QVBoxLayout(page), self.next, (middle, 1), self.saved, self._buttons(page))
         return page
 
-    def _gun(self) -> QWidget:
+    def _gun(self) -> QtWidgets.QWidget:
         simulated = self._opening.gun == SIMULATED
         made = widgets.text_label("gun", "SIMULATED GUN" if simulated else f"Gun: {self._opening.gun}", wrap=False)
         widgets.set_mood(made, "ask" if simulated else "wait")
         return made
 
-    def _buttons(self, page: QWidget) -> QGridLayout:
-        def button(text: str, key: str, slot: Callable[[], object], name: str = "") -> QPushButton:
+    def _buttons(self, page: QtWidgets.QWidget) -> QtWidgets.QGridLayout:
+        def button(text: str, key: str, slot: Callable[[], object], name: str = "") -> QtWidgets.QPushButton:
             return widgets.button(page, text, key, slot, name=name)
 
         self.test_button = button("Test shot", "Ctrl+T", self._test_shot)
         self.exclude_button = button("Exclude…", "Alt+E", self._ask_exclusion)
-        grid = QGridLayout()
+        grid = QtWidgets.QGridLayout()
         grid.addWidget(button("Start", "Ctrl+Return", self._start, "large"), 0, 0, 2, 1)
         grid.addWidget(button("Practice", "Ctrl+P", self._practice), 0, 1)
         grid.addWidget(button("Training (simulated gun)", "Ctrl+R", self._training), 0, 2, 1, 2)
@@ -171,10 +143,9 @@ class StartWindow(QWidget):
     def resizeEvent(self, event: QResizeEvent | None) -> None:  # noqa: N802 - Qt's name
         """Have the type grow with the window."""
         super().resizeEvent(event)
-        scale = type_scale(self.width(), self.height())
-        if scale != self._scale:
+        if (scale := windows.type_scale(self.width(), self.height())) != self._scale:
             self._scale = scale
-            self.setStyleSheet(scaled_sheet(start_sheet(), scale))
+            self.setStyleSheet(windows.scaled_sheet(start_sheet(), scale))
 
     def closeEvent(self, event: QCloseEvent | None) -> None:  # noqa: N802 - Qt's name
         """Let whoever waits for a choice go on, once no test shot is under way."""
@@ -184,7 +155,7 @@ class StartWindow(QWidget):
             event.ignore()
             return
         super().closeEvent(event)
-        remember(self, _NAME)
+        windows.remember(self, _NAME)
         self.closed.emit()
 
     def leave_for(self, signal: str) -> None:
@@ -284,13 +255,8 @@ class StartWindow(QWidget):
             self._start()
 
     def _is_reason(self, reason: str) -> bool:
-        """Whether a reason can be kept; if not, it is said why, and its line gets the keys."""
-        wrong = unfit(reason)
-        if wrong:
-            self.say(wrong, "bad")
-            if self.question is not None:
-                self.question.reason.setFocus()
-        return not wrong
+        """Whether a reason can be kept, as the question that is open says."""
+        return self.question is not None and self.question.takes(reason, self.say)
 
     def _leave(
         self, code: str, *, again: Again = "ask", reason: str = "", practice: bool = False, training: bool = False
@@ -381,11 +347,11 @@ def choose_run(study: StudyFolder, opening: Opening, clock: Clock) -> RunRequest
     window = StartWindow(study, opening, clock)
     loop = QEventLoop()
     window.closed.connect(loop.quit)
-    with signals_to(window.leave_for):
-        open_as_left(window, _NAME)
-        FreshShortcuts(window, clock.now)
+    with windows.signals_to(window.leave_for):
+        windows.open_as_left(window, _NAME)
+        windows.FreshShortcuts(window, clock.now)
         window.activateWindow()
         loop.exec()
     choice = window.choice
-    let_go(window)
+    windows.let_go(window)
     return choice

@@ -8,39 +8,12 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from math import ceil
+from pathlib import Path
 from string import Template
+from typing import TypeVar
 
+from PyQt6 import QtGui, QtWidgets
 from PyQt6.QtCore import QEvent, QPointF, QRectF, QSize, Qt
-from PyQt6.QtGui import (
-    QColor,
-    QKeyEvent,
-    QKeySequence,
-    QPainter,
-    QPaintEvent,
-    QPen,
-    QPolygonF,
-    QResizeEvent,
-    QShortcut,
-    QTextOption,
-    QWheelEvent,
-)
-from PyQt6.QtWidgets import (
-    QBoxLayout,
-    QCheckBox,
-    QComboBox,
-    QFrame,
-    QHBoxLayout,
-    QLabel,
-    QLineEdit,
-    QListWidget,
-    QPushButton,
-    QSizePolicy,
-    QStyle,
-    QStyleOptionButton,
-    QTextEdit,
-    QVBoxLayout,
-    QWidget,
-)
 
 from experiments.screens.participant.messages import Theme
 from experiments.study.register import MAX_REASON, RegisterError, check_reason
@@ -48,144 +21,75 @@ from experiments.study.register import MAX_REASON, RegisterError, check_reason
 MOODS = ("act", "ask", "rest", "wait", "good", "bad")
 """What a line is about, which chooses its colour; the words say it as well."""
 
-_SHARED = {
-    "stop": "#b3261e",
-    "stop_text": "#ffffff",
-    "practice": "#5b2a86",
-    "practice_text": "#ffffff",
-    "simulated": "#ffb000",
-    "simulated_text": "#000000",
+_COLOURS = {
+    "stop": ("#b3261e", "#b3261e"),
+    "stop_text": ("#ffffff", "#ffffff"),
+    "practice": ("#5b2a86", "#5b2a86"),
+    "practice_text": ("#ffffff", "#ffffff"),
+    "simulated": ("#ffb000", "#ffb000"),
+    "simulated_text": ("#000000", "#000000"),
+    "ground": ("#101418", "#ffffff"),
+    "panel": ("#1b2229", "#f0f3f6"),
+    "line": ("#4a5764", "#7a8794"),
+    "filled": ("#34414d", "#c3ccd5"),
+    "text": ("#f2f5f7", "#10161c"),
+    "quiet": ("#b9c4ce", "#3c4852"),
+    "dim": ("#8593a1", "#66727e"),
+    "act": ("#8fd0ff", "#00497a"),
+    "ask": ("#ffd479", "#6b4300"),
+    "rest": ("#9fe0b5", "#0b5028"),
+    "wait": ("#c8d0d8", "#3c4852"),
+    "good": ("#9fe0b5", "#0b5028"),
+    "bad": ("#ffb3a7", "#8c1d18"),
 }
-_COLOURS: dict[Theme, dict[str, str]] = {
-    "dark": _SHARED
-    | {
-        "ground": "#101418",
-        "panel": "#1b2229",
-        "line": "#4a5764",
-        "filled": "#34414d",
-        "text": "#f2f5f7",
-        "quiet": "#b9c4ce",
-        "dim": "#8593a1",
-        "act": "#8fd0ff",
-        "ask": "#ffd479",
-        "rest": "#9fe0b5",
-        "wait": "#c8d0d8",
-        "good": "#9fe0b5",
-        "bad": "#ffb3a7",
-    },
-    "light": _SHARED
-    | {
-        "ground": "#ffffff",
-        "panel": "#f0f3f6",
-        "line": "#7a8794",
-        "filled": "#c3ccd5",
-        "text": "#10161c",
-        "quiet": "#3c4852",
-        "dim": "#66727e",
-        "act": "#00497a",
-        "ask": "#6b4300",
-        "rest": "#0b5028",
-        "wait": "#3c4852",
-        "good": "#0b5028",
-        "bad": "#8c1d18",
-    },
-}
+"""Each by what it is for, in the dark theme and in the light one."""
 
 
 def colour(theme: Theme, name: str) -> str:
     """A colour by what it is for."""
-    return _COLOURS[theme][name]
-
-
-_SHEET = Template("""
-    QWidget { background: $ground; color: $text; font-size: 17px; font-family: "DejaVu Sans", "Noto Sans"; }
-    $moods
-    QLabel#band[mood="practice"] { background: $practice; color: $practice_text; }
-    QLabel#band[mood="simulated"] { background: $simulated; color: $simulated_text; }
-    QFrame#panel { background: $panel; border: 1px solid $line; border-radius: 8px; }
-    QFrame#panel QLabel, QFrame#panel QCheckBox, QWidget#form { background: transparent; }
-    QLabel#place { font-size: 22px; color: $quiet; }
-    QLabel#band { font-size: 20px; font-weight: bold; padding: 4px 10px; border-radius: 4px; }
-    QLabel#quiet { font-size: 18px; color: $quiet; }
-    QLabel#saved { font-size: 22px; color: $good; }
-    QPushButton { background: $panel; border: 2px solid $line; border-radius: 8px; padding: 6px 4px; font-size: 16px; }
-    QPushButton:focus { border: 3px solid $act; }
-    QPushButton:hover { border-color: $act; }
-    QPushButton:disabled, QPushButton[dim="yes"] { color: $dim; border-style: dashed; }
-    QPushButton#large { font-size: 26px; font-weight: bold; padding: 8px 4px; }
-    QPushButton#stop { background: $stop; color: $stop_text; font-weight: bold; font-size: 22px; padding: 14px 6px; }
-    QLineEdit, QDoubleSpinBox, QSpinBox, QComboBox { background: $panel; border: 2px solid $line; border-radius: 6px;
-        padding: 8px; font-size: 24px; }
-    QLineEdit:focus, QDoubleSpinBox:focus, QSpinBox:focus, QComboBox:focus { border: 3px solid $act; }
-    QProgressBar { border: 1px solid $line; border-radius: 6px; text-align: center; background: $panel; color: $text;
-        min-height: 24px; }
-    QProgressBar::chunk { background: $filled; }
-    QCheckBox::indicator { width: 22px; height: 22px; border: 2px solid $line; border-radius: 4px; }
-    QCheckBox::indicator:checked { background: $act; }
-    QCheckBox:focus { color: $act; }
-    QListWidget, QTableWidget, QPlainTextEdit { background: $panel; border: 1px solid $line; font-size: 19px; }
-    QPlainTextEdit { font-family: "DejaVu Sans Mono", monospace; }
-    QListWidget::item:selected, QTableWidget::item:selected { background: $act; color: $ground; }
-    QHeaderView::section { background: $ground; color: $quiet; border: none; padding: 6px; }
-""")
-_START_SHEET = Template("""
-    QTextEdit { background: transparent; border: none; font-size: 19px; }
-    QTextEdit#place { font-size: 22px; color: $quiet; }
-    QLabel#title { font-size: 56px; font-weight: bold; }
-    QTextEdit#detail { font-size: 26px; }
-    QTextEdit#saved, QTextEdit#question { font-size: 22px; }
-    QLabel#gun { font-size: 22px; font-weight: bold; }
-    QLabel#count { font-size: 160px; font-weight: bold; color: $ask; }
-    QPushButton#stop { font-size: 34px; padding: 26px; }
-    QScrollArea { background: transparent; }
-    QTableWidget::item { padding: 3px 8px; }
-    QScrollBar { background: transparent; border: none; width: 14px; height: 14px; }
-    QScrollBar::handle { background: $line; border-radius: 5px; min-height: 30px; }
-    QScrollBar::add-line, QScrollBar::sub-line { width: 0px; height: 0px; }
-    $moods
-""")
+    return _COLOURS[name][theme == "light"]
 
 
 def sheet(theme: Theme) -> str:
     """The Qt style sheet of a theme, in the sizes of the window that it was designed for."""
     # labels that have a colour by their name are named, or that colour would win over the mood's
-    moods = _moods(theme, [f"QLabel{name}" for name in ("", "#saved", "#quiet", "#title", "#damper")])
-    return _SHEET.substitute(_COLOURS[theme], moods=moods)
+    return _styled("console.qss", theme, [f"QLabel{name}" for name in ("", "#saved", "#quiet", "#title", "#damper")])
 
 
 def start_sheet() -> str:
     """The same of the windows before a run, which are dark."""
-    moods = _moods("dark", ["QTextEdit", "QLabel#gun", "QLabel#count"])
-    return sheet("dark") + _START_SHEET.substitute(_COLOURS["dark"], moods=moods)
+    return sheet("dark") + _styled("start.qss", "dark", ["QTextEdit", "QLabel#gun", "QLabel#count"])
 
 
-def _moods(theme: Theme, kinds: Sequence[str]) -> str:
-    """Some kinds of widgets in the colour of each mood."""
+def _styled(file: str, theme: Theme, kinds: Sequence[str]) -> str:
+    """A style sheet beside this module in the colours of a theme, some kinds of widgets in the colour of each mood."""
     selectors = {mood: ", ".join(f'{kind}[mood="{mood}"]' for kind in kinds) for mood in MOODS}
-    return "\n".join(f"{selector} {{ color: {colour(theme, mood)}; }}" for mood, selector in selectors.items())
+    moods = "\n".join(f"{selector} {{ color: {colour(theme, mood)}; }}" for mood, selector in selectors.items())
+    template = Template(Path(__file__).with_name(file).read_text(encoding="utf-8"))
+    return template.substitute({name: colour(theme, name) for name in _COLOURS}, moods=moods)
 
 
 Slot = Callable[[], object]
 NO_FOCUS = Qt.FocusPolicy.NoFocus
 
 
-def text_label(name: str, text: str = "", *, wrap: bool = True) -> QLabel:
+def text_label(name: str, text: str = "", *, wrap: bool = True) -> QtWidgets.QLabel:
     """A label in the style of its name."""
-    made = QLabel(text)
+    made = QtWidgets.QLabel(text)
     made.setObjectName(name)
     made.setWordWrap(wrap)
     made.setTextFormat(Qt.TextFormat.PlainText)
     return made
 
 
-def set_mood(widget: QWidget, mood: str) -> None:
+def set_mood(widget: QtWidgets.QWidget, mood: str) -> None:
     """Give a label the colour of a mood; drawn anew only if it changes."""
     if widget.property("mood") != mood:
         widget.setProperty("mood", mood)
         restyle(widget)
 
 
-def restyle(widget: QWidget) -> None:
+def restyle(widget: QtWidgets.QWidget) -> None:
     """Have a widget drawn anew after a property that the style knows has changed."""
     style = widget.style()
     if style is not None:
@@ -193,71 +97,67 @@ def restyle(widget: QWidget) -> None:
         style.polish(widget)
 
 
-def button(parent: QWidget, text: str, key: str, slot: Slot, *, name: str = "") -> QPushButton:
+def button(parent: QtWidgets.QWidget, text: str, key: str, slot: Slot, *, name: str = "") -> QtWidgets.QPushButton:
     """A button that shows its key, and the key. Both do the same, and only while the button is there to be seen."""
-    made = _button(f"{text}  [{key.replace('Return', 'Enter')}]", text, slot, name)
+    made = QtWidgets.QPushButton(f"{text}  [{key.replace('Return', 'Enter')}]")
+    made.setObjectName(name)
+    made.setAccessibleName(text)
+    made.setFocusPolicy(Qt.FocusPolicy.TabFocus)
+    made.clicked.connect(lambda _: slot())
 
     def pressed() -> None:
         if made.isVisible():
             slot()
 
-    shortcut = QShortcut(QKeySequence(key), parent)
+    shortcut = QtGui.QShortcut(QtGui.QKeySequence(key), parent)
     shortcut.setAutoRepeat(False)
     shortcut.activated.connect(pressed)
     return made
 
 
-def _button(shown: str, spoken: str, slot: Slot, name: str) -> QPushButton:
-    made = QPushButton(shown)
-    made.setObjectName(name)
-    made.setAccessibleName(spoken)
-    made.setFocusPolicy(Qt.FocusPolicy.TabFocus)
-    made.clicked.connect(lambda _: slot())
-    return made
+_Box = TypeVar("_Box", bound=QtWidgets.QBoxLayout)
+Part = QtWidgets.QWidget | QtWidgets.QLayout
 
 
-def panel(*widgets: QWidget) -> QFrame:
+def fill(
+    layout: _Box, *parts: Part | tuple[Part, int], margins: tuple[int, int, int, int] | None = (0, 0, 0, 0)
+) -> _Box:
+    """Put widgets and layouts into a layout, each with its stretch where it has one. No margins: those of the style."""
+    if margins is not None:
+        layout.setContentsMargins(*margins)
+    for part, stretch in (part if isinstance(part, tuple) else (part, 0) for part in parts):
+        if isinstance(part, QtWidgets.QWidget):
+            layout.addWidget(part, stretch)
+        else:
+            layout.addLayout(part, stretch)
+    return layout
+
+
+def panel(*widgets: QtWidgets.QWidget) -> QtWidgets.QFrame:
     """A framed column."""
-    frame = QFrame()
+    frame = QtWidgets.QFrame()
     frame.setObjectName("panel")
-    _fill(QVBoxLayout(frame), widgets)
+    fill(QtWidgets.QVBoxLayout(frame), *widgets, margins=None)
     return frame
 
 
-def row(*widgets: QWidget) -> QWidget:
-    """Widgets side by side."""
-    return _plain(QHBoxLayout(), widgets)
-
-
-def column(*widgets: QWidget) -> QWidget:
+def column(*widgets: QtWidgets.QWidget) -> QtWidgets.QWidget:
     """Widgets below each other."""
-    return _plain(QVBoxLayout(), widgets)
-
-
-def _plain(layout: QBoxLayout, widgets: Sequence[QWidget]) -> QWidget:
-    made = QWidget()
-    made.setLayout(layout)
-    layout.setContentsMargins(0, 0, 0, 0)
-    _fill(layout, widgets)
+    fill(QtWidgets.QVBoxLayout(made := QtWidgets.QWidget()), *widgets)
     return made
 
 
-def _fill(layout: QBoxLayout, widgets: Sequence[QWidget]) -> None:
-    for widget in widgets:
-        layout.addWidget(widget)
-
-
-def quiet_list() -> QListWidget:
+def quiet_list() -> QtWidgets.QListWidget:
     """A list that is only looked at; long lines go on below."""
-    made = QListWidget()
+    made = QtWidgets.QListWidget()
     made.setWordWrap(True)
     made.setHorizontalScrollBarPolicy(Qt.ScrollBarPolicy.ScrollBarAlwaysOff)
     made.setFocusPolicy(Qt.FocusPolicy.NoFocus)
-    made.setSelectionMode(QListWidget.SelectionMode.SingleSelection)
+    made.setSelectionMode(QtWidgets.QListWidget.SelectionMode.SingleSelection)
     return made
 
 
-class TextLines(QTextEdit):
+class TextLines(QtWidgets.QTextEdit):
     """Text to read and to copy. A word that is too long, such as a path, is broken; a text that is too long scrolls."""
 
     def __init__(self, name: str, text: str = "", most_lines: int = 4) -> None:
@@ -266,10 +166,10 @@ class TextLines(QTextEdit):
         self.setObjectName(name)
         self.setReadOnly(True)
         self.setFocusPolicy(Qt.FocusPolicy.NoFocus)
-        self.setFrameShape(QFrame.Shape.NoFrame)
-        self.setWordWrapMode(QTextOption.WrapMode.WrapAtWordBoundaryOrAnywhere)
+        self.setFrameShape(QtWidgets.QFrame.Shape.NoFrame)
+        self.setWordWrapMode(QtGui.QTextOption.WrapMode.WrapAtWordBoundaryOrAnywhere)
         self.setHorizontalScrollBarPolicy(Qt.ScrollBarPolicy.ScrollBarAlwaysOff)
-        self.setSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Fixed)
+        self.setSizePolicy(QtWidgets.QSizePolicy.Policy.Expanding, QtWidgets.QSizePolicy.Policy.Fixed)
         self.say(text)
 
     def say(self, text: str, mood: str = "") -> None:
@@ -279,7 +179,7 @@ class TextLines(QTextEdit):
         set_mood(self, mood)
         self._fit()
 
-    def resizeEvent(self, event: QResizeEvent | None) -> None:  # noqa: N802 - Qt's name
+    def resizeEvent(self, event: QtGui.QResizeEvent | None) -> None:  # noqa: N802 - Qt's name
         """Take the height that the text needs at this width."""
         super().resizeEvent(event)
         self._fit()
@@ -302,22 +202,22 @@ class TextLines(QTextEdit):
         self.setFixedHeight(min(needed, most) if self.toPlainText() else 0)
 
 
-class TickBox(QCheckBox):
+class TickBox(QtWidgets.QCheckBox):
     """A box that shows a tick when it is ticked: colour alone does not say it."""
 
-    def paintEvent(self, event: QPaintEvent | None) -> None:  # noqa: N802 - Qt's name
+    def paintEvent(self, event: QtGui.QPaintEvent | None) -> None:  # noqa: N802 - Qt's name
         """The box as its style has it, with the tick on top."""
         super().paintEvent(event)
         style = self.style()
         if not self.isChecked() or style is None:
             return
-        option = QStyleOptionButton()
+        option = QtWidgets.QStyleOptionButton()
         self.initStyleOption(option)
-        box = QRectF(style.subElementRect(QStyle.SubElement.SE_CheckBoxIndicator, option, self))
-        painter = QPainter(self)
-        painter.setRenderHint(QPainter.RenderHint.Antialiasing)
-        painter.setPen(QPen(QColor(colour("dark", "ground")), box.width() / 7))
-        painter.drawPolyline(QPolygonF([_at(box, 0.22, 0.52), _at(box, 0.43, 0.74), _at(box, 0.79, 0.28)]))
+        box = QRectF(style.subElementRect(QtWidgets.QStyle.SubElement.SE_CheckBoxIndicator, option, self))
+        painter = QtGui.QPainter(self)
+        painter.setRenderHint(QtGui.QPainter.RenderHint.Antialiasing)
+        painter.setPen(QtGui.QPen(QtGui.QColor(colour("dark", "ground")), box.width() / 7))
+        painter.drawPolyline(QtGui.QPolygonF([_at(box, 0.22, 0.52), _at(box, 0.43, 0.74), _at(box, 0.79, 0.28)]))
         painter.end()
 
 
@@ -325,26 +225,26 @@ def _at(box: QRectF, across: float, down: float) -> QPointF:
     return QPointF(box.left() + across * box.width(), box.top() + down * box.height())
 
 
-class ListBox(QComboBox):
+class ListBox(QtWidgets.QComboBox):
     """One of several. The wheel that scrolls the form does not turn it, nor does its longest entry widen the form."""
 
     def __init__(self, entries: Sequence[str]) -> None:
         super().__init__()
         self.addItems(entries)
-        self.setSizeAdjustPolicy(QComboBox.SizeAdjustPolicy.AdjustToMinimumContentsLengthWithIcon)
+        self.setSizeAdjustPolicy(QtWidgets.QComboBox.SizeAdjustPolicy.AdjustToMinimumContentsLengthWithIcon)
         self.setMinimumContentsLength(10)
-        self.setSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Fixed)
+        self.setSizePolicy(QtWidgets.QSizePolicy.Policy.Expanding, QtWidgets.QSizePolicy.Policy.Fixed)
 
-    def wheelEvent(self, event: QWheelEvent | None) -> None:  # noqa: N802 - Qt's name
+    def wheelEvent(self, event: QtGui.QWheelEvent | None) -> None:  # noqa: N802 - Qt's name
         """Leave the wheel to what is scrolled."""
         if event is not None:
             event.ignore()
 
 
-class LineEdit(QLineEdit):
+class LineEdit(QtWidgets.QLineEdit):
     """A line of text. Enter goes on to the next field, and a held Enter no further."""
 
-    def keyPressEvent(self, event: QKeyEvent | None) -> None:  # noqa: N802 - Qt's name
+    def keyPressEvent(self, event: QtGui.QKeyEvent | None) -> None:  # noqa: N802 - Qt's name
         """Take a key."""
         if event is None:
             return
@@ -371,37 +271,31 @@ class Option:
     do: Callable[[str], None]
 
 
-class QuestionBox(QFrame):
+class QuestionBox(QtWidgets.QFrame):
     """Asks one thing, until it is answered or taken back."""
 
     def __init__(self, text: str, answers: tuple[Option, ...], *, reason: str = "") -> None:
         super().__init__()
         self.setObjectName("panel")
-        down = QVBoxLayout(self)
         self.text = TextLines("question")
         self.text.say(text, "ask")
-        down.addWidget(self.text)
         self.reason = LineEdit()
         self.reason.setMaxLength(MAX_REASON)
         self.reason.setPlaceholderText(reason)
         self.reason.setAccessibleName(reason)
         self.reason.setVisible(bool(reason))
-        down.addWidget(self.reason)
-        across = QHBoxLayout()
-        for answer in answers:
-            across.addWidget(self._button(answer))
-        down.addLayout(across)
+        across = fill(QtWidgets.QHBoxLayout(), *map(self._button, answers))
+        fill(QtWidgets.QVBoxLayout(self), self.text, self.reason, across, margins=None)
 
-    def _button(self, answer: Option) -> QWidget:
+    def _button(self, answer: Option) -> QtWidgets.QWidget:
         return button(self, answer.text, answer.key, lambda: answer.do(self.reason.text().strip()))
 
-
-def unfit(reason: str) -> str:
-    """Why a reason cannot be kept, in one sentence; empty if it can."""
-    if not reason:
-        return "Type why, first."
-    try:
-        check_reason(reason)
-    except RegisterError as error:
-        return f"{error}."
-    return ""
+    def takes(self, reason: str, say: Callable[[str, str], None]) -> bool:
+        """Whether a reason can be kept; if not, it is said why in one sentence, and its line gets the keys."""
+        try:
+            check_reason(reason)
+        except RegisterError as error:
+            say(f"{error}." if reason else "Type why, first.", "bad")
+            self.reason.setFocus()
+            return False
+        return True

@@ -5,15 +5,9 @@ It decides nothing: keys and buttons become events, and the table of states judg
 
 from __future__ import annotations
 
+from PyQt6 import QtWidgets
 from PyQt6.QtCore import QTimer, pyqtSignal
 from PyQt6.QtGui import QCloseEvent, QResizeEvent, QShowEvent
-from PyQt6.QtWidgets import (
-    QHBoxLayout,
-    QMainWindow,
-    QStackedWidget,
-    QVBoxLayout,
-    QWidget,
-)
 
 from experiments.clock import Clock
 from experiments.live_run import LiveRun
@@ -22,18 +16,6 @@ from experiments.screens.console.controls import Controls, TextField
 from experiments.screens.console.keys import Name, Typing
 from experiments.screens.console.panels import FITS, Bars, Buttons, Notice, SidePanel, TextFields, TextPage
 from experiments.screens.console.progress import RunTiming, marks
-from experiments.screens.console.view import (
-    About,
-    Began,
-    Ended,
-    GunSeen,
-    Message,
-    ParticipantSeen,
-    Saved,
-    Seen,
-    Shown,
-    Trouble,
-)
 from experiments.screens.console.windows import Keyboard, remember, scaled_sheet
 from experiments.screens.participant.messages import Theme
 from experiments.screens.texts import saved_text
@@ -51,20 +33,20 @@ SMALLEST, LARGEST = 0.55, 2.2
 """How far type shrinks and grows with the window."""
 
 
-class ConsoleWindow(QMainWindow):
+class ConsoleWindow(QtWidgets.QMainWindow):
     """What to do now, the keys that do it, and what an experimenter looks for: progress, gun, what comes next."""
 
     closed = pyqtSignal()
 
-    def __init__(self, about: About, clock: Clock) -> None:
+    def __init__(self, about: view.About, clock: Clock) -> None:
         super().__init__()
         self.about, self.clock = about, clock
         self.live: LiveRun | None = None
         self.controls: Controls | None = None
         self.drawn = Position()
-        self.gun: GunSeen | None = None
-        self.participant: ParticipantSeen | None = None
-        self.ended: Ended | None = None
+        self.gun: view.GunSeen | None = None
+        self.participant: view.ParticipantSeen | None = None
+        self.ended: view.Ended | None = None
         self._progress = RunTiming()
         self._brief_until_s: float | None = None
         self._brief_for = -1
@@ -86,30 +68,19 @@ class ConsoleWindow(QMainWindow):
         self.place, self.saved = widgets.text_label("place"), widgets.text_label("saved")
         self.notice, self.fields, self.side, self.buttons = Notice(), TextFields(), SidePanel(self.about), Buttons(self)
         self.bars = Bars(self.about)
-        self._main = QWidget()
-        left = QVBoxLayout(self._main)
-        left.setContentsMargins(0, 0, 0, 0)
-        for line in self.notice.labels:
-            left.addWidget(line)
+        self._main = QtWidgets.QWidget()
+        left = widgets.fill(QtWidgets.QVBoxLayout(self._main), *self.notice.labels)
         left.addStretch(1)
-        for below in (self.fields.pages, self.buttons.slots, self.fields.bar, self.saved):
-            left.addWidget(below)
-        across = QHBoxLayout()
-        across.addWidget(self._main, 3)
-        across.addWidget(self.side, 1)
-        down = QVBoxLayout(whole := QWidget())
-        down.setContentsMargins(10, 6, 10, 6)
-        down.addWidget(self.place)
-        down.addLayout(across, 1)
-        down.addWidget(self.bars)
-        self.pages, self.page = QStackedWidget(), TextPage()
+        widgets.fill(left, self.fields.pages, self.buttons.slots, self.fields.bar, self.saved)
+        across = widgets.fill(QtWidgets.QHBoxLayout(), (self._main, 3), (self.side, 1))
+        down = QtWidgets.QVBoxLayout(whole := QtWidgets.QWidget())
+        widgets.fill(down, self.place, (across, 1), self.bars, margins=(10, 6, 10, 6))
+        self.pages, self.page = QtWidgets.QStackedWidget(), TextPage()
         self.pages.addWidget(whole)
         self.pages.addWidget(self.page)
-        outer = QVBoxLayout(central := QWidget())
-        outer.setContentsMargins(0, 0, 0, 4)
-        outer.addWidget(widgets.row(*self.bands))
-        outer.addWidget(self.pages, 1)
-        outer.addWidget(self.buttons.row)
+        outer, bands = QtWidgets.QVBoxLayout(central := QtWidgets.QWidget()), QtWidgets.QWidget()
+        widgets.fill(QtWidgets.QHBoxLayout(bands), *self.bands)
+        widgets.fill(outer, bands, (self.pages, 1), self.buttons.row, margins=(0, 0, 0, 4))
         self.setCentralWidget(central)
         central.setMinimumSize(1, 1)
         self.setMinimumSize(640, 400)
@@ -121,29 +92,27 @@ class ConsoleWindow(QMainWindow):
         """A live run is there, and who works it."""
         self.live, self.controls = live, controls
 
-    def take(self, message: Message) -> None:  # noqa: C901 - one case a message
+    def take(self, message: view.Message) -> None:
         """Take a message from the run, show it, and say when it was painted."""
         match message:
-            case Began():
+            case view.Began() | view.Shown():
                 self._arrive()
-            case Saved():
+            case view.Saved():
                 self._acknowledge(message)
-            case GunSeen():
+            case view.GunSeen():
                 self.gun = message
-            case ParticipantSeen():
+            case view.ParticipantSeen():
                 self.participant = message
-            case Trouble():
+            case view.Trouble():
                 self._last(message.text, message.mood)
-            case Ended():
+            case view.Ended():
                 self._end(message)
-            case Shown():
-                self._arrive()
         self.refresh()
-        if isinstance(message, Shown | Began) and self.live is not None:
+        if isinstance(message, view.Shown | view.Began) and self.live is not None:
             self.repaint()
             self.live.painted(self.drawn.serial, self.clock.now())
 
-    def _end(self, message: Ended) -> None:
+    def _end(self, message: view.Ended) -> None:
         self.ended = message
         if self.controls is not None:
             self.controls.ended = True
@@ -165,7 +134,7 @@ class ConsoleWindow(QMainWindow):
         self.fields.at(self.drawn, self.controls.entered_so_far() if self.controls is not None else "")
         self.fields.focus(self.drawn, self)
 
-    def _acknowledge(self, message: Saved) -> None:
+    def _acknowledge(self, message: view.Saved) -> None:
         """Say that it is safe; a tone at the end of a break."""
         self._progress.saved(message.word, self.clock.now())
         text = saved_text(self.about.plan, message.step, message.word)
@@ -201,9 +170,9 @@ class ConsoleWindow(QMainWindow):
     # showing
 
     @property
-    def seen(self) -> Seen:
+    def seen(self) -> view.Seen:
         """Everything that is shown now."""
-        return Seen(
+        return view.Seen(
             about=self.about,
             position=self.drawn,
             told=() if self.live is None else self.live.history,
@@ -229,7 +198,7 @@ class ConsoleWindow(QMainWindow):
             self._unbrief()
         self._fit()
 
-    def _show_bands(self, seen: Seen) -> None:
+    def _show_bands(self, seen: view.Seen) -> None:
         found = view.bands(seen)
         for label, (text, name) in zip(self.bands, [*found, *[("", "")] * (2 - len(found))], strict=True):
             label.setVisible(bool(text))
@@ -266,8 +235,7 @@ class ConsoleWindow(QMainWindow):
     def showEvent(self, event: QShowEvent | None) -> None:  # noqa: N802 - Qt's name
         """Hear the keys before any widget does."""
         super().showEvent(event)
-        handle = self.windowHandle()
-        if handle is not None:
+        if (handle := self.windowHandle()) is not None:
             handle.removeEventFilter(self._keyboard)
             handle.installEventFilter(self._keyboard)
 
@@ -345,10 +313,6 @@ class ConsoleWindow(QMainWindow):
         """Change the colours."""
         self.theme = "light" if self.theme == "dark" else "dark"
         self._restyle()
-
-    def shut(self) -> None:
-        """Close the window of a run that has ended."""
-        self.close()
 
     def closeEvent(self, event: QCloseEvent | None) -> None:  # noqa: N802 - Qt's name
         """Closing the window of a live run asks why it stops; once it has ended, the window goes."""

@@ -20,18 +20,7 @@ from functools import lru_cache
 from types import FrameType
 from typing import Any, Protocol
 
-from PyQt6.QtCore import (
-    QByteArray,
-    QCoreApplication,
-    QEvent,
-    QMessageLogContext,
-    QObject,
-    QSettings,
-    Qt,
-    QTimer,
-    QtMsgType,
-    qInstallMessageHandler,
-)
+from PyQt6 import QtCore
 from PyQt6.QtGui import QKeyEvent
 from PyQt6.QtWidgets import QApplication, QWidget
 
@@ -45,7 +34,7 @@ _SMALLEST, _LARGEST, _GRAIN = 0.7, 2.5, 0.05
 def open_as_left(window: QWidget, name: str) -> None:
     """Show a window where and as large as it was when it was closed; maximised if it never was, or lay elsewhere."""
     left = _settings().value(name)
-    if isinstance(left, QByteArray) and window.restoreGeometry(left):
+    if isinstance(left, QtCore.QByteArray) and window.restoreGeometry(left):
         window.show()
         return
     screen = window.screen()
@@ -61,14 +50,14 @@ def remember(window: QWidget, name: str) -> None:
     settings.sync()
 
 
-def let_go(thing: QObject) -> None:
+def let_go(thing: QtCore.QObject) -> None:
     """Have Qt delete a window, or a timer, now and in this thread: Python's garbage collector works in any thread."""
     thing.deleteLater()
-    QCoreApplication.sendPostedEvents(thing, QEvent.Type.DeferredDelete.value)
+    QtCore.QCoreApplication.sendPostedEvents(thing, QtCore.QEvent.Type.DeferredDelete.value)
 
 
-def _settings() -> QSettings:
-    return QSettings(QSettings.Format.IniFormat, QSettings.Scope.UserScope, "recoil", "windows")
+def _settings() -> QtCore.QSettings:
+    return QtCore.QSettings(QtCore.QSettings.Format.IniFormat, QtCore.QSettings.Scope.UserScope, "recoil", "windows")
 
 
 def type_scale(width_px: int, height_px: int) -> float:
@@ -106,10 +95,10 @@ def on_loss(act: Callable[[], None]) -> Iterator[None]:
 
 def hear_of_loss() -> None:
     """Hear Qt's messages from now on; they still go where they went."""
-    qInstallMessageHandler(_heard)
+    QtCore.qInstallMessageHandler(_heard)
 
 
-def _heard(kind: QtMsgType, context: QMessageLogContext, text: str | None) -> None:
+def _heard(kind: QtCore.QtMsgType, context: QtCore.QMessageLogContext, text: str | None) -> None:
     del kind, context
     sys.stderr.write(f"{text}\n")
     if text and any(sign in text for sign in _SIGNS):
@@ -150,9 +139,9 @@ def signals_to(leave: Callable[[str], None] | None = None) -> Iterator[list[str]
 
 
 @lru_cache(maxsize=1)
-def _wake() -> QTimer:
+def _wake() -> QtCore.QTimer:
     """Lets Python look at signals while Qt waits; one for the whole program, as long as it lasts."""
-    wake = QTimer(QCoreApplication.instance())
+    wake = QtCore.QTimer(QtCore.QCoreApplication.instance())
     wake.timeout.connect(lambda: None)
     wake.start(WAKE_MS)
     return wake
@@ -170,7 +159,7 @@ class _Handler:
         self._note(number)
         if leave is None:
             raise KeyboardInterrupt(name)
-        QTimer.singleShot(0, lambda: leave(name))
+        QtCore.QTimer.singleShot(0, lambda: leave(name))
 
     def _note(self, number: int) -> None:
         self.came.append(signal.Signals(number).name)
@@ -184,30 +173,18 @@ LET_GO_MS = 100
 may come apart.
 """
 _NAMES = {
-    Qt.Key.Key_Space: "Space",
-    Qt.Key.Key_Return: "Enter",
-    Qt.Key.Key_Enter: "Enter",
-    Qt.Key.Key_Escape: "Esc",
-    Qt.Key.Key_F1: "F1",
-    Qt.Key.Key_F2: "F2",
-    Qt.Key.Key_F12: "F12",
+    QtCore.Qt.Key.Key_Space: "Space",
+    QtCore.Qt.Key.Key_Return: "Enter",
+    QtCore.Qt.Key.Key_Enter: "Enter",
+    QtCore.Qt.Key.Key_Escape: "Esc",
+    QtCore.Qt.Key.Key_F1: "F1",
+    QtCore.Qt.Key.Key_F2: "F2",
+    QtCore.Qt.Key.Key_F12: "F12",
 }
 _PLACES = {
-    24: "Q",
-    26: "E",
-    27: "R",
-    28: "T",
-    29: "Y",
-    30: "U",
-    33: "P",
-    39: "S",
-    41: "F",
-    42: "G",
-    46: "L",
-    53: "X",
-    56: "B",
-    57: "N",
-    58: "M",
+    first + place: letter
+    for first, row in ((24, "QWERTYUIOP"), (38, "ASDFGHJKL"), (52, "ZXCVBNM"))
+    for place, letter in enumerate(row)
 }
 """Letters by X's number of their place on the keyboard, for alphabets that have others there."""
 
@@ -225,7 +202,7 @@ class Hears(Protocol):
         """A key was let go."""
 
 
-class Keyboard(QObject):
+class Keyboard(QtCore.QObject):
     """An event filter for a window (`QWindow`): what is a command is taken out, the rest is text for the widgets."""
 
     def __init__(self, hears: Hears, now: Callable[[], float]) -> None:
@@ -235,21 +212,21 @@ class Keyboard(QObject):
         self._into: dict[str, QWidget | None] = {}
         """Where a key went as text when it went down."""
 
-    def eventFilter(self, watched: QObject | None, event: QEvent | None) -> bool:  # noqa: N802 - Qt's name
+    def eventFilter(self, watched: QtCore.QObject | None, event: QtCore.QEvent | None) -> bool:  # noqa: N802 - Qt's name
         """Take a key that is a command; true keeps it from everybody else."""
         del watched
-        if event is not None and event.type() == QEvent.Type.FocusOut:
+        if event is not None and event.type() == QtCore.QEvent.Type.FocusOut:
             for key in self._presses.lost():
                 self._hears.up(key)
         if not isinstance(event, QKeyEvent):
             return False
         key, at_s = key_name(event), self._clock.at(event.timestamp(), self._now())
-        if event.type() == QEvent.Type.KeyRelease:
+        if event.type() == QtCore.QEvent.Type.KeyRelease:
             number = self._presses.up(key, at_s, repeated=event.isAutoRepeat())
             if not event.isAutoRepeat():
-                QTimer.singleShot(LET_GO_MS, lambda: self._let_go(key, number))
+                QtCore.QTimer.singleShot(LET_GO_MS, lambda: self._let_go(key, number))
             return False
-        if event.type() != QEvent.Type.KeyPress:
+        if event.type() != QtCore.QEvent.Type.KeyPress:
             return False
         return self._pressed(key, event, at_s)
 
@@ -260,7 +237,7 @@ class Keyboard(QObject):
 
     def _pressed(self, key: str, event: QKeyEvent, at_s: float) -> bool:
         acts = self._presses.down(key, at_s, repeated=event.isAutoRepeat())
-        name = self._hears.command(key, ctrl=bool(event.modifiers() & Qt.KeyboardModifier.ControlModifier))
+        name = self._hears.command(key, ctrl=bool(event.modifiers() & QtCore.Qt.KeyboardModifier.ControlModifier))
         if name is None:
             return self._is_stale_text(key, fresh=acts)
         self._into.pop(key, None)
@@ -276,7 +253,7 @@ class Keyboard(QObject):
         return key not in self._into or self._into[key] is not into
 
 
-class FreshShortcuts(QObject):
+class FreshShortcuts(QtCore.QObject):
     """Has each shortcut of a window act once a press, however long its key is held.
 
     Qt itself takes a repeated key for a new one when the machine is too busy to read its two events together.
@@ -290,40 +267,44 @@ class FreshShortcuts(QObject):
         if (window := widget.windowHandle()) is not None:
             window.installEventFilter(self)
 
-    def eventFilter(self, watched: QObject | None, event: QEvent | None) -> bool:  # noqa: N802 - Qt's name
+    def eventFilter(self, watched: QtCore.QObject | None, event: QtCore.QEvent | None) -> bool:  # noqa: N802 - Qt's name
         """Take a key that is held still; true keeps it from everybody else. Text repeats as it always does."""
         del watched
-        if event is not None and event.type() == QEvent.Type.FocusOut:
+        if event is not None and event.type() == QtCore.QEvent.Type.FocusOut:
             self._presses.lost()
         if not isinstance(event, QKeyEvent):
             return False
         key, at_s = key_name(event), self._clock.at(event.timestamp(), self._now())
-        if event.type() == QEvent.Type.KeyRelease:
+        if event.type() == QtCore.QEvent.Type.KeyRelease:
             if self._presses.is_down(key):
                 self._presses.up(key, at_s, repeated=event.isAutoRepeat())
             return False
-        if event.type() == QEvent.Type.ShortcutOverride and _may_be_shortcut(event):
+        if event.type() == QtCore.QEvent.Type.ShortcutOverride and _may_be_shortcut(event):
             acts = self._presses.down(key, at_s, repeated=event.isAutoRepeat())
             self._stale = "" if acts else key
             event.setAccepted(not acts)
-        elif event.type() == QEvent.Type.ShortcutOverride:
+        elif event.type() == QtCore.QEvent.Type.ShortcutOverride:
             self._stale = ""
         return key == self._stale
 
 
 def _may_be_shortcut(event: QKeyEvent) -> bool:
     """Whether a key is no text, nor moves within it."""
-    held = event.modifiers() & (Qt.KeyboardModifier.ControlModifier | Qt.KeyboardModifier.AltModifier)
-    return bool(held) or event.key() == Qt.Key.Key_Escape or Qt.Key.Key_F1 <= event.key() <= Qt.Key.Key_F12
+    held = event.modifiers() & (QtCore.Qt.KeyboardModifier.ControlModifier | QtCore.Qt.KeyboardModifier.AltModifier)
+    return (
+        bool(held)
+        or event.key() == QtCore.Qt.Key.Key_Escape
+        or QtCore.Qt.Key.Key_F1 <= event.key() <= QtCore.Qt.Key.Key_F12
+    )
 
 
 def key_name(event: QKeyEvent) -> str:
     """A key by the name that commands have: letters as capitals, by their place where the alphabet is another."""
     key = event.key()
-    named = _NAMES.get(Qt.Key(key)) if key in set(_NAMES) else None
+    named = _NAMES.get(QtCore.Qt.Key(key)) if key in set(_NAMES) else None
     if named is not None:
         return named
-    if Qt.Key.Key_A <= key <= Qt.Key.Key_Z:
+    if QtCore.Qt.Key.Key_A <= key <= QtCore.Qt.Key.Key_Z:
         return chr(key)
     if event.text().isalpha() and not event.text().isascii():
         return _PLACES.get(event.nativeScanCode(), f"#{key}")

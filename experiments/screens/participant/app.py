@@ -154,7 +154,6 @@ class App:
     def _answer(self) -> None:
         """Say what the page came to, if it did, and thank for it. After a page to type on another is likely to come."""
         page = self._stage.page
-        given = None if page is None else page.outcome()
-        if page is not None and given is not None:
+        if (given := page.outcome()) is not None:
             self._wire.say(given)
             self._stage.put(MessagePage(self._stage, messages.BETWEEN), keep_keys=page.typed)

@@ -21,7 +21,7 @@ from typing import IO, Self, TypeVar
 from pydantic import ValidationError
 
 from device.words import RecoilError
-from experiments.clock import Clock, RealClock
+from experiments.clock import RealClock
 from experiments.screens.participant import messages
 from experiments.screens.participant.messages import line
 
@@ -90,8 +90,8 @@ _Given = TypeVar("_Given", messages.RatingGiven, messages.DescriptionGiven, mess
 class ParticipantLink:
     """The participant's screen, as a console sees it. Use it as a context manager, or `close` it."""
 
-    def __init__(self, command: Sequence[str], clock: Clock) -> None:
-        self._clock = clock
+    def __init__(self, command: Sequence[str]) -> None:
+        self._clock = RealClock()
         self._mail = Mailbox()
         self._asking = threading.RLock()
         self._page = threading.Lock()
@@ -107,17 +107,10 @@ class ParticipantLink:
             raise ParticipantError(f"the participant's screen cannot be started: {error}") from error
 
     @classmethod
-    def start(
-        cls, look: messages.Look | None = None, *, clock: Clock | None = None, command: Sequence[str] | None = None
-    ) -> Self:
+    def start(cls, look: messages.Look | None = None, *, command: Sequence[str] | None = None) -> Self:
         """Start the program and return at once; its window takes seconds to open. `command` is another program."""
-        program = command or (
-            sys.executable,
-            "-m",
-            "experiments.screens.participant",
-            *messages.arguments(look or messages.Look()),
-        )
-        return cls(program, clock or RealClock())
+        own = (sys.executable, "-m", "experiments.screens.participant", *messages.arguments(look or messages.Look()))
+        return cls(command or own)
 
     @property
     def failure(self) -> str | None:
@@ -158,10 +151,10 @@ class ParticipantLink:
             self._stands = 0
             self._process.write(line(messages.Show(text=text, tell=tell, keep_keys=keep_keys)))
 
-    def map_clocks(self, pings: int = PINGS) -> ClockMap:
+    def map_clocks(self) -> ClockMap:
         """Map the clocks anew."""
         with self._alone():
-            return clock_map([self._trip() for _ in range(pings)])
+            return clock_map([self._trip() for _ in range(PINGS)])
 
     def ask_rating(
         self, question: messages.AskRating, timeout_s: float | None = None, *, wanted: Callable[[], bool] = lambda: True
@@ -174,24 +167,14 @@ class ParticipantLink:
             return self._answer(replace(question, ask=self._mail.open_ask()), messages.RatingGiven, timeout_s, wanted)
 
     def ask_description(
-        self,
-        question: messages.AskDescription,
-        timeout_s: float | None = None,
-        *,
-        wanted: Callable[[], bool] = lambda: True,
+        self, question: messages.AskDescription, *, wanted: Callable[[], bool] = lambda: True
     ) -> messages.DescriptionGiven:
         """Have a stimulus described. Waits for the participant. `wanted` as of a rating."""
         with self._alone():
-            return self._answer(
-                replace(question, ask=self._mail.open_ask()), messages.DescriptionGiven, timeout_s, wanted
-            )
+            return self._answer(replace(question, ask=self._mail.open_ask()), messages.DescriptionGiven, None, wanted)
 
     def ask_direction(
-        self,
-        question: messages.AskDirection,
-        timeout_s: float | None = None,
-        *,
-        wanted: Callable[[], bool] = lambda: True,
+        self, question: messages.AskDirection, *, wanted: Callable[[], bool] = lambda: True
     ) -> messages.DirectionGiven:
         """Have a direction judged. Waits for the participant. `onset_s` and `pressed_s` are on this side's clock.
 
@@ -200,7 +183,7 @@ class ParticipantLink:
         with self._alone():
             ask, clocks = self._mail.open_ask(), self.map_clocks()
             asked = replace(question, ask=ask, onset_s=clocks.there(question.onset_s))
-            given = self._answer(asked, messages.DirectionGiven, timeout_s, wanted)
+            given = self._answer(asked, messages.DirectionGiven, None, wanted)
             after = self.map_clocks()
         if surely_moved_s(clocks, after) > MAX_CLOCK_STEP_S:
             moved_s = after.offset_s - clocks.offset_s
@@ -212,9 +195,8 @@ class ParticipantLink:
     def noise(self, on: bool, level: float = 0.3) -> messages.NoiseIs:
         """Turn the masking noise on or off; the answer says whether it plays, and if it cannot, why."""
         with self._alone():
-            return self._answer(
-                messages.Noise(on=on, level=level, ask=self._mail.open_ask()), messages.NoiseIs, NOISE_S, lambda: True
-            )
+            asked = messages.Noise(on=on, level=level, ask=self._mail.open_ask())
+            return self._answer(asked, messages.NoiseIs, NOISE_S, lambda: True)
 
     def cancel(self) -> bool:
         """Call off the question that is being asked, from another thread; true if there was one."""

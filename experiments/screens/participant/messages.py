@@ -7,11 +7,10 @@ with it, so that an answer that is late is never taken for that of the next ques
 
 from __future__ import annotations
 
-import argparse
 import json
 from collections.abc import Sequence
 from dataclasses import asdict, dataclass
-from typing import Annotated, Literal, get_args
+from typing import Annotated, Literal
 
 from pydantic import Field, TypeAdapter
 
@@ -266,31 +265,18 @@ PALETTES: dict[Theme, Palette] = {
 }
 
 
+_LOOK = TypeAdapter(Look)
+
+
 def arguments(look: Look) -> list[str]:
     """A look as arguments of the program.
 
     >>> look_from(arguments(Look(screen=1, theme="light"))) == Look(screen=1, theme="light")
     True
     """
-    size = [] if look.full_screen else ["--window", str(look.width_px), str(look.height_px)]
-    return ["--screen", str(look.screen), "--theme", look.theme, "--font", look.font, *size]
+    return [json.dumps(asdict(look))]
 
 
 def look_from(words: Sequence[str]) -> Look:
-    """The look that arguments ask for; `SystemExit` with a message if they are wrong."""
-    usual = Look()
-    parser = argparse.ArgumentParser(prog="experiments.screens.participant", description="The participant's screen.")
-    parser.add_argument("--screen", type=int, default=usual.screen, help="index of the screen")
-    parser.add_argument("--theme", choices=get_args(Theme), default=usual.theme)
-    parser.add_argument("--font", default=usual.font, help="name of the font")
-    parser.add_argument("--window", type=int, nargs=2, metavar=("WIDTH", "HEIGHT"), help="a window, not full screen")
-    told = parser.parse_args(words)
-    width_px, height_px = told.window or (usual.width_px, usual.height_px)
-    return Look(
-        screen=told.screen,
-        full_screen=told.window is None,
-        width_px=width_px,
-        height_px=height_px,
-        theme=told.theme,
-        font=told.font,
-    )
+    """The look that arguments ask for, as `arguments` writes it."""
+    return _LOOK.validate_json(" ".join(words) or "{}")

@@ -9,14 +9,7 @@ import math
 from collections.abc import Callable
 from typing import Any, Literal
 
-from experiments.screens.participant.messages import (
-    AskDescription,
-    AskDirection,
-    AskRating,
-    DescriptionGiven,
-    DirectionGiven,
-    RatingGiven,
-)
+from experiments.screens.participant import messages
 from experiments.screens.participant.stage import KeyPresses, Page, Stage, TextBox, half_width
 from experiments.session.steps import on_scale
 
@@ -42,7 +35,7 @@ class DirectionPage(Page):
     After a pause, or where a key was refused, only those that go down once it stands there again.
     """
 
-    def __init__(self, stage: Stage, asked: AskDirection, keys: KeyPresses) -> None:
+    def __init__(self, stage: Stage, asked: messages.AskDirection, keys: KeyPresses) -> None:
         self._asked, self._keys, self._now = asked, keys, stage.toolkit.now
         self._since_s = math.inf if asked.once_seen else asked.onset_s
         width, ink = stage.half_width, stage.palette.ink
@@ -65,13 +58,13 @@ class DirectionPage(Page):
         if math.isinf(self._since_s):
             self._since_s = max(self._now(), self._asked.onset_s)
 
-    def outcome(self) -> DirectionGiven | None:
+    def outcome(self) -> messages.DirectionGiven | None:
         """The first of the two keys since the onset."""
         for press in self._keys.since(self._since_s):
             if press.name == self._asked.forward_key:
-                return DirectionGiven(response="forward", pressed_s=press.pressed_s, ask=self._asked.ask)
+                return messages.DirectionGiven(response="forward", pressed_s=press.pressed_s, ask=self._asked.ask)
             if press.name == self._asked.backward_key:
-                return DirectionGiven(response="backward", pressed_s=press.pressed_s, ask=self._asked.ask)
+                return messages.DirectionGiven(response="backward", pressed_s=press.pressed_s, ask=self._asked.ask)
         return None
 
 
@@ -108,7 +101,7 @@ class Button:
         return abs(x - self._box.x) <= self._box.width / 2 and abs(y - self._box.y) <= self._box.height / 2
 
 
-def heading(stage: Stage, asked: AskRating | AskDescription) -> list[Any]:
+def heading(stage: Stage, asked: messages.AskRating | messages.AskDescription) -> list[Any]:
     """Which stimulus is meant, by its order of presentation, and the question."""
     width = 2 * stage.half_width
     which = f"Feedback {asked.number} of {asked.of}"
@@ -128,7 +121,7 @@ Move = Literal["left", "right", "far left", "far right", "first", "last"]
 GRAINS_FAR = 10
 """Grains of a far move: a tenth of a scale of 0 to 10 in grains of 0.1."""
 
-_STEPS: dict[Move, Callable[[AskRating, float], float]] = {
+_STEPS: dict[Move, Callable[[messages.AskRating, float], float]] = {
     "left": lambda scale, rating: rating - scale.grain,
     "right": lambda scale, rating: rating + scale.grain,
     "far left": lambda scale, rating: rating - GRAINS_FAR * scale.grain,
@@ -138,12 +131,12 @@ _STEPS: dict[Move, Callable[[AskRating, float], float]] = {
 }
 
 
-def put(scale: AskRating, part: float) -> float:
+def put(scale: messages.AskRating, part: float) -> float:
     """The rating where the marker is put by hand; beyond an end it is that end."""
     return on_scale(scale.minimum + part * (scale.maximum - scale.minimum), scale)
 
 
-def move(scale: AskRating, rating: float | None, step: Move) -> float:
+def move(scale: messages.AskRating, rating: float | None, step: Move) -> float:
     """The rating after a key; from nowhere the first key puts the marker in the middle, or at the end it names."""
     middle = on_scale((scale.minimum + scale.maximum) / 2, scale)
     if rating is None and step not in ("first", "last"):
@@ -190,7 +183,7 @@ class RatingPage(Page):
     pointer = True
     typed = True
 
-    def __init__(self, stage: Stage, asked: AskRating, drafts: Drafts) -> None:
+    def __init__(self, stage: Stage, asked: messages.AskRating, drafts: Drafts) -> None:
         self._stage, self._asked, self._drafts = stage, asked, drafts
         self._rating = None if asked.draft not in drafts else float(drafts[asked.draft])
         self._dragging = self._done = False
@@ -235,11 +228,11 @@ class RatingPage(Page):
         if name in _MOVES:
             self._rating = move(self._asked, self._rating, _MOVES[name])
 
-    def outcome(self) -> RatingGiven | None:
+    def outcome(self) -> messages.RatingGiven | None:
         """The rating, once it is confirmed. 0 is a rating."""
         if not self._done or self._rating is None:
             return None
-        return RatingGiven(rating=self._rating, ask=self._asked.ask)
+        return messages.RatingGiven(rating=self._rating, ask=self._asked.ask)
 
     def leave(self) -> None:
         """Where the marker stands is kept."""
@@ -303,7 +296,7 @@ class DescriptionPage(Page):
     pointer = True
     typed = True
 
-    def __init__(self, stage: Stage, asked: AskDescription, drafts: Drafts) -> None:
+    def __init__(self, stage: Stage, asked: messages.AskDescription, drafts: Drafts) -> None:
         self._asked, self._drafts = asked, drafts
         self._now, self._drawn_s = stage.toolkit.now, math.inf
         self._done = self._full = False
@@ -334,9 +327,9 @@ class DescriptionPage(Page):
         self._done = self._done or (ctrl and name in ENTER)
         return self._done or name == "TAB"
 
-    def outcome(self) -> DescriptionGiven | None:
+    def outcome(self) -> messages.DescriptionGiven | None:
         """The description, once it is done."""
-        return DescriptionGiven(comment=self._box.text.strip(), ask=self._asked.ask) if self._done else None
+        return messages.DescriptionGiven(comment=self._box.text.strip(), ask=self._asked.ask) if self._done else None
 
     def leave(self) -> None:
         """No more typing; what was written is kept."""

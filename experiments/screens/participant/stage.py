@@ -21,16 +21,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from experiments.screens.participant.messages import (
-    PALETTES,
-    EmergencyPressed,
-    Focused,
-    FromParticipant,
-    Look,
-    Noise,
-    NoiseIs,
-    Unasked,
-)
+from experiments.screens.participant import messages
 
 _NO_WINDOW = 1
 """Up to this X means nobody, or whoever is under the pointer."""
@@ -120,7 +111,7 @@ class Page:
     def motion(self, name: str) -> None:
         """A key that moves something went down, or is held."""
 
-    def outcome(self) -> FromParticipant | None:
+    def outcome(self) -> messages.FromParticipant | None:
         """What it comes to: a message to say, or nothing yet."""
         return None
 
@@ -147,17 +138,17 @@ def half_width(width_px: int, height_px: int) -> float:
 class Stage:
     """The open window with one page on it."""
 
-    def __init__(self, toolkit: Toolkit, look: Look) -> None:
-        self.toolkit, self.look, self.palette = toolkit, look, PALETTES[look.theme]
+    def __init__(self, toolkit: Toolkit, look: messages.Look) -> None:
+        self.toolkit, self.look, self.palette = toolkit, look, messages.PALETTES[look.theme]
         self.window = _open(toolkit, look, self.palette.ground)
         self.width_px, self.height_px = (int(pixels) for pixels in self.window.clientSize)
         self.half_width = half_width(self.width_px, self.height_px)
-        self.page: Page | None = None
+        self.page = Page()
         self._focus = Focus(self.window.winHandle)
         self.drawn_s = 0.0
         """When the page was drawn last; 0 if it was not yet."""
         self._closed = False
-        self.unasked: deque[Unasked] = deque()
+        self.unasked: deque[messages.Unasked] = deque()
         """What is to be said without a question."""
         self._font_files = [str(path) for path in sorted(toolkit.fonts.glob("NotoSans-*.ttf"))]
         self._handlers = _Handlers(self)  # pyglet holds them weakly
@@ -175,8 +166,7 @@ class Stage:
         `keep_keys`: until the next one to type on the keys stay, so that no key goes to another window meanwhile.
         """
         self.window.winHandle.dispatch_events()
-        if self.page is not None:
-            self.page.leave()
+        self.page.leave()
         self.page = page
         self.window.mouseVisible = page.pointer
         if page.typed:
@@ -191,7 +181,7 @@ class Stage:
         if self._closed:
             raise WindowClosed("the participant's window was closed")
         now_s = self.toolkit.now()
-        if self.page is not None and now_s - self.drawn_s >= self.page.redraw_s:
+        if now_s - self.drawn_s >= self.page.redraw_s:
             self.drawn_s = now_s
             self.page.draw()
             self.window.flip()
@@ -229,7 +219,7 @@ class Stage:
             color=color,
         )
 
-    def panel(self, box: TextBox, fill: str, line: str | None = None) -> Any:
+    def panel(self, box: TextBox, fill: str) -> Any:
         """A filled rectangle; its box's place is its middle."""
         return self.toolkit.visual.Rect(
             self.window,
@@ -237,7 +227,7 @@ class Stage:
             height=box.height,
             pos=(box.x, box.y),
             fillColor=fill,
-            lineColor=line,
+            lineColor=None,
             lineWidth=2,
         )
 
@@ -247,7 +237,7 @@ class Stage:
         self.window.close()
 
 
-def _open(toolkit: Toolkit, look: Look, ground: str) -> Any:
+def _open(toolkit: Toolkit, look: messages.Look, ground: str) -> Any:
     window = toolkit.visual.Window(
         size=(look.width_px, look.height_px),
         screen=look.screen,
@@ -270,39 +260,35 @@ class _Handlers:
         self._names = stage.toolkit.key
 
     def on_activate(self) -> None:
-        self._stage.unasked.append(Focused(on=True))
+        self._stage.unasked.append(messages.Focused(on=True))
 
     def on_deactivate(self) -> None:
-        self._stage.unasked.append(Focused(on=False))
+        self._stage.unasked.append(messages.Focused(on=False))
 
     def on_close(self) -> bool:
         self._stage.note_closed()
         return True
 
     def on_mouse_press(self, x: int, y: int, button: int, _: int) -> None:
-        if self._stage.page is not None and button == 1:
+        if button == 1:
             self._stage.page.pressed(*self._stage.at(x, y))
 
     def on_mouse_drag(self, x: int, y: int, *_: int) -> None:
-        if self._stage.page is not None:
-            self._stage.page.dragged(self._stage.at(x, y)[0])
+        self._stage.page.dragged(self._stage.at(x, y)[0])
 
     def on_mouse_release(self, _x: int, _y: int, button: int, _: int) -> None:
-        if self._stage.page is not None and button == 1:
+        if button == 1:
             self._stage.page.released()
 
     def on_key_press(self, symbol: int, modifiers: int) -> bool:
         name = self._names.symbol_string(symbol)
         if name == EMERGENCY_KEY:
-            self._stage.unasked.append(EmergencyPressed())
+            self._stage.unasked.append(messages.EmergencyPressed())
             return True
-        if self._stage.page is None:
-            return False
         return self._stage.page.key(name, bool(modifiers & self._names.MOD_CTRL))
 
     def on_text_motion(self, motion: int) -> None:
-        if self._stage.page is not None:
-            self._stage.page.motion(self._names.motion_string(motion))
+        self._stage.page.motion(self._names.motion_string(motion))
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -404,18 +390,18 @@ class MaskingNoise:
     def __init__(self) -> None:
         self._sound: Any = None
 
-    def turn(self, asked: Noise) -> NoiseIs:
+    def turn(self, asked: messages.Noise) -> messages.NoiseIs:
         """Turn it on or off."""
         self.stop()
         if not asked.on:
-            return NoiseIs(on=False, message="", ask=asked.ask)
+            return messages.NoiseIs(on=False, message="", ask=asked.ask)
         try:
             self._sound = _playing(asked.level)
         except (KeyboardInterrupt, SystemExit):
             raise
         except BaseException as error:  # noqa: BLE001 - PsychoPy raises plain Exception, and some that derive from BaseException alone
-            return NoiseIs(on=False, message=_why_not(error), ask=asked.ask)
-        return NoiseIs(on=True, message="", ask=asked.ask)
+            return messages.NoiseIs(on=False, message=_why_not(error), ask=asked.ask)
+        return messages.NoiseIs(on=True, message="", ask=asked.ask)
 
     def stop(self) -> None:
         """Silence."""

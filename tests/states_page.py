@@ -1,4 +1,4 @@
-"""The table of states as a page to read: `python -m experiments.session.states_page`."""
+"""The table of states as a page to read: `python -m tests.states_page`."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from experiments.session.states import TABLE, WHY_NOT, Back, Beneath, Change, No
 
 _HEAD = """# States of a live run
 
-Made by `python -m experiments.session.states_page > docs/states.md`; do not edit by hand.
+Made by `python -m tests.states_page > docs/states.md`; do not edit by hand.
 
 What each event does in each state, as `experiments/session/states.py` says it. `→` leaves the state for another; *over*
 lays one over it, *back* takes it away again; what is *kept* changes no state; *beneath* does as the state beneath says;

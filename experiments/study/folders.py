@@ -1,4 +1,4 @@
-"""A study's folder as it stands: what the register and the journals say of every participant. Reads, never writes.
+"""A study's folders: where a participant's files lie, and how far everybody is by the register and the journals.
 
 A journal is read without being held. Whether another process holds it is looked up in a moment, for which a run that
 begins just then has patience; so looking never stands in the way of a run.
@@ -7,23 +7,156 @@ begins just then has patience; so looking never stands in the way of a run.
 from __future__ import annotations
 
 import os
-from collections.abc import Iterator
+import re
+from collections.abc import Callable, Iterable, Iterator
 from contextlib import suppress
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
+from device.words import RecoilError
 from experiments import catalogue
-from experiments.config.models import StudyConfig
+from experiments.config.models import CODE, StudyConfig
 from experiments.config.setup import Setup
+from experiments.design import plan
 from experiments.load import load_setup, load_study
-from experiments.record import journal, replay, storage
+from experiments.record import journal, replay, storage, tables
 from experiments.record.journal import Contents, Head, JournalError
 from experiments.session.history import answered
-from experiments.study import places, register
-from experiments.study.places import Place, PlaceError
-from experiments.study.register import Member, Register
-from experiments.study.study import NextParticipant, Participant, RunProgress, by_code, who_is_next
+from experiments.study import register
+from experiments.study.register import Register
+from experiments.study.study import Member, NextParticipant, Participant, RunProgress, by_code, who_is_next
+
+_CODE = re.compile(CODE)
+
+
+class PlaceError(RecoilError):
+    """A participant or folder that cannot be used; the message names value and rule."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Place:
+    """The files of one participant in one experiment."""
+
+    results: Path
+    participant_id: str
+    experiment: str
+    practice: bool = False
+
+    @property
+    def folder(self) -> Path:
+        """The participant's folder."""
+        return self.results / f"sub-{self.participant_id}"
+
+    @property
+    def stem(self) -> str:
+        """How the names of the files begin."""
+        practice = "_practice" if self.practice else ""
+        return f"sub-{self.participant_id}_task-{self.experiment}{practice}"
+
+    @property
+    def journal(self) -> Path:
+        """The journal: the truth."""
+        return self.folder / f"{self.stem}_journal.jsonl"
+
+    @property
+    def table(self) -> Path:
+        """The table made from it."""
+        return self.folder / f"{self.stem}_{tables.FILE_SUFFIX[self.experiment]}.csv"
+
+
+def is_code(text: str) -> bool:
+    """Whether a text can be a participant's code."""
+    return _CODE.fullmatch(text) is not None
+
+
+def check_code(participant_id: str) -> None:
+    """`PlaceError`, if it is no participant's code."""
+    if not is_code(participant_id):
+        shown = participant_id if len(participant_id) <= 40 else f"{participant_id[:40]}..."
+        raise PlaceError(
+            f"participant code {shown!r} ({len(participant_id)} characters): must be 1 to 32 letters and digits "
+            "(A-Z, a-z, 0-9), no blanks, dots or slashes; use a code, not a name"
+        )
+
+
+def place(results: Path, participant_id: str, experiment: str, registered: Register | None = None) -> Place:
+    """The place of a run. `PlaceError` if the code breaks a rule or differs from a known one in case alone.
+
+    `registered` is the folder's register, where it has been read.
+    """
+    check_code(participant_id)
+    check_case(results, participant_id, known_codes(results, registered or register.read_register(results)))
+    return Place(results=results, participant_id=participant_id, experiment=experiment)
+
+
+def check_case(results: Path, participant_id: str, known: Iterable[str]) -> None:
+    """`PlaceError`, if a code differs from a known one in case alone."""
+    for code in known:
+        if code != participant_id and code.lower() == participant_id.lower():
+            raise PlaceError(
+                f"participant code {participant_id!r} differs from {code!r} in {results} in case alone; "
+                f"use {code!r} or another code"
+            )
+
+
+def known_codes(results: Path, registered: Register) -> list[str]:
+    """The participants who have a folder, or stand in the register as far as it can be trusted."""
+    folders = {path.name.removeprefix("sub-") for path in results.glob("sub-*") if path.is_dir()}
+    return sorted(folders | set(registered.members))
+
+
+def journals(results: Path, experiment: str) -> Iterator[Path]:
+    """The journals of an experiment in a results folder."""
+    yield from sorted(results.glob(f"sub-*/sub-*_task-{experiment}_journal.jsonl"))
+
+
+HeadOf = Callable[[Path], Head | None]
+"""Gives the head of a journal; `None` where nothing in it was acknowledged."""
+
+
+def row_of_next_run(
+    setup: Setup[Any], results: Path, registered: Register, head_of: HeadOf = journal.head
+) -> int | None:
+    """The row of the balancing square that the next run takes; `None` for a random order.
+
+    The least used row over the runs of participants who are not excluded, the first such row. So rows are used equally
+    often, to within one, whenever everyone who was excluded has been replaced.
+    """
+    design = setup.config.design
+    if design.order == "random":
+        return None
+    used = used_rows(results, setup.config.experiment, registered, head_of)
+    return plan.next_row(design.order, len(design.methods), used)
+
+
+def used_rows(results: Path, experiment: str, registered: Register, head_of: HeadOf = journal.head) -> list[int]:
+    """The rows that runs in this folder have taken; who is excluded gives theirs back."""
+    left_out = registered.excluded()
+    heads = [head_of(path) for path in journals(results, experiment) if _code(path) not in left_out]
+    rows = [one.plan.order_row for one in heads if one is not None]
+    return [row for row in rows if row is not None]
+
+
+def _code(journal_path: Path) -> str:
+    return journal_path.parent.name.removeprefix("sub-")
+
+
+def set_aside(run: Place) -> list[Path]:
+    """Rename a run's files so that a fresh one can begin; nothing is lost. Returns the new names."""
+    return [set_aside_file(path) for path in (run.journal, run.table) if path.exists()]
+
+
+def set_aside_file(path: Path) -> Path:
+    """Rename a file, or a folder, to the first free `NAME.aside-N`. Returns the new name."""
+    number = 1
+    while _aside(path, number).exists():
+        number += 1
+    return path.rename(_aside(path, number))
+
+
+def _aside(path: Path, number: int) -> Path:
+    return path.with_name(f"{path.stem}.aside-{number}{path.suffix}")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -68,7 +201,7 @@ def open_study(folder: Path) -> StudyFolder:
     beside = Path(os.path.normpath(folder / ".." / "study.toml"))
     if folder.resolve().name == "results" and beside.is_file():
         return _loaded(str(beside), folder)
-    if not ((folder / register.REGISTER_FILE).exists() or places.known_codes(folder, register.read_register(folder))):
+    if not ((folder / register.REGISTER_FILE).exists() or known_codes(folder, register.read_register(folder))):
         raise PlaceError(
             f"{folder}: neither a study's folder (study.toml) nor a results folder "
             f"(sub-CODE or {register.REGISTER_FILE}); `recoil new STUDY` makes one"
@@ -108,7 +241,7 @@ class _Look:
 
     def __init__(self, study: StudyFolder, registered: Register) -> None:
         self._study, self.registered, self._members = study, registered, registered.members
-        self._codes = places.known_codes(study.results, registered)
+        self._codes = known_codes(study.results, registered)
         self._heads: dict[Path, Head | JournalError | None] = {}
         self.problems: list[str] = []
 
@@ -123,8 +256,8 @@ class _Look:
     def participant(self, code: str) -> Participant:
         """How one stands. `PlaceError` if the code breaks a rule."""
         results = self._study.results
-        places.check_code(code)
-        places.check_case(results, code, self._codes)
+        check_code(code)
+        check_case(results, code, self._codes)
         runs = [Place(results=results, participant_id=code, experiment=name) for name in self._study.experiments]
         member = self._members.get(code, Member(participant_id=code))
         return Participant(
@@ -183,7 +316,7 @@ class _Look:
 
     def _next_methods(self, setup: Setup[Any], participant_id: str) -> tuple[str, ...] | None:
         """The methods of a participant's next run in their order; `None` if chance decides when the run begins."""
-        row, seed = places.row_of_next_run(setup, self._study.results, self.registered, self._head), setup.config.seed
+        row, seed = row_of_next_run(setup, self._study.results, self.registered, self._head), setup.config.seed
         if row is None and seed is None:
             return None
         return catalogue.experiment(setup).make_plan(setup.config, participant_id, seed or 0, row).methods
