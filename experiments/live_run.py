@@ -100,9 +100,9 @@ class LiveRun:
         self._painted_s: float | None = None
         self._pauses: list[tuple[float, float]] = []
         self.shown_s: float | None = None
-        self._inbox: deque[Event] = deque()
-        self._news = threading.Condition(threading.RLock())
-        self._disarming: list[threading.Thread] = []
+        self.inbox: deque[Event] = deque()
+        self.news = threading.Condition(threading.RLock())
+        self.disarming: list[threading.Thread] = []
 
     # for everybody
 
@@ -114,13 +114,13 @@ class LiveRun:
     @property
     def history(self) -> History:
         """What was done so far: steps with their outcomes, and remarks."""
-        with self._news:
+        with self.news:
             return tuple(self._history)
 
     @property
     def moment(self) -> Moment:
         """What is so now, to judge by."""
-        with self._news:
+        with self.news:
             began_s = self._position.paused_s
             return Moment(
                 plan=self.plan,
@@ -134,14 +134,14 @@ class LiveRun:
 
     def painted(self, serial: int, at_s: float) -> None:
         """Take when a position was painted: from then on, and the guard time later, it can be worked."""
-        with self._news:
+        with self.news:
             if serial == self._position.serial and self._painted_s is None:
                 self._painted_s = at_s
                 self.shown_s = at_s if self.shown_s is None else self.shown_s
 
     def offer(self, event: Event, press: Press | None = None) -> EventVerdict:
         """Have an event judged, and taken if it may be. Never waits. `press`: by the experimenter's hand."""
-        with self._news:
+        with self.news:
             moment = self.moment
             meant, text = judging.meant(moment, event)
             refusal = judging.event_refusal(moment, meant, press)
@@ -169,21 +169,21 @@ class LiveRun:
         elif self._painted_s is not None and isinstance(event, TYPED):  # a second Enter is not for what stands behind
             self._painted_s = self.clock.now()
         if self._position.base not in (before.base, State.HALTED, State.STOPPED):
-            self._inbox.append(event)
-        self._news.notify_all()
+            self.inbox.append(event)
+        self.news.notify_all()
 
     # for the run
 
     def enter(self, state: State, step: Step | None = None, until_s: float | None = None) -> None:
         """The session's next step is there. `RunStopped`: the run was stopped before. `Held`: no shot may be fired."""
-        with self._news:
+        with self.news:
             self._check()
-            if state in ARMED and self._inbox:
-                self._inbox.clear()
+            if state in ARMED and self.inbox:
+                self.inbox.clear()
                 raise Held(self._position.why)  # paused since the key to fire, and perhaps gone on with
             new = step is not None and step is not self._position.step
             self._position = entered(self._position, state, self.clock.now(), step, until_s)
-            self._inbox.clear()
+            self.inbox.clear()
             self._painted_s = None
             if new:
                 self.shown_s = None
@@ -193,7 +193,7 @@ class LiveRun:
     def stimulus_begins(self, onset_s: float | None, *, least_s: float = 0.0) -> None:
         """A stimulus began, or is about to (`None`): what carries a train on is not taken before the least exposure."""
         not_before_s = math.inf if onset_s is None else onset_s + least_s
-        with self._news:
+        with self.news:
             position = self._position = replace(self._position, onset_s=onset_s, not_before_s=not_before_s)
         self._screen.show(position)
 
@@ -203,68 +203,68 @@ class LiveRun:
         `RunStopped`: the run was stopped, or halted; but what was taken before is done first.
         """
         self._screen.act(self._position, until_s)
-        with self._news:
-            while not self._inbox:
+        with self.news:
+            while not self.inbox:
                 self._check()
                 left_s = self._left_s(until_s)
                 if left_s is not None and left_s <= 0:
                     return None
-                self.clock.wait(self._news, left_s)
-            return self._inbox.popleft()
+                self.clock.wait(self.news, left_s)
+            return self.inbox.popleft()
 
     def taken(self) -> Event | None:
         """What was taken meanwhile, without waiting. Raises as `wait`."""
-        with self._news:
+        with self.news:
             self._check()
-            return self._inbox.popleft() if self._inbox else None
+            return self.inbox.popleft() if self.inbox else None
 
     def stay_halted(self) -> str:
         """Wait until a halted run is closed; why."""
         while self._position.base is State.HALTED:
             self._screen.act(self._position, None)
-            with self._news:
+            with self.news:
                 if self._position.base is State.HALTED:
-                    self.clock.wait(self._news, None)
+                    self.clock.wait(self.news, None)
         return self._position.why
 
     def end(self, why: str) -> None:
         """The run is over: finished, or stopped for a reason. Nothing is taken any more."""
-        with self._news:
+        with self.news:
             stopped = replace(self._position, states=(State.STOPPED,), correcting=None, paused_s=None)
             position = self._position = replace(stopped, serial=stopped.serial + 1, why=why)
         self._screen.show(position)
 
     def allow_shot(self) -> None:
         """Nothing if a shot may be fired now. `RunStopped`, `Held`: it may not."""
-        with self._news:
+        with self.news:
             self._check()
             if self._position.state not in ARMED:
                 raise Held(self._position.why)
 
     def settle(self) -> None:
         """Wait until what began to disarm beside the run is done, so that it does not come too late."""
-        while self._disarming:
-            self._disarming.pop().join(DISARMED_S)
+        while self.disarming:
+            self.disarming.pop().join(DISARMED_S)
 
     def sleep(self, until_s: float) -> None:
         """Wait until a time, as long as a shot may be fired; raises as `allow_shot`."""
-        with self._news:
+        with self.news:
             while True:
                 self.allow_shot()
                 left_s = until_s - self.clock.now()
                 if left_s <= 0:
                     return
-                self.clock.wait(self._news, left_s)
+                self.clock.wait(self.news, left_s)
 
     def keep(self, step: Step, outcome: Outcome) -> None:
         """Take an outcome that is on the disk, and show that it is."""
-        with self._news:
+        with self.news:
             self._history.append((step, outcome))
         self._screen.acknowledge(step, outcome)
 
     def remark(self, remark: Remark) -> None:
         """Have a remark written behind what was written before, and shown when it is on the disk."""
-        with self._news:
+        with self.news:
             written = self._submit(remark)
         if written is not None:
             written.add_done_callback(lambda done: self._written(remark, done))
@@ -303,7 +303,7 @@ class LiveRun:
 
     def _disarm_beside(self) -> None:
         thread = threading.Thread(target=self._disarm, daemon=True, name="disarm")
-        self._disarming.append(thread)
+        self.disarming.append(thread)
         thread.start()
 
     def _disarm(self) -> None:

@@ -297,7 +297,7 @@ class PaperWindow:
         offer = live.offer
 
         def watched(event: Any, press: Press | None = None) -> Any:
-            with live._news:
+            with live.news:
                 waits = self._clock.idle.is_set()
                 self._clock.idle.clear()  # what is taken wakes the run, which is then at work until it waits again
                 position, painted_s = live.position, self.painted_s.get(live.position.serial)
@@ -544,7 +544,7 @@ class Sitting:
             return True
         live = self.live
         moving = live.position.base in (State.SAVING, State.FIRING, State.STOPPED) or self._no_onset(live.position)
-        untold = live._inbox and live.position.base is not State.HALTED  # after a halt nobody looks at it any more
+        untold = live.inbox and live.position.base is not State.HALTED  # after a halt nobody looks at it any more
         return self.clock.idle.is_set() and not moving and not untold
 
     def paint(self) -> None:

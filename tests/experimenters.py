@@ -299,7 +299,7 @@ class Hand:
         self.sitting.clock.skip(GUARD_S * 0.3 if when == "within" else GUARD_S + 0.01)
 
     def _disarmed(self) -> None:
-        for thread in tuple(self.sitting.live._disarming):
+        for thread in tuple(self.sitting.live.disarming):
             thread.join()
 
 

@@ -78,16 +78,16 @@ class WatchingScreen(SyntheticScreen):
 
     def __init__(self, config: Any, observer: Any, clock: Clock, gun: TroubledGun, journal: Path) -> None:
         super().__init__(config, observer, clock)
-        self._gun, self._journal = gun, journal
+        self.gun, self._journal = gun, journal
         self.acknowledged = 0
         self.trouble: dict[int, BaseException] = {}
 
     def act(self, position: Position, until_s: float | None) -> None:
-        assert position.state is State.TRAIN or not self._gun.armed
+        assert position.state is State.TRAIN or not self.gun.armed
         super().act(position, until_s)
 
     def acknowledge(self, step: Step | None, outcome: Outcome | Remark) -> None:
-        assert not self._gun.armed
+        assert not self.gun.armed
         assert step is not None
         assert not isinstance(outcome, Remark)
         lines = self._journal.read_bytes().splitlines(keepends=True)

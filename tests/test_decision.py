@@ -41,8 +41,8 @@ def test_the_log_density_of_the_far_tails_does_not_underflow() -> None:
 def test_the_two_series_agree_where_they_meet() -> None:
     near = np.linspace(0.001, 0.999, 41)
     tau = np.full(41, first_passage.MEET_AT)
-    images = first_passage._log_images(tau, near, 1 - near)
-    waves = first_passage._log_waves(tau, near, 1 - near)
+    images = first_passage.log_images(tau, near, 1 - near)
+    waves = first_passage.log_waves(tau, near, 1 - near)
     assert np.abs(images - waves).max() < 1e-12
 
 

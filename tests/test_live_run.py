@@ -370,7 +370,7 @@ def test_words_for_an_earlier_stimulus_are_refused(tmp_path: Path) -> None:
 @contextmanager
 def at_one_instant(sitting: Sitting) -> Iterator[None]:
     """What happens in here comes before the run looks."""
-    with sitting.live._news:
+    with sitting.live.news:
         yield
 
 

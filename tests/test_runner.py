@@ -75,7 +75,7 @@ def test_shots_of_a_train_come_at_whole_multiples_of_the_interval(tmp_path: Path
     desk = sitting("preference", tmp_path)
     timed = Timed(desk.setup, desk.clock, {})
     desk = desk._replace(gun=timed)
-    desk.screen._gun = timed
+    desk.screen.gun = timed
     done = desk.carry_out()
     shots = [outcome.shots for _, outcome in done if outcome.kind == "presented"]
     assert sum(shots) == len(times)

@@ -48,7 +48,7 @@ def test_a_forged_record_is_refused_with_its_cause_and_the_next_shot_is_fired(tm
         assert str(refused.value).endswith("; the gun's COUNT was 1 before it")
         assert liar.told == [kind]
         assert pair.gun.status().state == "disarmed"
-        assert abs(pair.gun._history.ready_s - pair.clock()) < 60  # 3 s of the world: nobody waits for a forged time
+        assert abs(pair.gun.history.ready_s - pair.clock()) < 60  # 3 s of the world: nobody waits for a forged time
         forger.lie = lambda body: body
         third = once(pair)
         assert [first.timing.gun_count, third.timing.gun_count] == [1, 3]
@@ -177,7 +177,7 @@ def test_a_misread_clock_does_not_put_off_the_next_shot(tmp_path):
         pair.gun.link.ask("TIME?")
         before_s = pair.clock()
         assert pair.gun.status().ready_at_s <= pair.clock() + 0.211005
-        assert pair.gun._history.ready_s < before_s + 1
+        assert pair.gun.history.ready_s < before_s + 1
 
 
 def test_a_run_with_a_lying_gun_goes_on_and_each_row_has_one_valid_shot(tmp_path, quick_configs):
@@ -342,7 +342,7 @@ def test_history_of_a_forged_shot_is_kept_from_its_time(tmp_path):
         forger.lie = ShotLiar(1.0, FAR_US, kinds=("in 285 years",))
         with pytest.raises(LinkError):
             once(pair)
-        history: DriveHistory = pair.gun._history
+        history: DriveHistory = pair.gun.history
         (pulse,) = history.pulses
         (true,) = pair.twin.body.ledger
         assert true.start_s <= pulse[0] / 1e6 <= pair.clock()  # never earlier than it was, and not in the future

@@ -57,12 +57,12 @@ class Watched:
 
 
 def watched_turn(gun):
-    gun._turn = Watched(gun._turn)
-    return gun._turn
+    gun.turn = Watched(gun.turn)
+    return gun.turn
 
 
 def state(pair):
-    return pair.twin._core.machine.state
+    return pair.twin.core.machine.state
 
 
 def heard_by(forger, lost=lambda _: False):
@@ -156,8 +156,8 @@ def test_what_waited_for_its_turn_when_the_gun_was_disarmed_is_called_off(tmp_pa
 
 def test_a_disarming_between_the_answer_to_an_arming_and_its_note_counts(tmp_path):
     with a_pair(tmp_path, speed=1.0) as pair:
-        arming = pair.gun._arming
-        arming._lock = Watched(arming._lock, pair.gun.disarm)
+        arming = pair.gun.arming
+        arming.lock = Watched(arming.lock, pair.gun.disarm)
         with pytest.raises(CalledOff, match="disarmed meanwhile"):
             pair.gun.arm()
         with pytest.raises(LimitError, match="the gun is disarmed"):
@@ -171,9 +171,9 @@ def test_a_shot_that_was_asked_for_before_a_disarming_is_not_fired_on_a_later_ar
 
         def as_another_thread_would():
             pair.gun.disarm()
-            pair.gun._arming.arm(pair.gun._arming.disarms)
+            pair.gun.arming.arm(pair.gun.arming.disarms)
 
-        pair.gun._turn = Watched(pair.gun._turn, as_another_thread_would)
+        pair.gun.turn = Watched(pair.gun.turn, as_another_thread_would)
         with pytest.raises(LimitError, match="the gun is disarmed"):
             pair.gun.fire(a_shot())
         assert said(pair, "TRIG") == []

@@ -85,7 +85,7 @@ def test_a_trains_shots_are_whole_ticks_of_the_guns_clock_apart_and_never_too_so
             ticks.append(report.timing.gun_start_us - first.timing.gun_start_us)
         assert ticks == [750_000 * shot for shot in range(1, 6)]
         assert not any(true.too_soon for true in pair.twin.body.ledger)
-        pair.gun._clock = lambda: report.pulse_end_s
+        pair.gun.clock = lambda: report.pulse_end_s
         with pytest.raises(LimitError, match="not home yet"):
             pair.gun.fire(a_shot(), report.pulse_start_s + 0.2)
 
@@ -146,10 +146,10 @@ def test_too_soon_and_too_hot_are_refused_before_a_byte_is_written(slow_pair):
     slow_pair.ready()
     report = slow_pair.gun.fire(a_shot("asymmetric-1"))
     slow_pair.commands.clear()
-    slow_pair.gun._clock = lambda: report.pulse_end_s
+    slow_pair.gun.clock = lambda: report.pulse_end_s
     with pytest.raises(LimitError, match="not home yet"):
         slow_pair.gun.fire(a_shot("asymmetric-2"))
-    slow_pair.gun._history = DriveHistory(warmth_K=60.0, warmth_tick=round(report.pulse_end_s * 1e6))
+    slow_pair.gun.history = DriveHistory(warmth_K=60.0, warmth_tick=round(report.pulse_end_s * 1e6))
     assert slow_pair.gun.status().coil_temperature_C == pytest.approx(85.0, abs=1.0)
     with pytest.raises(LimitError, match="limit 80 degC"):
         slow_pair.gun.fire(a_shot("asymmetric-2", drive=Pulse(voltage_V=24.0, pulse_s=0.020)))
@@ -178,7 +178,7 @@ def test_disarming_from_another_thread_cuts_a_shot_that_waits(slow_pair):
 
     thread = threading.Thread(target=fire)
     thread.start()
-    wait_for(lambda: pair.twin._core.machine.state == "WAITING")
+    wait_for(lambda: pair.twin.core.machine.state == "WAITING")
     pair.gun.disarm()
     thread.join()
     assert outcome == ["not fired: the gun was disarmed meanwhile"]
@@ -202,6 +202,6 @@ def test_a_closed_gun_is_disarmed_and_its_port_free(pair):
         with pytest.raises(LinkError, match="closed"):
             ask()
     assert pair.gun.status().state == "disarmed"
-    assert not pair.twin._core.strict
+    assert not pair.twin.core.strict
     again = open_gun(f"serial:{pair.socket.address}", clock=time.monotonic)
     again.close()

@@ -114,17 +114,17 @@ def test_a_run_that_is_killed_leaves_the_gun_disarmed(tmp_path, quick_configs, n
         command = warm(*words, "--gun", f"serial:{socket.address}")
         program = subprocess.Popen(command, cwd=tmp_path, stderr=subprocess.DEVNULL)
         try:
-            wait_for(lambda: len(twin.body.ledger) >= 2 and twin._core.machine.state != "DISARMED")
-            twin._core._errors.clear()
+            wait_for(lambda: len(twin.body.ledger) >= 2 and twin.core.machine.state != "DISARMED")
+            twin.core.errors.clear()
             program.send_signal(number)
             program.wait(PATIENCE_S)
         finally:
             program.kill()
             program.wait()
-        wait_for(lambda: twin._core.machine.state == "DISARMED")
-        left_to_the_watchdog = WireError.WATCHDOG in twin._core._errors
+        wait_for(lambda: twin.core.machine.state == "DISARMED")
+        left_to_the_watchdog = WireError.WATCHDOG in twin.core.errors
         assert left_to_the_watchdog == (number == signal.SIGKILL)
-        assert twin._core.machine.due_us() is None  # nothing comes any more
+        assert twin.core.machine.due_us() is None  # nothing comes any more
 
 
 def test_the_doctor_measures_the_way_to_a_gun_on_a_line(recoil, plugged, quick_configs):

@@ -32,13 +32,13 @@ def test_an_abandoned_gun_is_disarmed_by_its_watchdog(tmp_path):
     with a_pair(tmp_path, speed=1.0, watchdog_s=SHORT_S) as pair:
         link, disarmings = pair.gun.link, disarmings_of(pair.twin)
         pair.gun.arm()
-        link._closing.set()  # the host dies: nothing is said any more, and nothing is said about it
-        for thread in (link._thread, link._keeper):
+        link.closing.set()  # the host dies: nothing is said any more, and nothing is said about it
+        for thread in (link.thread, link.keeper):
             thread.join()
         wait_for(lambda: disarmings)
-        heard_s = pair.twin.world_of(pair.twin._core._heard_us)
+        heard_s = pair.twin.world_of(pair.twin.core.heard_us)
         assert disarmings[0] - heard_s == pytest.approx(link.watchdog_s, abs=1e-5)
-        assert pair.twin._core.machine.state == "DISARMED"
+        assert pair.twin.core.machine.state == "DISARMED"
 
 
 def test_disarming_a_gun_that_is_gone_waits_for_its_watchdog(tmp_path):
@@ -47,18 +47,18 @@ def test_disarming_a_gun_that_is_gone_waits_for_its_watchdog(tmp_path):
         disarmings = disarmings_of(pair.twin)
         pair.twin.order(pair.twin.unplug)
         wait_for(lambda: not is_up(pair.gun))
-        written_s = pair.gun.link._written_s
+        written_s = pair.gun.link.written_s
         pair.gun.disarm()
         assert time.monotonic() - written_s > pair.gun.link.watchdog_s
         wait_for(lambda: disarmings)
-        assert pair.twin._core.machine.state == "DISARMED"
+        assert pair.twin.core.machine.state == "DISARMED"
         assert not is_up(pair.gun)
 
 
 def away(pair):
     """This machine does nothing for the gun until its watchdog has disarmed it."""
-    with pair.gun.link._lock:
-        wait_for(lambda: not pair.twin._core.strict)
+    with pair.gun.link.lock:
+        wait_for(lambda: not pair.twin.core.strict)
 
 
 AWAY = r"the gun's watchdog disarmed it: this machine was away for \d{3,} ms, and the gun waits for 1500 ms"
@@ -93,7 +93,7 @@ def test_a_shot_that_waits_when_the_watchdog_disarms_the_gun_says_so(tmp_path):
 
         thread = threading.Thread(target=fire)
         thread.start()
-        wait_for(lambda: pair.twin._core.machine.state == "WAITING")
+        wait_for(lambda: pair.twin.core.machine.state == "WAITING")
         away(pair)
         thread.join()
         assert re.fullmatch(f"not fired: {AWAY}", causes[0])
@@ -104,7 +104,7 @@ def test_a_line_that_lost_every_frame_is_named_when_the_watchdog_disarms(tmp_pat
     with a_lying_pair(tmp_path, speed=1.0, watchdog_s=SHORT_S) as (pair, forger):
         pair.ready()
         forger.swallow = lambda _: True
-        wait_for(lambda: not pair.twin._core.strict)
+        wait_for(lambda: not pair.twin.core.strict)
         forger.swallow = lambda _: False
         wait_for(lambda: pair.gun.link.session == 2)
         with pytest.raises(Disconnected, match="nothing reached it for 1500 ms, though this machine wrote; check the"):
@@ -150,8 +150,8 @@ def test_a_gun_whose_magnet_is_not_home_says_how_long_it_takes(tmp_path):
     with a_pair(tmp_path, speed=1.0) as pair:
         pair.ready()
         pair.gun.fire(a_shot())
-        pair.gun._history = DriveHistory()  # a host that forgot the shot
-        pair.twin._core.machine._ready_us += 9_000_000
+        pair.gun.history = DriveHistory()  # a host that forgot the shot
+        pair.twin.core.machine.ready_us += 9_000_000
         with pytest.raises(LimitError, match=r"magnet was not home, by the gun's own clock \(\d\.\d{3} s to go\)"):
             pair.gun.fire(a_shot())
         assert len(pair.twin.body.ledger) == 1
@@ -185,7 +185,7 @@ def test_unplugged_in_mid_shot_the_shot_is_found_done(tmp_path):
 
 def test_unplugged_in_mid_answer_nothing_is_lost_and_nothing_done_twice(tmp_path):
     with a_pair(tmp_path, Troubles(replug_s=0.05)) as pair:
-        object.__setattr__(pair.twin._make, "troubles", Troubles(replug_s=0.05, unplug_reply=0.1))
+        object.__setattr__(pair.twin.make, "troubles", Troubles(replug_s=0.05, unplug_reply=0.1))
         done, troubles = 0, []
         for _ in range(20):
             try:
@@ -256,7 +256,7 @@ def test_a_trigger_that_was_held_up_does_not_fire_late(tmp_path):
 
         def hear_again():
             wait_for(lambda: any(c.body.startswith("TRIG") and c.outcome == "timed out" for c in said()))
-            pair.twin._hangs_until_s = 0.0
+            pair.twin.hangs_until_s = 0.0
 
         def said():
             return list(pair.commands)
@@ -264,7 +264,7 @@ def test_a_trigger_that_was_held_up_does_not_fire_late(tmp_path):
         pair.ready()
         pair.gun.fire(a_shot())  # so that it is set already
         pair.ready()
-        pair.twin._hangs_until_s = math.inf
+        pair.twin.hangs_until_s = math.inf
         held_up = threading.Thread(target=hear_again)
         held_up.start()
         try:
@@ -281,7 +281,7 @@ def test_a_trigger_that_was_held_up_does_not_fire_late(tmp_path):
 
 def test_on_a_bad_line_every_shot_is_done_once_or_marked(tmp_path):
     with a_pair(tmp_path, speed=5.0) as pair:
-        object.__setattr__(pair.twin._make, "troubles", ALL)
+        object.__setattr__(pair.twin.make, "troubles", ALL)
         done, marked = [], 0
         for number in range(60):
             way = ("forward", "backward")[number % 2]

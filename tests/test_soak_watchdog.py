@@ -50,7 +50,7 @@ def test_a_host_that_is_killed_leaves_the_gun_armed_for_less_than_400_ms(tmp_pat
             words = [sys.executable, armed_host.__file__, f"serial:{socket.address}"]
             with subprocess.Popen(words, stdout=subprocess.PIPE, text=True) as host:
                 assert host.stdout.readline() == "armed\n"
-                assert twin._core.machine.state == "ARMED"
+                assert twin.core.machine.state == "ARMED"
                 time.sleep(moments.random() * 0.5)
                 disarmings = disarmings_of(twin)
                 killed_s = time.monotonic()

@@ -58,7 +58,7 @@ def listening(
 ) -> tuple[Sitting, ListeningGun]:
     desk = sitting("preference", folder)
     gun = kind(desk.setup, desk.clock, troubles or {})
-    desk.screen._gun = gun
+    desk.screen.gun = gun
     return desk._replace(gun=gun), gun
 
 

@@ -77,13 +77,13 @@ def is_up(gun: SerialGun) -> bool:
 def disarmings_of(twin: Twin) -> list[float]:
     """When the twin disarms, or is disarmed, from now on: on its own clock, in seconds of its world."""
     times: list[float] = []
-    abort = twin._core.machine.abort
+    abort = twin.core.machine.abort
 
     def noted(now_us: int) -> bool:
         times.append(twin.world_of(now_us))
         return abort(now_us)
 
-    twin._core.machine.abort = noted  # type: ignore[method-assign]
+    twin.core.machine.abort = noted  # type: ignore[method-assign]
     return times
 
 
@@ -123,7 +123,7 @@ def plugged_in(socket: Socket, make: Make, watchdog_s: float = PATIENT_S, *, res
     """A twin at a socket, whose hosts in this process ask for this watchdog; rested, it was switched on a while ago."""
     twin = Twin(socket, paper_methods(), make)
     if rested:
-        twin._boot_s -= BOOT_REST_US / 1e6
+        twin.boot_s -= BOOT_REST_US / 1e6
     with pytest.MonkeyPatch.context() as patch, twin:
         patch.setattr(link, "WATCHDOG_S", watchdog_s)
         yield twin

@@ -87,12 +87,12 @@ def unit_log_density(tau: FloatArray, near: FloatArray, far: FloatArray) -> Floa
     """Log f(tau, near), with far = 1 - near given apart so that neither end loses digits."""
     value = np.empty(np.shape(tau))
     short = tau <= MEET_AT
-    value[short] = _log_images(tau[short], near[short], far[short])
-    value[~short] = _log_waves(tau[~short], near[~short], far[~short])
+    value[short] = log_images(tau[short], near[short], far[short])
+    value[~short] = log_waves(tau[~short], near[~short], far[~short])
     return value
 
 
-def _log_images(tau: FloatArray, near: FloatArray, far: FloatArray) -> FloatArray:
+def log_images(tau: FloatArray, near: FloatArray, far: FloatArray) -> FloatArray:
     """The images paired round each odd m at distance `far`: (m - far) e^.. - (m + far) e^.., without cancellation."""
     total = np.zeros_like(tau)
     for m in range(1, 2 * IMAGES, 2):
@@ -104,7 +104,7 @@ def _log_images(tau: FloatArray, near: FloatArray, far: FloatArray) -> FloatArra
         return np.asarray(np.log(total) - near**2 / (2.0 * tau) - (_LOG_2PI + 3.0 * np.log(tau)) / 2.0)
 
 
-def _log_waves(tau: FloatArray, near: FloatArray, far: FloatArray) -> FloatArray:
+def log_waves(tau: FloatArray, near: FloatArray, far: FloatArray) -> FloatArray:
     """Pi sum k sin(k pi w) exp(-k^2 pi^2 tau / 2), the sines from the nearer end."""
     angle = math.pi * np.minimum(near, far)
     mirrored = far < near

@@ -39,11 +39,11 @@ class SerialGun:
 
     def __init__(self, link: Link, methods: Mapping[str, Method], clock: Callable[[], float], speed: float) -> None:
         self.link = link
-        self._methods, self._clock, self._speed = dict(methods), clock, speed
-        self._turn = threading.Lock()
-        self._arming = Arming(link)
-        self._triggering = Triggering(link, self._arming, clock, speed)
-        self._history = DriveHistory()
+        self._methods, self.clock, self._speed = dict(methods), clock, speed
+        self.turn = threading.Lock()
+        self.arming = Arming(link)
+        self._triggering = Triggering(link, self.arming, clock, speed)
+        self.history = DriveHistory()
         self._mark = time.time_ns() // 1_000_000 % 2**31 + 1
         self._counted: tuple[int, int] | None = None  # the gun's boot, and its count of shots; None if it is not known
         self._first: tuple[int, float] | None = None  # onset of the first shot since `arm`, on the gun's clock and ours
@@ -59,10 +59,10 @@ class SerialGun:
 
     def arm(self) -> None:
         """Allow the next shots. `LinkError`: the gun does not answer, has a fault, or was disarmed meanwhile."""
-        disarms = self._arming.disarms
+        disarms = self.arming.disarms
         self._is_open()
-        with self._turn:
-            self._arming.arm(disarms)
+        with self.turn:
+            self.arming.arm(disarms)
             self._first = None
 
     def fire(self, shot: Shot, at_s: float | None = None) -> ShotReport:
@@ -74,15 +74,15 @@ class SerialGun:
         `LinkError` says whether the shot was fired, was not, or may have been: what the gun says of it is believed only
         if it contradicts neither its order nor the clocks (`checks`). It is never fired later.
         """
-        disarms = self._arming.disarms
+        disarms = self.arming.disarms
         self._is_open()
-        with self._turn:
-            session = self._arming.session
-            if not session or self._arming.disarms != disarms:
+        with self.turn:
+            session = self.arming.session
+            if not session or self.arming.disarms != disarms:
                 raise LimitError("the gun is disarmed; arm it before it may fire")
             wanted = asked(shot, self._methods)
-            now_s = self._clock()
-            self._history.check(wanted.rendering.load, planned_start_s(now_s, at_s))
+            now_s = self.clock()
+            self.history.check(wanted.rendering.load, planned_start_s(now_s, at_s))
             self._know_the_clock()
             boot, count = self._count()
             self._configure(wanted)
@@ -91,7 +91,7 @@ class SerialGun:
                 mark=self._mark,
                 wanted=wanted,
                 requested_s=now_s,
-                written_s=self._clock(),
+                written_s=self.clock(),
                 at_s=at_s,
                 at_us=0 if at_s is None else self._tick(at_s),
                 count=count,
@@ -103,15 +103,15 @@ class SerialGun:
 
     def disarm(self) -> None:
         """Forbid shots, from every state and thread. If the gun cannot be told, wait until its watchdog has done it."""
-        self._arming.disarm()
+        self.arming.disarm()
 
     def status(self) -> GunStatus:
         """The gun at this moment. After `close` what is known without it. `LinkError`: it does not answer."""
         if self._closed:
-            return self._status("disarmed", 0, 0.0, self._history.ready_s, None)
+            return self._status("disarmed", 0, 0.0, self.history.ready_s, None)
         reply, said = standing(self.link)
         (ready,) = self.link.host(said.ready_us)
-        next_s = max(self._history.ready_s, ready_s(said, reply, ready))
+        next_s = max(self.history.ready_s, ready_s(said, reply, ready))
         return self._status(_STATES[said.state], said.count, said.coil_mC / 1000, next_s, self._fault(said))
 
     def close(self) -> None:
@@ -126,7 +126,7 @@ class SerialGun:
         return GunStatus(
             state=state,
             shots=shots,
-            coil_temperature_C=max(coil_C, self._history.coil_celsius(self._clock())),
+            coil_temperature_C=max(coil_C, self.history.coil_celsius(self.clock())),
             ready_at_s=ready_s,
             fault=fault,
         )
@@ -135,7 +135,7 @@ class SerialGun:
         """What is wrong with the gun: its driver, or that it disarmed itself while it was to be armed."""
         if said.fault:
             return f"the driver reports fault {said.fault}"
-        return self.link.why_lost if self._arming.lapsed else None
+        return self.link.why_lost if self.arming.lapsed else None
 
     def _is_open(self) -> None:
         if self._closed:
@@ -144,7 +144,7 @@ class SerialGun:
     def _know_the_clock(self) -> None:
         """Nothing, if a shot's time would be known well enough; none is fired at a person only to be thrown away."""
         for _ in range(TRIES):
-            (now,) = self.link.host(self.link.gun_us(self._clock()))
+            (now,) = self.link.host(self.link.gun_us(self.clock()))
             if now.uncertainty_s <= MAX_UNCERTAINTY_S * self._speed:
                 return
             ask_again(self.link, "TIME?")
@@ -185,7 +185,7 @@ class SerialGun:
             told = self._triggering.fire(order)
         except Unsure:
             self._counted = None
-            self._spend(order.wanted, self._clock())
+            self._spend(order.wanted, self.clock())
             raise
         self._counted = order.boot, told.record.count
         self._first = self._first or (told.record.start_us, told.start.time_s)
@@ -194,8 +194,8 @@ class SerialGun:
 
     def _spend(self, wanted: ShotRequest, start_s: float) -> None:
         """Take a shot into account that was fired, or may have been."""
-        start_s = max(start_s, self._history.earliest_s(wanted.rendering.load))
-        self._history = self._history.record(wanted.rendering.load, start_s, start_s + wanted.rest_s)
+        start_s = max(start_s, self.history.earliest_s(wanted.rendering.load))
+        self.history = self.history.record(wanted.rendering.load, start_s, start_s + wanted.rest_s)
 
 
 SCHEME = "serial:"

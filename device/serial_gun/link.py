@@ -51,26 +51,26 @@ class Link:
         self.watchdog_s = self._watchdog_ms / 1000 / speed
         self._keep_alive_s = min(KEEP_ALIVE_S, self.watchdog_s / 6)
         self._clocks = lines.Clocks()
-        self._lock = threading.RLock()
+        self.lock = threading.RLock()
         self._port: lines.Port | None = None
         self._splitter = Splitter()
         self._pending = lines.Pending()
         self._number = int(time.monotonic() * 1e3) % 0xFFFF
         self._token = 0
-        self._written_s = self._heard_s = 0.0
+        self.written_s = self._heard_s = 0.0
         self._trouble: LinkError | None = None
         self._ended_by: LinkError | None = None  # the trouble that ended the last session
         self._broken, self._unbroken, self._leaving = False, True, False
         self._plain = b""
-        self._up, self._closing = threading.Event(), threading.Event()
+        self._up, self.closing = threading.Event(), threading.Event()
         self._failed = threading.Event()
-        self._thread = threading.Thread(target=self._run, name="gun", daemon=True)
-        self._keeper = threading.Thread(target=self._keep_alive, name="gun-keep-alive", daemon=True)
+        self.thread = threading.Thread(target=self._run, name="gun", daemon=True)
+        self.keeper = threading.Thread(target=self._keep_alive, name="gun-keep-alive", daemon=True)
 
     def start(self, patience_s: float) -> None:
         """Connect for the first time. `LinkError`: there is no port, no gun, or one of another version."""
-        self._thread.start()
-        self._keeper.start()
+        self.thread.start()
+        self.keeper.start()
         end_s = time.monotonic() + patience_s
         while not self._up.wait(0.005):
             if self._failed.is_set() or time.monotonic() > end_s:
@@ -81,22 +81,22 @@ class Link:
     @property
     def silent_for_s(self) -> float:
         """How long nothing was written, in seconds of the real world."""
-        return time.monotonic() - self._written_s
+        return time.monotonic() - self.written_s
 
     def wait_up(self, patience_s: float) -> None:
         """Wait until the gun is there. `Disconnected`: it does not come back."""
-        if self._closing.is_set() or not self._up.wait(patience_s):
+        if self.closing.is_set() or not self._up.wait(patience_s):
             raise lines.Disconnected(f"the gun is not there ({self._trouble or 'no answer'})")
 
     def host(self, *gun_us: int) -> list[lines.HostTime]:
         """Times on the gun's clock, on the host's, all by one map. `Disconnected`: the gun with this clock is gone."""
-        with self._lock:
+        with self.lock:
             self._check_clocks()
             return [self._clocks.host(time_us) for time_us in gun_us]
 
     def gun_us(self, host_s: float) -> int:
         """A time on the host's clock, on the gun's. `Disconnected` as `host`."""
-        with self._lock:
+        with self.lock:
             self._check_clocks()
             return self._clocks.gun_us(host_s)
 
@@ -109,7 +109,7 @@ class Link:
 
         `allowed` is asked while nobody else can write: a command that is not allowed then is `CalledOff`.
         """
-        with self._lock:
+        with self.lock:
             if not self._up.is_set():
                 raise lines.Disconnected(f"the gun is not there ({self._trouble or 'no answer'})")
             if not allowed():
@@ -124,21 +124,21 @@ class Link:
 
     def close(self) -> None:
         """Leave the gun disarmed in its plain mode, and let go for good."""
-        with self._lock:
+        with self.lock:
             self._leaving = True
         with suppress(LinkError):
             self.ask("SYST:PLAI")
-        self._closing.set()
-        for thread in (self._thread, self._keeper):
+        self.closing.set()
+        for thread in (self.thread, self.keeper):
             if thread.is_alive():
                 thread.join()
         self._lose(lines.Disconnected("the line is closed"))
 
     def _run(self) -> None:
-        while not self._closing.is_set():
+        while not self.closing.is_set():
             try:
                 self._connect()
-                while not self._closing.is_set():
+                while not self.closing.is_set():
                     self._pump()
                     self._look_after()
             except LinkError as error:
@@ -147,12 +147,12 @@ class Link:
                 self._let_go()
                 if self.session == 0 and fatal:
                     self._failed.set()
-            self._closing.wait(RECONNECT_EVERY_S)
+            self.closing.wait(RECONNECT_EVERY_S)
         self._let_go()
 
     def _connect(self) -> None:
         port = self._open_port(self._find())
-        with self._lock:
+        with self.lock:
             self._port, self._splitter, self._broken = port, Splitter(), False
             self._heard_s = time.monotonic()
         self._introduce(port)
@@ -163,13 +163,13 @@ class Link:
         named = Named.parse(self._greet("*IDN?").body)
         self._check(named)
         self._greet(f"SYST:WATC {self._watchdog_ms}")
-        with self._lock:
+        with self.lock:
             self._token = token
             if not same:
                 self._clocks = lines.Clocks()
         for _ in range(FIRST_EXCHANGES):
             self._greet("TIME?")
-        with self._lock:
+        with self.lock:
             self.named, self.remembers, self._unbroken = named, self._unbroken, True
             self.why_lost = self._why_ended()
             self.boot += not self.remembers
@@ -192,7 +192,7 @@ class Link:
             self._plain = b""
             port.write(b"\n*IDN?\n")
             end_s = time.monotonic() + PATIENCE_S
-            while not self._plain and time.monotonic() < end_s and not self._closing.is_set():
+            while not self._plain and time.monotonic() < end_s and not self.closing.is_set():
                 self._pump()
             try:
                 self._check(Named.parse(self._plain.decode("latin-1")))
@@ -219,7 +219,7 @@ class Link:
         for _ in range(GREETING_TRIES):
             waiting = self._write(body)
             end_s = time.monotonic() + PATIENCE_S
-            while not waiting.ended.is_set() and time.monotonic() < end_s and not self._closing.is_set():
+            while not waiting.ended.is_set() and time.monotonic() < end_s and not self.closing.is_set():
                 self._pump()
             try:
                 return self._pending.outcome(waiting)
@@ -228,7 +228,7 @@ class Link:
         raise trouble or lines.TimedOut("no answer")
 
     def _write(self, body: str) -> lines.Waiting:
-        with self._lock:
+        with self.lock:
             if self._port is None or self._broken:
                 raise lines.Disconnected(f"the gun is not there ({self._trouble or 'no answer'})")
             self._number = following(self._number)
@@ -238,7 +238,7 @@ class Link:
                 body=body,
                 written_s=self._clock(),
                 since_s=now_s,
-                gap_s=now_s - self._written_s,
+                gap_s=now_s - self.written_s,
             )
             self._pending.add(waiting)
             try:
@@ -248,7 +248,7 @@ class Link:
                 self._lose(error)
                 raise
             waiting.gap_s += time.monotonic() - now_s
-            self._written_s = time.monotonic()
+            self.written_s = time.monotonic()
         return waiting
 
     def _pump(self) -> None:
@@ -290,7 +290,7 @@ class Link:
         exchange = lines.Exchange(
             sent_s=reply.written_s, gun_us=named_value(reply.body, "TIME"), received_s=reply.received_s
         )
-        with self._lock:
+        with self.lock:
             self._clocks.add(exchange)
 
     def _alone(self, waiting: lines.Waiting | None) -> str:
@@ -319,14 +319,14 @@ class Link:
         In a thread that does nothing else: it needs the interpreter twice a turn, the one that reads a dozen times, and
         each time may have to wait for it on a busy machine.
         """
-        while not self._closing.wait(self._keep_alive_s):
-            with self._lock, suppress(LinkError):  # whoever reads is told of it, and connects again
+        while not self.closing.wait(self._keep_alive_s):
+            with self.lock, suppress(LinkError):  # whoever reads is told of it, and connects again
                 if self._up.is_set() and not self._leaving:
                     self._write("TIME?")
 
     def _lose(self, trouble: LinkError) -> None:
         """The line is of no use any more: whoever waits is told. The thread that reads lets go of the port."""
-        with self._lock:
+        with self.lock:
             if self._up.is_set():
                 self._ended_by = trouble
             self._up.clear()
@@ -334,7 +334,7 @@ class Link:
         self._pending.end_all(lines.Disconnected(str(trouble)))
 
     def _let_go(self) -> None:
-        with self._lock:
+        with self.lock:
             port, self._port = self._port, None
         if port is not None:
             port.close()

@@ -77,7 +77,7 @@ class Arming:
         self.disarms = 0
         self.session = 0  # the link's, in which the gun was armed; 0 if it is disarmed
         self._link = link
-        self._lock = threading.Lock()
+        self.lock = threading.Lock()
 
     @property
     def lapsed(self) -> bool:
@@ -97,14 +97,14 @@ class Arming:
         except LinkError:  # it may be armed, and its answer lost
             self.disarm()
             raise
-        with self._lock:
+        with self.lock:
             if self.disarms != disarms:
                 raise lines.CalledOff("ARM was called off: the gun was disarmed meanwhile")
             self.session = session
 
     def disarm(self) -> None:
         """Forbid shots. If the gun cannot be told, wait until its watchdog has done it."""
-        with self._lock:
+        with self.lock:
             self.disarms += 1
             self.session = 0
         session = self._link.session

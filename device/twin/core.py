@@ -33,12 +33,12 @@ class Core:
         self.strict = False
         self._identity = identity
         self._splitter = records.Splitter()
-        self._errors: list[int] = []
+        self.errors: list[int] = []
         self._out = bytearray()
         self._last = 0  # sequence number
         self._token = 0
         self._pending = 0  # sequence number of the trigger that waits for its answer, 0 if none does
-        self._heard_us = now_us
+        self.heard_us = now_us
         self._watchdog_us = 1000 * WATCHDOG_MS
 
     def wake_us(self) -> int | None:
@@ -70,7 +70,7 @@ class Core:
 
     def _watchdog_due_us(self) -> int | None:
         watched = self.strict or self.machine.state in {"ARMED", "WAITING", "FIRING"}
-        return self._heard_us + self._watchdog_us if watched else None
+        return self.heard_us + self._watchdog_us if watched else None
 
     def _run_due(self, now_us: int) -> None:
         """At the same microsecond the gun's own event comes before the watchdog."""
@@ -93,7 +93,7 @@ class Core:
             self._queue(WireError.OVERRUN)
         else:
             said = self._do(_text(line), now_us)
-            self._heard_us = self._heard_us if isinstance(said, int) else now_us
+            self.heard_us = self.heard_us if isinstance(said, int) else now_us
             self._say(said)
 
     def _take_frame(self, line: bytes, now_us: int) -> None:
@@ -110,7 +110,7 @@ class Core:
         elif not self.strict:
             self._send(frame.number, f"ERR {message(WireError.NO_SESSION)}")
         elif records.is_newer(frame.number, self._last):
-            self._last, self._heard_us = frame.number, now_us
+            self._last, self.heard_us = frame.number, now_us
             self._answer(frame, now_us)
 
     def _enter(self, frame: records.Frame, now_us: int) -> None:
@@ -123,7 +123,7 @@ class Core:
         self._pending = 0
         self._abort(now_us)
         self._send(frame.number, f"STRI {self._token}")
-        self.strict, self._token, self._last, self._heard_us = True, token, frame.number, now_us
+        self.strict, self._token, self._last, self.heard_us = True, token, frame.number, now_us
 
     def _answer(self, frame: records.Frame, now_us: int) -> None:
         if frame.body == "SYST:PLAI":
@@ -175,7 +175,7 @@ class Core:
                     self.machine.clear()
                 return None
             case "*CLS":
-                self._errors.clear()
+                self.errors.clear()
                 return None
             case _:
                 return self._question(header, now_us)
@@ -196,7 +196,7 @@ class Core:
             case "SYST:WATC?":
                 return f"WATC {self._watchdog_us // 1000}"
             case _:
-                return message(self._errors.pop(0) if self._errors else WireError.NO_DEVICE_ERROR)
+                return message(self.errors.pop(0) if self.errors else WireError.NO_DEVICE_ERROR)
 
     def _with(self, header: str, rest: str, numbers: list[int], now_us: int) -> Said:
         match header:
@@ -230,10 +230,10 @@ class Core:
         self._out.extend(records.encode(records.Frame(number=sequence, body=body), "gun"))
 
     def _queue(self, error: int) -> None:
-        if len(self._errors) < QUEUE_SIZE:
-            self._errors.append(error)
+        if len(self.errors) < QUEUE_SIZE:
+            self.errors.append(error)
         else:
-            self._errors[-1] = WireError.QUEUE_OVERFLOW
+            self.errors[-1] = WireError.QUEUE_OVERFLOW
 
 
 _WITHOUT: Final = frozenset(

@@ -196,7 +196,7 @@ class StateMachine:
         self.never: int = WireError.NO_DEVICE_ERROR
         self._board = board or Board()
         self._fault = 0
-        self._ready_us = boot_us + BOOT_REST_US
+        self.ready_us = boot_us + BOOT_REST_US
         self._budget = Budget()
 
     def due_us(self) -> int | None:
@@ -259,7 +259,7 @@ class StateMachine:
             return WireError.ALREADY_FIRED
         if before_us != 0 and start_us > before_us:
             return WireError.TOO_LATE
-        if start_us < self._ready_us:
+        if start_us < self.ready_us:
             return WireError.MAGNET_NOT_HOME if self.shot.count else WireError.JUST_BOOTED
         return self._budget.refusal(self.setting, start_us)
 
@@ -286,12 +286,12 @@ class StateMachine:
 
     def standing(self, now_us: int) -> StatusRecord:
         """How the gun stands; an armed one is resetting while its magnet is on its way home, by prediction."""
-        resetting = self.state == "ARMED" and now_us < self._ready_us
+        resetting = self.state == "ARMED" and now_us < self.ready_us
         return StatusRecord(
             state="RESETTING" if resetting else self.state,
             count=self.shot.count,
             clock_us=now_us,
-            ready_us=self._ready_us,
+            ready_us=self.ready_us,
             coil_mC=self._budget.coil_millicelsius(now_us),
             fault=self._fault,
         )
@@ -308,13 +308,13 @@ class StateMachine:
         if carried.at_us - start_us > _allowed_us(setting):
             start_us = carried.at_us
         self.state = "FIRING"
-        self._ready_us = start_us + setting.rest_us
+        self.ready_us = start_us + setting.rest_us
         self.shot = replace(
             self.shot,
             count=self.shot.count + 1,
             ending="DRIV",
             start_us=start_us,
-            home_predicted_us=self._ready_us,
+            home_predicted_us=self.ready_us,
         )
         self._budget.spend(setting, start_us)
         return True

@@ -310,28 +310,28 @@ class Twin:
         self.body = Body(methods)
         self.accidents: list[str] = []
         self._socket = socket
-        self._make = make or Make()
-        self._draw = Random(self._make.seed)  # noqa: S311 - troubles, no secrets
-        self._boot_s = self.world_s()
-        self._core = self._booted()
+        self.make = make or Make()
+        self._draw = Random(self.make.seed)  # noqa: S311 - troubles, no secrets
+        self.boot_s = self.world_s()
+        self.core = self._booted()
         self._coming: deque[tuple[float, bytes]] = deque()
         self._going: deque[tuple[float, bytes]] = deque()
         self._planned: list[tuple[float, Callable[[], None]]] = []
-        self._hangs_until_s = 0.0
+        self.hangs_until_s = 0.0
         self._stop = Event()
         self._thread: Thread | None = None
 
     def world_s(self) -> float:
         """The twin's world: monotonic seconds times the speed."""
-        return time.monotonic() * self._make.speed
+        return time.monotonic() * self.make.speed
 
     def clock_us(self) -> int:
         """The gun's own clock: from its boot on, with its crystal's error."""
-        return int((self.world_s() - self._boot_s) * (1e6 + self._make.drift_ppm))
+        return int((self.world_s() - self.boot_s) * (1e6 + self.make.drift_ppm))
 
     def world_of(self, clock_us: int) -> float:
         """When the gun's clock read this since its last boot."""
-        return self._boot_s + clock_us / (1e6 + self._make.drift_ppm)
+        return self.boot_s + clock_us / (1e6 + self.make.drift_ppm)
 
     def __enter__(self) -> Self:
         self._socket.plug()
@@ -359,7 +359,7 @@ class Twin:
         for due_s, act in [plan for plan in self._planned if plan[0] <= now_s]:
             self._planned.remove((due_s, act))
             act()
-        hangs = now_s < self._hangs_until_s  # its timers go on
+        hangs = now_s < self.hangs_until_s  # its timers go on
         self._step(b"" if hangs else b"".join(_due(self._coming, now_s)))
         for piece in _due(self._going, now_s):
             self._socket.write(piece)
@@ -374,43 +374,43 @@ class Twin:
         self._socket.unplug()
         self._coming.clear()
         self._going.clear()
-        self._planned.append((time.monotonic() + self._make.troubles.replug_s, self._socket.plug))
+        self._planned.append((time.monotonic() + self.make.troubles.replug_s, self._socket.plug))
 
     def reset(self) -> None:
         """The firmware boots anew; the magnet flies on."""
         self.accidents.append("reset")
         self.body.stop(self.world_s())
-        self._boot_s = self.world_s()
-        self._core = self._booted()
+        self.boot_s = self.world_s()
+        self.core = self._booted()
         self._coming.clear()
 
     def _booted(self) -> Core:
-        return Core(self._make.identity, board=self._carry)
+        return Core(self.make.identity, board=self._carry)
 
     def _carry(self, drive: DriveEvent) -> Carried:
         """What the board makes of a drive."""
-        late = drive.kind != "OFF" and self._happens(self._make.troubles.late)
+        late = drive.kind != "OFF" and self._happens(self.make.troubles.late)
         if late:
             self.accidents.append("late")
         return Board(late_us=int(1.5 * self._draw.random() * (drive.end_us - drive.time_us)) if late else 0)(drive)
 
     def _wait_s(self) -> float:
-        now_s, wake_us = time.monotonic(), self._core.wake_us()
+        now_s, wake_us = time.monotonic(), self.core.wake_us()
         times = [plan[0] for plan in self._planned] + [queue[0][0] for queue in (self._coming, self._going) if queue]
         if wake_us is not None:
-            times.append(self.world_of(wake_us) / self._make.speed)
+            times.append(self.world_of(wake_us) / self.make.speed)
         return min(max(min(times, default=now_s + 1) - now_s, 0.0), LONGEST_WAIT_S)
 
     def _post(self, queue: deque[tuple[float, bytes]], data: bytes) -> None:
         """Put bytes on their way; they stay in order."""
-        troubles = self._make.troubles
+        troubles = self.make.troubles
         due_s = time.monotonic() + troubles.delay_s(self._draw)
         queue.append((max(due_s, queue[-1][0]) if queue else due_s, troubles.damaged(data, self._draw)))
 
     def _step(self, data: bytes) -> None:
-        out, drives = self._core.step(data, self.clock_us())
+        out, drives = self.core.step(data, self.clock_us())
         for drive in drives:
-            self.body.drive(drive, self._core.machine.shot, self.world_of(drive.time_us))
+            self.body.drive(drive, self.core.machine.shot, self.world_of(drive.time_us))
             if drive.kind != "OFF":
                 self._mishap(drive)
         if out:
@@ -419,27 +419,27 @@ class Twin:
 
     def _mishap(self, drive: DriveEvent) -> None:
         """What befalls a shot."""
-        troubles, shot = self._make.troubles, self._core.machine.shot
+        troubles, shot = self.make.troubles, self.core.machine.shot
         middle_s = self.world_of(drive.time_us + int(shot.setting.length_us * self._draw.random()))
-        real_s = middle_s / self._make.speed
+        real_s = middle_s / self.make.speed
         if self._happens(troubles.reset):
             self._planned.append((real_s, self.reset))
         elif self._happens(troubles.unplug):
             self._planned.append((real_s, self.unplug))
         elif self._happens(troubles.busy):
             self.accidents.append("busy")
-            self._core.machine.shot = replace(shot, end_us=shot.end_us + BUSY_US)
+            self.core.machine.shot = replace(shot, end_us=shot.end_us + BUSY_US)
         elif self._happens(troubles.hang):
             self.accidents.append("hang")
-            self._hangs_until_s = time.monotonic() + troubles.hang_s
+            self.hangs_until_s = time.monotonic() + troubles.hang_s
 
     def _pull_out(self) -> None:
         """What befalls an answer."""
-        if self._happens(self._make.troubles.unplug_reply):
+        if self._happens(self.make.troubles.unplug_reply):
             _, piece = self._going.pop()
             self._socket.write(piece[: len(piece) // 2])
             self._planned.append((time.monotonic() + 0.001, self.unplug))
-        elif self._happens(self._make.troubles.unplug_idle):
+        elif self._happens(self.make.troubles.unplug_idle):
             self._planned.append((time.monotonic() + 0.01, self.unplug))
 
     def _happens(self, rate: float) -> bool:
