@@ -87,11 +87,11 @@ def test_the_heat_of_a_pulse_is_that_of_its_full_voltage_on_the_resistance():
     assert load_of(Effect(effect=1), 2.9) == Load(on_s=0.0, heat_J=0.0)
 
 
-def test_the_papers_drive_at_five_hertz_stays_below_the_temperature_limit_for_an_hour():
+def test_the_papers_drive_at_five_hertz_stays_below_the_temperature_limit():
     load = load_of(Pulse(voltage_V=16.0, pulse_s=0.010), 2.9)
-    history = fired(load, [n / 5 for n in range(18_000)])
+    history = fired(load, [n / 5 for n in range(10_000)])  # ten time constants
     steady_C = AMBIENT_C + load.heat_J * 5 * 10.0  # power times the thermal resistance
-    assert history.coil_celsius(3600.0) == pytest.approx(steady_C, abs=0.1)
+    assert history.coil_celsius(2000.0) == pytest.approx(steady_C, abs=0.1)
     assert history.coil_celsius(1e6) == AMBIENT_C
 
 
