@@ -21,11 +21,19 @@ from analysis.paper.audit import (
     repeated_f,
     total,
 )
-from analysis.paper.audit.lattices import Levels, effect, find_groups, find_rows, ratio, search_rows, within_rows
+from analysis.paper.audit.lattices import (
+    BudgetError,
+    Levels,
+    effect,
+    find_groups,
+    find_rows,
+    numbers_with_sums,
+    ratio,
+    search_rows,
+    within_rows,
+)
 from analysis.paper.audit.p_values import p_bounds
-from analysis.paper.audit.power_sums import BudgetError, numbers_with_sums
-from analysis.paper.audit.printed import Interval, decimal
-from analysis.paper.audit.words import NONE_EXISTS, UNKNOWN, DataExistence, judge_readings
+from analysis.paper.audit.printed import NONE_EXISTS, UNKNOWN, DataExistence, Interval, decimal, judge_readings
 from tests.exact import exact_rm_F
 
 

@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from analysis.predict.design_search.critical import (
+from analysis.predict.design_search.choice import (
     THRESHOLD_SHARE,
     Contour,
     band_of,
@@ -17,8 +17,7 @@ from analysis.predict.design_search.critical import (
     drawn_contours,
     rate_at,
 )
-from analysis.predict.design_search.shots import Layer, layers, rows_of, simulate_rows
-from analysis.predict.design_search.space import DesignRequest, Space, make_space
+from analysis.predict.design_search.space import DesignRequest, Layer, Space, layers, make_space, rows_of, simulate_rows
 from analysis.predict.fit.percept_model import PAPER_RATES, PerceptFit, fit_percept, predicted_rate
 from analysis.predict.jobs import on_processes
 from analysis.stats.arrays import FloatArray

@@ -17,10 +17,9 @@ from analysis.logs.reading import read_logs
 from analysis.report.figures.shot import ShotPanel, figure_5
 from analysis.report.figures.style import display_name, stars
 from analysis.stats.cells import ByParticipant
-from analysis.summary.figures import directions, results
-from analysis.summary.figures.directions import figure_directions
-from analysis.summary.figures.results import figure_8
-from analysis.summary.figures.times import figure_response_times
+from analysis.summary.figures import results
+from analysis.summary.figures.results import figure_8, figure_directions
+from analysis.summary.figures.trade import figure_response_times
 from analysis.summary.results import Scores, StudyStatistics
 from analysis.summary.summary import summarize
 from tests.log_files import rating_rows, ratings_path, write_rows, write_study
@@ -107,12 +106,9 @@ def test_figure_8_shows_both_experiments_or_the_one_there_is(statistics: StudySt
 def test_nothing_that_is_written_in_a_figure_touches_its_neighbour(
     statistics: StudyStatistics, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    for module, draw, found in (
-        (results, figure_8, statistics),
-        (directions, figure_directions, statistics.direction),
-    ):
+    for draw, found in ((figure_8, statistics), (figure_directions, statistics.direction)):
         drawn: list[Figure] = []
-        monkeypatch.setattr(module, "save", lambda figure, _, drawn=drawn: drawn.append(figure))
+        monkeypatch.setattr(results, "save", lambda figure, _, drawn=drawn: drawn.append(figure))
         draw(found, tmp_path / "never")
         (figure,) = drawn
         canvas = FigureCanvasAgg(figure)

@@ -18,8 +18,8 @@ from typing import TypedDict
 
 import pandas as pd
 
-from analysis.logs.frames import Cell
 from analysis.logs.reading import Logs
+from analysis.logs.texts import Cell
 from experiments.record import columns
 from experiments.record.columns import Column
 from experiments.study.register import Member

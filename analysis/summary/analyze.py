@@ -8,16 +8,16 @@ from pathlib import Path
 
 from analysis.logs.column_map import ColumnMap
 from analysis.logs.exclusions import ExclusionEffect, Rules, apply_rules, by_study
-from analysis.logs.reading import Logs, Problem, Track, read_logs
+from analysis.logs.files import Problem
+from analysis.logs.reading import Logs, Track, read_logs
 from analysis.paper.audit import audit
-from analysis.paper.audit.paper_file import load_paper_file
-from analysis.paper.audit.sentences import predictions
-from analysis.paper.paper import load_paper
-from analysis.paper.published import Prediction
+from analysis.paper.audit.page import predictions
+from analysis.paper.audit.run import load_paper_file
+from analysis.paper.paper import Prediction, load_paper
 from analysis.summary import remarks_coding
 from analysis.summary.comparison import compare
 from analysis.summary.results import RulesApplied, StudyStatistics
-from analysis.summary.sections.data import ReportData
+from analysis.summary.sections.content import ReportData
 from analysis.summary.sections.sections import write_report
 from analysis.summary.summary import summarize
 from analysis.summary.tables_out import result_tables

@@ -6,14 +6,18 @@ import math
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 
-from analysis.paper.paper import Paper, PublishedDirection, PublishedExperiment, PublishedPreference, PublishedTukeyTest
-from analysis.paper.published import (
+from analysis.paper.paper import (
     ANOVA_F,
     ANOVA_P,
     PARTICIPANTS,
     ComparisonRow,
     ComparisonVerdict,
+    Paper,
     Prediction,
+    PublishedDirection,
+    PublishedExperiment,
+    PublishedPreference,
+    PublishedTukeyTest,
     anova_df,
     mean_rate,
     named_in,

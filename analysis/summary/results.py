@@ -18,14 +18,12 @@ from analysis.logs.exclusions import KeptTrials, LeftOut
 from analysis.report import apa
 from analysis.report.serial import OPTIONAL, beside, plain
 from analysis.stats.cells import ByParticipant
-from analysis.stats.diagnostics import Normality
+from analysis.stats.diagnostics import Normality, Sphericity
 from analysis.stats.effect_sizes import EffectSize
 from analysis.stats.logit_model import Clustering, LogitModel
-from analysis.stats.paired import PairedT
-from analysis.stats.rank_tests import SignedRanks
-from analysis.stats.sphericity import Sphericity
+from analysis.stats.paired import PairedT, SignedRanks
 from analysis.summary.remarks_coding import CodedRemarks
-from analysis.times.response_times import ResponseTimes
+from analysis.times.own_trials import ResponseTimes
 from analysis.times.speed_accuracy import NoSpeedAccuracy, SpeedAccuracy
 
 

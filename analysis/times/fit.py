@@ -10,7 +10,6 @@ from numpy.typing import ArrayLike
 from scipy import optimize, special
 
 from analysis.stats.arrays import FloatArray, share
-from analysis.times.ez import ez_from_summary
 from analysis.times.first_passage import distribution
 from analysis.times.likelihood import (
     DiffusionLikelihood,
@@ -22,6 +21,7 @@ from analysis.times.likelihood import (
     natural,
     trial_scores,
 )
+from analysis.times.trade import ez_from_summary
 
 EDGE = 1e-4
 """A share of lapses below this counts as none: its logit has no curvature left to take an interval from."""

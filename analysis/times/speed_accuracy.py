@@ -9,7 +9,6 @@ import numpy as np
 import pandas as pd
 
 from analysis.stats.arrays import FloatArray
-from analysis.times.ez import ez_people
 from analysis.times.fit import DiffusionFit
 from analysis.times.own_trials import REFUSALS, OwnTrials, own_trials
 from analysis.times.people import (
@@ -30,6 +29,7 @@ from analysis.times.trade import (
     QuantileProbability,
     balanced_integration,
     conditional_accuracy,
+    ez_people,
     inverse_efficiency,
     quantile_probability,
 )

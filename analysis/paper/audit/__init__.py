@@ -4,20 +4,15 @@
 `reconstruct` finds data that meet many printed numbers at once.
 """
 
-from analysis.paper.audit.annealing import ColumnOrder
-from analysis.paper.audit.claims import CHECKS
-from analysis.paper.audit.freedom import degrees_of_freedom
-from analysis.paper.audit.means import grim, percent_of_count, scale_of
+from analysis.paper.audit.claims import CHECKS, AuditFinding
+from analysis.paper.audit.freedom import Term, degrees_of_freedom, total
+from analysis.paper.audit.means import debit, grim, grimmer, percent_of_count, scale_of
 from analysis.paper.audit.p_values import binomial_p, p_against_statistic
-from analysis.paper.audit.paper_file import PaperFile, load_paper_file, parse_paper
-from analysis.paper.audit.printed import Interval, PrintedNumber, Rounding, read_printed
-from analysis.paper.audit.reconstruct import Constraints, Reconstruction, printed_constraints, reconstruct
-from analysis.paper.audit.run import AuditFinding, audit
-from analysis.paper.audit.spreads import debit, grimmer
-from analysis.paper.audit.totals import Term, total
+from analysis.paper.audit.printed import AuditVerdict, CheckResult, Interval, PrintedNumber, Rounding, read_printed
+from analysis.paper.audit.reconstruct import ColumnOrder, Constraints, Reconstruction, printed_constraints, reconstruct
+from analysis.paper.audit.run import PaperFile, audit, load_paper_file, parse_paper
 from analysis.paper.audit.tukey_pattern import ClaimedComparison, tukey_pattern
 from analysis.paper.audit.variance_ratios import between_f, repeated_f
-from analysis.paper.audit.words import AuditVerdict, CheckResult
 
 __all__ = [
     "CHECKS",

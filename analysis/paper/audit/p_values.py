@@ -13,9 +13,21 @@ import numpy as np
 from scipy import special
 
 from analysis.paper.audit.means import check_count
-from analysis.paper.audit.printed import Interval, PrintedNumber, Rounding, decimal, read_printed
-from analysis.paper.audit.words import NONE_EXISTS, UNKNOWN, Attempt, CheckResult, DataExistence, judge_readings, listed
-from analysis.stats.studentized_range import studentized_range_sf
+from analysis.paper.audit.printed import (
+    NONE_EXISTS,
+    UNKNOWN,
+    Attempt,
+    CheckResult,
+    DataExistence,
+    Interval,
+    PrintedNumber,
+    Rounding,
+    decimal,
+    judge_readings,
+    listed,
+    read_printed,
+)
+from analysis.stats.tukey import studentized_range_sf
 
 Statistic = Literal["t", "F", "chi2", "r", "z", "Q", "q"]
 Sides = Literal["two-sided", "one-sided"]

@@ -17,9 +17,19 @@ import numpy as np
 from analysis.paper.audit.lattices import column_choices
 from analysis.paper.audit.means import AnswerScale, check_count, scale_of
 from analysis.paper.audit.p_values import p_range
-from analysis.paper.audit.printed import Interval, PrintedNumber, Rounding, read_printed
-from analysis.paper.audit.words import NONE_EXISTS, UNKNOWN, Attempt, CheckResult, DataExistence, judge_readings
-from analysis.stats.studentized_range import studentized_range_isf
+from analysis.paper.audit.printed import (
+    NONE_EXISTS,
+    UNKNOWN,
+    Attempt,
+    CheckResult,
+    DataExistence,
+    Interval,
+    PrintedNumber,
+    Rounding,
+    judge_readings,
+    read_printed,
+)
+from analysis.stats.tukey import studentized_range_isf
 
 OWN_ERROR = "each pair's own error term"
 _SOURCE = "Tukey 1953; Kramer 1956, Biometrics 12, 307; Winer 1971, chapter 4"

@@ -14,20 +14,35 @@ from fractions import Fraction
 from math import asin, sqrt
 from random import Random
 
-from analysis.paper.audit import lattices as between
-from analysis.paper.audit import lattices as repeated
-from analysis.paper.audit.lattices import Levels, Rows, column_choices
+from analysis.paper.audit.lattices import (
+    Levels,
+    Rows,
+    between_candidates,
+    between_ratio,
+    between_terms,
+    candidates,
+    column_choices,
+    effect,
+    find_groups,
+    find_rows,
+    needed,
+    ratio,
+)
 from analysis.paper.audit.means import AnswerScale, check_count, scale_of
-from analysis.paper.audit.printed import Interval, PrintedNumber, Rounding, decimal, read_printed
-from analysis.paper.audit.words import (
+from analysis.paper.audit.printed import (
     NONE_EXISTS,
     UNKNOWN,
     Attempt,
     CheckResult,
     DataExistence,
+    Interval,
     JudgedReadings,
+    PrintedNumber,
+    Rounding,
     Witness,
+    decimal,
     judge_readings,
+    read_printed,
 )
 
 _STEPS, _STARTS, _MARGIN = 1_500, 8, 1e-9
@@ -145,7 +160,7 @@ def repeated_f(
     between conditions within participants, both whole in grains squared, W of known parity. Without means every set of
     column sums is allowed. Readings: another error term (between), `transforms` of the scores as shares of the scale,
     scores in `other_grains` with any means. `ValueError`: text that is no number, n or k below 2, a wrong scale.
-    Source: Winer 1971, chapter 4; the lattice by the identity in `repeated_lattice`.
+    Source: Winer 1971, chapter 4; the lattice by the identity in `lattices`.
 
     >>> repeated_f("28.45", 14, 3, ["55.7%", "79.3%", "92.9%"], grain="0.1", low="0", high="1").verdict
     'not attainable'
@@ -204,16 +219,16 @@ def _claimed(F: str, means: Sequence[str] | None, sizes: tuple[int, ...], scale:
 
 def _repeated(claim: _Claim) -> Search:
     def search(columns: Sequence[int], F: Interval) -> tuple[tuple[int, ...], ...] | bool | None:
-        targets = repeated.candidates(columns, claim.n, F, claim.levels)
-        return repeated.find_rows(columns, claim.n, targets, claim.levels)
+        targets = candidates(columns, claim.n, F, claim.levels)
+        return find_rows(columns, claim.n, targets, claim.levels)
 
     return search
 
 
 def _between(claim: _Claim) -> Search:
     def search(columns: Sequence[int], F: Interval) -> tuple[tuple[int, ...], ...] | bool | None:
-        targets = between.between_candidates(columns, claim.sizes, F, claim.levels.top)
-        return between.find_groups(columns, claim.sizes, targets, claim.levels.top)
+        targets = between_candidates(columns, claim.sizes, F, claim.levels.top)
+        return find_groups(columns, claim.sizes, targets, claim.levels.top)
 
     return search
 
@@ -281,16 +296,16 @@ def _neighbours(claim: _Claim, steps: Steps) -> tuple[Fraction | None, Fraction 
 
 def _w_steps(claim: _Claim, sums: tuple[int, ...]) -> Iterator[tuple[Fraction, int]]:
     value = claim.F.value
-    edge = repeated.needed(sums, claim.n, Interval(value, value)).low
+    edge = needed(sums, claim.n, Interval(value, value)).low
     if value <= 0 or edge is None:
         return
     start = int(edge) + (int(edge) - (sum(sums) if len(sums) % 2 == 0 else 0)) % 2
     for side in (1, -1):
         places = (start - 2 * i if side > 0 else start + 2 * i for i in range(6))
         for w in places:
-            F = repeated.ratio(sums, w, claim.n)
+            F = ratio(sums, w, claim.n)
             on_side = F is not None and (F - value) * side >= 0
-            if F is not None and on_side and repeated.find_rows(sums, claim.n, range(w, w + 1), claim.levels):
+            if F is not None and on_side and find_rows(sums, claim.n, range(w, w + 1), claim.levels):
                 yield F, side
                 break
 
@@ -299,16 +314,16 @@ def _s_steps(claim: _Claim, sums: tuple[int, ...]) -> Iterator[tuple[Fraction, i
     value = claim.F.value
     if value <= 0:
         return
-    b, explained = between.between_terms(sums, claim.sizes)
+    b, explained = between_terms(sums, claim.sizes)
     edge = int(b + explained * (sum(claim.sizes) - len(sums)) / ((len(sums) - 1) * value))
     start = edge + (edge - sum(sums)) % 2
     for side in (1, -1):
         places = (start - 2 * i if side > 0 else start + 2 * i for i in range(6))
         for s in places:
-            F = between.between_ratio(sums, s, claim.sizes)
+            F = between_ratio(sums, s, claim.sizes)
             on_side = F is not None and (F - value) * side >= 0
             targets = range(s, s + 1)
-            if F is not None and on_side and between.find_groups(sums, claim.sizes, targets, claim.levels.top):
+            if F is not None and on_side and find_groups(sums, claim.sizes, targets, claim.levels.top):
                 yield F, side
                 break
 
@@ -351,5 +366,5 @@ def _numbers(claim: _Claim, check: str) -> tuple[tuple[str, str], ...]:
     interval = claim.F.interval(Rounding.ANY)
     shown = [("column sums in grains", ", ".join(map(str, columns)))]
     if check.startswith("repeated"):
-        shown += [("A", str(repeated.effect(columns))), ("W needed", str(repeated.needed(columns, claim.n, interval)))]
+        shown += [("A", str(effect(columns))), ("W needed", str(needed(columns, claim.n, interval)))]
     return tuple(shown)

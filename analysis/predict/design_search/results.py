@@ -7,19 +7,18 @@ from dataclasses import dataclass, fields, replace
 
 import numpy as np
 
-from analysis.predict.design_search.choice import Designs
-from analysis.predict.design_search.critical import (
+from analysis.predict.design_search.choice import (
     DRAWS,
     INSIDE,
     THRESHOLD_SHARE,
     Alternative,
     Contour,
+    Designs,
+    predict,
     unbiased,
     under,
 )
-from analysis.predict.design_search.rates import predict
-from analysis.predict.design_search.shots import Layer
-from analysis.predict.design_search.space import Space
+from analysis.predict.design_search.space import Layer, Space
 from analysis.predict.fit.percept_model import PAPER_TRIALS, Fitted, PerceptFit, predicted_rate
 from analysis.stats.arrays import FloatArray
 from device.limits import (

@@ -12,8 +12,19 @@ from pathlib import Path
 
 import numpy as np
 
-from analysis.predict.design_search.choice import Designs, best_design, designs_of, front, joined_designs, summary_error
-from analysis.predict.design_search.critical import LEAKS, Alternative, Contour, alternatives, contour_of
+from analysis.predict.design_search.choice import (
+    LEAKS,
+    Alternative,
+    Contour,
+    Designs,
+    alternatives,
+    best_design,
+    contour_of,
+    designs_of,
+    front,
+    joined_designs,
+    summary_error,
+)
 from analysis.predict.design_search.page import in_short, sections
 from analysis.predict.design_search.results import (
     DesignSearch,
@@ -27,8 +38,7 @@ from analysis.predict.design_search.results import (
     plane_of,
     search_assumptions,
 )
-from analysis.predict.design_search.shots import Layer, layers, rows_of, simulate_rows
-from analysis.predict.design_search.space import DesignRequest, Space, make_space
+from analysis.predict.design_search.space import DesignRequest, Layer, Space, layers, make_space, rows_of, simulate_rows
 from analysis.predict.fit.percept_model import PAPER_RATES, PerceptFit, fit_percept
 from analysis.predict.jobs import RunPieces, cores, on_processes
 from analysis.report.page import write_page

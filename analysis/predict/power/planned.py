@@ -18,10 +18,8 @@ from scipy import special
 from analysis.paper.recurrence import SIGNIFICANT, Recurrence, ShareOfStudies, share_of
 from analysis.stats.anova import check_scores, rm_anova
 from analysis.stats.arrays import FloatArray
-from analysis.stats.binomial import binomial_test
-from analysis.stats.detection import yes_no
-from analysis.stats.studentized_range import studentized_range_isf
-from analysis.stats.tukey import pairs_of, pooled_pairs
+from analysis.stats.binomial import binomial_test, yes_no
+from analysis.stats.tukey import pairs_of, pooled_pairs, studentized_range_isf
 
 ANOVA = "ANOVA"
 ALL_PAIRS = "Tukey, all pairs"

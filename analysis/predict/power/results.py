@@ -6,9 +6,8 @@ from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 
 from analysis.paper.recurrence import SIGNIFICANT, WHOLE_PATTERN, ShareOfStudies
-from analysis.predict.power.grid import Grid, GridCell
+from analysis.predict.power.grid import PUBLISHED, Grid, GridCell
 from analysis.predict.power.planned import DesignOption, Precision, Tally, merged, precisions, shares, smallest
-from analysis.predict.power.studies import PUBLISHED
 from experiments.record.provenance import provenance
 
 PATTERN = f"{PUBLISHED}, {WHOLE_PATTERN}"

@@ -11,12 +11,10 @@ from dataclasses import asdict, dataclass
 from pathlib import Path
 
 from analysis.predict.jobs import RunPieces, cores, on_cluster, on_processes
-from analysis.predict.power.assumptions import grid_assumptions
-from analysis.predict.power.grid import Grid, PowerRequest, make_grid
-from analysis.predict.power.page import in_short, sections
+from analysis.predict.power.grid import Chunk, Grid, PowerRequest, make_grid, run_chunk
+from analysis.predict.power.page import grid_assumptions, in_short, sections
 from analysis.predict.power.planned import Tally
 from analysis.predict.power.results import Power, power_of
-from analysis.predict.power.studies import Chunk, run_chunk
 from analysis.report.page import write_page
 from analysis.report.serial import as_json
 from analysis.report.terminal import Progress

@@ -5,8 +5,8 @@ from __future__ import annotations
 import os
 from pathlib import Path
 
-from analysis.logs.reading import Problem
-from analysis.paper.published import AUDITED, ComparisonRow
+from analysis.logs.files import Problem
+from analysis.paper.paper import AUDITED, ComparisonRow
 from analysis.paper.recurrence import PatternOdds
 from analysis.report import apa
 from analysis.report.figures.shot import ShotPanel
@@ -15,9 +15,8 @@ from analysis.report.page import write_page
 from analysis.report.section import LISTED, SHOWN, Section, Table, shortened
 from analysis.report.serial import as_json
 from analysis.summary.results import DirectionStatistics, Origin, StudyStatistics
-from analysis.summary.sections.data import EXPERIMENTS, ReportData
+from analysis.summary.sections.content import EXPERIMENTS, ReportData, results_picture, shot_picture, write_figures
 from analysis.summary.sections.experiments import direction_section, preference_section
-from analysis.summary.sections.pictures import results_picture, shot_picture, write_figures
 from analysis.summary.sections.supplement import supplement_sections
 from analysis.summary.sections.trade import trade_section
 

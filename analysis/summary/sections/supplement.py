@@ -7,8 +7,8 @@ from collections.abc import Iterable, Iterator
 from analysis.report import apa
 from analysis.report.figures.style import display_name, named
 from analysis.report.section import Section, Table
+from analysis.stats.diagnostics import Sphericity
 from analysis.stats.logit_model import Contrast
-from analysis.stats.sphericity import Sphericity
 from analysis.summary.results import (
     Assumption,
     Diagnostics,

@@ -1,4 +1,4 @@
-"""`recoil twin`: a gun that is none, on a pseudo-terminal or a TCP port, for training and for tests."""
+"""`recoil twin`, a gun that is none, on a pseudo-terminal or a TCP port; `recoil doctor`, the rig's self-test."""
 
 from __future__ import annotations
 
@@ -6,13 +6,21 @@ from collections.abc import Callable, Sequence
 from contextlib import closing
 from dataclasses import dataclass, fields, replace
 from pathlib import Path
-from typing import Any
+from typing import Any, Literal
 
+from analysis.report.section import Section, Table
+from analysis.report.serial import as_json
+from analysis.report.terminal import Progress, with_tables
 from device.serial_gun.opening import MAX_SPEED
 from device.twin.core import IDENTITY
 from device.twin.ports import Pty, Socket, Tcp, Troubles
 from device.twin.twin import Make, Twin
+from experiments.clock import RealClock
+from experiments.doctor.checks import carry_out_check, checks
+from experiments.doctor.figures import DoctorFinding
+from experiments.doctor.verdicts import overall
 from experiments.load import find, load_gun
+from experiments.record import storage
 from experiments.study.places import PlaceError
 
 
@@ -92,3 +100,44 @@ def troubles_of(words: Sequence[str]) -> Troubles:
         except ValueError as error:
             raise PlaceError(f"--trouble {word}: {error}") from error
     return Troubles(**found)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Examination:
+    """What every check found, when, and the worst verdict."""
+
+    utc: str
+    verdict: Literal["good", "warning", "fails"]
+    checks: tuple[DoctorFinding, ...]
+
+
+def examine(results: Path, gun: str, config: str, progress: Progress) -> Examination:
+    """Carry out every check; `config` is the gun's, with the limit of its line.
+
+    `PlaceError`: the gun's address has no such form; `ConfigError`: the config cannot be used.
+    """
+    findings, planned = list[DoctorFinding](), checks(results, gun, load_gun(find(config)).serial.round_trip_limit_s)
+    with progress("doctor", len(planned)) as tell:
+        for check in planned:
+            findings += carry_out_check(check)
+            tell(check.name)
+    verdict = overall([finding.verdict for finding in findings])
+    return Examination(utc=RealClock().utc(), verdict=verdict, checks=tuple(findings))
+
+
+def keep(found: Examination, path: Path) -> None:
+    """Put the machine-readable result into a file, in place of an older one."""
+    storage.make_folder(path.parent)
+    storage.write_whole(path, as_json(found))
+
+
+def findings_section(findings: tuple[DoctorFinding, ...]) -> Section:
+    """The findings as a table."""
+    rows = tuple((one.check, str(one.verdict), one.measured, one.advice) for one in findings)
+    header = ("check", "verdict", "measured", "what to do")
+    return Section(title="", tables=(Table(caption="", header=header, rows=rows),))
+
+
+def examination_text(findings: tuple[DoctorFinding, ...]) -> str:
+    """The table for people at a terminal."""
+    return with_tables(findings_section(findings), ruled=True, unfolded=2)
