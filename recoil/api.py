@@ -83,7 +83,7 @@ def audit(paper: str | Path = "paper") -> tuple[AuditFinding, ...]:
     >>> findings[0].quote, findings[0].result.verdict
     ('14 participants (7 males and 7 females)', 'attainable')
     """
-    from analysis.paper.audit import audit as audited
+    from analysis.paper.audit.run import audit as audited
     from analysis.paper.audit.run import load_paper_file
     from experiments.load import find
 

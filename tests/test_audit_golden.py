@@ -9,8 +9,9 @@ from typing import Any
 
 import pytest
 
-from analysis.paper.audit import CheckResult, Rounding, debit, grim, grimmer, p_against_statistic, read_printed
-from analysis.paper.audit.means import scale_of
+from analysis.paper.audit.means import debit, grim, grimmer, scale_of
+from analysis.paper.audit.p_values import p_against_statistic
+from analysis.paper.audit.printed import CheckResult, Rounding, read_printed
 
 GOLDEN = Path(__file__).parent / "golden" / "audit"
 SCRUTINY: dict[str, Any] = tomllib.loads((GOLDEN / "scrutiny.toml").read_text(encoding="utf-8"))

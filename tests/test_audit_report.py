@@ -9,8 +9,10 @@ from pathlib import Path
 
 import pytest
 
-from analysis.paper.audit import audit, binomial_p, debit, degrees_of_freedom, grim, grimmer, load_paper_file
 from analysis.paper.audit.claims import AuditFinding
+from analysis.paper.audit.freedom import degrees_of_freedom
+from analysis.paper.audit.means import debit, grim, grimmer
+from analysis.paper.audit.p_values import binomial_p
 from analysis.paper.audit.page import (
     ELSEWHERE,
     counts,
@@ -23,6 +25,7 @@ from analysis.paper.audit.page import (
     sentences,
 )
 from analysis.paper.audit.printed import CheckResult
+from analysis.paper.audit.run import audit, load_paper_file
 from tests.conftest import Recoil
 
 CONFIGS = Path(__file__).parent.parent / "configs"

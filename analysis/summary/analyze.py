@@ -10,9 +10,8 @@ from analysis.logs.column_map import ColumnMap
 from analysis.logs.exclusions import ExclusionEffect, Rules, apply_rules, by_study
 from analysis.logs.files import Problem
 from analysis.logs.reading import Logs, Track, read_logs
-from analysis.paper.audit import audit
 from analysis.paper.audit.page import predictions
-from analysis.paper.audit.run import load_paper_file
+from analysis.paper.audit.run import audit, load_paper_file
 from analysis.paper.paper import Prediction, load_paper
 from analysis.summary import remarks_coding
 from analysis.summary.comparison import compare

@@ -8,14 +8,14 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
 from types import MappingProxyType
-from typing import Annotated, Any, ClassVar, Literal
+from typing import Annotated, Literal
 
-from pydantic import AfterValidator, Field
+from pydantic import Field
 
 from analysis.paper.audit.freedom import Bound, ComparisonDesign, Term, degrees_of_freedom, total
 from analysis.paper.audit.means import debit, grim, grimmer, percent_of_count, scale_of
 from analysis.paper.audit.p_values import Sides, Statistic, binomial_p, p_against_statistic
-from analysis.paper.audit.printed import CheckResult, Rounding, read_printed
+from analysis.paper.audit.printed import CheckResult, PrintedText, Rounding, read_printed
 from analysis.paper.audit.tukey_pattern import ClaimedComparison, tukey_pattern
 from analysis.paper.audit.variance_ratios import between_f, repeated_f
 from analysis.paper.paper import (
@@ -54,15 +54,6 @@ CHECKS: Mapping[str, Callable[..., CheckResult]] = MappingProxyType(
 """Name in a paper's file -> check; a claim's other keys are the check's arguments (`paper_file` types them)."""
 
 
-def _is_printed(text: str) -> str:
-    read_printed(text)
-    return text
-
-
-PrintedText = Annotated[str, AfterValidator(_is_printed)]
-"""A number or a bound as printed: "28.45", ".205", "< .001", "64.3%"."""
-
-
 class Claim(Model):
     """One printed number: `place` in the paper, a short `quote`, and a `note` on how the file reads it.
 
@@ -73,27 +64,35 @@ class Claim(Model):
     quote: str
     note: str = ""
     about: list[str] = Field(default_factory=list)
-    not_arguments: ClassVar[frozenset[str]] = frozenset({"place", "quote", "note", "about", "kind"})
 
     def run(self) -> CheckResult:
         """The check of this kind with this claim's numbers; `ValueError` where they make no such claim."""
-        return CHECKS[self.kind](**self.arguments())  # type: ignore[attr-defined]
-
-    def arguments(self) -> dict[str, Any]:
-        """The check's arguments."""
-        return {name: getattr(self, name) for name in type(self).model_fields if name not in self.not_arguments}
+        own = type(self).model_fields.keys() - Claim.model_fields.keys() - {"kind"}
+        return CHECKS[self.kind](**{name: getattr(self, name) for name in own})  # type: ignore[attr-defined]
 
 
-class GrimClaim(Claim):
+class ScaleClaim(Claim):
+    """About scores in steps of `grain` from `low` to `high`."""
+
+    grain: PrintedText = "1"
+    low: PrintedText | None = None
+    high: PrintedText | None = None
+
+
+class MeansClaim(ScaleClaim):
+    """An F of several means, which are printed or not."""
+
+    F: PrintedText
+    means: list[PrintedText] | None = None
+
+
+class GrimClaim(ScaleClaim):
     """A mean of n scores in steps of `grain`; see `grim`."""
 
     kind: Literal["grim"]
     mean: PrintedText
     n: AtLeastOne
-    grain: PrintedText = "1"
     items: AtLeastOne = 1
-    low: PrintedText | None = None
-    high: PrintedText | None = None
 
 
 class PercentClaim(Claim):
@@ -151,66 +150,31 @@ class BinomialClaim(Claim):
     counts: list[int] | None = None
 
 
-class RepeatedFClaim(Claim):
+class RepeatedFClaim(MeansClaim):
     """F within participants, against its means; see `repeated_f`."""
 
     kind: Literal["repeated-f"]
-    F: PrintedText
     n: AtLeastOne
     k: AtLeastOne
-    means: list[PrintedText] | None = None
-    grain: PrintedText = "1"
-    low: PrintedText | None = None
-    high: PrintedText | None = None
     transforms: list[str] = Field(default_factory=list)
     other_grains: list[PrintedText] = Field(default_factory=list)
 
 
-class BetweenFClaim(Claim):
+class BetweenFClaim(MeansClaim):
     """F between groups, against their means; see `between_f`."""
 
     kind: Literal["between-f"]
-    F: PrintedText
     sizes: Annotated[list[AtLeastOne], Field(min_length=2)]
-    means: list[PrintedText] | None = None
-    grain: PrintedText = "1"
-    low: PrintedText | None = None
-    high: PrintedText | None = None
 
 
-class TukeyPair(Model):
-    """Mean `higher` above mean `lower`, by their places from 0; see `ClaimedComparison`."""
-
-    higher: int
-    lower: int
-    p: PrintedText
-    p_at_least: PrintedText | None = None
-
-
-class TukeyClaim(Claim):
+class TukeyClaim(MeansClaim):
     """The pattern of a Tukey test; see `tukey_pattern`."""
 
     kind: Literal["tukey"]
-    F: PrintedText
     sizes: Annotated[list[AtLeastOne], Field(min_length=2)]
-    comparisons: Annotated[list[TukeyPair], Field(min_length=1)]
-    means: list[PrintedText] | None = None
+    comparisons: Annotated[list[ClaimedComparison], Field(min_length=1)]
     repeated: bool = True
-    grain: PrintedText | None = None
-    low: PrintedText | None = None
-    high: PrintedText | None = None
-
-    def arguments(self) -> dict[str, Any]:
-        """The check's arguments, the pairs as its own words."""
-        pairs = [ClaimedComparison(**pair.model_dump()) for pair in self.comparisons]
-        return super().arguments() | {"comparisons": pairs}
-
-
-class TermModel(Model):
-    """A product of factors over divisors; see `Term`."""
-
-    times: Annotated[list[int | PrintedText], Field(min_length=1)]
-    over: list[int | PrintedText] = Field(default_factory=list)
+    grain: PrintedText | None = None  # type: ignore[assignment]
 
 
 class TotalClaim(Claim):
@@ -218,12 +182,8 @@ class TotalClaim(Claim):
 
     kind: Literal["total"]
     printed: PrintedText
-    terms: Annotated[list[TermModel], Field(min_length=1)]
+    terms: Annotated[list[Term], Field(min_length=1)]
     bound: Bound = "equals"
-
-    def arguments(self) -> dict[str, Any]:
-        """The check's arguments, the terms as its own words."""
-        return super().arguments() | {"terms": [Term(times=term.times, over=term.over) for term in self.terms]}
 
 
 class StatedClaim(Claim):
@@ -302,11 +262,11 @@ STARS = {"0.05": "0.01", "0.01": "0.001"}
 def participants_claims(people: Participants) -> Iterator[Claim]:
     """Of who took part: the sexes add up, the ages span their range."""
     place = "III, Participants"
-    sexes = [TermModel(times=[people.male]), TermModel(times=[people.female])]
+    sexes = [Term(times=[people.male]), Term(times=[people.female])]
     quote = f"{people.n} participants ({people.male} males and {people.female} females)"
     about = [named_in(name, PARTICIPANTS) for name in ("direction", "preference")]
     yield TotalClaim(place=place, quote=quote, about=about, kind="total", printed=str(people.n), terms=sexes)
-    low = [TermModel(times=[people.age_min])]
+    low = [Term(times=[people.age_min])]
     quote = f"ages ranged from {people.age_min} to {people.age_max} years"
     yield TotalClaim(place=place, quote=quote, kind="total", printed=str(people.age_max), terms=low, bound="at least")
     yield UnpublishedClaim(place=place, quote=quote, kind="unpublished", quantity="mean and SD of the ages")
@@ -349,15 +309,15 @@ def _counts(percent: str, n: int) -> list[int]:
 def _protocol(paper: PublishedDirection) -> Iterator[Claim]:
     place, protocol = "III.A, Method", paper.protocol
     trials = protocol.forward_trials_per_session + protocol.backward_trials_per_session
-    terms = [TermModel(times=[protocol.sets_per_session, protocol.trials_per_set])]
+    terms = [Term(times=[protocol.sets_per_session, protocol.trials_per_set])]
     quote = f"{trials} trials ({protocol.sets_per_session} sets x {protocol.trials_per_set} repetitions)"
     yield TotalClaim(place=place, quote=quote, kind="total", printed=str(trials), terms=terms)
-    one_each = [TermModel(times=[len(paper.methods)])]
+    one_each = [Term(times=[len(paper.methods)])]
     quote = f"{protocol.sessions} sessions corresponded to the rendering methods"
     yield TotalClaim(place=place, quote=quote, kind="total", printed=str(protocol.sessions), terms=one_each)
     breaks = [
-        TermModel(times=[protocol.sessions, protocol.sets_per_session - 1, protocol.set_break_s], over=[60]),
-        TermModel(times=[protocol.sessions - 1, protocol.session_break_s], over=[60]),
+        Term(times=[protocol.sessions, protocol.sets_per_session - 1, protocol.set_break_s], over=[60]),
+        Term(times=[protocol.sessions - 1, protocol.session_break_s], over=[60]),
     ]
     quote = f"around {protocol.duration_min} minutes; {protocol.set_break_s} s and {protocol.session_break_s} s breaks"
     yield TotalClaim(
@@ -396,7 +356,7 @@ def _scale_top(paper: PublishedExperiment) -> str:
 def _tukey(paper: PublishedExperiment, place: str, means: list[str] | None) -> Iterator[Claim]:
     index = {method: i for i, method in enumerate(paper.methods)}
     pairs = [
-        TukeyPair(
+        ClaimedComparison(
             higher=index[claim.higher], lower=index[claim.lower], p=f"< {claim.p_below}",
             p_at_least=STARS.get(claim.p_below),
         )
@@ -415,7 +375,7 @@ def _tukey(paper: PublishedExperiment, place: str, means: list[str] | None) -> I
 def preference_claims(paper: PublishedPreference) -> Iterator[Claim]:
     """Of experiment 2: its protocol, F, post-hoc tests and shares of participants, and what is only drawn."""
     place, n = "III.B, Results", paper.n
-    trials = [TermModel(times=[len(paper.methods)])]
+    trials = [Term(times=[len(paper.methods)])]
     quote = f"{paper.protocol.trials} trials corresponded to the rendering methods"
     yield TotalClaim(place="III.B, Method", quote=quote, kind="total", printed=str(paper.protocol.trials), terms=trials)
     yield from _anova(paper, place, None)

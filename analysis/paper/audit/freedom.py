@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass
 from fractions import Fraction
+from functools import partial
 from math import prod
-from typing import Literal
+from typing import Annotated, Literal
+
+from pydantic import Field
 
 from analysis.paper.audit.means import check_count
 from analysis.paper.audit.printed import (
@@ -16,12 +18,14 @@ from analysis.paper.audit.printed import (
     DataExistence,
     Interval,
     PrintedNumber,
+    PrintedText,
     Rounding,
     decimal,
     judge_readings,
     listed,
     read_printed,
 )
+from experiments.config.door import Model
 
 ComparisonDesign = Literal["between", "repeated", "one sample", "paired", "two samples", "correlation", "contingency"]
 Freedom = tuple[Fraction, ...]
@@ -57,9 +61,11 @@ def degrees_of_freedom(df: Sequence[str], design: ComparisonDesign, counts: Sequ
     expected = expected_df(design, counts)
     if len(printed) != len(expected):
         raise ValueError(f"a {design} design has {len(expected)} degrees of freedom, not {len(printed)}")
-    others = [(name, _same(printed, other)) for name, other in _readings(design, counts)]
-    others += [(name, test) for name, test in _corrections(printed, design, counts)]
-    decision = judge_readings(_same(printed, expected), others)
+    others: list[tuple[str, Attempt]] = [
+        (name, partial(_same, printed, other)) for name, other in _readings(design, counts)
+    ]
+    others += _corrections(printed, design, counts)
+    decision = judge_readings(partial(_same, printed, expected), others)
     return CheckResult(
         check="df",
         printed=f"({', '.join(number.text for number in printed)})",
@@ -87,12 +93,9 @@ def expected_df(design: ComparisonDesign, counts: Sequence[int]) -> Freedom:
     return tuple(map(Fraction, values))
 
 
-def _same(printed: Sequence[PrintedNumber], values: Freedom) -> Attempt:
-    def attempt(rounding: Rounding) -> DataExistence:
-        fits = all(n.interval(rounding).holds(value) for n, value in zip(printed, values, strict=True))
-        return DataExistence(True, (values,)) if fits else NONE_EXISTS
-
-    return attempt
+def _same(printed: Sequence[PrintedNumber], values: Freedom, rounding: Rounding) -> DataExistence:
+    fits = all(n.interval(rounding).holds(value) for n, value in zip(printed, values, strict=True))
+    return DataExistence(True, (values,)) if fits else NONE_EXISTS
 
 
 def _readings(design: ComparisonDesign, counts: Sequence[int]) -> Iterator[tuple[str, Freedom]]:
@@ -126,47 +129,40 @@ def _corrections(
     printed: Sequence[PrintedNumber], design: ComparisonDesign, counts: Sequence[int]
 ) -> Iterator[tuple[str, Attempt]]:
     if design == "repeated":
-        yield "Greenhouse-Geisser or Huynh-Feldt correction", _corrected(printed, counts[0], counts[1])
+        yield "Greenhouse-Geisser or Huynh-Feldt correction", partial(_corrected, printed, counts[0], counts[1])
     if design == "two samples":
-        yield "Welch's correction", _welch(printed[0], min(counts) - 1, sum(counts) - 2)
+        yield "Welch's correction", partial(_welch, printed[0], min(counts) - 1, sum(counts) - 2)
 
 
-def _corrected(printed: Sequence[PrintedNumber], n: int, k: int) -> Attempt:
+def _corrected(printed: Sequence[PrintedNumber], n: int, k: int, rounding: Rounding) -> DataExistence:
     """Both df times an epsilon from 1 / (k - 1) to 1: is there one that prints so?"""
-
-    def attempt(rounding: Rounding) -> DataExistence:
-        first, second = (number.interval(rounding) for number in printed)
-        mapped = second.mapped(lambda df: df / (n - 1))
-        ends = [x for x in (first.low, first.high, mapped.low, mapped.high, Fraction(1), Fraction(k - 1)) if x]
-        middles = [(a + b) / 2 for a in ends for b in ends]
-        fits = (x for x in middles if 1 <= x <= k - 1 and first.holds(x) and mapped.holds(x))
-        df = next(fits, None)
-        return NONE_EXISTS if df is None else DataExistence(True, ((df, df * (n - 1)),))
-
-    return attempt
+    first, second = (number.interval(rounding) for number in printed)
+    df = _within([first, second.mapped(lambda df: df / (n - 1))], 1, k - 1)
+    return NONE_EXISTS if df is None else DataExistence(True, ((df, df * (n - 1)),))
 
 
-def _welch(printed: PrintedNumber, low: int, high: int) -> Attempt:
-    def attempt(rounding: Rounding) -> DataExistence:
-        interval = printed.interval(rounding)
-        ends = [x for x in (interval.low, interval.high, Fraction(low), Fraction(high)) if x is not None]
-        fits = (x for a in ends for b in ends if interval.holds(x := (a + b) / 2) and low <= x <= high)
-        df = next(fits, None)
-        return NONE_EXISTS if df is None else DataExistence(True, ((df,),))
+def _welch(printed: PrintedNumber, low: int, high: int, rounding: Rounding) -> DataExistence:
+    df = _within([printed.interval(rounding)], low, high)
+    return NONE_EXISTS if df is None else DataExistence(True, ((df,),))
 
-    return attempt
+
+def _within(intervals: Sequence[Interval], low: int, high: int) -> Fraction | None:
+    """A number in `low..high` and in all the intervals, if there is one: then a middle of two of the ends is."""
+    ends = [end for one in intervals for end in (one.low, one.high) if end is not None]
+    ends += [Fraction(low), Fraction(high)]
+    middles = ((a + b) / 2 for a in ends for b in ends)
+    return next((x for x in middles if low <= x <= high and all(one.holds(x) for one in intervals)), None)
 
 
 Bound = Literal["equals", "at least", "at most"]
 _BOUNDS = {"equals": "that", "at least": "at least that", "at most": "at most that"}
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Term:
+class Term(Model):
     """A product of factors, over divisors: a whole number is exact, text is a printed number with its rounding."""
 
-    times: Sequence[int | str]
-    over: Sequence[int | str] = ()
+    times: Annotated[list[int | PrintedText], Field(min_length=1)]
+    over: list[int | PrintedText] = Field(default_factory=list)
 
 
 def total(printed: str, terms: Sequence[Term], bound: Bound = "equals") -> CheckResult:
@@ -182,7 +178,7 @@ def total(printed: str, terms: Sequence[Term], bound: Bound = "equals") -> Check
     number = read_printed(printed)
     if not terms:
         raise ValueError("a total needs at least one term")
-    decision = judge_readings(_attempt(number.text, terms, bound))
+    decision = judge_readings(partial(_met, number, terms, bound))
     sums = [_sum(terms, rounding) for rounding in (Rounding.HALF_UP, Rounding.ANY)]
     middle = sum((_value(term) for term in terms), Fraction(0))
     return CheckResult(
@@ -201,16 +197,13 @@ def total(printed: str, terms: Sequence[Term], bound: Bound = "equals") -> Check
     )
 
 
-def _attempt(text: str, terms: Sequence[Term], bound: Bound) -> Attempt:
-    def attempt(rounding: Rounding) -> DataExistence:
-        claimed, whole = read_printed(text).interval(rounding), _sum(terms, rounding)
-        if bound == "at least":
-            whole = Interval(whole.low, None, whole.low_closed, False)
-        elif bound == "at most":
-            whole = Interval(None, whole.high, False, whole.high_closed)
-        return DataExistence(True) if claimed.meets(whole) else NONE_EXISTS
-
-    return attempt
+def _met(printed: PrintedNumber, terms: Sequence[Term], bound: Bound, rounding: Rounding) -> DataExistence:
+    whole = _sum(terms, rounding)
+    if bound == "at least":
+        whole = Interval(whole.low, None, whole.low_closed, False)
+    elif bound == "at most":
+        whole = Interval(None, whole.high, False, whole.high_closed)
+    return DataExistence(True) if printed.interval(rounding).meets(whole) else NONE_EXISTS
 
 
 def _sum(terms: Sequence[Term], rounding: Rounding) -> Interval:

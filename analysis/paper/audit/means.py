@@ -84,7 +84,7 @@ def grim(
     """
     printed, scale = read_printed(mean), scale_of(grain, low, high, items)
     check_count(n)
-    decision = judge_readings(_means_attempt(printed, n, scale))
+    decision = judge_readings(partial(_mean_data, printed, n, scale))
     below, above = nearest(printed.value, scale.grain / n, scale.origin, scale.ends(n))
     return CheckResult(
         check="grim",
@@ -108,12 +108,9 @@ def check_count(n: int, name: str = "n") -> None:
         raise ValueError(f"{name} must be at least 1, not {n}")
 
 
-def _means_attempt(printed: PrintedNumber, n: int, scale: AnswerScale) -> Attempt:
-    def attempt(rounding: Rounding) -> DataExistence:
-        sums = scale.sums(printed.interval(rounding), n)
-        return DataExistence(True, even_spread(sums[len(sums) // 2], n, scale)) if sums else NONE_EXISTS
-
-    return attempt
+def _mean_data(printed: PrintedNumber, n: int, scale: AnswerScale, rounding: Rounding) -> DataExistence:
+    sums = scale.sums(printed.interval(rounding), n)
+    return DataExistence(True, even_spread(sums[len(sums) // 2], n, scale)) if sums else NONE_EXISTS
 
 
 def even_spread(total: int, n: int, scale: AnswerScale) -> Witness:
@@ -183,13 +180,12 @@ def _bases(printed: PrintedNumber, count: int, n: int) -> list[int]:
     return [m for m in range(max(count, 1), n) if widest.holds(Fraction(count, m))]
 
 
-Divisor = Callable[[int], int]
-"""What n the sum of squared deviations is divided by to give the square of the printed number."""
-DIVISORS: tuple[tuple[str, Divisor], ...] = (
+DIVISORS: tuple[tuple[str, Callable[[int], int]], ...] = (
     ("SD with n - 1", lambda n: n - 1),
     ("SD with n", lambda n: n),
     ("the printed SD is a standard error", lambda n: n * (n - 1)),
 )
+"""What the sum of squared deviations of n is divided by to give the square of the printed number."""
 _MOST_SUMS = 20_000
 
 
@@ -207,7 +203,7 @@ def grimmer(
     """
     means, spread, scale = read_printed(mean), read_printed(sd), scale_of(grain, low, high, items)
     check_count(n - 1, "n - 1")
-    plain, *others = ((name, _spread_attempt(means, spread, n, scale, by)) for name, by in DIVISORS)
+    plain, *others = ((name, _spread_attempt(means, spread, n, scale, by(n))) for name, by in DIVISORS)
     decision = judge_readings(plain[1], others)
     below, above = _nearest_spreads(means, spread, n, scale)
     return CheckResult(
@@ -226,15 +222,12 @@ def grimmer(
     )
 
 
-def _spread_attempt(
-    means: PrintedNumber, spread: PrintedNumber, n: int, scale: AnswerScale, divisor: Divisor
-) -> Attempt:
+def _spread_attempt(means: PrintedNumber, spread: PrintedNumber, n: int, scale: AnswerScale, divisor: int) -> Attempt:
     def attempt(rounding: Rounding) -> DataExistence:
         variances = spread.interval(rounding).squared()
         if variances is None:
             return NONE_EXISTS
-        sums = scale.sums(means.interval(rounding), n)
-        pairs = _pairs(sums, variances, n, scale, divisor(n))
+        pairs = _pairs(scale.sums(means.interval(rounding), n), variances, n, scale, divisor)
         return _first_witness(islice(pairs, _MOST_SUMS), n, scale)
 
     return attempt
@@ -312,7 +305,7 @@ def debit(mean: str, sd: str, n: int) -> CheckResult:
     """
     means, spread = read_printed(mean), read_printed(sd)
     check_count(n - 1, "n - 1")
-    plain, *others = ((name, _binary_attempt(means, spread, n, by)) for name, by in DIVISORS)
+    plain, *others = ((name, partial(_binary_data, means, spread, n, by(n))) for name, by in DIVISORS)
     decision = judge_readings(plain[1], others)
     ones = AnswerScale(Fraction(1), low=0, high=1).sums(means.interval(Rounding.ANY), n)
     squares = sorted(_binary_variance(k, n, n - 1) for k in ones)
@@ -336,12 +329,10 @@ def _binary_variance(ones: int, n: int, divisor: int) -> Fraction:
     return Fraction(ones * (n - ones), n * divisor)
 
 
-def _binary_attempt(means: PrintedNumber, spread: PrintedNumber, n: int, divisor: Divisor) -> Attempt:
-    def attempt(rounding: Rounding) -> DataExistence:
-        variances = spread.interval(rounding).squared()
-        ones = AnswerScale(Fraction(1), low=0, high=1).sums(means.interval(rounding), n)
-        fitting = (k for k in ones if variances and variances.holds(_binary_variance(k, n, divisor(n))))
-        k = next(fitting, None)
-        return NONE_EXISTS if k is None else DataExistence(True, ((Fraction(1),) * k + (Fraction(0),) * (n - k),))
-
-    return attempt
+def _binary_data(
+    means: PrintedNumber, spread: PrintedNumber, n: int, divisor: int, rounding: Rounding
+) -> DataExistence:
+    variances = spread.interval(rounding).squared()
+    ones = AnswerScale(Fraction(1), low=0, high=1).sums(means.interval(rounding), n)
+    k = next((k for k in ones if variances and variances.holds(_binary_variance(k, n, divisor))), None)
+    return NONE_EXISTS if k is None else DataExistence(True, ((Fraction(1),) * k + (Fraction(0),) * (n - k),))

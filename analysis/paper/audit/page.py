@@ -13,7 +13,6 @@ from analysis.paper.audit.printed import ROUNDINGS, AuditVerdict, CheckResult, P
 from analysis.paper.paper import ComparisonRow, ComparisonVerdict, Prediction
 from analysis.report.section import Section, Table
 
-Json = dict[str, Any]
 _AUDIT_VERDICTS: tuple[AuditVerdict, ...] = get_args(AuditVerdict)
 
 
@@ -102,12 +101,12 @@ def _proof(result: CheckResult) -> Iterator[str]:
     yield from (f"{name} {value}" for name, value in result.numbers)
 
 
-def findings_json(findings: Sequence[AuditFinding]) -> list[Json]:
+def findings_json(findings: Sequence[AuditFinding]) -> list[dict[str, Any]]:
     """Every finding with all of its proof, fractions exact as text beside their decimal value."""
     return [_finding(finding) for finding in findings]
 
 
-def _finding(finding: AuditFinding) -> Json:
+def _finding(finding: AuditFinding) -> dict[str, Any]:
     result = finding.result
     return {
         "place": finding.place,
@@ -130,7 +129,7 @@ def _finding(finding: AuditFinding) -> Json:
     }
 
 
-def _exact(value: Fraction | None) -> Json | None:
+def _exact(value: Fraction | None) -> dict[str, str | float] | None:
     return None if value is None else {"exact": str(value), "value": float(value)}
 
 

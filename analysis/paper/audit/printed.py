@@ -14,7 +14,9 @@ from dataclasses import dataclass, replace
 from enum import StrEnum
 from fractions import Fraction
 from math import ceil, floor
-from typing import Literal
+from typing import Annotated, Literal
+
+from pydantic import AfterValidator
 
 Relation = Literal["=", "<", "<=", ">", ">="]
 _RELATIONS: dict[str, Relation] = {"": "=", "=": "=", "<": "<", ">": ">", "<=": "<=", ">=": ">=", "≤": "<=", "≥": ">="}
@@ -130,6 +132,15 @@ def read_printed(text: str | int) -> PrintedNumber:
     unit = Fraction(1, 10 ** len(decimals)) / (100 if percent else 1)
     value = int(whole + decimals) * unit
     return PrintedNumber(str(text).strip(), _RELATIONS[relation], -value if sign in {"-", "−"} else value, unit)
+
+
+def _is_printed(text: str) -> str:
+    read_printed(text)
+    return text
+
+
+PrintedText = Annotated[str, AfterValidator(_is_printed)]
+"""A number or a bound as printed: "28.45", ".205", "< .001", "64.3%"."""
 
 
 def _positive_interval(value: Fraction, unit: Fraction, digits: int, rounding: Rounding) -> Interval:

@@ -23,15 +23,16 @@ from random import Random
 
 from analysis.paper.audit.lattices import (
     BudgetError,
-    Levels,
     Rows,
     affordable,
     candidates,
     distance,
+    effect,
     every_sum,
     greatest_squares,
     least_squares,
     numbers_with_sums,
+    of_parity,
     ratio,
     within_rows,
 )
@@ -122,11 +123,6 @@ class Constraints:
     orders: tuple[ColumnOrder, ...] = ()
     accepts: Callable[[ColumnSums], bool] | None = None
     person_sd: float = 0.0
-
-    @property
-    def levels(self) -> Levels:
-        """The whole numbers of a cell."""
-        return Levels(self.top)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -222,8 +218,7 @@ def _spread_fits(values: ColumnSums, column: ConditionColumn) -> bool:
 
 
 def _f_fits(rows: Rows, sums: ColumnSums, F: Interval) -> bool:
-    w = sum(len(row) * sum(value * value for value in row) - sum(row) ** 2 for row in rows)
-    found = ratio(sums, w, len(rows))
+    found = ratio(sums, within_rows(rows), len(rows))
     return found is not None and F.holds(found)
 
 
@@ -257,17 +252,17 @@ def _impossible(wanted: Constraints) -> bool:
 
 def _has_w(wanted: Constraints, sums: ColumnSums) -> bool:
     """False only by proof: these sums have none of the W that F needs."""
-    if wanted.F is None or not affordable(wanted.n, len(sums), wanted.levels):
+    if wanted.F is None or not affordable(wanted.n, len(sums), wanted.top):
         return True
     exact = every_sum(wanted.n, len(sums), wanted.top).get(sums, 0)
-    return any(exact >> w & 1 for w in candidates(sums, wanted.n, wanted.F, wanted.levels))
+    return any(exact >> w & 1 for w in candidates(sums, wanted.n, wanted.F, wanted.top))
 
 
 def _possible(wanted: Constraints, sums: ColumnSums) -> bool:
     """Will the sums do, and is there any W for them that gives F?"""
     if wanted.accepts is not None and not wanted.accepts(sums):
         return False
-    return wanted.F is None or bool(candidates(sums, wanted.n, wanted.F, wanted.levels))
+    return wanted.F is None or bool(candidates(sums, wanted.n, wanted.F, wanted.top))
 
 
 def _sums(wanted: Constraints, random: Random) -> Iterator[ColumnSums]:
@@ -287,7 +282,7 @@ def _sums(wanted: Constraints, random: Random) -> Iterator[ColumnSums]:
 
 def _searched(wanted: Constraints, sums: ColumnSums, random: Random) -> Rows | None:
     """One start: columns that meet their own constraints, then moves that keep them until the joint ones are met."""
-    targets = None if wanted.F is None else candidates(sums, wanted.n, wanted.F, wanted.levels)
+    targets = None if wanted.F is None else candidates(sums, wanted.n, wanted.F, wanted.top)
     people = [random.gauss(0, wanted.person_sd) for _ in range(wanted.n)]
     sd = _start_sd(wanted, sums, targets)
     columns = []
@@ -312,16 +307,14 @@ def _start_sd(wanted: Constraints, sums: ColumnSums, targets: range | None) -> f
     if not targets:
         return None
     n, k = wanted.n, len(sums)
-    a = k * sum(c * c for c in sums) - sum(sums) ** 2
-    return sqrt(max((n * targets[0] - a) / (n * k * (n - 1) * (k - 1)), 0.0))
+    return sqrt(max((n * targets[0] - effect(sums)) / (n * k * (n - 1) * (k - 1)), 0.0))
 
 
 def _squares(wanted: Constraints, total: int, variance: Interval) -> range:
     """The sums of squares that go with a sum and a variance, of the sum's parity."""
     n = wanted.n
     interval = variance.mapped(lambda value: value * (n - 1) + Fraction(total**2, n))
-    whole = interval.integers(least_squares(n, total), greatest_squares(n, total, 0, wanted.top))
-    return range(whole.start + (whole.start - total) % 2, whole.stop, 2)
+    return of_parity(interval, least_squares(n, total), greatest_squares(n, total, 0, wanted.top), total)
 
 
 _HOT, _COLD = 1.0, 0.002

@@ -57,7 +57,7 @@ from analysis.paper.audit.claims import (
 from analysis.paper.audit.page import counts, findings_json, findings_text, sections
 from analysis.paper.paper import PaperHead, Participants, PublishedDirection, PublishedPreference
 from analysis.report.page import write_page
-from experiments.config.door import ConfigError, Model, load, parsed
+from experiments.config.door import ConfigError, Model, load
 from experiments.config.setup import sha256
 from experiments.load import find
 from experiments.record import storage
@@ -100,11 +100,6 @@ class PaperFile(Model):
     direction: PublishedDirection | None = None
     preference: PublishedPreference | None = None
     claims: tuple[AnyClaim, ...] = Field(default=(), strict=False)
-
-
-def parse_paper(text: str, name: str = "the paper") -> PaperFile:
-    """A paper's file from its TOML text. `ConfigError` with its name, key, value and rule."""
-    return parsed(PaperFile, text, name)
 
 
 def load_paper_file(path: str | Path) -> PaperFile:

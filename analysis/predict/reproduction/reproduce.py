@@ -16,12 +16,11 @@ from pathlib import Path
 from typing import Any, Literal
 
 from analysis.logs.reading import Logs, read_logs
-from analysis.paper.audit import audit
 from analysis.paper.audit.claims import AuditFinding
 from analysis.paper.audit.lattices import Rows
 from analysis.paper.audit.page import ATTENTION, ELSEWHERE, other_rows, predictions
 from analysis.paper.audit.participants import MEAN_SLACK, RebuiltAnswers, backward_counts, forward_counts, rating_grains
-from analysis.paper.audit.run import load_paper_file
+from analysis.paper.audit.run import audit, load_paper_file
 from analysis.paper.paper import (
     ComparisonRow,
     Paper,
