@@ -206,16 +206,7 @@ def binomial_test(
     columns += [*clopper_pearson(cases[0], cases[1], tail), *wilson(cases[0], cases[1], tail)]
     with np.errstate(under="ignore"):
         found = [float_or_array(column.astype(np.float64)[where.ravel()].reshape(k.shape)) for column in columns]
-    p, log, estimate, ci_low, ci_high, wilson_low, wilson_high = found
-    return BinomialTest(
-        p=p,
-        log_p=log,
-        estimate=estimate,
-        ci_low=ci_low,
-        ci_high=ci_high,
-        wilson_low=wilson_low,
-        wilson_high=wilson_high,
-    )
+    return BinomialTest(**dict(zip(BinomialTest.__slots__, found, strict=True)))
 
 
 def _checked(successes: ArrayLike, trials: ArrayLike, p0: ArrayLike) -> tuple[FloatArray, FloatArray, FloatArray]:

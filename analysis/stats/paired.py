@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike
 from scipy import special, stats
 
 from analysis.stats.anova import check_scores
-from analysis.stats.arrays import FloatArray, numbers, pingouin, share
+from analysis.stats.arrays import FloatArray, by_row, numbers, pingouin, share
 from analysis.stats.tukey import Label, own_pairs, pairs_of
 
 SCALE = math.sqrt(2.0) / 2.0
@@ -89,22 +89,14 @@ def paired_t_tests(
     adjusted[there] = holm(p[there])
     tail = (1.0 - share(confidence, "confidence")) / 2.0
     half = -float(special.stdtrit(n - 1, tail)) * math.sqrt(2.0) * pairs.error  # the error is on the scale of q
+    low, high = pairs.difference - half, pairs.difference + half
+    rows = by_row(t=t, p=p, p_holm=adjusted, ci_low=low, ci_high=high, d_z=t / math.sqrt(n))
+    tests = [row if tested else {} for row, tested in zip(rows, there, strict=True)]
     return tuple(
         PairedT(
-            a=names[a],
-            b=names[b],
-            difference=float(pairs.difference[i]),
-            t=float(t[i]),
-            df=n - 1,
-            p=float(p[i]),
-            p_holm=float(adjusted[i]),
-            ci_low=float(pairs.difference[i] - half[i]),
-            ci_high=float(pairs.difference[i] + half[i]),
-            d_z=float(t[i]) / math.sqrt(n),
+            a=names[a], b=names[b], difference=d, df=n - 1, reason=None if test else CONSTANT if d else EQUAL, **test
         )
-        if there[i]
-        else _untested(names[a], names[b], float(pairs.difference[i]), n - 1)
-        for i, (a, b) in enumerate(pairs_of(k))
+        for (a, b), d, test in zip(pairs_of(k), pairs.difference.tolist(), tests, strict=True)
     )
 
 
@@ -122,10 +114,6 @@ def holm(p: ArrayLike) -> FloatArray:
     adjusted = np.empty_like(array)
     adjusted[order] = np.minimum(steps, 1.0)
     return adjusted
-
-
-def _untested(a: Label, b: Label, difference: float, df: int) -> PairedT:
-    return PairedT(a=a, b=b, difference=difference, df=df, reason=CONSTANT if difference else EQUAL)
 
 
 EXACT_UP_TO = 50
