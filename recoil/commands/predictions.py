@@ -69,7 +69,7 @@ def power(
         seed=seed,
         paper=paper,
     )
-    found = feature.power(request, feature.Where(workers=workers, scheduler=scheduler), out, progress)
+    found = feature.power(request, out, progress, workers, scheduler)
     show(found, f"{in_text(feature.in_short(found))}\nReport: {out / 'report.html'}", as_json)
 
 

@@ -46,10 +46,6 @@ _LAWS = {"direction": ("rates", FELT), "preference": ("ratings",)}
 """The observers that studies can be drawn from."""
 
 
-class GridError(ConfigError):
-    """A grid that cannot be worked out; the message names option, value and rule."""
-
-
 @dataclass(frozen=True, slots=True, kw_only=True)
 class PowerRequest:
     """What the command line asks for. Lists are text, as in `8,10,14-20`."""
@@ -67,11 +63,11 @@ class PowerRequest:
 
 
 def check_scalars(request: PowerRequest) -> None:
-    """`GridError` for a target that is no share, and for an effect of people who feel none."""
+    """`ConfigError` for a target that is no share, and for an effect of people who feel none."""
     if not 0.0 < request.target < 1.0:
-        raise GridError(f"--target {request.target:g}: must lie between 0 and 1, such as 0.8")
+        raise ConfigError(f"--target {request.target:g}: must lie between 0 and 1, such as 0.8")
     if request.null and request.effects is not None:
-        raise GridError(f"--null has no effect at all; leave --effect {request.effects} out")
+        raise ConfigError(f"--null has no effect at all; leave --effect {request.effects} out")
 
 
 def checked_setup(name: str) -> Setup[Any]:
@@ -81,9 +77,11 @@ def checked_setup(name: str) -> Setup[Any]:
     observer, laws = config.synthetic.observer, _LAWS.get(config.experiment, ())
     if not isinstance(config, DirectionConfig | PreferenceConfig) or observer not in laws:
         drawn = " or ".join(f'"{law}"' for law in laws)
-        raise GridError(f'{find(name)}: synthetic.observer = "{observer}" has no power; studies are drawn from {drawn}')
+        raise ConfigError(
+            f'{find(name)}: synthetic.observer = "{observer}" has no power; studies are drawn from {drawn}'
+        )
     if isinstance(config, DirectionConfig) and not config.design.forward_per_session:
-        raise GridError(f"{find(name)}: design.forward_per_session = 0; the planned analysis is of forward trials")
+        raise ConfigError(f"{find(name)}: design.forward_per_session = 0; the planned analysis is of forward trials")
     return setup
 
 
@@ -94,7 +92,7 @@ def method_sets_of(asked: tuple[str, ...], config: DrawnConfig) -> list[tuple[st
         names = [name.strip() for name in text.split(",")]
         strangers = [name for name in names if name not in known]
         if strangers or len(set(names)) != len(names) or len(names) < 2:
-            raise GridError(f"--methods {text}: must be two or more different ones of {', '.join(known)}")
+            raise ConfigError(f"--methods {text}: must be two or more different ones of {', '.join(known)}")
         sets.append(tuple(method for method in known if method in names))
     return list(dict.fromkeys(sets))
 
@@ -103,7 +101,7 @@ def trials_per_method(asked: str | None, config: DrawnConfig) -> list[int]:
     """The trials of one method: the config's own unless some are named."""
     if isinstance(config, PreferenceConfig):
         if asked is not None:
-            raise GridError(f"--trials {asked}: {config.title!r} has one trial a method; leave the option out")
+            raise ConfigError(f"--trials {asked}: {config.title!r} has one trial a method; leave the option out")
         return [1]
     design = config.design
     if asked is None:
@@ -113,19 +111,19 @@ def trials_per_method(asked: str | None, config: DrawnConfig) -> list[int]:
     found = whole_numbers(asked, "--trials", 1, 10_000)
     uneven = [trials for trials in found if trials % step]
     if uneven and "-" not in asked:
-        raise GridError(
+        raise ConfigError(
             f"--trials {asked}: {uneven[0]} is no multiple of {step}, so it makes no sets of {design.trials_per_set} "
             f"with forward and backward trials as the config has them ({design.forward_per_session} to "
             f"{design.backward_per_session})"
         )
     fitting = [trials for trials in found if trials % step == 0]
     if not fitting:
-        raise GridError(f"--trials {asked}: holds no multiple of {step}")
+        raise ConfigError(f"--trials {asked}: holds no multiple of {step}")
     return fitting
 
 
 def whole_numbers(text: str, option: str, low: int, high: int) -> list[int]:
-    """Whole numbers and ranges, in order and once each. `GridError` for others, or outside `low`..`high`.
+    """Whole numbers and ranges, in order and once each. `ConfigError` for others, or outside `low`..`high`.
 
     >>> whole_numbers("14, 8-10", "--participants", 2, 999)
     [8, 9, 10, 14]
@@ -134,16 +132,16 @@ def whole_numbers(text: str, option: str, low: int, high: int) -> list[int]:
     for part in text.split(","):
         match = re.fullmatch(r"\s*([0-9]{1,9})\s*(?:-\s*([0-9]{1,9})\s*)?", part)
         if not match:
-            raise GridError(f"{option} {text}: {part.strip()!r} is no whole number and no range such as 8-20")
+            raise ConfigError(f"{option} {text}: {part.strip()!r} is no whole number and no range such as 8-20")
         first, last = int(match[1]), int(match[2] or match[1])
         if not low <= first <= last <= high:
-            raise GridError(f"{option} {text}: {part.strip()} must be from {low} to {high}, ranges upwards")
+            raise ConfigError(f"{option} {text}: {part.strip()} must be from {low} to {high}, ranges upwards")
         found |= set(range(first, last + 1))
     return sorted(found)
 
 
 def factors(text: str) -> list[float]:
-    """Effect factors, in order and once each. `GridError` for what is not a number from 0 to 10.
+    """Effect factors, in order and once each. `ConfigError` for what is not a number from 0 to 10.
 
     >>> factors("1,0.5")
     [0.5, 1.0]
@@ -155,7 +153,9 @@ def factors(text: str) -> list[float]:
         except ValueError:
             value = math.nan
         if not 0.0 <= value <= _LARGEST_EFFECT:
-            raise GridError(f"--effect {text}: {part.strip()!r} must be a number from 0 (none) to {_LARGEST_EFFECT:g}")
+            raise ConfigError(
+                f"--effect {text}: {part.strip()!r} must be a number from 0 (none) to {_LARGEST_EFFECT:g}"
+            )
         found.add(value)
     return sorted(found)
 

@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Literal, TypeVar
 
 from analysis.paper.recurrence import ShareOfStudies
-from analysis.predict.power.figures import Curve, FalsePositives, Panel, figure_false_positives, figure_power
+from analysis.predict.power.figures import Curve, Panel, figure_false_positives, figure_power
 from analysis.predict.power.grid import FELT, PUBLISHED, Grid
 from analysis.predict.power.planned import ALL_PAIRS, ANOVA, ANY_PAIR
 from analysis.predict.power.results import PATTERN, DesignPower, Power, PublishedPattern, Reached, Smallest
@@ -245,19 +245,12 @@ def _curves(designs: Sequence[DesignPower], claims: Sequence[str], x: XAxis) -> 
 
 def _curve(designs: Sequence[DesignPower], claim: str, x: XAxis, name: str) -> Curve:
     points = [(getattr(one, x), share) for one in designs if (share := one.share_of(claim)) is not None]
-    return Curve(
-        name=name,
-        x=[place for place, _ in points],
-        share=[share.share for _, share in points],
-        low=[share.ci_low for _, share in points],
-        high=[share.ci_high for _, share in points],
-    )
+    return Curve(name=name, points=points)
 
 
 def _false_positives(found: Power, figures: Path) -> Section:
     groups = _grouped(found.designs, lambda one: (one.methods, one.trials, one.participants))
-    shown = groups[:4]
-    panels = [(f"{some[0].participants} people", _null_rates(some)) for some in shown]
+    panels = [(f"{some[0].participants} people", some) for some in groups[:4]]
     figure_false_positives(panels, found.level, figures / "false-positives")
     return Section(
         title="False positives of null participants",
@@ -271,14 +264,6 @@ def _false_positives(found: Power, figures: Path) -> Section:
         ),
         tables=tuple(_null_table(some) for some in groups[:MOST_TABLES]),
     )
-
-
-def _null_rates(group: Sequence[DesignPower]) -> list[FalsePositives]:
-    return [
-        FalsePositives(claim=one.claim, people=design.people, share=one.share, low=one.ci_low, high=one.ci_high)
-        for design in group
-        for one in design.claims
-    ]
 
 
 def _null_table(group: Sequence[DesignPower]) -> Table:
