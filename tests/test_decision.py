@@ -11,7 +11,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy.integrate import quad
 
-from analysis.times import first_passage, likelihood
+from analysis.times import first_passage, trade
 from analysis.times.first_passage import distribution, log_density, moments, with_slopes
 from analysis.times.own_trials import own_times
 from analysis.times.trade import ez, ez_from_summary
@@ -185,8 +185,8 @@ def test_a_time_from_the_experimenter_s_hand_is_refused_with_the_reason() -> Non
         own_times([0.5, 0.6, 0.7], sources)
     calls = (
         lambda: ez([1, 1, 0], [0.5, 0.6, 0.7], sources),
-        lambda: likelihood.conditional_accuracy([1, 1, 0], [0.5, 0.6, 0.7], sources, ["a"] * 3),
-        lambda: likelihood.quantile_probability([1, 1, 0], [0.5, 0.6, 0.7], sources, ["a"] * 3),
+        lambda: trade.conditional_accuracy([1, 1, 0], [0.5, 0.6, 0.7], sources, ["a"] * 3),
+        lambda: trade.quantile_probability([1, 1, 0], [0.5, 0.6, 0.7], sources, ["a"] * 3),
     )
     for call in calls:
         with pytest.raises(ValueError, match="experimenter"):
@@ -214,60 +214,60 @@ def test_conditional_accuracy_averages_people_not_trials() -> None:
     """By hand: one fast and one slow person, two bins of two."""
     times = [0.1, 0.2, 0.3, 0.4, 1.1, 1.2, 1.3, 1.4, 9.0]
     correct = [0, 1, 1, 1, 0, 0, 1, 0, 1]
-    found = likelihood.conditional_accuracy(correct, times, ["participant"] * 9, list("aaaabbbbc"), bins=2)
+    found = trade.conditional_accuracy(correct, times, ["participant"] * 9, list("aaaabbbbc"), bins=2)
     assert found.mean_time_s.tolist() == pytest.approx([0.65, 0.85])
     assert found.accuracy.tolist() == [0.25, 0.75]
     assert (found.people, found.left_out) == (2, 1)
 
 
 def test_conditional_accuracy_without_enough_trials_is_nan() -> None:
-    found = likelihood.conditional_accuracy([1], [0.5], ["participant"], ["a"], bins=5)
+    found = trade.conditional_accuracy([1], [0.5], ["participant"], ["a"], bins=5)
     assert np.isnan(found.accuracy).all()
     with pytest.raises(ValueError, match="bins"):
-        likelihood.conditional_accuracy([1], [0.5], ["participant"], ["a"], bins=0)
+        trade.conditional_accuracy([1], [0.5], ["participant"], ["a"], bins=0)
 
 
 def test_an_unbiased_diffusion_has_a_flat_conditional_accuracy() -> None:
     """Theory: from the middle the answer and the time are independent."""
     drawn = decide_all(0.8, 1.5, 0.5, 0.3, generator=generator(2, "caf"), shape=(50_000,))
     people = np.repeat(np.arange(10), 5_000)
-    found = likelihood.conditional_accuracy(drawn.upper, drawn.time_s, ["synthetic"] * 50_000, people)
+    found = trade.conditional_accuracy(drawn.upper, drawn.time_s, ["synthetic"] * 50_000, people)
     assert found.accuracy == pytest.approx(float(moments(0.8, 1.5).upper), abs=4.5 * 0.0042)
 
 
 def test_quantile_probability_points_are_those_of_theory() -> None:
     drawn = decide_all(0.8, 1.5, 0.5, 0.3, generator=generator(2, "qpp"), shape=(50_000,))
     people = np.repeat(np.arange(10), 5_000)
-    found = likelihood.quantile_probability(drawn.upper, drawn.time_s, ["synthetic"] * 50_000, people)
+    found = trade.quantile_probability(drawn.upper, drawn.time_s, ["synthetic"] * 50_000, people)
     whole = float(moments(0.8, 1.5).upper)
     assert found.probability[1] == pytest.approx(whole, abs=0.01)
     assert found.people.tolist() == [10, 10]
     for answer, p in ((1, whole), (0, 1 - whole)):
         shares = np.asarray(distribution(found.quantiles_s[answer] - 0.3, bool(answer), 0.8, 1.5, 0.5)) / p
-        assert shares == pytest.approx(likelihood.QUANTILES, abs=0.02)
+        assert shares == pytest.approx(trade.QUANTILES, abs=0.02)
 
 
 def test_quantiles_of_answers_that_nobody_gave_are_nan() -> None:
-    found = likelihood.quantile_probability([1] * 6, np.linspace(0.4, 0.9, 6), ["participant"] * 6, ["a"] * 6)
+    found = trade.quantile_probability([1] * 6, np.linspace(0.4, 0.9, 6), ["participant"] * 6, ["a"] * 6)
     assert np.isnan(found.quantiles_s[0]).all()
     assert found.people.tolist() == [0, 1]
-    assert found.quantiles_s[1] == pytest.approx(np.quantile(np.linspace(0.4, 0.9, 6), likelihood.QUANTILES))
+    assert found.quantiles_s[1] == pytest.approx(np.quantile(np.linspace(0.4, 0.9, 6), trade.QUANTILES))
 
 
 def test_the_balanced_score_weighs_speed_and_accuracy_alike() -> None:
     """By hand: z with the population SD of (0.8, 0.9, 1.0) and (0.6, 0.5, 0.7)."""
     root = math.sqrt(1.5)
-    found = likelihood.balanced_integration([0.8, 0.9, 1.0], [0.6, 0.5, 0.7])
+    found = trade.balanced_integration([0.8, 0.9, 1.0], [0.6, 0.5, 0.7])
     assert found == pytest.approx([-root, root, 0.0], abs=1e-12)
     assert found.mean() == pytest.approx(0.0, abs=1e-12)
-    assert likelihood.balanced_integration([0.9, 0.9], [0.5, 0.7]) == pytest.approx([1.0, -1.0])
+    assert trade.balanced_integration([0.9, 0.9], [0.5, 0.7]) == pytest.approx([1.0, -1.0])
 
 
 def test_inverse_efficiency_is_infinite_where_nothing_is_right() -> None:
-    assert likelihood.inverse_efficiency([0.0], [0.5]).tolist() == [math.inf]
+    assert trade.inverse_efficiency([0.0], [0.5]).tolist() == [math.inf]
 
 
-@pytest.mark.parametrize("score", [likelihood.balanced_integration, likelihood.inverse_efficiency])
+@pytest.mark.parametrize("score", [trade.balanced_integration, trade.inverse_efficiency])
 def test_scores_refuse_what_is_no_rate_or_time(score: object) -> None:
     assert callable(score)
     for rates, times in (([1.1], [0.5]), ([0.5], [0.0]), ([0.5, 0.6], [0.5])):

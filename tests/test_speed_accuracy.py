@@ -26,7 +26,7 @@ from analysis.summary.sections.content import ReportData
 from analysis.summary.sections.sections import write_report
 from analysis.summary.sections.trade import CONDITIONAL_ACCURACY, QUANTILE_PROBABILITY, trade_section
 from analysis.summary.summary import summarize
-from analysis.times import likelihood
+from analysis.times import trade
 from analysis.times.first_passage import moments
 from analysis.times.fit import fit
 from analysis.times.likelihood import trials_of
@@ -122,7 +122,7 @@ def found(folder: Path) -> Any:
 def test_each_cell_equals_direct_calls_on_its_rows(folder: Path, found: Any, method: str, instruction: str) -> None:
     cell, rows = found["methods"][method][instruction], cell_of(folder, method, instruction)
     assert cell["n"] == len(rows[0]) == 180
-    curve, points = likelihood.conditional_accuracy(*rows), likelihood.quantile_probability(*rows)
+    curve, points = trade.conditional_accuracy(*rows), trade.quantile_probability(*rows)
     assert cell["conditional_accuracy"]["accuracy"] == pytest.approx(curve.accuracy.tolist())
     assert cell["conditional_accuracy"]["mean_time_s"] == pytest.approx(curve.mean_time_s.tolist())
     assert cell["quantile_probability"]["probability"] == pytest.approx(points.probability.tolist())
@@ -142,7 +142,7 @@ def test_means_over_people_are_those_of_their_own_values(folder: Path, found: An
     assert cell["accuracy"]["ci_low"] == pytest.approx(rates.mean() - half)
     assert cell["median_s"]["mean"] == pytest.approx(np.mean([np.median(times[rows]) for rows in each]))
     assert cell["mean_s"]["mean"] == pytest.approx(np.mean([times[rows].mean() for rows in each]))
-    efficiency = likelihood.inverse_efficiency(rates, right_s)
+    efficiency = trade.inverse_efficiency(rates, right_s)
     assert cell["inverse_efficiency_s"]["mean"] == pytest.approx(efficiency.mean())
     single = [ez(correct[rows], times[rows], sources[rows]) for rows in each]
     assert not any(one.reason for one in single)
@@ -158,7 +158,7 @@ def test_balanced_integration_is_over_all_cells_together(folder: Path, found: An
         each = [people == code for code in sorted(set(people))]
         rates.append([correct[rows].mean() for rows in each])
         times.append([seconds[rows & (correct == 1)].mean() for rows in each])
-    scores = likelihood.balanced_integration(np.transpose(rates), np.transpose(times)).mean(axis=0)
+    scores = trade.balanced_integration(np.transpose(rates), np.transpose(times)).mean(axis=0)
     shown = [found["methods"][method][told]["balanced_integration"]["mean"] for method, told in cells]
     assert shown == pytest.approx(scores.tolist())
     assert sum(shown) == pytest.approx(0.0, abs=1e-12)
@@ -376,8 +376,10 @@ def test_whatever_the_log_there_is_a_section_and_no_nan(kind: str, people: int, 
 def test_figures_are_drawn_where_there_is_little_to_draw(kind: str, tmp_path: Path) -> None:
     write_rows(trials_path(tmp_path, "P1"), changed(trial_rows("P1", sets=2), kind))
     found = summarize(read_logs([tmp_path])).direction
-    assert all(path.is_file() for path in figure_conditional_accuracy(found, tmp_path / "curve"))
-    assert all(path.is_file() for path in figure_quantile_probability(found, tmp_path / "points"))
+    figure_conditional_accuracy(found, tmp_path / "curve")
+    figure_quantile_probability(found, tmp_path / "points")
+    kinds = ("png", "svg", "pdf")
+    assert all((tmp_path / f"{name}.{kind}").is_file() for name in ("curve", "points") for kind in kinds)
 
 
 def test_the_order_of_the_files_changes_nothing(folder: Path, found: Any, tmp_path: Path) -> None:
@@ -396,7 +398,7 @@ def test_bins_and_quantiles_are_those_of_numpy_person_by_person(seed: int, peopl
     n = int(draws.integers(1, 40))
     person, right = draws.integers(0, people, n), draws.integers(0, 2, n)
     times = np.round(0.2 + draws.random(n), 1 + seed % 2)
-    found = likelihood.conditional_accuracy(right, times, ["participant"] * n, person, bins)
+    found = trade.conditional_accuracy(right, times, ["participant"] * n, person, bins)
     parts = []
     for code in np.unique(person):
         rows = np.flatnonzero(person == code)
@@ -406,8 +408,8 @@ def test_bins_and_quantiles_are_those_of_numpy_person_by_person(seed: int, peopl
     assert found.people == len(parts)
     if parts:
         assert np.array([found.mean_time_s, found.accuracy]) == pytest.approx(np.mean(parts, axis=0))
-    each = quantiles(times, ordered(person, times), likelihood.QUANTILES)
-    expected = [np.quantile(times[person == code], likelihood.QUANTILES) for code in np.unique(person)]
+    each = quantiles(times, ordered(person, times), trade.QUANTILES)
+    expected = [np.quantile(times[person == code], trade.QUANTILES) for code in np.unique(person)]
     assert each == pytest.approx(np.array(expected))
 
 

@@ -8,7 +8,6 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-import matplotlib as mpl
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.colors import BoundaryNorm, ListedColormap
@@ -23,10 +22,8 @@ from analysis.report.figures.style import (
     METHOD_LINES,
     ORANGE,
     VERMILION,
+    drawn,
     light_grid,
-    new_figure,
-    save,
-    style,
 )
 from analysis.stats.arrays import FloatArray
 
@@ -62,8 +59,7 @@ class Trade:
 
 def figure_trade(trade: Trade, bound_Hz: float, best: Mark | None, own: Sequence[Mark], path_stem: Path) -> None:
     """Predicted share over shooting rate, the front with its 95 % band, the bound, the gun's own methods, the best."""
-    with mpl.rc_context(style()):  # type: ignore[arg-type]
-        figure = new_figure(6.6, 4.6)
+    with drawn(path_stem, 6.6, 4.6) as figure:
         axes = figure.subplots()
         light_grid(axes)
         _clouds(axes, trade)
@@ -78,7 +74,6 @@ def figure_trade(trade: Trade, bound_Hz: float, best: Mark | None, own: Sequence
         _scales(axes, bound_Hz, trade)
         where: Any = "outside lower center"
         figure.legend(loc=where, ncols=3, frameon=False, fontsize=8.0)
-        save(figure, path_stem)
 
 
 def _clouds(axes: Axes, trade: Trade) -> None:
@@ -167,8 +162,7 @@ def figure_maps(
 ) -> None:
     """Two maps over friction and voltage: the predicted share and the shooting rate, each with its line of `lines`."""
     level, bound_Hz = lines
-    with mpl.rc_context(style()):  # type: ignore[arg-type]
-        figure = new_figure(8.6, 4.7)
+    with drawn(path_stem, 8.6, 4.7) as figure:
         left, right = figure.subplots(1, 2, sharex=True, sharey=True)
         shares = _mesh(left, field, 100.0 * field.predicted, "viridis", (50.0, 100.0))
         _level(left, field, 100.0 * field.predicted, 100.0 * level, "%")
@@ -184,13 +178,11 @@ def figure_maps(
             axes.set_xlabel("damper friction [N]")
         left.set_ylabel("voltage [V]")
         _legend(figure, left, field)
-        save(figure, path_stem)
 
 
 def figure_critical(field: MapField, lines: ContourLines, level: float, own: Sequence[Mark], path_stem: Path) -> None:
     """The contour of `level` over friction and voltage with its band, and the contours under other assumptions."""
-    with mpl.rc_context(style()):  # type: ignore[arg-type]
-        figure = new_figure(6.6, 5.2)
+    with drawn(path_stem, 6.6, 5.2) as figure:
         axes = figure.subplots()
         _areas(axes, field)
         x, top = field.friction_N, float(field.voltage_V[-1])
@@ -208,7 +200,6 @@ def figure_critical(field: MapField, lines: ContourLines, level: float, own: Seq
         axes.set_ylabel("voltage [V]")
         axes.set_title(f"Pulse {1e3 * field.pulse_s:.3g} ms", loc="left")
         _legend(figure, axes, field)
-        save(figure, path_stem)
 
 
 def _finite(values: FloatArray) -> FloatArray:

@@ -5,11 +5,8 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
 
-import matplotlib as mpl
 from matplotlib.axes import Axes
-from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
 
 from analysis.paper.recurrence import ShareOfStudies
@@ -17,12 +14,11 @@ from analysis.predict.power.results import DesignPower
 from analysis.report.figures.style import (
     METHOD_LINES,
     bounded,
+    drawn,
+    legend_below,
     light_grid,
     method_colour,
-    new_figure,
     reference_line,
-    save,
-    style,
 )
 
 _MARKERS = "os^Dv<>"
@@ -44,31 +40,26 @@ class Panel:
     curves: Sequence[Curve]
 
 
-def figure_power(rows: Sequence[Sequence[Panel]], x_label: str, target: float, path_stem: Path) -> tuple[Path, ...]:
+def figure_power(rows: Sequence[Sequence[Panel]], x_label: str, target: float, path_stem: Path) -> None:
     """Rows of panels, share over `x_label`, bands of 95 %; PNG, SVG and PDF are written."""
-    with mpl.rc_context(style()):  # type: ignore[arg-type]
-        columns = max(map(len, rows))
-        figure = new_figure(max(3.1 * columns, 4.2), 2.7 * len(rows) + 0.6)
+    columns = max(map(len, rows))
+    with drawn(path_stem, max(3.1 * columns, 4.2), 2.7 * len(rows) + 0.6) as figure:
         grid = figure.subplots(len(rows), columns, squeeze=False, sharex=True, sharey=True)
         for place, row in enumerate(rows):
             for axes, panel in zip(grid[place], row, strict=True):
                 _draw_curves(axes, panel, target)
                 axes.set_xlabel(x_label if place == len(rows) - 1 else "")
             grid[place][0].set_ylabel("share of studies [%]")
-        _legend(figure, grid[0][0])
-        return save(figure, path_stem)
+        legend_below(figure, grid[0][0], 3)
 
 
-def figure_false_positives(
-    panels: Sequence[tuple[str, Sequence[DesignPower]]], level: float, path_stem: Path
-) -> tuple[Path, ...]:
+def figure_false_positives(panels: Sequence[tuple[str, Sequence[DesignPower]]], level: float, path_stem: Path) -> None:
     """A row of panels (title, designs that differ in their null participants), the nominal level as a line.
 
     Each claim's share is a point with its interval.
     """
-    with mpl.rc_context(style()):  # type: ignore[arg-type]
-        claims = [share.claim for share in panels[0][1][0].claims]
-        figure = new_figure(2.6 + 2.3 * len(panels), 1.3 + 0.27 * len(claims))
+    claims = [share.claim for share in panels[0][1][0].claims]
+    with drawn(path_stem, 2.6 + 2.3 * len(panels), 1.3 + 0.27 * len(claims)) as figure:
         grid = figure.subplots(1, len(panels), squeeze=False, sharex=True, sharey=True)[0]
         grid[0].set_xlim(
             0.0, 105.0 * max(share.ci_high for _, designs in panels for one in designs for share in one.claims)
@@ -79,8 +70,7 @@ def figure_false_positives(
             axes.set_xlabel("false positives [%]")
         grid[0].set_yticks(range(len(claims)), claims)
         grid[0].invert_yaxis()
-        _legend(figure, grid[0])
-        return save(figure, path_stem)
+        legend_below(figure, grid[0], 3)
 
 
 def _draw_curves(axes: Axes, panel: Panel, target: float) -> None:
@@ -134,10 +124,3 @@ def _draw_rates(axes: Axes, claims: Sequence[str], designs: Sequence[DesignPower
 
 def _percents(one: ShareOfStudies) -> tuple[float, float, float]:
     return 100.0 * one.share, 100.0 * one.ci_low, 100.0 * one.ci_high
-
-
-def _legend(figure: Figure, axes: Axes) -> None:
-    """One legend below all panels."""
-    handles, names = axes.get_legend_handles_labels()
-    where: Any = "outside lower center"
-    figure.legend(handles, names, loc=where, ncols=min(3, len(names)), frameon=False, fontsize=8.0, handlelength=3.2)

@@ -8,7 +8,6 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Literal
 
-import matplotlib as mpl
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.colors import to_rgba
@@ -20,13 +19,11 @@ from analysis.report.figures.style import (
     BLACK,
     DIRECTION_MARKERS,
     bounded,
+    drawn,
     light_grid,
     method_colour,
-    new_figure,
     reference_line,
-    save,
     stars,
-    style,
     wrapped,
 )
 from analysis.stats.arrays import FloatArray
@@ -68,7 +65,7 @@ _PANELS = (
 )
 
 
-def figure_8(statistics: StudyStatistics, path_stem: Path) -> tuple[Path, Path, Path]:
+def figure_8(statistics: StudyStatistics, path_stem: Path) -> None:
     """Bars (mean, SD), participants as points and lines, brackets from the Tukey tests; PNG, SVG and PDF are written.
 
     An experiment without a complete participant gets no panel. `ValueError` if none is left.
@@ -78,14 +75,11 @@ def figure_8(statistics: StudyStatistics, path_stem: Path) -> tuple[Path, Path, 
     if not panels:
         raise ValueError("figure 8 needs an experiment with at least one complete participant")
     widest = max(len(found[panel.experiment].methods) for panel in panels)
-    with mpl.rc_context(style()):  # type: ignore[arg-type]
-        figure = new_figure(
-            0.4 + (0.9 + max(widest, 3)) * len(panels), 4.5 + 0.16 * max(0, widest * (widest - 1) // 2 - 3)
-        )
+    height_in = 4.5 + 0.16 * max(0, widest * (widest - 1) // 2 - 3)
+    with drawn(path_stem, 0.4 + (0.9 + max(widest, 3)) * len(panels), height_in) as figure:
         row = figure.subplots(1, len(panels), squeeze=False)[0]
         for i, (axes, panel) in enumerate(zip(row, panels, strict=True)):
             _draw_panel(axes, panel, found[panel.experiment], chr(ord("a") + i))
-        return save(figure, path_stem)
 
 
 def _draw_panel(axes: Axes, panel: _Panel, found: WithinStatistics, letter: str) -> None:
@@ -177,21 +171,19 @@ _MEASURES = (
 )
 
 
-def figure_directions(found: DirectionStatistics, path_stem: Path) -> tuple[Path, Path, Path]:
+def figure_directions(found: DirectionStatistics, path_stem: Path) -> None:
     """Correct rate by method and direction (mean, SD, everybody), d′ and criterion; PNG, SVG and PDF are written.
 
     `found` has at least one participant. Where a direction was never presented d′
     and criterion are undefined: without any of them their panels are left out.
     """
     measures = _MEASURES if any(found.sensitivity.values()) else ()
-    with mpl.rc_context(style()):  # type: ignore[arg-type]
-        figure = new_figure(max(8.0, 0.8 + 2.2 * len(found.methods)), 7.6 if measures else 4.2)
+    with drawn(path_stem, max(8.0, 0.8 + 2.2 * len(found.methods)), 7.6 if measures else 4.2) as figure:
         rows = figure.add_gridspec(2 if measures else 1, 2)
         _draw_rates(figure.add_subplot(rows[0, :]), found)
         for i, measure in enumerate(measures):
             _draw_measure(figure.add_subplot(rows[1, i]), found, measure, chr(ord("b") + i))
         _explain(figure, found)
-        return save(figure, path_stem)
 
 
 def _draw_rates(axes: Axes, found: DirectionStatistics) -> None:

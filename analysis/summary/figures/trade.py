@@ -8,7 +8,6 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Protocol
 
-import matplotlib as mpl
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.colors import to_rgba
@@ -22,12 +21,10 @@ from analysis.report.figures.style import (
     INK,
     METHOD_LINES,
     display_name,
+    drawn,
     light_grid,
     method_colour,
-    new_figure,
     reference_line,
-    save,
-    style,
     wrapped,
 )
 from analysis.summary.results import DirectionStatistics
@@ -58,24 +55,24 @@ class _Panel:
     lines: bool
 
 
-def figure_conditional_accuracy(found: DirectionStatistics, path_stem: Path) -> tuple[Path, Path, Path]:
+def figure_conditional_accuracy(found: DirectionStatistics, path_stem: Path) -> None:
     """Accuracy over response time, a line a method, a panel an instruction; PNG, SVG and PDF are written.
 
     `ValueError` if nobody has a trial in every bin.
     """
     if not isinstance(found.speed_accuracy, SpeedAccuracy) or not has_curve(found):
         raise ValueError("the figure of conditional accuracy needs somebody with a trial in every bin")
-    return _panels(found.methods, found.speed_accuracy, path_stem, _CURVES)
+    _panels(found.methods, found.speed_accuracy, path_stem, _CURVES)
 
 
-def figure_quantile_probability(found: DirectionStatistics, path_stem: Path) -> tuple[Path, Path, Path]:
+def figure_quantile_probability(found: DirectionStatistics, path_stem: Path) -> None:
     """Quantiles of the times of errors and correct answers over their probabilities; PNG, SVG and PDF are written.
 
     `ValueError` if nobody has enough answers of a kind.
     """
     if not isinstance(found.speed_accuracy, SpeedAccuracy) or not has_points(found):
         raise ValueError("the quantile-probability plot needs somebody with five answers of a kind")
-    return _panels(found.methods, found.speed_accuracy, path_stem, _POINTS)
+    _panels(found.methods, found.speed_accuracy, path_stem, _POINTS)
 
 
 def has_curve(found: DirectionStatistics) -> bool:
@@ -94,13 +91,12 @@ def _cells_of(trade: SpeedAccuracy | NoSpeedAccuracy | None) -> list[CellTrade]:
     return [cell for by_instruction in trade.methods.values() for cell in by_instruction.values()]
 
 
-def _panels(methods: Sequence[str], trade: SpeedAccuracy, path_stem: Path, panel: _Panel) -> tuple[Path, Path, Path]:
+def _panels(methods: Sequence[str], trade: SpeedAccuracy, path_stem: Path, panel: _Panel) -> None:
     """A panel an instruction on shared axes, the methods' legend above all."""
     instructions = [i for i in trade.instructions if any(i in one for one in trade.methods.values())]
     columns = min(_ACROSS, len(instructions))
     rows = -(-len(instructions) // columns)
-    with mpl.rc_context(style()):  # type: ignore[arg-type]
-        figure = new_figure(5.8 if columns == 1 else 0.6 + 3.3 * columns, 0.5 + 3.7 * rows)
+    with drawn(path_stem, 5.8 if columns == 1 else 0.6 + 3.3 * columns, 0.5 + 3.7 * rows) as figure:
         grid = figure.subplots(rows, columns, squeeze=False, sharex=True, sharey=True).ravel()
         for spare in grid[len(instructions) :]:
             spare.set_visible(False)
@@ -117,7 +113,6 @@ def _panels(methods: Sequence[str], trade: SpeedAccuracy, path_stem: Path, panel
         panel.limit(grid[0], trade)
         shown = [(i, method) for i, method in enumerate(methods) if method in trade.methods]
         figure.legend(handles=_handles(shown, lines=panel.lines), loc="outside upper center", ncols=3, frameon=False)
-        return save(figure, path_stem)
 
 
 def _handles(methods: Sequence[tuple[int, str]], *, lines: bool) -> list[Line2D]:
@@ -232,7 +227,7 @@ _POINTS = _Panel(
 _PLACES = {"forward": -0.19, "backward": 0.19}
 
 
-def figure_response_times(found: DirectionStatistics, path_stem: Path) -> tuple[Path, Path, Path]:
+def figure_response_times(found: DirectionStatistics, path_stem: Path) -> None:
     """Valid response times as cumulative shares and as boxes (5, 25, 50, 75, 95 %); PNG, SVG and PDF are written.
 
     `ValueError` if there is no valid time.
@@ -240,13 +235,11 @@ def figure_response_times(found: DirectionStatistics, path_stem: Path) -> tuple[
     times = found.response_times
     if not times.n:
         raise ValueError("the figure of response times needs at least one valid time")
-    with mpl.rc_context(style()):  # type: ignore[arg-type]
-        figure = new_figure(8.6 + 1.6 * max(0, len(found.methods) - 3), 3.9)
+    with drawn(path_stem, 8.6 + 1.6 * max(0, len(found.methods) - 3), 3.9) as figure:
         left, right = figure.subplots(1, 2, width_ratios=[1.0, 1.15])
         limit = _limit(times)
         _draw_shares(left, times, found.methods, limit)
         _draw_boxes(right, times, found.methods)
-        return save(figure, path_stem)
 
 
 def _limit(times: ResponseTimes) -> float:
