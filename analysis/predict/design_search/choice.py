@@ -196,17 +196,23 @@ THRESHOLD_SHARE = 0.75
 """Halfway between guessing and certainty: the usual threshold of a choice between two."""
 DRAWS = 2000
 INSIDE = 0.95
+REACHED, ABOVE, BELOW = "at this voltage", "not within the range", "from the lowest voltage on"
+NEVER = "no voltage brings the magnet home"
 _CLOSE_V = 1e-3
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Band:
-    """Between which voltages 95 % of the drawn contours lie over their whole length, and at each friction alone."""
+    """The contours that the fit allows: `inside` of so many draws lie wholly within; and each friction alone."""
 
+    inside: float
+    draws: int
     low_V: FloatArray
     high_V: FloatArray
-    alone_low_V: FloatArray
-    alone_high_V: FloatArray
+    reached_low: tuple[str, ...]
+    reached_high: tuple[str, ...]
+    each_friction_low_V: FloatArray
+    each_friction_high_V: FloatArray
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -217,6 +223,19 @@ class Contour:
     interpolated_V: FloatArray  # from the grid alone, as the band and the alternatives have it
     lasting: tuple[bool, ...]
     band: Band
+
+
+def reached(voltages_V: FloatArray) -> tuple[str, ...]:
+    """What stands behind each voltage of a contour."""
+    return tuple(map(_reached, voltages_V.tolist()))
+
+
+def _reached(voltage_V: float) -> str:
+    if math.isnan(voltage_V):
+        return NEVER
+    if math.isinf(voltage_V):
+        return ABOVE if voltage_V > 0 else BELOW
+    return REACHED
 
 
 def contour_of(space: Space, layer: Layer, fit: PerceptFit, seed: int) -> Contour:
@@ -243,12 +262,12 @@ def crossings(found: FloatArray, volts: FloatArray) -> FloatArray:
 
 def _crossing(row: FloatArray, volts: FloatArray) -> float:
     some = np.flatnonzero(np.isfinite(row))
-    reached = np.flatnonzero(np.isfinite(row) & (row >= THRESHOLD_SHARE))
+    enough = np.flatnonzero(np.isfinite(row) & (row >= THRESHOLD_SHARE))
     if not some.size:
         return math.nan
-    if not reached.size:
+    if not enough.size:
         return math.inf
-    at = int(reached[0])
+    at = int(enough[0])
     if at == some[0]:
         return -math.inf
     before = some[some < at][-1]
@@ -257,8 +276,8 @@ def _crossing(row: FloatArray, volts: FloatArray) -> float:
 
 
 def _lasts(row: FloatArray) -> bool:
-    reached = np.flatnonzero(row >= THRESHOLD_SHARE)
-    return bool(reached.size) and bool(np.all(row[reached[0] :][np.isfinite(row[reached[0] :])] >= THRESHOLD_SHARE))
+    enough = np.flatnonzero(row >= THRESHOLD_SHARE)
+    return bool(enough.size) and bool(np.all(row[enough[0] :][np.isfinite(row[enough[0] :])] >= THRESHOLD_SHARE))
 
 
 def rate_at(gun: GunParameters, parameters: PerceptParameters) -> float:
@@ -325,7 +344,16 @@ def band_of(contours: FloatArray, inside: float = INSIDE) -> Band:
         tail = round((1.0 - inside) / 2.0 * len(contours))
         low[known], high[known] = ordered[k - 1], ordered[-k]
         alone_low[known], alone_high[known] = ordered[tail], ordered[-1 - tail]
-    return Band(low_V=low, high_V=high, alone_low_V=alone_low, alone_high_V=alone_high)
+    return Band(
+        inside=inside,
+        draws=len(contours),
+        low_V=low,
+        high_V=high,
+        reached_low=reached(low),
+        reached_high=reached(high),
+        each_friction_low_V=alone_low,
+        each_friction_high_V=alone_high,
+    )
 
 
 def _depth(contours: FloatArray, inside: float) -> int:
@@ -354,6 +382,7 @@ class Alternative:
     parameters: PerceptParameters
     deviance: float
     voltage_V: FloatArray
+    reached: tuple[str, ...]
 
 
 def base_parameters() -> list[tuple[str, PerceptParameters]]:
@@ -369,7 +398,13 @@ def alternatives(methods: dict[str, Method], layer: Layer, voltage_V: tuple[floa
     for name, base in base_parameters():
         other = fit_percept(PAPER_RATES, methods, base=base)
         found = crossings(rates(layer.felt[base.leak_s], other.parameters), volts)
-        yield Alternative(name=name, parameters=other.parameters, deviance=other.deviance, voltage_V=found)
+        yield Alternative(
+            name=name,
+            parameters=other.parameters,
+            deviance=other.deviance,
+            voltage_V=found,
+            reached=reached(found),
+        )
 
 
 def unbiased(layer: Layer, voltage_V: tuple[float, ...], fit: PerceptFit) -> FloatArray:
