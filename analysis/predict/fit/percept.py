@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import replace
+from dataclasses import asdict, replace
 from pathlib import Path
 
 from analysis.paper.recurrence import WHOLE_PATTERN, wilson_interval
@@ -23,10 +23,9 @@ from analysis.predict.fit.studies import (
     RecurringClaim,
     cases_of,
     judge,
-    pieces_of,
     read_request,
 )
-from analysis.predict.synthetic_studies import spread_sentence
+from analysis.predict.synthetic_studies import piece_sizes, spread_sentence
 from analysis.report import apa
 from analysis.report.page import write_page
 from analysis.report.section import Picture, Section, Table, origin_table
@@ -49,7 +48,7 @@ def percept(request: PerceptRequest, out: Path, progress: Progress) -> FittedPer
     `ConfigError`: rates or files that cannot be used.
     """
     task = read_request(request)
-    pieces = pieces_of(request.studies, task.published) if task.published else 0
+    pieces = len(piece_sizes(request.studies, task.published.n)) if task.published else 0
     with progress("fit", 2 + len(OTHERS) + CASES * pieces) as tell:
         fit = fit_percept(task.rates, task.methods, trials=task.trials, people=task.people)
         tell("percept")
@@ -163,13 +162,9 @@ def _config_lines(found: FittedPercept) -> Iterator[str]:
     yield f"leak_s = {found.assumed.leak_s!r}  # assumed"
     for name, one in found.fitted.items():
         yield f"{name} = {one.value:.6g}  # {_limits(one)}"
-    people = found.people
-    if people != People():
+    if found.people != People():
         yield "\n[synthetic.people]  # assumed"
-        yield f"drift_factor_sd = {people.drift_factor_sd!r}"
-        yield f"log_boundary_sd = {people.log_boundary_sd!r}"
-        yield f"log_non_decision_sd = {people.log_non_decision_sd!r}"
-        yield f"logit_start_sd = {people.logit_start_sd!r}"
+        yield from (f"{name} = {sd!r}" for name, sd in asdict(found.people).items())
 
 
 def _limits(one: Fitted) -> str:
@@ -382,33 +377,28 @@ def _draw_places(judged: Judgement, histograms: Sequence[Histograms], path_stem:
 
 
 def _places_table(cases: Sequence[Judged]) -> Table:
-    rows = [
-        (
-            f"{alike[0].quantity} = {alike[0].published}" + (" (fitted)" if alike[0].fitted else ""),
-            *(f"{apa.number(100.0 * one.percentile, 1)} {_percents(one)}" for one in alike),
-        )
-        for alike in zip(*(case.places for case in cases), strict=True)
-    ]
+    each = zip(*(case.places for case in cases), strict=True)
     return Table(
         caption="Percentile of each published number among the simulated ones [95 % Monte Carlo interval]",
         header=("Published", *(case.name for case in cases)),
-        rows=tuple(rows),
+        rows=tuple(_share_row(f"{alike[0].quantity} = {alike[0].published}", alike) for alike in each),
     )
 
 
 def _claims_table(cases: Sequence[Judged]) -> Table:
-    rows = [
-        (
-            alike[0].claim + (" (fitted)" if alike[0].fitted else ""),
-            *(f"{apa.number(100.0 * one.share, 1)} {_percents(one)}" for one in alike),
-        )
-        for alike in zip(*(case.claims for case in cases), strict=True)
-    ]
+    each = zip(*(case.claims for case in cases), strict=True)
     return Table(
         caption="Share of the studies in which a published claim holds, % [95 % Monte Carlo interval]",
         header=("Published claim", *(case.name for case in cases)),
-        rows=tuple(rows),
+        rows=tuple(_share_row(alike[0].claim, alike) for alike in each),
     )
+
+
+def _share_row(name: str, alike: Sequence[PublishedPlace | RecurringClaim]) -> tuple[str, ...]:
+    """What is said of one published number or claim, in each case, in percent."""
+    shares = [one.percentile if isinstance(one, PublishedPlace) else one.share for one in alike]
+    cells = [f"{apa.number(100.0 * share, 1)} {_percents(one)}" for share, one in zip(shares, alike, strict=True)]
+    return (f"{name} (fitted)" if alike[0].fitted else name, *cells)
 
 
 def _cases_table(cases: Sequence[Judged]) -> Table:

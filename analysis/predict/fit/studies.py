@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterator, Mapping
-from dataclasses import dataclass, replace
+from dataclasses import asdict, dataclass, replace
 
 import numpy as np
 
@@ -115,12 +115,7 @@ def published_rates(published: PublishedDirection) -> tuple[dict[str, float], in
 
 def scaled_spread(people: People, factor: float) -> People:
     """People who differ so many times as much."""
-    return People(
-        drift_factor_sd=factor * people.drift_factor_sd,
-        log_boundary_sd=factor * people.log_boundary_sd,
-        log_non_decision_sd=factor * people.log_non_decision_sd,
-        logit_start_sd=factor * people.logit_start_sd,
-    )
+    return People(**{name: factor * sd for name, sd in asdict(people).items()})
 
 
 def _published(request: PerceptRequest) -> PublishedDirection:
@@ -266,11 +261,6 @@ def judge(
         claims=tuple(_claims(correct, published)),
     )
     return judged, {name: _histogram(values) for name, _, values, _ in quantities}
-
-
-def pieces_of(studies: int, published: PublishedDirection) -> int:
-    """How many pieces a case's studies are drawn in."""
-    return len(piece_sizes(studies, published.n))
 
 
 def _counts(
