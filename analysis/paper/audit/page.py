@@ -139,7 +139,7 @@ def findings_text(findings: Sequence[AuditFinding]) -> str:
     places = max((len(finding.place) for finding in findings), default=0)
     checks = max((len(finding.result.check) for finding in findings), default=0)
     lines = [
-        f"{f.result.verdict:{verdicts}}  {f.result.check:{checks}}  {f.place:{places}}  {_short(f.quote)}"
+        f"{f.result.verdict:{verdicts}}  {f.result.check:{checks}}  {f.place:{places}}  {cut(f.quote, 56)}"
         for f in findings
     ]
     asked = [f"{f.place}, “{f.quote}”: {' '.join(sentences(f))}" for f in findings if f.result.verdict in ATTENTION]
@@ -147,7 +147,8 @@ def findings_text(findings: Sequence[AuditFinding]) -> str:
     return "\n".join([*lines, "", f"{len(findings)} numbers: {told or 'none'}.", *(f"\n{text}" for text in asked)])
 
 
-def _short(text: str, most: int = 56) -> str:
+def cut(text: str, most: int) -> str:
+    """Of a long text the beginning."""
     return text if len(text) <= most else f"{text[: most - 1]}…"
 
 

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import csv
-import io
 from bisect import bisect_right
 from collections.abc import Callable, Sequence
 from contextlib import AbstractContextManager
@@ -49,7 +47,7 @@ from analysis.predict.design_search.space import (
 from analysis.predict.fit.percept_model import PAPER_RATES, PerceptFit, fit_percept
 from analysis.predict.jobs import RunPieces, cores, on_processes
 from analysis.report.page import write_page
-from analysis.report.serial import as_json
+from analysis.report.serial import as_csv, as_json
 from analysis.report.terminal import Progress
 from device.limits import TRAIN_LIMITS
 from device.methods import Method, paper_methods
@@ -190,16 +188,8 @@ def _results(
 
 def _write(out: Path, found: DesignSearch, designs: Designs) -> None:
     storage.write_whole(out / "design.json", as_json(found))
-    storage.write_whole(out / "designs.csv", _table(designs).encode())
+    storage.write_whole(out / "designs.csv", as_csv(COLUMNS, (_cells(designs, place) for place in range(len(designs)))))
     write_page(out, f"Design search: {found.title}", sections(found, designs, out / "figures"))
-
-
-def _table(designs: Designs) -> str:
-    text = io.StringIO(newline="")
-    writer = csv.writer(text, lineterminator="\r\n")
-    writer.writerow(COLUMNS)
-    writer.writerows(_cells(designs, place) for place in range(len(designs)))
-    return text.getvalue()
 
 
 def _cells(designs: Designs, place: int) -> Sequence[object]:

@@ -6,8 +6,6 @@ participants of the same config, whose logs are not written.
 
 from __future__ import annotations
 
-import csv
-import io
 import json
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -18,7 +16,7 @@ from typing import Any, Literal
 from analysis.logs.reading import Logs, read_logs
 from analysis.paper.audit.claims import AuditFinding
 from analysis.paper.audit.lattices import Rows
-from analysis.paper.audit.page import ATTENTION, ELSEWHERE, other_rows, predictions
+from analysis.paper.audit.page import ATTENTION, ELSEWHERE, cut, other_rows, predictions
 from analysis.paper.audit.participants import MEAN_SLACK, RebuiltAnswers, backward_counts, forward_counts, rating_grains
 from analysis.paper.audit.run import audit, load_paper_file
 from analysis.paper.paper import (
@@ -32,6 +30,7 @@ from analysis.paper.paper import (
 from analysis.paper.recurrence import PatternOdds
 from analysis.predict.simulate.shot import shot_panel
 from analysis.predict.synthetic_studies import pattern_odds
+from analysis.report.serial import as_csv
 from analysis.summary.comparison import compare
 from analysis.summary.results import StudyStatistics
 from analysis.summary.sections.content import ReportData
@@ -122,8 +121,8 @@ def prepared(name: str, seed: int, observer: Observer | None = None) -> Reproduc
         raise ConfigError(f"{name}: no reconstructed participants: {reason}")
     if paper is None or reason:
         return replace(study, notes=(f"The participants are those of the configs: {reason}.",))
-    people = reconstructed_people(config, setups, paper, seed)
-    return replace(study, answering=people.setups, notes=people.notes)
+    answering, notes = reconstructed_people(config, setups, paper, seed)
+    return replace(study, answering=answering, notes=notes)
 
 
 def reproduce(study: ReproducedStudy, out: Path, tell: Tell) -> Reproduced:
@@ -160,11 +159,7 @@ def comparison_text(comparison: tuple[ComparisonRow, ...]) -> str:
 def _cells(row: ComparisonRow) -> tuple[str, str, str, str]:
     apart = row.experiment == ELSEWHERE
     name = row.quantity if apart else f"{row.experiment}: {row.quantity}"
-    return row.verdict, _shortened(row.published, 20), "" if apart else obtained_text(row), _shortened(name, 72)
-
-
-def _shortened(text: str, most: int) -> str:
-    return text if len(text) <= most else f"{text[: most - 1]}…"
+    return row.verdict, cut(row.published, 20), "" if apart else obtained_text(row), cut(name, 72)
 
 
 def _remarkable(row: ComparisonRow) -> bool:
@@ -268,14 +263,6 @@ HONESTY = (
 )
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class ReconstructedPeople:
-    """Setups whose synthetic participants are reconstructed, and what is to be said of them."""
-
-    setups: tuple[Setup[Any], ...]
-    notes: tuple[str, ...]
-
-
 def misfit(study: StudyConfig, setups: Sequence[Setup[Any]], paper: Paper | None) -> str | None:
     """Why the paper's participants do not fit this study; None if they can."""
     if paper is None:
@@ -306,8 +293,11 @@ def _other_trials(config: DirectionConfig | PreferenceConfig, paper: Paper) -> s
 
 def reconstructed_people(
     study: StudyConfig, setups: Sequence[Setup[Any]], paper: Paper, seed: int
-) -> ReconstructedPeople:
-    """The setups with reconstructed participants. `ConfigError` if no such participants were found."""
+) -> tuple[tuple[Setup[Any], ...], tuple[str, ...]]:
+    """The setups with reconstructed participants, and what is to be said of them.
+
+    `ConfigError` if no such participants were found.
+    """
     codes, people, notes = study.codes(), [], [HONESTY]
     for setup in setups:
         try:
@@ -318,7 +308,7 @@ def reconstructed_people(
         config = setup.config.model_copy(update={"synthetic": synthetic})
         people.append(replace(setup, config=config, answers=answers))
         notes.append(note)
-    return ReconstructedPeople(setups=tuple(people), notes=tuple(notes))
+    return tuple(people), tuple(notes)
 
 
 def table_name(setup: Setup[Any]) -> str:
@@ -328,11 +318,8 @@ def table_name(setup: Setup[Any]) -> str:
 
 def answers_table(setup: Setup[Any]) -> bytes:
     """The answers as CSV: a table for `synthetic.table` of a config."""
-    text = io.StringIO(newline="")
-    writer = csv.DictWriter(text, CATALOGUE[setup.config.experiment].answer_columns)
-    writer.writeheader()
-    writer.writerows(setup.answers)
-    return text.getvalue().encode()
+    columns = CATALOGUE[setup.config.experiment].answer_columns
+    return as_csv(columns, ([row[name] for name in columns] for row in setup.answers))
 
 
 def _answers(config: Any, paper: Paper, codes: Sequence[str], seed: int) -> tuple[Answers, str]:

@@ -186,54 +186,42 @@ class SweepAxis:
     values: NDArray[Any]
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class SweepRequest:
-    """A table as it was asked for. `instead` are options that belong to a single shot, `changes` those of --set.
-
-    `scene`: the pick that the model comes from, if it was picked.
-    """
-
-    gun: GunParameters
-    fidelity: str
-    vary: Sequence[str]
-    changes: Sequence[str]
-    table: Path | None
-    instead: Sequence[str] = ()
-    yes: bool = False
-    scene: ScenePick | None = None
-
-
-def sweep(request: SweepRequest, progress: Progress) -> Sweep:
+def sweep(request: SimulateRequest, gun: GunParameters, progress: Progress, tell: Callable[[str], None]) -> Sweep:
     """Shoots all of it and writes the table; what it holds. `ConfigError`: what is asked for makes no table."""
+    of_scene = [axis_of(words, gun) for words in request.vary] if request.model.is_of_scene else []
+    fidelity, pick = picked(request.model, gun, {axis.key: axis.values for axis in of_scene})
+    if note := interpreted_note():
+        tell(note)
     if not request.vary or request.table is None:
         raise ConfigError("--vary and --table go together: --vary KEY=FROM:TO:COUNT --table FILE.parquet")
-    axes = _axes(request)
+    axes = _axes(request, gun)
     path, rows = request.table, math.prod(len(axis.values) for axis in axes)
-    _is_sensible(request, rows)
+    _is_sensible(request, fidelity, rows)
     check_place(path)
-    origin = _origin(request, axes, rows)
+    origin = _origin(gun, fidelity, axes, rows)
     counts = np.zeros(len(STATUSES), dtype=np.int64)
     with opened(path, {axis.key: PARAMETER_KINDS[axis.key] for axis in axes}, origin) as write:
-        for arrays, shots in _shoot(request, axes, rows, progress):
+        for arrays, shots in _shoot(gun, fidelity, axes, progress):
             write(arrays, shots)
             counts += np.bincount(shots.status, minlength=len(STATUSES))
     statuses: dict[str, int] = {name: int(count) for name, count in zip(STATUSES, counts, strict=True) if count}
     known = {one.name: getattr(origin, one.name) for one in fields(SweepOrigin)}
-    return Sweep(**known, table=str(path), statuses=statuses, scene=request.scene)
+    return Sweep(**known, table=str(path), statuses=statuses, scene=pick)
 
 
 def _shoot(
-    request: SweepRequest, axes: Sequence[SweepAxis], rows: int, progress: Progress
+    gun: GunParameters, fidelity: str, axes: Sequence[SweepAxis], progress: Progress
 ) -> Iterator[tuple[dict[str, NDArray[Any]], ShotBatch]]:
     """Block by block: the parameters that vary, and the shots."""
     block = _BLOCK if find_spec("numba") else _SLOW_BLOCK
     shape = tuple(len(axis.values) for axis in axes)
+    rows = math.prod(shape)
     with progress("shots", math.ceil(rows / block)) as done:
         for start in range(0, rows, block):
             end = min(start + block, rows)
             places = np.unravel_index(np.arange(start, end), shape)
             arrays: dict[str, Any] = {axis.key: axis.values[place] for axis, place in zip(axes, places, strict=True)}
-            yield arrays, simulate_batch(request.gun, fidelity=request.fidelity, **arrays)
+            yield arrays, simulate_batch(gun, fidelity=fidelity, **arrays)
             done(f"{end:,} of {rows:,}")
 
 
@@ -252,30 +240,28 @@ def table_sections(found: Sweep) -> tuple[Section, ...]:
     return (table,) if found.scene is None else (scene_section(found.scene), table)
 
 
-def _origin(request: SweepRequest, axes: Sequence[SweepAxis], rows: int) -> SweepOrigin:
+def _origin(gun: GunParameters, fidelity: str, axes: Sequence[SweepAxis], rows: int) -> SweepOrigin:
     varied = {axis.key: axis.words for axis in axes}
     return SweepOrigin(
         rows=rows,
-        fidelity=request.fidelity,
+        fidelity=fidelity,
         vary=varied,
-        parameters={key: value for key, value in asdict(request.gun).items() if key not in varied},
+        parameters={key: value for key, value in asdict(gun).items() if key not in varied},
         provenance=provenance(),
     )
 
 
-def _is_sensible(request: SweepRequest, rows: int) -> None:
-    if request.instead:
-        raise ConfigError(
-            f"--vary makes a table of shots; {', '.join(request.instead)} tells of a single one: drop either"
-        )
-    if request.fidelity not in FIDELITIES:
-        raise ConfigError(f"--fidelity {request.fidelity}: must be one of {', '.join(FIDELITIES)}")
+def _is_sensible(request: SimulateRequest, fidelity: str, rows: int) -> None:
+    if instead := request.of_files + request.of_one_shot:
+        raise ConfigError(f"--vary makes a table of shots; {', '.join(instead)} tells of a single one: drop either")
+    if fidelity not in FIDELITIES:
+        raise ConfigError(f"--fidelity {fidelity}: must be one of {', '.join(FIDELITIES)}")
     if rows > MOST_ROWS and not request.yes:
         raise ConfigError(f"--vary asks for {rows:,} shots; more than {MOST_ROWS:,} need --yes")
 
 
-def _axes(request: SweepRequest) -> list[SweepAxis]:
-    axes = [axis_of(words, request.gun) for words in request.vary]
+def _axes(request: SimulateRequest, gun: GunParameters) -> list[SweepAxis]:
+    axes = [axis_of(words, gun) for words in request.vary]
     keys = [axis.key for axis in axes] + [change.partition("=")[0] for change in request.changes]
     twice = sorted({key for key in keys[: len(axes)] if keys.count(key) > 1})
     if twice:
@@ -387,7 +373,7 @@ def simulated(request: SimulateRequest, progress: Progress, tell: Callable[[str]
         return _vibration(request, rendering)
     gun = parameters_of(config, request.method, request.changes)
     if request.vary or request.table:
-        return _table(request, gun, progress, tell)
+        return sweep(request, gun, progress, tell)
     return _shot(request, gun)
 
 
@@ -405,24 +391,6 @@ def _vibration(request: SimulateRequest, parameters: VibrationParameters) -> Sim
             "ask for --trace or --plot, or simulate a voice-coil method"
         )
     return simulated_vibration(parameters, request.trace, request.plot)
-
-
-def _table(request: SimulateRequest, gun: GunParameters, progress: Progress, tell: Callable[[str], None]) -> Sweep:
-    axes = [axis_of(words, gun) for words in request.vary] if request.model.is_of_scene else []
-    fidelity, pick = picked(request.model, gun, {axis.key: axis.values for axis in axes})
-    if note := interpreted_note():
-        tell(note)
-    asked = SweepRequest(
-        gun=gun,
-        fidelity=fidelity,
-        vary=request.vary,
-        changes=request.changes,
-        table=request.table,
-        instead=request.of_files + request.of_one_shot,
-        yes=request.yes,
-        scene=pick,
-    )
-    return sweep(asked, progress)
 
 
 def _shot(request: SimulateRequest, gun: GunParameters) -> SimulatedShot:
