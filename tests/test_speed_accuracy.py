@@ -178,9 +178,10 @@ def test_the_diffusion_fits_are_those_of_the_same_rows(folder: Path, found: Any)
     each, together = fit_people(trials), fit(trials, by_person=True)
     shown = found["diffusion"]
     assert (shown["people"], shown["fitted"], shown["trials"]) == (6, 6, 1080)
-    assert set(shown["each"]["estimates"]) == {mean.name for mean in each.means}
+    means = {mean.name: mean for mean in each.means}
+    assert set(shown["each"]["estimates"]) == set(means)
     for name, one in shown["each"]["estimates"].items():
-        assert [one["mean"], one["ci_low"]] == pytest.approx([each[name].value, each[name].ci_low], abs=1e-4)
+        assert [one["mean"], one["ci_low"]] == pytest.approx([means[name].value, means[name].ci_low], abs=1e-4)
     for name, one in shown["together"]["estimates"].items():
         assert [one["value"], one["ci_high"]] == pytest.approx([together[name].value, together[name].ci_high], abs=1e-4)
 

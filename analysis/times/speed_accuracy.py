@@ -303,10 +303,7 @@ def _together(found: DiffusionFit) -> PooledFit:
     known = () if found.reason else found.estimates
     return PooledFit(
         estimates={
-            one.name: Parameter(
-                value=defined(one.value), se=defined(one.se), ci_low=defined(one.ci_low), ci_high=defined(one.ci_high)
-            )
-            for one in known
+            one.name: Parameter(**{key: defined(getattr(one, key)) for key in Parameter.__slots__}) for one in known
         },
         log_likelihood=defined(found.log_likelihood),
         unidentified=found.unidentified,

@@ -170,9 +170,9 @@ class EZ:
     `corrected`: no error or nothing but errors, so the accuracy was moved by half an answer.
     """
 
-    drift: float
-    boundary: float
-    non_decision_s: float
+    drift: float = math.nan
+    boundary: float = math.nan
+    non_decision_s: float = math.nan
     accuracy: float
     corrected: bool = False
     reason: str | None = None
@@ -203,10 +203,8 @@ def ez(correct: ArrayLike, time_s: ArrayLike, sources: Sequence[str] | ArrayLike
     times = own_times(time_s, sources)
     right = answers(correct, "correct", times.size) == 1.0
     if right.sum() < FEWEST:
-        nan = math.nan
         reason = f"{int(right.sum())} correct answers; at least {FEWEST} are needed for a variance"
-        accuracy = float(right.mean()) if right.size else nan
-        return EZ(drift=nan, boundary=nan, non_decision_s=nan, accuracy=accuracy, reason=reason)
+        return EZ(accuracy=float(right.mean()) if right.size else math.nan, reason=reason)
     mean_s, spread = float(times[right].mean()), float(np.var(times[right], ddof=1))
     some = spread > (ROUNDING * mean_s) ** 2
     return ez_from_summary(float(right.mean()), mean_s, spread if some else 0.0, times.size)
@@ -216,9 +214,9 @@ def ez_from_summary(accuracy: float, mean_s: float, variance_s2: float, trials: 
     """EZ-diffusion from the accuracy, and mean and variance of the correct answers' times.
 
     For an unbiased start V(T) = a^4 (h(L) - h(L/2)/16) and E(T) = a^2 (c(L) - c(L/2)/4) with L = logit(accuracy) = v a
-    and the forms of `moments`. That is the published v = +-(L (L P^2 - L P + P - 1/2) / V)^(1/4), a = L / v, so written
-    that an accuracy of 1/2 (v = 0, a^4 = 24 V) is no special case and needs no edge correction. For 0 and 1 the
-    published one is used: half an answer, 1/(2 n).
+    and its forms c and h. That is the published v = +-(L (L P^2 - L P + P - 1/2) / V)^(1/4), a = L / v, so written that
+    an accuracy of 1/2 (v = 0, a^4 = 24 V) is no special case and needs no edge correction. For 0 and 1 the published
+    one is used: half an answer, 1/(2 n).
 
     Caveats: no starting bias (for 2AFC that means: forward and backward shots together, never apart), no lapses, no
     variability between trials. Refused (`reason`): a variance that is not above 0; a non-decision time below 0, which
@@ -231,10 +229,9 @@ def ez_from_summary(accuracy: float, mean_s: float, variance_s2: float, trials: 
     """
     if not 0.0 <= accuracy <= 1.0 or trials < 1:
         raise ValueError(f"accuracy must be 0 to 1 and trials at least 1, not {accuracy} and {trials}")
-    nan = math.nan
     if not (variance_s2 > 0.0 and math.isfinite(variance_s2) and math.isfinite(mean_s)):
         reason = f"the correct answers' times have a variance of {variance_s2:g} s2"
-        return EZ(drift=nan, boundary=nan, non_decision_s=nan, accuracy=accuracy, reason=reason)
+        return EZ(accuracy=accuracy, reason=reason)
     given = np.array([[accuracy], [mean_s], [variance_s2], [trials]], dtype=np.float64)
     drift, boundary, non_decision_s, p = _solved(*given)[:, 0].tolist()
     return EZ(
