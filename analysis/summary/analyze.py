@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -65,21 +66,16 @@ def analyze(request: Request, track: Track = iter) -> tuple[StudyStatistics, tup
         title="Statistics of " + ", ".join(path.name or str(path) for path in request.paths),
         statistics=statistics,
         problems=logs.problems,
-        comparison=compare(statistics, published, _predicted(request.paper)) if published else None,
+        comparison=None if published is None else compare(statistics, published, _predicted(request.paper)),
         files=logs.files,
         provenance=provenance() | _read_by(request.columns, mapping),
         notes=tuple(_notes(effect)),
         extra=() if coded is None else (remarks_coding.coding_section(coded),),
     )
     write_report(request.out, report)
-    write_tables(request.out, used, statistics)
+    for name, content in result_tables(used, statistics.analysed).items():
+        storage.write_whole(request.out / name, content)
     return statistics, logs.problems
-
-
-def write_tables(out: Path, logs: Logs, statistics: StudyStatistics) -> None:
-    """Write each experiment's results by participant, long and wide, as CSV."""
-    for name, content in result_tables(logs, statistics.analysed).items():
-        storage.write_whole(out / name, content)
 
 
 def _predicted(paper: Path | None) -> dict[str, Prediction]:
@@ -125,10 +121,9 @@ def _notes(effect: ExclusionEffect | None) -> list[str]:
         return []
     notes = []
     for experiment, people in effect.dropped.items():
-        counts: dict[str, int] = {}
+        counts = Counter[str]()
         for by_rule in people.values():
-            for rule, count in by_rule.items():
-                counts[rule] = counts.get(rule, 0) + count
+            counts.update(by_rule)
         shown = ", ".join(f"{rule} {count}" for rule, count in sorted(counts.items())) or "none"
         recorded = effect.trials[experiment].recorded
         notes.append(f"Trials dropped by rule in {experiment}, of {recorded}: {shown}.")

@@ -327,8 +327,8 @@ class StudyStatistics:
     @property
     def analysed(self) -> dict[str, WithinStatistics]:
         """The experiments that have a complete participant, by name."""
-        both = {"direction": self.direction, "preference": self.preference}
-        return {name: found for name, found in both.items() if found is not None and found.n}
+        names = ("direction", "preference")
+        return {name: found for name in names if (found := self.of(name)) is not None and found.n}
 
     def to_dict(self) -> dict[str, Any]:
         """The content of `statistics.json`."""

@@ -24,7 +24,7 @@ from analysis.stats.cells import ByParticipant, TrialCells, coded, trial_cells
 from analysis.stats.diagnostics import NORMALITY_NOTE, OUTLIER_RULE, ends, normality, outliers, sphericity, unit_scaled
 from analysis.stats.effect_sizes import EFFECT_SIZE_NOTE, cousineau_morey, effect_size
 from analysis.stats.logit_model import METHOD as CLUSTERING_NOTE
-from analysis.stats.logit_model import MODEL_NAME, MODEL_NOTE, Clustering, LogitModel, clustering, logit_model
+from analysis.stats.logit_model import MODEL_NAME, MODEL_NOTE, LogitModel, clustering, logit_model
 from analysis.stats.paired import (
     CONSTANT,
     EQUAL,
@@ -253,7 +253,7 @@ def _binomials(cells: TrialCells, method: str) -> dict[str, PooledBinomial]:
                 successes=successes,
                 trials=trials,
                 **{field.name: float(getattr(test, field.name)) for field in fields(test)},
-                clustering=pooled_clustering(cells, method, direction),
+                clustering=clustering(cells.correct[:, *column], cells.trials[:, *column]),
             )
     return result
 
@@ -336,12 +336,6 @@ def model(cells: TrialCells) -> NamedModel:
     return NamedModel(name=MODEL_NAME, note=MODEL_NOTE, fit=found)
 
 
-def pooled_clustering(cells: TrialCells, method: str, direction: str) -> Clustering:
-    """How the answers of a method and direction cluster in people, and what that leaves of their binomial test."""
-    place = cells.methods.index(method), DIRECTIONS.index(direction)
-    return clustering(cells.correct[:, *place], cells.trials[:, *place])
-
-
 def _friedman(scores: FloatArray, methods: Sequence[str]) -> FriedmanTest:
     found = friedman(scores)
     return FriedmanTest(
@@ -371,7 +365,7 @@ def _bayes_factor(pair: PairedT, n: int) -> BayesFactor:
 
 
 def _diagnostics(scores: pd.DataFrame, scale: tuple[float, float]) -> Diagnostics:
-    array, people, methods = scores.to_numpy(dtype="float64"), scores.index, [str(m) for m in scores.columns]
+    array, people, methods = scores.to_numpy(dtype="float64"), scores.index, list(map(str, scores.columns))
     at_ends = ends(array, scale)
     far = tuple(
         FarScore(participant=str(people[o.row]), method=methods[o.column], score=o.score, fence=o.fence)

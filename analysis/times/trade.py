@@ -214,9 +214,9 @@ def ez_from_summary(accuracy: float, mean_s: float, variance_s2: float, trials: 
     """EZ-diffusion from the accuracy, and mean and variance of the correct answers' times.
 
     For an unbiased start V(T) = a^4 (h(L) - h(L/2)/16) and E(T) = a^2 (c(L) - c(L/2)/4) with L = logit(accuracy) = v a
-    and its forms c and h. That is the published v = +-(L (L P^2 - L P + P - 1/2) / V)^(1/4), a = L / v, so written that
-    an accuracy of 1/2 (v = 0, a^4 = 24 V) is no special case and needs no edge correction. For 0 and 1 the published
-    one is used: half an answer, 1/(2 n).
+    and c and h of `first_passage`. That is the published v = +-(L (L P^2 - L P + P - 1/2) / V)^(1/4), a = L / v, so
+    written that an accuracy of 1/2 (v = 0, a^4 = 24 V) is no special case and needs no edge correction. For 0 and 1 the
+    published one is used: half an answer, 1/(2 n).
 
     Caveats: no starting bias (for 2AFC that means: forward and backward shots together, never apart), no lapses, no
     variability between trials. Refused (`reason`): a variance that is not above 0; a non-decision time below 0, which

@@ -42,16 +42,12 @@ def write_figures(folder: Path, report: ReportData) -> None:
         figure_directions(direction, folder / _DIRECTIONS_FIGURE)
         if direction.response_times.n:
             figure_response_times(direction, folder / _TIMES_FIGURE)
-        _write_trade(folder, direction)
+        if has_curve(direction):
+            figure_conditional_accuracy(direction, folder / CONDITIONAL_ACCURACY)
+        if has_points(direction):
+            figure_quantile_probability(direction, folder / QUANTILE_PROBABILITY)
     if report.panels:
         figure_5(report.panels, folder / FIGURE_5)
-
-
-def _write_trade(folder: Path, found: DirectionStatistics) -> None:
-    if has_curve(found):
-        figure_conditional_accuracy(found, folder / CONDITIONAL_ACCURACY)
-    if has_points(found):
-        figure_quantile_probability(found, folder / QUANTILE_PROBABILITY)
 
 
 def results_picture(statistics: StudyStatistics) -> Picture:
