@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from contextlib import closing
 from dataclasses import dataclass, fields, replace
 from pathlib import Path
 from typing import Any, Literal
@@ -48,19 +47,11 @@ def serve(asked: TwinRequest, tell: Callable[[dict[str, Any]], None]) -> None:
         socket.plug()
     except (OSError, ImportError, AttributeError) as error:  # the latter two: a system without pseudo-terminals
         raise PlaceError(f"the twin cannot be plugged in here: {error}; try --tcp PORT, or another --link") from error
-    with closing(_Plugged(socket)):
+    try:
         tell({"address": socket.address, "gun": _gun_option(socket.address, asked.speed)})
         twin.serve()
-
-
-class _Plugged:
-    """A socket that is pulled out when all is over."""
-
-    def __init__(self, socket: Socket) -> None:
-        self._socket = socket
-
-    def close(self) -> None:
-        self._socket.unplug()
+    finally:
+        socket.unplug()
 
 
 def _socket(asked: TwinRequest) -> Socket:
@@ -131,13 +122,9 @@ def keep(found: Examination, path: Path) -> None:
     storage.write_whole(path, as_json(found))
 
 
-def findings_section(findings: tuple[DoctorFinding, ...]) -> Section:
-    """The findings as a table."""
+def examination_text(findings: tuple[DoctorFinding, ...]) -> str:
+    """The findings as a table, for people at a terminal."""
     rows = tuple((one.check, str(one.verdict), one.measured, one.advice) for one in findings)
     header = ("check", "verdict", "measured", "what to do")
-    return Section(title="", tables=(Table(caption="", header=header, rows=rows),))
-
-
-def examination_text(findings: tuple[DoctorFinding, ...]) -> str:
-    """The table for people at a terminal."""
-    return with_tables(findings_section(findings), ruled=True, unfolded=2)
+    section = Section(title="", tables=(Table(caption="", header=header, rows=rows),))
+    return with_tables(section, ruled=True, unfolded=2)
