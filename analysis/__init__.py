@@ -10,10 +10,16 @@ from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
     from analysis.stats.anova import Anova, RepeatedMeasuresAnova, one_way_anova, rm_anova
-    from analysis.stats.binomial import BinomialTest, binomial_test
-    from analysis.stats.detection import Detection, yes_no
-    from analysis.stats.studentized_range import studentized_range_isf, studentized_range_logsf, studentized_range_sf
-    from analysis.stats.tukey import Comparison, rm_tukey_hsd, rm_tukey_hsd_paired, tukey_hsd
+    from analysis.stats.binomial import BinomialTest, Detection, binomial_test, yes_no
+    from analysis.stats.tukey import (
+        Comparison,
+        rm_tukey_hsd,
+        rm_tukey_hsd_paired,
+        studentized_range_isf,
+        studentized_range_logsf,
+        studentized_range_sf,
+        tukey_hsd,
+    )
 
 __all__ = [
     "Anova",
@@ -33,7 +39,7 @@ __all__ = [
     "yes_no",
 ]
 
-_MODULES = ("anova", "binomial", "detection", "studentized_range", "tukey")
+_MODULES = ("anova", "binomial", "tukey")
 
 
 def __getattr__(name: str) -> object:

@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from analysis.paper.audit.run import AuditFinding
+    from analysis.paper.audit.claims import AuditFinding
     from analysis.predict.power.results import Power
     from analysis.summary.results import StudyStatistics
     from experiments.config.setup import Setup
@@ -83,8 +83,8 @@ def audit(paper: str | Path = "paper") -> tuple[AuditFinding, ...]:
     >>> findings[0].quote, findings[0].result.verdict
     ('14 participants (7 males and 7 females)', 'attainable')
     """
-    from analysis.paper.audit import audit as audited
-    from analysis.paper.audit.paper_file import load_paper_file
+    from analysis.paper.audit.run import audit as audited
+    from analysis.paper.audit.run import load_paper_file
     from experiments.load import find
 
     return audited(load_paper_file(find(str(paper))))

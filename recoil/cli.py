@@ -12,7 +12,7 @@ import typer
 import recoil
 from analysis.report.terminal import INTERRUPTED, UNUSABLE, say
 from device.words import RecoilError
-from recoil.commands import design, fit, guns, numbers, power, sessions
+from recoil.commands import guns, numbers, predictions, sessions
 
 app = typer.Typer(
     name="recoil",
@@ -32,8 +32,8 @@ COMMANDS = (
     sessions.rebuild,
     numbers.analyze,
     numbers.audit,
-    power.power,
-    design.design,
+    predictions.power,
+    predictions.design,
     guns.simulate,
     sessions.configs,
     sessions.new,
@@ -62,7 +62,7 @@ for command in COMMANDS:
     app.command()(command)
 export_commands.command()(numbers.bids)
 app.add_typer(export_commands, name="export")
-app.add_typer(fit.app, name="fit")
+app.add_typer(predictions.app, name="fit")
 
 
 def main() -> None:

@@ -146,12 +146,8 @@ class RebuiltTable:
     messages: tuple[str, ...]
 
 
-def rebuild_tables(journals: list[Path]) -> list[RebuiltTable]:
-    """The tables of journals. A table that differs from its journal is set aside, not overwritten."""
-    return [_rebuild(path) for path in journals]
-
-
-def _rebuild(path: Path) -> RebuiltTable:
+def rebuild_table(path: Path) -> RebuiltTable:
+    """The table of a journal. One that differs from its journal is set aside, not overwritten."""
     table, data, contents = rebuild(path)
     messages = [contents.cut_message] if contents.cut_message else []
     same = table.exists() and table.read_bytes() == data

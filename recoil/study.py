@@ -116,20 +116,16 @@ def _not_eligible(found: StudyStatus, one: Participant) -> tuple[str, ...]:
     return eligible(one.facts, found.study.config.eligibility) if one.facts else ()
 
 
-def study_section(found: StudyStatus) -> Section:
-    """The study for people: a table, then who comes next."""
+def study_text(found: StudyStatus) -> str:
+    """The study for people at a terminal: a table, then who comes next."""
     header = ("code", "age", "sex", "hand", *found.study.experiments, "remark")
     rows = tuple(tuple(_cells(found, one)) for one in found.overview.participants)
-    return Section(
+    section = Section(
         title=found.study.config.title,
         tables=(Table(caption="", header=header, rows=rows),),
         items=(*_count_lines(found), *_next_lines(found)),
     )
-
-
-def study_text(found: StudyStatus) -> str:
-    """The study for people at a terminal."""
-    return with_tables(study_section(found))
+    return with_tables(section)
 
 
 def _cells(found: StudyStatus, one: Participant) -> Iterator[str]:
@@ -169,11 +165,7 @@ def _next_lines(found: StudyStatus) -> Iterator[str]:
 
 
 def _nobody(taking_part: list[Participant]) -> str:
-    if any(map(_unreadable, taking_part)):
+    if any(run.state == "unreadable" for one in taking_part for run in one.runs):
         return "nobody who can be named, see what could not be read"
     elsewhere = [one.participant_id for one in taking_part if one.is_elsewhere]
     return f"nobody waits; at a console now: {', '.join(elsewhere)}" if elsewhere else "nobody, the study is done"
-
-
-def _unreadable(one: Participant) -> bool:
-    return any(run.state == "unreadable" for run in one.runs)

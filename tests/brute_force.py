@@ -15,20 +15,12 @@ from math import comb
 import mpmath
 import numpy as np
 
-from analysis.paper.audit import (
-    CheckResult,
-    ClaimedComparison,
-    between_f,
-    binomial_p,
-    debit,
-    degrees_of_freedom,
-    grim,
-    grimmer,
-    p_against_statistic,
-    percent_of_count,
-    repeated_f,
-    tukey_pattern,
-)
+from analysis.paper.audit.freedom import degrees_of_freedom
+from analysis.paper.audit.means import debit, grim, grimmer, percent_of_count
+from analysis.paper.audit.p_values import binomial_p, p_against_statistic
+from analysis.paper.audit.printed import CheckResult
+from analysis.paper.audit.tukey_pattern import ClaimedComparison, tukey_pattern
+from analysis.paper.audit.variance_ratios import between_f, repeated_f
 from tests.exact import exact_one_way_F, exact_rm_F
 
 MODES = (ROUND_HALF_UP, ROUND_HALF_EVEN, ROUND_HALF_DOWN, ROUND_DOWN)

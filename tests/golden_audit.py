@@ -9,7 +9,7 @@ from typing import Any
 
 import pytest
 
-from analysis.paper.audit import CheckResult, Rounding
+from analysis.paper.audit.printed import CheckResult, Rounding
 
 GOLDEN = Path(__file__).parent / "golden" / "audit"
 SCRUTINY: dict[str, Any] = tomllib.loads((GOLDEN / "scrutiny.toml").read_text(encoding="utf-8"))

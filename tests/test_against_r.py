@@ -26,11 +26,9 @@ from analysis import (
     studentized_range_sf,
     tukey_hsd,
 )
-from analysis.stats.diagnostics import normality
+from analysis.stats.diagnostics import normality, sphericity
 from analysis.stats.effect_sizes import effect_size
-from analysis.stats.paired import paired_t_tests
-from analysis.stats.rank_tests import friedman
-from analysis.stats.sphericity import sphericity
+from analysis.stats.paired import friedman, paired_t_tests
 from tests.golden.r import make_datasets
 
 GOLDEN = Path(__file__).parent / "golden" / "r"

@@ -6,8 +6,9 @@ from typing import Any
 
 import pytest
 
-from analysis.paper.audit import Rounding, debit, grim, grimmer, p_against_statistic, read_printed
-from analysis.paper.audit.means import scale_of
+from analysis.paper.audit.means import debit, grim, grimmer, scale_of
+from analysis.paper.audit.p_values import p_against_statistic
+from analysis.paper.audit.printed import Rounding, read_printed
 from tests.golden_audit import rounded_either_way, rows, statcheck_cases
 
 

@@ -9,8 +9,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from analysis.paper.audit import CHECKS, AuditFinding, audit, load_paper_file, parse_paper, repeated_f
-from analysis.paper.audit.claims import AnyClaim
+from analysis.paper.audit.claims import CHECKS, AnyClaim, AuditFinding, Claim
+from analysis.paper.audit.run import audit, load_paper_file
+from analysis.paper.audit.variance_ratios import repeated_f
 from experiments.config.door import ConfigError
 from tests.exact import exact_rm_F
 
@@ -106,12 +107,18 @@ def test_a_claim_has_the_arguments_of_its_check_and_no_others() -> None:
     for model in union:
         kind = model.model_fields["kind"].annotation.__args__[0]
         if kind in CHECKS:
-            names = set(model.model_fields) - model.not_arguments
+            names = set(model.model_fields) - set(Claim.model_fields) - {"kind"}
             assert names == set(inspect.signature(CHECKS[kind]).parameters), kind
 
 
 def test_every_check_names_its_source() -> None:
     assert all("Source" in (check.__doc__ or "") for check in CHECKS.values())
+
+
+def written(folder: Path, text: str) -> Path:
+    path = folder / "some.toml"
+    path.write_text(text, encoding="utf-8")
+    return path
 
 
 @pytest.mark.parametrize(
@@ -125,20 +132,21 @@ def test_every_check_names_its_source() -> None:
         ('kind = "grim"\nmean = "5.2"\nn = 28\nextra = 1', "extra"),
     ],
 )
-def test_a_fault_is_named_with_its_key(claim: str, message: str) -> None:
+def test_a_fault_is_named_with_its_key(claim: str, message: str, tmp_path: Path) -> None:
     with pytest.raises(ConfigError, match=message) as error:
-        parse_paper(f'[[claims]]\nplace = "I"\nquote = "x"\n{claim}', "some.toml")
-    assert str(error.value).startswith("some.toml:1: claims.0")
+        load_paper_file(written(tmp_path, f'[[claims]]\nplace = "I"\nquote = "x"\n{claim}'))
+    assert str(error.value).startswith(f"{tmp_path / 'some.toml'}:1: claims.0")
 
 
-def test_a_claim_that_makes_no_sense_is_named_by_its_place() -> None:
-    paper = parse_paper('[[claims]]\nplace = "II"\nquote = "x"\nkind = "percent"\npercent = "50%"\ncount = 3\nn = 2')
+def test_a_claim_that_makes_no_sense_is_named_by_its_place(tmp_path: Path) -> None:
+    claim = 'place = "II"\nquote = "x"\nkind = "percent"\npercent = "50%"\ncount = 3\nn = 2'
+    paper = load_paper_file(written(tmp_path, f"[[claims]]\n{claim}"))
     with pytest.raises(ValueError, match=r"II, “x”: count must lie in 0\.\.2"):
         audit(paper)
 
 
-def test_what_is_no_toml_or_no_file_is_said() -> None:
+def test_what_is_no_toml_or_no_file_is_said(tmp_path: Path) -> None:
     with pytest.raises(ConfigError, match="not TOML"):
-        parse_paper("a = ")
+        load_paper_file(written(tmp_path, "a = "))
     with pytest.raises(ConfigError, match="cannot be read"):
         load_paper_file("nowhere.toml")

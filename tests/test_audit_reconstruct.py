@@ -11,12 +11,18 @@ import numpy as np
 import pytest
 
 from analysis import rm_anova, rm_tukey_hsd
-from analysis.paper.audit import repeated_f
-from analysis.paper.audit.annealing import ColumnOrder
 from analysis.paper.audit.means import scale_of
 from analysis.paper.audit.participants import attainable_f, backward_counts, forward_counts, rating_grains
 from analysis.paper.audit.printed import Interval, read_printed
-from analysis.paper.audit.reconstruct import ConditionColumn, Constraints, meets, printed_constraints, reconstruct
+from analysis.paper.audit.reconstruct import (
+    ColumnOrder,
+    ConditionColumn,
+    Constraints,
+    meets,
+    printed_constraints,
+    reconstruct,
+)
+from analysis.paper.audit.variance_ratios import repeated_f
 from analysis.paper.paper import Paper, load_paper
 from analysis.stats.binomial import binomial_test
 from tests.exact import exact_rm_F

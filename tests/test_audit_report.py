@@ -9,11 +9,23 @@ from pathlib import Path
 
 import pytest
 
-from analysis.paper.audit import audit, binomial_p, debit, degrees_of_freedom, grim, grimmer, load_paper_file
-from analysis.paper.audit.page import counts, findings_json, findings_text, sections
-from analysis.paper.audit.run import AuditFinding
-from analysis.paper.audit.sentences import ELSEWHERE, nearest_text, other_rows, predictions, sentences
-from analysis.paper.audit.words import CheckResult
+from analysis.paper.audit.claims import AuditFinding
+from analysis.paper.audit.freedom import degrees_of_freedom
+from analysis.paper.audit.means import debit, grim, grimmer
+from analysis.paper.audit.p_values import binomial_p
+from analysis.paper.audit.page import (
+    ELSEWHERE,
+    counts,
+    findings_json,
+    findings_text,
+    nearest_text,
+    other_rows,
+    predictions,
+    sections,
+    sentences,
+)
+from analysis.paper.audit.printed import CheckResult
+from analysis.paper.audit.run import audit, load_paper_file
 from tests.conftest import Recoil
 
 CONFIGS = Path(__file__).parent.parent / "configs"

@@ -10,22 +10,30 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from analysis.paper.audit import (
-    Rounding,
-    Term,
-    between_f,
-    binomial_p,
-    grimmer,
-    p_against_statistic,
-    read_printed,
-    repeated_f,
-    total,
+from analysis.paper.audit.freedom import Term, total
+from analysis.paper.audit.lattices import (
+    BudgetError,
+    effect,
+    find_groups,
+    find_rows,
+    numbers_with_sums,
+    ratio,
+    search_rows,
+    within_rows,
 )
-from analysis.paper.audit.lattices import Levels, effect, find_groups, find_rows, ratio, search_rows, within_rows
-from analysis.paper.audit.p_values import p_bounds
-from analysis.paper.audit.power_sums import BudgetError, numbers_with_sums
-from analysis.paper.audit.printed import Interval, decimal
-from analysis.paper.audit.words import NONE_EXISTS, UNKNOWN, DataExistence, judge_readings
+from analysis.paper.audit.means import grimmer
+from analysis.paper.audit.p_values import binomial_p, p_against_statistic, p_bounds
+from analysis.paper.audit.printed import (
+    NONE_EXISTS,
+    UNKNOWN,
+    DataExistence,
+    Interval,
+    Rounding,
+    decimal,
+    judge_readings,
+    read_printed,
+)
+from analysis.paper.audit.variance_ratios import between_f, repeated_f
 from tests.exact import exact_rm_F
 
 
@@ -109,11 +117,11 @@ def test_the_identity_of_the_repeated_lattice_holds() -> None:
 
 
 def test_rows_found_have_the_sums_asked_for() -> None:
-    rows = search_rows((78, 111, 130), 14, range(432, 433), Levels(10))
+    rows = search_rows((78, 111, 130), 14, range(432, 433), 10)
     assert rows is not None
     assert tuple(map(sum, zip(*rows, strict=True))) == (78, 111, 130)
     assert within_rows(rows) == 432
-    assert find_rows((3, 3), 2, range(1, 2), Levels(2)) is False  # W is even with T
+    assert find_rows((3, 3), 2, range(1, 2), 2) is False  # W is even with T
 
 
 def test_groups_beyond_enumeration_are_found_too() -> None:

@@ -46,7 +46,7 @@ def test_every_contract_is_kept(copy: Path) -> None:
         ("device/limits.py", "import experiments.clock", "Three floors and a roof"),
         ("experiments/session/states.py", "import analysis.stats.anova", "Three floors and a roof"),
         ("experiments/session/remarks.py", "import experiments.record.journal", "The rooms of the lab"),
-        ("analysis/stats/anova.py", "import analysis.logs.files", "The rooms of the desk"),
+        ("analysis/stats/anova.py", "import analysis.logs.reading", "The rooms of the desk"),
         ("experiments/record/storage.py", "import experiments.record.journal", "No circle"),
         ("analysis/stats/binomial.py", "import time", "Pure rooms touch neither files nor clock, line nor process"),
         ("device/physics/shot.py", "import os", "Pure rooms touch neither files nor clock, line nor process"),

@@ -12,9 +12,9 @@ from hypothesis import strategies as st
 from scipy.integrate import quad
 
 from analysis.times import first_passage, trade
-from analysis.times.ez import ez, ez_from_summary
 from analysis.times.first_passage import distribution, log_density, moments, with_slopes
 from analysis.times.own_trials import own_times
+from analysis.times.trade import ez, ez_from_summary
 from experiments.design.streams import generator
 from tests.decisions import decide_all, reference
 

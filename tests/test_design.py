@@ -15,7 +15,7 @@ from typing import Any
 import pytest
 
 from analysis.predict.design_search import run as feature
-from analysis.predict.design_search.critical import rate_at
+from analysis.predict.design_search.choice import rate_at
 from analysis.predict.design_search.space import axis, make_space, span
 from analysis.predict.fit.percept_model import PAPER_RATES
 from analysis.report.serial import plain

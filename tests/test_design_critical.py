@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from analysis.predict.design_search.critical import (
+from analysis.predict.design_search.choice import (
     THRESHOLD_SHARE,
     Contour,
     band_of,
@@ -17,8 +17,7 @@ from analysis.predict.design_search.critical import (
     drawn_contours,
     rate_at,
 )
-from analysis.predict.design_search.shots import Layer, layers, rows_of, simulate_rows
-from analysis.predict.design_search.space import DesignRequest, Space, make_space
+from analysis.predict.design_search.space import DesignRequest, Layer, Space, layers, make_space, rows_of, simulate_rows
 from analysis.predict.fit.percept_model import PAPER_RATES, PerceptFit, fit_percept, predicted_rate
 from analysis.predict.jobs import on_processes
 from analysis.stats.arrays import FloatArray
@@ -73,8 +72,8 @@ def test_the_contour_lies_in_its_band(contour: Contour) -> None:
     band = contour.band
     assert (band.low_V[some] < contour.voltage_V[some]).all()
     assert (contour.voltage_V[some] < band.high_V[some]).all()
-    assert (band.low_V[some] <= band.alone_low_V[some]).all()
-    assert (band.alone_high_V[some] <= band.high_V[some]).all()
+    assert (band.low_V[some] <= band.each_friction_low_V[some]).all()
+    assert (band.each_friction_high_V[some] <= band.high_V[some]).all()
 
 
 def test_a_surer_fit_has_a_narrower_band(contour: Contour, layer: Layer, fit: PerceptFit) -> None:
@@ -109,7 +108,7 @@ def test_95_percent_of_the_contours_lie_wholly_in_the_band() -> None:
     drawn = curves(2000, 12)
     band = band_of(drawn)
     wholly = ((drawn >= band.low_V) & (drawn <= band.high_V)).all(axis=1).mean()
-    alone = ((drawn >= band.alone_low_V) & (drawn <= band.alone_high_V)).all(axis=1).mean()
+    alone = ((drawn >= band.each_friction_low_V) & (drawn <= band.each_friction_high_V)).all(axis=1).mean()
     assert 0.95 <= wholly < 0.965
     assert alone < 0.93  # the quantiles of each place alone would claim too much
 

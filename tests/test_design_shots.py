@@ -11,10 +11,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from analysis.predict.design_search import shots as design_shots
-from analysis.predict.design_search.critical import both_ways
-from analysis.predict.design_search.rates import evidences, logits, predict, rates
-from analysis.predict.design_search.shots import COIL_POINTS, FREE_POINTS, FrictionRow, shot_percepts, shots, summarised
+from analysis.predict.design_search import space as design_shots
+from analysis.predict.design_search.choice import both_ways, evidences, logits, predict, rates
+from analysis.predict.design_search.space import COIL_POINTS, FREE_POINTS, FrictionRow, shot_percepts, shots, summarised
 from analysis.predict.fit.percept_model import PAPER_RATES, fit_percept, predicted_rate
 from device.limits import (
     BEYOND_DUTY,

@@ -74,7 +74,7 @@ from experiments.session.steps import (
     step_record,
 )
 from experiments.study.folders import PlaceError
-from recoil.doctor import examination_text
+from recoil.rig import examination_text
 from tests.conftest import RECOIL, Recoil
 from tests.kills import can_mount, in_small_disk
 from tests.waiting import PATIENCE_S

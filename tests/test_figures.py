@@ -4,6 +4,7 @@ import math
 import re
 import subprocess
 import sys
+from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 
@@ -14,13 +15,12 @@ from matplotlib.figure import Figure
 from matplotlib.text import Text
 
 from analysis.logs.reading import read_logs
+from analysis.report.figures import style
 from analysis.report.figures.shot import ShotPanel, figure_5
 from analysis.report.figures.style import display_name, stars
 from analysis.stats.cells import ByParticipant
-from analysis.summary.figures import directions, results
-from analysis.summary.figures.directions import figure_directions
-from analysis.summary.figures.results import figure_8
-from analysis.summary.figures.times import figure_response_times
+from analysis.summary.figures.results import figure_8, figure_directions
+from analysis.summary.figures.trade import figure_response_times
 from analysis.summary.results import Scores, StudyStatistics
 from analysis.summary.summary import summarize
 from tests.log_files import rating_rows, ratings_path, write_rows, write_study
@@ -39,8 +39,14 @@ def _png_size(path: Path) -> tuple[int, int]:
     return int.from_bytes(header[16:20], "big"), int.from_bytes(header[20:24], "big")
 
 
+def files_of(draw: Callable[..., None], what: object, stem: Path) -> list[Path]:
+    """The files of a figure, drawn."""
+    draw(what, stem)
+    return [stem.with_name(f"{stem.name}.{kind}") for kind in ("png", "svg", "pdf")]
+
+
 def test_figure_5_is_written_as_png_svg_and_pdf_and_names_the_stages(tmp_path: Path) -> None:
-    png, svg, pdf = figure_5([shot_panel(), shot_panel(0.05)], tmp_path / "new" / "figure-5")
+    png, svg, pdf = files_of(figure_5, [shot_panel(), shot_panel(0.05)], tmp_path / "new" / "figure-5")
     assert _png_size(png) == (1800, 1480)  # 9.0 x 7.4 inches at 200 dpi
     assert pdf.read_bytes().startswith(b"%PDF-")
     text = svg.read_text(encoding="utf-8")
@@ -50,7 +56,7 @@ def test_figure_5_is_written_as_png_svg_and_pdf_and_names_the_stages(tmp_path: P
 
 @pytest.mark.parametrize("landing_s", [0.15, np.nan])
 def test_a_shot_that_does_not_come_home_is_drawn_without_a_collision(landing_s: float, tmp_path: Path) -> None:
-    _, svg, _ = figure_5([shot_panel(np.nan if np.isnan(landing_s) else 1.0, landing_s)], tmp_path / "shot")
+    _, svg, _ = files_of(figure_5, [shot_panel(np.nan if np.isnan(landing_s) else 1.0, landing_s)], tmp_path / "shot")
     assert ("collision" in svg.read_text(encoding="utf-8")) is not np.isnan(landing_s)
 
 
@@ -70,7 +76,7 @@ def still_panel() -> ShotPanel:
 
 
 def test_a_magnet_that_never_moved_is_at_rest_and_the_figure_says_why(tmp_path: Path) -> None:
-    _, svg, _ = figure_5([still_panel()], tmp_path / "shot")
+    _, svg, _ = files_of(figure_5, [still_panel()], tmp_path / "shot")
     text = svg.read_text(encoding="utf-8")
     assert "at rest" in text
     assert "no break away" in text
@@ -78,7 +84,7 @@ def test_a_magnet_that_never_moved_is_at_rest_and_the_figure_says_why(tmp_path: 
 
 
 def test_a_shot_that_stuck_ends_in_its_resetting_stage(tmp_path: Path) -> None:
-    _, svg, _ = figure_5([replace(shot_panel(np.nan, np.nan), status="stuck")], tmp_path / "shot")
+    _, svg, _ = files_of(figure_5, [replace(shot_panel(np.nan, np.nan), status="stuck")], tmp_path / "shot")
     text = svg.read_text(encoding="utf-8")
     assert "stuck" in text
     assert "resetting" in text
@@ -90,13 +96,13 @@ def test_time_is_logarithmic_where_a_stage_would_be_too_narrow_to_see(
     last_s: float, logarithmic: bool, tmp_path: Path
 ) -> None:
     panel = shot_panel()
-    _, svg, _ = figure_5([replace(panel, time_s=panel.time_s * last_s / 0.25)], tmp_path / "shot")
+    _, svg, _ = files_of(figure_5, [replace(panel, time_s=panel.time_s * last_s / 0.25)], tmp_path / "shot")
     assert ("$\\mathdefault{10^{2}}$" in svg.read_text(encoding="utf-8")) is logarithmic
 
 
 def test_figure_8_shows_both_experiments_or_the_one_there_is(statistics: StudyStatistics, tmp_path: Path) -> None:
-    both, both_svg, _ = figure_8(statistics, tmp_path / "both")
-    one, *_ = figure_8(replace(statistics, direction=None), tmp_path / "one")
+    both, both_svg, _ = files_of(figure_8, statistics, tmp_path / "both")
+    one, *_ = files_of(figure_8, replace(statistics, direction=None), tmp_path / "one")
     assert _png_size(both)[0] > 1.7 * _png_size(one)[0]
     text = both_svg.read_text(encoding="utf-8")
     for words in ("correct rate, forward [%]", "rating (0 dislike", "Force II", "6 synthetic participants", "chance"):
@@ -107,12 +113,9 @@ def test_figure_8_shows_both_experiments_or_the_one_there_is(statistics: StudySt
 def test_nothing_that_is_written_in_a_figure_touches_its_neighbour(
     statistics: StudyStatistics, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    for module, draw, found in (
-        (results, figure_8, statistics),
-        (directions, figure_directions, statistics.direction),
-    ):
+    for draw, found in ((figure_8, statistics), (figure_directions, statistics.direction)):
         drawn: list[Figure] = []
-        monkeypatch.setattr(module, "save", lambda figure, _, drawn=drawn: drawn.append(figure))
+        monkeypatch.setattr(style, "save", lambda figure, _, drawn=drawn: drawn.append(figure))
         draw(found, tmp_path / "never")
         (figure,) = drawn
         canvas = FigureCanvasAgg(figure)
@@ -128,10 +131,10 @@ def test_nothing_that_is_written_in_a_figure_touches_its_neighbour(
 
 def test_figures_are_the_same_bytes_each_time(statistics: StudyStatistics, tmp_path: Path) -> None:
     for first, second in (
-        (figure_5([shot_panel()], tmp_path / "a"), figure_5([shot_panel()], tmp_path / "b")),
-        (figure_8(statistics, tmp_path / "c"), figure_8(statistics, tmp_path / "d")),
+        (files_of(figure_5, [shot_panel()], tmp_path / "a"), files_of(figure_5, [shot_panel()], tmp_path / "b")),
+        (files_of(figure_8, statistics, tmp_path / "c"), files_of(figure_8, statistics, tmp_path / "d")),
         *(
-            (draw(statistics.direction, tmp_path / "e"), draw(statistics.direction, tmp_path / "f"))
+            (files_of(draw, statistics.direction, tmp_path / "e"), files_of(draw, statistics.direction, tmp_path / "f"))
             for draw in (figure_directions, figure_response_times)
         ),
     ):
@@ -144,7 +147,7 @@ def test_figures_are_the_same_bytes_each_time(statistics: StudyStatistics, tmp_p
 def test_the_directions_are_shown_against_chance_with_sensitivity_and_criterion(
     statistics: StudyStatistics, tmp_path: Path
 ) -> None:
-    _, svg, _ = figure_directions(statistics.direction, tmp_path / "directions")
+    _, svg, _ = files_of(figure_directions, statistics.direction, tmp_path / "directions")
     text = svg.read_text(encoding="utf-8")
     for words in ("forward shots", "backward shots", "chance", "d′", "possible", "(c) Criterion", "no bias"):
         assert f"<!-- {words}" in text or words in text
@@ -159,7 +162,7 @@ def test_without_backward_shots_there_is_no_sensitivity_to_draw(statistics: Stud
         sensitivity=dict.fromkeys(found.methods),
         binomial={method: {"forward": tests["forward"]} for method, tests in found.binomial.items()},
     )
-    _, svg, _ = figure_directions(bare, tmp_path / "forward")
+    _, svg, _ = files_of(figure_directions, bare, tmp_path / "forward")
     assert "(b)" not in svg.read_text(encoding="utf-8")
 
 
@@ -171,7 +174,7 @@ def test_response_times_say_how_many_and_cut_a_single_slow_one(statistics: Study
     slow = replace(one, percentiles=(*one.percentiles[:100], 41.3))
     times = replace(times, methods={**times.methods, "vibration": slow})
     found = replace(statistics.direction, response_times=times)
-    _, svg, _ = figure_response_times(found, tmp_path / "times")
+    _, svg, _ = files_of(figure_response_times, found, tmp_path / "times")
     text = svg.read_text(encoding="utf-8")
     for words in ("n = 60 / 60", "Vibration (n = 120)", "the slowest took 41.3 s"):
         assert words in text
@@ -191,7 +194,7 @@ def test_beyond_200_people_their_distribution_is_drawn_instead_of_each(
     one = statistics.preference
     assert one is not None
     crowd = replace(one, n=people, participants=crowd_of(one.participants, people))
-    _, svg, _ = figure_8(StudyStatistics(preference=crowd), tmp_path / "crowd")
+    _, svg, _ = files_of(figure_8, StudyStatistics(preference=crowd), tmp_path / "crowd")
     text = svg.read_text(encoding="utf-8")
     assert (text.count("<use ") > 3 * 200) is (people <= 200)
 
@@ -201,7 +204,7 @@ def test_an_undefined_comparison_gets_no_bracket(statistics: StudyStatistics, tm
     assert one is not None
     assert one.tukey is not None
     undefined = replace(one, tukey=tuple(replace(pair, p=math.nan) for pair in one.tukey))
-    _, svg, _ = figure_8(StudyStatistics(preference=undefined), tmp_path / "undefined")
+    _, svg, _ = files_of(figure_8, StudyStatistics(preference=undefined), tmp_path / "undefined")
     assert "n.s." not in svg.read_text(encoding="utf-8")
 
 

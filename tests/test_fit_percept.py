@@ -16,12 +16,19 @@ import pytest
 from scipy import stats
 
 from analysis.paper.paper import load_paper
-from analysis.predict.fit.percept import percept
+from analysis.predict.fit.percept import config_text, percept, verdict_sentence
 from analysis.predict.fit.percept_model import PAPER_RATES, PAPER_TRIALS
-from analysis.predict.fit.percept_request import ASSUMED_SPREAD, PerceptRequest, read_request
 from analysis.predict.fit.percept_results import FittedPercept
-from analysis.predict.fit.percept_sections import config_text, verdict_sentence
-from analysis.predict.fit.studies import Case, Judged, cases_of, judge, place_of
+from analysis.predict.fit.studies import (
+    ASSUMED_SPREAD,
+    Case,
+    Judged,
+    PerceptRequest,
+    cases_of,
+    judge,
+    place_of,
+    read_request,
+)
 from analysis.report.serial import plain
 from device.methods import paper_methods
 from experiments.config.door import ConfigError

@@ -15,10 +15,9 @@ from hypothesis import strategies as st
 
 from analysis.logs import reading
 from analysis.logs.files import BadLogError, find_logs
-from analysis.logs.frames import joined
 from analysis.logs.reading import read_logs
 from analysis.logs.rules import check_logs
-from analysis.logs.texts import TEXT, TextTable, arrow_tables, csv_tables, decimals, records, text_tables
+from analysis.logs.texts import TEXT, TextTable, arrow_tables, csv_tables, decimals, joined, records, text_tables
 from experiments.record import tables
 from tests.log_files import TextRow, rating_rows, trial_rows, trials_path, write_rows, write_study
 from tests.plain_rules import Table, check_table

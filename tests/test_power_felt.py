@@ -10,9 +10,8 @@ import numpy as np
 import pytest
 from scipy import stats
 
-from analysis.predict.power.grid import PowerRequest, make_grid
+from analysis.predict.power.grid import PowerRequest, make_grid, run_chunk
 from analysis.predict.power.planned import ANOVA, ANY_PAIR, merged, shares
-from analysis.predict.power.studies import run_chunk
 from analysis.predict.synthetic_studies import Felt, felt_counts, felt_people, percepts_of_setup
 from experiments.design.streams import generator
 from experiments.direction.config import DirectionConfig

@@ -13,7 +13,7 @@ from scipy import stats
 
 from analysis.paper.paper import load_paper
 from analysis.paper.recurrence import WHOLE_PATTERN, answers_recur, recurs, with_whole_pattern
-from analysis.predict.power.grid import PowerRequest, make_grid
+from analysis.predict.power.grid import Chunk, PowerRequest, StudyDesign, make_grid, run_chunk
 from analysis.predict.power.planned import (
     ALL_PAIRS,
     ANOVA,
@@ -27,7 +27,6 @@ from analysis.predict.power.planned import (
     shares,
     tallied,
 )
-from analysis.predict.power.studies import Chunk, StudyDesign, run_chunk
 from analysis.predict.synthetic_studies import (
     direction_counts,
     null_rates,

@@ -10,8 +10,7 @@ from scipy import stats
 
 from analysis import rm_anova, rm_tukey_hsd
 from analysis.logs.reading import read_logs
-from analysis.paper.paper import Paper, load_paper
-from analysis.paper.published import ComparisonRow, Prediction, rounds_to
+from analysis.paper.paper import ComparisonRow, Paper, Prediction, load_paper, rounds_to
 from analysis.paper.recurrence import WHOLE_PATTERN, chance_recurs, odds_of, recurs, wilson_interval
 from analysis.summary.comparison import compare
 from analysis.summary.results import DirectionStatistics, Pair, StudyStatistics

@@ -8,7 +8,7 @@ import pingouin
 import pytest
 from scipy import stats
 
-from analysis.stats.rank_tests import (
+from analysis.stats.paired import (
     ALL_TIED,
     NOTHING_TO_RANK,
     TWO_CONDITIONS,

@@ -9,11 +9,12 @@ import numpy as np
 import pytest
 
 from analysis.logs.exclusions import LeftOut
-from analysis.logs.reading import Logs, Problem, read_logs
+from analysis.logs.files import Problem
+from analysis.logs.reading import Logs, read_logs
 from analysis.paper.paper import Paper, load_paper
 from analysis.paper.recurrence import odds_of
 from analysis.summary.comparison import compare
-from analysis.summary.sections.data import ReportData
+from analysis.summary.sections.content import ReportData
 from analysis.summary.sections.sections import write_report
 from analysis.summary.summary import summarize
 from tests.log_files import trial_rows, trials_path, write_rows, write_study

@@ -7,7 +7,7 @@ import pytest
 
 from analysis.logs.reading import read_logs
 from analysis.summary.summary import summarize
-from analysis.times.response_times import ResponseTimes, response_times
+from analysis.times.own_trials import ResponseTimes, response_times
 from tests.log_files import METHODS, TextRow, trial_rows, trials_path, write_rows
 
 

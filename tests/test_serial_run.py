@@ -13,8 +13,8 @@ from experiments.record.journal import read_journal
 from experiments.record.replay import history
 from experiments.session.steps import Failed
 from experiments.study.folders import PlaceError
+from recoil.rig import troubles_of
 from recoil.session import check_pace
-from recoil.twin import troubles_of
 from tests.serial_runs import SPEED, TROUBLES, check, hasty, of_trains, one_run, resumed, rows, run_all, timings_of
 from tests.twins import Troubles, a_twin
 from tests.waiting import PATIENCE_S, wait_for

@@ -11,9 +11,12 @@ from pathlib import Path
 
 import pytest
 
-from analysis.paper.audit import CheckResult, audit, debit, grim, grimmer, load_paper_file, p_against_statistic
+from analysis.paper.audit.means import debit, grim, grimmer
+from analysis.paper.audit.p_values import p_against_statistic
 from analysis.paper.audit.participants import forward_counts, rating_grains
+from analysis.paper.audit.printed import CheckResult
 from analysis.paper.audit.reconstruct import meets, reconstruct
+from analysis.paper.audit.run import audit, load_paper_file
 from analysis.paper.paper import load_paper
 from tests import brute_force as brute
 from tests import golden_audit as golden

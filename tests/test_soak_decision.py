@@ -13,8 +13,8 @@ import pytest
 from scipy.stats import kstwo
 
 from analysis.times.first_passage import distribution, log_density, moments
-from analysis.times.fit import DiffusionFit, fit
-from analysis.times.people import PeopleFit, fit_people
+from analysis.times.fit import DiffusionFit, Estimate, fit
+from analysis.times.people import MeanEstimate, PeopleFit, fit_people
 from experiments.design.streams import generator
 from experiments.synthetic.diffusion import Diffusion, upper_probabilities
 from tests.conftest import Soak
@@ -124,6 +124,10 @@ def failed(found: DiffusionFit | PeopleFit) -> bool:
     return bool(found.left_out) if isinstance(found, PeopleFit) else found.reason is not None
 
 
+def estimate(found: DiffusionFit | PeopleFit, name: str) -> Estimate | MeanEstimate:
+    return found[name] if isinstance(found, DiffusionFit) else {mean.name: mean for mean in found.means}[name]
+
+
 @cache
 def recovered(case: str, times: int) -> tuple[list[DiffusionFit | PeopleFit], float]:
     begun = time.perf_counter()
@@ -135,7 +139,7 @@ def rows(case: str, times: int) -> Iterator[tuple[str, float, float, float, floa
     fits, _ = recovered(case, times)
     truth = TRUTH | ({"lapse": 0.02} if case == "lapsing" else {})
     for name, true in truth.items():
-        found = [one[name] for one in fits]
+        found = [estimate(one, name) for one in fits]
         told = [e for e in found if math.isfinite(e.se)]
         values = np.array([e.value for e in found])
         covered = np.mean([e.ci_low <= true <= e.ci_high for e in told]) if told else math.nan
@@ -183,7 +187,7 @@ def test_one_person_alone(soak: Soak) -> None:
     fits = [fit(made(5000 + number, people=1)) for number in range(SETS)]
     seconds = time.perf_counter() - begun
     for name, true in TRUTH.items():
-        found = [one[name] for one in fits]
+        found = [estimate(one, name) for one in fits]
         told = [e for e in found if math.isfinite(e.se)]
         values = np.array([e.value for e in found])
         covered = float(np.mean([e.ci_low <= true <= e.ci_high for e in told]))

@@ -22,17 +22,17 @@ from analysis.summary.figures.trade import (
     has_curve,
     has_points,
 )
-from analysis.summary.sections.data import ReportData
+from analysis.summary.sections.content import ReportData
 from analysis.summary.sections.sections import write_report
 from analysis.summary.sections.trade import CONDITIONAL_ACCURACY, QUANTILE_PROBABILITY, trade_section
 from analysis.summary.summary import summarize
 from analysis.times import trade
-from analysis.times.ez import ez, ez_people
 from analysis.times.first_passage import moments
 from analysis.times.fit import fit
 from analysis.times.likelihood import trials_of
 from analysis.times.own_trials import ordered, own_trials, quantiles
 from analysis.times.people import MOST_PEOPLE, as_trials, fit_people, sampled_fit
+from analysis.times.trade import ez, ez_people
 from experiments.design.streams import generator
 from experiments.record import tables
 from tests.decisions import decide_all
@@ -178,9 +178,10 @@ def test_the_diffusion_fits_are_those_of_the_same_rows(folder: Path, found: Any)
     each, together = fit_people(trials), fit(trials, by_person=True)
     shown = found["diffusion"]
     assert (shown["people"], shown["fitted"], shown["trials"]) == (6, 6, 1080)
-    assert set(shown["each"]["estimates"]) == {mean.name for mean in each.means}
+    means = {mean.name: mean for mean in each.means}
+    assert set(shown["each"]["estimates"]) == set(means)
     for name, one in shown["each"]["estimates"].items():
-        assert [one["mean"], one["ci_low"]] == pytest.approx([each[name].value, each[name].ci_low], abs=1e-4)
+        assert [one["mean"], one["ci_low"]] == pytest.approx([means[name].value, means[name].ci_low], abs=1e-4)
     for name, one in shown["together"]["estimates"].items():
         assert [one["value"], one["ci_high"]] == pytest.approx([together[name].value, together[name].ci_high], abs=1e-4)
 
@@ -376,8 +377,10 @@ def test_whatever_the_log_there_is_a_section_and_no_nan(kind: str, people: int, 
 def test_figures_are_drawn_where_there_is_little_to_draw(kind: str, tmp_path: Path) -> None:
     write_rows(trials_path(tmp_path, "P1"), changed(trial_rows("P1", sets=2), kind))
     found = summarize(read_logs([tmp_path])).direction
-    assert all(path.is_file() for path in figure_conditional_accuracy(found, tmp_path / "curve"))
-    assert all(path.is_file() for path in figure_quantile_probability(found, tmp_path / "points"))
+    figure_conditional_accuracy(found, tmp_path / "curve")
+    figure_quantile_probability(found, tmp_path / "points")
+    kinds = ("png", "svg", "pdf")
+    assert all((tmp_path / f"{name}.{kind}").is_file() for name in ("curve", "points") for kind in kinds)
 
 
 def test_the_order_of_the_files_changes_nothing(folder: Path, found: Any, tmp_path: Path) -> None:

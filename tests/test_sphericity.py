@@ -6,8 +6,7 @@ import numpy as np
 import pytest
 
 from analysis.stats.anova import rm_anova
-from analysis.stats.diagnostics import residuals
-from analysis.stats.sphericity import NO_COVARIANCES, SINGULAR, TOO_FEW, TRIVIAL, Corrected, sphericity
+from analysis.stats.diagnostics import NO_COVARIANCES, SINGULAR, TOO_FEW, TRIVIAL, Corrected, residuals, sphericity
 from tests.made_scores import RIGHT
 
 

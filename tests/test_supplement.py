@@ -17,8 +17,7 @@ from analysis.report.serial import undefined
 from analysis.stats.paired import SCALE, jzs_paired
 from analysis.summary.results import Supplement
 from analysis.summary.sections.supplement import supplement_sections
-from analysis.summary.summary import summarize
-from analysis.summary.supplement import within_supplement
+from analysis.summary.summary import summarize, within_supplement
 from tests.log_files import METHODS, write_study
 from tests.made_scores import CEILING, ONE_AT_CEILING, RIGHT, ratings_of, study_of
 from tests.waiting import PATIENCE_S

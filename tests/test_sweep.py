@@ -11,7 +11,8 @@ import numpy as np
 import pyarrow.parquet as pq
 import pytest
 
-from analysis.predict.simulate import sweep
+from analysis.predict.simulate import run as shots
+from analysis.predict.simulate.scene import ModelRequest
 from device.physics import GunParameters, simulate
 from experiments.config.door import ConfigError
 from tests.waiting import PATIENCE_S, wait_for
@@ -25,8 +26,11 @@ def silent(_what, _total):
     yield lambda _done: None
 
 
-def asked(table, *vary, **others):
-    return sweep.SweepRequest(**{"gun": GUN, "fidelity": "full", "vary": vary, "changes": (), "table": table} | others)
+def swept(table, *vary, fidelity="full", **others):
+    usual = {"gun": "gun", "method": None, "changes": (), "trace": None, "plot": None, "audit": False, "hand": None}
+    usual |= {"contact_stiffness_N_m": None, "vary": vary, "table": table, "yes": False}
+    model = ModelRequest(fidelity=fidelity, scene=None, needs=())
+    return shots.sweep(shots.SimulateRequest(**usual | {"model": model} | others), GUN, silent, lambda _note: None)
 
 
 def rows_of(path):
@@ -36,7 +40,7 @@ def rows_of(path):
 
 def test_every_combination_is_shot_the_last_parameter_fastest(tmp_path):
     table = tmp_path / "shots.csv"
-    found = sweep.sweep(asked(table, "friction_N=0.21:1.12:2", "drive_off=open,shorted", "voltage_V=12,16,20"), silent)
+    found = swept(table, "friction_N=0.21:1.12:2", "drive_off=open,shorted", "voltage_V=12,16,20")
     rows = rows_of(table)
     assert found.rows == len(rows) == 12
     assert [row["voltage_V"] for row in rows[:4]] == ["12", "16", "20", "12"]
@@ -53,7 +57,7 @@ def test_every_combination_is_shot_the_last_parameter_fastest(tmp_path):
 def test_parquet_and_csv_hold_the_same(tmp_path):
     words = ("friction_N=0.2,1.7", "emf=printed,reciprocal")
     for name in ("a.csv", "b.parquet"):
-        sweep.sweep(asked(tmp_path / name, *words), silent)
+        swept(tmp_path / name, *words)
     table = pq.read_table(tmp_path / "b.parquet").to_pylist()
     for one, other in zip(rows_of(tmp_path / "a.csv"), table, strict=True):
         assert list(one) == list(other)
@@ -64,7 +68,7 @@ def test_parquet_and_csv_hold_the_same(tmp_path):
 
 def test_what_was_not_reached_is_missing_and_statuses_are_words(tmp_path):
     table = tmp_path / "b.parquet"
-    found = sweep.sweep(asked(table, "friction_N=0.21,1.7,1000"), silent)
+    found = swept(table, "friction_N=0.21,1.7,1000")
     assert found.statuses == {"home": 1, "no-break-away": 1, "stuck": 1}
     columns = pq.read_table(table).to_pydict()
     assert columns["status"] == ["home", "stuck", "no-break-away"]
@@ -74,7 +78,7 @@ def test_what_was_not_reached_is_missing_and_statuses_are_words(tmp_path):
 
 def test_a_table_says_where_it_comes_from(tmp_path):
     for name in ("a.csv", "b.parquet"):
-        sweep.sweep(asked(tmp_path / name, "friction_N=0.2,0.3", fidelity="no-inductance"), silent)
+        swept(tmp_path / name, "friction_N=0.2,0.3", fidelity="no-inductance")
     beside = json.loads((tmp_path / "a.csv.json").read_text())
     inside = json.loads(pq.read_schema(tmp_path / "b.parquet").metadata[b"recoil"])
     assert beside == inside
@@ -87,25 +91,25 @@ def test_a_table_says_where_it_comes_from(tmp_path):
 
 def test_blocks_make_the_table_of_one_piece(tmp_path, monkeypatch):
     words = ("friction_N=0.1:1.2:7", "voltage_V=12:24:5")
-    sweep.sweep(asked(tmp_path / "whole.csv", *words), silent)
-    monkeypatch.setattr(sweep, "_BLOCK", 4)
-    monkeypatch.setattr(sweep, "_GROUP", 10)
-    sweep.sweep(asked(tmp_path / "pieces.csv", *words), silent)
+    swept(tmp_path / "whole.csv", *words)
+    monkeypatch.setattr(shots, "_BLOCK", 4)
+    monkeypatch.setattr(shots, "_GROUP", 10)
+    swept(tmp_path / "pieces.csv", *words)
     assert (tmp_path / "pieces.csv").read_bytes() == (tmp_path / "whole.csv").read_bytes()
-    sweep.sweep(asked(tmp_path / "pieces.parquet", *words), silent)
+    swept(tmp_path / "pieces.parquet", *words)
     assert pq.ParquetFile(tmp_path / "pieces.parquet").num_row_groups == 3
 
 
 def test_without_the_compiler_the_numbers_are_the_same_and_it_is_said(tmp_path, monkeypatch):
     from device.physics import batch
 
-    sweep.sweep(asked(tmp_path / "fast.parquet", "friction_N=0.1:1.2:5"), silent)
-    for module in (sweep, batch):
+    swept(tmp_path / "fast.parquet", "friction_N=0.1:1.2:5")
+    for module in (shots, batch):
         monkeypatch.setattr(module, "find_spec", lambda _name: None)
-    sweep.sweep(asked(tmp_path / "slow.parquet", "friction_N=0.1:1.2:5"), silent)
+    swept(tmp_path / "slow.parquet", "friction_N=0.1:1.2:5")
     fast, slow = (pq.read_table(tmp_path / f"{name}.parquet").to_pydict() for name in ("fast", "slow"))
     assert slow["impact_speed_m_s"] == pytest.approx(fast["impact_speed_m_s"], rel=1e-12)
-    assert "recoil[fast]" in sweep.interpreted_note()
+    assert "recoil[fast]" in shots.interpreted_note()
 
 
 @pytest.mark.parametrize(
@@ -119,7 +123,7 @@ def test_without_the_compiler_the_numbers_are_the_same_and_it_is_said(tmp_path, 
     ],
 )
 def test_values_are_ranges_logarithmic_ranges_or_lists(words, values):
-    found = sweep.axis_of(words, GUN).values.tolist()
+    found = shots.axis_of(words, GUN).values.tolist()
     assert found == (pytest.approx(values, rel=1e-14) if words[0] != "e" else values)
 
 
@@ -146,7 +150,7 @@ def test_values_are_ranges_logarithmic_ranges_or_lists(words, values):
 )
 def test_values_that_make_no_sense_are_refused(words, said):
     with pytest.raises(ConfigError, match=said) as raised:
-        sweep.axis_of(words, GUN)
+        shots.axis_of(words, GUN)
     assert f"--vary {words}" in str(raised.value)
 
 
@@ -157,29 +161,28 @@ def test_values_that_make_no_sense_are_refused(words, said):
         ({"table": None}, "go together"),
         ({"table": "shots.xlsx"}, "must end with"),
         ({"fidelity": "perfect"}, "--fidelity perfect"),
-        ({"instead": ("--audit",)}, "--audit tells of a single one"),
+        ({"audit": True}, "--audit tells of a single one"),
         ({"changes": ("friction_N=1",)}, "set or varied twice"),
         ({"vary": ("friction_N=1,2", "friction_N=3,4")}, "set or varied twice"),
         ({"vary": ("friction_N=1:2:4000", "voltage_V=1:2:4000")}, "16,000,000 shots; more than 10,000,000 need --yes"),
     ],
 )
 def test_a_table_that_makes_no_sense_is_refused_before_it_is_begun(tmp_path, changed, said):
-    request = asked(tmp_path / "shots.csv", "friction_N=0.1,0.2")
-    values = {name: getattr(request, name) for name in sweep.SweepRequest.__slots__} | changed
+    values = {"table": tmp_path / "shots.csv", "vary": ("friction_N=0.1,0.2",)} | changed
     if isinstance(values["table"], str):
         values["table"] = tmp_path / values["table"]
     with pytest.raises(ConfigError, match=said):
-        sweep.sweep(sweep.SweepRequest(**values), silent)
+        swept(values.pop("table"), *values.pop("vary"), **values)
     assert not list(tmp_path.iterdir())
 
 
 def test_a_table_that_fails_leaves_the_old_one(tmp_path, monkeypatch):
     table = tmp_path / "shots.csv"
-    sweep.sweep(asked(table, "friction_N=0.2,0.3"), silent)
+    swept(table, "friction_N=0.2,0.3")
     before = table.read_bytes()
-    monkeypatch.setattr(sweep, "simulate_batch", lambda *_, **__: 1 / 0)
+    monkeypatch.setattr(shots, "simulate_batch", lambda *_, **__: 1 / 0)
     with pytest.raises(ZeroDivisionError):
-        sweep.sweep(asked(table, "friction_N=0.2,0.4"), silent)
+        swept(table, "friction_N=0.2,0.4")
     assert table.read_bytes() == before
     assert sorted(path.name for path in tmp_path.iterdir()) == ["shots.csv", "shots.csv.json"]
 

@@ -12,14 +12,14 @@ from __future__ import annotations
 import json
 import re
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from datetime import UTC, datetime
 from typing import TypedDict
 
 import pandas as pd
 
-from analysis.logs.frames import Cell
 from analysis.logs.reading import Logs
+from analysis.logs.texts import Cell
 from experiments.record import tables
 from experiments.record.tables import Column
 from experiments.study.study import Member
@@ -203,7 +203,7 @@ class Runs:
     """The runs that a data set is made of, and what of the logs could not be taken over."""
 
     runs: tuple[Run, ...]
-    problems: tuple[str, ...] = field(default=())
+    problems: tuple[str, ...] = ()
 
     @property
     def by_code(self) -> dict[str, tuple[Run, ...]]:

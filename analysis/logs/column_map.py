@@ -19,6 +19,7 @@ from __future__ import annotations
 import csv
 import io
 import re
+from collections import Counter
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from typing import Annotated, Literal, Self
@@ -117,6 +118,10 @@ class Skip(Model):
             raise ValueError("give `values`, or `empty = true`")
         return self
 
+    def leaves_out(self, cell: str) -> bool:
+        """Is a row with this cell left out?"""
+        return cell in self.values or (self.empty and cell == tables.MISSING)
+
 
 class ValuesMapping(Model):
     """What cells mean."""
@@ -178,7 +183,8 @@ class _Line:
 
 def read_mapped(content: bytes, file_name: str, mapping: ColumnMap) -> list[MappedLog]:
     """The logs in a file, one a participant and study; `BadLogError` if it is no such table."""
-    lines = _wanted(_lines(content, mapping), mapping)
+    every = list(_lines(content, mapping))
+    lines = [line for line in every if not any(skip.leaves_out(line.cells[skip.column]) for skip in mapping.skip)]
     people: dict[tuple[str | None, str], list[_Line]] = {}
     for line in lines:
         study = line.cells[mapping.columns.study] if mapping.columns.study else None
@@ -245,14 +251,6 @@ def _check_header(header: list[str], mapping: ColumnMap) -> None:
             raise BadLogError(f"column {name!r} stands {header.count(name)} times in the header (rule: once)", 1, name)
 
 
-def _wanted(lines: Iterator[_Line], mapping: ColumnMap) -> list[_Line]:
-    return [line for line in lines if not any(_skips(skip, line.cells[skip.column]) for skip in mapping.skip)]
-
-
-def _skips(skip: Skip, cell: str) -> bool:
-    return cell in skip.values or (skip.empty and cell == tables.MISSING)
-
-
 def _participant(line: _Line, file_name: str, mapping: ColumnMap) -> str:
     if mapping.participant.column is not None:
         code = line.cells[mapping.participant.column]
@@ -278,11 +276,8 @@ def _records(code: str, lines: Sequence[_Line], mapping: ColumnMap) -> tuple[Csv
 
 def _common(code: str, line: _Line, mapping: ColumnMap) -> _Row:
     named = mapping.columns.model_dump(exclude_none=True)
-    row: _Row = {name: line.cells[named[name]] for name in ("session", "set", "trial") if name in named}
-    texts: _Row = {
-        name: tables.guard(line.cells[named[name]]) for name in ("flags", "note", "comment") if name in named
-    }
-    row |= texts
+    row = {name: line.cells[named[name]] for name in named if name in ("session", "set", "trial")}
+    row |= {name: tables.guard(line.cells[named[name]]) for name in named if name in ("flags", "note", "comment")}
     method = line.cells[mapping.columns.method]
     return row | {
         "participant_id": code,
@@ -295,21 +290,16 @@ def _common(code: str, line: _Line, mapping: ColumnMap) -> _Row:
 def _trial(line: _Line, mapping: ColumnMap) -> _Row:
     direction = _translated(line, "direction", mapping)
     response = _translated(line, "response", mapping)
-    time = _seconds(line, mapping)
+    time, own = _seconds(line, mapping), str(int(mapping.response_source != "experimenter"))
     return {
         "direction": direction,
         "response": response,
         "correct": str(int(response == direction)) if response else tables.MISSING,
         "response_time_s": time,
         "response_source": mapping.response_source if response else tables.MISSING,
-        "response_time_valid": _valid(mapping) if time else tables.MISSING,
+        "response_time_valid": own if time else tables.MISSING,
         "instruction": _instruction(line, mapping),
     }
-
-
-def _valid(mapping: ColumnMap) -> str:
-    """Whether a time is the answerer's own."""
-    return str(int(mapping.response_source != "experimenter"))
 
 
 def _instruction(line: _Line, mapping: ColumnMap) -> str:
@@ -357,10 +347,10 @@ def _number_in(cell: str) -> float | None:
 def _number(rows: list[_Row], mapping: ColumnMap) -> None:
     """Sessions by method, sets and trials in the order of rows, where the map names no column for them."""
     methods: dict[str, int] = {}
-    counts: dict[str, int] = {}
+    counts = Counter[str]()
     for row in rows:
         session = row.setdefault("session", str(methods.setdefault(row["method"], len(methods) + 1)))
         block = session if mapping.experiment == "direction" else ""
-        counts[block] = counts.get(block, 0) + 1
+        counts[block] += 1
         row.setdefault("trial", str(counts[block]))
         row.setdefault("set", "1")

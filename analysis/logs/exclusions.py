@@ -33,8 +33,8 @@ import pandas as pd
 from pydantic import Field, model_validator
 
 from analysis.logs.column_map import ShortText
-from analysis.logs.frames import STUDY
 from analysis.logs.reading import Logs
+from analysis.logs.texts import STUDY
 from analysis.stats.arrays import BoolArray
 from analysis.stats.cells import codes_of, places_among
 from analysis.times.own_trials import timed

@@ -41,14 +41,9 @@ class Problem:
     message: str
 
     def __str__(self) -> str:
-        place = "".join(
-            [
-                str(self.file),
-                f", line {self.line}" if self.line is not None else "",
-                f", column {self.column}" if self.column is not None else "",
-            ]
-        )
-        return f"{place}: {self.message}"
+        line = "" if self.line is None else f", line {self.line}"
+        column = "" if self.column is None else f", column {self.column}"
+        return f"{self.file}{line}{column}: {self.message}"
 
 
 def find_logs(paths: Sequence[Path], endings: tuple[str, ...] = ENDINGS) -> tuple[dict[str, str], list[Problem]]:

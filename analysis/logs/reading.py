@@ -13,9 +13,8 @@ import pandas as pd
 
 from analysis.logs.column_map import ColumnMap, MappedLog, is_recoils, read_mapped
 from analysis.logs.files import ENDINGS, BadLogError, Problem, code_in_name, find_logs, read_content, study_names
-from analysis.logs.frames import Block, joined
 from analysis.logs.rules import Log, check_logs
-from analysis.logs.texts import TextTable, table_of_records, text_tables
+from analysis.logs.texts import Block, TextTable, joined, table_of_records, text_tables
 from experiments.record import tables
 from experiments.study import register
 

@@ -17,8 +17,19 @@ import pyarrow as pa
 from numpy.typing import NDArray
 
 from analysis.logs.files import BadLogError
-from analysis.logs.frames import Block, Cell, Cells, Coded, chosen
-from analysis.logs.texts import Texts, TextTable, decimals, few, has_many_values, unguarded
+from analysis.logs.texts import (
+    Block,
+    Cell,
+    Cells,
+    Coded,
+    Texts,
+    TextTable,
+    chosen,
+    decimals,
+    few,
+    has_many_values,
+    unguarded,
+)
 from analysis.stats.arrays import BoolArray
 from experiments.record import tables
 from experiments.record.tables import Column

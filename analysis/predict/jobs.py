@@ -38,10 +38,6 @@ _SAME = ("recoil", "numpy", "scipy")
 """What workers must have in the versions of this machine, lest their numbers differ."""
 
 
-class JobError(ConfigError):
-    """Work that cannot be done where it was asked for."""
-
-
 def cores() -> int:
     """How many cores this process may use."""
     return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
@@ -51,14 +47,14 @@ def cores() -> int:
 def on_processes(workers: int) -> Iterator[RunPieces]:
     """On so many processes of their own, started anew ("spawn") so that it is the same on every system.
 
-    When interrupted, what has begun ends and nothing more begins. `JobError` if a process is killed.
+    When interrupted, what has begun ends and nothing more begins. `ConfigError` if a process is killed.
     """
     yield partial(_on_processes, workers)
 
 
 @contextmanager
 def on_cluster(address: str) -> Iterator[RunPieces]:
-    """On the workers of the Dask scheduler at `address`. `JobError` if there is none, or its workers lack Recoil."""
+    """On the workers of the Dask scheduler at `address`. `ConfigError` if there is none, or its workers lack Recoil."""
     with _cluster(address) as client:
         check_workers(client, address)
         yield partial(_on_cluster, client)
@@ -77,7 +73,7 @@ def _on_processes(workers: int, function: Function, pieces: Sequence[Any], done:
         for future in as_completed(numbers):
             done(numbers[future], future.result())
     except BrokenProcessPool as error:
-        raise JobError("a worker process was killed (too little memory?); run again with fewer --workers") from error
+        raise ConfigError("a worker process was killed (too little memory?); run again with fewer --workers") from error
     finally:  # once: leaving a `with` would shut down again, and take back that the rest is cancelled
         pool.shutdown(wait=True, cancel_futures=True)
 
@@ -138,23 +134,23 @@ def _cluster(address: str) -> Any:
     try:
         import distributed  # noqa: PLC0415 - the extra `dask`
     except ModuleNotFoundError as error:
-        raise JobError('--scheduler needs Dask: install "recoil[dask]" here and on the workers') from error
+        raise ConfigError('--scheduler needs Dask: install "recoil[dask]" here and on the workers') from error
     if not re.fullmatch(_ADDRESS, address):  # some others would be tried in vain, and long
-        raise JobError(f"--scheduler {address}: must be host and port, such as tcp://127.0.0.1:8786")
+        raise ConfigError(f"--scheduler {address}: must be host and port, such as tcp://127.0.0.1:8786")
     logging.getLogger("distributed").setLevel(logging.CRITICAL)  # the message is ours
     client: Any = distributed.Client  # it has no types
     try:
         return client(address, timeout=CONNECT_S, set_as_default=False)
     except (OSError, ValueError, TypeError) as error:
         reason = str(error).splitlines()[0] if str(error) else type(error).__name__
-        raise JobError(f"--scheduler {address}: no Dask scheduler answers there ({reason})") from error
+        raise ConfigError(f"--scheduler {address}: no Dask scheduler answers there ({reason})") from error
 
 
 def _result(future: Any) -> Any:
     try:
         return future.result()
     except Exception as error:  # a lost scheduler, a killed worker, whatever a worker raises: passed on in words
-        raise JobError(f"--scheduler: {type(error).__name__}: {error}") from error
+        raise ConfigError(f"--scheduler: {type(error).__name__}: {error}") from error
 
 
 def check_workers(client: Any, address: str) -> None:
@@ -163,11 +159,11 @@ def check_workers(client: Any, address: str) -> None:
         client.wait_for_workers(1, timeout=CONNECT_S)
         theirs = client.run(versions)
     except TimeoutError as error:
-        raise JobError(f"--scheduler {address}: has no workers; start some with `dask worker {address}`") from error
+        raise ConfigError(f"--scheduler {address}: has no workers; start some with `dask worker {address}`") from error
     except Exception as error:  # whatever a worker raises
-        raise JobError(f"--scheduler {address}: a worker cannot run Recoil {recoil_version()}: {error}") from error
+        raise ConfigError(f"--scheduler {address}: a worker cannot run Recoil {recoil_version()}: {error}") from error
     ours = versions()
     for worker, there in theirs.items():
         other = [f"{name} {there.get(name)}, not {ours[name]}" for name in _SAME if there.get(name) != ours[name]]
         if other:
-            raise JobError(f"--scheduler {address}: the worker {worker} has {'; '.join(other)}; make them the same")
+            raise ConfigError(f"--scheduler {address}: the worker {worker} has {'; '.join(other)}; make them the same")

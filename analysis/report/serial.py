@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import csv
+import io
 import json
 import math
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import fields, is_dataclass
 from typing import Any, Final
 
@@ -60,6 +62,15 @@ def undefined(value: Any, place: str = "") -> Iterator[tuple[str, float]]:
 def as_json(result: Any) -> bytes:
     """A result as the text of a JSON file."""
     return (json.dumps(plain(result), indent=1, ensure_ascii=False, allow_nan=False) + "\n").encode()
+
+
+def as_csv(header: Iterable[str], rows: Iterable[Iterable[object]]) -> bytes:
+    """A header and rows as the content of a CSV file: RFC 4180, UTF-8."""
+    text = io.StringIO(newline="")
+    writer = csv.writer(text, lineterminator="\r\n")
+    writer.writerow(header)
+    writer.writerows(rows)
+    return text.getvalue().encode()
 
 
 def _members(result: Any) -> Iterator[tuple[str, Any]]:

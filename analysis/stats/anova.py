@@ -61,18 +61,7 @@ def one_way_anova(groups: Sequence[ArrayLike]) -> Anova:
     >>> result.F, result.df_effect, result.df_error
     (21.0, 2, 6)
     """
-    sums = between_sums(check_groups(groups))
-    F, p = _f_test(sums)
-    effect, error, ms_error = _in_data_units(sums)
-    return Anova(
-        F=F,
-        df_effect=sums.df_effect,
-        df_error=sums.df_error,
-        p=p,
-        ss_effect=effect,
-        ss_error=error,
-        ms_error=ms_error,
-    )
+    return _anova(between_sums(check_groups(groups)))
 
 
 def rm_anova(scores: ArrayLike) -> RepeatedMeasuresAnova:
@@ -90,18 +79,9 @@ def rm_anova(scores: ArrayLike) -> RepeatedMeasuresAnova:
     (7.0, 2, 4)
     """
     sums = repeated_sums(check_scores(scores))
-    F, p = _f_test(sums)
-    effect, error, ms_error = _in_data_units(sums)
-    return RepeatedMeasuresAnova(
-        F=F,
-        df_effect=sums.df_effect,
-        df_error=sums.df_error,
-        p=p,
-        ss_effect=effect,
-        ss_error=error,
-        ms_error=ms_error,
-        ss_participants=float_or_array(unscaled(sums.participants, 2 * sums.exponent)),
-    )
+    found = _anova(sums)
+    people = float_or_array(unscaled(sums.participants, 2 * sums.exponent))
+    return RepeatedMeasuresAnova(**{name: getattr(found, name) for name in Anova.__slots__}, ss_participants=people)
 
 
 def check_scores(scores: ArrayLike) -> FloatArray:
@@ -128,14 +108,18 @@ def check_groups(groups: Sequence[ArrayLike]) -> list[FloatArray]:
     return arrays
 
 
-def _f_test(sums: Sums) -> tuple[Values, Values]:
+def _anova(sums: Sums) -> Anova:
+    """The F test of decomposed data, its sums of squares in the data's own units."""
     with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
         F = (sums.effect / sums.df_effect) / sums.ms_error
-    return float_or_array(F), float_or_array(special.fdtrc(sums.df_effect, sums.df_error, F))
-
-
-def _in_data_units(sums: Sums) -> tuple[Values, Values, Values]:
-    squared = 2 * sums.exponent
-    values = (sums.effect, sums.error, sums.ms_error)
-    effect, error, ms_error = (float_or_array(unscaled(value, squared)) for value in values)
-    return effect, error, ms_error
+    squares = (unscaled(value, 2 * sums.exponent) for value in (sums.effect, sums.error, sums.ms_error))
+    effect, error, ms_error = map(float_or_array, squares)
+    return Anova(
+        F=float_or_array(F),
+        df_effect=sums.df_effect,
+        df_error=sums.df_error,
+        p=float_or_array(special.fdtrc(sums.df_effect, sums.df_error, F)),
+        ss_effect=effect,
+        ss_error=error,
+        ms_error=ms_error,
+    )

@@ -67,6 +67,15 @@ def share(value: float, name: str) -> float:
     return value
 
 
+def by_row(**columns: ArrayLike) -> list[dict[str, float]]:
+    """The numbers of columns (n,) row by row, as plain floats under the columns' names.
+
+    >>> by_row(t=[1.0, 2.0], p=[0.5, 0.1])
+    [{'t': 1.0, 'p': 0.5}, {'t': 2.0, 'p': 0.1}]
+    """
+    return [dict(zip(columns, row, strict=True)) for row in np.column_stack(list(columns.values())).tolist()]
+
+
 def pingouin(name: str) -> Callable[..., Any]:
     """A function of pingouin by its name, its import silent: the deprecations in there are for its authors."""
     with warnings.catch_warnings():

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 from scipy import special
 
-from analysis.stats.arrays import FloatArray, numbers, share
+from analysis.stats.arrays import FloatArray, by_row, numbers, share
 from analysis.stats.paired import holm
 from analysis.stats.tukey import Label, pairs_of
 
@@ -193,19 +193,11 @@ def _unfit(right: FloatArray, total: FloatArray, people: int, labels: Sequence[L
 def _conditions(
     log_odds: FloatArray, covariance: FloatArray, df_and_confidence: tuple[int, float], labels: Sequence[Label]
 ) -> tuple[Odds, ...]:
-    half = _critical(*df_and_confidence) * np.sqrt(np.diag(covariance))
+    se = np.sqrt(np.diag(covariance))
+    half = _critical(*df_and_confidence) * se
     low, rate, high = (special.expit(value) for value in (log_odds - half, log_odds, log_odds + half))
-    return tuple(
-        Odds(
-            label=label,
-            rate=float(rate[j]),
-            ci_low=float(low[j]),
-            ci_high=float(high[j]),
-            log_odds=float(log_odds[j]),
-            se=float(np.sqrt(covariance[j, j])),
-        )
-        for j, label in enumerate(labels)
-    )
+    rows = by_row(rate=rate, ci_low=low, ci_high=high, log_odds=log_odds, se=se)
+    return tuple(Odds(label=label, **row) for label, row in zip(labels, rows, strict=True))
 
 
 def _contrasts(
@@ -223,21 +215,11 @@ def _contrasts(
     adjusted, critical = holm(p), _critical(*df_and_confidence)
     with np.errstate(over="ignore"):
         ratio, low, high = (np.exp(difference + sign * critical * se) for sign in (0.0, -1.0, 1.0))
+    tests = by_row(log_odds_difference=difference, se=se, t=t, p=p, p_holm=adjusted)
+    odds = by_row(odds_ratio=ratio, ci_low=low, ci_high=high)
     return tuple(
-        Contrast(
-            a=labels[a[i]],
-            b=labels[b[i]],
-            log_odds_difference=float(difference[i]),
-            se=float(se[i]),
-            t=float(t[i]),
-            df=df,
-            p=float(p[i]),
-            p_holm=float(adjusted[i]),
-            odds_ratio=float(ratio[i]),
-            ci_low=float(low[i]),
-            ci_high=float(high[i]),
-        )
-        for i in range(len(a))
+        Contrast(a=labels[i], b=labels[j], df=df, **test, **of_odds)
+        for i, j, test, of_odds in zip(a, b, tests, odds, strict=True)
     )
 
 

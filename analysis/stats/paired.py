@@ -1,17 +1,18 @@
-"""All pairs of conditions, each on its own differences: the paired t-tests, and Bayes factors."""
+"""All pairs of conditions on their own differences: paired t, Bayes factors, signed ranks; Friedman over all."""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
-from scipy import special
+from scipy import special, stats
 
 from analysis.stats.anova import check_scores
-from analysis.stats.arrays import FloatArray, numbers, pingouin, share
+from analysis.stats.arrays import FloatArray, by_row, numbers, pingouin, share
 from analysis.stats.tukey import Label, own_pairs, pairs_of
 
 SCALE = math.sqrt(2.0) / 2.0
@@ -88,22 +89,14 @@ def paired_t_tests(
     adjusted[there] = holm(p[there])
     tail = (1.0 - share(confidence, "confidence")) / 2.0
     half = -float(special.stdtrit(n - 1, tail)) * math.sqrt(2.0) * pairs.error  # the error is on the scale of q
+    low, high = pairs.difference - half, pairs.difference + half
+    rows = by_row(t=t, p=p, p_holm=adjusted, ci_low=low, ci_high=high, d_z=t / math.sqrt(n))
+    tests = [row if tested else {} for row, tested in zip(rows, there, strict=True)]
     return tuple(
         PairedT(
-            a=names[a],
-            b=names[b],
-            difference=float(pairs.difference[i]),
-            t=float(t[i]),
-            df=n - 1,
-            p=float(p[i]),
-            p_holm=float(adjusted[i]),
-            ci_low=float(pairs.difference[i] - half[i]),
-            ci_high=float(pairs.difference[i] + half[i]),
-            d_z=float(t[i]) / math.sqrt(n),
+            a=names[a], b=names[b], difference=d, df=n - 1, reason=None if test else CONSTANT if d else EQUAL, **test
         )
-        if there[i]
-        else _untested(names[a], names[b], float(pairs.difference[i]), n - 1)
-        for i, (a, b) in enumerate(pairs_of(k))
+        for (a, b), d, test in zip(pairs_of(k), pairs.difference.tolist(), tests, strict=True)
     )
 
 
@@ -123,5 +116,113 @@ def holm(p: ArrayLike) -> FloatArray:
     return adjusted
 
 
-def _untested(a: Label, b: Label, difference: float, df: int) -> PairedT:
-    return PairedT(a=a, b=b, difference=difference, df=df, reason=CONSTANT if difference else EQUAL)
+EXACT_UP_TO = 50
+TWO_CONDITIONS = "The Friedman test needs three conditions; with two, read the signed-rank test."
+ALL_TIED = "Every participant scores all conditions alike: there are no ranks to compare."
+NOTHING_TO_RANK = "The two conditions are equal in every participant: there is nothing to rank."
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Friedman:
+    """Friedman's test with the correction for ties; `kendall_w` is the agreement of the participants, 0 to 1."""
+
+    chi2: float | None = None
+    df: int | None = None
+    p: float | None = None
+    kendall_w: float | None = None
+    mean_ranks: tuple[float, ...]
+    reason: str | None = None
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class SignedRanks:
+    """One pair: `W` is the smaller sum of ranks over the `n` participants with a difference, `r` the rank-biserial.
+
+    `r` = (sum of ranks in favour of `a` - in favour of `b`) / sum of ranks. `exact`: p from all 2^n signs, not from
+    the normal approximation. `p_holm` is adjusted for all pairs.
+    """
+
+    a: Label
+    b: Label
+    n: int
+    W: float | None = None
+    p: float | None = None
+    p_holm: float | None = None
+    r: float | None = None
+    exact: bool = True
+    reason: str | None = None
+
+
+def friedman(scores: ArrayLike) -> Friedman:
+    """Friedman's test: chi2 of the rank sums over participants, corrected for ties, on k - 1 degrees of freedom.
+
+    `scores`: (n participants, k conditions); `ValueError` as in `rm_anova`. Kendall's W = chi2 / (n (k - 1)).
+    Source: Friedman 1937, J. Am. Stat. Assoc. 32, 675; Conover 1999, Practical Nonparametric Statistics, 5.8.
+    """
+    array = check_scores(scores)
+    n, k = array.shape
+    ranks = stats.rankdata(array, axis=1)
+    mean_ranks = tuple(float(rank) for rank in ranks.mean(axis=0))
+    if k < 3:
+        return Friedman(mean_ranks=mean_ranks, reason=TWO_CONDITIONS)
+    if (ranks == ranks[:1, :1]).all():
+        return Friedman(mean_ranks=mean_ranks, reason=ALL_TIED)
+    chi2, p = stats.friedmanchisquare(*array.T)
+    agreement = float(chi2) / (n * (k - 1))
+    return Friedman(chi2=float(chi2), df=k - 1, p=float(p), kendall_w=agreement, mean_ranks=mean_ranks)
+
+
+def signed_rank_tests(scores: ArrayLike, labels: Sequence[Label] | None = None) -> tuple[SignedRanks, ...]:
+    """Wilcoxon's signed-rank test of all pairs, Holm's correction over the pairs that have a p.
+
+    Differences of 0 are left out, ties get mean ranks. Up to 50 differences p is exact, ties included.
+    `scores`: (n participants, k conditions); `ValueError` as in `rm_anova`.
+    Source: Wilcoxon 1945, Biometrics Bulletin 1, 80; Holm 1979.
+    """
+    array = check_scores(scores)
+    names = range(array.shape[1]) if labels is None else labels
+    tests = [_signed_ranks(array[:, a], array[:, b], names[a], names[b]) for a, b in pairs_of(array.shape[1])]
+    adjusted = iter(holm([test.p for test in tests if test.p is not None]).tolist())
+    return tuple(test if test.p is None else replace(test, p_holm=next(adjusted)) for test in tests)
+
+
+def exact_signed_rank_p(ranks: ArrayLike, statistic: float) -> float:
+    """Two-sided p of the smaller rank sum: 2 P(sum of the ranks with a heads <= statistic), every sign a fair coin.
+
+    `ranks`: whole or half (mean ranks of ties). The 2^n sums are counted by convolution, one rank after the other.
+
+    >>> exact_signed_rank_p([1.0, 2.0, 3.0], 0.0)
+    0.25
+    """
+    doubled = np.rint(2.0 * numbers(ranks, "ranks")).astype(np.int64)
+    ways = np.zeros(int(doubled.sum()) + 1)
+    ways[0] = 1.0
+    for rank in doubled:
+        ways[rank:] = (ways[rank:] + ways[: ways.size - rank]) / 2.0
+        ways[:rank] /= 2.0
+    return min(1.0, 2.0 * float(ways[: int(np.rint(2.0 * statistic)) + 1].sum()))
+
+
+def _signed_ranks(first: FloatArray, second: FloatArray, a: Label, b: Label) -> SignedRanks:
+    difference = _tidy(first - second, float(np.abs([first, second]).max()))
+    difference = difference[difference != 0.0]
+    if not difference.size:
+        return SignedRanks(a=a, b=b, n=0, reason=NOTHING_TO_RANK)
+    ranks = stats.rankdata(np.abs(difference))
+    favour, total = float(ranks[difference > 0.0].sum()), float(ranks.sum())
+    smaller = min(favour, total - favour)
+    exact = difference.size <= EXACT_UP_TO
+    p = exact_signed_rank_p(ranks, smaller) if exact else _normal_p(difference)
+    return SignedRanks(
+        a=a, b=b, n=difference.size, W=smaller, p=float(p), r=(2.0 * favour - total) / total, exact=exact
+    )
+
+
+def _normal_p(difference: FloatArray) -> float:
+    wilcoxon: Any = stats.wilcoxon  # its stubs do not know the method's name
+    return float(wilcoxon(difference, method="asymptotic").pvalue)
+
+
+def _tidy(difference: FloatArray, largest: float) -> FloatArray:
+    """Differences that are equal but for rounding made equal (0.9 - 0.8 and 0.8 - 0.7), else ties would be broken."""
+    return np.round(difference / largest, 12) if largest > 0.0 else difference

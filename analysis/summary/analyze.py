@@ -2,22 +2,22 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
 from analysis.logs.column_map import ColumnMap
 from analysis.logs.exclusions import ExclusionEffect, Rules, apply_rules, by_study
-from analysis.logs.reading import Logs, Problem, Track, read_logs
-from analysis.paper.audit import audit
-from analysis.paper.audit.paper_file import load_paper_file
-from analysis.paper.audit.sentences import predictions
-from analysis.paper.paper import load_paper
-from analysis.paper.published import Prediction
+from analysis.logs.files import Problem
+from analysis.logs.reading import Logs, Track, read_logs
+from analysis.paper.audit.page import predictions
+from analysis.paper.audit.run import audit, load_paper_file
+from analysis.paper.paper import Prediction, load_paper
 from analysis.summary import remarks_coding
 from analysis.summary.comparison import compare
 from analysis.summary.results import RulesApplied, StudyStatistics
-from analysis.summary.sections.data import ReportData
+from analysis.summary.sections.content import ReportData
 from analysis.summary.sections.sections import write_report
 from analysis.summary.summary import summarize
 from analysis.summary.tables_out import result_tables
@@ -66,21 +66,16 @@ def analyze(request: Request, track: Track = iter) -> tuple[StudyStatistics, tup
         title="Statistics of " + ", ".join(path.name or str(path) for path in request.paths),
         statistics=statistics,
         problems=logs.problems,
-        comparison=compare(statistics, published, _predicted(request.paper)) if published else None,
+        comparison=None if published is None else compare(statistics, published, _predicted(request.paper)),
         files=logs.files,
         provenance=provenance() | _read_by(request.columns, mapping),
         notes=tuple(_notes(effect)),
         extra=() if coded is None else (remarks_coding.coding_section(coded),),
     )
     write_report(request.out, report)
-    write_tables(request.out, used, statistics)
+    for name, content in result_tables(used, statistics.analysed).items():
+        storage.write_whole(request.out / name, content)
     return statistics, logs.problems
-
-
-def write_tables(out: Path, logs: Logs, statistics: StudyStatistics) -> None:
-    """Write each experiment's results by participant, long and wide, as CSV."""
-    for name, content in result_tables(logs, statistics.analysed).items():
-        storage.write_whole(out / name, content)
 
 
 def _predicted(paper: Path | None) -> dict[str, Prediction]:
@@ -126,10 +121,9 @@ def _notes(effect: ExclusionEffect | None) -> list[str]:
         return []
     notes = []
     for experiment, people in effect.dropped.items():
-        counts: dict[str, int] = {}
+        counts = Counter[str]()
         for by_rule in people.values():
-            for rule, count in by_rule.items():
-                counts[rule] = counts.get(rule, 0) + count
+            counts.update(by_rule)
         shown = ", ".join(f"{rule} {count}" for rule, count in sorted(counts.items())) or "none"
         recorded = effect.trials[experiment].recorded
         notes.append(f"Trials dropped by rule in {experiment}, of {recorded}: {shown}.")

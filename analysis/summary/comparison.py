@@ -6,14 +6,18 @@ import math
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 
-from analysis.paper.paper import Paper, PublishedDirection, PublishedExperiment, PublishedPreference, PublishedTukeyTest
-from analysis.paper.published import (
+from analysis.paper.paper import (
     ANOVA_F,
     ANOVA_P,
     PARTICIPANTS,
     ComparisonRow,
     ComparisonVerdict,
+    Paper,
     Prediction,
+    PublishedDirection,
+    PublishedExperiment,
+    PublishedPreference,
+    PublishedTukeyTest,
     anova_df,
     mean_rate,
     named_in,
@@ -65,39 +69,37 @@ def _number(experiment: str, quantity: str, printed: str, obtained: float | None
     verdict: ComparisonVerdict = "not obtained"
     if obtained is not None:
         verdict = "agrees" if rounds_to(obtained, printed) else "differs"
-    published = f"{printed} {unit}".strip()
-    return ComparisonRow(
-        experiment=experiment, quantity=quantity, published=published, obtained=_float(obtained), verdict=verdict
-    )
+    return _row(experiment, quantity, f"{printed} {unit}".strip(), obtained, verdict=verdict)
 
 
 def _claim(
     experiment: str, quantity: str, published: str, obtained: float | None, *, truth: bool, note: str = ""
 ) -> ComparisonRow:
     verdict: ComparisonVerdict = "not obtained" if obtained is None else "agrees" if truth else "differs"
+    return _row(experiment, quantity, published, obtained, verdict=verdict, note=note)
+
+
+def _unpublished(experiment: str, quantity: str, obtained: float | None, note: str) -> ComparisonRow:
+    return _row(experiment, quantity, "", obtained, verdict="not published", note=note)
+
+
+def _row(
+    experiment: str,
+    quantity: str,
+    published: str,
+    obtained: float | None,
+    *,
+    verdict: ComparisonVerdict,
+    note: str = "",
+) -> ComparisonRow:
     return ComparisonRow(
         experiment=experiment,
         quantity=quantity,
         published=published,
-        obtained=_float(obtained),
+        obtained=None if obtained is None else float(obtained),
         verdict=verdict,
         note=note,
     )
-
-
-def _unpublished(experiment: str, quantity: str, obtained: float | None, note: str) -> ComparisonRow:
-    return ComparisonRow(
-        experiment=experiment,
-        quantity=quantity,
-        published="",
-        obtained=_float(obtained),
-        verdict="not published",
-        note=note,
-    )
-
-
-def _float(value: float | None) -> float | None:
-    return None if value is None else float(value)
 
 
 def _common(name: str, published: PublishedExperiment, found: WithinStatistics | None) -> Iterator[ComparisonRow]:

@@ -18,14 +18,12 @@ from analysis.logs.exclusions import KeptTrials, LeftOut
 from analysis.report import apa
 from analysis.report.serial import OPTIONAL, beside, plain
 from analysis.stats.cells import ByParticipant
-from analysis.stats.diagnostics import Normality
+from analysis.stats.diagnostics import Normality, Sphericity
 from analysis.stats.effect_sizes import EffectSize
 from analysis.stats.logit_model import Clustering, LogitModel
-from analysis.stats.paired import PairedT
-from analysis.stats.rank_tests import SignedRanks
-from analysis.stats.sphericity import Sphericity
+from analysis.stats.paired import PairedT, SignedRanks
 from analysis.summary.remarks_coding import CodedRemarks
-from analysis.times.response_times import ResponseTimes
+from analysis.times.own_trials import ResponseTimes
 from analysis.times.speed_accuracy import NoSpeedAccuracy, SpeedAccuracy
 
 
@@ -329,8 +327,8 @@ class StudyStatistics:
     @property
     def analysed(self) -> dict[str, WithinStatistics]:
         """The experiments that have a complete participant, by name."""
-        both = {"direction": self.direction, "preference": self.preference}
-        return {name: found for name, found in both.items() if found is not None and found.n}
+        names = ("direction", "preference")
+        return {name: found for name in names if (found := self.of(name)) is not None and found.n}
 
     def to_dict(self) -> dict[str, Any]:
         """The content of `statistics.json`."""

@@ -1,4 +1,7 @@
-"""Log tables into the statistics of the paper, as typed results. Nothing is rounded here."""
+"""Log tables into the statistics of the paper and what stands around them, as typed results. Nothing is rounded here.
+
+The supplement cannot fail on data that the core takes: what is undefined is None, and a `reason` beside it says why.
+"""
 
 from __future__ import annotations
 
@@ -16,30 +19,51 @@ from analysis.logs.reading import Logs
 from analysis.report.serial import undefined
 from analysis.stats.anova import rm_anova
 from analysis.stats.arrays import FloatArray
-from analysis.stats.binomial import binomial_test
+from analysis.stats.binomial import binomial_test, yes_no
 from analysis.stats.cells import ByParticipant, TrialCells, coded, trial_cells
-from analysis.stats.detection import yes_no
-from analysis.stats.effect_sizes import cousineau_morey
+from analysis.stats.diagnostics import NORMALITY_NOTE, OUTLIER_RULE, ends, normality, outliers, sphericity, unit_scaled
+from analysis.stats.effect_sizes import EFFECT_SIZE_NOTE, cousineau_morey, effect_size
 from analysis.stats.logit_model import METHOD as CLUSTERING_NOTE
-from analysis.stats.tukey import rm_tukey_hsd
+from analysis.stats.logit_model import MODEL_NAME, MODEL_NOTE, LogitModel, clustering, logit_model
+from analysis.stats.paired import (
+    CONSTANT,
+    EQUAL,
+    SCALE,
+    PairedT,
+    friedman,
+    jzs_paired,
+    paired_t_tests,
+    signed_rank_tests,
+)
+from analysis.stats.tukey import Comparison, rm_tukey_hsd, rm_tukey_hsd_paired
 from analysis.summary.assumptions import assumptions
 from analysis.summary.results import (
     AnovaTest,
+    BayesFactor,
+    BayesFactors,
     ConfidenceInterval,
+    Diagnostics,
     DirectionStatistics,
+    FarScore,
+    FriedmanTest,
     MeanSd,
     MedianTime,
+    NamedModel,
+    NotedEffectSize,
+    NotedNormality,
     Origin,
+    Outliers,
+    OwnErrorPair,
     Pair,
     PooledBinomial,
+    PostHoc,
     Scores,
     Sensitivity,
     StudyStatistics,
+    Supplement,
     WithinStatistics,
 )
-from analysis.summary.supplement import model, pooled_clustering, within_supplement
-from analysis.times.own_trials import INSTRUCTION, timed
-from analysis.times.response_times import response_times
+from analysis.times.own_trials import INSTRUCTION, response_times, timed
 from analysis.times.speed_accuracy import speed_accuracy
 from device.words import DIRECTIONS
 
@@ -229,7 +253,7 @@ def _binomials(cells: TrialCells, method: str) -> dict[str, PooledBinomial]:
                 successes=successes,
                 trials=trials,
                 **{field.name: float(getattr(test, field.name)) for field in fields(test)},
-                clustering=pooled_clustering(cells, method, direction),
+                clustering=clustering(cells.correct[:, *column], cells.trials[:, *column]),
             )
     return result
 
@@ -263,3 +287,94 @@ def _median_times(trials: pd.DataFrame, methods: list[str]) -> dict[str, MedianT
         method: MedianTime(median=float(own.median()) if len(own) else None, n=len(own))
         for method, own in times.items()
     }
+
+
+SIGNED_RANKS = (
+    "Wilcoxon's signed-rank test of each pair, Holm's correction. Chosen over Conover's and Nemenyi's because these "
+    "compare mean ranks, which makes a pair's result depend on the other methods (Benavoli, Corani & Mangili 2016)."
+)
+TUKEY_PAIRED_NOTE = (
+    "studentized range with each pair's own standard error and n − 1 degrees of freedom: needs no sphericity."
+)
+BAYES_NOTE = (
+    "BF10 of the paired t-test: a Cauchy prior of scale r on the standardised mean difference against none at all "
+    "(Rouder et al. 2009), each pair by itself, not adjusted for their number."
+)
+BEYOND = "The Bayes factor cannot be computed: it is above 1.8e308, or |t| is above 100."
+
+
+def within_supplement(scores: pd.DataFrame, scale: tuple[float, float]) -> Supplement | None:
+    """Further statistics of scores, participants by methods, on a `scale` from lowest to highest.
+
+    None for fewer than two participants or methods, as the ANOVA is.
+    """
+    if min(scores.shape) < 2:
+        return None
+    array, methods = scores.to_numpy(dtype="float64"), [str(method) for method in scores.columns]
+    pairs = paired_t_tests(array, methods)
+    return Supplement(
+        sphericity=sphericity(array),
+        effect_size=NotedEffectSize(size=effect_size(rm_anova(unit_scaled(array))), note=EFFECT_SIZE_NOTE),
+        friedman=_friedman(array, methods),
+        paired_t=pairs,
+        tukey_paired=tuple(_finite(pair) for pair in rm_tukey_hsd_paired(array, methods)),
+        tukey_paired_note=TUKEY_PAIRED_NOTE,
+        bayes_factors=BayesFactors(
+            r=SCALE, note=BAYES_NOTE, pairs=tuple(_bayes_factor(pair, len(array)) for pair in pairs)
+        ),
+        diagnostics=_diagnostics(scores, scale),
+    )
+
+
+def model(cells: TrialCells) -> NamedModel:
+    """The logistic model of the forward answers."""
+    place, methods = DIRECTIONS.index("forward"), cells.methods
+    if min(len(cells.participants), len(methods)) < 2:
+        found = LogitModel(reason="A model needs two participants and two methods.")
+    else:
+        found = logit_model(cells.correct[..., place], cells.trials[..., place], methods)
+    return NamedModel(name=MODEL_NAME, note=MODEL_NOTE, fit=found)
+
+
+def _friedman(scores: FloatArray, methods: Sequence[str]) -> FriedmanTest:
+    found = friedman(scores)
+    return FriedmanTest(
+        chi2=found.chi2,
+        df=found.df,
+        p=found.p,
+        kendall_w=found.kendall_w,
+        reason=found.reason,
+        mean_ranks=dict(zip(methods, found.mean_ranks, strict=True)),
+        post_hoc=PostHoc(name=SIGNED_RANKS, pairs=signed_rank_tests(scores, methods)),
+    )
+
+
+def _finite(pair: Comparison) -> OwnErrorPair:
+    """A Tukey comparison with None for q, p and interval where the differences have no variance."""
+    a, b, difference, q = str(pair.a), str(pair.b), float(pair.difference), float(pair.q)
+    if not math.isfinite(q):
+        return OwnErrorPair(a=a, b=b, difference=difference, reason=CONSTANT if difference else EQUAL)
+    p, low, high = float(pair.p), float(pair.ci_low), float(pair.ci_high)
+    return OwnErrorPair(a=a, b=b, difference=difference, q=q, p=p, ci_low=low, ci_high=high)
+
+
+def _bayes_factor(pair: PairedT, n: int) -> BayesFactor:
+    factor = None if pair.t is None else jzs_paired(pair.t, n)
+    reason = pair.reason if factor is not None or pair.t is None else BEYOND
+    return BayesFactor(a=str(pair.a), b=str(pair.b), bf10=factor, reason=reason)
+
+
+def _diagnostics(scores: pd.DataFrame, scale: tuple[float, float]) -> Diagnostics:
+    array, people, methods = scores.to_numpy(dtype="float64"), scores.index, list(map(str, scores.columns))
+    at_ends = ends(array, scale)
+    far = tuple(
+        FarScore(participant=str(people[o.row]), method=methods[o.column], score=o.score, fence=o.fence)
+        for o in outliers(array)
+    )
+    return Diagnostics(
+        normality=NotedNormality(test=normality(array), note=NORMALITY_NOTE),
+        outliers=Outliers(rule=OUTLIER_RULE, found=far),
+        scale=scale,
+        floor=dict(zip(methods, at_ends.floor, strict=True)),
+        ceiling=dict(zip(methods, at_ends.ceiling, strict=True)),
+    )

@@ -13,8 +13,8 @@ from collections.abc import Iterable, Mapping, Sequence
 import numpy as np
 import pandas as pd
 
-from analysis.logs.frames import STUDY
 from analysis.logs.reading import Logs
+from analysis.logs.texts import STUDY
 from analysis.summary.results import WithinStatistics
 from analysis.times.own_trials import timed
 

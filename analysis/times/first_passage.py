@@ -61,16 +61,22 @@ def log_density(time_s: ArrayLike, upper: ArrayLike, drift: ArrayLike, boundary:
     >>> round(float(log_density(0.5, True, 1.0, 1.0, 0.5)), 6)
     -1.072671
     """
-    t, v, a, w = np.broadcast_arrays(
-        *(np.asarray(values, dtype=np.float64) for values in (time_s, drift, boundary, start))
-    )
-    t, up, v, a, w = np.broadcast_arrays(t, np.asarray(upper, dtype=np.bool_), v, a, w)
-    check_bounds(a, w)
+    t, up, v, a, w = _together(time_s, upper, drift, boundary, start)
     v, near, far = np.where(up, -v, v), np.where(up, 1.0 - w, w), np.where(up, w, 1.0 - w)
     some = t > 0.0
     tau = np.where(some, t, 1.0) / a**2
     value = unit_log_density(tau, near, far) - 2.0 * np.log(a) - v * a * near - v * v * t / 2.0
     return float_or_array(np.where(some, value, -math.inf))
+
+
+def _together(
+    time_s: ArrayLike, upper: ArrayLike, drift: ArrayLike, boundary: ArrayLike, start: ArrayLike
+) -> tuple[FloatArray, NDArray[np.bool_], FloatArray, FloatArray, FloatArray]:
+    """The arguments as arrays of one shape. `ValueError`: as `check_bounds`."""
+    t, v, a, w = (np.asarray(values, dtype=np.float64) for values in (time_s, drift, boundary, start))
+    t, up, v, a, w = np.broadcast_arrays(t, np.asarray(upper, dtype=np.bool_), v, a, w)
+    check_bounds(a, w)
+    return t, up, v, a, w
 
 
 def check_bounds(boundary: FloatArray, start: FloatArray) -> None:
@@ -236,16 +242,12 @@ def distribution(
 ) -> Values:
     """P(T <= t, answer), rising from 0 to the answer's probability; divide by that for the time given the answer.
 
-    The decision time is without t0; all arguments broadcast. `ValueError`: as `density.log_density`.
+    The decision time is without t0; all arguments broadcast. `ValueError`: as `log_density`.
 
     >>> round(distribution(100.0, True, 1.0, 2.0, 0.5), 6)
     0.880797
     """
-    t, v, a, w = np.broadcast_arrays(
-        *(np.asarray(values, dtype=np.float64) for values in (time_s, drift, boundary, start))
-    )
-    t, up, v, a, w = np.broadcast_arrays(t, np.asarray(upper, dtype=np.bool_), v, a, w)
-    check_bounds(a, w)
+    t, up, v, a, w = _together(time_s, upper, drift, boundary, start)
     c, near = np.where(up, -v, v) * a, np.where(up, 1.0 - w, w)
     some = t > 0.0
     tau = np.where(some, t, 1.0) / a**2

@@ -9,8 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 from scipy import optimize, special
 
-from analysis.stats.arrays import FloatArray, share
-from analysis.times.ez import ez_from_summary
+from analysis.stats.arrays import FloatArray, by_row
 from analysis.times.first_passage import distribution
 from analysis.times.likelihood import (
     DiffusionLikelihood,
@@ -22,7 +21,10 @@ from analysis.times.likelihood import (
     natural,
     trial_scores,
 )
+from analysis.times.trade import ez_from_summary
 
+ALPHA = 1.0 - 0.95
+"""Of all intervals."""
 EDGE = 1e-4
 """A share of lapses below this counts as none: its logit has no curvature left to take an interval from."""
 BLIND = 1e-6
@@ -82,7 +84,6 @@ def fit(
     bias: bool = True,
     lapses: bool | LapseRange = False,
     by_person: bool = False,
-    confidence: float = 0.95,
     near: DiffusionFit | None = None,
 ) -> DiffusionFit:
     """Fit a drift a condition, a boundary an instruction, t0, and if asked the start and the lapses, to all trials.
@@ -95,11 +96,10 @@ def fit(
     `near`: a fit of like data to climb from, which saves two of three climbs; if that ends nowhere, the three are made.
     When people differ the estimates are those of a compromise person all the same: t0 is pulled towards the fastest,
     drifts towards 0, boundaries up, and no interval cures that (`people.fit_people` averages over people instead).
-    `profile.profile` gives likelihood intervals. Without participants' own times none of this can be: accuracy alone
-    fixes only the product of drift and boundary. `ValueError`: confidence outside 0..1.
+    `profile` gives likelihood intervals. Without participants' own times none of this can be: accuracy alone fixes only
+    the product of drift and boundary.
     Source: Ratcliff & Tuerlinckx 2002, Psychon. Bull. Rev. 9, 438.
     """
-    alpha = 1.0 - share(confidence, "confidence")
     model = model_of(trials, bias=bias, lapses=lapses)
     peak = highest_peak(model, starts(model) if near is None else [_beside(model, near)])
     if near is not None and not peak.converged:
@@ -108,7 +108,7 @@ def fit(
     covariance, unidentified = _covariance(model, peak.at, by_person=by_person)
     if not peak.converged:
         covariance = np.full_like(covariance, math.nan)
-    critical = -float(special.stdtrit(people - 1, alpha / 2.0) if people else special.ndtri(alpha / 2.0))
+    critical = -float(special.stdtrit(people - 1, ALPHA / 2.0) if people else special.ndtri(ALPHA / 2.0))
     return DiffusionFit(
         estimates=_estimates(model, peak.at, np.sqrt(np.diag(covariance)), critical),
         log_likelihood=peak.value,
@@ -234,32 +234,22 @@ def _estimates(model: DiffusionLikelihood, at: FloatArray, se: FloatArray, criti
     low, value, high = (natural(model, at + sign * critical * known) for sign in (-1.0, 0.0, 1.0))
     slope = (natural(model, at + _DIFFERENCE_STEP) - natural(model, at - _DIFFERENCE_STEP)) / (2.0 * _DIFFERENCE_STEP)
     blank = np.where(np.isfinite(se), 0.0, math.nan)
-    return tuple(
-        Estimate(
-            name=name,
-            value=float(value[i]),
-            se=float(slope[i] * se[i]),
-            ci_low=float(low[i] + blank[i]),
-            ci_high=float(high[i] + blank[i]),
-        )
-        for i, name in enumerate(model.names)
-    )
+    rows = by_row(value=value, se=slope * se, ci_low=low + blank, ci_high=high + blank)
+    return tuple(Estimate(name=name, **row) for name, row in zip(model.names, rows, strict=True))
 
 
 _FARTHEST = 12.0
 """How far from the peak, in coordinates, a limit is looked for: a factor of 160,000 in odds or size."""
 
 
-def profile(
-    trials: Trials, name: str, *, bias: bool = True, lapses: bool | LapseRange = False, confidence: float = 0.95
-) -> tuple[float, float]:
+def profile(trials: Trials, name: str, *, bias: bool = True, lapses: bool | LapseRange = False) -> tuple[float, float]:
     """The limits where twice the fall of the profile likelihood equals the chi-squared quantile on 1 df.
 
     An end that is never reached is the edge of the parameter's range (0 or 1, infinite, or the cap of t0), as for a
-    share of lapses that may as well be none. `KeyError`: no such parameter. `ValueError`: confidence outside 0..1.
+    share of lapses that may as well be none. `KeyError`: no such parameter.
     Source: Venzon & Moolgavkar 1988, Appl. Stat. 37, 87.
     """
-    fall = float(special.chdtri(1, 1.0 - share(confidence, "confidence"))) / 2.0
+    fall = float(special.chdtri(1, ALPHA)) / 2.0
     model = model_of(trials, bias=bias, lapses=lapses)
     if name not in model.names:
         raise KeyError(name)

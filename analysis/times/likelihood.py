@@ -21,7 +21,6 @@ from analysis.stats.arrays import FloatArray, IndexArray
 from analysis.times.first_passage import with_slopes
 from analysis.times.own_trials import answers, own_times
 
-_Label = str
 LapseRange = tuple[float, float]
 """Earliest and latest time of a lapse in s."""
 
@@ -36,8 +35,8 @@ class Trials:
     condition: IndexArray
     instruction: IndexArray
     person: IndexArray
-    conditions: tuple[_Label, ...]
-    instructions: tuple[_Label, ...]
+    conditions: tuple[str, ...]
+    instructions: tuple[str, ...]
 
 
 def trials_of(
@@ -46,8 +45,8 @@ def trials_of(
     time_s: ArrayLike,
     sources: Sequence[str] | ArrayLike,
     towards_upper: ArrayLike,
-    condition: Sequence[_Label] | ArrayLike,
-    instruction: Sequence[_Label] | ArrayLike | None = None,
+    condition: Sequence[str] | ArrayLike,
+    instruction: Sequence[str] | ArrayLike | None = None,
     person: Sequence[str] | ArrayLike | None = None,
 ) -> Trials:
     """Columns of a log as `Trials`: for a judgement of direction "upper" is the answer "forward".
@@ -72,7 +71,7 @@ def trials_of(
     )
 
 
-def _places(labels: Sequence[_Label] | ArrayLike, count: int, name: str) -> tuple[tuple[_Label, ...], IndexArray]:
+def _places(labels: Sequence[str] | ArrayLike, count: int, name: str) -> tuple[tuple[str, ...], IndexArray]:
     found = np.asarray(labels, dtype=np.str_)
     if found.shape != (count,):
         raise ValueError(f"{name} must be {count} labels, one a trial, not {found.shape}")

@@ -11,8 +11,8 @@ import numpy as np
 from numpy.typing import ArrayLike
 from scipy import special
 
-from analysis.stats.arrays import FloatArray, share
-from analysis.times.fit import DiffusionFit, fit
+from analysis.stats.arrays import FloatArray
+from analysis.times.fit import ALPHA, DiffusionFit, fit
 from analysis.times.likelihood import LapseRange, Trials, trials_of
 from analysis.times.own_trials import OwnTrials, ordered, quantiles
 
@@ -41,20 +41,12 @@ class PeopleFit:
     fits: tuple[DiffusionFit, ...]
     left_out: tuple[int, ...]
 
-    def __getitem__(self, name: str) -> MeanEstimate:
-        """The mean of a name. `KeyError`: there is none."""
-        for mean in self.means:
-            if mean.name == name:
-                return mean
-        raise KeyError(name)
-
 
 def fit_people(
     trials: Trials,
     *,
     bias: bool = True,
     lapses: bool | LapseRange = False,
-    confidence: float = 0.95,
     track: Callable[[Sequence[int]], Iterable[int]] = iter,
     together: DiffusionFit | None = None,
 ) -> PeopleFit:
@@ -64,9 +56,8 @@ def fit_people(
     bias of few trials (with 60: t0 about +10 ms, drifts some percent too large), which the mean keeps. Each climbs from
     the peak of all trials `together`, a fit of the same model, which is made if not given. A person who lacks a
     condition or instruction, or whose fit has no clear peak, is left out and named by place. `track` is given the
-    places and gives them back one by one: for a progress bar. `ValueError`: confidence outside 0..1.
+    places and gives them back one by one: for a progress bar.
     """
-    alpha = 1.0 - share(confidence, "confidence")
     places = track(range(int(trials.person.max()) + 1))
     near = together or fit(trials, bias=bias, lapses=lapses)
     fits = [fit(of_person(trials, place), bias=bias, lapses=lapses, near=near) for place in places]
@@ -74,7 +65,7 @@ def fit_people(
     whole = [one.reason is None and tuple(e.name for e in one.estimates) == names for one in fits]
     kept = [one for one, good in zip(fits, whole, strict=True) if good]
     return PeopleFit(
-        means=tuple(mean_estimate(name, [one[name].value for one in kept], alpha) for name in names),
+        means=tuple(mean_estimate(name, [one[name].value for one in kept], ALPHA) for name in names),
         fits=tuple(fits),
         left_out=tuple(place for place, good in enumerate(whole) if not good),
     )

@@ -9,7 +9,6 @@ import numpy as np
 import pandas as pd
 
 from analysis.stats.arrays import FloatArray
-from analysis.times.ez import ez_people
 from analysis.times.fit import DiffusionFit
 from analysis.times.own_trials import REFUSALS, OwnTrials, own_trials
 from analysis.times.people import (
@@ -30,6 +29,7 @@ from analysis.times.trade import (
     QuantileProbability,
     balanced_integration,
     conditional_accuracy,
+    ez_people,
     inverse_efficiency,
     quantile_probability,
 )
@@ -303,10 +303,7 @@ def _together(found: DiffusionFit) -> PooledFit:
     known = () if found.reason else found.estimates
     return PooledFit(
         estimates={
-            one.name: Parameter(
-                value=defined(one.value), se=defined(one.se), ci_low=defined(one.ci_low), ci_high=defined(one.ci_high)
-            )
-            for one in known
+            one.name: Parameter(**{key: defined(getattr(one, key)) for key in Parameter.__slots__}) for one in known
         },
         log_likelihood=defined(found.log_likelihood),
         unidentified=found.unidentified,

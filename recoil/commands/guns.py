@@ -93,7 +93,7 @@ def twin(
     as_json: AsJsonOption = False,
 ) -> None:
     """The gun's twin on a pseudo-terminal, until interrupted: prints its port, to be given to --gun."""
-    from recoil import twin as feature
+    from recoil import rig as feature
 
     asked = feature.TwinRequest(
         gun=gun, link=link, tcp=tcp, speed=speed, drift_ppm=drift_ppm, wire=wire, troubles=trouble or [], seed=seed
@@ -117,7 +117,7 @@ def doctor(
     as_json: AsJsonOption = False,
 ) -> None:
     """The rig's self-test: what was measured, and what to do about what is not good."""
-    from recoil import doctor as feature
+    from recoil import rig as feature
 
     found = feature.examine(results, gun, gun_config, progress)
     show(found, feature.examination_text(found.checks), as_json)

@@ -99,7 +99,7 @@ def audit(
     as_json: AsJsonOption = False,
 ) -> None:
     """Are the published numbers attainable and consistent? Each with its proof; exit code 1 if one is not."""
-    from analysis.paper.audit import command as feature
+    from analysis.paper.audit import run as feature
 
     audited = feature.audit_file(paper)
     feature.write(audited, out)

@@ -133,9 +133,9 @@ def rebuild(
     journals: Annotated[list[Path], typer.Argument(metavar="JOURNAL...")], as_json: AsJsonOption = False
 ) -> None:
     """Make the CSV again from its journal, byte for byte."""
-    from recoil.session import rebuild_tables
+    from recoil.session import rebuild_table
 
-    built = rebuild_tables(journals)
+    built = [rebuild_table(path) for path in journals]
     for message in (message for one in built for message in one.messages):
         say(f"recoil: {message}")
     shown = [{"table": str(one.table), "rebuilt": one.rebuilt} for one in built]

@@ -6,32 +6,29 @@ F = (n - 1) A / (n W - A). W is even for odd k, and odd with T for even k.
 
 With sums C_j of groups of n_j, B = sum C_j^2 / n_j, T and N in all, and S the sum of all squares:
 F = ((B - T^2 / N) / (k - 1)) / ((S - B) / (N - k)); S is whole, and odd with T.
+
+Whether whole numbers with a given sum and a given sum of squares exist is settled by a complete search: it ends with
+such numbers, or with the proof that there are none, or says that its budget of steps is used up. Values fall from left
+to right; a partial choice is left when the rest cannot have its sums, by parity (x and x^2 are odd together), by the
+least sum of squares (all values equal) or by the greatest (all at an end).
 """
 
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from fractions import Fraction
 from functools import lru_cache
 from itertools import product
-from math import prod
+from math import isqrt, prod
 from random import Random
 
-from analysis.paper.audit.power_sums import BudgetError, greatest_squares, least_squares, numbers_with_sums
 from analysis.paper.audit.printed import Interval
 
 Rows = tuple[tuple[int, ...], ...]
 EXACT_WORK = 2_400_000
 """Transitions of a full enumeration that are affordable."""
 _STEPS, _STARTS = 6_000, 6
-
-
-@dataclass(frozen=True, slots=True)
-class Levels:
-    """Whole numbers `0..top`, or all of them (None)."""
-
-    top: int | None
 
 
 def effect(columns: Sequence[int]) -> int:
@@ -63,45 +60,44 @@ def needed(columns: Sequence[int], n: int, F: Interval) -> Interval:
     return Interval(least, most, F.high_closed and high is not None, F.low_closed and low > 0)
 
 
-def candidates(columns: Sequence[int], n: int, F: Interval, levels: Levels) -> range:
-    """The whole W of the right parity that give an F inside, up to the greatest that the levels allow."""
-    interval = needed(columns, n, F)
-    most = greatest_within(columns, n, levels)
+def candidates(columns: Sequence[int], n: int, F: Interval, top: int | None) -> range:
+    """The whole W of the right parity that give an F inside, up to the greatest that numbers up to `top` allow."""
+    parity = 0 if len(columns) % 2 else sum(columns)
+    return of_parity(needed(columns, n, F), 0, greatest_within(columns, n, top), parity)
+
+
+def of_parity(interval: Interval, least: int, most: int | None, parity: int) -> range:
+    """The whole numbers inside, from `least` to `most` (None: or a thousand on), as even or odd as `parity` is."""
     if most is None and interval.high is None:
         most = int(interval.low or 0) + 1_000
-    whole = interval.integers(0, most)
-    odd = sum(columns) % 2 if len(columns) % 2 == 0 else 0
-    start = whole.start + (whole.start - odd) % 2
-    return range(start, whole.stop, 2)
+    whole = interval.integers(least, most)
+    return range(whole.start + (whole.start - parity) % 2, whole.stop, 2)
 
 
-def greatest_within(columns: Sequence[int], n: int, levels: Levels) -> int | None:
+def greatest_within(columns: Sequence[int], n: int, top: int | None) -> int | None:
     """A bound on W: no square of a column is above top times its sum, and sum R^2 is at least T^2 / n."""
-    if levels.top is None:
+    if top is None:
         return None
     k, total = len(columns), sum(columns)
-    return k * levels.top * total - -(-total * total // n)
+    return k * top * total - -(-total * total // n)
 
 
-def find_rows(columns: Sequence[int], n: int, targets: range, levels: Levels) -> Rows | bool | None:
-    """Rows with these column sums and W in `targets`; False if it is proved that there are none, else None."""
+def find_rows(columns: Sequence[int], n: int, targets: range, top: int | None) -> Rows | bool | None:
+    """Rows of `0..top` (None: any) with these column sums and W in `targets`; False if proved that there are none."""
     if not targets:
         return False
-    if affordable(n, len(columns), levels):
-        exact = every_sum(n, len(columns), levels.top or 0).get(tuple(columns), 0)
+    if affordable(n, len(columns), top):
+        exact = every_sum(n, len(columns), top or 0).get(tuple(columns), 0)
         hits = [w for w in targets if exact >> w & 1]
         if not hits:
             return False
         targets = range(hits[0], hits[0] + 1)
-    return search_rows(columns, n, targets, levels)
+    return search_rows(columns, n, targets, top)
 
 
-def affordable(n: int, k: int, levels: Levels) -> bool:
+def affordable(n: int, k: int, top: int | None) -> bool:
     """Can all sums be enumerated?"""
-    if levels.top is None:
-        return False
-    work: int = n * (levels.top + 1) ** k * (n * levels.top + 1) ** k
-    return work <= EXACT_WORK
+    return top is not None and bool(n * (top + 1) ** k * (n * top + 1) ** k <= EXACT_WORK)
 
 
 @lru_cache(maxsize=64)
@@ -119,13 +115,13 @@ def every_sum(n: int, k: int, top: int) -> dict[tuple[int, ...], int]:
     return sums
 
 
-def search_rows(columns: Sequence[int], n: int, targets: range, levels: Levels, seed: int = 0) -> Rows | None:
+def search_rows(columns: Sequence[int], n: int, targets: range, top: int | None, seed: int = 0) -> Rows | None:
     """Rows with these column sums and W in `targets`, by small steps that keep the sums; None if none was met."""
     random = Random(seed)  # noqa: S311 a search, no secret
-    if levels.top is not None and any(not 0 <= c <= n * levels.top for c in columns):
+    if top is not None and any(not 0 <= c <= n * top for c in columns):
         return None
     for _ in range(_STARTS):
-        table = _Table(_start(columns, n, random), levels)
+        table = _Table(_start(columns, n, random), top)
         for _ in range(_STEPS):
             if table.w in targets:
                 return tuple(tuple(row) for row in table.rows)
@@ -145,8 +141,8 @@ def _start(columns: Sequence[int], n: int, random: Random) -> list[list[int]]:
 class _Table:
     """Rows under way, with their sums and W kept up to date."""
 
-    def __init__(self, rows: list[list[int]], levels: Levels) -> None:
-        self.rows, self.levels = rows, levels
+    def __init__(self, rows: list[list[int]], top: int | None) -> None:
+        self.rows, self.top = rows, top
         self.sums = [sum(row) for row in rows]
         self.w = within_rows(tuple(tuple(row) for row in rows))
 
@@ -170,7 +166,7 @@ class _Table:
     def _change(self, a: int, b: int, j: int, amount: int) -> int | None:
         """What the move does to W; None if it leaves the levels or moves nothing."""
         x, y, k = self.rows[a][j], self.rows[b][j], len(self.rows[0])
-        top = self.levels.top
+        top = self.top
         if a == b or amount == 0 or (top is not None and not (0 <= x + amount <= top and 0 <= y - amount <= top)):
             return None
         squares = 2 * amount * (x - y + amount)
@@ -189,7 +185,6 @@ def column_choices(ranges: Sequence[range], most: int = 2_000) -> Iterator[tuple
     return None if prod(map(len, ranges)) > most else product(*ranges)
 
 
-Groups = tuple[tuple[int, ...], ...]
 _EXACT_WORK = 400_000
 _TRIES = 60
 
@@ -220,11 +215,7 @@ def between_candidates(sums: Sequence[int], sizes: Sequence[int], F: Interval, t
         low = b if F.high is None else b + scaled / F.high
         high = b + scaled / F.low if F.low is not None and F.low > 0 else None
         interval = Interval(low, high, F.high_closed and F.high is not None, F.low_closed)
-    if most is None and interval.high is None:
-        most = int(interval.low or 0) + 1_000
-    whole = interval.integers(least, most)
-    start = whole.start + (whole.start - sum(sums)) % 2
-    return range(start, whole.stop, 2)
+    return of_parity(interval, least, most, sum(sums))
 
 
 def squares_bounds(sums: Sequence[int], sizes: Sequence[int], top: int | None) -> tuple[int, int | None]:
@@ -234,7 +225,7 @@ def squares_bounds(sums: Sequence[int], sizes: Sequence[int], top: int | None) -
     return sum(least_squares(n, c) for n, c in pairs), most
 
 
-def find_groups(sums: Sequence[int], sizes: Sequence[int], targets: range, top: int | None) -> Groups | bool | None:
+def find_groups(sums: Sequence[int], sizes: Sequence[int], targets: range, top: int | None) -> Rows | bool | None:
     """Groups with these sums and a sum of squares in `targets`; False if proved that there are none, else None."""
     if not targets or (top is not None and any(not 0 <= c <= n * top for c, n in zip(sums, sizes, strict=True))):
         return False
@@ -247,7 +238,7 @@ def find_groups(sums: Sequence[int], sizes: Sequence[int], targets: range, top: 
     return None
 
 
-def _exact(sums: Sequence[int], sizes: Sequence[int], targets: range, top: int) -> Groups | bool:
+def _exact(sums: Sequence[int], sizes: Sequence[int], targets: range, top: int) -> Rows | bool:
     sets = [square_sums(n, top)[c] for n, c in zip(sizes, sums, strict=True)]
     after = [1]
     for bits in reversed(sets):
@@ -287,7 +278,7 @@ def _sumset(one: int, other: int) -> int:
     return total
 
 
-def _greedy(sums: Sequence[int], sizes: Sequence[int], squares: int, top: int | None) -> Groups | None:
+def _greedy(sums: Sequence[int], sizes: Sequence[int], squares: int, top: int | None) -> Rows | None:
     """Every group as even as can be, what is left of the squares going to the first that can take it."""
     groups: list[tuple[int, ...]] = []
     later = [least_squares(n, c) for n, c in zip(sizes, sums, strict=True)]
@@ -314,3 +305,80 @@ def _largest(n: int, total: int, room: int, top: int | None, tries: int) -> tupl
         if found is not None:
             return found
     return None
+
+
+class BudgetError(RuntimeError):
+    """The search ended without an answer."""
+
+
+@dataclass(slots=True)
+class _Search:
+    low: int
+    budget: int
+    failed: set[tuple[int, int, int, int]] = field(default_factory=set)
+
+    def run(self, n: int, total: int, squares: int, high: int) -> tuple[int, ...] | None:
+        """Falling values, the first at most `high`: the greatest value and how often, then the rest below it."""
+        if not possible(n, total, squares, self.low, high):
+            return None
+        if n == 0:
+            return ()
+        place = (n, total, squares, high)
+        if place in self.failed:
+            return None
+        self.budget -= 1
+        if self.budget < 0:
+            raise BudgetError
+        for value in range(min(high, _greatest_value(n, total, squares)), -(-total // n) - 1, -1):
+            for times in range(n, 0, -1):
+                rest = self.run(n - times, total - times * value, squares - times * value**2, value - 1)
+                if rest is not None:
+                    return (value,) * times + rest
+        self.failed.add(place)
+        return None
+
+
+def _greatest_value(n: int, total: int, squares: int) -> int:
+    """No value lies above the mean plus sqrt((n - 1)(n squares - total^2)) / n (Samuelson 1968, JASA 63, 1522)."""
+    return (total + isqrt((n - 1) * (n * squares - total**2))) // n
+
+
+def possible(n: int, total: int, squares: int, low: int, high: int) -> bool:
+    """Necessary for n whole numbers in `low..high` to have these sums: range, parity, least and greatest squares."""
+    if n == 0:
+        return total == 0 and squares == 0
+    if low > high or not n * low <= total <= n * high or (total - squares) % 2:
+        return False
+    return least_squares(n, total) <= squares <= greatest_squares(n, total, low, high)
+
+
+def least_squares(n: int, total: int) -> int:
+    """The least sum of squares of n whole numbers with this sum: all as equal as can be."""
+    base, more = divmod(total, n)
+    return n * base**2 + more * (2 * base + 1)
+
+
+def greatest_squares(n: int, total: int, low: int, high: int) -> int:
+    """The greatest sum of squares of n whole numbers in `low..high` with this sum: all but one at an end."""
+    if low == high:
+        return n * low**2
+    at_high, rest = divmod(total - n * low, high - low)
+    if at_high == n:
+        return n * high**2
+    return at_high * high**2 + (low + rest) ** 2 + (n - at_high - 1) * low**2
+
+
+def numbers_with_sums(
+    n: int, total: int, squares: int, low: int | None = None, high: int | None = None, *, budget: int = 20_000
+) -> tuple[int, ...] | None:
+    """Falling whole numbers with sum `total` and sum of squares `squares`; None if there are none: that is proved.
+
+    `low, high`: the scale; without them the squares bound it. `BudgetError` if the search ends without an answer.
+
+    >>> numbers_with_sums(3, 6, 14)
+    (3, 2, 1)
+    """
+    reach = isqrt(squares) if squares > 0 else 0
+    low = -reach if low is None else max(low, -reach)
+    high = reach if high is None else min(high, reach)
+    return _Search(low, budget).run(n, total, squares, high)

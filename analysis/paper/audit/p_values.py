@@ -5,6 +5,7 @@ from __future__ import annotations
 from bisect import bisect_right
 from collections.abc import Callable, Iterator, Sequence
 from fractions import Fraction
+from functools import partial
 from itertools import accumulate
 from math import comb
 from typing import Literal
@@ -13,9 +14,20 @@ import numpy as np
 from scipy import special
 
 from analysis.paper.audit.means import check_count
-from analysis.paper.audit.printed import Interval, PrintedNumber, Rounding, decimal, read_printed
-from analysis.paper.audit.words import NONE_EXISTS, UNKNOWN, Attempt, CheckResult, DataExistence, judge_readings, listed
-from analysis.stats.studentized_range import studentized_range_sf
+from analysis.paper.audit.printed import (
+    NONE_EXISTS,
+    UNKNOWN,
+    CheckResult,
+    DataExistence,
+    Interval,
+    PrintedNumber,
+    Rounding,
+    decimal,
+    judge_readings,
+    listed,
+    read_printed,
+)
+from analysis.stats.tukey import studentized_range_sf
 
 Statistic = Literal["t", "F", "chi2", "r", "z", "Q", "q"]
 Sides = Literal["two-sided", "one-sided"]
@@ -112,7 +124,6 @@ _TAILS: dict[Statistic, Callable[[Fraction, list[float]], float]] = {
     "q": _range_tail,
 }
 
-PFromRange = Callable[[Rounding], tuple[Interval, Interval | None]]
 _SOURCE = "Nuijten et al. 2016, Behavior Research Methods 48, 1205"
 
 
@@ -134,13 +145,13 @@ def p_against_statistic(
     if number.relation != "=":
         raise ValueError(f"the statistic must be a number, not the bound {number.text}")
 
-    def at(sides: Sides) -> PFromRange:
-        return lambda rounding: p_range(statistic, number.interval(rounding), freedom, sides)
+    def attempt(sides: Sides, rounding: Rounding) -> DataExistence:
+        return _fitting(printed.interval(rounding), *p_range(statistic, number.interval(rounding), freedom, sides))
 
     other: Sides = "one-sided" if sides == "two-sided" else "two-sided"
-    others = [(f"{other} p", p_attempt(printed, at(other)))] if statistic in SIDED else []
-    decision = judge_readings(p_attempt(printed, at(sides)), others)
-    outer, _ = at(sides)(Rounding.HALF_UP)
+    others = [(f"{other} p", partial(attempt, other))] if statistic in SIDED else []
+    decision = judge_readings(partial(attempt, sides), others)
+    outer, _ = p_range(statistic, number.interval(Rounding.HALF_UP), freedom, sides)
     return CheckResult(
         check="p against statistic",
         printed=f"{statistic}({', '.join(df)}) = {number.text}, p {_shown(printed)}",
@@ -159,28 +170,12 @@ def p_against_statistic(
     )
 
 
-def p_attempt(printed: PrintedNumber, values: PFromRange) -> Attempt:
-    """Does the p range of a rounding meet what prints as `printed`? A proof on both sides of the margin."""
-
-    def attempt(rounding: Rounding) -> DataExistence:
-        outer, inner = values(rounding)
-        claimed = printed.interval(rounding)
-        if not outer.meets(claimed) or _empty(claimed):
-            return NONE_EXISTS
-        if inner is not None and inner.meets(claimed):
-            return DataExistence(True)
-        return DataExistence(True) if _within(outer, claimed) else UNKNOWN
-
-    return attempt
-
-
-def _empty(claimed: Interval) -> bool:
-    """No p-value from 0 to 1 is inside: a bound such as "< .000"."""
-    return not claimed.meets(Interval(Fraction(0), Fraction(1)))
-
-
-def _within(inner: Interval, outer: Interval) -> bool:
-    return all(end is not None and outer.holds(end) for end in (inner.low, inner.high))
+def _fitting(claimed: Interval, outer: Interval, inner: Interval | None) -> DataExistence:
+    """Does the range of p meet what prints as claimed? A proof on both sides of the margin."""
+    if not outer.meets(claimed) or not claimed.meets(Interval(Fraction(0), Fraction(1))):  # such as "< .000"
+        return NONE_EXISTS
+    within = all(end is not None and claimed.holds(end) for end in (outer.low, outer.high))
+    return DataExistence(True) if within or (inner is not None and inner.meets(claimed)) else UNKNOWN
 
 
 def _shown(printed: PrintedNumber) -> str:
@@ -217,7 +212,7 @@ def binomial_p(p: str, n: int, *, chance: str = "1/2", counts: Sequence[int] | N
     asked = list(range(n + 1)) if counts is None else list(counts)
     if any(not 0 <= count <= n for count in asked):
         raise ValueError(f"counts must lie in 0..{n}, not {listed(asked)}")
-    plain, *others = ((name, _rule_attempt(printed, rule(n, share), asked)) for name, rule in RULES)
+    plain, *others = ((name, partial(_count_data, printed, rule(n, share), asked)) for name, rule in RULES)
     decision = judge_readings(plain[1], others)
     exact = [low for low, _ in small_probabilities(n, share)]
     fitting = [k for k in range(n + 1) if printed.interval(Rounding.ANY).holds(exact[k])]
@@ -241,17 +236,16 @@ def _asked(counts: Sequence[int] | None, n: int) -> str:
     return f"0 to {n}" if counts is None else listed(counts)
 
 
-def _rule_attempt(printed: PrintedNumber, values: list[Bounds], counts: Sequence[int]) -> Attempt:
-    def attempt(rounding: Rounding) -> DataExistence:
-        interval, unsure = printed.interval(rounding), False
-        for count in counts:
-            low, high = values[count]
-            if interval.holds(low) and interval.holds(high):
-                return DataExistence(True, ((Fraction(count),),))
-            unsure |= low < high and interval.meets(Interval(low, high))
-        return UNKNOWN if unsure else NONE_EXISTS
-
-    return attempt
+def _count_data(
+    printed: PrintedNumber, values: list[Bounds], counts: Sequence[int], rounding: Rounding
+) -> DataExistence:
+    interval, unsure = printed.interval(rounding), False
+    for count in counts:
+        low, high = values[count]
+        if interval.holds(low) and interval.holds(high):
+            return DataExistence(True, ((Fraction(count),),))
+        unsure |= low < high and interval.meets(Interval(low, high))
+    return UNKNOWN if unsure else NONE_EXISTS
 
 
 def weights(n: int, chance: Fraction) -> list[int]:
@@ -278,16 +272,9 @@ def tails(n: int, chance: Fraction) -> Iterator[tuple[Fraction, Fraction]]:
         yield Fraction(sums[k], sums[-1]), Fraction(sums[-1] - sums[k] + weight[k], sums[-1])
 
 
-def _doubled(n: int, chance: Fraction) -> list[Bounds]:
-    return [(p, p) for p in (min(Fraction(1), 2 * min(pair)) for pair in tails(n, chance))]
-
-
-def _lower(n: int, chance: Fraction) -> list[Bounds]:
-    return [(low, low) for low, _ in tails(n, chance)]
-
-
-def _upper(n: int, chance: Fraction) -> list[Bounds]:
-    return [(high, high) for _, high in tails(n, chance)]
+def _of_tails(p_of: Callable[[Fraction, Fraction], Fraction]) -> _PValueRule:
+    """A rule that takes the p-value of a count from its two tails."""
+    return lambda n, chance: [(p, p) for p in (p_of(*pair) for pair in tails(n, chance))]
 
 
 def _normal(correction: Fraction) -> _PValueRule:
@@ -305,9 +292,9 @@ def _normal(correction: Fraction) -> _PValueRule:
 RULES: tuple[tuple[str, _PValueRule], ...] = (
     ("sum of the small probabilities", small_probabilities),
     ("sum of the small probabilities, near ties counted", lambda n, p: small_probabilities(n, p, _NEAR_TIE)),
-    ("doubled tail", _doubled),
-    ("one-sided, lower tail", _lower),
-    ("one-sided, upper tail", _upper),
+    ("doubled tail", _of_tails(lambda lower, upper: min(Fraction(1), 2 * min(lower, upper)))),
+    ("one-sided, lower tail", _of_tails(lambda lower, _: lower)),
+    ("one-sided, upper tail", _of_tails(lambda _, upper: upper)),
     ("normal approximation", _normal(Fraction(0))),
     ("normal approximation with continuity correction", _normal(Fraction(1, 2))),
 )

@@ -11,17 +11,22 @@ from dataclasses import dataclass
 from fractions import Fraction
 from typing import Any
 
-from analysis.paper.audit.annealing import ColumnOrder
-from analysis.paper.audit.derived import STARS
+from analysis.paper.audit.claims import STARS
 from analysis.paper.audit.lattices import Rows, effect
 from analysis.paper.audit.means import AnswerScale, scale_of
 from analysis.paper.audit.p_values import binomial_p
-from analysis.paper.audit.printed import Interval, Rounding, read_printed
-from analysis.paper.audit.reconstruct import ColumnSums, ConditionColumn, Constraints, Reconstruction, reconstruct
+from analysis.paper.audit.printed import CheckResult, Interval, Rounding, read_printed
+from analysis.paper.audit.reconstruct import (
+    ColumnOrder,
+    ColumnSums,
+    ConditionColumn,
+    Constraints,
+    Reconstruction,
+    reconstruct,
+)
 from analysis.paper.audit.variance_ratios import repeated_f
-from analysis.paper.audit.words import CheckResult
 from analysis.paper.paper import PublishedDirection, PublishedExperiment, PublishedPreference, PublishedTukeyTest
-from analysis.stats.studentized_range import studentized_range_isf
+from analysis.stats.tukey import studentized_range_isf
 
 MEAN_SLACK = Fraction(3, 10)
 """How far an assumed mean rating may be off in a data set, in units of the scale; assumed."""
@@ -100,7 +105,7 @@ def attainable_f(printed: str, found: CheckResult) -> tuple[Interval, str]:
 def pattern_holds(paper: PublishedExperiment) -> Callable[[ColumnSums], bool]:
     """Says of column sums whether they, with the printed F, give the published Tukey pattern, stars included.
 
-    q^2 = k (k - 1) F d^2 / A for a difference d of column sums, A as in `repeated_lattice`.
+    q^2 = k (k - 1) F d^2 / A for a difference d of column sums, A as in `lattices`.
     """
     k, F = len(paper.methods), float(read_printed(paper.anova.F).value)
     df = (paper.n - 1) * (k - 1)

@@ -1,10 +1,15 @@
 """Data sets that meet all constraints at once: n participants in k conditions, whole numbers.
 
-Sources: SPRITE, Heathers, Anaya, van der Zee & Brown 2018, PeerJ Preprints 6, e26968v1; `power_sums` where it fails.
+Sources: SPRITE, Heathers, Anaya, van der Zee & Brown 2018, PeerJ Preprints 6, e26968v1; the complete search of
+`lattices` where it fails.
 
 Constraints are column sums (or the printed means they give), spreads, a repeated-measures F, and how many participants
 rank two conditions in which order. Small spaces are enumerated, which also proves that there are none; others are
 searched from many starts. Whatever is returned has been checked exactly.
+
+Moves keep the sums of the columns: a whole amount goes from one row of a column to another, or two of its numbers
+change places, which also keeps its sum of squares. What is steered is W (see `lattices`) into its targets, and
+how many rows have which order of two columns. Source: Kirkpatrick, Gelatt & Vecchi 1983, Science 220, 671.
 """
 
 from __future__ import annotations
@@ -13,13 +18,25 @@ from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from fractions import Fraction
 from itertools import combinations_with_replacement, islice, product
-from math import comb, prod, sqrt
+from math import comb, exp, prod, sqrt
 from random import Random
 
-from analysis.paper.audit.annealing import AnnealedRows, ColumnOrder
-from analysis.paper.audit.lattices import Levels, Rows, affordable, candidates, distance, every_sum, ratio
+from analysis.paper.audit.lattices import (
+    BudgetError,
+    Rows,
+    affordable,
+    candidates,
+    distance,
+    effect,
+    every_sum,
+    greatest_squares,
+    least_squares,
+    numbers_with_sums,
+    of_parity,
+    ratio,
+    within_rows,
+)
 from analysis.paper.audit.means import AnswerScale
-from analysis.paper.audit.power_sums import BudgetError, greatest_squares, least_squares, numbers_with_sums
 from analysis.paper.audit.printed import Interval, Rounding, read_printed
 
 _DRAW_STEPS, _EXACT = 3_000, 6
@@ -106,11 +123,6 @@ class Constraints:
     orders: tuple[ColumnOrder, ...] = ()
     accepts: Callable[[ColumnSums], bool] | None = None
     person_sd: float = 0.0
-
-    @property
-    def levels(self) -> Levels:
-        """The whole numbers of a cell."""
-        return Levels(self.top)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -206,8 +218,7 @@ def _spread_fits(values: ColumnSums, column: ConditionColumn) -> bool:
 
 
 def _f_fits(rows: Rows, sums: ColumnSums, F: Interval) -> bool:
-    w = sum(len(row) * sum(value * value for value in row) - sum(row) ** 2 for row in rows)
-    found = ratio(sums, w, len(rows))
+    found = ratio(sums, within_rows(rows), len(rows))
     return found is not None and F.holds(found)
 
 
@@ -241,17 +252,17 @@ def _impossible(wanted: Constraints) -> bool:
 
 def _has_w(wanted: Constraints, sums: ColumnSums) -> bool:
     """False only by proof: these sums have none of the W that F needs."""
-    if wanted.F is None or not affordable(wanted.n, len(sums), wanted.levels):
+    if wanted.F is None or not affordable(wanted.n, len(sums), wanted.top):
         return True
     exact = every_sum(wanted.n, len(sums), wanted.top).get(sums, 0)
-    return any(exact >> w & 1 for w in candidates(sums, wanted.n, wanted.F, wanted.levels))
+    return any(exact >> w & 1 for w in candidates(sums, wanted.n, wanted.F, wanted.top))
 
 
 def _possible(wanted: Constraints, sums: ColumnSums) -> bool:
     """Will the sums do, and is there any W for them that gives F?"""
     if wanted.accepts is not None and not wanted.accepts(sums):
         return False
-    return wanted.F is None or bool(candidates(sums, wanted.n, wanted.F, wanted.levels))
+    return wanted.F is None or bool(candidates(sums, wanted.n, wanted.F, wanted.top))
 
 
 def _sums(wanted: Constraints, random: Random) -> Iterator[ColumnSums]:
@@ -271,7 +282,7 @@ def _sums(wanted: Constraints, random: Random) -> Iterator[ColumnSums]:
 
 def _searched(wanted: Constraints, sums: ColumnSums, random: Random) -> Rows | None:
     """One start: columns that meet their own constraints, then moves that keep them until the joint ones are met."""
-    targets = None if wanted.F is None else candidates(sums, wanted.n, wanted.F, wanted.levels)
+    targets = None if wanted.F is None else candidates(sums, wanted.n, wanted.F, wanted.top)
     people = [random.gauss(0, wanted.person_sd) for _ in range(wanted.n)]
     sd = _start_sd(wanted, sums, targets)
     columns = []
@@ -296,13 +307,116 @@ def _start_sd(wanted: Constraints, sums: ColumnSums, targets: range | None) -> f
     if not targets:
         return None
     n, k = wanted.n, len(sums)
-    a = k * sum(c * c for c in sums) - sum(sums) ** 2
-    return sqrt(max((n * targets[0] - a) / (n * k * (n - 1) * (k - 1)), 0.0))
+    return sqrt(max((n * targets[0] - effect(sums)) / (n * k * (n - 1) * (k - 1)), 0.0))
 
 
 def _squares(wanted: Constraints, total: int, variance: Interval) -> range:
     """The sums of squares that go with a sum and a variance, of the sum's parity."""
     n = wanted.n
     interval = variance.mapped(lambda value: value * (n - 1) + Fraction(total**2, n))
-    whole = interval.integers(least_squares(n, total), greatest_squares(n, total, 0, wanted.top))
-    return range(whole.start + (whole.start - total) % 2, whole.stop, 2)
+    return of_parity(interval, least_squares(n, total), greatest_squares(n, total, 0, wanted.top), total)
+
+
+_HOT, _COLD = 1.0, 0.002
+"""Temperatures at the start and at the end, in rows out of order; found by trial on data that existed."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ColumnOrder:
+    """In so many rows column `one` is above `other`, or tied with it; None: in any number of them."""
+
+    one: int
+    other: int
+    above: int | None = None
+    tied: int | None = None
+
+
+class AnnealedRows:
+    """Rows under way. `fixed` columns change by exchanges alone; numbers stay in `0..top`."""
+
+    def __init__(
+        self, columns: Sequence[list[int]], top: int, fixed: Sequence[bool], orders: Sequence[ColumnOrder]
+    ) -> None:
+        self._columns, self._top, self._fixed, self._orders = columns, top, fixed, orders
+        self._n, self._k = len(columns[0]), len(columns)
+        self._sums = [sum(row) for row in zip(*columns, strict=True)]
+        self._w = within_rows(self.rows)
+        self._of = [[order for order in orders if j in (order.one, order.other)] for j in range(self._k)]
+        self._above = {order: sum(self._sign(order, row) > 0 for row in range(self._n)) for order in orders}
+        self._tied = {order: sum(self._sign(order, row) == 0 for row in range(self._n)) for order in orders}
+
+    @property
+    def rows(self) -> Rows:
+        """The rows as they are."""
+        return tuple(zip(*self._columns, strict=True))
+
+    def anneal(self, targets: range | None, steps: int, random: Random) -> bool:
+        """Step on until W is in `targets` (None: anywhere) and all orders hold; False if they do not in so many."""
+        unit = self._unit(targets)
+        energy, cooling, temperature = self._energy(targets, unit), (_COLD / _HOT) ** (1 / steps), _HOT
+        for _ in range(steps):
+            if energy == 0:
+                return True
+            temperature *= cooling
+            move = self._move(random)
+            if move is None:
+                continue
+            self._apply(*move)
+            then = self._energy(targets, unit)
+            if then <= energy or random.random() < exp((energy - then) / temperature):
+                energy = then
+            else:
+                row, other, column, amount = move
+                self._apply(other, row, column, amount)
+        return energy == 0
+
+    def _unit(self, targets: range | None) -> float:
+        """How far off W weighs as much as one row out of order: a move's usual change."""
+        return max(2.0, 4 * max(self._w, targets[-1] if targets else 0) / self._n)
+
+    def _energy(self, targets: range | None, unit: float) -> float:
+        energy = 0.0 if targets is None else distance(self._w, targets) / unit
+        for order in self._orders:
+            if order.above is not None:
+                energy += abs(self._above[order] - order.above)
+            if order.tied is not None:
+                energy += abs(self._tied[order] - order.tied)
+        return energy
+
+    def _move(self, random: Random) -> tuple[int, int, int, int] | None:
+        """Two rows, a column and an amount from the second to the first; None if that is no move."""
+        a, b = int(random.random() * self._n), int(random.random() * self._n)
+        column = int(random.random() * self._k)
+        x, y = self._columns[column][a], self._columns[column][b]
+        if self._fixed[column] or random.random() < 0.4:
+            amount = y - x
+        else:
+            amount = 1 if random.random() < 0.7 else int(random.random() * (2 + self._top // 8)) + 1
+        if a == b or not amount or not (0 <= x + amount <= self._top and 0 <= y - amount <= self._top):
+            return None
+        return a, b, column, amount
+
+    def _apply(self, a: int, b: int, column: int, amount: int) -> None:
+        values, sums = self._columns[column], self._sums
+        self._count(a, column, -1)
+        self._count(b, column, -1)
+        squares = 2 * amount * (values[a] - values[b] + amount)
+        self._w += self._k * squares - 2 * amount * (sums[a] - sums[b] + amount)
+        values[a] += amount
+        values[b] -= amount
+        sums[a] += amount
+        sums[b] -= amount
+        self._count(a, column, 1)
+        self._count(b, column, 1)
+
+    def _count(self, row: int, column: int, step: int) -> None:
+        """Take a row into the counts of the orders, or out of them."""
+        for order in self._of[column]:
+            sign = self._sign(order, row)
+            if sign > 0:
+                self._above[order] += step
+            elif sign == 0:
+                self._tied[order] += step
+
+    def _sign(self, order: ColumnOrder, row: int) -> int:
+        return self._columns[order.one][row] - self._columns[order.other][row]

@@ -1,27 +1,67 @@
-"""The audit of a paper: every claim of its file, checked in the order of the paper."""
+"""The audit of a paper: every claim of its file, checked in the order of the paper.
+
+```
+[paper]
+title = "..."
+source = "doi or address"
+
+[[claims]]
+place = "Results, first paragraph"
+quote = "M = 5.21, SD = 1.60"
+kind = "grimmer"          # a key of analysis.paper.audit.claims.CHECKS, or "stated", "unpublished"
+mean = "5.21"             # text: the printed digits; whole numbers are exact
+sd = "1.60"
+n = 28
+```
+
+The other keys of a claim are the arguments of its check (`claims` has them with their types):
+
+| kind | keys (those after ; may be left out) |
+| --- | --- |
+| grim | mean, n; grain, items, low, high |
+| grimmer | mean, sd, n; grain, items, low, high |
+| debit | mean, sd, n |
+| percent | percent, count, n |
+| df | df, design, counts |
+| p | statistic, value, p; df, sides |
+| binomial | p, n; chance, counts |
+| repeated-f | F, n, k; means, grain, low, high, transforms, other_grains |
+| between-f | F, sizes; means, grain, low, high |
+| tukey | F, sizes, comparisons ({higher, lower, p, p_at_least}); means, repeated, grain, low, high |
+| total | printed, terms ({times, over}); bound ("equals", "at least", "at most") |
+| stated | printed; unit |
+| unpublished | quantity |
+
+Every claim may also have a `note` on how the file reads the paper, and `about`, the names of the numbers of Recoil's
+own comparison that it is about. `[participants]`, `[direction]` and `[preference]`, if there, give claims of their own
+(`derived`).
+"""
 
 from __future__ import annotations
 
+import json
 from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
 
-from analysis.paper.audit.claims import Claim
-from analysis.paper.audit.derived import derived
-from analysis.paper.audit.paper_file import PaperFile
-from analysis.paper.audit.words import CheckResult
+from pydantic import Field
 
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class AuditFinding:
-    """What the audit found of one number: where the paper prints it, in which words, and the check's result.
-
-    `about`: the numbers of Recoil's own comparison that it is about.
-    """
-
-    place: str
-    quote: str
-    note: str
-    result: CheckResult
-    about: tuple[str, ...] = ()
+from analysis.paper.audit.claims import (
+    AnyClaim,
+    AuditFinding,
+    Claim,
+    direction_claims,
+    participants_claims,
+    preference_claims,
+)
+from analysis.paper.audit.page import counts, findings_json, findings_text, sections
+from analysis.paper.paper import PaperHead, Participants, PublishedDirection, PublishedPreference
+from analysis.report.page import write_page
+from experiments.config.door import ConfigError, Model, load
+from experiments.config.setup import sha256
+from experiments.load import find
+from experiments.record import storage
+from experiments.record.provenance import provenance
 
 
 def audit(paper: PaperFile) -> tuple[AuditFinding, ...]:
@@ -32,9 +72,97 @@ def audit(paper: PaperFile) -> tuple[AuditFinding, ...]:
     return tuple(_finding(claim) for claim in (*derived(paper), *paper.claims))
 
 
+def derived(paper: PaperFile) -> tuple[Claim, ...]:
+    """The claims of the sections that the file has, in the order of the paper."""
+    claims: list[Claim] = []
+    if paper.participants is not None:
+        claims += participants_claims(paper.participants)
+    if paper.direction is not None:
+        claims += direction_claims(paper.direction)
+    if paper.preference is not None:
+        claims += preference_claims(paper.preference)
+    return tuple(claims)
+
+
 def _finding(claim: Claim) -> AuditFinding:
     try:
         result = claim.run()
     except ValueError as error:
         raise ValueError(f"{claim.place}, “{claim.quote}”: {error}") from error
     return AuditFinding(place=claim.place, quote=claim.quote, note=claim.note, result=result, about=tuple(claim.about))
+
+
+class PaperFile(Model):
+    """Everything that a paper reports, as claims; the three sections are those of Recoil's own paper."""
+
+    paper: PaperHead = PaperHead()
+    participants: Participants | None = None
+    direction: PublishedDirection | None = None
+    preference: PublishedPreference | None = None
+    claims: tuple[AnyClaim, ...] = Field(default=(), strict=False)
+
+
+def load_paper_file(path: str | Path) -> PaperFile:
+    """A paper's file. `ConfigError` with file, key, value and rule."""
+    return load(PaperFile, Path(path))
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Audited:
+    """A paper with what was found of its numbers."""
+
+    paper: PaperFile
+    findings: tuple[AuditFinding, ...]
+    source: Path
+
+    @property
+    def exceptions(self) -> bool:
+        """Is any number not attainable?"""
+        return any(finding.result.verdict == "not attainable" for finding in self.findings)
+
+    def as_json(self) -> dict[str, Any]:
+        """All of it as plain JSON values."""
+        return {
+            "paper": self.paper.paper.model_dump(),
+            "verdicts": counts(self.findings),
+            "findings": findings_json(self.findings),
+            "versions": {"file": self.source.name, "sha256": self._sha256, **provenance()},
+        }
+
+    def as_text(self) -> str:
+        """The terminal's table."""
+        return findings_text(self.findings)
+
+    @property
+    def origin(self) -> list[tuple[str, str]]:
+        """Label and value of where it comes from."""
+        head = self.paper.paper
+        facts = {"paper": head.title, "source": head.source, "field": head.field, "file": self.source.name}
+        shown = [(name, value) for name, value in facts.items() if value]
+        return [*shown, ("sha256 of the file's content", self._sha256), *provenance().items()]
+
+    @property
+    def _sha256(self) -> str:
+        return sha256(self.paper.model_dump(mode="json"))
+
+
+def audit_file(name: str) -> Audited:
+    """The audit of a paper's file, or of a shipped one. `ConfigError` if it cannot be used."""
+    source = find(name)
+    paper = load_paper_file(source)
+    try:
+        findings = audit(paper)
+    except ValueError as error:
+        raise ConfigError(f"{source}: {error}") from error
+    if not findings:
+        raise ConfigError(f"{source}: makes no claims; give [[claims]], or the sections of a paper")
+    return Audited(paper=paper, findings=findings, source=source)
+
+
+def write(audited: Audited, out: Path) -> None:
+    """Write `audit.json`, `report.html` and `report.md` into `out`."""
+    storage.make_folder(out)
+    text = json.dumps(audited.as_json(), indent=1, ensure_ascii=False) + "\n"
+    storage.write_whole(out / "audit.json", text.encode())
+    title = f"Audit: {audited.paper.paper.title or audited.source.stem}"
+    write_page(out, title, sections(audited.findings, audited.origin))

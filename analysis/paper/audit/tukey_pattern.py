@@ -9,6 +9,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from fractions import Fraction
+from functools import partial
 from itertools import product
 from math import isqrt
 
@@ -17,9 +18,21 @@ import numpy as np
 from analysis.paper.audit.lattices import column_choices
 from analysis.paper.audit.means import AnswerScale, check_count, scale_of
 from analysis.paper.audit.p_values import p_range
-from analysis.paper.audit.printed import Interval, PrintedNumber, Rounding, read_printed
-from analysis.paper.audit.words import NONE_EXISTS, UNKNOWN, Attempt, CheckResult, DataExistence, judge_readings
-from analysis.stats.studentized_range import studentized_range_isf
+from analysis.paper.audit.printed import (
+    NONE_EXISTS,
+    UNKNOWN,
+    Attempt,
+    CheckResult,
+    DataExistence,
+    Interval,
+    PrintedNumber,
+    PrintedText,
+    Rounding,
+    judge_readings,
+    read_printed,
+)
+from analysis.stats.tukey import studentized_range_isf
+from experiments.config.door import Model
 
 OWN_ERROR = "each pair's own error term"
 _SOURCE = "Tukey 1953; Kramer 1956, Biometrics 12, 307; Winer 1971, chapter 4"
@@ -32,8 +45,7 @@ Adjust = Callable[[Interval, int, int], tuple[Interval, Interval | None]]
 """From q, the number of means and the error df: p-values certainly holding, and certainly within."""
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class ClaimedComparison:
+class ClaimedComparison(Model):
     """Mean `higher` is said to be above mean `lower` (places from 0) with `p`, such as "< .05".
 
     Stars also say that p is not below the next level: `p_at_least`.
@@ -41,8 +53,8 @@ class ClaimedComparison:
 
     higher: int
     lower: int
-    p: str
-    p_at_least: str | None = None
+    p: PrintedText
+    p_at_least: PrintedText | None = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -80,11 +92,12 @@ def tukey_pattern(
     Sources: Kramer 1956, Biometrics 12, 307; Winer 1971, chapter 4.
     """
     scale = None if grain is None else scale_of(grain, low, high)
-    pattern = _checked(F, sizes, comparisons, means, repeated)
-    pattern = replace(pattern, scale=scale)
-    plain = _attempt(pattern, _tukey)
-    others = [(name, _attempt(pattern, adjust)) for name, adjust in _OTHERS]
-    decision = judge_readings(plain, [*others, (OWN_ERROR, _own_error(pattern))] if repeated else others)
+    pattern = replace(_checked(F, sizes, comparisons, means, repeated), scale=scale)
+    plain = partial(_means, pattern, _tukey)
+    others: list[tuple[str, Attempt]] = [(name, partial(_means, pattern, adjust)) for name, adjust in _OTHERS]
+    if repeated:
+        others.append((OWN_ERROR, partial(_own_error, pattern)))
+    decision = judge_readings(plain, others)
     pooled = judge_readings(plain).verdict
     return CheckResult(
         check="Tukey pattern",
@@ -124,23 +137,20 @@ def _checked(
     return _Pattern(read_printed(F), printed, tuple(sizes), None, tuple(comparisons), df)
 
 
-def _attempt(pattern: _Pattern, adjust: Adjust) -> Attempt:
-    def attempt(rounding: Rounding) -> DataExistence:
-        F = pattern.F.interval(rounding)
-        boxes = _boxes(pattern, rounding)
-        if boxes is not None and not any(_box_possible(pattern, box, F, adjust, rounding) for box in boxes):
-            return NONE_EXISTS
-        around = _inside(F, pattern.F.value)
-        for point in _points(pattern, boxes):
-            if not all(point[c.higher] > point[c.lower] for c in pattern.comparisons):
-                continue
-            solved = boxes is not None and adjust is _tukey
-            values = [pattern.F.value, *_solved(pattern, point, F, rounding)] if solved else around
-            if any(_point_fits(pattern, point, value, adjust, rounding) for value in values if value > 0):
-                return DataExistence(True, (point,))
-        return UNKNOWN
-
-    return attempt
+def _means(pattern: _Pattern, adjust: Adjust, rounding: Rounding) -> DataExistence:
+    F = pattern.F.interval(rounding)
+    boxes = _boxes(pattern, rounding)
+    if boxes is not None and not any(_box_possible(pattern, box, F, adjust, rounding) for box in boxes):
+        return NONE_EXISTS
+    around = _inside(F, pattern.F.value)
+    for point in _points(pattern, boxes):
+        if not all(point[c.higher] > point[c.lower] for c in pattern.comparisons):
+            continue
+        solved = boxes is not None and adjust is _tukey
+        values = [pattern.F.value, *_solved(pattern, point, F, rounding)] if solved else around
+        if any(_point_fits(pattern, point, value, adjust, rounding) for value in values if value > 0):
+            return DataExistence(True, (point,))
+    return UNKNOWN
 
 
 def _solved(pattern: _Pattern, point: Point, F: Interval, rounding: Rounding) -> list[Fraction]:
@@ -168,15 +178,10 @@ def _inside(F: Interval, value: Fraction) -> list[Fraction]:
     return [x for x in (value, *around) if F.holds(x)]
 
 
-def _own_error(pattern: _Pattern) -> Attempt:
+def _own_error(pattern: _Pattern, rounding: Rounding) -> DataExistence:
     """Each pair on its own error, which is not printed: settled only where a mean is not above the other."""
-
-    def attempt(rounding: Rounding) -> DataExistence:
-        boxes = _boxes(pattern, rounding)
-        ordered = boxes is None or any(_in_order(pattern, box) for box in boxes)
-        return UNKNOWN if ordered else NONE_EXISTS
-
-    return attempt
+    boxes = _boxes(pattern, rounding)
+    return UNKNOWN if boxes is None or any(_in_order(pattern, box) for box in boxes) else NONE_EXISTS
 
 
 def _in_order(pattern: _Pattern, box: Box) -> bool:

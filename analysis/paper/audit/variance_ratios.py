@@ -11,23 +11,37 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from fractions import Fraction
+from functools import partial
 from math import asin, sqrt
 from random import Random
 
-from analysis.paper.audit import lattices as between
-from analysis.paper.audit import lattices as repeated
-from analysis.paper.audit.lattices import Levels, Rows, column_choices
+from analysis.paper.audit.lattices import (
+    Rows,
+    between_candidates,
+    between_ratio,
+    between_terms,
+    candidates,
+    column_choices,
+    effect,
+    find_groups,
+    find_rows,
+    needed,
+    ratio,
+)
 from analysis.paper.audit.means import AnswerScale, check_count, scale_of
-from analysis.paper.audit.printed import Interval, PrintedNumber, Rounding, decimal, read_printed
-from analysis.paper.audit.words import (
+from analysis.paper.audit.printed import (
     NONE_EXISTS,
     UNKNOWN,
     Attempt,
     CheckResult,
     DataExistence,
+    Interval,
     JudgedReadings,
-    Witness,
+    PrintedNumber,
+    Rounding,
+    decimal,
     judge_readings,
+    read_printed,
 )
 
 _STEPS, _STARTS, _MARGIN = 1_500, 8, 1e-9
@@ -98,7 +112,7 @@ def _f_of(rows: list[list[int]], values: Sequence[float]) -> float:
     return (n - 1) * effect / error if error > 1e-9 else float("inf")
 
 
-Search = Callable[[Sequence[int], Interval], tuple[tuple[int, ...], ...] | bool | None]
+Search = Callable[[Sequence[int], Interval], Rows | bool | None]
 """From column sums and the F allowed: data in grains, False if proved that there are none, None if not settled."""
 _SOURCE = "Winer 1971, chapter 4; lattice of whole sums as in Brown & Heathers 2017 and Anaya 2016"
 _GUESSES = 3_000
@@ -114,8 +128,8 @@ class _Claim:
     scale: AnswerScale
 
     @property
-    def levels(self) -> Levels:
-        return Levels(self.scale.high if self.scale.low is not None else None)
+    def top(self) -> int | None:
+        return self.scale.high if self.scale.low is not None else None
 
     @property
     def n(self) -> int:
@@ -145,19 +159,21 @@ def repeated_f(
     between conditions within participants, both whole in grains squared, W of known parity. Without means every set of
     column sums is allowed. Readings: another error term (between), `transforms` of the scores as shares of the scale,
     scores in `other_grains` with any means. `ValueError`: text that is no number, n or k below 2, a wrong scale.
-    Source: Winer 1971, chapter 4; the lattice by the identity in `repeated_lattice`.
+    Source: Winer 1971, chapter 4; the lattice by the identity in `lattices`.
 
     >>> repeated_f("28.45", 14, 3, ["55.7%", "79.3%", "92.9%"], grain="0.1", low="0", high="1").verdict
     'not attainable'
     """
     check_count(n - 1, "n - 1")
     claim = _claimed(F, means, (n,) * k, scale_of(grain, low, high))
-    others: list[tuple[str, Attempt]] = [("error term of a between-subjects design", _attempt(claim, _between(claim)))]
-    others += [(f"{name} transform", _attempt(claim, _transformed(claim, name))) for name in transforms]
+    others: list[tuple[str, Attempt]] = [
+        ("error term of a between-subjects design", partial(_data, claim, _between(claim)))
+    ]
+    others += [(f"{name} transform", partial(_data, claim, _transformed(claim, name))) for name in transforms]
     for step in other_grains:
         free = _claimed(F, None, (n,) * k, scale_of(step, low, high))
-        others.append((f"scores in steps of {step} with other means", _attempt(free, _repeated(free))))
-    decision = judge_readings(_attempt(claim, _repeated(claim)), others)
+        others.append((f"scores in steps of {step} with other means", partial(_data, free, _repeated(free))))
+    decision = judge_readings(partial(_data, claim, _repeated(claim)), others)
     return _result("repeated-measures F", claim, decision, _neighbours(claim, _w_steps))
 
 
@@ -182,8 +198,8 @@ def between_f(
     """
     claim = _claimed(F, means, tuple(sizes), scale_of(grain, low, high))
     equal = len(set(sizes)) == 1 and claim.n > 1
-    others = [("error term of a repeated-measures design", _attempt(claim, _repeated(claim)))] if equal else []
-    decision = judge_readings(_attempt(claim, _between(claim)), others)
+    others = [("error term of a repeated-measures design", partial(_data, claim, _repeated(claim)))] if equal else []
+    decision = judge_readings(partial(_data, claim, _between(claim)), others)
     return _result("between-subjects F", claim, decision, _neighbours(claim, _s_steps))
 
 
@@ -203,47 +219,34 @@ def _claimed(F: str, means: Sequence[str] | None, sizes: tuple[int, ...], scale:
 
 
 def _repeated(claim: _Claim) -> Search:
-    def search(columns: Sequence[int], F: Interval) -> tuple[tuple[int, ...], ...] | bool | None:
-        targets = repeated.candidates(columns, claim.n, F, claim.levels)
-        return repeated.find_rows(columns, claim.n, targets, claim.levels)
-
-    return search
+    n, top = claim.n, claim.top
+    return lambda columns, F: find_rows(columns, n, candidates(columns, n, F, top), top)
 
 
 def _between(claim: _Claim) -> Search:
-    def search(columns: Sequence[int], F: Interval) -> tuple[tuple[int, ...], ...] | bool | None:
-        targets = between.between_candidates(columns, claim.sizes, F, claim.levels.top)
-        return between.find_groups(columns, claim.sizes, targets, claim.levels.top)
-
-    return search
+    sizes, top = claim.sizes, claim.top
+    return lambda columns, F: find_groups(columns, sizes, between_candidates(columns, sizes, F, top), top)
 
 
 def _transformed(claim: _Claim, name: str) -> Search:
-    top = claim.levels.top
+    top = claim.top
     if top is None or claim.means is None:
         raise ValueError(f"the {name} transform needs a scale with both ends, and means")
     return lambda columns, F: find_transformed(name, columns, claim.n, top, F)
 
 
-def _attempt(claim: _Claim, search: Search) -> Attempt:
-    def attempt(rounding: Rounding) -> DataExistence:
-        F = claim.F.interval(rounding)
-        if F.high is not None and F.high < 0:
-            return NONE_EXISTS
-        columns, complete = _columns(claim, rounding)
-        for sums in columns:
-            found = search(sums, F)
-            if found is None:
-                complete = False
-            elif found is not False and found is not True:
-                return DataExistence(True, _in_data_units(found, claim.scale))
-        return NONE_EXISTS if complete else UNKNOWN
-
-    return attempt
-
-
-def _in_data_units(rows: tuple[tuple[int, ...], ...], scale: AnswerScale) -> Witness:
-    return tuple(tuple(scale.value(value) for value in row) for row in rows)
+def _data(claim: _Claim, search: Search, rounding: Rounding) -> DataExistence:
+    F = claim.F.interval(rounding)
+    if F.high is not None and F.high < 0:
+        return NONE_EXISTS
+    columns, complete = _columns(claim, rounding)
+    for sums in columns:
+        found = search(sums, F)
+        if found is None:
+            complete = False
+        elif found is not False and found is not True:
+            return DataExistence(True, tuple(tuple(map(claim.scale.value, row)) for row in found))
+    return NONE_EXISTS if complete else UNKNOWN
 
 
 def _columns(claim: _Claim, rounding: Rounding) -> tuple[Iterator[tuple[int, ...]], bool]:
@@ -252,9 +255,8 @@ def _columns(claim: _Claim, rounding: Rounding) -> tuple[Iterator[tuple[int, ...
         ranges = claim.sums(rounding)
         every = column_choices(ranges)
         return (every, True) if every is not None else (_guessed(ranges), False)
-    top = claim.levels.top
-    ranges = [range(n * (top if top is not None else 100) + 1) for n in claim.sizes]
-    every = column_choices(ranges, 20_000) if top is not None else None
+    ranges = [range(n * (100 if claim.top is None else claim.top) + 1) for n in claim.sizes]
+    every = None if claim.top is None else column_choices(ranges, 20_000)
     return (every, True) if every is not None else (map(tuple, map(sorted, _guessed(ranges))), False)
 
 
@@ -271,7 +273,7 @@ Steps = Callable[[_Claim, tuple[int, ...]], Iterator[tuple[Fraction, int]]]
 
 def _neighbours(claim: _Claim, steps: Steps) -> tuple[Fraction | None, Fraction | None]:
     """The nearest F below and above the printed one that data give, for the column sums that print the means."""
-    if claim.means is None:
+    if claim.means is None or claim.F.value <= 0:
         return None, None
     choices = column_choices(claim.sums(Rounding.ANY), 12)
     found = [pair for sums in choices or () for pair in steps(claim, sums)]
@@ -280,35 +282,31 @@ def _neighbours(claim: _Claim, steps: Steps) -> tuple[Fraction | None, Fraction 
 
 
 def _w_steps(claim: _Claim, sums: tuple[int, ...]) -> Iterator[tuple[Fraction, int]]:
-    value = claim.F.value
-    edge = repeated.needed(sums, claim.n, Interval(value, value)).low
-    if value <= 0 or edge is None:
-        return
-    start = int(edge) + (int(edge) - (sum(sums) if len(sums) % 2 == 0 else 0)) % 2
-    for side in (1, -1):
-        places = (start - 2 * i if side > 0 else start + 2 * i for i in range(6))
-        for w in places:
-            F = repeated.ratio(sums, w, claim.n)
-            on_side = F is not None and (F - value) * side >= 0
-            if F is not None and on_side and repeated.find_rows(sums, claim.n, range(w, w + 1), claim.levels):
-                yield F, side
-                break
+    edge = int(needed(sums, claim.n, Interval(claim.F.value, claim.F.value)).low or 0)
+    start = edge + (edge - (0 if len(sums) % 2 else sum(sums))) % 2
+    rows = partial(find_rows, sums, claim.n, top=claim.top)
+    return _beside(claim.F.value, start, lambda w: ratio(sums, w, claim.n), rows)
 
 
 def _s_steps(claim: _Claim, sums: tuple[int, ...]) -> Iterator[tuple[Fraction, int]]:
-    value = claim.F.value
-    if value <= 0:
-        return
-    b, explained = between.between_terms(sums, claim.sizes)
-    edge = int(b + explained * (sum(claim.sizes) - len(sums)) / ((len(sums) - 1) * value))
+    b, explained = between_terms(sums, claim.sizes)
+    edge = int(b + explained * (sum(claim.sizes) - len(sums)) / ((len(sums) - 1) * claim.F.value))
     start = edge + (edge - sum(sums)) % 2
+    groups = partial(find_groups, sums, claim.sizes, top=claim.top)
+    return _beside(claim.F.value, start, lambda s: between_ratio(sums, s, claim.sizes), groups)
+
+
+def _beside(
+    value: Fraction,
+    start: int,
+    ratio_of: Callable[[int], Fraction | None],
+    data: Callable[[range], Rows | bool | None],
+) -> Iterator[tuple[Fraction, int]]:
+    """On both sides, the first F, from `start` squares on, that data are found to have. F falls as it grows."""
     for side in (1, -1):
-        places = (start - 2 * i if side > 0 else start + 2 * i for i in range(6))
-        for s in places:
-            F = between.between_ratio(sums, s, claim.sizes)
-            on_side = F is not None and (F - value) * side >= 0
-            targets = range(s, s + 1)
-            if F is not None and on_side and between.find_groups(sums, claim.sizes, targets, claim.levels.top):
+        for squares in range(start, start - 12 * side, -2 * side):
+            F = ratio_of(squares)
+            if F is not None and (F - value) * side >= 0 and data(range(squares, squares + 1)):
                 yield F, side
                 break
 
@@ -351,5 +349,5 @@ def _numbers(claim: _Claim, check: str) -> tuple[tuple[str, str], ...]:
     interval = claim.F.interval(Rounding.ANY)
     shown = [("column sums in grains", ", ".join(map(str, columns)))]
     if check.startswith("repeated"):
-        shown += [("A", str(repeated.effect(columns))), ("W needed", str(repeated.needed(columns, claim.n, interval)))]
+        shown += [("A", str(effect(columns))), ("W needed", str(needed(columns, claim.n, interval)))]
     return tuple(shown)

@@ -3,19 +3,19 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-import matplotlib as mpl
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.colors import BoundaryNorm, ListedColormap
 from matplotlib.figure import Figure
 from matplotlib.patches import Patch
 
-from analysis.predict.design_search.results import DesignSearch, DrivePrediction, OwnMethod, Plane, SweptAxes
+from analysis.predict.design_search.choice import Designs
+from analysis.predict.design_search.results import DesignSearch, DrivePrediction
 from analysis.report.figures.style import (
     BLACK,
     BLUE,
@@ -23,82 +23,70 @@ from analysis.report.figures.style import (
     METHOD_LINES,
     ORANGE,
     VERMILION,
+    drawn,
     light_grid,
-    new_figure,
-    save,
-    style,
 )
 from analysis.stats.arrays import FloatArray
 
+BOTH = "both directions alike"
 MARKERS = "os^Dv<>"
 FAINT, SOFT = "#d6d6d6", "#9db8cc"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Mark:
-    """A design with a name: where it stands, and its predicted share of 1 with its limits."""
+    """A design with a name."""
 
     name: str
-    friction_N: float
-    voltage_V: float
-    shooting_rate_Hz: float
-    predicted: float
-    ci_low: float
-    ci_high: float
+    design: DrivePrediction
 
 
-@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class Trade:
-    """All designs by rate and predicted share; those within the limits; the front, from the fastest on, with limits."""
-
-    rate_Hz: FloatArray
-    predicted: FloatArray
-    allowed: Any  # booleans
-    front_rate_Hz: FloatArray
-    front: FloatArray
-    front_low: FloatArray
-    front_high: FloatArray
-
-
-def figure_trade(trade: Trade, bound_Hz: float, best: Mark | None, own: Sequence[Mark], path_stem: Path) -> None:
+def figure_trade(found: DesignSearch, designs: Designs, path_stem: Path) -> None:
     """Predicted share over shooting rate, the front with its 95 % band, the bound, the gun's own methods, the best."""
-    with mpl.rc_context(style()):  # type: ignore[arg-type]
-        figure = new_figure(6.6, 4.6)
+    bound_Hz, best = found.rate_above_Hz, _best_mark(found)
+    rate_Hz, predicted, low, high = (
+        np.array([getattr(one, key) for one in found.front], dtype=np.float64)
+        for key in ("shooting_rate_Hz", "predicted", "ci_low", "ci_high")
+    )
+    with drawn(path_stem, 6.6, 4.6) as figure:
         axes = figure.subplots()
         light_grid(axes)
-        _clouds(axes, trade)
-        low, high = 100.0 * trade.front_low, 100.0 * trade.front_high
-        axes.fill_between(trade.front_rate_Hz, low, high, color=BLUE, alpha=0.18, linewidth=0.0)
-        axes.plot(trade.front_rate_Hz, 100.0 * trade.front, color=BLUE, linewidth=1.5, label="Pareto front, 95 % band")
+        _clouds(axes, designs)
+        axes.fill_between(rate_Hz, 100.0 * low, 100.0 * high, color=BLUE, alpha=0.18, linewidth=0.0)
+        axes.plot(rate_Hz, 100.0 * predicted, color=BLUE, linewidth=1.5, label="Pareto front, 95 % band")
         axes.axvline(bound_Hz, color="#444444", linewidth=0.9, linestyle=(0, (4, 3)), zorder=1.5)
-        for place, mark in enumerate(own):
+        for place, mark in enumerate(_own_marks(found)):
             _point(axes, mark, VERMILION, MARKERS[place % len(MARKERS)], 6.0)
         if best is not None:
             _point(axes, best, ORANGE, "*", 13.0)
-        _scales(axes, bound_Hz, trade)
+        _scales(axes, bound_Hz, designs)
         where: Any = "outside lower center"
         figure.legend(loc=where, ncols=3, frameon=False, fontsize=8.0)
-        save(figure, path_stem)
 
 
-def _clouds(axes: Axes, trade: Trade) -> None:
-    """All designs as dots, with larger ones in the legend."""
-    size = 2.0 if len(trade.rate_Hz) > 4000 else 4.0
+def _clouds(axes: Axes, designs: Designs) -> None:
+    """All designs with a prediction as dots, with larger ones in the legend."""
+    known = np.isfinite(designs.predicted)
+    size = 2.0 if known.sum() > 4000 else 4.0
     for mask, colour, name in (
-        (~trade.allowed, FAINT, "beyond the device's limits"),
-        (trade.allowed, SOFT, "a design"),
+        (known & ~designs.proposable, FAINT, "beyond the device's limits"),
+        (known & designs.proposable, SOFT, "a design"),
     ):
-        x, y = trade.rate_Hz[mask], 100.0 * trade.predicted[mask]
+        x, y = designs.shooting_rate_Hz[mask], 100.0 * designs.predicted[mask]
         axes.plot(x, y, ".", color=colour, markersize=size, markeredgewidth=0.0, rasterized=True)
         if mask.any():
             axes.plot([], [], ".", color=colour, markersize=9.0, markeredgewidth=0.0, label=name)
 
 
 def _point(axes: Axes, mark: Mark, colour: str, marker: str, size: float) -> None:
+    """Without known limits the prediction stands for them."""
+    one = mark.design
+    predicted = math.nan if one.predicted is None else one.predicted
+    low, high = (predicted if end is None else end for end in (one.ci_low, one.ci_high))
     axes.errorbar(
-        [mark.shooting_rate_Hz],
-        [100.0 * mark.predicted],
-        yerr=[[100.0 * (mark.predicted - mark.ci_low)], [100.0 * (mark.ci_high - mark.predicted)]],
+        [one.shooting_rate_Hz],
+        [100.0 * predicted],
+        yerr=[[100.0 * (predicted - low)], [100.0 * (high - predicted)]],
         fmt=marker,
         color=colour,
         markersize=size,
@@ -112,10 +100,11 @@ def _point(axes: Axes, mark: Mark, colour: str, marker: str, size: float) -> Non
     )
 
 
-def _scales(axes: Axes, bound_Hz: float, trade: Trade) -> None:
+def _scales(axes: Axes, bound_Hz: float, designs: Designs) -> None:
     """Rates from below the bound to three times it: what is faster is hardly felt."""
     widest = 3.0 * bound_Hz
-    slowest = float(trade.rate_Hz[trade.allowed].min()) if trade.allowed.any() else 0.0
+    rates_Hz = designs.shooting_rate_Hz[designs.proposable & np.isfinite(designs.predicted)]
+    slowest = float(rates_Hz.min()) if rates_Hz.size else 0.0
     axes.set_xlim(max(0.0, min(slowest, bound_Hz) - 0.2), widest)
     axes.set_ylim(48.0, 101.0)
     axes.set_xlabel("highest shooting rate [Hz]")
@@ -141,74 +130,64 @@ AREA_NAMES = {
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class MapField:
-    """A plane of designs of one pulse: axes, then arrays (frictions, voltages); NaN where there is no prediction."""
+    """What a map of one pulse stands on: its axes, and the status of the shots (frictions, voltages)."""
 
     pulse_s: float
     friction_N: FloatArray
     voltage_V: FloatArray
     status: Any  # words
-    predicted: FloatArray
-    shooting_rate_Hz: FloatArray
     beyond: Any  # booleans over the voltages: a limit of the device would be broken
 
 
-@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class ContourLines:
-    """The contour over the frictions with its band; other contours by name. What is not reached is not finite."""
-
-    voltage_V: FloatArray
-    low_V: FloatArray
-    high_V: FloatArray
-    others: Mapping[str, FloatArray]
-
-
-def figure_maps(
-    field: MapField, lines: tuple[float, float], own: Sequence[Mark], best: Mark | None, path_stem: Path
-) -> None:
-    """Two maps over friction and voltage: the predicted share and the shooting rate, each with its line of `lines`."""
-    level, bound_Hz = lines
-    with mpl.rc_context(style()):  # type: ignore[arg-type]
-        figure = new_figure(8.6, 4.7)
+def figure_maps(found: DesignSearch, path_stem: Path) -> None:
+    """Two maps over friction and voltage: predicted share and shooting rate, each with the line of what is asked."""
+    plane, bound_Hz, best = found.map, found.rate_above_Hz, _best_mark(found)
+    marks = [*_own_marks(found, swept=True, pulse_s=plane.pulse_s), *([best] if best else [])]
+    beyond = [words is not None for words in plane.limit_of_voltage]
+    field = _field_of(found, plane.pulse_s, plane.status, beyond)
+    predicted = 100.0 * plane.predicted
+    with drawn(path_stem, 8.6, 4.7) as figure:
         left, right = figure.subplots(1, 2, sharex=True, sharey=True)
-        shares = _mesh(left, field, 100.0 * field.predicted, "viridis", (50.0, 100.0))
-        _level(left, field, 100.0 * field.predicted, 100.0 * level, "%")
-        _level(left, field, field.shooting_rate_Hz, bound_Hz, "Hz")
+        shares = _mesh(left, field, predicted, "viridis", (50.0, 100.0))
+        _level(left, field, predicted, 100.0 * found.critical.level, "%")
+        _level(left, field, plane.shooting_rate_Hz, bound_Hz, "Hz")
         figure.colorbar(shares, ax=left, label="right about a forward shot, predicted [%]")
-        rates = _mesh(right, field, field.shooting_rate_Hz, "cividis", (0.0, 4.0 * bound_Hz))
-        _level(right, field, field.shooting_rate_Hz, bound_Hz, "Hz")
+        rates = _mesh(right, field, plane.shooting_rate_Hz, "cividis", (0.0, 4.0 * bound_Hz))
+        _level(right, field, plane.shooting_rate_Hz, bound_Hz, "Hz")
         figure.colorbar(rates, ax=right, extend="max", label="highest shooting rate [Hz]")
         for axes, title in ((left, "felt"), (right, "fast")):
             axes.set_title(f"{title}, pulse {1e3 * field.pulse_s:.3g} ms", loc="left")
             _beyond(axes, field)
-            _marks(axes, field, [*own, *([best] if best else [])], best)
+            _marks(axes, field, marks, best)
             axes.set_xlabel("damper friction [N]")
         left.set_ylabel("voltage [V]")
         _legend(figure, left, field)
-        save(figure, path_stem)
 
 
-def figure_critical(field: MapField, lines: ContourLines, level: float, own: Sequence[Mark], path_stem: Path) -> None:
-    """The contour of `level` over friction and voltage with its band, and the contours under other assumptions."""
-    with mpl.rc_context(style()):  # type: ignore[arg-type]
-        figure = new_figure(6.6, 5.2)
+def figure_critical(found: DesignSearch, path_stem: Path) -> None:
+    """The contour of the level over friction and voltage with its band, and the contours under other assumptions."""
+    critical, band = found.critical, found.critical.band
+    field = _field_of(found, critical.pulse_s, critical.status, [False] * len(found.axes.voltage_V))
+    others = {one.name: one.voltage_V for one in critical.alternatives} | {BOTH: critical.both_directions_V}
+    with drawn(path_stem, 6.6, 5.2) as figure:
         axes = figure.subplots()
         _areas(axes, field)
         x, top = field.friction_N, float(field.voltage_V[-1])
-        low, high = (np.clip(part, 0.0, top) for part in (lines.low_V, lines.high_V))
+        low, high = (np.clip(part, 0.0, top) for part in (band.low_V, band.high_V))
         axes.fill_between(x, low, high, color=BLUE, alpha=0.18, linewidth=0.0, label="95 % of the contours drawn")
-        for n, (name, voltage_V) in enumerate(lines.others.items()):
+        for n, (name, voltage_V) in enumerate(others.items()):
             dashes = METHOD_LINES[(n + 1) % len(METHOD_LINES)]
             colour = (INK, INK, VERMILION, VERMILION, ORANGE)[n % 5]
             axes.plot(x, _finite(voltage_V), color=colour, linewidth=1.1, linestyle=dashes, label=name)
-        axes.plot(x, _finite(lines.voltage_V), color=BLUE, linewidth=2.0, label=f"{100.0 * level:g} % right")
-        _marks(axes, field, own, None)
+        name = f"{100.0 * critical.level:g} % right"
+        axes.plot(x, _finite(critical.voltage_V), color=BLUE, linewidth=2.0, label=name)
+        _marks(axes, field, _own_marks(found, swept=True), None)
         axes.set_xlim(float(x[0]), float(x[-1]))
         axes.set_ylim(float(field.voltage_V[0]), top)
         axes.set_xlabel("damper friction [N]")
         axes.set_ylabel("voltage [V]")
         axes.set_title(f"Pulse {1e3 * field.pulse_s:.3g} ms", loc="left")
         _legend(figure, axes, field)
-        save(figure, path_stem)
 
 
 def _finite(values: FloatArray) -> FloatArray:
@@ -271,8 +250,8 @@ def _marks(axes: Axes, field: MapField, marks: Sequence[Mark], best: Mark | None
             continue
         is_best = mark is best
         axes.plot(
-            [mark.friction_N],
-            [mark.voltage_V],
+            [mark.design.friction_N],
+            [mark.design.voltage_V],
             "*" if is_best else MARKERS[n % len(MARKERS)],
             color=ORANGE if is_best else VERMILION,
             markersize=13.0 if is_best else 6.5,
@@ -287,7 +266,7 @@ def _marks(axes: Axes, field: MapField, marks: Sequence[Mark], best: Mark | None
 
 def _holds(field: MapField, mark: Mark) -> bool:
     x, y = field.friction_N, field.voltage_V
-    return bool(x[0] <= mark.friction_N <= x[-1] and y[0] <= mark.voltage_V <= y[-1])
+    return bool(x[0] <= mark.design.friction_N <= x[-1] and y[0] <= mark.design.voltage_V <= y[-1])
 
 
 def _legend(figure: Figure, axes: Axes, field: MapField) -> None:
@@ -311,45 +290,29 @@ def _legend(figure: Figure, axes: Axes, field: MapField) -> None:
     )
 
 
-def field_of(axes: SweptAxes, plane: Plane) -> MapField:
-    """A plane of designs, for a map."""
+def _field_of(found: DesignSearch, pulse_s: float, status: Sequence[Sequence[str]], beyond: Sequence[bool]) -> MapField:
     return MapField(
-        pulse_s=plane.pulse_s,
-        friction_N=np.array(axes.friction_N),
-        voltage_V=np.array(axes.voltage_V),
-        status=np.array(plane.status),
-        predicted=plane.predicted,
-        shooting_rate_Hz=plane.shooting_rate_Hz,
-        beyond=np.array([words is not None for words in plane.limit_of_voltage]),
+        pulse_s=pulse_s,
+        friction_N=np.array(found.axes.friction_N),
+        voltage_V=np.array(found.axes.voltage_V),
+        status=np.array(status),
+        beyond=np.array(beyond),
     )
 
 
-def with_pulse(one: OwnMethod, pulse_s: float) -> str:
-    """A method's name; with its pulse, if that is another than the map's."""
-    return one.name if one.pulse_s == pulse_s else f"{one.name} (pulse {1e3 * one.pulse_s:.3g} ms)"
+def _own_marks(found: DesignSearch, *, swept: bool = False, pulse_s: float | None = None) -> list[Mark]:
+    """The gun's own methods that have a prediction; those alone that the sweep could come upon, if asked.
 
-
-def own_marks(found: DesignSearch, *, swept: bool = False, pulse_s: float | None = None) -> list[Mark]:
-    """The gun's own methods that have a prediction; those alone that the sweep could come upon, if asked."""
+    With the pulse of a map, a method of another pulse has its own beside its name.
+    """
     own = [one for one in found.own if one.predicted is not None and (one.swept or not swept)]
-    return [mark_of(one.name if pulse_s is None else with_pulse(one, pulse_s), one) for one in own]
+    other_pulse = {
+        one.name: f" (pulse {1e3 * one.pulse_s:.3g} ms)" for one in own if pulse_s not in (None, one.pulse_s)
+    }
+    return [Mark(name=one.name + other_pulse.get(one.name, ""), design=one) for one in own]
 
 
-def best_mark(found: DesignSearch) -> Mark | None:
+def _best_mark(found: DesignSearch) -> Mark | None:
     """The best design, if one may be proposed."""
-    best = found.best
-    return None if best is None else mark_of(f"best at {found.rate_above_Hz:g} Hz or faster", best)
-
-
-def mark_of(name: str, one: DrivePrediction) -> Mark:
-    """A design under a name; without known limits its prediction stands for them."""
-    predicted = math.nan if one.predicted is None else one.predicted
-    return Mark(
-        name=name,
-        friction_N=one.friction_N,
-        voltage_V=one.voltage_V,
-        shooting_rate_Hz=one.shooting_rate_Hz,
-        predicted=predicted,
-        ci_low=predicted if one.ci_low is None else one.ci_low,
-        ci_high=predicted if one.ci_high is None else one.ci_high,
-    )
+    name = f"best at {found.rate_above_Hz:g} Hz or faster"
+    return None if found.best is None else Mark(name=name, design=found.best)

@@ -4,61 +4,27 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
-from analysis.predict.design_search.choice import Designs
-from analysis.predict.design_search.figures import (
-    ContourLines,
-    Trade,
-    best_mark,
-    field_of,
-    figure_critical,
-    figure_maps,
-    figure_trade,
-    own_marks,
-)
+from analysis.predict.design_search.choice import ABOVE, BELOW, REACHED, Designs
+from analysis.predict.design_search.figures import BOTH, figure_critical, figure_maps, figure_trade
 from analysis.predict.design_search.results import (
-    ABOVE,
-    BELOW,
-    REACHED,
     BestDesign,
     Critical,
     DesignSearch,
     DrivePrediction,
     PerceptBehind,
-    Plane,
     SweptDesign,
 )
 from analysis.report import apa
 from analysis.report.section import Picture, Section, Table, origin_table
 
-BOTH = "both directions alike"
-
 
 def critical_section(found: DesignSearch, figures: Path) -> Section:
     """The section; its figure is written."""
-    critical = found.critical
-    band = critical.band
-    lines = ContourLines(
-        voltage_V=critical.voltage_V,
-        low_V=band.low_V,
-        high_V=band.high_V,
-        others={one.name: one.voltage_V for one in critical.alternatives} | {BOTH: critical.both_directions_V},
-    )
-    plane = Plane(
-        pulse_s=critical.pulse_s,
-        status=critical.status,
-        predicted=critical.predicted,
-        ci_low=critical.predicted,
-        ci_high=critical.predicted,
-        shooting_rate_Hz=critical.predicted,
-        limit_of_voltage=(None,) * len(critical.status[0]),
-    )
-    figure_critical(
-        field_of(found.axes, plane), lines, critical.level, own_marks(found, swept=True), figures / "critical"
-    )
+    critical, band = found.critical, found.critical.band
+    figure_critical(found, figures / "critical")
     level = apa.percent(critical.level, 0)
     return Section(
         title=f"Critical conditions of a directional percept: {level} right",
@@ -82,7 +48,7 @@ def critical_section(found: DesignSearch, figures: Path) -> Section:
 def _said(critical: Critical, level: str) -> Iterator[str]:
     yield (
         f"Below the line the model has fewer than {level} of the answers right; the pulse is the gun's own, "
-        f"{1e3 * critical.pulse_s:.3g} ms. The band is of the three fitted numbers alone: under other assumed "
+        f"{_ms(critical.pulse_s)}. The band is of the three fitted numbers alone: under other assumed "
         "numbers the line lies elsewhere, as the other lines show, each refitted to the same rates. Where forward and "
         "backward shots count alike the fitted bias towards forward does not help, and it takes more."
     )
@@ -256,17 +222,7 @@ def _cells(one: DrivePrediction) -> tuple[str, ...]:
 
 def _trade(found: DesignSearch, designs: Designs, figures: Path) -> Section:
     front = found.front
-    known = np.isfinite(designs.predicted)
-    trade = Trade(
-        rate_Hz=designs.shooting_rate_Hz[known],
-        predicted=designs.predicted[known],
-        allowed=designs.proposable[known],
-        front_rate_Hz=_column(front, "shooting_rate_Hz"),
-        front=_column(front, "predicted"),
-        front_low=_column(front, "ci_low"),
-        front_high=_column(front, "ci_high"),
-    )
-    figure_trade(trade, found.rate_above_Hz, best_mark(found), own_marks(found), figures / "trade")
+    figure_trade(found, designs, figures / "trade")
     rows = tuple(_cells(one) for one in _spread(front, FASTEST * found.rate_above_Hz))
     return Section(
         title="The trade: felt against fast",
@@ -298,13 +254,9 @@ def _spread(front: Sequence[SweptDesign], fastest_Hz: float) -> list[SweptDesign
 
 
 def _maps(found: DesignSearch, figures: Path) -> Section:
-    plane = found.map
-    own = own_marks(found, swept=True, pulse_s=plane.pulse_s)
-    lines = (found.critical.level, found.rate_above_Hz)
-    figure_maps(field_of(found.axes, plane), lines, own, best_mark(found), figures / "maps")
-    pulse = f"{1e3 * plane.pulse_s:.3g} ms"
+    figure_maps(found, figures / "maps")
     return Section(
-        title=f"Over friction and voltage, at the pulse of the best design ({pulse})",
+        title=f"Over friction and voltage, at the pulse of the best design ({_ms(found.map.pulse_s)})",
         paragraphs=("Where there is no prediction the map says why: no break-away is no percept.",),
         pictures=(
             Picture(
@@ -343,7 +295,3 @@ def _other_route(percept: PerceptBehind) -> str:
         f" From the shot's summary alone the predicted rate would differ by {error['median']} percentage points in the "
         f"median and {error['largest']} at most, since it leaves out the coil's braking before the landing."
     )
-
-
-def _column(designs: Sequence[SweptDesign], key: str) -> Any:
-    return np.array([getattr(one, key) for one in designs], dtype=np.float64)

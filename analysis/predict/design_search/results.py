@@ -7,19 +7,18 @@ from dataclasses import dataclass, fields, replace
 
 import numpy as np
 
-from analysis.predict.design_search.choice import Designs
-from analysis.predict.design_search.critical import (
-    DRAWS,
-    INSIDE,
+from analysis.predict.design_search.choice import (
     THRESHOLD_SHARE,
     Alternative,
+    Band,
     Contour,
+    Designs,
+    predict,
+    reached,
     unbiased,
     under,
 )
-from analysis.predict.design_search.rates import predict
-from analysis.predict.design_search.shots import Layer
-from analysis.predict.design_search.space import Space
+from analysis.predict.design_search.space import Layer, Space
 from analysis.predict.fit.percept_model import PAPER_TRIALS, Fitted, PerceptFit, predicted_rate
 from analysis.stats.arrays import FloatArray
 from device.limits import (
@@ -37,9 +36,6 @@ from device.physics.equations import STATUSES
 from device.physics.shot import highest_rate_Hz, rates_of_periods_Hz
 from device.words import MAX_PULSE_S, MAX_VOLTAGE_V, Pulse
 from experiments.synthetic.percept import PerceptParameters, percept_of
-
-REACHED, ABOVE, BELOW = "at this voltage", "not within the range", "from the lowest voltage on"
-NEVER = "no voltage brings the magnet home"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -115,31 +111,6 @@ class Plane:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class ContourBand:
-    """The contours that the fit allows: `inside` of so many draws lie wholly within; and each friction alone."""
-
-    inside: float
-    draws: int
-    low_V: FloatArray
-    high_V: FloatArray
-    reached_low: tuple[str, ...]
-    reached_high: tuple[str, ...]
-    each_friction_low_V: FloatArray
-    each_friction_high_V: FloatArray
-
-
-@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class OtherContour:
-    """The contour under another assumption."""
-
-    name: str
-    parameters: PerceptParameters
-    deviance: float
-    voltage_V: FloatArray
-    reached: tuple[str, ...]
-
-
-@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Critical:
     """The voltages over the frictions from which so many are right; one that is not finite is told by its `reached`."""
 
@@ -150,8 +121,8 @@ class Critical:
     reached: tuple[str, ...]
     lasting: tuple[bool, ...]
     interpolation_error_V: float | None
-    band: ContourBand
-    alternatives: tuple[OtherContour, ...]
+    band: Band
+    alternatives: tuple[Alternative, ...]
     both_directions_V: FloatArray
     status: tuple[tuple[str, ...], ...]
     predicted: FloatArray
@@ -288,52 +259,20 @@ def critical_of(
     space: Space, layer: Layer, fit: PerceptFit, contour: Contour, others: Sequence[Alternative]
 ) -> Critical:
     """The contour with band and alternatives."""
-    band = contour.band
     return Critical(
         level=THRESHOLD_SHARE,
         pulse_s=layer.pulse_s,
         friction_N=space.friction_N,
         voltage_V=contour.voltage_V,
-        reached=_reached(contour.voltage_V),
+        reached=reached(contour.voltage_V),
         lasting=contour.lasting,
         interpolation_error_V=_apart(contour.voltage_V, contour.interpolated_V),
-        band=ContourBand(
-            inside=INSIDE,
-            draws=DRAWS,
-            low_V=band.low_V,
-            high_V=band.high_V,
-            reached_low=_reached(band.low_V),
-            reached_high=_reached(band.high_V),
-            each_friction_low_V=band.alone_low_V,
-            each_friction_high_V=band.alone_high_V,
-        ),
-        alternatives=tuple(
-            OtherContour(
-                name=other.name,
-                parameters=other.parameters,
-                deviance=other.deviance,
-                voltage_V=other.voltage_V,
-                reached=_reached(other.voltage_V),
-            )
-            for other in others
-        ),
+        band=contour.band,
+        alternatives=tuple(others),
         both_directions_V=unbiased(layer, space.voltage_V, fit),
         status=_status_words(layer),
         predicted=predict(layer.felt[fit.parameters.leak_s], fit).rate,
     )
-
-
-def _reached(voltages_V: FloatArray) -> tuple[str, ...]:
-    return tuple(reached(voltage_V) for voltage_V in voltages_V.tolist())
-
-
-def reached(voltage_V: float) -> str:
-    """What stands behind a voltage of a contour."""
-    if np.isnan(voltage_V):
-        return NEVER
-    if np.isinf(voltage_V):
-        return ABOVE if voltage_V > 0 else BELOW
-    return REACHED
 
 
 def _apart(one: FloatArray, other: FloatArray) -> float | None:

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import csv
-import io
 from bisect import bisect_right
 from collections.abc import Callable, Sequence
 from contextlib import AbstractContextManager
@@ -12,8 +10,17 @@ from pathlib import Path
 
 import numpy as np
 
-from analysis.predict.design_search.choice import Designs, best_design, designs_of, front, joined_designs, summary_error
-from analysis.predict.design_search.critical import LEAKS, Alternative, Contour, alternatives, contour_of
+from analysis.predict.design_search.choice import (
+    LEAKS,
+    Designs,
+    alternatives,
+    best_design,
+    contour_of,
+    designs_of,
+    front,
+    joined_designs,
+    summary_error,
+)
 from analysis.predict.design_search.page import in_short, sections
 from analysis.predict.design_search.results import (
     DesignSearch,
@@ -27,12 +34,20 @@ from analysis.predict.design_search.results import (
     plane_of,
     search_assumptions,
 )
-from analysis.predict.design_search.shots import Layer, layers, rows_of, simulate_rows
-from analysis.predict.design_search.space import DesignRequest, Space, make_space
+from analysis.predict.design_search.space import (
+    DesignRequest,
+    FrictionRow,
+    Layer,
+    Space,
+    layers,
+    make_space,
+    rows_of,
+    simulate_rows,
+)
 from analysis.predict.fit.percept_model import PAPER_RATES, PerceptFit, fit_percept
 from analysis.predict.jobs import RunPieces, cores, on_processes
 from analysis.report.page import write_page
-from analysis.report.serial import as_json
+from analysis.report.serial import as_csv, as_json
 from analysis.report.terminal import Progress
 from device.limits import TRAIN_LIMITS
 from device.methods import Method, paper_methods
@@ -61,19 +76,20 @@ class Searched:
 
 def search(space: Space, fit: PerceptFit, rate_Hz: float, workers: OpenWorkers, progress: Progress) -> Searched:
     """Sweep the space, then look closer around the best design that shoots at `rate_Hz` or faster."""
-    by_pulse = _swept(space, workers, progress)
+    by_pulse = _simulated(space, rows_of(space, space.pulses_s, LEAKS), workers, progress, "sweep")
     designs = designs_of(space, by_pulse, fit, rate_Hz)
     chosen = best_design(designs, rate_Hz)
     if chosen is None:
         return Searched(designs=designs, chosen=None, layers=by_pulse)
     for number in range(PASSES):
         around = closer(space, designs, chosen, 0.5**number)
-        found = _simulated(around, around.pulse_s, _here, progress, f"closer look {number + 1}")
+        rows = rows_of(around, around.pulse_s, LEAKS[:1])
+        found = _simulated(around, rows, _here, progress, f"closer look {number + 1}")
         designs = joined_designs(designs, designs_of(around, found, fit, rate_Hz))
         chosen = best_design(designs, rate_Hz) or chosen
     pulse_s = float(designs.pulse_s[chosen])
     if pulse_s not in by_pulse:
-        by_pulse |= _simulated(space, (pulse_s,), workers, progress, "map")
+        by_pulse |= _simulated(space, rows_of(space, (pulse_s,), LEAKS[:1]), workers, progress, "map")
     return Searched(designs=designs, chosen=chosen, layers=by_pulse)
 
 
@@ -104,16 +120,9 @@ def _here() -> AbstractContextManager[RunPieces]:
     return on_processes(1)
 
 
-def _swept(space: Space, workers: OpenWorkers, progress: Progress) -> dict[float, Layer]:
-    rows = rows_of(space, space.pulses_s, LEAKS)
-    with workers() as run, progress("sweep", len(rows)) as tell:
-        return layers(space, rows, simulate_rows(rows, run, tell))
-
-
 def _simulated(
-    space: Space, pulses_s: tuple[float, ...], workers: OpenWorkers, progress: Progress, name: str
+    space: Space, rows: list[FrictionRow], workers: OpenWorkers, progress: Progress, name: str
 ) -> dict[float, Layer]:
-    rows = rows_of(space, pulses_s, LEAKS[:1])
     with workers() as run, progress(name, len(rows)) as tell:
         return layers(space, rows, simulate_rows(rows, run, tell))
 
@@ -127,17 +136,6 @@ COLUMNS = (
 """Of `designs.csv`; an empty cell means that there is no prediction, or that no limit is broken."""
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class _Found:
-    """What was worked out, before it becomes plain values."""
-
-    space: Space
-    fit: PerceptFit
-    search: Searched
-    contour: Contour
-    others: tuple[Alternative, ...]
-
-
 def design(request: DesignRequest, workers: int | None, out: Path, progress: Progress) -> DesignSearch:
     """Sweep, choose, write `design.json`, `designs.csv`, report and figures into `out`.
 
@@ -145,16 +143,10 @@ def design(request: DesignRequest, workers: int | None, out: Path, progress: Pro
     """
     space = make_space(request)
     storage.make_folder(out)
-    methods = readings(space.gun)
-    fit = fit_percept(PAPER_RATES, methods)
+    fit = fit_percept(PAPER_RATES, readings(space.gun))
     found = search(space, fit, request.rate_above_Hz, lambda: on_processes(workers or cores()), progress)
-    own = found.layers[space.gun.pulse_s]
     with progress("report", 3) as tell:
-        contour = contour_of(space, own, fit, request.seed)
-        tell("contour")
-        others = tuple(alternatives(methods, own, space.voltage_V))
-        tell("assumptions")
-        result = _results(request, _Found(space=space, fit=fit, search=found, contour=contour, others=others))
+        result = _results(request, space, fit, found, tell)
         _write(out, result, found.designs)
         tell("written")
     return result
@@ -165,10 +157,15 @@ def readings(gun: GunParameters) -> dict[str, Method]:
     return paper_methods(replace(GunParameters(), drive_off=gun.drive_off, emf=gun.emf))
 
 
-def _results(request: DesignRequest, found: _Found) -> DesignSearch:
+def _results(
+    request: DesignRequest, space: Space, fit: PerceptFit, found: Searched, tell: Callable[[str], None]
+) -> DesignSearch:
     """The content of `design.json`."""
-    space, fit, rate_Hz = found.space, found.fit, request.rate_above_Hz
-    designs, chosen = found.search.designs, found.search.chosen
+    designs, chosen, rate_Hz, own = found.designs, found.chosen, request.rate_above_Hz, found.layers[space.gun.pulse_s]
+    contour = contour_of(space, own, fit, request.seed)
+    tell("contour")
+    others = tuple(alternatives(readings(space.gun), own, space.voltage_V))
+    tell("assumptions")
     map_pulse_s = space.pulse_s[-1] if chosen is None else float(designs.pulse_s[chosen])
     return DesignSearch(
         title=space.title,
@@ -178,11 +175,11 @@ def _results(request: DesignRequest, found: _Found) -> DesignSearch:
         rate_above_Hz=rate_Hz,
         axes=SweptAxes(friction_N=space.friction_N, voltage_V=space.voltage_V, pulse_s=space.pulse_s),
         designs=counted(designs, rate_Hz),
-        best=None if chosen is None else best_of(space, designs, chosen, rate_Hz, found.others),
+        best=None if chosen is None else best_of(space, designs, chosen, rate_Hz, others),
         own=tuple(own_of(space, label, fit, rate_Hz) for label in space.own),
         front=tuple(design_of(designs, place, space.gun, rate_Hz) for place in front(designs)),
-        map=plane_of(space, found.search.layers[map_pulse_s], fit, rate_Hz),
-        critical=critical_of(space, found.search.layers[space.gun.pulse_s], fit, found.contour, found.others),
+        map=plane_of(space, found.layers[map_pulse_s], fit, rate_Hz),
+        critical=critical_of(space, own, fit, contour, others),
         percept=percept_behind(fit, summary_error(designs)),
         assumptions=search_assumptions(space, rate_Hz),
         provenance=provenance(),
@@ -191,16 +188,8 @@ def _results(request: DesignRequest, found: _Found) -> DesignSearch:
 
 def _write(out: Path, found: DesignSearch, designs: Designs) -> None:
     storage.write_whole(out / "design.json", as_json(found))
-    storage.write_whole(out / "designs.csv", _table(designs).encode())
+    storage.write_whole(out / "designs.csv", as_csv(COLUMNS, (_cells(designs, place) for place in range(len(designs)))))
     write_page(out, f"Design search: {found.title}", sections(found, designs, out / "figures"))
-
-
-def _table(designs: Designs) -> str:
-    text = io.StringIO(newline="")
-    writer = csv.writer(text, lineterminator="\r\n")
-    writer.writerow(COLUMNS)
-    writer.writerows(_cells(designs, place) for place in range(len(designs)))
-    return text.getvalue()
 
 
 def _cells(designs: Designs, place: int) -> Sequence[object]:

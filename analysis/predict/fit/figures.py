@@ -5,21 +5,18 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
 
-import matplotlib as mpl
 from matplotlib.axes import Axes
 
 from analysis.report.figures.style import (
     BLACK,
     METHOD_LINES,
     display_name,
+    drawn,
+    legend_below,
     light_grid,
     method_colour,
-    new_figure,
     reference_line,
-    save,
-    style,
     wrapped,
 )
 
@@ -75,10 +72,9 @@ class TimesPanel:
     each: tuple[_Numbers, _Numbers]
 
 
-def figure_percept(curves: Sequence[RateCurve], points: Sequence[RatePoint], path_stem: Path) -> tuple[Path, ...]:
+def figure_percept(curves: Sequence[RateCurve], points: Sequence[RatePoint], path_stem: Path) -> None:
     """Predicted forward rate over friction (bands 95 %) with the observed rates; PNG, SVG and PDF are written."""
-    with mpl.rc_context(style()):  # type: ignore[arg-type]
-        figure = new_figure(6.6, 3.9)
+    with drawn(path_stem, 6.6, 3.9) as figure:
         left, right = figure.subplots(1, 2, width_ratios=[0.16, 1.0], sharey=True)
         apart = [point for point in points if point.friction_N is None]
         for place, point in enumerate(apart):
@@ -98,36 +94,27 @@ def figure_percept(curves: Sequence[RateCurve], points: Sequence[RatePoint], pat
             axes.set_ylim(100.0 * max(lowest, -0.02), 101.0)
         reference_line(right, 50.0, "chance")
         right.legend(loc="lower right", fontsize=7.5, framealpha=1.0, edgecolor="none", handlelength=3.2)
-        return save(figure, path_stem)
 
 
-def figure_places(spreads: Sequence[SimulatedSpread], path_stem: Path) -> tuple[Path, ...]:
+def figure_places(spreads: Sequence[SimulatedSpread], path_stem: Path) -> None:
     """A panel a quantity: the simulated distributions, a line a case, and where the published numbers stand."""
-    with mpl.rc_context(style()):  # type: ignore[arg-type]
-        figure = new_figure(0.6 + 3.6 * len(spreads), 3.3)
+    with drawn(path_stem, 0.6 + 3.6 * len(spreads), 3.3) as figure:
         row = figure.subplots(1, len(spreads), squeeze=False)[0]
         for axes, spread in zip(row, spreads, strict=True):
             _draw_spread(axes, spread)
-        handles, names = row[0].get_legend_handles_labels()
-        where: Any = "outside lower center"
-        figure.legend(handles, names, loc=where, ncols=2, frameon=False, fontsize=8.0, handlelength=3.2)
-        return save(figure, path_stem)
+        legend_below(figure, row[0], 2)
 
 
-def figure_times(rows: Sequence[Sequence[TimesPanel]], path_stem: Path) -> tuple[Path, ...]:
+def figure_times(rows: Sequence[Sequence[TimesPanel]], path_stem: Path) -> None:
     """A row an instruction, a panel a method: right and wrong answers by time; PNG, SVG and PDF are written."""
-    with mpl.rc_context(style()):  # type: ignore[arg-type]
-        figure = new_figure(0.8 + 2.6 * len(rows[0]), 0.7 + 2.3 * len(rows))
+    with drawn(path_stem, 0.8 + 2.6 * len(rows[0]), 0.7 + 2.3 * len(rows)) as figure:
         grid = figure.subplots(len(rows), len(rows[0]), squeeze=False, sharex="row", sharey=True)
         for place, row in enumerate(rows):
             for axes, panel in zip(grid[place], row, strict=True):
                 _draw_times(axes, panel)
                 axes.set_xlabel("response time [s]" if place == len(rows) - 1 else "")
             grid[place][0].set_ylabel("share of the trials [%]")
-        handles, names = grid[0][0].get_legend_handles_labels()
-        where: Any = "outside lower center"
-        figure.legend(handles, names, loc=where, ncols=3, frameon=False, fontsize=8.0, handlelength=3.2)
-        return save(figure, path_stem)
+        legend_below(figure, grid[0][0], 3)
 
 
 def _draw_times(axes: Axes, panel: TimesPanel) -> None:

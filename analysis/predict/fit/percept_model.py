@@ -19,6 +19,8 @@ from experiments.synthetic.percept import Percept, PerceptParameters, evidence, 
 FITTED = ("sensitivity", "confusion", "start")
 ASSUMED = ("exponent", "leak_s", "boundary")
 """What the rates bear on as well; the boundary only through its product with the drift, the sensitivity."""
+ALIKE, USUAL = People(), PerceptParameters()
+CONFIDENCE = 0.95
 _LOWEST, _HIGHEST = np.array([-12.0, -9.0, -8.0]), np.array([6.0, 9.0, 8.0])
 """Ends of log sensitivity, log confusion and logit start: as good as 0 and infinite."""
 
@@ -30,7 +32,7 @@ class _Likelihood:
     methods: Mapping[str, Method]
     percepts: Mapping[str, Percept]
     rates: Mapping[str, float]
-    trials: Mapping[str, int]
+    trials: int
     people: People
     base: PerceptParameters
 
@@ -49,34 +51,19 @@ class _Likelihood:
     def residuals(self, place: Floats) -> Floats:
         """Signed roots of the rates' binomial deviances, whose squares sum to the deviance."""
         p = np.clip(self.predicted(self.at(place)), 1e-15, 1.0 - 1e-15)
-        r, n = np.array(list(self.rates.values())), np.array([self.trials[name] for name in self.rates])
-        parts = 2.0 * n * (special.rel_entr(r, p) + special.rel_entr(1.0 - r, 1.0 - p))
+        r = np.array(list(self.rates.values()))
+        parts = 2.0 * self.trials * (special.rel_entr(r, p) + special.rel_entr(1.0 - r, 1.0 - p))
         return np.asarray(np.sign(p - r) * np.sqrt(np.maximum(parts, 0.0)))
 
 
 def _likelihood_of(
     rates: Mapping[str, float],
     methods: Mapping[str, Method],
-    trials: Mapping[str, int] | int,
-    people: People | None,
-    base: PerceptParameters | None,
+    trials: int,
+    people: People,
+    base: PerceptParameters,
 ) -> _Likelihood:
     """The likelihood of these rates. `ValueError`: rates, methods or trials that cannot be used."""
-    counts = dict.fromkeys(rates, trials) if isinstance(trials, int) else dict(trials)
-    _check(rates, methods, counts)
-    base = PerceptParameters() if base is None else base
-    kept = {name: methods[name] for name in rates}
-    return _Likelihood(
-        methods=kept,
-        percepts=percepts_of(kept, base.leak_s),
-        rates=dict(rates),
-        trials=counts,
-        people=People() if people is None else people,
-        base=base,
-    )
-
-
-def _check(rates: Mapping[str, float], methods: Mapping[str, Method], trials: Mapping[str, int]) -> None:
     if len(rates) < len(FITTED):
         raise ValueError(f"{len(rates)} rates; at least {len(FITTED)} are needed for {', '.join(FITTED)}")
     for name, rate in rates.items():
@@ -84,8 +71,11 @@ def _check(rates: Mapping[str, float], methods: Mapping[str, Method], trials: Ma
             raise ValueError(f"the rate of {name} is {rate}; it must be 0 to 1")
         if name not in methods:
             raise ValueError(f"there is a rate of {name}, but no such method; there are {', '.join(methods)}")
-        if trials.get(name, 0) < 1:
-            raise ValueError(f"the trials of {name} are {trials.get(name, 0)}; there must be at least 1")
+        if trials < 1:
+            raise ValueError(f"the trials of {name} are {trials}; there must be at least 1")
+    kept = {name: methods[name] for name in rates}
+    percepts = percepts_of(kept, base.leak_s)
+    return _Likelihood(methods=kept, percepts=percepts, rates=dict(rates), trials=trials, people=people, base=base)
 
 
 _STARTS = np.array([[-1.0, -1.0, 0.0], [-1.0, 1.0, 0.0], [1.0, 3.0, 0.0]])
@@ -144,23 +134,10 @@ def _scaled(likelihood: _Likelihood, parameters: PerceptParameters, name: str, f
 def _information(likelihood: _Likelihood, parameters: PerceptParameters) -> Floats:
     """Fisher information of the logarithms: sum over methods of n p' p'^T / (p (1 - p))."""
     p = np.clip(likelihood.predicted(parameters), 1e-12, 1.0 - 1e-12)
-    weights = np.array([likelihood.trials[name] for name in likelihood.rates]) / (p * (1.0 - p))
+    weights = likelihood.trials / (p * (1.0 - p))
     slopes = _slopes(likelihood, parameters)
     return np.asarray(slopes.T @ (weights[:, None] * slopes))
 
-
-__all__ = [
-    "ASSUMED",
-    "FITTED",
-    "PAPER_RATES",
-    "PAPER_TRIALS",
-    "Fitted",
-    "PerceptFit",
-    "PerceptPeak",
-    "best_percept",
-    "fit_percept",
-    "predicted_rate",
-]
 
 PAPER_RATES = {"vibration": 0.557, "asymmetric-1": 0.793, "asymmetric-2": 0.929}
 """Shares of right answers to forward shots (paper, section III.A)."""
@@ -182,38 +159,34 @@ class Fitted:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class PerceptFit:
-    """The fit. `rank` of the information on all `parameters`; `unknown` says in words what the rates do not tell."""
+class PerceptPeak:
+    """The fit without its intervals; the covariance is NaN where there is none."""
 
     parameters: PerceptParameters
-    fitted: dict[str, Fitted]
-    rates: dict[str, float]  # observed
-    predicted: dict[str, float]
     deviance: float  # 0: the rates are met exactly
-    freedom: int  # rates less fitted numbers
-    rank: int
-    untold: dict[str, float]  # of each number, 0 if the rates fix it alone to 1 if they do not bear on it at all
     covariance: tuple[tuple[float, ...], ...]  # of the logarithms of `FITTED`, the assumed numbers held
-    unknown: tuple[str, ...]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class PerceptPeak:
-    """The fit without its intervals; the covariance as in `PerceptFit`, NaN where there is none."""
+class PerceptFit(PerceptPeak):
+    """The fit. `rank` of the information on all `parameters`; `unknown` says in words what the rates do not tell."""
 
-    parameters: PerceptParameters
-    deviance: float
-    covariance: tuple[tuple[float, ...], ...]
+    fitted: dict[str, Fitted]
+    rates: dict[str, float]  # observed
+    predicted: dict[str, float]
+    freedom: int  # rates less fitted numbers
+    rank: int
+    untold: dict[str, float]  # of each number, 0 if the rates fix it alone to 1 if they do not bear on it at all
+    unknown: tuple[str, ...]
 
 
 def fit_percept(
     rates: Mapping[str, float],
     methods: Mapping[str, Method],
     *,
-    trials: Mapping[str, int] | int = PAPER_TRIALS,
-    people: People | None = None,
-    base: PerceptParameters | None = None,
-    confidence: float = 0.95,
+    trials: int = PAPER_TRIALS,
+    people: People = ALIKE,
+    base: PerceptParameters = USUAL,
 ) -> PerceptFit:
     """Sensitivity, confusion and start by maximum likelihood from the methods' mean forward rates.
 
@@ -226,8 +199,6 @@ def fit_percept(
     >>> round(found.fitted["start"].value, 3), round(found.deviance, 6), found.freedom, found.rank
     (0.557, 0.0, 0, 3)
     """
-    if not 0.0 < confidence < 1.0:
-        raise ValueError(f"confidence is {confidence}; it must lie between 0 and 1")
     likelihood = _likelihood_of(rates, methods, trials, people, base)
     place, deviance = _lowest(likelihood)
     parameters = likelihood.at(place)
@@ -235,7 +206,7 @@ def fit_percept(
     values, vectors = np.linalg.eigh(matrix)
     rank = int((values > 1e-8 * values[-1]).sum())
     covariance = _inverse(matrix[: len(FITTED), : len(FITTED)])
-    fitted = _fitted(likelihood, place, deviance, np.sqrt(np.diag(covariance)), confidence)
+    fitted = _fitted(likelihood, place, deviance, np.sqrt(np.diag(covariance)))
     return PerceptFit(
         parameters=parameters,
         fitted=fitted,
@@ -246,7 +217,7 @@ def fit_percept(
         rank=rank,
         untold=dict(zip((*FITTED, *ASSUMED), np.linalg.norm(vectors[:, :-rank], axis=1).tolist(), strict=True)),
         covariance=tuple(map(tuple, covariance.tolist())),
-        unknown=_unknown(fitted, rank, len(rates), deviance, confidence),
+        unknown=_unknown(fitted, rank, len(rates), deviance),
     )
 
 
@@ -254,9 +225,9 @@ def best_percept(
     rates: Mapping[str, float],
     methods: Mapping[str, Method],
     *,
-    trials: Mapping[str, int] | int = PAPER_TRIALS,
-    people: People | None = None,
-    base: PerceptParameters | None = None,
+    trials: int = PAPER_TRIALS,
+    people: People = ALIKE,
+    base: PerceptParameters = USUAL,
 ) -> PerceptPeak:
     """The numbers of `fit_percept` alone, thirty times as fast: the profile takes the time."""
     likelihood = _likelihood_of(rates, methods, trials, people, base)
@@ -267,29 +238,23 @@ def best_percept(
 
 
 def predicted_rate(
-    fit: PerceptFit,
-    percept: Percept,
-    *,
-    direction: Direction = "forward",
-    people: People | None = None,
-    confidence: float = 0.95,
+    fit: PerceptFit, percept: Percept, *, direction: Direction = "forward", people: People = ALIKE
 ) -> Fitted:
     """The correct rate that the fit predicts for a shot, with the fit's uncertainty (delta method, on the logit).
 
     Only of the fitted numbers: that of `exponent`, `leak_s` and of the model itself comes on top and is not known. NaN
     limits for a rate of 0 or 1, and where the fit has no covariance.
     """
-    spread = People() if people is None else people
     sign = 1.0 if direction == "forward" else -1.0
 
     def logit(name: str, factor: float) -> Floats:
         changed = replace(fit.parameters, **{name: getattr(fit.parameters, name) * factor})
-        return sign * special.logit(forward_rates(sign * evidence(percept, changed), changed.start, spread))
+        return sign * special.logit(forward_rates(sign * evidence(percept, changed), changed.start, people))
 
     with np.errstate(invalid="ignore"):
         slopes = np.array([_slope(partial(logit, name)) for name in FITTED])
     centre, se = float(logit("start", 1.0)), float(np.sqrt(slopes @ np.array(fit.covariance) @ slopes))
-    reach = -float(special.ndtri((1.0 - confidence) / 2.0)) * se
+    reach = -float(special.ndtri((1.0 - CONFIDENCE) / 2.0)) * se
     rate, low, high = (float(special.expit(x)) for x in (centre, centre - reach, centre + reach))
     return Fitted(value=rate, se=rate * (1.0 - rate) * se, ci_low=low, ci_high=high)
 
@@ -300,10 +265,8 @@ def _inverse(matrix: Floats) -> Floats:
     return np.asarray(np.linalg.inv(matrix) if told else np.full_like(matrix, math.nan))
 
 
-def _fitted(
-    likelihood: _Likelihood, place: Floats, deviance: float, spread: Floats, confidence: float
-) -> dict[str, Fitted]:
-    wanted = deviance + float(special.chdtri(1, 1.0 - confidence))
+def _fitted(likelihood: _Likelihood, place: Floats, deviance: float, spread: Floats) -> dict[str, Fitted]:
+    wanted = deviance + float(special.chdtri(1, 1.0 - CONFIDENCE))
     best, found = likelihood.at(place), {}
     for i, name in enumerate(FITTED):
         value = float(getattr(best, name))
@@ -332,11 +295,9 @@ def _limit(likelihood: _Likelihood, index: int, place: Floats, wanted: float, si
     return forms[index](float(place[index]) + sign * distance)
 
 
-def _unknown(
-    fitted: Mapping[str, Fitted], rank: int, rates: int, deviance: float, confidence: float
-) -> tuple[str, ...]:
+def _unknown(fitted: Mapping[str, Fitted], rank: int, rates: int, deviance: float) -> tuple[str, ...]:
     """In words: what these rates cannot tell."""
-    count, level = len(FITTED) + len(ASSUMED), f"{100.0 * confidence:g} %"
+    count, level = len(FITTED) + len(ASSUMED), f"{100.0 * CONFIDENCE:g} %"
     said = [
         f"The rates bear on {count} numbers and fix {rank} combinations of them (rank of the information): exponent "
         "and leak_s are assumed, and others fit as well with another sensitivity and confusion.",

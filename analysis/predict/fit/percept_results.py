@@ -8,8 +8,7 @@ from dataclasses import asdict, dataclass, replace
 import numpy as np
 
 from analysis.predict.fit.percept_model import Fitted, PerceptFit, PerceptPeak, predicted_rate
-from analysis.predict.fit.percept_request import PerceptTask
-from analysis.predict.fit.studies import Judgement
+from analysis.predict.fit.studies import Judgement, PerceptTask
 from device.parameters import GunParameters
 from experiments.record.provenance import provenance
 from experiments.synthetic.diffusion import People

@@ -1,4 +1,4 @@
-"""Simulated studies of the fitted percept, and where the published numbers that were not fitted lie among them.
+"""What the percept is fitted to, and where the published numbers that were not fitted lie among simulated studies.
 
 The fit knows the mean forward rates alone. What the same people would give for F, for Tukey's pattern and for backward
 shots is the model's own, so those are what it can fail by.
@@ -6,25 +6,140 @@ shots is the model's own, so those are what it can fail by.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Iterator, Mapping
-from dataclasses import dataclass, replace
+from dataclasses import asdict, dataclass, replace
 
 import numpy as np
 
-from analysis.paper.paper import PublishedDirection
-from analysis.paper.published import rounds_to
+from analysis.paper.paper import PublishedDirection, load_paper, rounds_to
 from analysis.paper.recurrence import WHOLE_PATTERN, Recurrence, answers_recur, recurs, share_of, wilson_interval
-from analysis.predict.fit.percept_model import FITTED, PerceptPeak, best_percept
-from analysis.predict.fit.percept_request import ASSUMED_SPREAD, scaled_spread
+from analysis.predict.fit.percept_model import FITTED, PAPER_TRIALS, PerceptPeak, best_percept
 from analysis.predict.synthetic_studies import Counts, Felt, felt_counts, piece_sizes
 from analysis.stats.anova import rm_anova
 from analysis.stats.arrays import FloatArray
 from analysis.stats.binomial import binomial_test
 from device.methods import Method
 from device.words import DIRECTIONS
+from experiments.config.door import ConfigError
 from experiments.design.streams import generator
+from experiments.load import find, load_gun
 from experiments.synthetic.diffusion import People
 from experiments.synthetic.percept import Percept, PerceptParameters, evidence, percepts_of
+
+ASSUMED_SPREAD = People(drift_factor_sd=0.2, log_boundary_sd=0.1, log_non_decision_sd=0.1, logit_start_sd=0.2)
+"""How people are taken to differ; assumed: the paper prints no spread."""
+_LARGEST_SPREAD = 5.0
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class PerceptRequest:
+    """What is to be fitted. `rates`, such as `vibration=0.557,...`, stand in for the paper's.
+
+    `spread`: factor on the assumed differences between people whose mean rates these are.
+    """
+
+    paper: str = "paper"
+    rates: str | None = None
+    trials: int | None = None
+    gun: str = "gun"
+    spread: float = 0.0
+    studies: int = 10_000
+    seed: int = 1
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class PerceptTask:
+    """A request with all that it names: forward rates, the trials behind each, methods, people, and what is published.
+
+    `source` says in words where the rates come from; without a paper there is nothing to judge by.
+    """
+
+    source: str
+    rates: Mapping[str, float]
+    trials: int
+    methods: Mapping[str, Method]
+    people: People
+    published: PublishedDirection | None
+
+
+def read_request(request: PerceptRequest) -> PerceptTask:
+    """The task of a request. `ConfigError`: rates, trials, a paper or a gun that cannot be used."""
+    if not 0.0 <= request.spread <= _LARGEST_SPREAD:
+        raise ConfigError(f"--spread {request.spread:g}: must be a factor from 0 (people alike) to {_LARGEST_SPREAD:g}")
+    if request.rates is not None:
+        published, source = None, "the given rates"
+        rates, trials = given_rates(request.rates), PAPER_TRIALS if request.trials is None else request.trials
+    else:
+        published, source = _published(request), "the published rates"
+        rates, trials = published_rates(published)
+    if len(rates) < len(FITTED):
+        option = f"--rates {request.rates}" if request.rates is not None else str(find(request.paper))
+        raise ConfigError(f"{option}: {len(rates)} rates; three numbers are fitted, so there must be at least 3")
+    return PerceptTask(
+        source=source,
+        rates=rates,
+        trials=trials,
+        methods=_methods(request.gun, rates),
+        people=scaled_spread(ASSUMED_SPREAD, request.spread),
+        published=published,
+    )
+
+
+def given_rates(text: str) -> dict[str, float]:
+    """Rates by method. `ConfigError` for what is no name with a share from 0 to 1, or a name that comes twice.
+
+    >>> given_rates("vibration=0.557, asymmetric-1=0.793")
+    {'vibration': 0.557, 'asymmetric-1': 0.793}
+    """
+    found: dict[str, float] = {}
+    for part in text.split(","):
+        name, _, value = (word.strip() for word in part.partition("="))
+        try:
+            rate = float(value)
+        except ValueError:
+            rate = math.nan
+        if not name or not 0.0 <= rate <= 1.0:
+            raise ConfigError(f"--rates {text}: {part.strip()!r} must be a method and a share, such as vibration=0.557")
+        if name in found:
+            raise ConfigError(f"--rates {text}: {name} stands there twice; name each method once")
+        found[name] = rate
+    return found
+
+
+def published_rates(published: PublishedDirection) -> tuple[dict[str, float], int]:
+    """The paper's mean forward rates as shares, in its order of methods, and the forward trials behind each."""
+    rates = {name: float(published.means[name]) / 100.0 for name in published.methods}
+    return rates, published.n * published.protocol.forward_trials_per_session
+
+
+def scaled_spread(people: People, factor: float) -> People:
+    """People who differ so many times as much."""
+    return People(**{name: factor * sd for name, sd in asdict(people).items()})
+
+
+def _published(request: PerceptRequest) -> PublishedDirection:
+    if request.trials is not None:
+        raise ConfigError(f"--trials {request.trials}: the paper has its own; give the option with --rates alone")
+    path = find(request.paper)
+    published = load_paper(path).direction
+    missing = [name for name in published.methods if name not in published.means]
+    if missing:
+        raise ConfigError(f"{path}: direction.means has no rate of {', '.join(missing)}; give one for each method")
+    return published
+
+
+def _methods(gun: str, rates: Mapping[str, float]) -> dict[str, Method]:
+    path = find(gun)
+    config = load_gun(path)
+    strangers = [name for name in rates if name not in config.methods]
+    if strangers:
+        raise ConfigError(
+            f"{path}: there is a rate of {', '.join(strangers)}, but no such method; there are "
+            f"{', '.join(config.methods)}"
+        )
+    return config.renderings(tuple(rates))
+
 
 PERCENTILES = (2.5, 25.0, 50.0, 75.0, 97.5)
 HISTOGRAM_BINS = 40
@@ -146,11 +261,6 @@ def judge(
         claims=tuple(_claims(correct, published)),
     )
     return judged, {name: _histogram(values) for name, _, values, _ in quantities}
-
-
-def pieces_of(studies: int, published: PublishedDirection) -> int:
-    """How many pieces a case's studies are drawn in."""
-    return len(piece_sizes(studies, published.n))
 
 
 def _counts(

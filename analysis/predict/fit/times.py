@@ -1,4 +1,4 @@
-"""`recoil fit times`: the diffusion model fitted to the response times of logs, together and person by person."""
+"""`recoil fit times`: the diffusion model fitted to the response times of logs, and what was found, in words."""
 
 from __future__ import annotations
 
@@ -10,17 +10,21 @@ from pathlib import Path
 
 import numpy as np
 
-from analysis.logs.reading import Logs, Problem, Track, read_logs
-from analysis.predict.fit.percept_sections import NO_OWN_TIMES
-from analysis.predict.fit.times_results import FittedTimes, TimesFit, times_fit
-from analysis.predict.fit.times_sections import in_short, left_out, sections
+from analysis.logs.files import Problem
+from analysis.logs.reading import Logs, Track, read_logs
+from analysis.predict.fit.figures import TimesPanel, figure_times
+from analysis.predict.fit.percept import NO_OWN_TIMES
+from analysis.predict.fit.times_results import EZCell, FittedTimes, TimesFit, times_fit
+from analysis.report import apa
 from analysis.report.page import write_page
+from analysis.report.section import Picture, Section, Table, origin_table
 from analysis.report.serial import as_json
 from analysis.report.terminal import Progress
-from analysis.times.fit import fit, profile
+from analysis.stats.arrays import FloatArray
+from analysis.times.fit import AnsweredBy, DiffusionFit, Estimate, answered_by, fit, profile
 from analysis.times.likelihood import LapseRange, Trials
 from analysis.times.own_trials import REFUSALS, OwnTrials, own_trials
-from analysis.times.people import FEWEST_TRIALS, as_trials, fit_people
+from analysis.times.people import FEWEST_TRIALS, MeanEstimate, as_trials, fit_people
 from experiments.config.door import ConfigError
 from experiments.record import storage
 from experiments.study.folders import PlaceError
@@ -115,3 +119,239 @@ def _fitted(
     profiled = [one.name for one in together.estimates] if request.profiled else []
     profiles = {name: profile(trials, name, bias=bias, lapses=with_lapses) for name in profiled}
     return FittedTimes(own=own, trials=trials, lapse_range_s=range_s, together=together, profiles=profiles, each=each)
+
+
+TIMES_CAVEATS = (
+    "Decisions are taken to be a simple diffusion: one drift a method (its sign that of the shot), one boundary an "
+    "instruction, one start and one non-decision time; nothing varies from trial to trial but the noise.",
+    "Where people differ, the fit of all together is that of a compromise person (non-decision time towards the "
+    "fastest, drifts towards 0, boundaries up); the mean over people of their own fits is the one to report.",
+    "A person's own fit rests on few trials: see results/soak/decision.md for its bias and spread at 60 trials.",
+    "EZ-diffusion knows no bias and no lapses, and takes forward and backward shots together.",
+    NO_OWN_TIMES,
+)
+
+
+SHOWN_PEOPLE = 60
+"""A table of more people is read by nobody; `fit.json` has all."""
+_LIKELY = 0.995
+_POINTS = 200
+
+
+def in_short(found: TimesFit) -> Section:
+    """What a reader looks for, in a few lines."""
+    return Section(
+        title=f"The diffusion model fitted to {found.trials} trials of {_people_count(found)}",
+        items=tuple(_lines(found)),
+    )
+
+
+def _lines(found: TimesFit) -> Iterator[str]:
+    several = found.mean_of_people is not None
+    yield f"95 % CI of {'the mean over people of their own fits' if several else 'the one fit'}"
+    yield from map(_estimate_line, found.main_estimates)
+    if several:
+        yield "one fit of all together (a compromise person, intervals by person)"
+        yield from map(_estimate_line, found.together.estimates)
+    yield from (f"not identified: {name}" for name in found.together.unidentified)
+    yield NO_OWN_TIMES
+
+
+def _estimate_line(one: MeanEstimate | Estimate) -> str:
+    return f"{one.name:26} {apa.number(one.value, 3):>7} {_interval(one)}"
+
+
+def left_out(found: TimesFit) -> Iterator[str]:
+    """What was left out, in words."""
+    for one in found.refused.values():
+        yield f"{one.trials} of {found.answered} answered trials: {one.reason}"
+    if found.together.reason:
+        yield f"intervals of all trials together: {found.together.reason}"
+    for who in found.left_out:
+        yield f"participant {who}, of the mean over people: a method or instruction is missing, or the fit has no peak"
+
+
+def _people_count(found: TimesFit) -> str:
+    n = len(found.people)
+    return f"{n} participant{'' if n == 1 else 's'}"
+
+
+def _interval(one: MeanEstimate | Estimate, digits: int = 3) -> str:
+    """An estimate's interval, or that there is none."""
+    return apa.interval(one.ci_low, one.ci_high, digits) if math.isfinite(one.ci_low) else "[not identified]"
+
+
+def sections(found: TimesFit, fitted: FittedTimes, figures: Path) -> tuple[Section, ...]:
+    """The page's sections; their figure is written."""
+    parts = [_estimates(found), _against(fitted, figures), _ez(found)]
+    parts += [_people(found)] if found.each else []
+    return (*parts, _origin(found))
+
+
+def _estimates(found: TimesFit) -> Section:
+    header = ["Parameter", "Unit", "All together", "95 % CI"]
+    rows = [[one.name, _unit(one.name), apa.number(one.value, 3), _interval(one)] for one in found.together.estimates]
+    if found.mean_of_people is not None:
+        header[2:2] = ["Mean over people", "95 % CI", "SD of people"]
+        means = {one.name: one for one in found.mean_of_people}
+        for row in rows:
+            row[2:2] = _mean_cells(means.get(row[0]))
+    return Section(
+        title="Estimates",
+        paragraphs=(
+            f"{found.trials} trials of {_people_count(found)} with times of their own; lapses: {found.lapses}; "
+            f"start {'fitted' if found.bias else 'held at one half'}.",
+            *(f"Not identified by these data: {name}." for name in found.together.unidentified),
+        ),
+        tables=(
+            Table(caption="The diffusion by maximum likelihood", header=tuple(header), rows=tuple(map(tuple, rows))),
+            *_profiles(found.together.profiles),
+        ),
+        items=tuple(left_out(found)),
+    )
+
+
+def _profiles(profiles: dict[str, tuple[float, float]]) -> list[Table]:
+    """Of all together, where they were asked for; an end that is never reached is a dash."""
+    rows = tuple((name, apa.interval(low, high, 3)) for name, (low, high) in profiles.items())
+    caption = "Likelihood intervals of all together, 95 %; as if people were alike"
+    return [Table(caption=caption, header=("Parameter", "95 % CI"), rows=rows)] if rows else []
+
+
+def _mean_cells(mean: MeanEstimate | None) -> list[str]:
+    return [apa.NO_NUMBER] * 3 if mean is None else [apa.number(mean.value, 3), _interval(mean), apa.number(mean.sd, 3)]
+
+
+def _unit(name: str) -> str:
+    units = {"drift": "1/√s", "boundary": "√s", "start": "z/a", "non_decision_s": "s", "lapse": "share"}
+    return units[name.split(" ", maxsplit=1)[0]]
+
+
+def _against(fitted: FittedTimes, figures: Path) -> Section:
+    panels = [
+        [_panel(fitted, method, instruction) for method in fitted.own.methods]
+        for instruction in fitted.own.instructions
+    ]
+    figure_times(panels, figures / "times")
+    return Section(
+        title="Times against the fit",
+        paragraphs=(
+            "The share of all trials answered rightly, and wrongly, by each time: what was observed, and what the fit "
+            "predicts. Where a line leaves the points, the model misses the data.",
+        ),
+        pictures=(
+            Picture(
+                stem="times",
+                caption="Right and wrong answers by time: observed (points) and fitted (lines)",
+                alt="Rising curves of right and wrong answers over time by method and instruction, with points",
+            ),
+        ),
+    )
+
+
+def _panel(fitted: FittedTimes, method: str, instruction: str) -> TimesPanel:
+    cell = fitted.own.cell(method, instruction)
+    told = fitted.own.instruction == fitted.own.instructions.index(instruction)
+    end_s = float(np.quantile(fitted.own.time_s[told], _LIKELY))
+    grid = np.linspace(0.0, end_s, _POINTS)
+    one = _predicted([fitted.together], fitted, grid, method, instruction)
+    each = _predicted(fitted.each.fits if fitted.each else (), fitted, grid, method, instruction)
+    right, wrong = (np.sort(cell.time_s[cell.correct == kind]) for kind in (1.0, 0.0))
+    return TimesPanel(
+        method=method,
+        instruction=instruction,
+        trials=cell.time_s.size,
+        right_s=right.tolist(),
+        wrong_s=wrong.tolist(),
+        grid_s=grid.tolist(),
+        together=_as_lists(one),
+        each=_as_lists(each),
+    )
+
+
+def _predicted(
+    fits: Sequence[DiffusionFit], fitted: FittedTimes, grid: FloatArray, method: str, instruction: str
+) -> AnsweredBy | None:
+    """The mean prediction of the fits that know the cell."""
+    cell = fitted.own.cell(method, instruction)
+    if not cell.time_s.size:
+        return None
+    found = []
+    for one in fits:
+        names = {estimate.name for estimate in one.estimates}
+        if {f"drift {method}", f"boundary {instruction}"} <= names and one.reason is None:
+            towards = float(cell.forward.mean())
+            found.append(
+                answered_by(
+                    one,
+                    grid,
+                    condition=method,
+                    instruction=instruction,
+                    towards_upper=towards,
+                    lapse_range_s=fitted.lapse_range_s,
+                )
+            )
+    if not found:
+        return None
+    right, wrong = (np.mean([getattr(one, kind) for one in found], axis=0) for kind in ("right", "wrong"))
+    return AnsweredBy(right=right, wrong=wrong)
+
+
+def _as_lists(found: AnsweredBy | None) -> tuple[list[float], list[float]]:
+    return ([], []) if found is None else (found.right.tolist(), found.wrong.tolist())
+
+
+def _ez(found: TimesFit) -> Section:
+    rows = tuple((one.method, one.instruction, *_mean_ez(one), _whose(one)) for one in found.ez)
+    pooled = tuple((one.method, one.instruction, *_pooled_ez(one)) for one in found.ez)
+    header = ("Method", "Instruction", "Drift [1/√s]", "Boundary [√s]", "Non-decision time [s]")
+    return Section(
+        title="EZ-diffusion beside it",
+        paragraphs=(
+            "In closed form, without bias or lapses. Of each person and cell, then the mean over people; left out are "
+            "people with fewer than 10 right answers in the cell, and those whose non-decision time would be below 0. "
+            "Of everybody's trials together it mixes people's differences into the times.",
+        ),
+        tables=(
+            Table(caption="EZ-diffusion, mean over people [95 % CI]", header=(*header, "People"), rows=rows),
+            Table(caption="EZ-diffusion of everybody's trials together", header=header, rows=pooled),
+        ),
+    )
+
+
+def _mean_ez(cell: EZCell) -> tuple[str, ...]:
+    return _with_interval(cell.drift, 2), _with_interval(cell.boundary, 2), _with_interval(cell.non_decision_s, 3)
+
+
+def _pooled_ez(cell: EZCell) -> tuple[str, ...]:
+    found = cell.pooled
+    return apa.number(found.drift, 2), apa.number(found.boundary, 2), apa.number(found.non_decision_s, 3)
+
+
+def _whose(cell: EZCell) -> str:
+    had = cell.drift.people
+    return f"{had} of {had + cell.few + cell.flat + cell.impossible}"
+
+
+def _with_interval(one: MeanEstimate | Estimate, digits: int) -> str:
+    """A value with its interval, if it has one."""
+    value = apa.number(one.value, digits)
+    return f"{value} {_interval(one, digits)}" if math.isfinite(one.ci_low) else value
+
+
+def _people(found: TimesFit) -> Section:
+    names = [one.name for one in found.together.estimates]
+    rows = []
+    for who, one in list(found.each.items())[:SHOWN_PEOPLE]:
+        own = {estimate.name: _with_interval(estimate, 2) for estimate in one.estimates}
+        rows.append((who, str(one.trials), *(own.get(name, apa.NO_NUMBER) for name in names)))
+    more = len(found.each) - len(rows)
+    return Section(
+        title="Person by person",
+        paragraphs=("Each person's own fit [95 % CI]" + (f"; {more} more people are in fit.json." if more else "."),),
+        tables=(Table(caption="Own fits", header=("Participant", "Trials", *names), rows=tuple(rows)),),
+    )
+
+
+def _origin(found: TimesFit) -> Section:
+    return Section(title="What this rests on", items=TIMES_CAVEATS, tables=(origin_table(found.provenance),))

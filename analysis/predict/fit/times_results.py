@@ -9,11 +9,11 @@ import numpy as np
 
 from analysis.logs.reading import Logs
 from analysis.stats.arrays import FloatArray
-from analysis.times.ez import EZ, ez, ez_people
 from analysis.times.fit import DiffusionFit, Estimate
 from analysis.times.likelihood import LapseRange, Trials
 from analysis.times.own_trials import REFUSALS, OwnTrials
 from analysis.times.people import MeanEstimate, PeopleFit, mean_estimate
+from analysis.times.trade import EZ, ez, ez_people
 from experiments.record.provenance import provenance
 
 

@@ -5,22 +5,20 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
 
-import matplotlib as mpl
 from matplotlib.axes import Axes
-from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
 
+from analysis.paper.recurrence import ShareOfStudies
+from analysis.predict.power.results import DesignPower
 from analysis.report.figures.style import (
     METHOD_LINES,
     bounded,
+    drawn,
+    legend_below,
     light_grid,
     method_colour,
-    new_figure,
     reference_line,
-    save,
-    style,
 )
 
 _MARKERS = "os^Dv<>"
@@ -28,13 +26,10 @@ _MARKERS = "os^Dv<>"
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Curve:
-    """Shares of 1 with their intervals over `x`."""
+    """Shares of studies with their intervals, each over its place on the x axis."""
 
     name: str
-    x: Sequence[float]
-    share: Sequence[float]
-    low: Sequence[float]
-    high: Sequence[float]
+    points: Sequence[tuple[float, ShareOfStudies]]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -45,60 +40,49 @@ class Panel:
     curves: Sequence[Curve]
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class FalsePositives:
-    """A claim's share of false positives, with its interval, under a kind of null participants."""
-
-    claim: str
-    people: str
-    share: float
-    low: float
-    high: float
-
-
-def figure_power(rows: Sequence[Sequence[Panel]], x_label: str, target: float, path_stem: Path) -> tuple[Path, ...]:
+def figure_power(rows: Sequence[Sequence[Panel]], x_label: str, target: float, path_stem: Path) -> None:
     """Rows of panels, share over `x_label`, bands of 95 %; PNG, SVG and PDF are written."""
-    with mpl.rc_context(style()):  # type: ignore[arg-type]
-        columns = max(map(len, rows))
-        figure = new_figure(max(3.1 * columns, 4.2), 2.7 * len(rows) + 0.6)
+    columns = max(map(len, rows))
+    with drawn(path_stem, max(3.1 * columns, 4.2), 2.7 * len(rows) + 0.6) as figure:
         grid = figure.subplots(len(rows), columns, squeeze=False, sharex=True, sharey=True)
         for place, row in enumerate(rows):
             for axes, panel in zip(grid[place], row, strict=True):
                 _draw_curves(axes, panel, target)
                 axes.set_xlabel(x_label if place == len(rows) - 1 else "")
             grid[place][0].set_ylabel("share of studies [%]")
-        _legend(figure, grid[0][0])
-        return save(figure, path_stem)
+        legend_below(figure, grid[0][0], 3)
 
 
-def figure_false_positives(
-    panels: Sequence[tuple[str, Sequence[FalsePositives]]], level: float, path_stem: Path
-) -> tuple[Path, ...]:
-    """A row of panels (title, rates): each claim's share as a point with its interval, the nominal level as a line."""
-    with mpl.rc_context(style()):  # type: ignore[arg-type]
-        claims = list(dict.fromkeys(rate.claim for rate in panels[0][1]))
-        figure = new_figure(2.6 + 2.3 * len(panels), 1.3 + 0.27 * len(claims))
+def figure_false_positives(panels: Sequence[tuple[str, Sequence[DesignPower]]], level: float, path_stem: Path) -> None:
+    """A row of panels (title, designs that differ in their null participants), the nominal level as a line.
+
+    Each claim's share is a point with its interval.
+    """
+    claims = [share.claim for share in panels[0][1][0].claims]
+    with drawn(path_stem, 2.6 + 2.3 * len(panels), 1.3 + 0.27 * len(claims)) as figure:
         grid = figure.subplots(1, len(panels), squeeze=False, sharex=True, sharey=True)[0]
-        grid[0].set_xlim(0.0, 105.0 * max(rate.high for _, rates in panels for rate in rates))
-        for axes, (title, rates) in zip(grid, panels, strict=True):
-            _draw_rates(axes, claims, rates, level)
+        grid[0].set_xlim(
+            0.0, 105.0 * max(share.ci_high for _, designs in panels for one in designs for share in one.claims)
+        )
+        for axes, (title, designs) in zip(grid, panels, strict=True):
+            _draw_rates(axes, claims, designs, level)
             axes.set_title(title, loc="left")
             axes.set_xlabel("false positives [%]")
         grid[0].set_yticks(range(len(claims)), claims)
         grid[0].invert_yaxis()
-        _legend(figure, grid[0])
-        return save(figure, path_stem)
+        legend_below(figure, grid[0], 3)
 
 
 def _draw_curves(axes: Axes, panel: Panel, target: float) -> None:
     light_grid(axes)
     reference_line(axes, 100.0 * target, f"{100.0 * target:g} %")
     for i, curve in enumerate(panel.curves):
-        share, low, high = ([100.0 * value for value in row] for row in (curve.share, curve.low, curve.high))
+        x, shares = zip(*curve.points, strict=True)
+        share, low, high = zip(*(_percents(one) for one in shares), strict=True)
         colour = method_colour(i)
-        axes.fill_between(curve.x, low, high, color=colour, alpha=0.2, linewidth=0.0)
+        axes.fill_between(x, low, high, color=colour, alpha=0.2, linewidth=0.0)
         axes.plot(
-            curve.x,
+            x,
             share,
             color=colour,
             linestyle=METHOD_LINES[i % len(METHOD_LINES)],
@@ -107,8 +91,8 @@ def _draw_curves(axes: Axes, panel: Panel, target: float) -> None:
             linewidth=1.3,
             label=curve.name,
         )
-        if len(curve.x) == 1:
-            axes.vlines(curve.x, low, high, color=colour, linewidth=1.3)
+        if len(x) == 1:
+            axes.vlines(x, low, high, color=colour, linewidth=1.3)
     axes.set_ylim(-2.0, 103.0)
     axes.set_yticks(range(0, 101, 20))
     axes.xaxis.set_major_locator(MaxNLocator(nbins=6, integer=True))
@@ -116,18 +100,16 @@ def _draw_curves(axes: Axes, panel: Panel, target: float) -> None:
     axes.set_title(panel.title, loc="left")
 
 
-def _draw_rates(axes: Axes, claims: Sequence[str], rates: Sequence[FalsePositives], level: float) -> None:
+def _draw_rates(axes: Axes, claims: Sequence[str], designs: Sequence[DesignPower], level: float) -> None:
     axes.grid(visible=True, axis="x", color="#dddddd", linewidth=0.6)
     axes.set_axisbelow(True)
     axes.axvline(100.0 * level, color="#666666", linewidth=0.9, linestyle=(0, (4, 3)), zorder=1.5)
-    people = list(dict.fromkeys(rate.people for rate in rates))
-    for i, who in enumerate(people):
-        of_these = [rate for rate in rates if rate.people == who]
-        shift = 0.22 * (i - (len(people) - 1) / 2.0)
-        heights = [claims.index(rate.claim) + shift for rate in of_these]
-        share = [100.0 * rate.share for rate in of_these]
-        below = [100.0 * (rate.share - rate.low) for rate in of_these]
-        above = [100.0 * (rate.high - rate.share) for rate in of_these]
+    for i, design in enumerate(designs):
+        shift = 0.22 * (i - (len(designs) - 1) / 2.0)
+        heights = [claims.index(one.claim) + shift for one in design.claims]
+        share = [100.0 * one.share for one in design.claims]
+        below = [100.0 * (one.share - one.ci_low) for one in design.claims]
+        above = [100.0 * (one.ci_high - one.share) for one in design.claims]
         axes.errorbar(
             share,
             heights,
@@ -136,12 +118,9 @@ def _draw_rates(axes: Axes, claims: Sequence[str], rates: Sequence[FalsePositive
             color=method_colour(i),
             markersize=4.0,
             linewidth=1.3,
-            label=who,
+            label=design.people,
         )
 
 
-def _legend(figure: Figure, axes: Axes) -> None:
-    """One legend below all panels."""
-    handles, names = axes.get_legend_handles_labels()
-    where: Any = "outside lower center"
-    figure.legend(handles, names, loc=where, ncols=min(3, len(names)), frameon=False, fontsize=8.0, handlelength=3.2)
+def _percents(one: ShareOfStudies) -> tuple[float, float, float]:
+    return 100.0 * one.share, 100.0 * one.ci_low, 100.0 * one.ci_high

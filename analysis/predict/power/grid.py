@@ -1,27 +1,40 @@
-"""What `recoil power` is asked for, checked at the door and spelled out as a grid of designs with their costs."""
+"""What `recoil power` is asked for, spelled out as a grid of designs with their costs, and the studies of each."""
 
 from __future__ import annotations
 
 import math
 import re
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
-from typing import Any
+from dataclasses import asdict, dataclass, replace
+from typing import Any, Literal
+
+import numpy as np
 
 from analysis.paper.paper import PublishedExperiment, load_paper
-from analysis.predict.power.studies import Chunk, DrawnConfig, PeopleKind, StudyDesign
+from analysis.paper.recurrence import with_whole_pattern
+from analysis.predict.power.planned import Findings, Tally, analysed_directions, analysed_ratings, tallied
 from analysis.predict.synthetic_studies import (
+    Counts,
     Felt,
+    direction_counts,
+    felt_counts,
     felt_people,
     null_felt,
     null_rates,
     null_ratings,
     percepts_of_setup,
     piece_sizes,
+    preference_scores,
+    published_claims,
+    scaled_means,
 )
+from analysis.stats.arrays import FloatArray
+from device.words import DIRECTIONS
 from experiments.config.door import ConfigError
-from experiments.config.setup import Setup
-from experiments.direction.config import DirectionConfig
+from experiments.config.setup import Setup, canonical_json
+from experiments.design.streams import generator
+from experiments.direction.config import DirectionConfig, Rates
+from experiments.direction.synthetic import probit_of_forward
 from experiments.load import find, load_setup
 from experiments.preference.config import PreferenceConfig
 from experiments.synthetic.percept import Percept
@@ -31,10 +44,6 @@ FELT = "felt"
 """The observer of people who answer from what the gun does."""
 _LAWS = {"direction": ("rates", FELT), "preference": ("ratings",)}
 """The observers that studies can be drawn from."""
-
-
-class GridError(ConfigError):
-    """A grid that cannot be worked out; the message names option, value and rule."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -54,11 +63,11 @@ class PowerRequest:
 
 
 def check_scalars(request: PowerRequest) -> None:
-    """`GridError` for a target that is no share, and for an effect of people who feel none."""
+    """`ConfigError` for a target that is no share, and for an effect of people who feel none."""
     if not 0.0 < request.target < 1.0:
-        raise GridError(f"--target {request.target:g}: must lie between 0 and 1, such as 0.8")
+        raise ConfigError(f"--target {request.target:g}: must lie between 0 and 1, such as 0.8")
     if request.null and request.effects is not None:
-        raise GridError(f"--null has no effect at all; leave --effect {request.effects} out")
+        raise ConfigError(f"--null has no effect at all; leave --effect {request.effects} out")
 
 
 def checked_setup(name: str) -> Setup[Any]:
@@ -68,9 +77,11 @@ def checked_setup(name: str) -> Setup[Any]:
     observer, laws = config.synthetic.observer, _LAWS.get(config.experiment, ())
     if not isinstance(config, DirectionConfig | PreferenceConfig) or observer not in laws:
         drawn = " or ".join(f'"{law}"' for law in laws)
-        raise GridError(f'{find(name)}: synthetic.observer = "{observer}" has no power; studies are drawn from {drawn}')
+        raise ConfigError(
+            f'{find(name)}: synthetic.observer = "{observer}" has no power; studies are drawn from {drawn}'
+        )
     if isinstance(config, DirectionConfig) and not config.design.forward_per_session:
-        raise GridError(f"{find(name)}: design.forward_per_session = 0; the planned analysis is of forward trials")
+        raise ConfigError(f"{find(name)}: design.forward_per_session = 0; the planned analysis is of forward trials")
     return setup
 
 
@@ -81,7 +92,7 @@ def method_sets_of(asked: tuple[str, ...], config: DrawnConfig) -> list[tuple[st
         names = [name.strip() for name in text.split(",")]
         strangers = [name for name in names if name not in known]
         if strangers or len(set(names)) != len(names) or len(names) < 2:
-            raise GridError(f"--methods {text}: must be two or more different ones of {', '.join(known)}")
+            raise ConfigError(f"--methods {text}: must be two or more different ones of {', '.join(known)}")
         sets.append(tuple(method for method in known if method in names))
     return list(dict.fromkeys(sets))
 
@@ -90,7 +101,7 @@ def trials_per_method(asked: str | None, config: DrawnConfig) -> list[int]:
     """The trials of one method: the config's own unless some are named."""
     if isinstance(config, PreferenceConfig):
         if asked is not None:
-            raise GridError(f"--trials {asked}: {config.title!r} has one trial a method; leave the option out")
+            raise ConfigError(f"--trials {asked}: {config.title!r} has one trial a method; leave the option out")
         return [1]
     design = config.design
     if asked is None:
@@ -100,19 +111,19 @@ def trials_per_method(asked: str | None, config: DrawnConfig) -> list[int]:
     found = whole_numbers(asked, "--trials", 1, 10_000)
     uneven = [trials for trials in found if trials % step]
     if uneven and "-" not in asked:
-        raise GridError(
+        raise ConfigError(
             f"--trials {asked}: {uneven[0]} is no multiple of {step}, so it makes no sets of {design.trials_per_set} "
             f"with forward and backward trials as the config has them ({design.forward_per_session} to "
             f"{design.backward_per_session})"
         )
     fitting = [trials for trials in found if trials % step == 0]
     if not fitting:
-        raise GridError(f"--trials {asked}: holds no multiple of {step}")
+        raise ConfigError(f"--trials {asked}: holds no multiple of {step}")
     return fitting
 
 
 def whole_numbers(text: str, option: str, low: int, high: int) -> list[int]:
-    """Whole numbers and ranges, in order and once each. `GridError` for others, or outside `low`..`high`.
+    """Whole numbers and ranges, in order and once each. `ConfigError` for others, or outside `low`..`high`.
 
     >>> whole_numbers("14, 8-10", "--participants", 2, 999)
     [8, 9, 10, 14]
@@ -121,16 +132,16 @@ def whole_numbers(text: str, option: str, low: int, high: int) -> list[int]:
     for part in text.split(","):
         match = re.fullmatch(r"\s*([0-9]{1,9})\s*(?:-\s*([0-9]{1,9})\s*)?", part)
         if not match:
-            raise GridError(f"{option} {text}: {part.strip()!r} is no whole number and no range such as 8-20")
+            raise ConfigError(f"{option} {text}: {part.strip()!r} is no whole number and no range such as 8-20")
         first, last = int(match[1]), int(match[2] or match[1])
         if not low <= first <= last <= high:
-            raise GridError(f"{option} {text}: {part.strip()} must be from {low} to {high}, ranges upwards")
+            raise ConfigError(f"{option} {text}: {part.strip()} must be from {low} to {high}, ranges upwards")
         found |= set(range(first, last + 1))
     return sorted(found)
 
 
 def factors(text: str) -> list[float]:
-    """Effect factors, in order and once each. `GridError` for what is not a number from 0 to 10.
+    """Effect factors, in order and once each. `ConfigError` for what is not a number from 0 to 10.
 
     >>> factors("1,0.5")
     [0.5, 1.0]
@@ -142,7 +153,9 @@ def factors(text: str) -> list[float]:
         except ValueError:
             value = math.nan
         if not 0.0 <= value <= _LARGEST_EFFECT:
-            raise GridError(f"--effect {text}: {part.strip()!r} must be a number from 0 (none) to {_LARGEST_EFFECT:g}")
+            raise ConfigError(
+                f"--effect {text}: {part.strip()!r} must be a number from 0 (none) to {_LARGEST_EFFECT:g}"
+            )
         found.add(value)
     return sorted(found)
 
@@ -301,3 +314,86 @@ def _reference(config: DrawnConfig, published: PublishedExperiment | None) -> Gr
         return None
     trials = next(iter(trials_per_method(None, config)))
     return _cell(config, StudyDesign(participants=published.n, trials=trials, methods=config.design.methods))
+
+
+DrawnConfig = DirectionConfig | PreferenceConfig
+PeopleKind = Literal["own", "guessing", "guessing, with the config's bias", "without preference"]
+"""Who takes part: the config's own synthetic participants, or null participants who feel no difference."""
+
+PUBLISHED = "published"
+"""What the names of the published claims begin with."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class StudyDesign:
+    """A cell of the grid; `effect` is the factor on what people feel, `trials` those of one method."""
+
+    participants: int
+    trials: int
+    methods: tuple[str, ...]
+    effect: float = 1.0
+    people: PeopleKind = "own"
+
+    @property
+    def key(self) -> str:
+        """Its name, for the random streams."""
+        return canonical_json(asdict(self)).decode()
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Chunk:
+    """So many studies of a design. `config` is that of the design: its methods and trials; `felt` who feel the gun."""
+
+    config: DrawnConfig
+    design: StudyDesign
+    published: PublishedExperiment | None
+    seed: int
+    number: int
+    studies: int
+    felt: Felt | None = None
+
+
+def run_chunk(chunk: Chunk) -> Tally:
+    """Draw and analyse a chunk's studies."""
+    config, design = chunk.config, chunk.design
+    draws = generator(chunk.seed, "power", config.experiment, design.key, str(chunk.number))
+    if isinstance(config, DirectionConfig):
+        return tallied(_directions(config, design, chunk, draws))
+    return tallied(_ratings(config, design, chunk, draws))
+
+
+def _directions(config: DirectionConfig, design: StudyDesign, chunk: Chunk, draws: np.random.Generator) -> Findings:
+    trials = config.design.forward_per_session, config.design.backward_per_session
+    if chunk.felt is None:
+        correct = direction_counts(config, design.participants, chunk.studies, draws, design.effect)
+        expected, expected_d = _expected(config.synthetic.rates, design)
+    else:
+        correct = felt_counts(chunk.felt, trials, design.participants, chunk.studies, draws)
+        expected = expected_d = np.asarray(chunk.felt.log_odds).tolist()  # rates rise with it, and d' has its sign
+    found = analysed_directions(correct, trials, design.methods, expected, expected_d)
+    return _with_published(found, correct, trials, chunk)
+
+
+def _expected(rates: Rates, design: StudyDesign) -> tuple[list[float], list[float]]:
+    """What is expected of the correct rates on forward shots (their order), and of d' (its sign), by method."""
+    felt = [
+        [design.effect * (probit_of_forward(rates, m, way) - rates.bias_mean) for way in DIRECTIONS]
+        for m in design.methods
+    ]
+    return [row[0] for row in felt], [row[0] - row[1] for row in felt]
+
+
+def _ratings(config: PreferenceConfig, design: StudyDesign, chunk: Chunk, draws: np.random.Generator) -> Findings:
+    scores = preference_scores(config, design.participants, chunk.studies, draws, design.effect)
+    expected = scaled_means(config.synthetic.ratings, design.methods, design.effect)
+    found = analysed_ratings(scores, design.methods, expected.tolist())
+    return _with_published(found, scores, (0, 0), chunk)
+
+
+def _with_published(found: Findings, answers: Counts | FloatArray, trials: tuple[int, int], chunk: Chunk) -> Findings:
+    """With the published claims, if there are any of these methods, and their whole pattern."""
+    if chunk.published is None:
+        return found
+    claims = with_whole_pattern(published_claims(answers, trials, chunk.design.methods, chunk.published))
+    named = {f"{PUBLISHED}, {claim}": held for claim, held in claims.items()}
+    return Findings(claims=dict(found.claims) | named, half_widths=found.half_widths)

@@ -1,4 +1,4 @@
-"""What `recoil power` found, as sections: in short, smallest designs, the published pattern, curves, tables."""
+"""What `recoil power` found and what it assumed, as sections: smallest designs, published pattern, curves, tables."""
 
 from __future__ import annotations
 
@@ -7,12 +7,15 @@ from pathlib import Path
 from typing import Literal, TypeVar
 
 from analysis.paper.recurrence import ShareOfStudies
-from analysis.predict.power.figures import Curve, FalsePositives, Panel, figure_false_positives, figure_power
+from analysis.predict.power.figures import Curve, Panel, figure_false_positives, figure_power
+from analysis.predict.power.grid import FELT, PUBLISHED, Grid
 from analysis.predict.power.planned import ALL_PAIRS, ANOVA, ANY_PAIR
 from analysis.predict.power.results import PATTERN, DesignPower, Power, PublishedPattern, Reached, Smallest
-from analysis.predict.power.studies import PUBLISHED
+from analysis.predict.synthetic_studies import rates_law, ratings_law, spread_sentence
 from analysis.report import apa
 from analysis.report.section import Picture, Section, Table, origin_table
+from experiments.direction.config import DirectionConfig, Rates
+from experiments.preference.config import PreferenceConfig, Ratings
 
 XAxis = Literal["participants", "trials"]
 One = TypeVar("One")
@@ -242,19 +245,12 @@ def _curves(designs: Sequence[DesignPower], claims: Sequence[str], x: XAxis) -> 
 
 def _curve(designs: Sequence[DesignPower], claim: str, x: XAxis, name: str) -> Curve:
     points = [(getattr(one, x), share) for one in designs if (share := one.share_of(claim)) is not None]
-    return Curve(
-        name=name,
-        x=[place for place, _ in points],
-        share=[share.share for _, share in points],
-        low=[share.ci_low for _, share in points],
-        high=[share.ci_high for _, share in points],
-    )
+    return Curve(name=name, points=points)
 
 
 def _false_positives(found: Power, figures: Path) -> Section:
     groups = _grouped(found.designs, lambda one: (one.methods, one.trials, one.participants))
-    shown = groups[:4]
-    panels = [(f"{some[0].participants} people", _null_rates(some)) for some in shown]
+    panels = [(f"{some[0].participants} people", some) for some in groups[:4]]
     figure_false_positives(panels, found.level, figures / "false-positives")
     return Section(
         title="False positives of null participants",
@@ -268,14 +264,6 @@ def _false_positives(found: Power, figures: Path) -> Section:
         ),
         tables=tuple(_null_table(some) for some in groups[:MOST_TABLES]),
     )
-
-
-def _null_rates(group: Sequence[DesignPower]) -> list[FalsePositives]:
-    return [
-        FalsePositives(claim=one.claim, people=design.people, share=one.share, low=one.ci_low, high=one.ci_high)
-        for design in group
-        for one in design.claims
-    ]
 
 
 def _null_table(group: Sequence[DesignPower]) -> Table:
@@ -311,3 +299,75 @@ def _setting(design: DesignPower) -> str:
 
 def _effect(effect: float) -> str:
     return f"effect × {effect:g}"
+
+
+def grid_assumptions(grid: Grid) -> list[str]:
+    """What the numbers rest on."""
+    config, null = grid.config, grid.request.null
+    if isinstance(config, PreferenceConfig):
+        law = list(_null_ratings(config.synthetic.ratings) if null else _ratings(config.synthetic.ratings))
+    elif config.synthetic.observer == FELT:
+        law = list(_felt(config, null=null))
+    else:
+        law = list(_null_guessing(config.synthetic.rates) if null else _rates(config.synthetic.rates))
+    return [
+        *law,
+        "All tests are at 5 %, two-sided; Tukey's test is on the pooled repeated-measures error. A comparison counts "
+        "only if it comes out the way round that the config's means have it; where they are equal, either way counts.",
+        "Every participant is complete: nobody drops out or misses an answer.",
+        "Hours in the lab are participants times the config's own duration (trials and breaks, as `recoil check` has "
+        "it), one participant after another, without practice, preparation and no-shows.",
+        "Intervals are Wilson's, of 95 %: the Monte Carlo error of so many studies, not the uncertainty of the "
+        "assumed participants.",
+    ]
+
+
+def _rates(rates: Rates) -> Iterator[str]:
+    yield from rates_law(rates)
+    yield "The effect is a factor on the probit of each mean correct rate, so on d′: 1 is the config, 0 guessing."
+
+
+def _null_guessing(rates: Rates) -> Iterator[str]:
+    yield "Null participants feel no direction: each answer is right with a chance of one half in the mean over people."
+    yield (
+        "Those with the config's bias differ in their readiness to say forward (SD "
+        f"{rates.bias_sd:g} around {rates.bias_mean:g}, probit units). The pooled binomial test takes trials as "
+        "independent and rejects them more often than 5 %: trials come in people. The exact test of plain guessers "
+        "stays at or below 5 %, as counts are whole numbers."
+    )
+
+
+def _felt(config: DirectionConfig, *, null: bool) -> Iterator[str]:
+    percept, people, lapses = config.synthetic.percept, config.synthetic.people, config.synthetic.diffusion.lapses
+    yield (
+        f"People answer from what the gun does: exponent {percept.exponent:g}, leak {percept.leak_s:g} s, sensitivity "
+        f"{percept.sensitivity:g}, confusion {percept.confusion:g}, start {percept.start:g} (`recoil fit`): a model's "
+        "guess, not a measurement."
+    )
+    yield f"{spread_sentence(people.own)} Lapses {lapses.rate:g}."
+    if config.design.instructions:
+        yield (
+            f"Instructions {', '.join(config.design.instructions)}: each takes an equal part of a session's sets and "
+            "has its own boundary; the planned analysis counts all trials together."
+        )
+    if null:
+        yield (
+            "Null participants feel nothing: the evidence is 0, so each answers “forward” at the chance of their own "
+            "start: 0.5 for those who guess, the config's and its spread for those with the config's bias. The pooled "
+            "binomial test of the latter rejects as often as the bias is found, which is no false positive of a "
+            "direction felt; the exact test of plain guessers stays at or below 5 %, as counts are whole numbers."
+        )
+    else:
+        yield "The effect is a factor on the evidence (log odds of a right answer): 1 is the config, 0 nothing felt."
+
+
+def _ratings(law: Ratings) -> Iterator[str]:
+    yield from ratings_law(law, with_effect=True)
+    yield "The effect is a factor on the distances of the methods' means from their common mean; 1 is the config."
+
+
+def _null_ratings(law: Ratings) -> Iterator[str]:
+    yield (
+        f"Null participants like all methods alike: one mean, SD between people {law.person_sd:g}, within people "
+        f"{law.noise_sd:g}, none of the habits that set methods apart."
+    )

@@ -18,15 +18,13 @@ from scipy import special
 from analysis.paper.recurrence import SIGNIFICANT, Recurrence, ShareOfStudies, share_of
 from analysis.stats.anova import check_scores, rm_anova
 from analysis.stats.arrays import FloatArray
-from analysis.stats.binomial import binomial_test
-from analysis.stats.detection import yes_no
-from analysis.stats.studentized_range import studentized_range_isf
-from analysis.stats.tukey import pairs_of, pooled_pairs
+from analysis.stats.binomial import binomial_test, yes_no
+from analysis.stats.tukey import pairs_of, pooled_pairs, studentized_range_isf
+from device.words import DIRECTIONS
 
 ANOVA = "ANOVA"
 ALL_PAIRS = "Tukey, all pairs"
 ANY_PAIR = "Tukey, any pair"
-_DIRECTIONS = ("forward", "backward")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -121,7 +119,7 @@ def _binomials(
     return {
         f"binomial, {method} {direction}": _rejected(n * trials[way])[pooled[..., i, way]]
         for i, method in enumerate(methods)
-        for way, direction in enumerate(_DIRECTIONS)
+        for way, direction in enumerate(DIRECTIONS)
         if trials[way]
     }
 
@@ -149,16 +147,6 @@ class Precision:
     measure: str
     half_width: float
     mc_error: float
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class DesignOption:
-    """A design to choose from: what it costs, the lower end of the share that it reaches, and whether it may be run."""
-
-    lab_hours: float
-    participants: int
-    ci_low: float
-    allowed: bool
 
 
 def tallied(findings: Findings) -> Tally:
@@ -200,17 +188,3 @@ def precisions(tally: Tally) -> tuple[Precision, ...]:
         error = math.sqrt(spread / (n * max(n - 1, 1)))
         rows.append(Precision(measure=measure, half_width=total / n, mc_error=error))
     return tuple(rows)
-
-
-def smallest(options: Sequence[DesignOption], target: float) -> int | None:
-    """The place of the cheapest allowed option whose share is at least `target` even at its interval's lower end.
-
-    Cheapest is fewest hours in the lab, then fewest participants; `None` if none reaches it.
-
-    >>> few = DesignOption(lab_hours=4, participants=8, ci_low=0.7, allowed=True)
-    >>> many = DesignOption(lab_hours=7, participants=14, ci_low=0.9, allowed=True)
-    >>> smallest([many, few], 0.8), smallest([many, few], 0.95)
-    (0, None)
-    """
-    reaching = [i for i, option in enumerate(options) if option.allowed and option.ci_low >= target]
-    return min(reaching, key=lambda i: (options[i].lab_hours, options[i].participants, i), default=None)

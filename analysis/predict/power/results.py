@@ -3,26 +3,21 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass, field
 
 from analysis.paper.recurrence import SIGNIFICANT, WHOLE_PATTERN, ShareOfStudies
-from analysis.predict.power.grid import Grid, GridCell
-from analysis.predict.power.planned import DesignOption, Precision, Tally, merged, precisions, shares, smallest
-from analysis.predict.power.studies import PUBLISHED
+from analysis.predict.power.grid import PUBLISHED, Grid, GridCell, StudyDesign
+from analysis.predict.power.planned import Precision, Tally, merged, precisions, shares
+from analysis.report.serial import beside
 from experiments.record.provenance import provenance
 
 PATTERN = f"{PUBLISHED}, {WHOLE_PATTERN}"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class DesignPower:
+class DesignPower(StudyDesign):
     """A design, what it costs, and what studies of it found; `too_long` says why it keeps a participant too long."""
 
-    participants: int
-    trials: int
-    methods: tuple[str, ...]
-    effect: float
-    people: str
     duration_s: float
     lab_hours: float
     too_long: str
@@ -41,11 +36,7 @@ class Reached:
     participants: int
     trials: int
     lab_hours: float
-    claim: str
-    held: int
-    share: float
-    ci_low: float
-    ci_high: float
+    claim: ShareOfStudies = field(metadata=beside(ShareOfStudies))
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -112,13 +103,8 @@ def power_of(grid: Grid, tallies: Iterator[Tally], assumptions: Iterable[str]) -
 
 
 def _design(cell: GridCell, tally: Tally) -> DesignPower:
-    design = cell.design
     return DesignPower(
-        participants=design.participants,
-        trials=design.trials,
-        methods=design.methods,
-        effect=design.effect,
-        people=design.people,
+        **asdict(cell.design),
         duration_s=cell.duration_s,
         lab_hours=cell.lab_hours,
         too_long=cell.too_long,
@@ -147,33 +133,23 @@ def _smallest(designs: Sequence[DesignPower], target: float) -> Iterator[Smalles
         group = [one for one in designs if (one.effect, one.methods) == (effect, methods)]
         for place, claim in enumerate(one.claim for one in group[0].claims):
             reached = [one.claims[place] for one in group]
-            best = smallest([_option(one, share) for one, share in zip(group, reached, strict=True)], target)
             yield Smallest(
                 claim=claim,
                 effect=effect,
                 methods=methods,
-                design=None if best is None else _reached(group[best], reached[best]),
+                design=_cheapest(zip(group, reached, strict=True), target),
                 most=max(one.share for one in reached),
             )
 
 
-def _option(design: DesignPower, share: ShareOfStudies) -> DesignOption:
-    return DesignOption(
-        lab_hours=design.lab_hours,
-        participants=design.participants,
-        ci_low=share.ci_low,
-        allowed=not design.too_long,
-    )
+def _cheapest(designs: Iterable[tuple[DesignPower, ShareOfStudies]], target: float) -> Reached | None:
+    """Of those that keep nobody too long and whose share is at least `target` even at its interval's lower end.
 
-
-def _reached(design: DesignPower, share: ShareOfStudies) -> Reached:
-    return Reached(
-        participants=design.participants,
-        trials=design.trials,
-        lab_hours=design.lab_hours,
-        claim=share.claim,
-        held=share.held,
-        share=share.share,
-        ci_low=share.ci_low,
-        ci_high=share.ci_high,
+    Cheapest is fewest hours in the lab, then fewest participants; None if none reaches the target.
+    """
+    reaching = (
+        Reached(participants=one.participants, trials=one.trials, lab_hours=one.lab_hours, claim=share)
+        for one, share in designs
+        if not one.too_long and share.ci_low >= target
     )
+    return min(reaching, key=lambda one: (one.lab_hours, one.participants), default=None)

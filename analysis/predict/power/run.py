@@ -6,17 +6,14 @@ import contextlib
 import json
 import os
 from collections.abc import Callable, Iterator, Sequence
-from contextlib import AbstractContextManager
-from dataclasses import asdict, dataclass
+from dataclasses import asdict
 from pathlib import Path
 
 from analysis.predict.jobs import RunPieces, cores, on_cluster, on_processes
-from analysis.predict.power.assumptions import grid_assumptions
-from analysis.predict.power.grid import Grid, PowerRequest, make_grid
-from analysis.predict.power.page import in_short, sections
+from analysis.predict.power.grid import Chunk, Grid, PowerRequest, make_grid, run_chunk
+from analysis.predict.power.page import grid_assumptions, in_short, sections
 from analysis.predict.power.planned import Tally
 from analysis.predict.power.results import Power, power_of
-from analysis.predict.power.studies import Chunk, run_chunk
 from analysis.report.page import write_page
 from analysis.report.serial import as_json
 from analysis.report.terminal import Progress
@@ -24,26 +21,23 @@ from experiments.config.setup import sha256
 from experiments.record import storage
 from experiments.record.provenance import provenance
 
-__all__ = ["PowerRequest", "Where", "in_short", "power"]
+__all__ = ["PowerRequest", "in_short", "power"]
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Where:
-    """Where the work is done: on so many processes (all cores unless told), or on a Dask cluster."""
-
-    workers: int | None = None
-    scheduler: str | None = None
-
-
-def power(request: PowerRequest, where: Where, out: Path, progress: Progress) -> Power:
+def power(
+    request: PowerRequest, out: Path, progress: Progress, workers: int | None = None, scheduler: str | None = None
+) -> Power:
     """Simulate, analyse, write `power.json`, report and figures into `out`; what was found is returned.
+
+    The work is done on so many processes (all cores unless told), or on a Dask cluster.
 
     What was done before an interruption is kept there, and the same request goes on with it.
     """
     grid = make_grid(request)
     chunks = grid.chunks()
     kept = out / f"unfinished-{job_of(grid)[:12]}.jsonl"
-    with _workers(where) as run, progress("power", len(chunks)) as tell:
+    processes = on_processes(workers or cores()) if scheduler is None else on_cluster(scheduler)
+    with processes as run, progress("power", len(chunks)) as tell:
         storage.make_folder(out)
         tallies = _tallies(chunks, run, kept, tell)
     found = power_of(grid, iter(tallies), grid_assumptions(grid))
@@ -68,10 +62,6 @@ def job_of(grid: Grid) -> str:
     ]
     config = grid.config.model_dump(mode="json")
     return sha256([provenance(), grid.request.seed, grid.request.null, config, published, chunks])
-
-
-def _workers(where: Where) -> AbstractContextManager[RunPieces]:
-    return on_processes(where.workers or cores()) if where.scheduler is None else on_cluster(where.scheduler)
 
 
 def _tallies(chunks: Sequence[Chunk], run: RunPieces, kept: Path, tell: Callable[[str], None]) -> list[Tally]:

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import csv
-import io
 import math
 import textwrap
 from collections.abc import Iterator, Mapping, Sequence
@@ -16,7 +14,7 @@ import numpy as np
 from analysis.predict.simulate.scene import ScenePick, scene_section
 from analysis.report.figures.shot import ShotPanel, VibrationPanel, figure_5, figure_vibration
 from analysis.report.section import Section
-from analysis.report.serial import OPTIONAL
+from analysis.report.serial import OPTIONAL, as_csv
 from device.parameters import GunParameters
 from device.physics import ShotSummary, simulate, trace
 from device.physics.hand import (
@@ -165,18 +163,18 @@ def _changed(parameters: GunParameters, changes: Sequence[str]) -> GunParameters
         key, equals, text = change.partition("=")
         if not equals or key not in PARAMETER_KINDS:
             raise ConfigError(f"--set {change}: must be key=value with a key of {', '.join(PARAMETER_KINDS)}")
-        values[key] = _value(change, text, PARAMETER_KINDS[key])
+        values[key] = _value(f"--set {change}", text, PARAMETER_KINDS[key])
     try:
         return replace(parameters, **values)
     except ValueError as error:
         raise ConfigError(f"--set: {error}") from error
 
 
-def _value(change: str, text: str, kind: type[float] | type[str]) -> object:
+def _value(option: str, text: str, kind: type[float] | type[str]) -> Any:
     try:
         return kind(text)
     except ValueError as error:
-        raise ConfigError(f"--set {change}: {text!r} is not a number") from error
+        raise ConfigError(f"{option}: {text!r} is not a number") from error
 
 
 def simulated_shot(parameters: GunParameters, fidelity: str) -> SimulatedShot:
@@ -210,7 +208,7 @@ def _hand(words: str) -> HandMechanics:
             raise ConfigError(
                 f"--hand {words}: must be `{USUAL_HAND}`, or key=value,... with keys of {', '.join(known)}"
             )
-        numbers[key] = _number(f"--hand {words}", text)
+        numbers[key] = _value(f"--hand {words}", text, float)
     try:
         return HandMechanics(**numbers)
     except ValueError as error:
@@ -230,13 +228,6 @@ def collision_with_stop(parameters: GunParameters, impact_speed_m_s: float | Non
     )
 
 
-def _number(place: str, text: str) -> float:
-    try:
-        return float(text)
-    except ValueError as error:
-        raise ConfigError(f"{place}: {text!r} is not a number") from error
-
-
 def write_trace(parameters: GunParameters, path: Path) -> None:
     """The shot over time as CSV; units end the names."""
     shot = trace(parameters)
@@ -246,11 +237,7 @@ def write_trace(parameters: GunParameters, path: Path) -> None:
 
 def _write_columns(path: Path, columns: Mapping[str, Sequence[float]]) -> None:
     """Columns of one length as CSV."""
-    text = io.StringIO(newline="")
-    writer = csv.writer(text, lineterminator="\r\n")
-    writer.writerow(columns)
-    writer.writerows(zip(*columns.values(), strict=True))
-    storage.write_whole(path, text.getvalue().encode())
+    storage.write_whole(path, as_csv(columns, zip(*columns.values(), strict=True)))
 
 
 def write_plot(parameters: GunParameters, path: Path) -> None:

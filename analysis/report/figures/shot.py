@@ -7,7 +7,6 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-import matplotlib as mpl
 import numpy as np
 from matplotlib.axes import Axes
 from numpy.typing import NDArray
@@ -19,11 +18,9 @@ from analysis.report.figures.style import (
     INK,
     PURPLE,
     VERMILION,
+    drawn,
     light_grid,
-    new_figure,
     reference_line,
-    save,
-    style,
 )
 
 STAGES = ("recoil", "bullet firing", "resetting", "ready")
@@ -60,7 +57,7 @@ class _Trace:
     colour: str
 
 
-def figure_5(panels: Sequence[ShotPanel], path_stem: Path) -> tuple[Path, Path, Path]:
+def figure_5(panels: Sequence[ShotPanel], path_stem: Path) -> None:
     """A column (a), (b), ... for each shot; rows F, x, dx/dt, u over time in ms; PNG, SVG and PDF are written.
 
     Stage borders are lines with open circles on the traces, at the values just before. The collision is an arrow at the
@@ -69,8 +66,7 @@ def figure_5(panels: Sequence[ShotPanel], path_stem: Path) -> tuple[Path, Path, 
     """
     if not panels:
         raise ValueError("figure 5 needs at least one shot")
-    with mpl.rc_context(style()):  # type: ignore[arg-type]
-        figure = new_figure(0.8 + _PANEL_IN * len(panels), 7.4)
+    with drawn(path_stem, 0.8 + _PANEL_IN * len(panels), 7.4) as figure:
         grid = figure.subplots(4, len(panels), sharex=True, sharey="row", squeeze=False)
         for column, panel in enumerate(panels):
             _draw_column(list(grid[:, column]), panel, chr(ord("a") + column))
@@ -82,7 +78,6 @@ def figure_5(panels: Sequence[ShotPanel], path_stem: Path) -> tuple[Path, Path, 
             _name_stages(grid[0, column], panel)
             _draw_collision(grid[0, column], panel)
         figure.align_ylabels(grid[:, 0])
-        return save(figure, path_stem)
 
 
 def _traces(panel: ShotPanel) -> tuple[_Trace, ...]:
@@ -221,10 +216,9 @@ class VibrationPanel:
     duration_s: float
 
 
-def figure_vibration(panel: VibrationPanel, path_stem: Path) -> tuple[Path, Path, Path]:
+def figure_vibration(panel: VibrationPanel, path_stem: Path) -> None:
     """Acceleration over time in ms, its envelope, its root mean square and its end; PNG, SVG and PDF are written."""
-    with mpl.rc_context(style()):  # type: ignore[arg-type]
-        figure = new_figure(5.4, 3.2)
+    with drawn(path_stem, 5.4, 3.2) as figure:
         axes = figure.subplots()
         light_grid(axes)
         time_ms = panel.time_s * 1e3
@@ -255,4 +249,3 @@ def figure_vibration(panel: VibrationPanel, path_stem: Path) -> tuple[Path, Path
         axes.set_title(panel.title, loc="left", fontweight="bold")
         axes.set_xlabel("time [ms]")
         axes.set_ylabel("acceleration [m/s²]")
-        return save(figure, path_stem)

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import textwrap
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
@@ -38,18 +40,21 @@ _STYLE = {
 }
 
 
-def style() -> dict[str, object]:
-    """Settings to draw and to save under, for `matplotlib.rc_context`."""
-    return dict(mpl.rcParamsDefault) | _STYLE | {"backend": "agg"}
+@contextmanager
+def drawn(path_stem: Path, width_in: float, height_in: float) -> Iterator[Figure]:
+    """An empty figure to draw in, saved at the end as PNG, SVG and PDF.
+
+    It lays its axes out so that nothing is clipped, and no pyplot knows of it.
+    """
+    settings: Any = dict(mpl.rcParamsDefault) | _STYLE | {"backend": "agg"}
+    with mpl.rc_context(settings):
+        layout = ConstrainedLayoutEngine(w_pad=0.08, h_pad=0.07, wspace=0.03, hspace=0.03)  # labels touch by default
+        figure = Figure(figsize=(width_in, height_in), dpi=PNG_DPI, layout=layout, facecolor="white")
+        yield figure
+        save(figure, path_stem)
 
 
-def new_figure(width_in: float, height_in: float) -> Figure:
-    """An empty figure that lays its axes out so that nothing is clipped, and that no pyplot knows of."""
-    layout = ConstrainedLayoutEngine(w_pad=0.08, h_pad=0.07, wspace=0.03, hspace=0.03)  # labels touch by default
-    return Figure(figsize=(width_in, height_in), dpi=PNG_DPI, layout=layout, facecolor="white")
-
-
-def save(figure: Figure, path_stem: Path) -> tuple[Path, Path, Path]:
+def save(figure: Figure, path_stem: Path) -> None:
     """`path_stem`.png, .svg and .pdf, without dates or versions inside. Folders are made."""
     path_stem.parent.mkdir(parents=True, exist_ok=True)
     png, svg, pdf = (path_stem.with_name(f"{path_stem.name}.{kind}") for kind in ("png", "svg", "pdf"))
@@ -62,7 +67,13 @@ def save(figure: Figure, path_stem: Path) -> tuple[Path, Path, Path]:
     canvas.print_svg(svg, metadata={"Date": None, "Creator": None})
     canvas = FigureCanvasPdf(figure)
     canvas.print_pdf(pdf, metadata={"CreationDate": None, "Creator": None, "Producer": None})
-    return png, svg, pdf
+
+
+def legend_below(figure: Figure, axes: Axes, columns: int) -> None:
+    """One legend below all panels, of what `axes` has."""
+    handles, names = axes.get_legend_handles_labels()
+    where: Any = "outside lower center"
+    figure.legend(handles, names, loc=where, ncols=columns, frameon=False, fontsize=8.0, handlelength=3.2)
 
 
 def method_colour(i: int) -> str:

@@ -1,31 +1,34 @@
-"""Speed against accuracy: conditional accuracy functions, and quantile-probability plots."""
+"""Response times, and speed against accuracy: conditional accuracy functions and quantile-probability plots."""
 
 from __future__ import annotations
 
 import textwrap
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Protocol
+from typing import Any, Protocol
 
-import matplotlib as mpl
 import numpy as np
 from matplotlib.axes import Axes
+from matplotlib.colors import to_rgba
 from matplotlib.lines import Line2D
+from matplotlib.patches import Patch
 
+from analysis.report.figures.crowd import MANY, places
 from analysis.report.figures.style import (
     BLACK,
+    DIRECTION_MARKERS,
     INK,
     METHOD_LINES,
     display_name,
+    drawn,
     light_grid,
     method_colour,
-    new_figure,
     reference_line,
-    save,
-    style,
+    wrapped,
 )
 from analysis.summary.results import DirectionStatistics
+from analysis.times.own_trials import ResponseTimes
 from analysis.times.speed_accuracy import CellTrade, NoSpeedAccuracy, SpeedAccuracy
 
 _Cells = Sequence[tuple[int, CellTrade]]
@@ -52,24 +55,24 @@ class _Panel:
     lines: bool
 
 
-def figure_conditional_accuracy(found: DirectionStatistics, path_stem: Path) -> tuple[Path, Path, Path]:
+def figure_conditional_accuracy(found: DirectionStatistics, path_stem: Path) -> None:
     """Accuracy over response time, a line a method, a panel an instruction; PNG, SVG and PDF are written.
 
     `ValueError` if nobody has a trial in every bin.
     """
     if not isinstance(found.speed_accuracy, SpeedAccuracy) or not has_curve(found):
         raise ValueError("the figure of conditional accuracy needs somebody with a trial in every bin")
-    return _panels(found.methods, found.speed_accuracy, path_stem, _CURVES)
+    _panels(found.methods, found.speed_accuracy, path_stem, _CURVES)
 
 
-def figure_quantile_probability(found: DirectionStatistics, path_stem: Path) -> tuple[Path, Path, Path]:
+def figure_quantile_probability(found: DirectionStatistics, path_stem: Path) -> None:
     """Quantiles of the times of errors and correct answers over their probabilities; PNG, SVG and PDF are written.
 
     `ValueError` if nobody has enough answers of a kind.
     """
     if not isinstance(found.speed_accuracy, SpeedAccuracy) or not has_points(found):
         raise ValueError("the quantile-probability plot needs somebody with five answers of a kind")
-    return _panels(found.methods, found.speed_accuracy, path_stem, _POINTS)
+    _panels(found.methods, found.speed_accuracy, path_stem, _POINTS)
 
 
 def has_curve(found: DirectionStatistics) -> bool:
@@ -88,13 +91,12 @@ def _cells_of(trade: SpeedAccuracy | NoSpeedAccuracy | None) -> list[CellTrade]:
     return [cell for by_instruction in trade.methods.values() for cell in by_instruction.values()]
 
 
-def _panels(methods: Sequence[str], trade: SpeedAccuracy, path_stem: Path, panel: _Panel) -> tuple[Path, Path, Path]:
+def _panels(methods: Sequence[str], trade: SpeedAccuracy, path_stem: Path, panel: _Panel) -> None:
     """A panel an instruction on shared axes, the methods' legend above all."""
     instructions = [i for i in trade.instructions if any(i in one for one in trade.methods.values())]
     columns = min(_ACROSS, len(instructions))
     rows = -(-len(instructions) // columns)
-    with mpl.rc_context(style()):  # type: ignore[arg-type]
-        figure = new_figure(5.8 if columns == 1 else 0.6 + 3.3 * columns, 0.5 + 3.7 * rows)
+    with drawn(path_stem, 5.8 if columns == 1 else 0.6 + 3.3 * columns, 0.5 + 3.7 * rows) as figure:
         grid = figure.subplots(rows, columns, squeeze=False, sharex=True, sharey=True).ravel()
         for spare in grid[len(instructions) :]:
             spare.set_visible(False)
@@ -111,7 +113,6 @@ def _panels(methods: Sequence[str], trade: SpeedAccuracy, path_stem: Path, panel
         panel.limit(grid[0], trade)
         shown = [(i, method) for i, method in enumerate(methods) if method in trade.methods]
         figure.legend(handles=_handles(shown, lines=panel.lines), loc="outside upper center", ncols=3, frameon=False)
-        return save(figure, path_stem)
 
 
 def _handles(methods: Sequence[tuple[int, str]], *, lines: bool) -> list[Line2D]:
@@ -222,3 +223,103 @@ _POINTS = _Panel(
     upward="response time quantile [s]",
     lines=False,
 )
+
+_PLACES = {"forward": -0.19, "backward": 0.19}
+
+
+def figure_response_times(found: DirectionStatistics, path_stem: Path) -> None:
+    """Valid response times as cumulative shares and as boxes (5, 25, 50, 75, 95 %); PNG, SVG and PDF are written.
+
+    `ValueError` if there is no valid time.
+    """
+    times = found.response_times
+    if not times.n:
+        raise ValueError("the figure of response times needs at least one valid time")
+    with drawn(path_stem, 8.6 + 1.6 * max(0, len(found.methods) - 3), 3.9) as figure:
+        left, right = figure.subplots(1, 2, width_ratios=[1.0, 1.15])
+        limit = _limit(times)
+        _draw_shares(left, times, found.methods, limit)
+        _draw_boxes(right, times, found.methods)
+
+
+def _limit(times: ResponseTimes) -> float:
+    """The end of the time axis: the slowest, but no more than half as much again as 99 in 100 need."""
+    spreads = [spread.percentiles for spread in times.methods.values() if spread]
+    return float(min(1.05 * max(p[100] for p in spreads), 1.5 * max(p[99] for p in spreads))) or 1.0
+
+
+def _draw_shares(axes: Axes, times: ResponseTimes, methods: Sequence[str], limit: float) -> None:
+    light_grid(axes)
+    slowest = 0.0
+    for i, method in enumerate(methods):
+        spread = times.methods.get(method)
+        if spread:
+            label = f"{display_name(method)} (n = {spread.n:,})"
+            line = METHOD_LINES[i % len(METHOD_LINES)]
+            shares = np.arange(len(spread.percentiles))
+            axes.plot(spread.percentiles, shares, color=method_colour(i), linestyle=line, linewidth=1.7, label=label)
+            slowest = max(slowest, spread.percentiles[-1])
+    axes.set_xlim(0.0, limit)
+    axes.set_ylim(0.0, 101.0)
+    beyond = f"\n(cut: the slowest took {slowest:.1f} s)" if slowest > limit else ""
+    axes.set_xlabel(f"response time [s]{beyond}")
+    axes.set_ylabel("share of the trials answered by then [%]")
+    axes.set_title("(a) Cumulative distribution", loc="left", fontweight="bold")
+    axes.legend(loc="best", fontsize=8.0, handlelength=3.2, framealpha=0.9)
+
+
+def _draw_boxes(axes: Axes, times: ResponseTimes, methods: Sequence[str]) -> None:
+    light_grid(axes)
+    for i, method in enumerate(methods):
+        for direction, place in _PLACES.items():
+            spread = times.directions.get(method, {}).get(direction)
+            if spread:
+                _draw_box(axes, i + place, spread.percentiles, method_colour(i), filled=direction == "forward")
+                _draw_medians(axes, i + place, times.participants, method, direction)
+    axes.set_xlim(-0.6, len(methods) - 0.4)
+    axes.set_ylim(bottom=0.0)
+    axes.set_xticks(range(len(methods)), [f"{_counts(times, m)}\n{wrapped(m)}" for m in methods])
+    axes.set_xlabel(f"boxes: 5, 25, 50, 75 and 95 % of the trials{_medians_note(times)}", fontsize=8.0, labelpad=8.0)
+    axes.set_ylabel("response time [s]")
+    axes.set_title("(b) By direction", loc="left", fontweight="bold")
+    handles = [
+        Patch(facecolor="#bbbbbb", edgecolor=BLACK, label="forward shots"),
+        Patch(facecolor="white", edgecolor=BLACK, label="backward shots"),
+    ]
+    axes.legend(handles=handles, loc="lower right", bbox_to_anchor=(1.0, 1.0), ncols=2, frameon=False, fontsize=8.0)
+
+
+def _draw_box(axes: Axes, place: float, percentiles: Sequence[float], colour: str, *, filled: bool) -> None:
+    names = {"whislo": 5, "q1": 25, "med": 50, "q3": 75, "whishi": 95}
+    axes.bxp(
+        [{name: percentiles[at] for name, at in names.items()} | {"fliers": []}],
+        positions=[place],
+        widths=0.32,
+        showfliers=False,
+        patch_artist=True,
+        manage_ticks=False,
+        boxprops={"facecolor": to_rgba(colour, 0.35) if filled else "white", "edgecolor": colour, "linewidth": 1.2},
+        medianprops={"color": BLACK, "linewidth": 1.8},
+        whiskerprops={"color": colour, "linewidth": 1.2},
+        capprops={"color": colour, "linewidth": 1.2},
+        zorder=2.0,
+    )
+
+
+def _draw_medians(axes: Axes, place: float, participants: Mapping[str, Any], method: str, direction: str) -> None:
+    """A point a participant; beyond 200 of them the boxes stand alone."""
+    medians = [own[method][direction] for own in participants.values() if direction in own.get(method, {})]
+    if len(participants) <= MANY:
+        across = place + places(len(medians), 0.11)
+        size = 3.2 if len(medians) <= 30 else 2.0
+        marker = DIRECTION_MARKERS[direction]
+        axes.plot(across, medians, marker, markersize=size, mfc="white", mec=INK, mew=0.6, zorder=3.0)
+
+
+def _counts(times: ResponseTimes, method: str) -> str:
+    spreads = times.directions.get(method, {})
+    return "n = " + " / ".join(f"{spreads[d].n if d in spreads else 0:,}" for d in _PLACES)
+
+
+def _medians_note(times: ResponseTimes) -> str:
+    return "" if len(times.participants) > MANY else "; points: participants' medians"

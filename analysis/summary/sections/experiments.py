@@ -10,8 +10,8 @@ from analysis.report import apa
 from analysis.report.figures.style import display_name
 from analysis.report.section import LISTED, SHOWN, Section, Table
 from analysis.summary.results import ConfidenceInterval, DirectionStatistics, Pair, WithinStatistics
-from analysis.summary.sections.pictures import directions_picture, response_times_picture
-from analysis.times.response_times import ResponseTimes
+from analysis.summary.sections.content import directions_picture, response_times_picture
+from analysis.times.own_trials import ResponseTimes
 
 _WITHIN = (
     ". The CI is within-subject (Cousineau–Morey): it tells of differences between methods, not between people, and is "

@@ -3,21 +3,20 @@
 from __future__ import annotations
 
 import os
+from collections import Counter
 from pathlib import Path
 
-from analysis.logs.reading import Problem
-from analysis.paper.published import AUDITED, ComparisonRow
+from analysis.logs.files import Problem
+from analysis.paper.paper import AUDITED, ComparisonRow
 from analysis.paper.recurrence import PatternOdds
 from analysis.report import apa
-from analysis.report.figures.shot import ShotPanel
 from analysis.report.figures.style import named
 from analysis.report.page import write_page
 from analysis.report.section import LISTED, SHOWN, Section, Table, shortened
 from analysis.report.serial import as_json
-from analysis.summary.results import DirectionStatistics, Origin, StudyStatistics
-from analysis.summary.sections.data import EXPERIMENTS, ReportData
+from analysis.summary.results import DirectionStatistics, Origin
+from analysis.summary.sections.content import EXPERIMENTS, ReportData, results_picture, shot_picture, write_figures
 from analysis.summary.sections.experiments import direction_section, preference_section
-from analysis.summary.sections.pictures import results_picture, shot_picture, write_figures
 from analysis.summary.sections.supplement import supplement_sections
 from analysis.summary.sections.trade import trade_section
 
@@ -39,7 +38,7 @@ def sections(report: ReportData) -> tuple[Section, ...]:
     direction, preference = (statistics.analysed.get(name) for name in EXPERIMENTS)
     found = [
         _analysed(report),
-        _glance(statistics) if statistics.analysed else None,
+        Section(title="Results at a glance", pictures=(results_picture(statistics),)) if statistics.analysed else None,
         _verdicts(report.comparison) if report.comparison else None,
         *(
             (direction_section(direction), trade_section(direction))
@@ -50,7 +49,7 @@ def sections(report: ReportData) -> tuple[Section, ...]:
         *supplement_sections(statistics),
         *report.extra,
         _odds(report.odds) if report.odds else None,
-        _shot(report.panels) if report.panels else None,
+        Section(title="The shot", pictures=(shot_picture(report.panels),)) if report.panels else None,
         _left_out(report),
         _provenance(report),
     ]
@@ -58,8 +57,9 @@ def sections(report: ReportData) -> tuple[Section, ...]:
 
 
 def _analysed(report: ReportData) -> Section:
+    gone = Counter(entry.experiment for entry in report.statistics.excluded)
     rows = tuple(
-        (name.capitalize(), f"{found.n:,}", f"{_excluded(report.statistics, key):,}")
+        (name.capitalize(), f"{found.n:,}", f"{gone[key]:,}")
         for key, name in EXPERIMENTS.items()
         if (found := report.statistics.of(key)) is not None
     )
@@ -79,17 +79,10 @@ def _analysed(report: ReportData) -> Section:
 def _origin(name: str, origin: Origin) -> str:
     """Who answered, and on which gun: nobody is to take synthetic participants for people."""
     answers = ", ".join(f"{count} by {_HANDS[hand]}" for hand, count in origin.answers.items())
-    guns = ", ".join(f"{count} on {_gun(gun)}" for gun, count in origin.guns.items())
+    names = {gun: "the simulated gun" if gun == "simulated" else f"the gun {gun}" for gun in origin.guns}
+    guns = ", ".join(f"{count} on {names[gun]}" for gun, count in origin.guns.items())
     trials = f"; trials {guns}" if guns else ""
     return f"{name.capitalize()}: answers {answers}{trials}."
-
-
-def _gun(name: str) -> str:
-    return "the simulated gun" if name == "simulated" else f"the gun {name}"
-
-
-def _excluded(statistics: StudyStatistics, experiment: str) -> int:
-    return sum(entry.experiment == experiment for entry in statistics.excluded)
 
 
 def _verdicts(comparison: tuple[ComparisonRow, ...]) -> Section:
@@ -102,9 +95,9 @@ def _verdicts(comparison: tuple[ComparisonRow, ...]) -> Section:
 
 
 def _agreement(comparison: tuple[ComparisonRow, ...]) -> str:
-    words = ("agrees", "differs", "differs as predicted", "not obtained")
-    agrees, differs, predicted, missing = (sum(row.verdict == verdict for row in comparison) for verdict in words)
-    told = f"{agrees} published numbers and claims agree, {differs} differ"
+    counts = Counter(row.verdict for row in comparison)
+    predicted, missing = counts["differs as predicted"], counts["not obtained"]
+    told = f"{counts['agrees']} published numbers and claims agree, {counts['differs']} differ"
     told += f", {predicted} {'differs' if predicted == 1 else 'differ'} as the audit predicted" if predicted else ""
     told += f", {missing} were not obtained." if missing else "."
     return told + " A number agrees if it rounds to the printed digits, a bound or an order if it is true here."
@@ -154,14 +147,6 @@ def obtained_text(row: ComparisonRow) -> str:
     digits, _, unit = row.published.partition(" ")
     decimals = len(digits.partition(".")[2]) if digits else 2
     return f"{apa.number(row.obtained, decimals)} {unit}".strip()
-
-
-def _glance(statistics: StudyStatistics) -> Section:
-    return Section(title="Results at a glance", pictures=(results_picture(statistics),))
-
-
-def _shot(panels: tuple[ShotPanel, ...]) -> Section:
-    return Section(title="The shot", pictures=(shot_picture(panels),))
 
 
 def _odds(odds: tuple[PatternOdds, ...]) -> Section:

@@ -7,8 +7,8 @@ from collections.abc import Iterable, Iterator
 from analysis.report import apa
 from analysis.report.figures.style import display_name, named
 from analysis.report.section import Section, Table
+from analysis.stats.diagnostics import Sphericity
 from analysis.stats.logit_model import Contrast
-from analysis.stats.sphericity import Sphericity
 from analysis.summary.results import (
     Assumption,
     Diagnostics,
@@ -112,17 +112,8 @@ def _pairs_words(found: Supplement) -> str:
 
 
 def _pairs(found: WithinStatistics, beside: Supplement) -> Table:
-    columns = (
-        (pooled, own, t, ranks, factor)
-        for pooled, own, t, ranks, factor in zip(
-            found.tukey or (),
-            beside.tukey_paired,
-            beside.paired_t,
-            beside.friedman.post_hoc.pairs,
-            beside.bayes_factors.pairs,
-            strict=True,
-        )
-    )
+    ranks, factors = beside.friedman.post_hoc.pairs, beside.bayes_factors.pairs
+    pairs = zip(found.tukey or (), beside.tukey_paired, beside.paired_t, ranks, factors, strict=True)
     return Table(
         caption="p-values of the pairs by four tests, effect size and Bayes factor",
         header=("Pair", "Tukey, pooled error", "Tukey, own error", "t, Holm", "Signed ranks, Holm", "d_z", "BF10"),
@@ -132,11 +123,11 @@ def _pairs(found: WithinStatistics, beside: Supplement) -> Table:
                 apa.p_cell(pooled.p),
                 apa.p_cell(own.p),
                 apa.p_cell(t.p_holm),
-                apa.p_cell(ranks.p_holm),
+                apa.p_cell(rank.p_holm),
                 apa.number(t.d_z),
                 bayes_cell(factor.bf10),
             )
-            for pooled, own, t, ranks, factor in columns
+            for pooled, own, t, rank, factor in pairs
         ),
     )
 

@@ -1,17 +1,24 @@
-"""`recoil twin`: a gun that is none, on a pseudo-terminal or a TCP port, for training and for tests."""
+"""`recoil twin`, a gun that is none, on a pseudo-terminal or a TCP port; `recoil doctor`, the rig's self-test."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from contextlib import closing
 from dataclasses import dataclass, fields, replace
 from pathlib import Path
-from typing import Any
+from typing import Any, Literal
 
+from analysis.report.section import Section, Table
+from analysis.report.serial import as_json
+from analysis.report.terminal import Progress, with_tables
 from device.serial_gun.gun import MAX_SPEED
 from device.twin.core import IDENTITY
 from device.twin.twin import Make, Pty, Socket, Tcp, Troubles, Twin
+from experiments.clock import RealClock
+from experiments.doctor.checks import carry_out_check, checks
+from experiments.doctor.figures import DoctorFinding
+from experiments.doctor.verdicts import overall
 from experiments.load import find, load_gun
+from experiments.record import storage
 from experiments.study.folders import PlaceError
 
 
@@ -39,19 +46,11 @@ def serve(asked: TwinRequest, tell: Callable[[dict[str, Any]], None]) -> None:
         socket.plug()
     except (OSError, ImportError, AttributeError) as error:  # the latter two: a system without pseudo-terminals
         raise PlaceError(f"the twin cannot be plugged in here: {error}; try --tcp PORT, or another --link") from error
-    with closing(_Plugged(socket)):
+    try:
         tell({"address": socket.address, "gun": _gun_option(socket.address, asked.speed)})
         twin.serve()
-
-
-class _Plugged:
-    """A socket that is pulled out when all is over."""
-
-    def __init__(self, socket: Socket) -> None:
-        self._socket = socket
-
-    def close(self) -> None:
-        self._socket.unplug()
+    finally:
+        socket.unplug()
 
 
 def _socket(asked: TwinRequest) -> Socket:
@@ -91,3 +90,40 @@ def troubles_of(words: Sequence[str]) -> Troubles:
         except ValueError as error:
             raise PlaceError(f"--trouble {word}: {error}") from error
     return Troubles(**found)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Examination:
+    """What every check found, when, and the worst verdict."""
+
+    utc: str
+    verdict: Literal["good", "warning", "fails"]
+    checks: tuple[DoctorFinding, ...]
+
+
+def examine(results: Path, gun: str, config: str, progress: Progress) -> Examination:
+    """Carry out every check; `config` is the gun's, with the limit of its line.
+
+    `PlaceError`: the gun's address has no such form; `ConfigError`: the config cannot be used.
+    """
+    findings, planned = list[DoctorFinding](), checks(results, gun, load_gun(find(config)).serial.round_trip_limit_s)
+    with progress("doctor", len(planned)) as tell:
+        for check in planned:
+            findings += carry_out_check(check)
+            tell(check.name)
+    verdict = overall([finding.verdict for finding in findings])
+    return Examination(utc=RealClock().utc(), verdict=verdict, checks=tuple(findings))
+
+
+def keep(found: Examination, path: Path) -> None:
+    """Put the machine-readable result into a file, in place of an older one."""
+    storage.make_folder(path.parent)
+    storage.write_whole(path, as_json(found))
+
+
+def examination_text(findings: tuple[DoctorFinding, ...]) -> str:
+    """The findings as a table, for people at a terminal."""
+    rows = tuple((one.check, str(one.verdict), one.measured, one.advice) for one in findings)
+    header = ("check", "verdict", "measured", "what to do")
+    section = Section(title="", tables=(Table(caption="", header=header, rows=rows),))
+    return with_tables(section, ruled=True, unfolded=2)

@@ -1,26 +1,29 @@
-"""The report's figures: when there is one, what its caption says, and what its text alternative tells."""
+"""What a report is made of, and its pictures with their captions."""
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+from dataclasses import dataclass, field
 from pathlib import Path
 
+from analysis.logs.files import Problem
+from analysis.paper.paper import ComparisonRow
+from analysis.paper.recurrence import PatternOdds
 from analysis.report import apa
 from analysis.report.figures.shot import ShotPanel, figure_5
 from analysis.report.figures.style import named
-from analysis.report.section import Picture
-from analysis.summary.figures.directions import figure_directions
-from analysis.summary.figures.results import figure_8
-from analysis.summary.figures.times import figure_response_times
+from analysis.report.section import Picture, Section
+from analysis.summary.figures.results import figure_8, figure_directions
 from analysis.summary.figures.trade import (
     figure_conditional_accuracy,
     figure_quantile_probability,
+    figure_response_times,
     has_curve,
     has_points,
 )
 from analysis.summary.results import DirectionStatistics, Sensitivity, StudyStatistics, WithinStatistics
-from analysis.summary.sections.data import EXPERIMENTS, ReportData
 from analysis.summary.sections.trade import CONDITIONAL_ACCURACY, QUANTILE_PROBABILITY
-from analysis.times.response_times import TimeSpread
+from analysis.times.own_trials import TimeSpread
 
 FIGURE_5, FIGURE_8 = "figure-5", "figure-8"
 _DIRECTIONS_FIGURE, _TIMES_FIGURE = "figure-directions", "figure-response-times"
@@ -39,16 +42,12 @@ def write_figures(folder: Path, report: ReportData) -> None:
         figure_directions(direction, folder / _DIRECTIONS_FIGURE)
         if direction.response_times.n:
             figure_response_times(direction, folder / _TIMES_FIGURE)
-        _write_trade(folder, direction)
+        if has_curve(direction):
+            figure_conditional_accuracy(direction, folder / CONDITIONAL_ACCURACY)
+        if has_points(direction):
+            figure_quantile_probability(direction, folder / QUANTILE_PROBABILITY)
     if report.panels:
         figure_5(report.panels, folder / FIGURE_5)
-
-
-def _write_trade(folder: Path, found: DirectionStatistics) -> None:
-    if has_curve(found):
-        figure_conditional_accuracy(found, folder / CONDITIONAL_ACCURACY)
-    if has_points(found):
-        figure_quantile_probability(found, folder / QUANTILE_PROBABILITY)
 
 
 def results_picture(statistics: StudyStatistics) -> Picture:
@@ -155,3 +154,26 @@ def _landing_words(panel: ShotPanel) -> str:
     if not panel.collision_force_N >= 0.0:
         return f"{peaks}, no landing"
     return f"{peaks}, collision with {apa.number(panel.collision_force_N, 1 if panel.collision_force_N >= 1 else 2)} N"
+
+
+EXPERIMENTS = {"direction": "direction recognition", "preference": "preference"}
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ReportData:
+    """What a report tells. `comparison` is None without a paper.
+
+    `files` are the logs used; `provenance` is label -> text; `notes` are the assumptions behind the numbers; `extra`
+    are finished sections that follow the statistics.
+    """
+
+    title: str
+    statistics: StudyStatistics
+    problems: tuple[Problem, ...] = ()
+    comparison: tuple[ComparisonRow, ...] | None = None
+    odds: tuple[PatternOdds, ...] = ()
+    panels: tuple[ShotPanel, ...] = ()
+    files: tuple[Path, ...] = ()
+    provenance: Mapping[str, str] = field(default_factory=dict)
+    notes: tuple[str, ...] = ()
+    extra: tuple[Section, ...] = ()

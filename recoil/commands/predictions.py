@@ -1,0 +1,203 @@
+"""Commands before there are data: simulated power, the design search, and models fitted to rates and times."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+from typer.core import TyperGroup
+
+from analysis.report.terminal import (
+    AsJsonOption,
+    ConfigArgument,
+    FixedSeedOption,
+    GunConfigOption,
+    WorkersOption,
+    end,
+    in_text,
+    progress,
+    say,
+    show,
+    tracked,
+)
+
+ParticipantsOption = Annotated[str | None, typer.Option(metavar="N,N-N", help="How many people, such as 8,10,14-20.")]
+TrialsListOption = Annotated[
+    str | None, typer.Option(metavar="N,N-N", help="Trials of a method; the config's own unless given.")
+]
+MethodsOption = Annotated[
+    list[str] | None, typer.Option(metavar="NAME,NAME", help="Compare these alone; may come again.")
+]
+EffectOption = Annotated[
+    str | None, typer.Option(metavar="FACTOR,FACTOR", help="Factors on what people feel; 1 is the config.")
+]
+SimulatedOption = Annotated[int, typer.Option(min=1, max=10_000_000, help="Simulated studies of each design.")]
+NullOption = Annotated[bool, typer.Option("--null", help="People who feel no difference: false positives.")]
+SchedulerOption = Annotated[str | None, typer.Option(metavar="ADDRESS", help="Work on this Dask cluster instead.")]
+
+
+def power(
+    config: ConfigArgument,
+    *,
+    participants: ParticipantsOption = None,
+    trials: TrialsListOption = None,
+    methods: MethodsOption = None,
+    effect: EffectOption = None,
+    studies: SimulatedOption = 10_000,
+    target: Annotated[float, typer.Option(help="Power that a design is to reach.")] = 0.8,
+    null: NullOption = False,
+    seed: FixedSeedOption = 1,
+    paper: Annotated[str, typer.Option(help="Published numbers whose pattern may recur.")] = "paper",
+    workers: WorkersOption = None,
+    scheduler: SchedulerOption = None,
+    out: Annotated[Path, typer.Option(help="Folder for power.json, figures and report.")] = Path("results/power"),
+    as_json: AsJsonOption = False,
+) -> None:
+    """Simulated power and precision: how many people and trials does it take, and what does it cost?"""
+    from analysis.predict.power import run as feature
+
+    request = feature.PowerRequest(
+        config=config,
+        participants=participants,
+        trials=trials,
+        methods=tuple(methods or ()),
+        effects=effect,
+        studies=studies,
+        target=target,
+        null=null,
+        seed=seed,
+        paper=paper,
+    )
+    found = feature.power(request, out, progress, workers, scheduler)
+    show(found, f"{in_text(feature.in_short(found))}\nReport: {out / 'report.html'}", as_json)
+
+
+ConfigOrGunArgument = Annotated[str | None, typer.Argument(help="Config whose gun is meant; else the shipped gun.")]
+GunOption = Annotated[str | None, typer.Option(help="Config of a gun, instead of CONFIG.")]
+_RANGE = "FROM-TO"
+FrictionOption = Annotated[
+    str | None, typer.Option(metavar=_RANGE, help="Damper friction in N; from the gun's own on.")
+]
+VoltageOption = Annotated[str | None, typer.Option(metavar=_RANGE, help="Voltage in V; 0-24 unless given.")]
+PulseOption = Annotated[
+    str | None, typer.Option(metavar=_RANGE, help="Pulse in s, or one value; 0.002-0.02 unless given.")
+]
+RateAboveOption = Annotated[
+    float, typer.Option(metavar="HZ", help="Shots a second that a proposed design must keep up.")
+]
+GridOption = Annotated[int, typer.Option(help="Values of friction and of voltage; of the pulse a fifth as many.")]
+
+
+def design(
+    config: ConfigOrGunArgument = None,
+    *,
+    gun: GunOption = None,
+    friction: FrictionOption = None,
+    voltage: VoltageOption = None,
+    pulse: PulseOption = None,
+    rate_above: RateAboveOption = 5.0,
+    grid: GridOption = 40,
+    seed: FixedSeedOption = 1,
+    workers: WorkersOption = None,
+    out: Annotated[Path, typer.Option(help="Folder for design.json, figures and report.")] = Path("results/design"),
+    as_json: AsJsonOption = False,
+) -> None:
+    """Which damper, voltage and pulse would be felt best, and where a direction begins to be felt. Predictions."""
+    from analysis.predict.design_search import run as feature
+
+    request = feature.DesignRequest(
+        config=config,
+        gun=gun,
+        friction=friction,
+        voltage=voltage,
+        pulse=pulse,
+        rate_above_Hz=rate_above,
+        grid=grid,
+        seed=seed,
+    )
+    found = feature.design(request, workers, out, progress)
+    show(found, f"{in_text(feature.in_short(found))}\nReport: {out / 'report.html'}", as_json)
+    raise end(exceptions=found.best is None)
+
+
+class _PerceptUnlessNamed(TyperGroup):
+    """`recoil fit` with options alone, or with nothing, fits the percept."""
+
+    def parse_args(self, ctx: typer.Context, args: list[str]) -> list[str]:  # type: ignore[override] # its own context
+        named = args and (not args[0].startswith("-") or args[0] in ctx.help_option_names)
+        return super().parse_args(ctx, args if named else ["percept", *args])
+
+
+app = typer.Typer(
+    cls=_PerceptUnlessNamed,
+    help=(
+        "Fit a model: `percept` (what of a shot says its direction, to a paper's rates; also what `recoil fit` alone "
+        "does) or `times` (how fast and how carefully people decide, to logs with their own response times)."
+    ),
+    rich_markup_mode=None,
+)
+
+PaperOption = Annotated[str, typer.Option(help="Published numbers: file, or the name of a shipped one.")]
+RatesOption = Annotated[
+    str | None, typer.Option(metavar="NAME=SHARE,...", help="Forward rates by method instead of a paper's.")
+]
+TrialsOption = Annotated[
+    int | None, typer.Option(min=1, max=10**9, help="Forward trials behind each of --rates (140).")
+]
+SpreadOption = Annotated[
+    float, typer.Option(metavar="FACTOR", help="People differ by so many times the assumed spread; 0: all alike.")
+]
+StudiesOption = Annotated[
+    int, typer.Option(min=0, max=10_000_000, help="Simulated studies to judge the fit by; 0: none.")
+]
+
+
+@app.command()
+def percept(
+    *,
+    paper: PaperOption = "paper",
+    rates: RatesOption = None,
+    trials: TrialsOption = None,
+    gun: GunConfigOption = "gun",
+    spread: SpreadOption = 0.0,
+    studies: StudiesOption = 10_000,
+    seed: FixedSeedOption = 1,
+    out: Annotated[Path, typer.Option(help="Folder for fit.json, percept.toml, figures and report.")] = Path(
+        "results/fit"
+    ),
+    as_json: AsJsonOption = False,
+) -> None:
+    """The percept fitted to forward rates, what they cannot tell, and studies of it against what else is published."""
+    from analysis.predict.fit import percept as feature
+
+    request = feature.PerceptRequest(
+        paper=paper, rates=rates, trials=trials, gun=gun, spread=spread, studies=studies, seed=seed
+    )
+    found = feature.percept(request, out, progress)
+    text = "\n".join(map(in_text, feature.in_short(found)))
+    show(found, f"{text}\nReport: {out / 'report.html'}; for a config: {out / 'percept.toml'}", as_json)
+
+
+@app.command()
+def times(
+    logs: Annotated[list[Path], typer.Argument(metavar="LOGS...", help="Logs of experiment 1, or folders with logs.")],
+    *,
+    lapses: Annotated[
+        str, typer.Option(metavar="none|data|A-B", help="Lapses: none, over the times' range, or from A to B s.")
+    ] = "none",
+    bias: Annotated[bool, typer.Option("--bias/--no-bias", help="Fit the start, or hold it at one half.")] = True,
+    profile: Annotated[bool, typer.Option("--profile", help="Likelihood intervals as well; slower.")] = False,
+    out: Annotated[Path, typer.Option(help="Folder for fit.json, figure and report.")] = Path("results/fit-times"),
+    as_json: AsJsonOption = False,
+) -> None:
+    """The diffusion model (drift, boundary, start, non-decision time) fitted to people's own response times."""
+    from analysis.predict.fit import times as feature
+
+    request = feature.TimesRequest(paths=logs, lapses=lapses, bias=bias, profiled=profile)
+    found, problems = feature.times(request, out, tracked, progress)
+    missing = [*map(str, problems), *feature.left_out(found)]
+    for one in missing:
+        say(f"recoil: left out: {one}")
+    show(found, f"{in_text(feature.in_short(found))}\nReport: {out / 'report.html'}", as_json)
+    raise end(exceptions=bool(missing))
