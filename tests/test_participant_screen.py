@@ -204,10 +204,10 @@ def test_a_key_tells_the_direction_and_when_it_went_down(link, hands, console, m
 def test_a_key_before_the_onset_is_no_answer_but_one_before_the_question_stands_is(link, hands):
     question = replace(WHICH, onset_s=time.monotonic())
     hands.key("b")
-    before = link.ask_direction(question, PATIENCE_S)
+    before = link.ask_direction(question)
     time.sleep(2 * FAR_S)
     hands.key("f")
-    given = link.ask_direction(replace(question, onset_s=before.pressed_s + FAR_S), PATIENCE_S)
+    given = link.ask_direction(replace(question, onset_s=before.pressed_s + FAR_S))
     assert (before.response, given.response) == ("backward", "forward")
     assert given.pressed_s > before.pressed_s + FAR_S
 
