@@ -160,7 +160,7 @@ def ask(link, hands, console):
     def ask(question):
         show(link, "Please wait")
         how = link.ask_rating if isinstance(question, AskRating) else link.ask_description
-        return hands.changing(lambda: console.submit(how, question, PATIENCE_S))
+        return hands.changing(lambda: console.submit(how, question))
 
     return ask
 

@@ -62,7 +62,7 @@ def child():
 def test_a_rating_of_0_and_any_text_come_through(child):
     link = child("ready()\nfor word in words(): {'ask-rating': rate, 'ask-description': describe}[word['kind']](word)")
     assert link.wait_ready(PATIENCE_S).psychopy == "none"
-    rated, described = link.ask_rating(SCALE, PATIENCE_S), link.ask_description(WORDS, PATIENCE_S)
+    rated, described = link.ask_rating(SCALE, PATIENCE_S), link.ask_description(WORDS)
     assert rated == RatingGiven(rating=0.0, ask=rated.ask)
     assert described == DescriptionGiven(comment='"?"\n很', ask=described.ask)
     assert described.ask > rated.ask
@@ -78,14 +78,14 @@ def test_a_description_that_is_called_off_is_not_taken_for_the_next_one(child):
     link.wait_ready(PATIENCE_S)
     with while_asking(link, link.cancel), pytest.raises(ParticipantError, match="called off"):
         link.ask_description(WORDS)
-    assert link.ask_description(WORDS, PATIENCE_S).comment == WORDS.question
+    assert link.ask_description(WORDS).comment == WORDS.question
 
 
 def test_moments_are_mapped_there_and_back(child):
     link = child("ready()\nfor word in words(): direct(word)")
     link.wait_ready(PATIENCE_S)
     onset_s = time.monotonic()
-    given = link.ask_direction(AskDirection(**fields(WHICH) | {"onset_s": onset_s}), PATIENCE_S)
+    given = link.ask_direction(AskDirection(**fields(WHICH) | {"onset_s": onset_s}))
     assert given.response == "backward"
     assert given.pressed_s == pytest.approx(onset_s + 0.5, abs=1e-6)
     clocks = link.map_clocks()
@@ -100,7 +100,7 @@ def test_a_clock_that_is_set_in_mid_question_spoils_the_time_and_is_said(child):
     link = child("ready()\nfor word in words():\n    step_s = 3600.0\n    direct(word)")
     link.wait_ready(PATIENCE_S)
     with pytest.raises(ParticipantError, match=r"clock was set by (3599|3600)\.\d+ s.*'backward'"):
-        link.ask_direction(WHICH, PATIENCE_S)
+        link.ask_direction(WHICH)
 
 
 def test_a_screen_that_is_never_ready_is_not_waited_for_longer_than_said(child):
