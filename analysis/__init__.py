@@ -9,10 +9,12 @@ from importlib import import_module
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
-    from analysis.stats.anova import Anova, RepeatedMeasuresAnova, one_way_anova, rm_anova
-    from analysis.stats.binomial import BinomialTest, Detection, binomial_test, yes_no
-    from analysis.stats.tukey import (
+    from analysis.stats.anova import (
+        Anova,
         Comparison,
+        RepeatedMeasuresAnova,
+        one_way_anova,
+        rm_anova,
         rm_tukey_hsd,
         rm_tukey_hsd_paired,
         studentized_range_isf,
@@ -20,6 +22,7 @@ if TYPE_CHECKING:
         studentized_range_sf,
         tukey_hsd,
     )
+    from analysis.stats.binomial import BinomialTest, Detection, binomial_test, yes_no
 
 __all__ = [
     "Anova",
@@ -39,7 +42,7 @@ __all__ = [
     "yes_no",
 ]
 
-_MODULES = ("anova", "binomial", "tukey")
+_MODULES = ("anova", "binomial")
 
 
 def __getattr__(name: str) -> object:

@@ -26,8 +26,7 @@ from analysis import (
     studentized_range_sf,
     tukey_hsd,
 )
-from analysis.stats.diagnostics import normality, sphericity
-from analysis.stats.effect_sizes import effect_size
+from analysis.stats.diagnostics import effect_size, normality, sphericity
 from analysis.stats.paired import friedman, paired_t_tests
 from tests.golden.r import make_datasets
 

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from analysis.stats.anova import rm_anova
-from analysis.stats.effect_sizes import NO_ERROR_VARIANCE, TOO_LARGE, effect_size, partial_eta_squared_interval
+from analysis.stats.diagnostics import NO_ERROR_VARIANCE, TOO_LARGE, effect_size, partial_eta_squared_interval
 from tests.made_scores import RIGHT
 
 

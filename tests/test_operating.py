@@ -5,8 +5,8 @@ import pytest
 from scipy import stats
 
 from analysis import rm_tukey_hsd, rm_tukey_hsd_paired
+from analysis.stats.anova import pairs_of
 from analysis.stats.operating import ALPHA, POST_HOCS, box_epsilon, characteristics
-from analysis.stats.tukey import pairs_of
 
 DATA_SETS = 4_000
 

@@ -34,7 +34,7 @@ from analysis.predict.synthetic_studies import (
     preference_scores,
     ratings_on_scale,
 )
-from analysis.stats.tukey import rm_tukey_hsd
+from analysis.stats.anova import rm_tukey_hsd
 from experiments.design.streams import Stream, generator
 from experiments.direction.config import Rates
 from experiments.direction.session import make_plan

@@ -9,8 +9,7 @@ from hypothesis import strategies as st
 from scipy import stats
 
 from analysis import rm_anova, rm_tukey_hsd, rm_tukey_hsd_paired, tukey_hsd
-from analysis.stats.anova import check_scores
-from analysis.stats.tukey import own_pairs, pooled_pairs
+from analysis.stats.anova import check_scores, own_pairs, pooled_pairs
 from tests.exact import digits, exact_squared_group_q, exact_squared_q
 
 METHODS = ("vibration", "asymmetric-1", "asymmetric-2")

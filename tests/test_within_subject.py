@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from scipy import stats
 
-from analysis.stats.effect_sizes import cousineau_morey
+from analysis.stats.diagnostics import cousineau_morey
 
 
 def test_of_two_conditions_the_interval_is_that_of_the_paired_difference_over_root_two() -> None:

@@ -12,9 +12,8 @@ from numpy.typing import ArrayLike, NDArray
 from scipy import special
 
 from analysis.paper.paper import PublishedDirection, PublishedExperiment, PublishedTukeyTest
-from analysis.stats.anova import check_scores, rm_anova
+from analysis.stats.anova import PairStatistics, check_scores, pairs_of, pooled_pairs, rm_anova, studentized_range_isf
 from analysis.stats.binomial import binomial_test
-from analysis.stats.tukey import PairStatistics, pairs_of, pooled_pairs, studentized_range_isf
 
 WHOLE_PATTERN = "whole pattern"
 SIGNIFICANT = 0.05

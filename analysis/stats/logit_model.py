@@ -10,9 +10,9 @@ import numpy as np
 from numpy.typing import ArrayLike
 from scipy import special
 
+from analysis.stats.anova import Label, pairs_of
 from analysis.stats.arrays import FloatArray, by_row, numbers, share
 from analysis.stats.paired import holm
-from analysis.stats.tukey import Label, pairs_of
 
 METHOD = (
     "Clustering: the intraclass correlation is the analysis-of-variance estimate for binary answers (Ridout, Demétrio "

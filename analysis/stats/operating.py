@@ -13,8 +13,8 @@ from dataclasses import dataclass
 import numpy as np
 from scipy import special
 
+from analysis.stats.anova import PairStatistics, own_pairs, pairs_of, pooled_pairs, studentized_range_isf
 from analysis.stats.arrays import FloatArray
-from analysis.stats.tukey import PairStatistics, own_pairs, pairs_of, pooled_pairs, studentized_range_isf
 
 ALPHA = 0.05
 STUDY_SIZE = 14

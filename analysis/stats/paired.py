@@ -11,9 +11,8 @@ import numpy as np
 from numpy.typing import ArrayLike
 from scipy import special, stats
 
-from analysis.stats.anova import check_scores
+from analysis.stats.anova import Label, check_scores, own_pairs, pairs_of
 from analysis.stats.arrays import FloatArray, by_row, numbers, pingouin, share
-from analysis.stats.tukey import Label, own_pairs, pairs_of
 
 SCALE = math.sqrt(2.0) / 2.0
 """Scale r of the Cauchy prior on the standardised difference: "medium" in JASP and R's BayesFactor."""

@@ -18,8 +18,7 @@ from analysis.logs.exclusions import KeptTrials, LeftOut
 from analysis.report import apa
 from analysis.report.serial import OPTIONAL, beside, plain
 from analysis.stats.cells import ByParticipant
-from analysis.stats.diagnostics import Normality, Sphericity
-from analysis.stats.effect_sizes import EffectSize
+from analysis.stats.diagnostics import EffectSize, Normality, Sphericity
 from analysis.stats.logit_model import Clustering, LogitModel
 from analysis.stats.paired import PairedT, SignedRanks
 from analysis.summary.remarks_coding import CodedRemarks

@@ -17,12 +17,22 @@ import pandas as pd
 from analysis.logs.exclusions import LeftOut, complete_rows
 from analysis.logs.reading import Logs
 from analysis.report.serial import undefined
-from analysis.stats.anova import rm_anova
+from analysis.stats.anova import Comparison, rm_anova, rm_tukey_hsd, rm_tukey_hsd_paired
 from analysis.stats.arrays import FloatArray
 from analysis.stats.binomial import binomial_test, yes_no
 from analysis.stats.cells import ByParticipant, TrialCells, coded, trial_cells
-from analysis.stats.diagnostics import NORMALITY_NOTE, OUTLIER_RULE, ends, normality, outliers, sphericity, unit_scaled
-from analysis.stats.effect_sizes import EFFECT_SIZE_NOTE, cousineau_morey, effect_size
+from analysis.stats.diagnostics import (
+    EFFECT_SIZE_NOTE,
+    NORMALITY_NOTE,
+    OUTLIER_RULE,
+    cousineau_morey,
+    effect_size,
+    ends,
+    normality,
+    outliers,
+    sphericity,
+    unit_scaled,
+)
 from analysis.stats.logit_model import METHOD as CLUSTERING_NOTE
 from analysis.stats.logit_model import MODEL_NAME, MODEL_NOTE, LogitModel, clustering, logit_model
 from analysis.stats.paired import (
@@ -35,7 +45,6 @@ from analysis.stats.paired import (
     paired_t_tests,
     signed_rank_tests,
 )
-from analysis.stats.tukey import Comparison, rm_tukey_hsd, rm_tukey_hsd_paired
 from analysis.summary.assumptions import assumptions
 from analysis.summary.results import (
     AnovaTest,

@@ -23,7 +23,7 @@ from analysis.times.likelihood import (
 )
 from analysis.times.trade import ez_from_summary
 
-ALPHA = 1.0 - 0.95
+BEYOND_INTERVAL = 1.0 - 0.95
 """Of all intervals."""
 EDGE = 1e-4
 """A share of lapses below this counts as none: its logit has no curvature left to take an interval from."""
@@ -108,7 +108,9 @@ def fit(
     covariance, unidentified = _covariance(model, peak.at, by_person=by_person)
     if not peak.converged:
         covariance = np.full_like(covariance, math.nan)
-    critical = -float(special.stdtrit(people - 1, ALPHA / 2.0) if people else special.ndtri(ALPHA / 2.0))
+    critical = -float(
+        special.stdtrit(people - 1, BEYOND_INTERVAL / 2.0) if people else special.ndtri(BEYOND_INTERVAL / 2.0)
+    )
     return DiffusionFit(
         estimates=_estimates(model, peak.at, np.sqrt(np.diag(covariance)), critical),
         log_likelihood=peak.value,
@@ -249,7 +251,7 @@ def profile(trials: Trials, name: str, *, bias: bool = True, lapses: bool | Laps
     share of lapses that may as well be none. `KeyError`: no such parameter.
     Source: Venzon & Moolgavkar 1988, Appl. Stat. 37, 87.
     """
-    fall = float(special.chdtri(1, ALPHA)) / 2.0
+    fall = float(special.chdtri(1, BEYOND_INTERVAL)) / 2.0
     model = model_of(trials, bias=bias, lapses=lapses)
     if name not in model.names:
         raise KeyError(name)

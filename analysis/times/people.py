@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike
 from scipy import special
 
 from analysis.stats.arrays import FloatArray
-from analysis.times.fit import ALPHA, DiffusionFit, fit
+from analysis.times.fit import BEYOND_INTERVAL, DiffusionFit, fit
 from analysis.times.likelihood import LapseRange, Trials, trials_of
 from analysis.times.own_trials import OwnTrials, ordered, quantiles
 
@@ -65,7 +65,7 @@ def fit_people(
     whole = [one.reason is None and tuple(e.name for e in one.estimates) == names for one in fits]
     kept = [one for one, good in zip(fits, whole, strict=True) if good]
     return PeopleFit(
-        means=tuple(mean_estimate(name, [one[name].value for one in kept], ALPHA) for name in names),
+        means=tuple(mean_estimate(name, [one[name].value for one in kept], BEYOND_INTERVAL) for name in names),
         fits=tuple(fits),
         left_out=tuple(place for place, good in enumerate(whole) if not good),
     )

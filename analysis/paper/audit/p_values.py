@@ -27,7 +27,7 @@ from analysis.paper.audit.printed import (
     listed,
     read_printed,
 )
-from analysis.stats.tukey import studentized_range_sf
+from analysis.stats.anova import studentized_range_sf
 
 Statistic = Literal["t", "F", "chi2", "r", "z", "Q", "q"]
 Sides = Literal["two-sided", "one-sided"]

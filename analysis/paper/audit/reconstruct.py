@@ -42,7 +42,7 @@ from analysis.paper.audit.printed import Interval, Rounding, read_printed
 _DRAW_STEPS, _EXACT = 3_000, 6
 
 
-def drawn(total: int, around: list[float], sd: float, top: int, random: Random) -> list[int]:
+def _drawn(total: int, around: list[float], sd: float, top: int, random: Random) -> list[int]:
     """Numbers near `around` by a normal spread, then moved by ones until they have the sum."""
     values = [min(max(round(random.gauss(centre, sd)), 0), top) for centre in around]
     step = 1 if sum(values) < total else -1
@@ -59,7 +59,7 @@ def with_squares(n: int, total: int, squares: range, top: int, random: Random) -
     wanted = range(max(squares.start, least + (squares.start - least) % 2), min(squares.stop, most + 1), squares.step)
     if not wanted:
         return None
-    values = drawn(total, [total / n] * n, max((wanted[-1] - total * total / n) / n, 0.01) ** 0.5, top, random)
+    values = _drawn(total, [total / n] * n, max((wanted[-1] - total * total / n) / n, 0.01) ** 0.5, top, random)
     return values if _walked(values, wanted, top, random) else _exact(n, total, wanted, top, random)
 
 
@@ -291,7 +291,7 @@ def _searched(wanted: Constraints, sums: ColumnSums, random: Random) -> Rows | N
             around = [total / wanted.n + person for person in people]
             share = total / wanted.n / max(wanted.top, 1)
             binomial = (wanted.top * share * (1 - share)) ** 0.5
-            columns.append(drawn(total, around, sd or binomial, wanted.top, random))
+            columns.append(_drawn(total, around, sd or binomial, wanted.top, random))
             continue
         values = with_squares(wanted.n, total, _squares(wanted, total, column.variance), wanted.top, random)
         if values is None:
