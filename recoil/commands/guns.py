@@ -8,16 +8,7 @@ from typing import Annotated, Any
 
 import typer
 
-from analysis.report.terminal import (
-    AsJsonOption,
-    FixedSeedOption,
-    GunConfigOption,
-    end,
-    in_text,
-    progress,
-    say,
-    show,
-)
+from analysis.report.terminal import AsJsonOption, FixedSeedOption, GunConfigOption, end, in_text, progress, say, show
 
 MethodOption = Annotated[str | None, typer.Option(help="Rendering method of the gun.")]
 ChangesOption = Annotated[list[str] | None, typer.Option("--set", metavar="KEY=VALUE", help="Change a parameter.")]

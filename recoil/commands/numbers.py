@@ -8,15 +8,7 @@ from typing import Annotated
 
 import typer
 
-from analysis.report.terminal import (
-    AsJsonOption,
-    FixedSeedOption,
-    end,
-    progress,
-    say,
-    show,
-    tracked,
-)
+from analysis.report.terminal import AsJsonOption, FixedSeedOption, end, progress, say, show, tracked
 
 
 class ObserverName(StrEnum):

@@ -9,13 +9,7 @@ from typing import Annotated
 
 import typer
 
-from analysis.report.terminal import (
-    AsJsonOption,
-    SeedOption,
-    end,
-    say,
-    show,
-)
+from analysis.report.terminal import AsJsonOption, SeedOption, end, say, show
 
 
 class ScreenChoice(StrEnum):

@@ -16,16 +16,7 @@ from matplotlib.patches import Patch
 
 from analysis.predict.design_search.choice import Designs
 from analysis.predict.design_search.results import DesignSearch, DrivePrediction
-from analysis.report.figures.style import (
-    BLACK,
-    BLUE,
-    INK,
-    METHOD_LINES,
-    ORANGE,
-    VERMILION,
-    drawn,
-    light_grid,
-)
+from analysis.report.figures.style import BLACK, BLUE, INK, METHOD_LINES, ORANGE, VERMILION, drawn, light_grid
 from analysis.stats.arrays import FloatArray
 
 BOTH = "both directions alike"

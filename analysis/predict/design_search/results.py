@@ -21,15 +21,7 @@ from analysis.predict.design_search.choice import (
 from analysis.predict.design_search.space import Layer, Space
 from analysis.predict.fit.percept_model import PAPER_TRIALS, Fitted, PerceptFit, predicted_rate
 from analysis.stats.arrays import FloatArray
-from device.limits import (
-    MAX_COIL_C,
-    MAX_DUTY,
-    MAX_SHOTS_PER_MINUTE,
-    TRAIN_LIMITS,
-    broken_limit,
-    load_of,
-    steady_coil_C,
-)
+from device.limits import MAX_COIL_C, MAX_DUTY, MAX_SHOTS_PER_MINUTE, TRAIN_LIMITS, broken_limit, load_of, steady_coil_C
 from device.parameters import GunParameters
 from device.physics import simulate
 from device.physics.equations import STATUSES

@@ -17,13 +17,7 @@ from analysis.report.section import Section
 from analysis.report.serial import OPTIONAL, as_csv
 from device.parameters import GunParameters
 from device.physics import ShotSummary, simulate, trace
-from device.physics.hand import (
-    Collision,
-    HandMechanics,
-    compliant_collision,
-    rigid_collision,
-    simulate_held,
-)
+from device.physics.hand import Collision, HandMechanics, compliant_collision, rigid_collision, simulate_held
 from device.physics.traces import EnergyBalance
 from device.vibration import Vibration, VibrationParameters, solved, waveform
 from experiments.config.door import ConfigError

@@ -11,17 +11,7 @@ import numpy as np
 from matplotlib.axes import Axes
 from numpy.typing import NDArray
 
-from analysis.report.figures.style import (
-    BLACK,
-    BLUE,
-    GREEN,
-    INK,
-    PURPLE,
-    VERMILION,
-    drawn,
-    light_grid,
-    reference_line,
-)
+from analysis.report.figures.style import BLACK, BLUE, GREEN, INK, PURPLE, VERMILION, drawn, light_grid, reference_line
 
 STAGES = ("recoil", "bullet firing", "resetting", "ready")
 _WIDE = 200.0  # the longest shot in ends of its first stage, from which on time is shown logarithmic
