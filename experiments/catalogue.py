@@ -10,7 +10,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from experiments.config.models import ExperimentConfig
+from experiments.config.door import ExperimentConfig
 from experiments.config.setup import Setup
 from experiments.design.plan import Plan
 from experiments.direction import synthetic as direction_synthetic

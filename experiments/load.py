@@ -15,8 +15,7 @@ from device.methods import drive_of, rendering_of
 from device.parameters import GunParameters
 from device.words import Drive
 from experiments.catalogue import CATALOGUE
-from experiments.config.door import ConfigError, checked, load, read_toml
-from experiments.config.models import ExperimentConfig, StudyConfig
+from experiments.config.door import ConfigError, ExperimentConfig, StudyConfig, checked, load, read_toml
 from experiments.config.setup import GunConfig, Setup
 from experiments.preference.config import PreferenceConfig
 

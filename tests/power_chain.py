@@ -14,7 +14,7 @@ from analysis.predict.power.grid import PowerRequest, make_grid
 from analysis.predict.power.planned import ANOVA, ANY_PAIR, Findings, analysed_directions, analysed_ratings
 from analysis.summary.summary import summarize
 from experiments.clock import VirtualClock
-from experiments.config.models import participant_codes
+from experiments.config.door import participant_codes
 from experiments.config.setup import Setup
 from experiments.load import load_setup
 from experiments.run import RunRequest, run

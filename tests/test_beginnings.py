@@ -12,7 +12,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from experiments.clock import VirtualClock
-from experiments.config.models import EligibilityConfig
+from experiments.config.door import EligibilityConfig
 from experiments.record.journal import JournalError, hold_journal
 from experiments.run import RunRequest, run
 from experiments.screens.synthetic import synthetic_screen

@@ -5,7 +5,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from pydantic import ValidationError
 
-from experiments.config.models import StudyConfig, leaves, participant_codes
+from experiments.config.door import StudyConfig, leaves, participant_codes
 from experiments.direction.config import Design, DirectionConfig
 from experiments.load import load_setup, load_study, shipped_folder
 from experiments.preference.config import PreferenceConfig

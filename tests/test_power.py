@@ -19,8 +19,7 @@ from analysis.predict.power import run as feature
 from analysis.predict.power.grid import PowerRequest, make_grid
 from analysis.predict.power.planned import ALL_PAIRS, ANOVA
 from analysis.report.serial import plain
-from experiments.config.door import ConfigError
-from experiments.config.models import leaves
+from experiments.config.door import ConfigError, leaves
 from experiments.load import load_setup, shipped_folder
 from tests.conftest import RECOIL, Recoil
 from tests.power_files import files

@@ -13,8 +13,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from experiments.clock import VirtualClock
-from experiments.config.door import ConfigError
-from experiments.config.models import EligibilityConfig, Handedness, Sex, StudyConfig
+from experiments.config.door import ConfigError, EligibilityConfig, Handedness, Sex, StudyConfig
 from experiments.config.setup import Setup
 from experiments.design.plan import Plan
 from experiments.load import load_setup, load_study, shipped_folder

@@ -38,8 +38,7 @@ from analysis.logs.texts import STUDY
 from analysis.stats.arrays import BoolArray
 from analysis.stats.cells import codes_of, places_among
 from analysis.times.own_trials import timed
-from experiments.config.door import Model
-from experiments.config.models import Seconds, Share
+from experiments.config.door import Model, Seconds, Share
 
 _MEASURES = {"direction": ("correct", "trials unanswered"), "preference": ("rating", "ratings missing")}
 

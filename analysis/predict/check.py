@@ -15,8 +15,7 @@ from device.parameters import GunParameters
 from device.physics import simulate
 from device.words import MAX_PULSE_S, MAX_VOLTAGE_V, Pulse
 from experiments import catalogue
-from experiments.config.door import Model, read_toml
-from experiments.config.models import EligibilityConfig, participant_codes
+from experiments.config.door import EligibilityConfig, Model, participant_codes, read_toml
 from experiments.config.setup import Setup
 from experiments.design.plan import next_row
 from experiments.direction.config import Design, DirectionConfig

@@ -14,8 +14,7 @@ from pydantic import Field, PrivateAttr, model_validator
 
 from device.methods import Method
 from device.parameters import GunParameters, VibrationParameters, damper_friction
-from experiments.config.door import Model
-from experiments.config.models import ExperimentConfig, Text
+from experiments.config.door import ExperimentConfig, Model, Text
 
 Numbers = dict[str, object]
 """A table for one of the device's parameter types, which say what may stand in it."""

@@ -8,7 +8,7 @@ from dataclasses import asdict, dataclass
 from pydantic import TypeAdapter
 
 from device.words import Direction
-from experiments.config.models import Order
+from experiments.config.door import Order
 from experiments.config.setup import sha256, without_blank_instruction
 from experiments.design.streams import Stream
 

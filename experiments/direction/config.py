@@ -6,12 +6,12 @@ from typing import Annotated, Literal, Self
 
 from pydantic import AfterValidator, Field, model_validator
 
-from experiments.config.door import Model
-from experiments.config.models import (
+from experiments.config.door import (
     Count,
     ExperimentConfig,
     InnerShare,
     Methods,
+    Model,
     Order,
     Seconds,
     Spread,

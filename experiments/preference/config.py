@@ -7,11 +7,11 @@ from typing import Annotated, Literal, Self
 from pydantic import Field, model_validator
 
 from device.words import Direction
-from experiments.config.door import Model
-from experiments.config.models import (
+from experiments.config.door import (
     Count,
     ExperimentConfig,
     Methods,
+    Model,
     Order,
     Seconds,
     Share,

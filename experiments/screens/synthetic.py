@@ -7,8 +7,7 @@ from typing import Any
 from device import GunStatus
 from experiments import catalogue
 from experiments.clock import Clock
-from experiments.config.door import ConfigError
-from experiments.config.models import ExperimentConfig
+from experiments.config.door import ConfigError, ExperimentConfig
 from experiments.config.setup import Setup
 from experiments.design.plan import Plan
 from experiments.live_run import LiveRun

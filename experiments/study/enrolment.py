@@ -10,7 +10,7 @@ from typing import get_args
 from pydantic import ValidationError
 
 from experiments.clock import Clock
-from experiments.config.models import EligibilityConfig, Fact
+from experiments.config.door import EligibilityConfig, Fact
 from experiments.record.journal import JournalError
 from experiments.study import folders, register
 from experiments.study.folders import PlaceError, StudyFolder, look_at

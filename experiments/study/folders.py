@@ -16,7 +16,7 @@ from typing import Any
 
 from device.words import RecoilError
 from experiments import catalogue
-from experiments.config.models import CODE, StudyConfig
+from experiments.config.door import CODE, StudyConfig
 from experiments.config.setup import Setup
 from experiments.design import plan
 from experiments.load import load_setup, load_study

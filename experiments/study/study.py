@@ -8,8 +8,7 @@ from dataclasses import dataclass
 from itertools import count
 from typing import Literal, get_args
 
-from experiments.config.door import Model
-from experiments.config.models import AgeYears, EligibilityConfig, Fact, Handedness, Sex, StudyConfig
+from experiments.config.door import AgeYears, EligibilityConfig, Fact, Handedness, Model, Sex, StudyConfig
 
 RunState = Literal["done", "in progress", "open elsewhere", "not begun", "unreadable"]
 """How a run stands; `open elsewhere`: another process is carrying it out at this moment."""

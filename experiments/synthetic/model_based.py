@@ -9,8 +9,7 @@ from typing import Annotated, Self
 from pydantic import Field, model_validator
 
 from device.words import DIRECTIONS
-from experiments.config.door import Model
-from experiments.config.models import Share
+from experiments.config.door import Model, Share
 from experiments.design.plan import Plan, Trial
 from experiments.design.streams import Stream
 from experiments.synthetic.diffusion import Decision, Diffusion, Lapses, People, decide, person

@@ -29,8 +29,7 @@ from pydantic import Field
 
 from device.methods import Method
 from device.parameters import GunParameters
-from experiments.config.door import Model
-from experiments.config.models import InnerShare
+from experiments.config.door import InnerShare, Model
 from experiments.synthetic.diffusion import Diffusion, Floats, Lapses, People, upper_probabilities
 
 if TYPE_CHECKING:

@@ -19,8 +19,7 @@ from typing import Annotated
 
 from pydantic import Field
 
-from experiments.config.door import Model
-from experiments.config.models import Spread
+from experiments.config.door import Model, Spread
 from experiments.design.streams import Stream
 from experiments.session.steps import Scale, on_scale
 

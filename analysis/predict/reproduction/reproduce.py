@@ -39,8 +39,7 @@ from analysis.summary.summary import summarize
 from device.parameters import GunParameters
 from experiments.catalogue import CATALOGUE, rebuild
 from experiments.clock import VirtualClock
-from experiments.config.door import ConfigError
-from experiments.config.models import StudyConfig
+from experiments.config.door import ConfigError, StudyConfig
 from experiments.config.setup import Setup, sha256
 from experiments.direction.config import DirectionConfig
 from experiments.load import load_setup, load_study

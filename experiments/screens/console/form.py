@@ -10,7 +10,7 @@ from PyQt6 import QtWidgets
 from PyQt6.QtCore import Qt, pyqtSignal
 from PyQt6.QtGui import QGuiApplication, QScreen
 
-from experiments.config.models import Fact, Handedness, Sex
+from experiments.config.door import Fact, Handedness, Sex
 from experiments.run import ParticipantOptions
 from experiments.screens.console import widgets
 from experiments.screens.console.people import cell_text, note_text
