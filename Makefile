@@ -1,5 +1,5 @@
 # Two commands for a fresh machine: `make reproduce` and `make test`. Both set up what they need.
-.PHONY: setup full reproduce test soak lock reference clean
+.PHONY: setup full reproduce test quick soak lock reference clean
 
 setup: .venv/.ready
 
@@ -18,6 +18,10 @@ reproduce: setup
 test: full
 	scripts/system-packages
 	scripts/test
+
+# What a developer runs every few minutes: all but the tests that are marked slow
+quick: full
+	scripts/test -m "not soak and not slow"
 
 # The full figures of every promise, kept as tables under results/soak/
 soak: full
