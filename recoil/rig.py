@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, fields, replace
 from pathlib import Path
-from typing import Any, Literal
+from typing import Literal
 
 from analysis.report.section import Section, Table
 from analysis.report.serial import as_json
@@ -36,7 +36,15 @@ class TwinRequest:
     seed: int
 
 
-def serve(asked: TwinRequest, tell: Callable[[dict[str, Any]], None]) -> None:
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Plugged:
+    """A twin that can be opened: where, and the `--gun` that opens it."""
+
+    address: str
+    gun: str
+
+
+def serve(asked: TwinRequest, tell: Callable[[Plugged], None]) -> None:
     """Be a gun until interrupted. `tell` is called once it can be opened. `PlaceError`: it cannot be so."""
     gun = load_gun(find(asked.gun))
     methods = {name: gun.rendering(name) for name in gun.methods}
@@ -47,7 +55,7 @@ def serve(asked: TwinRequest, tell: Callable[[dict[str, Any]], None]) -> None:
     except (OSError, ImportError, AttributeError) as error:  # the latter two: a system without pseudo-terminals
         raise PlaceError(f"the twin cannot be plugged in here: {error}; try --tcp PORT, or another --link") from error
     try:
-        tell({"address": socket.address, "gun": _gun_option(socket.address, asked.speed)})
+        tell(Plugged(address=socket.address, gun=_gun_option(socket.address, asked.speed)))
         twin.serve()
     finally:
         socket.unplug()

@@ -143,3 +143,43 @@ def test_an_exception_excuses_its_own_modules_alone() -> None:
     assert shared.covers("check", ["experiments/check.py", "recoil/commands/sessions.py"])
     assert not shared.covers("check", ["experiments/check.py", "analysis/rules.py", "recoil/commands/sessions.py"])
     assert not shared.covers("checks", ["experiments/check.py", "recoil/commands/sessions.py"])
+
+
+SPREAD_OUT = ("experiments/config/door.py", "analysis/report/serial.py")
+"""The door, where tables come in, and the serialiser, where results go out."""
+
+
+def loose(source: str) -> list[str]:
+    """The functions whose signature has a dict of anything; `to_dict` gives one to a notebook and does it by name."""
+    functions = [node for node in ast.walk(ast.parse(source)) if isinstance(node, ast.FunctionDef)]
+    return [
+        node.name
+        for node in functions
+        if node.name != "to_dict" and any("dict[str, Any]" in ast.unparse(one) for one in annotations(node))
+    ]
+
+
+def annotations(node: ast.FunctionDef) -> Iterator[ast.expr]:
+    given = [*node.args.posonlyargs, *node.args.args, *node.args.kwonlyargs, node.args.vararg, node.args.kwarg]
+    yield from (one.annotation for one in given if one is not None and one.annotation is not None)
+    if node.returns is not None:
+        yield node.returns
+
+
+def test_results_have_types_between_the_door_and_the_serialiser() -> None:
+    found = {
+        name: functions
+        for path in modules()
+        if (name := str(path.relative_to(ROOT))) not in SPREAD_OUT
+        and (functions := loose(path.read_text(encoding="utf-8")))
+    }
+    assert found == {}
+
+
+@pytest.mark.parametrize(
+    "signature",
+    ["(a: dict[str, Any]): ...", "() -> list[dict[str, Any]]: ...", "(*, a: Callable[[dict[str, Any]], None]): ..."],
+)
+def test_a_signature_with_a_dict_of_anything_is_seen(signature: str) -> None:
+    assert loose(f"def name{signature}") == ["name"]
+    assert loose(f"class Room:\n    def name{signature}") == ["name"]

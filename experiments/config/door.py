@@ -70,14 +70,6 @@ def checked(model: type[SomeModel], table: dict[str, Any], path: Path) -> SomeMo
         raise ConfigError(_findings(error, path, read_text(path))) from error
 
 
-def parsed(model: type[SomeModel], text: str, source: str) -> SomeModel:
-    """A TOML text as what it means; `source` is what messages call it."""
-    try:
-        return _validated(model, tables(text, source))
-    except ValidationError as error:
-        raise ConfigError(_findings(error, source, text)) from error
-
-
 def _validated(model: type[SomeModel], table: dict[str, Any]) -> SomeModel:
     """By way of JSON: types stay strict, while TOML's arrays may become tuples."""
     return model.model_validate_json(json.dumps(table, default=_no_json))

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import sys
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated
 
 import typer
 
@@ -90,8 +90,8 @@ def twin(
         gun=gun, link=link, tcp=tcp, speed=speed, drift_ppm=drift_ppm, wire=wire, troubles=trouble or [], seed=seed
     )
 
-    def tell(found: dict[str, Any]) -> None:
-        show(found, f"{found['address']}\nTry: recoil doctor --gun {found['gun']}", as_json)
+    def tell(plugged: feature.Plugged) -> None:
+        show(plugged, f"{plugged.address}\nTry: recoil doctor --gun {plugged.gun}", as_json)
         sys.stdout.flush()
 
     feature.serve(asked, tell)

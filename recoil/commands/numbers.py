@@ -95,5 +95,5 @@ def audit(
 
     audited = feature.audit_file(paper)
     feature.write(audited, out)
-    show(audited.as_json(), f"{audited.as_text()}\n\nReport: {out / 'report.html'}", as_json)
+    show(audited.record, f"{audited.as_text()}\n\nReport: {out / 'report.html'}", as_json)
     raise end(exceptions=audited.exceptions)

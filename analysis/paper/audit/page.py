@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
 from fractions import Fraction
 from math import sqrt
 from types import MappingProxyType
-from typing import Any, cast, get_args
+from typing import cast, get_args
 
 from analysis.paper.audit.claims import AuditFinding
 from analysis.paper.audit.printed import ROUNDINGS, AuditVerdict, CheckResult, PrintedNumber, decimal, read_printed
@@ -101,36 +102,63 @@ def _proof(result: CheckResult) -> Iterator[str]:
     yield from (f"{name} {value}" for name, value in result.numbers)
 
 
-def findings_json(findings: Sequence[AuditFinding]) -> list[dict[str, Any]]:
-    """Every finding with all of its proof, fractions exact as text beside their decimal value."""
-    return [_finding(finding) for finding in findings]
+@dataclass(frozen=True)
+class Exact:
+    """A fraction, exact as text, and its decimal value."""
+
+    exact: str
+    value: float
 
 
-def _finding(finding: AuditFinding) -> dict[str, Any]:
+@dataclass(frozen=True)
+class FindingEntry:
+    """A finding with all of its proof, as it stands in `audit.json`."""
+
+    place: str
+    quote: str
+    note: str
+    check: str
+    printed: str
+    verdict: AuditVerdict
+    sentences: tuple[str, str]
+    reason: str
+    step: Exact | None
+    below: Exact | None
+    above: Exact | None
+    readings: tuple[str, ...]
+    tried: tuple[str, ...]
+    contradicts: tuple[str, ...]
+    numbers: Mapping[str, str]
+    data: tuple[tuple[str, ...], ...]
+    source: str
+
+
+def entry(finding: AuditFinding) -> FindingEntry:
+    """What `audit.json` says of a finding."""
     result = finding.result
-    return {
-        "place": finding.place,
-        "quote": finding.quote,
-        "note": finding.note,
-        "check": result.check,
-        "printed": result.printed,
-        "verdict": result.verdict,
-        "sentences": list(sentences(finding)),
-        "reason": result.reason,
-        "step": _exact(result.step),
-        "below": _exact(result.below),
-        "above": _exact(result.above),
-        "readings": list(result.readings),
-        "tried": list(result.tried),
-        "contradicts": list(result.contradicts),
-        "numbers": dict(result.numbers),
-        "data": [[str(value) for value in row] for row in result.witness],
-        "source": result.source,
-    }
+    return FindingEntry(
+        place=finding.place,
+        quote=finding.quote,
+        note=finding.note,
+        check=result.check,
+        printed=result.printed,
+        verdict=result.verdict,
+        sentences=sentences(finding),
+        reason=result.reason,
+        step=_exact(result.step),
+        below=_exact(result.below),
+        above=_exact(result.above),
+        readings=tuple(result.readings),
+        tried=tuple(result.tried),
+        contradicts=tuple(result.contradicts),
+        numbers=dict(result.numbers),
+        data=tuple(tuple(str(value) for value in row) for row in result.witness),
+        source=result.source,
+    )
 
 
-def _exact(value: Fraction | None) -> dict[str, str | float] | None:
-    return None if value is None else {"exact": str(value), "value": float(value)}
+def _exact(value: Fraction | None) -> Exact | None:
+    return None if value is None else Exact(str(value), float(value))
 
 
 def findings_text(findings: Sequence[AuditFinding]) -> str:

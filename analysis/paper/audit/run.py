@@ -39,10 +39,9 @@ own comparison that it is about. `[participants]`, `[direction]` and `[preferenc
 
 from __future__ import annotations
 
-import json
+from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
 
 from pydantic import Field
 
@@ -54,9 +53,10 @@ from analysis.paper.audit.claims import (
     participants_claims,
     preference_claims,
 )
-from analysis.paper.audit.page import counts, findings_json, findings_text, sections
+from analysis.paper.audit.page import FindingEntry, counts, entry, findings_text, sections
 from analysis.paper.paper import PaperHead, Participants, PublishedDirection, PublishedPreference
 from analysis.report.page import write_page
+from analysis.report.serial import as_json
 from experiments.config.door import ConfigError, Model, load
 from experiments.config.setup import sha256
 from experiments.load import find
@@ -108,6 +108,16 @@ def load_paper_file(path: str | Path) -> PaperFile:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
+class AuditRecord:
+    """The content of `audit.json`."""
+
+    paper: PaperHead
+    verdicts: Mapping[str, int]
+    findings: tuple[FindingEntry, ...]
+    versions: Mapping[str, str]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
 class Audited:
     """A paper with what was found of its numbers."""
 
@@ -120,14 +130,15 @@ class Audited:
         """Is any number not attainable?"""
         return any(finding.result.verdict == "not attainable" for finding in self.findings)
 
-    def as_json(self) -> dict[str, Any]:
-        """All of it as plain JSON values."""
-        return {
-            "paper": self.paper.paper.model_dump(),
-            "verdicts": counts(self.findings),
-            "findings": findings_json(self.findings),
-            "versions": {"file": self.source.name, "sha256": self._sha256, **provenance()},
-        }
+    @property
+    def record(self) -> AuditRecord:
+        """All of it, as it is written."""
+        return AuditRecord(
+            paper=self.paper.paper,
+            verdicts=counts(self.findings),
+            findings=tuple(entry(finding) for finding in self.findings),
+            versions={"file": self.source.name, "sha256": self._sha256, **provenance()},
+        )
 
     def as_text(self) -> str:
         """The terminal's table."""
@@ -162,7 +173,6 @@ def audit_file(name: str) -> Audited:
 def write(audited: Audited, out: Path) -> None:
     """Write `audit.json`, `report.html` and `report.md` into `out`."""
     storage.make_folder(out)
-    text = json.dumps(audited.as_json(), indent=1, ensure_ascii=False) + "\n"
-    storage.write_whole(out / "audit.json", text.encode())
+    storage.write_whole(out / "audit.json", as_json(audited.record))
     title = f"Audit: {audited.paper.paper.title or audited.source.stem}"
     write_page(out, title, sections(audited.findings, audited.origin))
