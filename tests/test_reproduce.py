@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import shutil
 import subprocess
-from functools import partial
+import sys
 from pathlib import Path
 
 import numpy as np
@@ -21,6 +21,8 @@ from tests.reproduced import EXPERIMENTS, scores, statistics
 from tests.waiting import PATIENCE_S, wait_for
 from tests.warm_start import warm
 
+RECOIL = Path(sys.executable).with_name("recoil")
+"""The program itself: when it is killed it is gone at once."""
 METHODS = ["vibration", "asymmetric-1", "asymmetric-2"]
 
 
@@ -110,59 +112,67 @@ def test_the_tables_of_reconstructed_answers_seat_the_same_people_again(reproduc
         drawn = next(f'observer = "{word}"' for word in ("rates", "ratings") if f'observer = "{word}"' in text)
         config.write_text(text.replace(drawn, f'observer = "table"\ntable = "{table}"'), encoding="utf-8")
         (tmp_path / table).write_bytes((reproduction / table).read_bytes())
-    words = warm("reproduce", "--study", tmp_path / "study.toml", "--out", tmp_path / "out")
-    subprocess.run(words, check=True, capture_output=True)
-    ours = statistics(reproduction)
-    assert {name: statistics(tmp_path / "out")[name]["anova"] for name in EXPERIMENTS} == {
-        name: ours[name]["anova"] for name in EXPERIMENTS
-    }
+        run = (
+            "run",
+            config,
+            "--participant",
+            "P03",
+            "--screen",
+            "synthetic",
+            "--results",
+            tmp_path / "logs",
+        )
+        subprocess.run(warm(*run), check=True, capture_output=True)
+        there = scores(reproduction, name)
+        there = there[there.participant_id == "P03"].set_index("method").score
+        assert scores(tmp_path, name).set_index("method").score.to_dict() == there.to_dict()
 
 
 def test_participants_drawn_by_the_configs_stay_an_option() -> None:
     """Loaded, not run: they are the setups of the configs themselves."""
-    study = reproduce.prepared("study", 1, "rates")
+    study, other = (reproduce.prepared("study", seed, observer) for seed, observer in ((1, "rates"), (2, None)))
     assert study.answering == study.setups
     assert "other participants were asked for" in study.notes[0]
-    assert reproduce.prepared("study", 1).manifest() == reproduce.prepared("study", 1, "reconstructed").manifest()
-    assert reproduce.prepared("study", 1).manifest() != study.manifest()
-    assert [setup.config.synthetic.observer for setup in reproduce.prepared("study", 2).answering] == [
-        "table",
-        "table",
-    ]
+    assert other.manifest() == reproduce.prepared("study", 2, "reconstructed").manifest()
+    assert other.manifest() != study.manifest()
+    assert [setup.config.synthetic.observer for setup in other.answering] == ["table", "table"]
 
 
-def test_a_killed_and_then_terminated_reproduction_ends_as_an_unbroken_one(reproduction: Path, tmp_path: Path) -> None:
-    words = warm("reproduce", "--out", tmp_path / "out")
-    tables = partial(tmp_path.glob, "out/logs/sub-*/*.csv")
-    with subprocess.Popen(words, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL) as killed:
-        wait_for(lambda: len(list(tables())) >= 5 or killed.poll() is not None)
-        killed.kill()
-    before = len(list(tables()))
-    with subprocess.Popen(words, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True) as terminated:
-        wait_for(lambda: len(list(tables())) > before or terminated.poll() is not None)
+@pytest.mark.slow
+def test_what_is_killed_is_set_aside_by_another_seed_and_gone_on_with_by_the_same(
+    reproduction: Path, tmp_path: Path
+) -> None:
+    out = tmp_path / "out"
+    for seed in ("2", "1"):
+        words = ("reproduce", "--out", out, "--seed", seed)
+        with subprocess.Popen([RECOIL, *words], stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL) as killed:
+            wait_for(lambda: len(tables(out)) >= 5 or killed.poll() is not None)
+            killed.kill()
+    other, begun = tables(tmp_path / "out.aside-1"), tables(out)
+    assert {path.name: path.read_bytes() for path in other[:4]} != {path.name: path.read_bytes() for path in begun[:4]}
+    again = warm(*words)
+    with subprocess.Popen(again, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True) as terminated:
+        wait_for(lambda: len(tables(out)) > len(begun) or terminated.poll() is not None)
         terminated.terminate()
         _, said = terminated.communicate(timeout=PATIENCE_S)
     assert terminated.returncode == 130
     assert "Traceback" not in said
     assert "interrupted" in said
-    assert len(list(tables())) < 28
-    subprocess.run(words, check=True, capture_output=True)
-    assert len(list(tables())) == 28
-    assert statistics(tmp_path / "out") == statistics(reproduction)
+    assert len(tables(out)) < 28
+    subprocess.run(again, check=True, capture_output=True)
+    assert len(tables(out)) == 28
+    assert statistics(out) == statistics(reproduction)
 
 
-def test_another_seed_gives_other_answers_and_the_study_before_is_set_aside(tmp_path: Path) -> None:
-    quick = tmp_path / "quick"
-    subprocess.run(warm("configs", "--copy", quick), check=True, capture_output=True)
-    study = quick / "study.toml"
-    study.write_text(study.read_text().replace("participants = 14", "participants = 2").replace("2000", "10"))
-    for seed in ("1", "2"):
-        words = warm("reproduce", "--study", study, "--out", tmp_path / "out", "--seed", seed)
-        subprocess.run(words, check=True, capture_output=True)
-    assert (tmp_path / "out.aside-1" / "report.html").exists()
-    assert (tmp_path / "out" / "report.html").exists()
-    assert statistics(tmp_path / "out") != statistics(tmp_path / "out.aside-1")
-    assert "the study has 2 participants, the paper 14" in (tmp_path / "out" / "report.md").read_text(encoding="utf-8")
+def tables(out: Path) -> list[Path]:
+    return sorted(out.glob("logs/sub-*/*.csv"))
+
+
+def test_a_study_that_the_published_numbers_do_not_fit_is_that_of_its_configs(tmp_path: Path) -> None:
+    subprocess.run(warm("configs", "--copy", tmp_path / "quick"), check=True, capture_output=True)
+    study = tmp_path / "quick" / "study.toml"
+    study.write_text(study.read_text().replace("participants = 14", "participants = 2"))
+    assert "the study has 2 participants, the paper 14" in reproduce.prepared(str(study), 1).notes[0]
     asked = warm("reproduce", "--study", study, "--out", tmp_path / "no", "--observer", "reconstructed")
     refused = subprocess.run(asked, check=False, capture_output=True, text=True)
     assert (refused.returncode, "the study has 2 participants" in refused.stderr) == (2, True)
