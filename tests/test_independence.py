@@ -41,14 +41,10 @@ def is_private(name: str) -> bool:
 
 
 @pytest.mark.parametrize("path", MODULES, ids=lambda path: path.stem)
-def test_no_test_module_is_imported(path: Path) -> None:
-    names = imported(ast.parse(path.read_text(encoding="utf-8")))
-    assert {name for name in names if name.startswith("tests.test_")} == set()
-
-
-@pytest.mark.parametrize("path", MODULES, ids=lambda path: path.stem)
-def test_nothing_private_is_reached_into(path: Path) -> None:
-    assert private_names(ast.parse(path.read_text(encoding="utf-8"))) == set()
+def test_no_test_module_is_imported_and_nothing_private_reached_into(path: Path) -> None:
+    tree = ast.parse(path.read_text(encoding="utf-8"))
+    assert {name for name in imported(tree) if name.startswith("tests.test_")} == set()
+    assert private_names(tree) == set()
 
 
 def test_every_way_in_is_seen() -> None:
