@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import csv
 import json
+import re
 import subprocess
 from pathlib import Path
 
@@ -160,17 +161,18 @@ def test_rebuild_of_something_else_is_refused(recoil: Recoil, tmp_path: Path) ->
 
 def test_analyze_leaves_out_what_was_edited_and_says_so(recoil: Recoil, tmp_path: Path) -> None:
     for code in ("P01", "P02", "P03"):
-        synthetic(recoil, participant=code)
-    table = tmp_path / TABLE
-    data = table.read_bytes()
-    table.write_bytes(data.replace(b",forward,forward,1,", b",forward,backward,0,", 1))
+        synthetic(recoil, config="preference", participant=code)
+    table = tmp_path / "results/sub-P01/sub-P01_task-preference_ratings.csv"
+    edited, cells = re.subn(rb"(?m)^(P01,preference,1,[^,]+),[^,]+", rb"\1,10", table.read_bytes())
+    assert cells == 1
+    table.write_bytes(edited)
     done = recoil("analyze", "results", "--out", "analysis")
     assert done.returncode == 1
     assert "edited since the run" in done.stderr
     text = (tmp_path / "analysis" / "report.html").read_text(encoding="utf-8")
     assert "edited since the run" in text
     assert str(tmp_path) not in text  # a report says nothing of the machine it was made on
-    assert json.loads((tmp_path / "analysis" / "statistics.json").read_text())["direction"]["n"] == 2
+    assert json.loads((tmp_path / "analysis" / "statistics.json").read_text())["preference"]["n"] == 2
 
 
 def test_analyze_without_any_usable_log_is_2_and_lists_the_reasons(recoil: Recoil, tmp_path: Path) -> None:
