@@ -1,5 +1,5 @@
 # Two commands for a fresh machine: `make reproduce` and `make test`. Both set up what they need.
-.PHONY: setup full reproduce test quick soak lock reference clean
+.PHONY: setup full reproduce test quick coverage soak lock reference clean
 
 setup: .venv/.ready
 
@@ -23,6 +23,11 @@ test: full
 quick: full
 	scripts/test -m "not soak and not slow"
 
+# Lines and branches that the tests reach, the programs that they start included
+coverage: full
+	scripts/system-packages
+	PATH="$(CURDIR)/.venv/bin:$$PATH" .venv/bin/pytest --numprocesses 2 --dist loadfile -m "not soak" --cov --cov-report term
+
 # The full figures of every promise, kept as tables under results/soak/
 soak: full
 	scripts/system-packages
@@ -43,4 +48,4 @@ reference: setup
 	    --screenshot=results/reference/report.png "file://$(CURDIR)/results/reference/report.html"
 
 clean:
-	rm -rf .venv .tools dist .pytest_cache .mypy_cache .ruff_cache .hypothesis
+	rm -rf .venv .tools dist .pytest_cache .coverage .mypy_cache .ruff_cache .hypothesis
