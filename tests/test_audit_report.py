@@ -16,7 +16,7 @@ from analysis.paper.audit.p_values import binomial_p
 from analysis.paper.audit.page import (
     ELSEWHERE,
     counts,
-    entry,
+    finding_entry,
     findings_text,
     nearest_text,
     other_rows,
@@ -93,7 +93,7 @@ def test_the_page_names_all_numbers_and_is_fair(findings: tuple[AuditFinding, ..
 
 
 def test_json_keeps_the_exact_fractions(findings: tuple[AuditFinding, ...]) -> None:
-    (found,) = [plain(entry(one)) for one in findings if one.result.printed == "F = 28.45"]
+    (found,) = [plain(finding_entry(one)) for one in findings if one.result.printed == "F = 28.45"]
     assert Fraction(found["above"]["exact"]) == Fraction(27001, 947)
     assert found["readings"] == ["arcsine transform", "scores in steps of 0.05 with other means"]
     assert json.loads(json.dumps(found)) == found

@@ -133,7 +133,7 @@ class FindingEntry:
     source: str
 
 
-def entry(finding: AuditFinding) -> FindingEntry:
+def finding_entry(finding: AuditFinding) -> FindingEntry:
     """What `audit.json` says of a finding."""
     result = finding.result
     return FindingEntry(

@@ -53,7 +53,7 @@ from analysis.paper.audit.claims import (
     participants_claims,
     preference_claims,
 )
-from analysis.paper.audit.page import FindingEntry, counts, entry, findings_text, sections
+from analysis.paper.audit.page import FindingEntry, counts, finding_entry, findings_text, sections
 from analysis.paper.paper import PaperHead, Participants, PublishedDirection, PublishedPreference
 from analysis.report.page import write_page
 from analysis.report.serial import as_json
@@ -136,7 +136,7 @@ class Audited:
         return AuditRecord(
             paper=self.paper.paper,
             verdicts=counts(self.findings),
-            findings=tuple(entry(finding) for finding in self.findings),
+            findings=tuple(finding_entry(finding) for finding in self.findings),
             versions={"file": self.source.name, "sha256": self._sha256, **provenance()},
         )
 
