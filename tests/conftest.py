@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import fcntl
+import gc
 import os
 import platform
 import re
@@ -20,6 +21,8 @@ from experiments.load import shipped_folder
 from tests import warm_start
 from tests.waiting import PATIENCE_S
 
+gc.disable()  # what is collected here stays: six thousand tests and all that they import, gone through again and again
+
 pytest.register_assert_rewrite("tests.at_controls", "tests.brute_force", "tests.experimenters", "tests.kills")
 
 settings.register_profile("recoil", deadline=None, derandomize=True)
@@ -31,6 +34,12 @@ def pytest_configure(config: pytest.Config) -> None:
     if not hasattr(config, "workerinput"):
         os.environ[warm_start.OWNER] = str(os.getpid())
         os.environ[warm_start.FOLDER] = tempfile.mkdtemp(prefix="recoil-tests-")
+
+
+def pytest_collection_finish(session: pytest.Session) -> None:
+    """From here on the collector looks at what the tests leave, not at themselves."""
+    gc.freeze()
+    gc.enable()
 
 
 def pytest_unconfigure(config: pytest.Config) -> None:
