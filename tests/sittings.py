@@ -2,6 +2,7 @@
 
 import csv
 import json
+from itertools import islice
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -91,7 +92,7 @@ class WatchingScreen(SyntheticScreen):
         assert step is not None
         assert not isinstance(outcome, Remark)
         lines = self._journal.read_bytes().splitlines(keepends=True)
-        announced, done = [one for line in lines if (one := json.loads(line))["kind"] != "shot"][-2:]
+        done, announced = islice((one for line in reversed(lines) if (one := json.loads(line))["kind"] != "shot"), 2)
         assert lines[-1].endswith(b"\n")
         assert (announced["kind"], announced["body"]) == ("step", json.loads(json.dumps(step_record(step))))
         assert (done["kind"], done["body"]) == ("outcome", step_record(outcome))

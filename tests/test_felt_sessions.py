@@ -62,7 +62,9 @@ def test_people_are_right_at_the_papers_forward_rates_in_the_mean() -> None:
                 right[trial.method].append(someone.answer(trial).response == "forward")
     for name, rate in PAPER.items():
         assert len(right[name]) == 10 * PEOPLE
-        assert np.mean(right[name]) == pytest.approx(rate, abs=4.5 * math.sqrt(rate * (1 - rate) / (10 * PEOPLE)) + 1e-3)
+        assert np.mean(right[name]) == pytest.approx(
+            rate, abs=4.5 * math.sqrt(rate * (1 - rate) / (10 * PEOPLE)) + 1e-3
+        )
 
 
 def alike_hurry() -> Setup[Any]:

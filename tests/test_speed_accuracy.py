@@ -16,14 +16,15 @@ from hypothesis import strategies as st
 from scipy import stats
 
 from analysis.logs.reading import read_logs
+from analysis.report.page import write_page
+from analysis.report.section import Section
 from analysis.summary.figures.trade import (
     figure_conditional_accuracy,
     figure_quantile_probability,
     has_curve,
     has_points,
 )
-from analysis.summary.sections.content import ReportData
-from analysis.summary.sections.sections import write_report
+from analysis.summary.results import StudyStatistics
 from analysis.summary.sections.trade import CONDITIONAL_ACCURACY, QUANTILE_PROBABILITY, trade_section
 from analysis.summary.summary import summarize
 from analysis.times import trade
@@ -113,8 +114,18 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 @pytest.fixture(scope="module")
-def found(folder: Path) -> Any:
-    return found_in(folder)
+def statistics(folder: Path) -> StudyStatistics:
+    return summarize(read_logs([folder]))
+
+
+@pytest.fixture(scope="module")
+def found(statistics: StudyStatistics) -> Any:
+    return statistics.to_dict()["direction"]["speed_accuracy"]
+
+
+def page_of(section: Section, out: Path) -> str:
+    write_page(out, "Trade", (section,))
+    return (out / "report.md").read_text(encoding="utf-8")
 
 
 @pytest.mark.parametrize("method", METHODS)
@@ -197,7 +208,7 @@ def test_estimates_lie_around_what_the_answers_were_drawn_with(found: Any) -> No
 
 
 def test_accuracy_times_and_ez_are_the_closed_forms_of_the_diffusion(tmp_path: Path) -> None:
-    found = found_in(study(tmp_path, people=4, trials=1_500, instructions=("",)))
+    found = found_in(study(tmp_path, people=4, trials=800, instructions=("",)))
     assert found["instructions"] == ["neutral"]
     assert found["instruction_effects"] == []
     for method in ("asymmetric-1", "asymmetric-2"):
@@ -225,11 +236,11 @@ def test_times_from_the_experimenters_hand_are_refused_with_the_reason(tmp_path:
     assert "the experimenter's hand" in found["reason"]
     assert found["refused"]["experimenter"]["trials"] == 120
     assert "reaction to it" in found["refused"]["experimenter"]["why"]
-    write_report(tmp_path / "out", ReportData(title="Hand", statistics=statistics))
-    text = (tmp_path / "out" / "report.md").read_text(encoding="utf-8")
+    section = trade_section(statistics.direction)
+    text = page_of(section, tmp_path)
     assert "all times came from the experimenter's hand" in text
     assert "Refused of 120 answered trials: 120 because the time came from the experimenter's hand" in text
-    assert not list((tmp_path / "out" / "figures").glob("figure-[cq][ou]*"))
+    assert not section.pictures
     for figure in (figure_conditional_accuracy, figure_quantile_probability):
         with pytest.raises(ValueError, match="needs somebody"):
             figure(statistics.direction, tmp_path / "none")
@@ -450,7 +461,7 @@ def test_a_high_bar_of_correct_answers_keeps_the_lucky_guessers() -> None:
 
 
 def test_a_crowd_is_fitted_by_a_sample_of_people_whose_codes_are_evenly_spaced(tmp_path: Path) -> None:
-    people = 3 * MOST_PEOPLE
+    people = 2 * MOST_PEOPLE
     logs = read_logs([write_many(tmp_path, people)])
     own = own_trials(logs.trials, METHODS)
     found = sampled_fit(own)
@@ -467,11 +478,15 @@ def test_a_crowd_is_fitted_by_a_sample_of_people_whose_codes_are_evenly_spaced(t
 # The report
 
 
-def test_the_report_shows_figures_tables_and_caveats(folder: Path, tmp_path: Path) -> None:
-    write_report(tmp_path, ReportData(title="Trade", statistics=summarize(read_logs([folder]))))
-    text = (tmp_path / "report.md").read_text(encoding="utf-8")
-    section = text.partition("## Speed and accuracy")[2].partition("\n## ")[0]
+def test_the_section_shows_figures_tables_and_caveats(statistics: StudyStatistics, tmp_path: Path) -> None:
+    section = trade_section(statistics.direction)
+    assert [picture.stem for picture in section.pictures] == [CONDITIONAL_ACCURACY, QUANTILE_PROBABILITY]
+    (tmp_path / "figures").mkdir()
+    figure_conditional_accuracy(statistics.direction, tmp_path / "figures" / CONDITIONAL_ACCURACY)
+    figure_quantile_probability(statistics.direction, tmp_path / "figures" / QUANTILE_PROBABILITY)
+    text = page_of(section, tmp_path)
     for words in (
+        "## Speed and accuracy",
         "1,080 of 1,080 answered trials have a time of the answerer's own hand (6 participants).",
         "| Vibration, speed | 180 |",
         "| speed − accuracy | all methods | 6 |",
@@ -480,8 +495,8 @@ def test_the_report_shows_figures_tables_and_caveats(folder: Path, tmp_path: Pat
         "| drift Asymmetric Force II | 1/√s |",
         "Where people differ it is biased",
     ):
-        assert words in section
+        assert words in text
     for stem in ("conditional-accuracy", "quantile-probability"):
-        assert f"figures/figure-{stem}.png" in section
+        assert f"figures/figure-{stem}.png" in text
         for kind in ("png", "svg", "pdf"):
             assert (tmp_path / "figures" / f"figure-{stem}.{kind}").stat().st_size > 5_000
