@@ -25,8 +25,16 @@ from experiments.session.remarks import Remark
 from experiments.session.states import Position, State
 from experiments.session.steps import Outcome, Step, step_record
 from experiments.study.folders import Place, place
+from tests.at_controls import changed
 
-SETUPS = {name: load_setup(name) for name in ("direction", "preference")}
+SETUPS = {
+    "direction": changed(
+        "direction",
+        design={"sets_per_session": 2, "trials_per_set": 2, "forward_per_session": 2, "backward_per_session": 2},
+    ),
+    "preference": load_setup("preference"),
+}
+"""Experiment 1 with three sessions of two sets of two trials."""
 
 
 class TroubledGun:

@@ -26,7 +26,7 @@ DIRECTION, PREFERENCE = load_setup("direction"), load_setup("preference")
 PLAN = direction_plan(DIRECTION.config, "P01", 1, None)
 FELT = preference_plan(PREFERENCE.config, "P01", 1, None)
 METHODS = ("vibration", "asymmetric-1", "asymmetric-2")
-PEOPLE = 200
+PEOPLE = 120
 PHI = NormalDist()
 
 

@@ -168,9 +168,7 @@ def alive_in(group: int) -> list[int]:
 
 
 def test_null_participants_find_what_is_not_there_in_five_percent(recoil: Recoil, tmp_path: Path) -> None:
-    again = recoil(
-        "power", "preference", "--null", "--participants", "14", "--studies", "3000", "--json", "--out", "n"
-    )
+    again = recoil("power", "preference", "--null", "--participants", "14", "--studies", "3000", "--json", "--out", "n")
     assert again.returncode == 0, again.stderr
     (design,) = json.loads(again.stdout)["designs"]
     anova = next(c for c in design["claims"] if c["claim"] == ANOVA)

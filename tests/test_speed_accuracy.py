@@ -32,7 +32,7 @@ from analysis.times.first_passage import moments
 from analysis.times.fit import fit
 from analysis.times.likelihood import trials_of
 from analysis.times.own_trials import ordered, own_trials, quantiles
-from analysis.times.people import MOST_PEOPLE, as_trials, fit_people, sampled_fit
+from analysis.times.people import MOST_PEOPLE, as_trials, fit_people
 from analysis.times.trade import ez, ez_people
 from experiments.design.streams import generator
 from experiments.record import tables
@@ -461,18 +461,17 @@ def test_a_high_bar_of_correct_answers_keeps_the_lucky_guessers() -> None:
 
 
 def test_a_crowd_is_fitted_by_a_sample_of_people_whose_codes_are_evenly_spaced(tmp_path: Path) -> None:
-    people = 2 * MOST_PEOPLE
+    people = 3 * MOST_PEOPLE // 2
     logs = read_logs([write_many(tmp_path, people)])
-    own = own_trials(logs.trials, METHODS)
-    found = sampled_fit(own)
-    assert (found.people, found.fitted, found.trials) == (people, MOST_PEOPLE, 60 * MOST_PEOPLE)
-    chosen = np.round(np.linspace(0, people - 1, MOST_PEOPLE)).astype(int)
-    trials = as_trials(own.of(np.isin(own.person, chosen)))
-    direct = fit(trials, by_person=True)
-    assert found.together is not None
-    assert found.together.log_likelihood == pytest.approx(direct.log_likelihood)
     shown = summarize(logs).to_dict()["direction"]["speed_accuracy"]
-    assert (shown["people"], shown["diffusion"]["fitted"]) == (people, MOST_PEOPLE)
+    sample = shown["diffusion"]
+    assert shown["people"] == people
+    assert (sample["people"], sample["fitted"], sample["trials"]) == (people, MOST_PEOPLE, 60 * MOST_PEOPLE)
+    own = own_trials(logs.trials, METHODS)
+    chosen = np.round(np.linspace(0, people - 1, MOST_PEOPLE)).astype(int)
+    direct = fit(as_trials(own.of(np.isin(own.person, chosen))), by_person=True)
+    for name, one in sample["together"]["estimates"].items():
+        assert [one["value"], one["se"]] == pytest.approx([direct[name].value, direct[name].se], abs=1e-4)
 
 
 # The report

@@ -35,7 +35,7 @@ def found(logs: Logs) -> dict[str, Any]:
 
 @pytest.fixture(scope="module")
 def published_like(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Any]:
-    return study_of(tmp_path_factory.mktemp("right"), RIGHT).to_dict()
+    return study_of(tmp_path_factory.mktemp("right"), RIGHT, timed=False).to_dict()
 
 
 @pytest.mark.parametrize("experiment", ["direction", "preference"])
@@ -92,7 +92,7 @@ def test_milder_departures_stay_beside_the_assumptions(published_like: dict[str,
 
 def test_clustering_that_turns_the_pooled_test_over_is_told_at_the_top(tmp_path: Path) -> None:
     counts = [[10, 8, 9], [10, 9, 8], [10, 8, 9], [9, 7, 8], [10, 8, 9], [1, 8, 9], [0, 8, 9], [2, 9, 8]]
-    found = study_of(tmp_path, counts).to_dict()
+    found = study_of(tmp_path, counts, timed=False).to_dict()
     test = found["direction"]["binomial"]["vibration"]["forward"]
     assert test["p"] < 0.05 < test["clustering"]["p_adjusted"]
     assert any("pooled binomial test is not to be read: vibration forward" in warning for warning in found["warnings"])
@@ -138,7 +138,7 @@ def _numbers(value: Any) -> list[float]:
 
 @pytest.mark.parametrize("name", DEGENERATE)
 def test_degenerate_answers_never_crash_and_never_give_a_silent_number(name: str, tmp_path: Path) -> None:
-    statistics = study_of(tmp_path, DEGENERATE[name])
+    statistics = study_of(tmp_path, DEGENERATE[name], timed=False)
     found = statistics.to_dict()
     direction = found["direction"]
     assert np.isfinite(_numbers(found)).all()
@@ -159,7 +159,7 @@ def test_degenerate_ratings_never_crash_either(name: str, tmp_path: Path) -> Non
 
 
 def test_all_at_ceiling_gives_reasons_everywhere(tmp_path: Path) -> None:
-    direction = study_of(tmp_path, CEILING).to_dict()["direction"]
+    direction = study_of(tmp_path, CEILING, timed=False).to_dict()["direction"]
     assert direction["effect_size"]["partial_eta_squared"] is None
     assert direction["friedman"]["reason"]
     assert [pair["p"] for pair in direction["paired_t"]] == [None] * 3
@@ -170,13 +170,13 @@ def test_all_at_ceiling_gives_reasons_everywhere(tmp_path: Path) -> None:
 
 
 def test_fewer_people_than_methods_have_no_mauchly_test_but_a_reason(tmp_path: Path) -> None:
-    sphericity = study_of(tmp_path, RIGHT[:2]).to_dict()["direction"]["sphericity"]
+    sphericity = study_of(tmp_path, RIGHT[:2], timed=False).to_dict()["direction"]["sphericity"]
     assert (sphericity["W"], sphericity["huynh_feldt"]) == (None, None)
     assert "fewer participants than conditions" in sphericity["reason"]
 
 
 def test_two_methods_need_no_sphericity(tmp_path: Path) -> None:
-    found = study_of(tmp_path, RIGHT[:, :2], ("ramp", "click")).to_dict()["direction"]
+    found = study_of(tmp_path, RIGHT[:, :2], ("ramp", "click"), timed=False).to_dict()["direction"]
     (pair,) = found["paired_t"]
     assert found["anova"]["F"] == pytest.approx(pair["t"] ** 2)
     assert found["anova"]["p"] == pytest.approx(pair["p"]) == pytest.approx(found["tukey_paired"][0]["p"])
@@ -188,7 +188,7 @@ def test_two_methods_need_no_sphericity(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize("right", [RIGHT[:1], RIGHT[:, :1]])
 def test_one_person_or_one_method_has_no_supplement(right: Any, tmp_path: Path) -> None:
-    statistics = study_of(tmp_path, right, METHODS[: right.shape[1]])
+    statistics = study_of(tmp_path, right, METHODS[: right.shape[1]], timed=False)
     found, direction = statistics.direction, statistics.to_dict()["direction"]
     assert found is not None
     assert found.supplement is None
