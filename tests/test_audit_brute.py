@@ -52,6 +52,7 @@ def test_p_says_what_mpmath_says() -> None:
     assert brute.compared(brute.p_cases(120, 1)) > 80
 
 
+@pytest.mark.slow
 def test_tukey_never_accuses_data_that_exist() -> None:
     assert brute.tukey_accusations(2, 1)[0] == 2
 

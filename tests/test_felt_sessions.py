@@ -53,6 +53,7 @@ def plans(setup: Setup[Any], count: int = PEOPLE) -> list[Plan]:
 # experiment 1
 
 
+@pytest.mark.slow
 def test_people_are_right_at_the_papers_forward_rates_in_the_mean() -> None:
     right: dict[str, list[bool]] = {name: [] for name in PAPER}
     for plan in plans(DIRECTION):
@@ -91,6 +92,7 @@ def hurried() -> tuple[Setup[Any], dict[tuple[str, str], list[tuple[bool, float]
     return setup, found
 
 
+@pytest.mark.slow
 def test_who_is_hurried_errs_as_much_more_as_the_law_says(hurried: Any) -> None:
     setup, found = hurried
     mind = model_parameters(setup.config)
@@ -103,6 +105,7 @@ def test_who_is_hurried_errs_as_much_more_as_the_law_says(hurried: Any) -> None:
     assert speed + 0.08 < accuracy
 
 
+@pytest.mark.slow
 def test_who_is_hurried_is_as_much_faster_as_the_law_says(hurried: Any) -> None:
     # optional stopping: E[X] at the answer is z + v E[t], so E[t] = (a P - z) / v; and z (a - z) without drift
     setup, found = hurried
@@ -237,6 +240,7 @@ def test_seed_and_person_make_the_ratings() -> None:
 # the example, as its user runs it
 
 
+@pytest.mark.slow
 def test_the_example_is_checked_run_and_read_with_its_instructions_and_without(recoil: Recoil, tmp_path: Path) -> None:
     assert recoil("configs", "--copy", "mine").returncode == 0
     config = "mine/examples/hurry.toml"

@@ -103,6 +103,7 @@ def _over_arrays(tables: list[TextTable]) -> tuple[dict[int, pd.DataFrame], dict
     return frames, faults
 
 
+@pytest.mark.slow
 @settings(max_examples=120)
 @given(st.lists(_spoilt(), min_size=1, max_size=5))
 def test_checks_over_arrays_say_and_read_what_checks_row_after_row_do(contents: list[bytes]) -> None:
@@ -118,6 +119,7 @@ def test_checks_over_arrays_say_and_read_what_checks_row_after_row_do(contents: 
         assert rows.drop(columns="study").to_dict("records") == list(expected.rows), content
 
 
+@pytest.mark.slow
 @settings(max_examples=120)
 @given(st.lists(_spoilt(), min_size=1, max_size=5))
 def test_what_arrow_reads_the_csv_module_reads_alike(contents: list[bytes]) -> None:

@@ -45,6 +45,7 @@ def stepped(setup: Any, people: int) -> np.ndarray:
     return steps
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("instructions", [(), ("speed", "accuracy")])
 def test_the_answers_are_distributed_as_those_of_the_participant_step_by_step(
     instructions: tuple[str, ...], tmp_path: Path
@@ -125,6 +126,7 @@ def test_trials_must_give_every_instruction_its_sets(tmp_path: Path) -> None:
     assert {cell.design.trials for cell in grid.cells} == {10, 20, 30, 40}
 
 
+@pytest.mark.slow
 def test_the_command_says_who_they_are_and_two_processes_give_the_same_bytes(recoil: Recoil, tmp_path: Path) -> None:
     folder = tmp_path / "study"
     folder.mkdir()

@@ -149,6 +149,7 @@ def test_an_unbroken_run_has_one_attempt_a_trial_and_no_flag(unbroken: dict[str,
         assert whole.records[-1]["table_sha256"] == hashlib.sha256(whole.table).hexdigest()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", SETUPS)
 def test_a_run_broken_off_at_any_record_goes_on_to_the_same_answers(
     name: str, unbroken: dict[str, Unbroken], tmp_path: Path

@@ -355,8 +355,10 @@ def changed(rows: list[TextRow], kind: str) -> list[TextRow]:
 KINDS = ["all correct", "all wrong", "equal times", "tiny times", "no times", "one trial", "one time", "told by method"]
 
 
-@pytest.mark.parametrize("people", [1, 2])
-@pytest.mark.parametrize("kind", KINDS)
+OF_TWO = ("all correct", "no times", "one trial", "one time", "told by method")
+
+
+@pytest.mark.parametrize(("kind", "people"), [*((kind, 1) for kind in KINDS), *((kind, 2) for kind in OF_TWO)])
 def test_whatever_the_log_there_is_a_section_and_no_nan(kind: str, people: int, tmp_path: Path) -> None:
     for i in range(people):
         rows = trial_rows(f"P{i}", i, sets=2)
@@ -384,6 +386,7 @@ def test_whatever_the_log_there_is_a_section_and_no_nan(kind: str, people: int, 
     assert bool(section.pictures) == (kind not in ("no times", "one trial", "one time"))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("kind", ["all correct", "told by method"])
 def test_figures_are_drawn_where_there_is_little_to_draw(kind: str, tmp_path: Path) -> None:
     write_rows(trials_path(tmp_path, "P1"), changed(trial_rows("P1", sets=2), kind))
@@ -477,6 +480,7 @@ def test_a_crowd_is_fitted_by_a_sample_of_people_whose_codes_are_evenly_spaced(t
 # The report
 
 
+@pytest.mark.slow
 def test_the_section_shows_figures_tables_and_caveats(statistics: StudyStatistics, tmp_path: Path) -> None:
     section = trade_section(statistics.direction)
     assert [picture.stem for picture in section.pictures] == [CONDITIONAL_ACCURACY, QUANTILE_PROBABILITY]

@@ -206,6 +206,7 @@ def test_the_paired_tukey_is_the_one_of_the_core(found: dict[str, Any]) -> None:
     ]
 
 
+@pytest.mark.slow
 def test_nothing_slow_is_imported_before_it_is_used() -> None:
     program = "import sys, analysis.summary.summary; print([m for m in {'pingouin', 'statsmodels'} & {*sys.modules}])"
     done = subprocess.run(

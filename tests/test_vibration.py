@@ -60,6 +60,7 @@ def test_what_vibrated_is_at_rest_at_its_place_again():
     assert abs(place[-1]) < 1e-5 * np.abs(place).max()
 
 
+@pytest.mark.slow
 @given(
     peak=st.floats(1.0, 1e4), ratio=st.floats(0.12, 0.35), duration=st.floats(0.005, 0.5), cycles=st.floats(2.0, 50.0)
 )
