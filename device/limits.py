@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from itertools import chain
+from itertools import chain, dropwhile
 
 from device import words
 
@@ -88,7 +88,8 @@ class DriveHistory:
 
     def __post_init__(self) -> None:
         ticks = (self.warmth_tick, *(() if self.ready_tick is None else (self.ready_tick,)), *chain(*self.pulses))
-        if not all(map(words.is_whole_number, ticks)):
+        one_of_each_type = {type(tick): tick for tick in ticks}.values()  # a train's hundreds are judged at every shot
+        if not all(map(words.is_whole_number, one_of_each_type)):
             raise words.LimitError("a history of shots counts in whole microseconds")
         if not (words.is_finite(self.warmth_K) and self.warmth_K >= 0):
             raise words.LimitError(
@@ -117,7 +118,7 @@ class DriveHistory:
         self.check(load, at_s)
         start, ready = _tick("at_s", at_s), _tick("ready_s", ready_s)
         end = start + _on_ticks(load)
-        recent = tuple(pulse for pulse in self.pulses if pulse[0] > start - _MINUTE)
+        recent = dropwhile(lambda pulse: pulse[0] <= start - _MINUTE, self.pulses)
         return DriveHistory(
             pulses=(*recent, (start, end)),
             ready_tick=max(ready, end),

@@ -40,8 +40,11 @@ RIGHT = np.array([row.split() for row in _ROWS.split(",")], dtype=np.int64)
 """Right forward answers of ten, 14 participants by 3 methods: the data of every "R 4.2.2" number in these tests."""
 
 
-def study_of(folder: Path, right: Any, methods: tuple[str, ...] = METHODS) -> StudyStatistics:
-    """Statistics of participants with so many right forward answers of ten; every second backward answer is right."""
+def study_of(folder: Path, right: Any, methods: tuple[str, ...] = METHODS, *, timed: bool = True) -> StudyStatistics:
+    """Statistics of participants with so many right forward answers of ten; every second backward answer is right.
+
+    Answers that are not timed have no diffusion to fit, which takes longer than all else.
+    """
     for i, counts in enumerate(right):
         code = f"P{i + 1:02d}"
         rows = trial_rows(code, methods=methods)
@@ -52,6 +55,7 @@ def study_of(folder: Path, right: Any, methods: tuple[str, ...] = METHODS) -> St
                     other = "backward" if direction == "forward" else "forward"
                     correct = place < share
                     row.update(response=direction if correct else other, correct=str(int(correct)))
+                    row.update({} if timed else {"response_time_s": "", "response_time_valid": ""})
         write_rows(trials_path(folder, code), rows)
     return summarize(read_logs([folder]))
 

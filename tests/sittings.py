@@ -2,6 +2,7 @@
 
 import csv
 import json
+from itertools import islice
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -24,8 +25,16 @@ from experiments.session.remarks import Remark
 from experiments.session.states import Position, State
 from experiments.session.steps import Outcome, Step, step_record
 from experiments.study.folders import Place, place
+from tests.at_controls import changed
 
-SETUPS = {name: load_setup(name) for name in ("direction", "preference")}
+SETUPS = {
+    "direction": changed(
+        "direction",
+        design={"sets_per_session": 2, "trials_per_set": 2, "forward_per_session": 2, "backward_per_session": 2},
+    ),
+    "preference": load_setup("preference"),
+}
+"""Experiment 1 with three sessions of two sets of two trials."""
 
 
 class TroubledGun:
@@ -91,7 +100,7 @@ class WatchingScreen(SyntheticScreen):
         assert step is not None
         assert not isinstance(outcome, Remark)
         lines = self._journal.read_bytes().splitlines(keepends=True)
-        announced, done = [one for line in lines if (one := json.loads(line))["kind"] != "shot"][-2:]
+        done, announced = islice((one for line in reversed(lines) if (one := json.loads(line))["kind"] != "shot"), 2)
         assert lines[-1].endswith(b"\n")
         assert (announced["kind"], announced["body"]) == ("step", json.loads(json.dumps(step_record(step))))
         assert (done["kind"], done["body"]) == ("outcome", step_record(outcome))

@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 from mpmath import mp, mpf
 from scipy import special, stats
@@ -25,6 +25,7 @@ def test_the_papers_binomial_tests_are_reproduced(successes: int, p: float) -> N
     assert binomial_test(successes, 140).p == pytest.approx(p, abs=5e-4)
 
 
+@settings(max_examples=40)
 @given(st.integers(1, 60), st.data(), st.sampled_from([Fraction(1, 2), Fraction(1, 3), Fraction(1, 10)]))
 def test_p_is_the_exact_sum_of_all_outcomes_not_more_likely(n: int, data: st.DataObject, p0: Fraction) -> None:
     k = data.draw(st.integers(0, n))
@@ -68,6 +69,7 @@ def test_both_intervals_have_fourteen_digits(case: dict[str, Any]) -> None:
         assert digits_of(getattr(found, limit), case[limit]) >= 14
 
 
+@settings(max_examples=40)
 @given(st.integers(0, 400), st.data(), st.sampled_from([1e-9, 0.5, 0.9, 0.999]))
 def test_clopper_pearson_limits_leave_the_tail_they_promise(k: int, data: st.DataObject, confidence: float) -> None:
     n = data.draw(st.integers(max(k, 1), 10**6))
@@ -119,10 +121,10 @@ def test_rare_successes_keep_the_digits_of_the_interval() -> None:
 
 
 def test_broadcasting_is_the_same_as_looping() -> None:
-    successes, chances = np.arange(0, 21)[:, None], np.array([0.2, 0.5, 0.9])
+    successes, chances = np.arange(0, 21, 4)[:, None], np.array([0.2, 0.5, 0.9])
     together = binomial_test(successes, 20, chances)
     for i, j in np.ndindex(together.p.shape):
-        alone = binomial_test(i, 20, chances[j])
+        alone = binomial_test(successes[i, 0], 20, chances[j])
         assert (together.p[i, j], together.ci_low[i, j], together.log_p[i, j]) == (alone.p, alone.ci_low, alone.log_p)
 
 

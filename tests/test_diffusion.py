@@ -38,7 +38,7 @@ def test_times_given_the_answer_follow_the_distribution(v: float, a: float, w: f
         drawn = decide_all(v, a, w, 0.0, generator=generator(5, "ks"), shape=(20_000,))
         upper, times = drawn.upper, drawn.time_s
     else:
-        decisions = scalar(law(v, a, w), 3_000)
+        decisions = scalar(law(v, a, w), 1_000)
         upper, times = np.array([d.upper for d in decisions]), np.array([d.time_s for d in decisions])
     for answer in (True, False):
         t = np.sort(times[upper == answer])
@@ -57,16 +57,17 @@ def ks_p(t: np.ndarray, answer: bool, v: float, a: float, w: float) -> float:
 
 def test_the_scalar_sampler_has_the_accuracy_and_mean_of_theory() -> None:
     for v, a, w in [(0.0, 1.0, 0.5), (1.0, 2.0, 0.5), (-2.0, 1.5, 0.7)]:
-        decisions = scalar(law(v, a, w), 4_000, seed=11)
+        n = 1_000
+        decisions = scalar(law(v, a, w), n, seed=11)
         expected = moments(v, a, w)
         t, p = np.array([d.time_s for d in decisions]), float(expected.upper)
-        assert abs(np.mean([d.upper for d in decisions]) - p) < 4.5 * math.sqrt(p * (1 - p) / 4_000)
-        assert abs(t.mean() - expected.mean_s) < 4.5 * t.std() / math.sqrt(4_000)
+        assert abs(np.mean([d.upper for d in decisions]) - p) < 4.5 * math.sqrt(p * (1 - p) / n)
+        assert abs(t.mean() - expected.mean_s) < 4.5 * t.std() / math.sqrt(n)
 
 
 @pytest.mark.parametrize("extreme", EXTREMES)
 def test_an_extreme_ends_with_a_finite_time(extreme: Diffusion) -> None:
-    decisions = scalar(extreme, 300)
+    decisions = scalar(extreme, 100)
     batch = decide_all(
         extreme.drift,
         extreme.boundary,
@@ -139,12 +140,12 @@ def test_lapses_are_coins_at_uniform_times() -> None:
     lapsing = Diffusion(
         drift=50.0, boundary=3.0, non_decision_s=0.3, lapses=Lapses(rate=0.2, earliest_s=1.0, latest_s=2.0)
     )
-    decisions = scalar(lapsing, 4_000)
+    decisions = scalar(lapsing, 1_500)
     lapsed = [d for d in decisions if d.lapse]
-    assert len(lapsed) == pytest.approx(800, abs=4.5 * math.sqrt(640))
+    assert len(lapsed) == pytest.approx(300, abs=4.5 * math.sqrt(240))
     assert sum(d.upper for d in lapsed) == pytest.approx(len(lapsed) / 2, abs=4.5 * math.sqrt(len(lapsed) / 4))
     assert all(1.0 < d.time_s < 2.0 for d in lapsed)
-    assert np.mean([d.time_s for d in lapsed]) == pytest.approx(1.5, abs=0.05)
+    assert np.mean([d.time_s for d in lapsed]) == pytest.approx(1.5, abs=4.5 / math.sqrt(12 * len(lapsed)))
     assert all(d.upper for d in decisions if not d.lapse)
 
 

@@ -31,7 +31,7 @@ from tests.felt_configs import felt_text, written
 
 HURRY = shipped_folder() / "examples" / "hurry.toml"
 PAPER = {"vibration": 0.557, "asymmetric-1": 0.793, "asymmetric-2": 0.929}
-PEOPLE = 400
+PEOPLE = 120
 
 
 def felt(setup: Setup[Any], **tables: dict[str, object]) -> Setup[Any]:
@@ -53,7 +53,8 @@ def plans(setup: Setup[Any], count: int = PEOPLE) -> list[Plan]:
 # experiment 1
 
 
-def test_four_hundred_people_are_right_at_the_papers_forward_rates_in_the_mean() -> None:
+@pytest.mark.slow
+def test_people_are_right_at_the_papers_forward_rates_in_the_mean() -> None:
     right: dict[str, list[bool]] = {name: [] for name in PAPER}
     for plan in plans(DIRECTION):
         someone = direction_participant(DIRECTION, plan)
@@ -61,8 +62,10 @@ def test_four_hundred_people_are_right_at_the_papers_forward_rates_in_the_mean()
             if trial.direction == "forward":
                 right[trial.method].append(someone.answer(trial).response == "forward")
     for name, rate in PAPER.items():
-        assert len(right[name]) == 4_000
-        assert np.mean(right[name]) == pytest.approx(rate, abs=4.5 * math.sqrt(rate * (1 - rate) / 4_000) + 1e-3)
+        assert len(right[name]) == 10 * PEOPLE
+        assert np.mean(right[name]) == pytest.approx(
+            rate, abs=4.5 * math.sqrt(rate * (1 - rate) / (10 * PEOPLE)) + 1e-3
+        )
 
 
 def alike_hurry() -> Setup[Any]:
@@ -79,7 +82,7 @@ def hurried() -> tuple[Setup[Any], dict[tuple[str, str], list[tuple[bool, float]
     """Forward trials by method and instruction: whether the answer was right, and its time in s."""
     setup = alike_hurry()
     found: dict[tuple[str, str], list[tuple[bool, float]]] = {}
-    for plan in plans(setup, 200):
+    for plan in plans(setup, 80):
         someone = direction_participant(setup, plan)
         for trial in plan.trials:
             if trial.direction == "forward":
@@ -89,6 +92,7 @@ def hurried() -> tuple[Setup[Any], dict[tuple[str, str], list[tuple[bool, float]
     return setup, found
 
 
+@pytest.mark.slow
 def test_who_is_hurried_errs_as_much_more_as_the_law_says(hurried: Any) -> None:
     setup, found = hurried
     mind = model_parameters(setup.config)
@@ -101,6 +105,7 @@ def test_who_is_hurried_errs_as_much_more_as_the_law_says(hurried: Any) -> None:
     assert speed + 0.08 < accuracy
 
 
+@pytest.mark.slow
 def test_who_is_hurried_is_as_much_faster_as_the_law_says(hurried: Any) -> None:
     # optional stopping: E[X] at the answer is z + v E[t], so E[t] = (a P - z) / v; and z (a - z) without drift
     setup, found = hurried
@@ -235,6 +240,7 @@ def test_seed_and_person_make_the_ratings() -> None:
 # the example, as its user runs it
 
 
+@pytest.mark.slow
 def test_the_example_is_checked_run_and_read_with_its_instructions_and_without(recoil: Recoil, tmp_path: Path) -> None:
     assert recoil("configs", "--copy", "mine").returncode == 0
     config = "mine/examples/hurry.toml"

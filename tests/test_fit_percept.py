@@ -86,6 +86,7 @@ def pasted(text: str, folder: Path) -> Any:
 # what it leaves
 
 
+@pytest.mark.slow
 def test_the_fit_to_the_shipped_paper_has_intervals_around_the_shipped_numbers(found: Any, folder: Path) -> None:
     for name, one in found["fitted"].items():
         assert one["ci_low"] < one["value"] < one["ci_high"]
@@ -95,6 +96,7 @@ def test_the_fit_to_the_shipped_paper_has_intervals_around_the_shipped_numbers(f
     assert json.loads((folder / "fit.json").read_text(encoding="utf-8")) == found
 
 
+@pytest.mark.slow
 def test_it_says_what_is_assumed_and_what_cannot_be_told(found: Any, folder: Path) -> None:
     assert found["assumed"] == {"exponent": 1.7, "leak_s": 0.02}
     assert found["untold"]["boundary"] == pytest.approx(1.0)
@@ -107,12 +109,14 @@ def test_it_says_what_is_assumed_and_what_cannot_be_told(found: Any, folder: Pat
         assert words in page
 
 
+@pytest.mark.slow
 def test_the_same_rates_are_met_under_other_assumptions(found: Any) -> None:
     for one in found["other_assumptions"]:
         assert one["deviance"] == pytest.approx(0.0, abs=1e-6)
     assert len({round(one["sensitivity"], 3) for one in found["other_assumptions"]}) == len(found["other_assumptions"])
 
 
+@pytest.mark.slow
 def test_the_curve_over_friction_runs_through_the_fitted_points(found: Any) -> None:
     (curve,) = found["friction"]
     for name, friction in curve["methods"].items():
@@ -122,6 +126,7 @@ def test_the_curve_over_friction_runs_through_the_fitted_points(found: Any) -> N
     assert ((low < value) & (value < high)).all()
 
 
+@pytest.mark.slow
 def test_a_backward_shot_is_the_forward_one_s_mirror_but_for_the_bias(found: Any) -> None:
     vibration = found["rates"]["vibration"]
     assert vibration["forward"]["value"] + vibration["backward"]["value"] == pytest.approx(1.0)
@@ -129,11 +134,13 @@ def test_a_backward_shot_is_the_forward_one_s_mirror_but_for_the_bias(found: Any
         assert one["backward"]["value"] < one["forward"]["value"]
 
 
+@pytest.mark.slow
 def test_the_page_and_the_figures_are_there(found: Any, folder: Path) -> None:
     assert {path.stem for path in (folder / "figures").iterdir()} == {"percept", "places"}
     assert "data:image/png;base64," in (folder / "report.html").read_text(encoding="utf-8")
 
 
+@pytest.mark.slow
 def test_the_fragment_loads_back_through_the_config(found: Any, folder: Path, tmp_path: Path) -> None:
     synthetic = pasted((folder / "percept.toml").read_text(encoding="utf-8"), tmp_path)
     for name, one in found["fitted"].items():
@@ -141,11 +148,13 @@ def test_the_fragment_loads_back_through_the_config(found: Any, folder: Path, tm
     assert synthetic.people.own == People()
 
 
+@pytest.mark.slow
 def test_with_a_spread_the_fragment_brings_the_people_too(fitted: FittedPercept, tmp_path: Path) -> None:
     text = config_text(replace(fitted, people=ASSUMED_SPREAD))
     assert pasted(text, tmp_path).people.own == ASSUMED_SPREAD
 
 
+@pytest.mark.slow
 def test_the_command_without_a_name_fits_the_percept(recoil: Recoil, tmp_path: Path) -> None:
     rates = "vibration=0.5,asymmetric-1=0.7,asymmetric-2=0.9"
     done = recoil("fit", "--rates", rates, "--trials", "50", "--out", "out", "--json")
@@ -156,6 +165,7 @@ def test_the_command_without_a_name_fits_the_percept(recoil: Recoil, tmp_path: P
     assert (tmp_path / "out" / "percept.toml").exists()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("rates", [(0.5, 1.0, 1.0), (0.0, 0.0, 0.0), (1.0, 0.1, 0.6)])
 def test_rates_at_the_ends_are_fitted_with_what_intervals_there_are(
     rates: tuple[float, float, float], tmp_path: Path
@@ -224,6 +234,7 @@ def test_a_percentile_counts_those_below_and_half_of_those_that_print_alike() ->
     assert place.outside == pytest.approx(2 * place.percentile)
 
 
+@pytest.mark.slow
 def test_a_number_beyond_the_central_95_percent_is_called_at_odds(fitted: FittedPercept) -> None:
     assert fitted.judged is not None
     case = fitted.judged.main_case

@@ -54,6 +54,7 @@ def estimates(rows: list[dict[str, Any]]) -> dict[str, dict[str, Any]]:
     return {row["name"]: row for row in rows}
 
 
+@pytest.mark.slow
 def test_known_parameters_are_found_again_within_their_intervals(logs: Path, recoil: Recoil, tmp_path: Path) -> None:
     done = recoil("fit", "times", logs, "--out", "out", "--json")
     assert done.returncode == 0, done.stderr
@@ -75,6 +76,7 @@ def test_known_parameters_are_found_again_within_their_intervals(logs: Path, rec
     assert (tmp_path / "out" / "figures" / "times.png").exists()
 
 
+@pytest.mark.slow
 def test_a_log_without_instructions_has_one_boundary(tmp_path: Path, recoil: Recoil) -> None:
     rows = [{key: value for key, value in row.items() if key != "instruction"} for row in decided("P01", 1)]
     write_rows(trials_path(tmp_path / "logs", "P01"), rows, header=list(rows[0]))
@@ -100,6 +102,7 @@ def test_times_by_the_experimenter_s_hand_are_refused_with_the_reason(tmp_path: 
     assert not (tmp_path / "out").exists()
 
 
+@pytest.mark.slow
 def test_single_answers_by_the_experimenter_are_left_out_and_listed(tmp_path: Path, recoil: Recoil) -> None:
     rows = decided("P01", 1)
     write_rows(trials_path(tmp_path / "logs", "P01"), [*by_hand(rows[:3]), *rows[3:]])

@@ -10,7 +10,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from analysis.predict.fit.percept_model import PAPER_RATES, PerceptFit, fit_percept, predicted_rate
+from analysis.predict.fit.percept_model import PAPER_RATES, PerceptFit, best_percept, fit_percept, predicted_rate
 from device.methods import paper_methods
 from device.parameters import GunParameters, VibrationParameters
 from device.physics import simulate, trace
@@ -170,9 +170,15 @@ def test_the_fit_says_what_it_cannot_tell(paper: PerceptFit) -> None:
 
 
 def test_another_exponent_meets_the_rates_as_well(paper: PerceptFit) -> None:
-    other = fit_percept(PAPER_RATES, METHODS, base=PerceptParameters(exponent=1.3, leak_s=0.015))
+    other = best_percept(PAPER_RATES, METHODS, base=PerceptParameters(exponent=1.3, leak_s=0.015))
     assert other.deviance == pytest.approx(0.0, abs=1e-9)
-    assert other.fitted["sensitivity"].value > 1.5 * paper.fitted["sensitivity"].value
+    assert other.parameters.sensitivity > 1.5 * paper.parameters.sensitivity
+
+
+def test_the_fit_without_its_intervals_is_the_fit(paper: PerceptFit) -> None:
+    alone = best_percept(PAPER_RATES, METHODS)
+    assert (alone.parameters, alone.deviance) == (paper.parameters, paper.deviance)
+    assert alone.covariance == paper.covariance
 
 
 def test_the_interval_s_ends_have_the_deviance_of_the_chi_squared_quantile(paper: PerceptFit) -> None:
@@ -185,9 +191,9 @@ def test_the_interval_s_ends_have_the_deviance_of_the_chi_squared_quantile(paper
 
 def test_with_people_who_differ_the_mean_rates_are_still_met() -> None:
     people = People(drift_factor_sd=0.3, logit_start_sd=0.3)
-    found = fit_percept(PAPER_RATES, METHODS, people=people)
-    assert found.predicted == pytest.approx(PAPER_RATES, abs=1e-6)
-    assert found.fitted["sensitivity"].value > DEFAULT.sensitivity
+    found = best_percept(PAPER_RATES, METHODS, people=people)
+    assert found.deviance == pytest.approx(0.0, abs=1e-9)
+    assert found.parameters.sensitivity > DEFAULT.sensitivity
 
 
 def test_rates_in_the_wrong_order_are_not_met_and_it_is_said() -> None:

@@ -27,9 +27,9 @@ def engine(request, monkeypatch):
 def test_a_batch_gives_the_digits_of_single_shots(engine, drive_off):
     rng = np.random.default_rng(3)
     arrays = {
-        "friction_N": rng.uniform(0, 2, 40),
-        "voltage_V": rng.uniform(0, 24, 40),
-        "pulse_s": rng.uniform(0, 0.03, 40),
+        "friction_N": rng.uniform(0, 2, 20),
+        "voltage_V": rng.uniform(0, 24, 20),
+        "pulse_s": rng.uniform(0, 0.03, 20),
     }
     found = simulate_batch(GunParameters(drive_off=drive_off), **arrays)
     for n, values in enumerate(zip(*(column.tolist() for column in arrays.values()), strict=True)):

@@ -45,6 +45,7 @@ def found(done: Path) -> Any:
     return json.loads((done / "power.json").read_text(encoding="utf-8"))
 
 
+@pytest.mark.slow
 def test_the_page_tells_what_was_found(done: Path, found: Any) -> None:
     page = (done / "report.md").read_text(encoding="utf-8")
     pattern = found["published_pattern"]
@@ -55,6 +56,7 @@ def test_the_page_tells_what_was_found(done: Path, found: Any) -> None:
     assert all(path.stat().st_mode & 0o077 == 0 for path in done.iterdir())
 
 
+@pytest.mark.slow
 def test_every_design_has_its_claims_with_intervals_and_its_cost(found: Any) -> None:
     assert [(one["participants"], one["effect"]) for one in found["designs"]] == [
         (8, 0.75),
@@ -68,6 +70,7 @@ def test_every_design_has_its_claims_with_intervals_and_its_cost(found: Any) -> 
         assert all(p["half_width"] > p["mc_error"] > 0 for p in one["precision"])
 
 
+@pytest.mark.slow
 def test_more_people_and_a_larger_effect_find_more(found: Any) -> None:
     share = {
         (one["participants"], one["effect"]): next(c["share"] for c in one["claims"] if c["claim"] == ALL_PAIRS)
@@ -77,6 +80,7 @@ def test_more_people_and_a_larger_effect_find_more(found: Any) -> None:
     assert share[8, 0.75] < share[14, 0.75] < share[14, 1.0]
 
 
+@pytest.mark.slow
 def test_the_smallest_design_is_the_cheapest_that_reaches_the_target(found: Any) -> None:
     for row in found["smallest"]:
         reaching = [
@@ -92,12 +96,14 @@ def test_the_smallest_design_is_the_cheapest_that_reaches_the_target(found: Any)
     assert any(row["design"] for row in found["smallest"])
 
 
+@pytest.mark.slow
 def test_the_same_seed_gives_the_same_bytes_on_two_processes(done: Path, recoil: Recoil, tmp_path: Path) -> None:
     again = recoil("power", "direction", *SMALL, "--workers", "2", "--out", "two")
     assert again.returncode == 0, again.stderr
     assert files(tmp_path / "two") == files(done)
 
 
+@pytest.mark.slow
 def test_another_seed_gives_other_studies(done: Path, recoil: Recoil, tmp_path: Path) -> None:
     again = recoil("power", "direction", *SMALL, "--seed", "2", "--workers", "1", "--out", "other", "--json")
     found = json.loads(again.stdout)
@@ -115,6 +121,7 @@ def cluster() -> Iterator[str]:
         yield running.scheduler_address
 
 
+@pytest.mark.slow
 def test_two_dask_workers_give_the_same_bytes_as_one_process(
     done: Path, cluster: str, recoil: Recoil, tmp_path: Path
 ) -> None:
@@ -123,6 +130,7 @@ def test_two_dask_workers_give_the_same_bytes_as_one_process(
     assert files(tmp_path / "dask") == files(done)
 
 
+@pytest.mark.slow
 def test_an_interrupted_job_goes_on_where_it_was(tmp_path: Path) -> None:
     words = warm("power", "direction", "--participants", 14, "--effect", 1, "--studies", 60000, "--workers", 1, "--out")
     whole, cut = tmp_path / "whole", tmp_path / "cut"
@@ -142,6 +150,7 @@ def test_an_interrupted_job_goes_on_where_it_was(tmp_path: Path) -> None:
     assert files(cut) == files(whole)
 
 
+@pytest.mark.slow
 def test_an_interrupted_job_on_processes_ends_and_leaves_none(tmp_path: Path) -> None:
     words = [RECOIL, "power", "direction", "--participants", "14", "--effect", "1", "--studies", "400000"]
     words += ["--workers", "2", "--out", tmp_path / "out"]
@@ -167,10 +176,9 @@ def alive_in(group: int) -> list[int]:
     return found
 
 
+@pytest.mark.slow
 def test_null_participants_find_what_is_not_there_in_five_percent(recoil: Recoil, tmp_path: Path) -> None:
-    again = recoil(
-        "power", "preference", "--null", "--participants", "14", "--studies", "20000", "--json", "--out", "n"
-    )
+    again = recoil("power", "preference", "--null", "--participants", "14", "--studies", "3000", "--json", "--out", "n")
     assert again.returncode == 0, again.stderr
     (design,) = json.loads(again.stdout)["designs"]
     anova = next(c for c in design["claims"] if c["claim"] == ANOVA)
@@ -299,6 +307,7 @@ def test_a_missing_dask_is_named(monkeypatch: pytest.MonkeyPatch) -> None:
         pass
 
 
+@pytest.mark.slow
 def test_assumptions_are_told(found: Any) -> None:
     told = " ".join(found["assumptions"])
     assert "0.557" in told

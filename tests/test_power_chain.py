@@ -12,6 +12,7 @@ from experiments.load import load_setup
 from tests.power_chain import counted, null_setup, said, through_the_chain
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("experiment", "participants"), [("direction", 4), ("preference", 8)])
 def test_the_claims_are_those_of_statistics_json(experiment: str, participants: int, tmp_path: Path) -> None:
     """With the config's own people, so that something is significant."""

@@ -45,13 +45,14 @@ def stepped(setup: Any, people: int) -> np.ndarray:
     return steps
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("instructions", [(), ("speed", "accuracy")])
 def test_the_answers_are_distributed_as_those_of_the_participant_step_by_step(
     instructions: tuple[str, ...], tmp_path: Path
 ) -> None:
     """Counts of a cell, and sums and differences over cells, in which people's differences show."""
     setup = load_setup(str(felt_config(tmp_path, instructions, SPREADS)))
-    steps = stepped(setup, 200)
+    steps = stepped(setup, 80)
     felt = felt_people(setup.config, percepts_of_setup(setup), METHODS)
     at_once = felt_counts(felt, (10, 10), 50, 400, generator(1, "test")).reshape(-1, 3, 2)
     summaries = {
@@ -125,6 +126,7 @@ def test_trials_must_give_every_instruction_its_sets(tmp_path: Path) -> None:
     assert {cell.design.trials for cell in grid.cells} == {10, 20, 30, 40}
 
 
+@pytest.mark.slow
 def test_the_command_says_who_they_are_and_two_processes_give_the_same_bytes(recoil: Recoil, tmp_path: Path) -> None:
     folder = tmp_path / "study"
     folder.mkdir()

@@ -60,7 +60,7 @@ def draws(number: int = 1) -> np.random.Generator:
 
 def test_the_answers_are_distributed_as_those_of_the_observer_step_by_step() -> None:
     """Correct counts of a cell, and the sum over all cells, in which people's ability and bias show."""
-    people = 600
+    people = 200
     plan = make_plan(DIRECTION, "P01", 1, None)
     steps = np.zeros((people, 3, 2), dtype=np.int64)
     for person in range(people):

@@ -16,7 +16,6 @@ from experiments.catalogue import rebuild
 from experiments.clock import VirtualClock
 from experiments.config.setup import Setup, canonical_json
 from experiments.design.plan import Plan
-from experiments.load import load_setup
 from experiments.record.journal import Journal, JournalError, link_of, read_journal
 from experiments.record.replay import go_on, history, replay
 from experiments.run import Again, RunRequest, run
@@ -25,10 +24,17 @@ from experiments.session.states import EMERGENCY
 from experiments.study import register
 from experiments.study.folders import PlaceError, place
 from experiments.study.register import RegisterError
+from tests.at_controls import changed
 from tests.journals import raw
 
-SETUPS = {name: load_setup(name) for name in ("direction", "preference")}
-EVERY = {"direction": 7, "preference": 1}
+SETUPS = {
+    "direction": changed(
+        "direction",
+        design={"sets_per_session": 2, "trials_per_set": 2, "forward_per_session": 2, "backward_per_session": 2},
+    ),
+    "preference": changed("preference", timing={"exposure_s": 5.0}),
+}
+"""Of every step several: three sessions of two sets of two trials; three trains of a few shots."""
 ANSWERS = {
     "direction": ("response", "correct", "response_time_s", "response_source", "response_time_valid"),
     "preference": ("rating", "rating_by", "comment", "shots"),
@@ -136,10 +142,6 @@ def check_resumed(whole: Unbroken, journal: Path, records: int) -> None:
     assert raw(contents.path)[-1]["table_sha256"] == hashlib.sha256(done.place.table.read_bytes()).hexdigest()
 
 
-def cuts(name: str, whole: Unbroken) -> range:
-    return range(1, len(whole.lines), EVERY[name])
-
-
 def test_an_unbroken_run_has_one_attempt_a_trial_and_no_flag(unbroken: dict[str, Unbroken]) -> None:
     for whole in unbroken.values():
         assert {(row["attempts"], row["flags"]) for row in whole.rows} == {("1", "")}
@@ -147,12 +149,13 @@ def test_an_unbroken_run_has_one_attempt_a_trial_and_no_flag(unbroken: dict[str,
         assert whole.records[-1]["table_sha256"] == hashlib.sha256(whole.table).hexdigest()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", SETUPS)
 def test_a_run_broken_off_at_any_record_goes_on_to_the_same_answers(
     name: str, unbroken: dict[str, Unbroken], tmp_path: Path
 ) -> None:
     whole = unbroken[name]
-    for records in cuts(name, whole):
+    for records in range(1, len(whole.lines)):
         check_resumed(whole, broken_off(whole, tmp_path / str(records), records), records)
 
 
@@ -203,7 +206,7 @@ def test_the_head_of_a_resumption_says_what_it_goes_on_with(
 # refused
 
 
-def changed(name: str) -> Iterator[Setup[Any]]:
+def others(name: str) -> Iterator[Setup[Any]]:
     setup = SETUPS[name]
     yield replace(setup, config=setup.config.model_copy(update={"title": "another"}))
     yield replace(setup, gun=setup.gun.model_copy(update={"title": "another"}))
@@ -217,7 +220,7 @@ def test_another_config_gun_or_table_of_answers_is_refused(
 ) -> None:
     journal = broken_off(unbroken[name], tmp_path, records)
     before = journal.read_bytes()
-    for setup in changed(name):
+    for setup in others(name):
         with pytest.raises(PlaceError, match=r"began with another config or gun file .*--fresh"):
             run(request(name, tmp_path, "resume", setup=setup), synthetic_screen, VirtualClock())
     assert journal.read_bytes() == before

@@ -12,6 +12,7 @@ from experiments.clock import Clock, VirtualClock
 from experiments.config.setup import Setup
 from experiments.design.plan import Plan
 from experiments.live_run import RunStopped
+from experiments.load import load_setup
 from experiments.record.journal import Journal, read_journal
 from experiments.run import RunRequest, run
 from experiments.runner import MAX_FAILURES
@@ -34,7 +35,7 @@ def test_an_answer_is_acknowledged_once_its_record_is_on_the_disk(name: str, tmp
     done = desk.carry_out()
     steps = Counter(step.kind for step, _ in done)
     trials = len(desk.plan.trials)
-    rests = {"rest": 11} if name == "direction" else {}
+    rests = {"rest": 5} if name == "direction" else {}
     each = ("prepare", "fire", "ask") if name == "direction" else ("prepare", "present", "rate", "describe")
     assert steps == dict.fromkeys(each, trials) | rests | {"close": 1}
     assert desk.screen.acknowledged == len(done)
@@ -46,7 +47,7 @@ def test_each_stimulus_is_armed_for_itself_and_disarmed_behind_it(name: str, tmp
     desk.carry_out()
     words = [word for word in desk.gun.asked if word in ("arm", "fire", "disarm")]
     trains = "".join(word[0] for word in words).split("d")
-    stimuli = 60 if name == "direction" else 3
+    stimuli = 12 if name == "direction" else 3
     assert [train[:2] for train in trains if train] == ["af"] * stimuli
     assert all(train[1:] == "f" * len(train[1:]) for train in trains if train)
     assert words[-1] == "disarm"
@@ -86,7 +87,7 @@ def test_shots_of_a_train_come_at_whole_multiples_of_the_interval(tmp_path: Path
 
 
 def test_a_virtual_run_takes_the_planned_time(tmp_path: Path) -> None:
-    desk = sitting("direction", tmp_path)
+    desk = sitting("direction", tmp_path, setup=load_setup("direction"))
     desk.carry_out()
     # 780 s of breaks, 60 hand-overs of 15.8 s, and answers of about 1.2 s
     assert desk.clock.now() == pytest.approx(30 * 60, rel=0.01)
@@ -223,7 +224,7 @@ def test_the_gun_is_disarmed_after_any_exception_of_the_screen(
 @BOTH
 def test_what_was_acknowledged_before_an_interrupt_is_there_when_resumed(name: str, tmp_path: Path) -> None:
     desk = sitting(name, tmp_path)
-    desk.screen.trouble[9] = KeyboardInterrupt()
+    desk.screen.trouble[10 if name == "direction" else 9] = KeyboardInterrupt()
     with suppress(KeyboardInterrupt):
         desk.carry_out()
     before = read_journal(desk.where.journal).records
@@ -251,7 +252,7 @@ def test_an_interrupted_run_leaves_a_reason_and_a_table_of_what_was_answered(tmp
     assert (last.kind, last.reason) == ("stopped", "interrupted")
     with where.table.open(newline="") as file:
         rows = list(csv.DictReader(file))
-    assert len(rows) == 60
+    assert len(rows) == 12
     assert [number for number, row in enumerate(rows) if row["response"]] == [0]
 
 

@@ -16,14 +16,15 @@ from hypothesis import strategies as st
 from scipy import stats
 
 from analysis.logs.reading import read_logs
+from analysis.report.page import write_page
+from analysis.report.section import Section
 from analysis.summary.figures.trade import (
     figure_conditional_accuracy,
     figure_quantile_probability,
     has_curve,
     has_points,
 )
-from analysis.summary.sections.content import ReportData
-from analysis.summary.sections.sections import write_report
+from analysis.summary.results import StudyStatistics
 from analysis.summary.sections.trade import CONDITIONAL_ACCURACY, QUANTILE_PROBABILITY, trade_section
 from analysis.summary.summary import summarize
 from analysis.times import trade
@@ -31,7 +32,7 @@ from analysis.times.first_passage import moments
 from analysis.times.fit import fit
 from analysis.times.likelihood import trials_of
 from analysis.times.own_trials import ordered, own_trials, quantiles
-from analysis.times.people import MOST_PEOPLE, as_trials, fit_people, sampled_fit
+from analysis.times.people import MOST_PEOPLE, as_trials, fit_people
 from analysis.times.trade import ez, ez_people
 from experiments.design.streams import generator
 from experiments.record import tables
@@ -113,8 +114,18 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 @pytest.fixture(scope="module")
-def found(folder: Path) -> Any:
-    return found_in(folder)
+def statistics(folder: Path) -> StudyStatistics:
+    return summarize(read_logs([folder]))
+
+
+@pytest.fixture(scope="module")
+def found(statistics: StudyStatistics) -> Any:
+    return statistics.to_dict()["direction"]["speed_accuracy"]
+
+
+def page_of(section: Section, out: Path) -> str:
+    write_page(out, "Trade", (section,))
+    return (out / "report.md").read_text(encoding="utf-8")
 
 
 @pytest.mark.parametrize("method", METHODS)
@@ -197,7 +208,7 @@ def test_estimates_lie_around_what_the_answers_were_drawn_with(found: Any) -> No
 
 
 def test_accuracy_times_and_ez_are_the_closed_forms_of_the_diffusion(tmp_path: Path) -> None:
-    found = found_in(study(tmp_path, people=4, trials=1_500, instructions=("",)))
+    found = found_in(study(tmp_path, people=4, trials=800, instructions=("",)))
     assert found["instructions"] == ["neutral"]
     assert found["instruction_effects"] == []
     for method in ("asymmetric-1", "asymmetric-2"):
@@ -225,11 +236,11 @@ def test_times_from_the_experimenters_hand_are_refused_with_the_reason(tmp_path:
     assert "the experimenter's hand" in found["reason"]
     assert found["refused"]["experimenter"]["trials"] == 120
     assert "reaction to it" in found["refused"]["experimenter"]["why"]
-    write_report(tmp_path / "out", ReportData(title="Hand", statistics=statistics))
-    text = (tmp_path / "out" / "report.md").read_text(encoding="utf-8")
+    section = trade_section(statistics.direction)
+    text = page_of(section, tmp_path)
     assert "all times came from the experimenter's hand" in text
     assert "Refused of 120 answered trials: 120 because the time came from the experimenter's hand" in text
-    assert not list((tmp_path / "out" / "figures").glob("figure-[cq][ou]*"))
+    assert not section.pictures
     for figure in (figure_conditional_accuracy, figure_quantile_probability):
         with pytest.raises(ValueError, match="needs somebody"):
             figure(statistics.direction, tmp_path / "none")
@@ -344,8 +355,10 @@ def changed(rows: list[TextRow], kind: str) -> list[TextRow]:
 KINDS = ["all correct", "all wrong", "equal times", "tiny times", "no times", "one trial", "one time", "told by method"]
 
 
-@pytest.mark.parametrize("people", [1, 2])
-@pytest.mark.parametrize("kind", KINDS)
+OF_TWO = ("all correct", "no times", "one trial", "one time", "told by method")
+
+
+@pytest.mark.parametrize(("kind", "people"), [*((kind, 1) for kind in KINDS), *((kind, 2) for kind in OF_TWO)])
 def test_whatever_the_log_there_is_a_section_and_no_nan(kind: str, people: int, tmp_path: Path) -> None:
     for i in range(people):
         rows = trial_rows(f"P{i}", i, sets=2)
@@ -373,6 +386,7 @@ def test_whatever_the_log_there_is_a_section_and_no_nan(kind: str, people: int, 
     assert bool(section.pictures) == (kind not in ("no times", "one trial", "one time"))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("kind", ["all correct", "told by method"])
 def test_figures_are_drawn_where_there_is_little_to_draw(kind: str, tmp_path: Path) -> None:
     write_rows(trials_path(tmp_path, "P1"), changed(trial_rows("P1", sets=2), kind))
@@ -450,28 +464,32 @@ def test_a_high_bar_of_correct_answers_keeps_the_lucky_guessers() -> None:
 
 
 def test_a_crowd_is_fitted_by_a_sample_of_people_whose_codes_are_evenly_spaced(tmp_path: Path) -> None:
-    people = 3 * MOST_PEOPLE
+    people = 3 * MOST_PEOPLE // 2
     logs = read_logs([write_many(tmp_path, people)])
-    own = own_trials(logs.trials, METHODS)
-    found = sampled_fit(own)
-    assert (found.people, found.fitted, found.trials) == (people, MOST_PEOPLE, 60 * MOST_PEOPLE)
-    chosen = np.round(np.linspace(0, people - 1, MOST_PEOPLE)).astype(int)
-    trials = as_trials(own.of(np.isin(own.person, chosen)))
-    direct = fit(trials, by_person=True)
-    assert found.together is not None
-    assert found.together.log_likelihood == pytest.approx(direct.log_likelihood)
     shown = summarize(logs).to_dict()["direction"]["speed_accuracy"]
-    assert (shown["people"], shown["diffusion"]["fitted"]) == (people, MOST_PEOPLE)
+    sample = shown["diffusion"]
+    assert shown["people"] == people
+    assert (sample["people"], sample["fitted"], sample["trials"]) == (people, MOST_PEOPLE, 60 * MOST_PEOPLE)
+    own = own_trials(logs.trials, METHODS)
+    chosen = np.round(np.linspace(0, people - 1, MOST_PEOPLE)).astype(int)
+    direct = fit(as_trials(own.of(np.isin(own.person, chosen))), by_person=True)
+    for name, one in sample["together"]["estimates"].items():
+        assert [one["value"], one["se"]] == pytest.approx([direct[name].value, direct[name].se], abs=1e-4)
 
 
 # The report
 
 
-def test_the_report_shows_figures_tables_and_caveats(folder: Path, tmp_path: Path) -> None:
-    write_report(tmp_path, ReportData(title="Trade", statistics=summarize(read_logs([folder]))))
-    text = (tmp_path / "report.md").read_text(encoding="utf-8")
-    section = text.partition("## Speed and accuracy")[2].partition("\n## ")[0]
+@pytest.mark.slow
+def test_the_section_shows_figures_tables_and_caveats(statistics: StudyStatistics, tmp_path: Path) -> None:
+    section = trade_section(statistics.direction)
+    assert [picture.stem for picture in section.pictures] == [CONDITIONAL_ACCURACY, QUANTILE_PROBABILITY]
+    (tmp_path / "figures").mkdir()
+    figure_conditional_accuracy(statistics.direction, tmp_path / "figures" / CONDITIONAL_ACCURACY)
+    figure_quantile_probability(statistics.direction, tmp_path / "figures" / QUANTILE_PROBABILITY)
+    text = page_of(section, tmp_path)
     for words in (
+        "## Speed and accuracy",
         "1,080 of 1,080 answered trials have a time of the answerer's own hand (6 participants).",
         "| Vibration, speed | 180 |",
         "| speed − accuracy | all methods | 6 |",
@@ -480,8 +498,8 @@ def test_the_report_shows_figures_tables_and_caveats(folder: Path, tmp_path: Pat
         "| drift Asymmetric Force II | 1/√s |",
         "Where people differ it is biased",
     ):
-        assert words in section
+        assert words in text
     for stem in ("conditional-accuracy", "quantile-probability"):
-        assert f"figures/figure-{stem}.png" in section
+        assert f"figures/figure-{stem}.png" in text
         for kind in ("png", "svg", "pdf"):
             assert (tmp_path / "figures" / f"figure-{stem}.{kind}").stat().st_size > 5_000

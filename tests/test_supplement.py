@@ -33,6 +33,11 @@ def found(logs: Logs) -> dict[str, Any]:
     return summarize(logs).to_dict()
 
 
+@pytest.fixture(scope="module")
+def published_like(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Any]:
+    return study_of(tmp_path_factory.mktemp("right"), RIGHT, timed=False).to_dict()
+
+
 @pytest.mark.parametrize("experiment", ["direction", "preference"])
 def test_every_key_is_there_and_plain_json(experiment: str, found: dict[str, Any]) -> None:
     assert {field.name for field in fields(Supplement)} < set(found[experiment])
@@ -40,9 +45,9 @@ def test_every_key_is_there_and_plain_json(experiment: str, found: dict[str, Any
     assert ("model" in found[experiment]) == (experiment == "direction")
 
 
-def test_published_like_rates_give_the_numbers_of_r(tmp_path: Path) -> None:
+def test_published_like_rates_give_the_numbers_of_r(published_like: dict[str, Any]) -> None:
     # R 4.2.2, afex 1.2.1 and emmeans 1.8.4: pairs(emmeans(a, "m", model = "multivariate")); see test_sphericity
-    direction = study_of(tmp_path, RIGHT).to_dict()["direction"]
+    direction = published_like["direction"]
     assert direction["sphericity"]["W"] == pytest.approx(0.542433747971877)
     assert direction["effect_size"]["generalized_eta_squared"] == pytest.approx(0.639745796372302)
     assert direction["friedman"]["chi2"] == pytest.approx(25.5294117647059)
@@ -71,25 +76,23 @@ def test_outliers_are_named_by_participant_and_method(tmp_path: Path) -> None:
     assert diagnostics["scale"] == [0.0, 10.0]
 
 
-def test_low_epsilon_warns_against_the_pooled_tukey_once_at_the_top(tmp_path: Path) -> None:
-    found = study_of(tmp_path, RIGHT).to_dict()
-    assert found["direction"]["sphericity"]["greenhouse_geisser"]["epsilon"] < 0.75
-    assert [warning for warning in found["warnings"] if "tukey_paired" in warning] == [
+def test_low_epsilon_warns_against_the_pooled_tukey_once_at_the_top(published_like: dict[str, Any]) -> None:
+    assert published_like["direction"]["sphericity"]["greenhouse_geisser"]["epsilon"] < 0.75
+    assert [warning for warning in published_like["warnings"] if "tukey_paired" in warning] == [
         "direction: sphericity does not hold (Greenhouse-Geisser epsilon below 0.75): read the corrected F test and "
         "the Tukey test with each pair's own error (tukey_paired), not the pooled one"
     ]
 
 
-def test_milder_departures_stay_beside_the_assumptions(tmp_path: Path) -> None:
-    found = study_of(tmp_path, RIGHT).to_dict()
-    told = [entry["warning"] for entry in found["direction"]["assumptions"] if entry["warning"]]
+def test_milder_departures_stay_beside_the_assumptions(published_like: dict[str, Any]) -> None:
+    told = [entry["warning"] for entry in published_like["direction"]["assumptions"] if entry["warning"]]
     assert any("asymmetric-2 (ceiling 10 of 14)" in warning for warning in told)
-    assert len(found["warnings"]) == 1
+    assert len(published_like["warnings"]) == 1
 
 
 def test_clustering_that_turns_the_pooled_test_over_is_told_at_the_top(tmp_path: Path) -> None:
     counts = [[10, 8, 9], [10, 9, 8], [10, 8, 9], [9, 7, 8], [10, 8, 9], [1, 8, 9], [0, 8, 9], [2, 9, 8]]
-    found = study_of(tmp_path, counts).to_dict()
+    found = study_of(tmp_path, counts, timed=False).to_dict()
     test = found["direction"]["binomial"]["vibration"]["forward"]
     assert test["p"] < 0.05 < test["clustering"]["p_adjusted"]
     assert any("pooled binomial test is not to be read: vibration forward" in warning for warning in found["warnings"])
@@ -114,7 +117,7 @@ DEGENERATE = {
 def test_supplements_of_any_scores_are_finite_or_have_a_reason() -> None:
     """Nearly degenerate, huge, tiny and far from 0: a warning of a library would fail the test, too."""
     rng = np.random.default_rng(6)
-    for _ in range(150):
+    for _ in range(60):
         n, k = int(rng.integers(2, 16)), int(rng.integers(2, 6))
         size = rng.choice([1.0, 0.1, 1e-200, 1e200])
         scores = size * (np.add.outer(rng.integers(0, 11, n), rng.integers(0, 4, k)) + rng.choice([0.0, 1e9]))
@@ -135,7 +138,7 @@ def _numbers(value: Any) -> list[float]:
 
 @pytest.mark.parametrize("name", DEGENERATE)
 def test_degenerate_answers_never_crash_and_never_give_a_silent_number(name: str, tmp_path: Path) -> None:
-    statistics = study_of(tmp_path, DEGENERATE[name])
+    statistics = study_of(tmp_path, DEGENERATE[name], timed=False)
     found = statistics.to_dict()
     direction = found["direction"]
     assert np.isfinite(_numbers(found)).all()
@@ -156,7 +159,7 @@ def test_degenerate_ratings_never_crash_either(name: str, tmp_path: Path) -> Non
 
 
 def test_all_at_ceiling_gives_reasons_everywhere(tmp_path: Path) -> None:
-    direction = study_of(tmp_path, CEILING).to_dict()["direction"]
+    direction = study_of(tmp_path, CEILING, timed=False).to_dict()["direction"]
     assert direction["effect_size"]["partial_eta_squared"] is None
     assert direction["friedman"]["reason"]
     assert [pair["p"] for pair in direction["paired_t"]] == [None] * 3
@@ -167,13 +170,13 @@ def test_all_at_ceiling_gives_reasons_everywhere(tmp_path: Path) -> None:
 
 
 def test_fewer_people_than_methods_have_no_mauchly_test_but_a_reason(tmp_path: Path) -> None:
-    sphericity = study_of(tmp_path, RIGHT[:2]).to_dict()["direction"]["sphericity"]
+    sphericity = study_of(tmp_path, RIGHT[:2], timed=False).to_dict()["direction"]["sphericity"]
     assert (sphericity["W"], sphericity["huynh_feldt"]) == (None, None)
     assert "fewer participants than conditions" in sphericity["reason"]
 
 
 def test_two_methods_need_no_sphericity(tmp_path: Path) -> None:
-    found = study_of(tmp_path, RIGHT[:, :2], ("ramp", "click")).to_dict()["direction"]
+    found = study_of(tmp_path, RIGHT[:, :2], ("ramp", "click"), timed=False).to_dict()["direction"]
     (pair,) = found["paired_t"]
     assert found["anova"]["F"] == pytest.approx(pair["t"] ** 2)
     assert found["anova"]["p"] == pytest.approx(pair["p"]) == pytest.approx(found["tukey_paired"][0]["p"])
@@ -185,7 +188,7 @@ def test_two_methods_need_no_sphericity(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize("right", [RIGHT[:1], RIGHT[:, :1]])
 def test_one_person_or_one_method_has_no_supplement(right: Any, tmp_path: Path) -> None:
-    statistics = study_of(tmp_path, right, METHODS[: right.shape[1]])
+    statistics = study_of(tmp_path, right, METHODS[: right.shape[1]], timed=False)
     found, direction = statistics.direction, statistics.to_dict()["direction"]
     assert found is not None
     assert found.supplement is None
@@ -203,6 +206,7 @@ def test_the_paired_tukey_is_the_one_of_the_core(found: dict[str, Any]) -> None:
     ]
 
 
+@pytest.mark.slow
 def test_nothing_slow_is_imported_before_it_is_used() -> None:
     program = "import sys, analysis.summary.summary; print([m for m in {'pingouin', 'statsmodels'} & {*sys.modules}])"
     done = subprocess.run(

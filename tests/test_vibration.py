@@ -2,14 +2,15 @@ import re
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import example, given, settings
 from hypothesis import strategies as st
+from scipy.integrate import cumulative_simpson
 from scipy.optimize import brentq
 
 from device.vibration import RESIDUAL, VibrationParameters, solved, waveform
 
 
-def shape(parameters, points=400_001):
+def shape(parameters, points=40_001):
     time_s, acceleration = waveform(parameters, points)
     rms = np.sqrt(np.trapezoid(acceleration**2, time_s) / time_s[-1])
     return np.abs(acceleration).max(), rms, time_s[-1]
@@ -52,18 +53,20 @@ def test_two_terms_of_the_frequency_decay_at_rates_of_their_own():
 
 
 def test_what_vibrated_is_at_rest_at_its_place_again():
-    time_s = np.linspace(0.0, 0.3, 3_000_001)
-    step_s, a = time_s[1], solved(VibrationParameters()).acceleration_m_s2(time_s)
-    speed = np.concatenate([[0.0], np.cumsum((a[1:] + a[:-1]) / 2 * step_s)])
-    place = np.cumsum(speed) * step_s
+    time_s = np.linspace(0.0, 0.3, 100_001)
+    speed = cumulative_simpson(solved(VibrationParameters()).acceleration_m_s2(time_s), x=time_s, initial=0.0)
+    place = cumulative_simpson(speed, x=time_s, initial=0.0)
     assert abs(speed[-1]) < 1e-7 * np.abs(speed).max()
     assert abs(place[-1]) < 1e-5 * np.abs(place).max()
 
 
+@pytest.mark.slow
 @given(
     peak=st.floats(1.0, 1e4), ratio=st.floats(0.12, 0.35), duration=st.floats(0.005, 0.5), cycles=st.floats(2.0, 50.0)
 )
-@settings(max_examples=10, deadline=None)
+@example(peak=1.0, ratio=0.12, duration=0.005, cycles=50.0)
+@example(peak=1e4, ratio=0.35, duration=0.5, cycles=2.0)
+@settings(max_examples=5, deadline=None)
 def test_any_solvable_request_is_met(peak, ratio, duration, cycles):
     asked = VibrationParameters(
         peak_m_s2=peak, rms_m_s2=ratio * peak, duration_s=duration, frequency_Hz=cycles / duration

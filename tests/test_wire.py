@@ -112,7 +112,7 @@ def test_a_frame_that_cannot_be_written_cannot_be_built(number, body):
         Frame(number=number, body=body)
 
 
-@settings(max_examples=2000)
+@settings(max_examples=500)
 @given(st.binary(max_size=2 * MAX_LINE), SENDERS)
 @example(b">0001 A~", "host")
 def test_any_line_is_a_frame_or_a_link_error(line, sender):
@@ -123,7 +123,7 @@ def test_any_line_is_a_frame_or_a_link_error(line, sender):
     assert encode(frame, sender) == line + b"\n"
 
 
-@settings(max_examples=1000)
+@settings(max_examples=300)
 @given(st.text(max_size=300) | BODIES)
 @example("٣")
 @example("SHOT 1,1,DONE,1,1,1,1,a,FORW,PULS,1,1,²")

@@ -126,6 +126,7 @@ def percept_of_summary(shot: ShotSummary, magnet_mass_kg: float, leak_s: float) 
     return Percept(first=first, reaction=reaction, second=blow)
 
 
+@lru_cache(maxsize=512)
 def percept_of(method: Method, leak_s: float) -> Percept:
     """The percept of a method's shot by the full model; `SILENT` for a vibration."""
     if not isinstance(method, GunParameters):

@@ -16,7 +16,7 @@ from scipy import special
 from scipy.optimize import brentq
 
 from analysis.predict.design_search.space import Layer, Space, shot_of
-from analysis.predict.fit.percept_model import FITTED, PAPER_RATES, PerceptFit, fit_percept
+from analysis.predict.fit.percept_model import FITTED, PAPER_RATES, PerceptFit, best_percept
 from analysis.stats.arrays import FloatArray
 from device.limits import TRAIN_LIMITS, broken_limit
 from device.methods import Method
@@ -396,7 +396,7 @@ def alternatives(methods: dict[str, Method], layer: Layer, voltage_V: tuple[floa
     """The contour under each other assumption."""
     volts = np.array(voltage_V)
     for name, base in base_parameters():
-        other = fit_percept(PAPER_RATES, methods, base=base)
+        other = best_percept(PAPER_RATES, methods, base=base)
         found = crossings(rates(layer.felt[base.leak_s], other.parameters), volts)
         yield Alternative(
             name=name,
