@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import re
 import time
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -14,6 +13,7 @@ from experiments.session import events
 from experiments.session.events import ACTS, Event
 from experiments.session.states import TABLE, No, State
 from tests.at_display import AtConsole, middle, records, remarks
+from tests.at_runs import shorten
 from tests.waiting import wait_for
 from tests.watched_console import Watch
 
@@ -35,17 +35,9 @@ def short_configs(folder: Path) -> Path:
     configs.mkdir(exist_ok=True)
     for source in shipped_folder().glob("*.toml"):
         (configs / source.name).write_text(source.read_text())
-    text = (configs / "direction.toml").read_text()
-    for key, value in (
-        ("methods", '["vibration", "asymmetric-2"]'),
-        ("sets_per_session", "2"),
-        ("trials_per_set", "2"),
-        ("forward_per_session", "2"),
-        ("backward_per_session", "2"),
-        ("between_sets_s", "600.0"),
-    ):
-        text = re.sub(rf"^{key} = [^#\n]*", f"{key} = {value} ", text, count=1, flags=re.MULTILINE)
-    (configs / "direction.toml").write_text(text)
+    shorten(configs)
+    config = configs / "direction.toml"
+    config.write_text(config.read_text().replace("between_sets_s = 20.0", "between_sets_s = 600.0"))
     return configs
 
 
