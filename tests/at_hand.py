@@ -142,7 +142,7 @@ class Cell:
                 screen.close()
         screen = self._console("--resume" if self.state is S.REARMING else "--fresh")
         try:
-            self._go(screen)
+            self.bring(screen)
         except BaseException:
             screen.__exit__()
             raise
@@ -153,7 +153,8 @@ class Cell:
         screen.stands("Recoil – P01")
         return screen
 
-    def _go(self, screen: AtConsole) -> None:
+    def bring(self, screen: AtConsole) -> None:
+        """Bring a console to the state; where a trial has to be before it, to the second of a session."""
         match self.state:
             case S.FIRING:
                 screen.to("preparing", trial=2)
@@ -316,6 +317,17 @@ def check_cell(cell: Cell, action: Action) -> Happened:
     check(cell, action, happened)
     check_gun(cell.watch, cell.journal)
     return happened
+
+
+def check_in_one_run(cell: Cell, *accidents: tuple[State, str]) -> None:
+    """The same of several in one run, in an order in which it comes to them."""
+    cell.state = accidents[0][0]
+    with cell.reach() as screen:
+        for state, name in accidents:
+            cell.state = state
+            cell.bring(screen)
+            check(cell, ACTIONS[name], carry_out(cell, ACTIONS[name], screen))
+    check_gun(cell.watch, cell.journal)
 
 
 PARTICIPANT = "Recoil: participant"
