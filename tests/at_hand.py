@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import re
 import time
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -14,6 +13,7 @@ from experiments.session import events
 from experiments.session.events import ACTS, Event
 from experiments.session.states import TABLE, No, State
 from tests.at_display import AtConsole, middle, records, remarks
+from tests.at_runs import shorten
 from tests.waiting import wait_for
 from tests.watched_console import Watch
 
@@ -35,17 +35,9 @@ def short_configs(folder: Path) -> Path:
     configs.mkdir(exist_ok=True)
     for source in shipped_folder().glob("*.toml"):
         (configs / source.name).write_text(source.read_text())
-    text = (configs / "direction.toml").read_text()
-    for key, value in (
-        ("methods", '["vibration", "asymmetric-2"]'),
-        ("sets_per_session", "2"),
-        ("trials_per_set", "2"),
-        ("forward_per_session", "2"),
-        ("backward_per_session", "2"),
-        ("between_sets_s", "600.0"),
-    ):
-        text = re.sub(rf"^{key} = [^#\n]*", f"{key} = {value} ", text, count=1, flags=re.MULTILINE)
-    (configs / "direction.toml").write_text(text)
+    shorten(configs)
+    config = configs / "direction.toml"
+    config.write_text(config.read_text().replace("between_sets_s = 20.0", "between_sets_s = 600.0"))
     return configs
 
 
@@ -150,7 +142,7 @@ class Cell:
                 screen.close()
         screen = self._console("--resume" if self.state is S.REARMING else "--fresh")
         try:
-            self._go(screen)
+            self.bring(screen)
         except BaseException:
             screen.__exit__()
             raise
@@ -161,7 +153,8 @@ class Cell:
         screen.stands("Recoil – P01")
         return screen
 
-    def _go(self, screen: AtConsole) -> None:
+    def bring(self, screen: AtConsole) -> None:
+        """Bring a console to the state; where a trial has to be before it, to the second of a session."""
         match self.state:
             case S.FIRING:
                 screen.to("preparing", trial=2)
@@ -324,6 +317,17 @@ def check_cell(cell: Cell, action: Action) -> Happened:
     check(cell, action, happened)
     check_gun(cell.watch, cell.journal)
     return happened
+
+
+def check_in_one_run(cell: Cell, *accidents: tuple[State, str]) -> None:
+    """The same of several in one run, in an order in which it comes to them."""
+    cell.state = accidents[0][0]
+    with cell.reach() as screen:
+        for state, name in accidents:
+            cell.state = state
+            cell.bring(screen)
+            check(cell, ACTIONS[name], carry_out(cell, ACTIONS[name], screen))
+    check_gun(cell.watch, cell.journal)
 
 
 PARTICIPANT = "Recoil: participant"

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import csv
+import re
 from pathlib import Path
 
 from experiments.record.journal import read_journal
@@ -12,6 +13,24 @@ from experiments.session.steps import Answered
 DIRECTION = "results/sub-P01/sub-P01_task-direction"
 PREFERENCE = "results/sub-P01/sub-P01_task-preference"
 RUN = "Recoil – P01"
+
+
+SHORT_TRIALS = 8
+
+
+def shorten(configs: Path) -> None:
+    """Experiment 1 with two methods of two sets of two trials: `SHORT_TRIALS`."""
+    config = configs / "direction.toml"
+    text = config.read_text()
+    for key, value in (
+        ("methods", '["vibration", "asymmetric-2"]'),
+        ("sets_per_session", "2"),
+        ("trials_per_set", "2"),
+        ("forward_per_session", "2"),
+        ("backward_per_session", "2"),
+    ):
+        text = re.sub(rf"^{key} = [^#\n]*", f"{key} = {value} ", text, count=1, flags=re.MULTILINE)
+    config.write_text(text)
 
 
 def words(configs: Path, experiment: str, *more: object) -> list[object]:

@@ -27,6 +27,7 @@ from experiments.run import RunRequest
 from experiments.screens.console import widgets
 from experiments.session.states import State
 from tests.at_controls import short_direction
+from tests.warm_start import warm
 
 TICK_MS = 5
 HANG_S = 1.0
@@ -216,8 +217,7 @@ def window_alone() -> dict[str, Any]:
 def child(*words: object) -> dict[str, Any]:
     """What the program of this module tells of a case."""
     done = subprocess.run(
-        [sys.executable, "-m", "tests.faulty_console", *map(str, words)],
-        cwd=Path(__file__).parent.parent,
+        warm("-m", "tests.faulty_console", *words),
         env=os.environ | {"QT_QPA_PLATFORM": "offscreen"},
         capture_output=True,
         text=True,

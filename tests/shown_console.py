@@ -1,4 +1,4 @@
-"""The console's window in every state and at several sizes: what of it is cut, and pictures of it.
+"""The console's window in every state and at several sizes: what of it is cut, and pictures of where something is.
 
 Called as a program with a folder for the pictures and sizes as 1024x600 in the window's own pixels, under an
 environment that says the scaling; the last line is what was cut, in JSON. Whole runs on the simulated gun go by for it.
@@ -31,7 +31,7 @@ from tests.at_controls import changed, short_direction
 
 LOOK_MS = 5
 SETTLE = 8
-"""So many rounds of events until a layout stands."""
+"""The most rounds of events until a layout stands."""
 HURRY = "Answer as fast as you can, but do not guess before you have felt where the shot went."
 GONE = (
     "results/sub-P01/sub-P01_task-direction_journal.jsonl: the journal was deleted during the run. Everything up to "
@@ -322,8 +322,9 @@ def carry_out(folder: Path, sizes: list[tuple[int, int]]) -> dict[str, list[str]
         for width, height in sizes:
             settle(window, width, height)
             found[f"{width}x{height}, {name}"] = cut(window)
-            file = f"{width}x{height} {re.sub('[^a-z]+', '-', name)}.png"
-            window.grab().save(str(folder / file))
+            if found[f"{width}x{height}, {name}"]:
+                file = f"{width}x{height} {re.sub('[^a-z]+', '-', name)}.png"
+                window.grab().save(str(folder / file))
 
     with tempfile.TemporaryDirectory() as results:
         for experiment, turns, again in (
@@ -336,13 +337,18 @@ def carry_out(folder: Path, sizes: list[tuple[int, int]]) -> dict[str, list[str]
 
 
 def settle(window: Any, width: int, height: int) -> None:
-    from PyQt6.QtWidgets import QApplication
+    from PyQt6.QtWidgets import QApplication, QWidget
 
     window.showNormal()
     window.resize(width, height)
+    places: list[Any] = []
     for _ in range(SETTLE):
+        before = places
         QApplication.processEvents()
         window.refresh()
+        places = [(one.geometry(), one.isVisible()) for one in window.findChildren(QWidget)]
+        if places == before:
+            return
 
 
 def one_run(  # noqa: PLR0917 - each is needed once

@@ -13,7 +13,7 @@ from pathlib import Path
 import pytest
 
 from tests.at_display import AtConsole, AtDisplay, needs_display, records, remarks, virtual_display
-from tests.at_runs import DIRECTION, PREFERENCE, RUN, answers, rows, words
+from tests.at_runs import DIRECTION, PREFERENCE, RUN, SHORT_TRIALS, answers, rows, shorten, words
 from tests.warm_start import warm
 
 pytest.importorskip("PyQt6")
@@ -62,15 +62,16 @@ def close_the_day(screen: AtConsole) -> tuple[int, str]:
 def test_experiment_1_from_the_start_window_to_the_end_screen(
     quick_configs: Path, tmp_path: Path, display: str
 ) -> None:
+    shorten(quick_configs)
     with AtConsole(words(quick_configs, "direction"), tmp_path, display) as screen:
         start(screen)
         screen.to_the_end()
-        screen.until(lambda look: look.says("Read back from the disk: 60 answers, all that were given."))
+        screen.until(lambda look: look.says(f"Read back from the disk: {SHORT_TRIALS} answers, all that were given."))
         code, said = close_the_day(screen)
     assert code == 0, said
     assert records(tmp_path / f"{DIRECTION}_journal.jsonl")[-1]["kind"] == "finished"
     table = rows(tmp_path, DIRECTION, "trials")
-    assert [row["response"] for row in table] == ["forward", "backward"] * 30
+    assert [row["response"] for row in table] == ["forward", "backward"] * (SHORT_TRIALS // 2)
     assert {row["response_source"] for row in table} == {"experimenter"}
     assert {row["attempts"] for row in table} == {"1"}
     register = (tmp_path / "results" / "participants.jsonl").read_text()
@@ -198,16 +199,17 @@ def _until_moved(screen: AtConsole, serial: int, end_s: float) -> None:
         time.sleep(0.002)
 
 
-@pytest.mark.parametrize("kill", range(4))
+@pytest.mark.parametrize("kill", range(2))
 def test_a_killed_console_loses_nothing_and_goes_on(
     quick_configs: Path, tmp_path: Path, display: str, kill: int
 ) -> None:
-    check_killed_console(quick_configs, tmp_path, display, random.Random(kill).uniform(0.2, 3.0))
+    check_killed_console(quick_configs, tmp_path, display, random.Random(kill).uniform(0.2, 1.5))
 
 
 def test_a_synthetic_participant_at_the_console_answers_as_in_data_mode(
     quick_configs: Path, tmp_path: Path, display: str
 ) -> None:
+    shorten(quick_configs)
     for experiment, kind in (("direction", "trials"), ("preference", "ratings")):
         with AtDisplay(
             words(quick_configs, experiment, "--participant", "P01", "--visual"), tmp_path, display

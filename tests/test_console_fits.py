@@ -5,13 +5,13 @@ from __future__ import annotations
 import json
 import os
 import subprocess
-import sys
 from pathlib import Path
 
 import pytest
 
 from tests.at_display import AtConsole, needs_display, virtual_display
 from tests.at_runs import RUN, words
+from tests.warm_start import warm
 
 pytest.importorskip("PyQt6")
 
@@ -26,8 +26,7 @@ STATES = 28
 def test_nothing_is_cut_in_any_state(tmp_path: Path, scale: str, sizes: tuple[str, ...]) -> None:
     beneath = [_beneath_a_title_bar(size) for size in sizes]
     done = subprocess.run(
-        [sys.executable, "-m", "tests.shown_console", str(tmp_path), *beneath],
-        cwd=Path(__file__).parent.parent,
+        warm("-m", "tests.shown_console", tmp_path, *beneath),
         env=os.environ | {"QT_QPA_PLATFORM": "offscreen", "QT_SCALE_FACTOR": scale},
         capture_output=True,
         text=True,

@@ -14,7 +14,7 @@ import pytest
 
 from experiments.session.states import State
 from tests.at_display import needs_display, remarks, virtual_display
-from tests.at_hand import ACTIONS, HELD_S, Cell, check_cell, check_gun, check_participants_keys
+from tests.at_hand import ACTIONS, HELD_S, Cell, check_cell, check_gun, check_in_one_run, check_participants_keys
 
 pytest.importorskip("PyQt6")
 pytestmark = needs_display
@@ -30,32 +30,34 @@ def display() -> Iterator[str]:
         yield name
 
 
-@pytest.mark.parametrize(
-    ("state", "action"),
-    [
+def test_accidents_of_the_hand_do_what_the_table_says(tmp_path: Path, display: str) -> None:
+    check_in_one_run(
+        Cell(tmp_path, display, S.SETTING),
         (S.SETTING, "double Space"),
         (S.PREPARING, "Space held 3 s"),
+        (S.CORRECTING, "double Space"),
+        (S.PAUSED, "Space held 3 s"),
         (S.PREPARING, "double Space"),
         (S.PREPARING, "double click on Fire"),
         (S.PREPARING, "Tab Tab Space"),
-        (S.FIRING, "F12"),
-        (S.FIRING, "P"),
-        (S.TRAIN, "F12"),
-        (S.TRAIN, "P"),
-        (S.PAUSED, "Space held 3 s"),
-        (S.CORRECTING, "double Space"),
         (S.HALTED, "double Space"),
-    ],
-)
-def test_an_accident_of_the_hand_does_what_the_table_says(
-    tmp_path: Path, display: str, state: State, action: str
-) -> None:
-    check_cell(Cell(tmp_path, display, state), ACTIONS[action])
+    )
 
 
-@pytest.mark.parametrize("action", ["Space held 3 s", "double Space", "double click on Fire"])
-def test_what_fires_a_train_does_not_end_it(tmp_path: Path, display: str, action: str) -> None:
-    check_cell(Cell(tmp_path, display, S.PREPARING, experiment="preference"), ACTIONS[action])
+@pytest.mark.parametrize("action", ["F12", "P"])
+def test_a_shot_under_way_is_halted_or_paused_as_the_table_says(tmp_path: Path, display: str, action: str) -> None:
+    check_cell(Cell(tmp_path, display, S.FIRING), ACTIONS[action])
+
+
+def test_what_fires_a_train_does_not_end_it_and_what_pauses_or_halts_it_does(tmp_path: Path, display: str) -> None:
+    check_in_one_run(
+        Cell(tmp_path, display, S.PREPARING, experiment="preference"),
+        (S.PREPARING, "Space held 3 s"),
+        (S.PREPARING, "double Space"),
+        (S.PREPARING, "double click on Fire"),
+        (S.TRAIN, "P"),
+        (S.TRAIN, "F12"),
+    )
 
 
 def test_letters_beside_the_field_of_a_rating_are_text_and_no_commands(tmp_path: Path, display: str) -> None:

@@ -9,7 +9,6 @@ import subprocess
 import sys
 import time
 from collections.abc import Iterator
-from contextlib import contextmanager
 from pathlib import Path
 
 import pytest
@@ -112,11 +111,9 @@ def test_two_ratings_by_the_participants_own_hand_and_one_entered_for_them(
     assert [row["comment"] for row in table] == ["soft", "like a toy", "hard"]
 
 
-def rated_and_half_described(screen: AtConsole, journal: Path) -> None:
-    """Trial 1 is rated on the participant's screen, which had the keys ever since, and half a word is typed there."""
-    screen.stands(RUN)
-    screen.to("rating", trial=1)
-    screen.participant_shows("RatingPage")
+def rated_and_half_described(screen: AtConsole, journal: Path, trial: int) -> None:
+    """A trial is rated on the participant's screen, which had the keys ever since, and half a word is typed there."""
+    screen.participant_shows("RatingPage", trial)
     click(screen, LEFT_END, LINE_Y)
     screen.until(lambda look: not look.active)
     before = len(screen.watch.looks())
@@ -129,19 +126,15 @@ def rated_and_half_described(screen: AtConsole, journal: Path) -> None:
     screen.keys.type("so")
 
 
-@contextmanager
-def half_described(configs: Path, folder: Path, display: str) -> Iterator[AtConsole]:
-    """A run whose first stimulus was rated on the participant's screen, and is being described."""
-    run = words(configs, "preference", "--participant", "P01", "--participant-screen")
-    with AtConsole(run, folder, display) as screen:
-        rated_and_half_described(screen, folder / f"{PREFERENCE}_journal.jsonl")
-        yield screen
-
-
-def test_a_pause_in_a_description_keeps_the_rating_and_the_words_so_far(
+def test_a_pause_and_f12_in_a_description_keep_the_rating_and_the_words_so_far(
     quick_configs: Path, tmp_path: Path, display: str
 ) -> None:
-    with half_described(quick_configs, tmp_path, display) as screen:
+    journal = tmp_path / f"{PREFERENCE}_journal.jsonl"
+    run = words(quick_configs, "preference", "--participant", "P01", "--participant-screen")
+    with AtConsole(run, tmp_path, display) as screen:
+        screen.stands(RUN)
+        screen.to("rating", trial=1)
+        rated_and_half_described(screen, journal, trial=1)
         screen.focus_on(RUN)
         screen.until(lambda look: look.active)
         screen.keys.press("p", "Control_L")
@@ -153,36 +146,25 @@ def test_a_pause_in_a_description_keeps_the_rating_and_the_words_so_far(
         screen.keys.type("ft")
         screen.keys.press("Return", "Control_L")
         screen.until(lambda look: look.state == "rating" and look.trial == 2)
-        screen.participant_shows("RatingPage", 2)
-        screen.focus_on(RUN)
-        screen.until(lambda look: look.active)
-        code, said = screen.stop()
-    assert code == 130, said
-    first = rows(tmp_path, PREFERENCE, "ratings")[0]
-    assert (first["rating"], first["rating_by"], first["comment"]) == ("0.0", "participant", "soft")
-
-
-def test_f12_in_a_description_keeps_the_rating_and_all_that_was_given_is_what_was_read_back(
-    quick_configs: Path, tmp_path: Path, display: str
-) -> None:
-    journal = tmp_path / f"{PREFERENCE}_journal.jsonl"
-    with half_described(quick_configs, tmp_path, display) as screen:
+        rated_and_half_described(screen, journal, trial=2)
         screen.keys.press("F12")
         screen.until(lambda look: look.state == "halted")
         screen.participant_shows("MessagePage Please wait.")
         screen.focus_on(RUN)
         screen.until(lambda look: look.active)
         screen.to_the_end()
-        screen.until(lambda look: look.says("Read back from the disk: 1 answer, all that were given."))
+        screen.until(lambda look: look.says("Read back from the disk: 2 answers, all that were given."))
         code, said = screen.close()
     assert code == 130, said
     assert remarks(journal, "halted") == [{"by": "participant", "kind": "halted"}]
     rated = [record["body"]["rating"] for record in records(journal) if record.get("body", {}).get("kind") == "rated"]
-    assert rated == [0.0]
-    assert rows(tmp_path, PREFERENCE, "ratings")[0]["rating"] == "0.0"
+    assert rated == [0.0, 0.0]
+    first, second, _ = rows(tmp_path, PREFERENCE, "ratings")
+    assert (first["rating"], first["rating_by"], first["comment"]) == ("0.0", "participant", "soft")
+    assert second["rating"] == "0.0"
 
 
-def test_a_participants_key_is_a_response_time_from_the_onset_of_the_shot(
+def test_a_participants_key_is_a_response_time_from_the_onset_of_the_shot_and_in_a_note_it_is_no_answer(
     quick_configs: Path, tmp_path: Path, display: str
 ) -> None:
     journal = tmp_path / f"{DIRECTION}_journal.jsonl"
@@ -197,43 +179,35 @@ def test_a_participants_key_is_a_response_time_from_the_onset_of_the_shot(
             pressed_s.append(screen.keys.press(key))
             screen.until(lambda look, serial=asking.serial: look.serial != serial)
             seen_s.append(time.monotonic())
-        screen.to("preparing", trial=4)
-        code, said = screen.stop()
-    assert code == 130, said
-    first, second, third, *_ = rows(tmp_path, DIRECTION, "trials")
-    assert [row["response"] for row in (first, second, third)] == ["forward", "backward", "forward"]
-    assert [row["response_source"] for row in (first, second, third)] == ["participant"] * 2 + ["experimenter"]
-    assert [row["response_time_valid"] for row in (first, second, third)] == ["1", "1", "0"]
-    for row, key_s, saved_s, onset_s in zip((first, second), pressed_s, seen_s, onsets_s(journal), strict=False):
-        assert key_s - onset_s - CLOCKS_S <= float(row["response_time_s"]) <= saved_s - onset_s
-
-
-def test_a_participants_key_that_went_into_a_note_is_no_answer_and_the_next_one_is(
-    quick_configs: Path, tmp_path: Path, display: str
-) -> None:
-    journal = tmp_path / f"{DIRECTION}_journal.jsonl"
-    run = words(quick_configs, "direction", "--participant", "P01", "--participant-keys")
-    with AtConsole(run, tmp_path, display) as screen:
-        screen.stands(RUN)
-        asking = screen.to("asking", trial=1)
-        screen.participant_shows("DirectionPage")
-        for count, (opened, why) in enumerate((("n", lambda look: look.line), ("F1", lambda look: look.page)), 2):
-            screen.keys.press(opened)
-            screen.until(why)
-            before = len(remarks(journal, "refused"))
-            screen.keys.press("Up")
-            screen.until(lambda look: look.says("The participant’s key was not taken."))
-            wait_for(lambda before=before: len(remarks(journal, "refused")) > before)
-            screen.keys.press("Escape")
-            screen.until(lambda look: not look.line and not look.page)
-            screen.participant_shows("DirectionPage", count)
+        asking = screen.to("asking", trial=4)
+        screen.participant_shows("DirectionPage", 4)
+        a_key_goes_into_a_note_and_a_page(screen, journal, shown=4)
         assert screen.look().serial == asking.serial
         screen.keys.press("Down")
         screen.until(lambda look: look.serial != asking.serial)
         code, said = screen.stop()
     assert code == 130, said
-    first = rows(tmp_path, DIRECTION, "trials")[0]
-    assert (first["response"], first["response_source"]) == ("backward", "participant")
+    first, second, third, fourth, *_ = rows(tmp_path, DIRECTION, "trials")
+    assert [row["response"] for row in (first, second, third)] == ["forward", "backward", "forward"]
+    assert [row["response_source"] for row in (first, second, third)] == ["participant"] * 2 + ["experimenter"]
+    assert [row["response_time_valid"] for row in (first, second, third)] == ["1", "1", "0"]
+    for row, key_s, saved_s, onset_s in zip((first, second), pressed_s, seen_s, onsets_s(journal), strict=False):
+        assert key_s - onset_s - CLOCKS_S <= float(row["response_time_s"]) <= saved_s - onset_s
+    assert (fourth["response"], fourth["response_source"]) == ("backward", "participant")
+
+
+def a_key_goes_into_a_note_and_a_page(screen: AtConsole, journal: Path, shown: int) -> None:
+    """The participant's key is refused while the experimenter types or reads; then the question stands there again."""
+    for count, (opened, why) in enumerate((("n", lambda look: look.line), ("F1", lambda look: look.page)), shown + 1):
+        screen.keys.press(opened)
+        screen.until(why)
+        before = len(remarks(journal, "refused"))
+        screen.keys.press("Up")
+        screen.until(lambda look: look.says("The participant’s key was not taken."))
+        wait_for(lambda before=before: len(remarks(journal, "refused")) > before)
+        screen.keys.press("Escape")
+        screen.until(lambda look: not look.line and not look.page)
+        screen.participant_shows("DirectionPage", count)
 
 
 def onsets_s(journal: Path) -> list[float]:
@@ -271,7 +245,7 @@ def test_a_synthetic_participant_rates_on_the_participants_screen_as_in_data_mod
     quick_configs: Path, tmp_path: Path, display: str
 ) -> None:
     run = words(quick_configs, "preference", "--participant", "P01", "--visual", "--participant-screen")
-    with AtDisplay(run, tmp_path, display) as screen:
+    with AtConsole(run, tmp_path, display) as screen:
         code, said = screen.end()
     assert code == 0, said
     data = ["run", quick_configs / "preference.toml", "--participant", "P01", "--seed", "1"]

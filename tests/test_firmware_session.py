@@ -8,15 +8,9 @@ from pathlib import Path
 
 import pytest
 
+from tests.at_runs import SHORT_TRIALS, shorten
 from tests.firmware import FAST, as_on_the_simulated_gun, emulated
 from tests.serial_runs import hasty
-
-
-@pytest.fixture
-def fast_chip(tmp_path):
-    """A chip that lives ten times faster than the world."""
-    with emulated(tmp_path, f"gun-qemu-{FAST}.elf") as chip:
-        yield chip
 
 
 def brief(folder: Path) -> None:
@@ -27,11 +21,12 @@ def brief(folder: Path) -> None:
 
 
 @pytest.mark.parametrize("name", ["direction", "preference"])
-def test_a_session_on_the_emulated_chip_logs_what_one_on_the_simulated_gun_does(recoil, quick_configs, fast_chip, name):
+def test_a_session_on_the_emulated_chip_logs_what_one_on_the_simulated_gun_does(recoil, quick_configs, name):
     hasty(quick_configs)
+    shorten(quick_configs)
     brief(quick_configs)
-    shots = as_on_the_simulated_gun(recoil, quick_configs / f"{name}.toml", fast_chip, FAST)
-    assert shots >= {"direction": 60, "preference": 3}[name]
+    shots = as_on_the_simulated_gun(recoil, quick_configs / f"{name}.toml", FAST)
+    assert shots >= {"direction": SHORT_TRIALS, "preference": 3}[name]
 
 
 def test_the_doctor_measures_the_way_to_the_emulated_chip(recoil, tmp_path):

@@ -94,10 +94,8 @@ def test_the_way_to_the_chip_and_back(tmp_path, soak):
 @pytest.mark.parametrize(("name", "speed"), [("direction", 1), ("preference", FAST)])
 def test_a_whole_session_on_the_chip(recoil, quick_configs, soak, name, speed):
     hasty(quick_configs)
-    image = "gun-qemu.elf" if speed == 1 else f"gun-qemu-{speed}.elf"
     start_s = time.monotonic()
-    with emulated(quick_configs.parent, image) as chip:
-        shots = as_on_the_simulated_gun(recoil, quick_configs / f"{name}.toml", chip, speed)
+    shots = as_on_the_simulated_gun(recoil, quick_configs / f"{name}.toml", speed)
     detail = f"{shots} shots, each driven once and when the journal says; {time.monotonic() - start_s:.0f} s"
     pace = "in real time" if speed == 1 else f"{speed} times as fast"
     soak(f"rows of a session ({name}, {pace}) that differ from the simulated gun's but for times", 0, 0, detail)

@@ -10,7 +10,7 @@ from device.twin.machine import LATE_EFFECT_US
 from device.wire.errors import WireError, message
 from device.wire.records import MAX_LINE
 from tests.twin_hosts import Hand, Strict
-from tests.twin_scripts import MAX_LATE_US, random_script, transcript
+from tests.twin_scripts import MAX_LATE_US, TELLING_SEEDS, random_script, transcript
 
 
 def test_the_error_queue_is_bounded_and_says_so():
@@ -45,7 +45,7 @@ def test_whatever_is_said_each_pulse_ends_in_time_and_none_comes_too_soon(seed):
 
 def test_a_script_gives_the_same_transcript_again_and_reaches_every_error():
     seen = set()
-    for seed in range(150):
+    for seed in TELLING_SEEDS:
         lines = list(transcript(random_script(seed)))
         assert seed > 3 or lines == list(transcript(random_script(seed)))
         for out in (bytes.fromhex(line.split()[2]) for line in lines if line.startswith("out")):

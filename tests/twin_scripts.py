@@ -74,6 +74,8 @@ _LONG: Final = 310
 _LATE_US: Final = (1, 20, 21, 100, 101, 200, 201, 999, 1_000, 1_001, 9_999, 10_000, 19_999, 20_000, 30_000)
 MAX_LATE_US: Final = max(_LATE_US)
 _PAUSES_US: Final = (500_000, 29_999_999, 30_000_000, 61_000_000, 400_000_000)
+TELLING_SEEDS: Final = (*range(24), 61)
+"""Of random scripts that together meet every error but an overflow of the queue."""
 
 
 def random_script(seed: int, phrases: int = 40) -> Iterator[str]:

@@ -10,6 +10,7 @@ import json
 import sys
 import threading
 import time
+from collections.abc import Callable
 from contextlib import suppress
 from dataclasses import asdict, dataclass, field
 from pathlib import Path
@@ -32,7 +33,7 @@ class Watch:
     sync_s: float = 0.0
     participants: int = 99
     times: int = 1
-    look_ms: int = 10
+    look_ms: int = 20
 
     @property
     def eye(self) -> Path:
@@ -108,54 +109,69 @@ def is_whole(label: Any) -> bool:
     return not label.visibleRegion().isEmpty() and label.height() >= label.heightForWidth(label.width())
 
 
-def look_around() -> Look:
-    """A look at the windows of this program; the run's where there is one, else the newest."""
-    from PyQt6.QtWidgets import QApplication, QLabel
+class Eye:
+    """Looks at the windows of this program; what is laborious to see, only where a widget has changed since."""
 
-    from experiments.screens.console.window import ConsoleWindow
+    def __init__(self) -> None:
+        self._seen: dict[str, tuple[Any, Any]] = {}
 
-    windows = [window for window in QApplication.topLevelWidgets() if window.isVisible() and window.windowTitle()]
-    texts = [label.text() for one in windows for label in [*one.findChildren(QLabel), one] if _read(label)]
-    consoles = [window for window in windows if isinstance(window, ConsoleWindow)]
-    here = next(iter([*consoles, *reversed(windows)]), None)
-    named = {"window": here.windowTitle(), "active": here.isActiveWindow()} if here is not None else {}
-    found = _run(consoles[0]) if consoles else {}
-    return Look(texts=texts, **named, **found)
+    def look(self) -> Look:
+        """What stands in the windows; where the run is, by its window where there is one, else by the newest."""
+        from PyQt6.QtWidgets import QApplication, QLabel
+
+        from experiments.screens.console.window import ConsoleWindow
+
+        windows = [window for window in QApplication.topLevelWidgets() if window.isVisible() and window.windowTitle()]
+        readable = [one for window in windows for one in [*window.findChildren(QLabel), window] if _has_text(one)]
+        texts = self._kept("texts", readable, lambda: [one.text() for one in readable if one.text() and is_whole(one)])
+        consoles = [window for window in windows if isinstance(window, ConsoleWindow)]
+        here = next(iter([*consoles, *reversed(windows)]), None)
+        named = {"window": here.windowTitle(), "active": here.isActiveWindow()} if here is not None else {}
+        found = self._run(consoles[0]) if consoles else {}
+        return Look(texts=texts, **named, **found)
+
+    def _kept(self, name: str, widgets: list[Any], see: Callable[[], Any]) -> Any:
+        """What is seen of some widgets: anew if one of them has another text or place or is shown or hidden."""
+        stand = [(one, one.text(), one.isVisible(), one.geometry(), one.window().geometry()) for one in widgets]
+        before, seen = self._seen.get(name, (None, None))
+        if stand != before:
+            seen = see()
+            self._seen[name] = stand, seen
+        return seen
+
+    def _run(self, window: Any) -> dict[str, Any]:
+        """Where the run of a console's window is, as far as it is drawn."""
+        from experiments.screens.console.keys import field_at
+        from experiments.screens.console.panels import CommandButton
+
+        if window.live is None:
+            return {"ended": window.ended is not None}
+        drawn, live, now_s = window.drawn, window.live, window.clock.now()
+        not_before_s = live.position.not_before_s
+        in_time = not_before_s is None or now_s >= not_before_s
+        buttons = window.findChildren(CommandButton)
+        return {
+            "state": str(drawn.state),
+            "base": str(drawn.base),
+            "serial": drawn.serial,
+            "trial": live.moment.trial.trial,
+            "ready": drawn.serial == live.position.serial and live.moment.is_ready(now_s) and in_time,
+            "ended": window.ended is not None,
+            "line": window.controls.typing.line,
+            "typed": window.typed("line" if window.controls.typing.line else field_at(drawn) or "number"),
+            "page": window.controls.page,
+            "theme": window.theme,
+            "places": self._kept("places", buttons, lambda: _places(buttons)),
+        }
 
 
-def _read(label: Any) -> bool:
-    return hasattr(label, "heightForWidth") and hasattr(label, "text") and bool(label.text()) and is_whole(label)
+def _has_text(widget: Any) -> bool:
+    return hasattr(widget, "heightForWidth") and hasattr(widget, "text")
 
 
-def _run(window: Any) -> dict[str, Any]:
-    """Where the run of a console's window is, as far as it is drawn."""
-    from experiments.screens.console.keys import field_at
-
-    if window.live is None:
-        return {"ended": window.ended is not None}
-    drawn, live, now_s = window.drawn, window.live, window.clock.now()
-    not_before_s = live.position.not_before_s
-    in_time = not_before_s is None or now_s >= not_before_s
-    return {
-        "state": str(drawn.state),
-        "base": str(drawn.base),
-        "serial": drawn.serial,
-        "trial": live.moment.trial.trial,
-        "ready": drawn.serial == live.position.serial and live.moment.is_ready(now_s) and in_time,
-        "ended": window.ended is not None,
-        "line": window.controls.typing.line,
-        "typed": window.typed("line" if window.controls.typing.line else field_at(drawn) or "number"),
-        "page": window.controls.page,
-        "theme": window.theme,
-        "places": _places(window),
-    }
-
-
-def _places(window: Any) -> dict[str, list[int]]:
-    from experiments.screens.console.panels import CommandButton
-
+def _places(buttons: list[Any]) -> dict[str, list[int]]:
     found = {}
-    for button in window.findChildren(CommandButton):
+    for button in buttons:
         if button.isVisible():
             corner = button.mapToGlobal(button.rect().topLeft())
             found[button.name] = [corner.x(), corner.y(), button.width(), button.height()]
@@ -166,11 +182,11 @@ def watch_windows(watch: Watch) -> Any:
     """Look from now on, as long as the timer that is given back lives."""
     from PyQt6.QtCore import QTimer
 
-    last = Look()
+    eye, last = Eye(), Look()
 
     def look() -> None:
         nonlocal last
-        if (now := look_around()) != last:
+        if (now := eye.look()) != last:
             last = now
             with watch.eye.open("a", encoding="utf-8") as out:
                 out.write(json.dumps(asdict(now)) + "\n")

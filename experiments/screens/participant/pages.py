@@ -179,7 +179,6 @@ class RatingPage(Page):
     `drafts` holds where it stood when the page was taken off: it stands there again.
     """
 
-    redraw_s = 1 / 60
     pointer = True
     typed = True
 
@@ -191,6 +190,10 @@ class RatingPage(Page):
         self._slider = self._scale()
         self._button = Button(stage, "Confirm")
         self._drawn = [*heading(stage, asked), *self._ends(), hint(stage, _HINT)]
+
+    def moves(self) -> float | None:
+        """The marker."""
+        return self._rating
 
     def draw(self) -> None:
         """The question, the scale with its marker if there is one, the button."""
@@ -292,7 +295,6 @@ class DescriptionPage(Page):
     `drafts` holds what was written so far: it stands there at first, and is kept at last.
     """
 
-    redraw_s = 1 / 30
     pointer = True
     typed = True
 
@@ -308,6 +310,10 @@ class DescriptionPage(Page):
         self._button = Button(stage, "Done")
         self._drawn = [*heading(stage, asked), self._box]
         self._hints = {False: hint(stage, _HOW), True: hint(stage, _FULL)}
+
+    def moves(self) -> tuple[str, int]:
+        """Letters and caret."""
+        return self._box.text, self._box.caret.index
 
     def draw(self) -> None:
         """The question, what was typed, the button."""

@@ -80,16 +80,19 @@ class WindowClosed(Exception):  # noqa: N818 - somebody closed it; that is no er
     """The participant's window was closed."""
 
 
-STILL_S = 0.1
-"""How often a page is drawn on which nothing moves."""
+STILL_S, MOVED_S = 0.1, 1 / 60
+"""How often a page is drawn on which nothing moves, and at most while something does."""
 
 
 class Page:
     """What fills the window, and hears what happens on it: nothing, but for what a page says of itself."""
 
-    redraw_s = STILL_S
     pointer = False
     typed = False
+
+    def moves(self) -> object:
+        """What of it moves, as it stands now."""
+        return None
 
     def draw(self) -> None:
         """Draw one frame."""
@@ -147,6 +150,7 @@ class Stage:
         self._focus = Focus(self.window.winHandle)
         self.drawn_s = 0.0
         """When the page was drawn last; 0 if it was not yet."""
+        self._stood: object = None
         self._closed = False
         self.unasked: deque[messages.Unasked] = deque()
         """What is to be said without a question."""
@@ -156,7 +160,8 @@ class Stage:
 
     def measure_refresh(self) -> float | None:
         """The refresh rate in Hz; `None` if frames do not come steadily."""
-        measured = self.window.getActualFrameRate(nIdentical=_STEADY_FLIPS, nMaxFrames=_MOST_FLIPS, nWarmUpFrames=2)
+        flips = {"nIdentical": _STEADY_FLIPS, "nMaxFrames": _MOST_FLIPS, "nWarmUpFrames": 2}
+        measured = self.window.getActualFrameRate(**flips, infoMsg="")  # nothing of PsychoPy's to read
         return None if measured is None else round(float(measured), 2)
 
     def put(self, page: Page, *, keep_keys: bool = False) -> None:
@@ -180,9 +185,9 @@ class Stage:
         self.window.winHandle.dispatch_events()
         if self._closed:
             raise WindowClosed("the participant's window was closed")
-        now_s = self.toolkit.now()
-        if now_s - self.drawn_s >= self.page.redraw_s:
-            self.drawn_s = now_s
+        now_s, stands = self.toolkit.now(), self.page.moves()
+        if now_s - self.drawn_s >= (STILL_S if stands == self._stood else MOVED_S):
+            self.drawn_s, self._stood = now_s, stands
             self.page.draw()
             self.window.flip()
 
