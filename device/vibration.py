@@ -18,7 +18,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from functools import cache
+from functools import lru_cache
 from itertools import pairwise
 
 import numpy as np
@@ -72,7 +72,7 @@ def waveform(parameters: VibrationParameters, points: int) -> tuple[NDArray[np.f
     return time_s, acceleration
 
 
-@cache
+@lru_cache(maxsize=64)
 def solved(parameters: VibrationParameters) -> Vibration:
     """The vibration that these numbers describe. `ValueError` as `waveform`, with the range that there is."""
     from scipy.optimize import brentq  # noqa: PLC0415 - the heavy import waits until a waveform is asked for
