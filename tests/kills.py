@@ -12,23 +12,13 @@ from experiments.record.replay import history
 from experiments.session.steps import Answered
 from tests.at_terminal import ANSWERS, FIRES, AtTerminal, answer_until_killed
 from tests.conftest import RECOIL
+from tests.warm_start import warm
 
 STEM = "sub-P01/sub-P01_task-direction"
 
 
 def words(configs: Path, *more: object) -> list[object]:
-    return [
-        RECOIL,
-        "run",
-        configs / "direction.toml",
-        "--participant",
-        "P01",
-        "--seed",
-        1,
-        "--results",
-        "results",
-        *more,
-    ]
+    return ["run", configs / "direction.toml", "--participant", "P01", "--seed", 1, "--results", "results", *more]
 
 
 def answers(contents: Contents) -> str:
@@ -49,7 +39,7 @@ def can_mount(folder: Path) -> bool:
 
 def killed_run(configs: Path, folder: Path, seconds: float, *, begun: bool) -> tuple[str, Path]:
     """A run killed some seconds after its start, or after it has `begun`: what was acknowledged, and the journal."""
-    with AtTerminal(words(configs), folder) as screen:
+    with AtTerminal(warm(*words(configs)), folder) as screen:
         if begun:
             screen.wait_for("Trial 1 of")
         answer_until_killed(screen, seconds)
@@ -71,7 +61,7 @@ def check_killed_run(configs: Path, folder: Path, seconds: float, *, begun: bool
 def traced_run(configs: Path, folder: Path) -> list[str]:
     trace = folder / "trace"
     calls = "trace=openat,write,fsync,close"
-    with AtTerminal(["strace", "-f", "-s", "64", "-e", calls, "-o", trace, *words(configs)], folder) as screen:
+    with AtTerminal(["strace", "-f", "-s", "64", "-e", calls, "-o", trace, RECOIL, *words(configs)], folder) as screen:
         screen.answer_trials(3)
         screen.wait_for(FIRES, 4)
         screen.type("stop")
@@ -103,7 +93,7 @@ def check_syncs(calls: list[str]) -> None:
 
 def check_full_disk(configs: Path, folder: Path) -> None:
     """A full disk stops a run at the last safe answer; with room again it goes on."""
-    run = " ".join(map(str, words(configs, "--screen", "synthetic")))
+    run = " ".join(map(str, [RECOIL, *words(configs, "--screen", "synthetic")]))
     done = in_small_disk(
         f"mkdir -p results && mount -t tmpfs -o size=64k none results && {run}; echo code $?; cp -r results full;"
         f"mount -o remount,size=8m results && {run} --resume; echo code $?; cp -r results whole",

@@ -274,16 +274,25 @@ def kill_participant(screen: AtConsole) -> None:
     screen.until(lambda look: look.active and look.ready)
 
 
+def start_again(screen: AtConsole) -> None:
+    """The participant's screen is started again, and the run goes on."""
+    screen.keys.press("s")
+    screen.participant_shows("MessagePage Paused. Please wait.")
+    screen.until(lambda look: look.says("The participant's screen is there again."))
+    screen.focus_on(RUN)
+    screen.keys.press("p")
+    screen.until(lambda look: look.state != "paused")
+
+
 @needs_psychopy
 @pytest.mark.parametrize(
     ("experiment", "side", "state", "page"),
     [
-        ("preference", "--participant-screen", "train", "MessagePage Please wait."),
         pytest.param("preference", "--participant-screen", "rating", "RatingPage", marks=pytest.mark.soak),
         ("direction", "--participant-keys", "asking", "DirectionPage"),
     ],
 )
-def test_a_killed_participants_screen_pauses_the_run_and_can_be_started_again(  # noqa: PLR0917 - each is looked at
+def test_a_participants_screen_that_is_killed_in_a_question_can_be_started_again_and_asks_it(  # noqa: PLR0917 - each is looked at
     quick_configs: Path, tmp_path: Path, display: str, experiment: str, side: str, state: str, page: str
 ) -> None:
     journal = tmp_path / f"{DIRECTION if experiment == 'direction' else PREFERENCE}_journal.jsonl"
@@ -293,24 +302,47 @@ def test_a_killed_participants_screen_pauses_the_run_and_can_be_started_again(  
         screen.participant_shows(page)
         kill_participant(screen)
         check_gun(screen.watch, journal)
-        screen.keys.press("s")
-        screen.participant_shows("MessagePage Paused. Please wait.")
-        screen.until(lambda look: look.says("The participant's screen is there again."))
+        start_again(screen)
+        screen.until(lambda look: look.state == state)
+        screen.participant_shows(page, 2)
         screen.focus_on(RUN)
-        screen.keys.press("p")
-        screen.until(lambda look: look.state != "paused")
-        if state != "train":
-            screen.until(lambda look: look.state == state)
-            screen.participant_shows(page, 2)
-            screen.focus_on(RUN)
-        screen.to({"train": "train", "rating": "describing", "asking": "preparing"}[state])
+        screen.to({"rating": "describing", "asking": "preparing"}[state])
         if state == "rating":
             screen.participant_shows("DescriptionPage")
             screen.focus_on(RUN)
         assert screen.stop()[0] == 130
-    paused, noted = remarks(journal, "paused", "noted")
+    check_started_again(journal)
+
+
+def check_started_again(journal: Path) -> None:
+    paused, noted, *_ = remarks(journal, "paused", "noted")
     assert "killed by signal 9" in paused["cause"]
     assert noted["text"] == "The participant's screen was started again."
+
+
+@needs_psychopy
+def test_a_killed_participants_screen_can_be_started_again_in_a_train_and_done_without_in_a_rating(
+    quick_configs: Path, tmp_path: Path, display: str
+) -> None:
+    journal = tmp_path / f"{PREFERENCE}_journal.jsonl"
+    with AtConsole(run_words(quick_configs, "preference", "--participant-screen"), tmp_path, display) as screen:
+        screen.stands(RUN)
+        screen.to("train", trial=1)
+        screen.participant_shows("MessagePage Please wait.")
+        kill_participant(screen)
+        check_gun(screen.watch, journal)
+        start_again(screen)
+        screen.to("rating", trial=1)
+        screen.participant_shows("RatingPage")
+        kill_participant(screen)
+        screen.to_the_end()
+        code, said = screen.close()
+    assert code == 0, said
+    check_started_again(journal)
+    table = rows(tmp_path, PREFERENCE, "ratings")
+    assert [(row["rating"], row["rating_by"]) for row in table] == [
+        ("0.0", "experimenter"), ("7.5", "experimenter"), ("7.5", "experimenter"),
+    ]  # fmt: skip
 
 
 @needs_psychopy
@@ -327,22 +359,3 @@ def test_a_participants_screen_that_does_not_start_again_ends_the_run(
         screen.until(lambda look: look.ended and look.says("The participant's screen did not start again"))
         assert screen.close()[0] == 130
     assert "did not start again" in records(journal)[-1]["reason"]
-
-
-@needs_psychopy
-def test_without_the_participants_screen_the_experimenter_can_enter_the_answers(
-    quick_configs: Path, tmp_path: Path, display: str
-) -> None:
-    run = run_words(quick_configs, "preference", "--participant-screen")
-    with AtConsole(run, tmp_path, display) as screen:
-        screen.stands(RUN)
-        screen.to("rating", trial=1)
-        screen.participant_shows("RatingPage")
-        kill_participant(screen)
-        screen.to_the_end()
-        code, said = screen.close()
-    assert code == 0, said
-    table = rows(tmp_path, PREFERENCE, "ratings")
-    assert [(row["rating"], row["rating_by"]) for row in table] == [
-        ("0.0", "experimenter"), ("7.5", "experimenter"), ("7.5", "experimenter"),
-    ]  # fmt: skip

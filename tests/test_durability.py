@@ -20,9 +20,10 @@ from tests.kills import (
     traced_run,
     words,
 )
+from tests.warm_start import warm
 
 
-@pytest.mark.parametrize("kill", range(6))
+@pytest.mark.parametrize("kill", range(4))
 def test_kill_9_at_a_random_moment_loses_no_acknowledged_answer(quick_configs: Path, tmp_path: Path, kill: int) -> None:
     check_killed_run(quick_configs, tmp_path, random.Random(kill).uniform(0.0, 2.0), begun=kill > 0)
 
@@ -33,7 +34,7 @@ def test_a_killed_run_goes_on_where_it_broke_off_and_ends_with_a_whole_table(
     acknowledged, journal = killed_run(quick_configs, tmp_path, 2.0, begun=True)
     assert acknowledged
     before = answers(read_journal(journal))
-    with AtTerminal(words(quick_configs, "--resume"), tmp_path) as screen:
+    with AtTerminal(warm(*words(quick_configs, "--resume")), tmp_path) as screen:
         screen.answer_trials(2, already=len(before))
         screen.wait_for(FIRES, 3)
         screen.type("stop lunch")

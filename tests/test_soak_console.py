@@ -131,7 +131,7 @@ def kill_a_terminal(configs: Path, folder: Path, seconds: float) -> tuple[int, b
     journal = folder / "results" / f"{console.DIRECTION.removeprefix('results/')}_journal.jsonl"
     begun = journal.exists() and journal.read_bytes().count(b"\n") > 0
     before = terminal_answers(read_journal(journal)) if begun else ""
-    with AtTerminal(terminal_words(configs, "--resume" if begun else "--fresh"), folder) as screen:
+    with AtTerminal([RECOIL, *terminal_words(configs, "--resume" if begun else "--fresh")], folder) as screen:
         screen.wait_for("Participant P01", timeout_s=60)
         answer_until_killed(screen, seconds, len(before))
         said = len(re.findall(r"Saved\. Trial", screen.seen))
