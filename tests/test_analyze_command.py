@@ -23,6 +23,8 @@ from tests.log_files import METHODS, trial_rows, trials_path, write_rows, write_
 from tests.waiting import PATIENCE_S, wait_for
 from tests.warm_start import warm
 
+pytestmark = pytest.mark.slow
+
 EXAMPLES = Path(__file__).parent.parent / "configs" / "examples"
 
 

@@ -21,6 +21,8 @@ from experiments.study.folders import PlaceError
 from recoil.config_files import copy_began_with
 from tests.conftest import Recoil
 
+pytestmark = pytest.mark.slow
+
 ODD = 'A "quoted" \\ title,\n\tin two lines: 反冲 é \x7f'
 
 

@@ -3,8 +3,12 @@ from __future__ import annotations
 import json
 from pathlib import Path
 
+import pytest
+
 from device.physics import FIDELITIES
 from tests.conftest import Recoil
+
+pytestmark = pytest.mark.slow
 
 
 def test_the_bench_tells_error_rates_and_power_of_every_post_hoc_test(recoil: Recoil, tmp_path: Path) -> None:

@@ -13,6 +13,8 @@ import pytest
 from experiments.load import shipped_folder
 from tests.conftest import Recoil, refused
 
+pytestmark = pytest.mark.slow
+
 TABLE = "results/sub-P01/sub-P01_task-direction_trials.csv"
 JOURNAL = "results/sub-P01/sub-P01_task-direction_journal.jsonl"
 

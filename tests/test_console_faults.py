@@ -21,6 +21,8 @@ from experiments.study.folders import place
 from tests.at_controls import short_direction
 from tests.faulty_console import PATIENCE_S, SLOW_SYNC_S, child
 
+pytestmark = pytest.mark.slow
+
 pytest.importorskip("PyQt6")
 
 

@@ -79,6 +79,8 @@ from tests.conftest import RECOIL, Recoil
 from tests.kills import can_mount, in_small_disk
 from tests.waiting import PATIENCE_S
 
+pytestmark = pytest.mark.slow
+
 milliseconds = st.floats(min_value=0, max_value=1e4)
 
 FAST = Percentiles(n=200, median=0.2, p95=0.3, p99=0.4, worst=0.5)

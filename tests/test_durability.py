@@ -22,6 +22,8 @@ from tests.kills import (
 )
 from tests.warm_start import warm
 
+pytestmark = pytest.mark.slow
+
 
 @pytest.mark.parametrize("kill", range(4))
 def test_kill_9_at_a_random_moment_loses_no_acknowledged_answer(quick_configs: Path, tmp_path: Path, kill: int) -> None:

@@ -29,6 +29,8 @@ from tests.conftest import RECOIL, Recoil, refused
 from tests.log_files import rating_rows, ratings_path, trial_rows, trials_path, write_rows, write_study
 from tests.waiting import PATIENCE_S
 
+pytestmark = pytest.mark.slow
+
 VALIDATOR = RECOIL.with_name("bids-validator-deno")
 NO_NETWORK = {"HTTP_PROXY": "http://127.0.0.1:9", "HTTPS_PROXY": "http://127.0.0.1:9"}
 KNOWN_TO_PEOPLE_ALONE = {

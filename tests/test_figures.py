@@ -27,6 +27,8 @@ from tests.log_files import rating_rows, ratings_path, write_rows, write_study
 from tests.made_scores import crowd_of
 from tests.shown_panels import shot_panel
 
+pytestmark = pytest.mark.slow
+
 
 @pytest.fixture(scope="module")
 def statistics(tmp_path_factory: pytest.TempPathFactory) -> StudyStatistics:

@@ -50,6 +50,8 @@ from tests.at_controls import (
 from tests.at_display import records
 from tests.waiting import wait_for
 
+pytestmark = pytest.mark.slow
+
 S = State
 LEAST_S: float = PREFERENCE.config.stimulus.least_exposure_s
 DUE: dict[State, Event] = {

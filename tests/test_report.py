@@ -23,6 +23,8 @@ from tests.log_files import trial_rows, trials_path, write_rows, write_study
 from tests.made_scores import crowd_of
 from tests.shown_panels import shot_panel
 
+pytestmark = pytest.mark.slow
+
 
 @pytest.fixture(scope="module")
 def logs(tmp_path_factory: pytest.TempPathFactory) -> Logs:

@@ -21,6 +21,8 @@ from tests.reproduced import EXPERIMENTS, scores, statistics
 from tests.waiting import PATIENCE_S, wait_for
 from tests.warm_start import warm
 
+pytestmark = pytest.mark.slow
+
 RECOIL = Path(sys.executable).with_name("recoil")
 """The program itself: when it is killed it is gone at once."""
 METHODS = ["vibration", "asymmetric-1", "asymmetric-2"]

@@ -29,6 +29,8 @@ from tests.serial_runs import SPEED, check, hasty, run_all, timings_of
 from tests.twins import Troubles, a_pair, a_shot
 from tests.waiting import wait_for
 
+pytestmark = pytest.mark.slow
+
 FAR_US = 60_000_000
 
 

@@ -14,6 +14,8 @@ from tests.forger import a_lying_pair
 from tests.twins import Troubles, a_pair, a_shot, is_up, said
 from tests.waiting import wait_for
 
+pytestmark = pytest.mark.slow
+
 ENDS_S = 30.0
 
 

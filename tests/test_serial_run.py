@@ -20,6 +20,8 @@ from tests.twins import Troubles, a_twin
 from tests.waiting import PATIENCE_S, wait_for
 from tests.warm_start import warm
 
+pytestmark = pytest.mark.slow
+
 
 def test_two_hundred_trials_on_a_bad_line_are_each_done_once_or_marked_and_offered_again(tmp_path, quick_configs):
     often = replace(TROUBLES, reset=0.025, busy=0.025, hang=0.025)  # so few trials see each of them

@@ -16,6 +16,8 @@ from tests.forger import a_lying_pair
 from tests.twins import SLOW, Troubles, a_pair, a_shot, a_twin, disarmings_of, is_up, said
 from tests.waiting import PATIENCE_S, wait_for
 
+pytestmark = pytest.mark.slow
+
 ALL = Troubles(lose=0.02, double=0.02, corrupt=0.02, partial=0.02, jitter_s=0.002)
 
 

@@ -15,6 +15,8 @@ from PyQt6.QtCore import QCoreApplication
 from experiments.screens.console.app import application
 from experiments.screens.console.windows import signals_to
 
+pytestmark = pytest.mark.slow
+
 
 @pytest.fixture(autouse=True)
 def qt() -> None:

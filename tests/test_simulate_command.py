@@ -8,6 +8,8 @@ from device.physics import GunParameters, simulate
 from device.physics.hand import HandMechanics, compliant_collision, simulate_held
 from device.physics.traces import energy_balance
 
+pytestmark = pytest.mark.slow
+
 
 def test_audit_hand_and_stop_are_those_of_the_physics(recoil):
     words = ("--set", "friction_N=0.5", "--audit", "--hand", "stiffness_N_m=800", "--contact-stiffness", "2e5")

@@ -37,6 +37,8 @@ from experiments.study.register import read_register
 from experiments.study.study import Facts
 from recoil.config_files import new_study
 
+pytestmark = pytest.mark.slow
+
 FACTS = Facts(age_years=25, sex="female", handedness="right")
 PATIENCE_S = 60
 SERIAL = "serial:/dev/nowhere"

@@ -22,6 +22,8 @@ from tests.conftest import Recoil, refused
 from tests.waiting import PATIENCE_S
 from tests.warm_start import warm
 
+pytestmark = pytest.mark.slow
+
 RIGHT = ("--age", 25, "--sex", "female", "--handedness", "right")
 
 

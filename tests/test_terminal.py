@@ -13,6 +13,8 @@ import pytest
 from tests.at_terminal import DAMPER, FIRES, AtTerminal
 from tests.warm_start import warm
 
+pytestmark = pytest.mark.slow
+
 
 def run(configs: Path, experiment: str, *more: object) -> list[str]:
     return warm("run", configs / f"{experiment}.toml", "--participant", "P01", "--results", "results", *more)
