@@ -16,6 +16,7 @@ from tests.waiting import PATIENCE_S, wait_for
 from tests.warm_start import warm
 
 pytestmark = [
+    pytest.mark.slow,
     pytest.mark.skipif(shutil.which("Xvfb") is None, reason="Xvfb is not installed: a window needs a display"),
     pytest.mark.skipif(importlib.util.find_spec("psychopy") is None, reason="PsychoPy is not installed: extra `gui`"),
 ]

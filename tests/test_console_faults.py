@@ -22,6 +22,7 @@ from tests.at_controls import short_direction
 from tests.faulty_console import PATIENCE_S, SLOW_SYNC_S, child
 
 pytest.importorskip("PyQt6")
+pytestmark = pytest.mark.slow
 
 
 Case = Callable[[str], tuple[dict[str, Any], Contents, list[dict[str, str]]]]

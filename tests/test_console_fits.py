@@ -14,6 +14,7 @@ from tests.at_runs import RUN, words
 from tests.warm_start import warm
 
 pytest.importorskip("PyQt6")
+pytestmark = pytest.mark.slow
 
 TITLE_BAR_PX = 24
 STATES = 28

@@ -18,6 +18,7 @@ from tests.at_runs import DIRECTION, PREFERENCE, RUN, rows, words
 from tests.warm_start import warm
 
 pytestmark = [
+    pytest.mark.slow,
     needs_display,
     pytest.mark.skipif(importlib.util.find_spec("psychopy") is None, reason="PsychoPy is not installed: extra `gui`"),
 ]

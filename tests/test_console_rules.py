@@ -12,6 +12,7 @@ from hypothesis import given, settings
 from tests.at_controls import SETUPS
 from tests.experimenters import MOVES, Experimenter, check
 
+pytestmark = pytest.mark.slow
 RUNS = 20
 """Of each experiment; `make soak` makes 1,000 of each."""
 

@@ -27,6 +27,8 @@ from tests.firmware import (
     well,
 )
 
+pytestmark = pytest.mark.slow  # the firmware has to be built
+
 
 def test_a_pulse_lasts_as_long_as_it_should_and_the_record_says_when_it_was():
     run = Run(*say(1_100_000, PULSE, "ARM", "TRIG 5"), *say(1_200_000, "TIME?", "SHOT?"))

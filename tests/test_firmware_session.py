@@ -12,6 +12,8 @@ from tests.at_runs import SHORT_TRIALS, shorten
 from tests.firmware import FAST, as_on_the_simulated_gun, emulated
 from tests.serial_runs import hasty
 
+pytestmark = pytest.mark.slow
+
 
 def brief(folder: Path) -> None:
     """Experiment 2 with trains of a few shots and no waiting."""
