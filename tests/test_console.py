@@ -17,7 +17,7 @@ from tests.at_runs import DIRECTION, PREFERENCE, RUN, SHORT_TRIALS, answers, row
 from tests.warm_start import warm
 
 pytest.importorskip("PyQt6")
-pytestmark = [pytest.mark.slow, needs_display]
+pytestmark = [needs_display, pytest.mark.slow]
 
 START = "Recoil – start"
 

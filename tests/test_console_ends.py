@@ -29,7 +29,7 @@ from tests.at_runs import DIRECTION, PREFERENCE, RUN, answers, rows
 from tests.watched_console import Watch
 
 pytest.importorskip("PyQt6")
-pytestmark = [pytest.mark.slow, needs_display]
+pytestmark = [needs_display, pytest.mark.slow]
 needs_psychopy = pytest.mark.skipif(
     importlib.util.find_spec("psychopy") is None, reason="PsychoPy is not installed: extra `gui`"
 )

@@ -24,6 +24,7 @@ from tests.faulty_console import PATIENCE_S, SLOW_SYNC_S, child
 pytestmark = pytest.mark.slow
 
 pytest.importorskip("PyQt6")
+pytestmark = pytest.mark.slow
 
 
 Case = Callable[[str], tuple[dict[str, Any], Contents, list[dict[str, str]]]]

@@ -17,7 +17,7 @@ from tests.felt_configs import felt_text, written
 from tests.warm_start import warm
 
 pytest.importorskip("PyQt6")
-pytestmark = [pytest.mark.slow, needs_display]
+pytestmark = [needs_display, pytest.mark.slow]
 
 STEM = "sub-P01/sub-P01_task-direction"
 ANSWER = (

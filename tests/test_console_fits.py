@@ -16,6 +16,7 @@ from tests.warm_start import warm
 pytestmark = pytest.mark.slow
 
 pytest.importorskip("PyQt6")
+pytestmark = pytest.mark.slow
 
 TITLE_BAR_PX = 24
 STATES = 28

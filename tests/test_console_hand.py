@@ -17,7 +17,7 @@ from tests.at_display import needs_display, remarks, virtual_display
 from tests.at_hand import ACTIONS, HELD_S, Cell, check_cell, check_gun, check_in_one_run, check_participants_keys
 
 pytest.importorskip("PyQt6")
-pytestmark = [pytest.mark.slow, needs_display]
+pytestmark = [needs_display, pytest.mark.slow]
 needs_psychopy = pytest.mark.skipif(
     importlib.util.find_spec("psychopy") is None, reason="PsychoPy is not installed: extra `gui`"
 )

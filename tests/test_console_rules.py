@@ -13,7 +13,6 @@ from tests.at_controls import SETUPS
 from tests.experimenters import MOVES, Experimenter, check
 
 pytestmark = pytest.mark.slow
-
 RUNS = 20
 """Of each experiment; `make soak` makes 1,000 of each."""
 

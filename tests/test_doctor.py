@@ -78,6 +78,7 @@ from recoil.rig import examination_text
 from tests.conftest import RECOIL, Recoil
 from tests.kills import can_mount, in_small_disk
 from tests.waiting import PATIENCE_S
+from tests.warm_start import warm
 
 pytestmark = pytest.mark.slow
 
@@ -533,7 +534,7 @@ def display() -> Iterator[str]:
 def on_display(name: str, folder: Path) -> subprocess.CompletedProcess[str]:
     environment = {key: value for key, value in os.environ.items() if not key.startswith(("QT_", "WAYLAND"))}
     return subprocess.run(
-        [str(RECOIL), "doctor", "--json"],
+        warm("doctor", "--json"),
         env=environment | {"DISPLAY": name, "HOME": str(folder)},
         cwd=folder,
         capture_output=True,
@@ -543,6 +544,7 @@ def on_display(name: str, folder: Path) -> subprocess.CompletedProcess[str]:
     )
 
 
+@pytest.mark.slow
 def test_on_a_display_windows_open_and_injected_keys_come_to_them(display: str, tmp_path: Path) -> None:
     done = on_display(display, tmp_path)
     found = rows(done)
@@ -559,6 +561,7 @@ def test_on_a_display_windows_open_and_injected_keys_come_to_them(display: str, 
     assert all(0 < event < painted for event, painted in zip(keys["to_event_ms"], keys["to_painted_ms"], strict=True))
 
 
+@pytest.mark.slow
 def test_a_display_that_nobody_serves_fails_with_what_to_do_and_stops_nothing(tmp_path: Path) -> None:
     done = on_display(":32000", tmp_path)
     found = rows(done)

@@ -27,7 +27,7 @@ from tests.firmware import (
     well,
 )
 
-pytestmark = pytest.mark.slow
+pytestmark = pytest.mark.slow  # the firmware has to be built
 
 
 def test_a_pulse_lasts_as_long_as_it_should_and_the_record_says_when_it_was():

@@ -38,6 +38,7 @@ def by_hand(*lines: tuple[int, str]) -> list[str]:
     return [f"in {time_us} {text.encode().hex().upper()}0A" for time_us, text in lines]
 
 
+pytestmark = pytest.mark.slow  # the firmware has to be built
 ALL = ("twin", *CORES)
 
 

@@ -14,8 +14,7 @@ from device.wire.errors import message
 from tests.firmware import Hand, agree, emulated, play_all
 from tests.waiting import wait_for
 
-pytestmark = pytest.mark.slow
-
+pytestmark = pytest.mark.slow  # the firmware has to be built
 SCRIPTS = range(6, 10)
 """Of two hundred in `make soak`: short ones in lines and in frames, with faults of the driver, and power that goes."""
 

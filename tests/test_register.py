@@ -245,6 +245,7 @@ def appending(results: Path, console: str, count: int, limit: int = 0) -> subpro
     return subprocess.Popen(words, cwd=ROOT, stderr=subprocess.PIPE, text=True)
 
 
+@pytest.mark.slow
 def test_consoles_that_write_at_once_neither_lose_nor_tear_a_record(tmp_path: Path) -> None:
     consoles = [appending(tmp_path / "results", name, 20) for name in "ABCD"]
     for console in consoles:

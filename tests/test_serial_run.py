@@ -15,6 +15,7 @@ from experiments.session.steps import Failed
 from experiments.study.folders import PlaceError
 from recoil.rig import troubles_of
 from recoil.session import check_pace
+from tests.at_runs import shorten
 from tests.serial_runs import SPEED, TROUBLES, check, hasty, of_trains, one_run, resumed, rows, run_all, timings_of
 from tests.twins import Troubles, a_twin
 from tests.waiting import PATIENCE_S, wait_for
@@ -23,13 +24,14 @@ from tests.warm_start import warm
 pytestmark = pytest.mark.slow
 
 
-def test_two_hundred_trials_on_a_bad_line_are_each_done_once_or_marked_and_offered_again(tmp_path, quick_configs):
-    often = replace(TROUBLES, reset=0.025, busy=0.025, hang=0.025)  # so few trials see each of them
+@pytest.mark.slow
+def test_trials_on_a_bad_line_are_each_done_once_or_marked_and_offered_again(tmp_path, quick_configs):
+    often = replace(TROUBLES, reset=0.05, busy=0.05, hang=0.05)  # so few trials see each of them
     with a_twin(tmp_path, often, speed=SPEED, drift_ppm=60.0) as (twin, socket):
         gun = f"serial:{socket.address}?speed={SPEED:g}"
-        tally = run_all(hasty(quick_configs), tmp_path / "results", gun, range(1, 5))
+        tally = run_all(hasty(quick_configs), tmp_path / "results", gun, range(1, 3))
         figures = check(tally, twin, slack_s=1e-4)
-    assert figures["trials"] == 240
+    assert figures["trials"] == 120
     assert len(set(twin.accidents)) >= 3
     assert figures["marked"] > 0
 
@@ -78,6 +80,7 @@ def test_a_run_on_the_twin_logs_what_one_on_the_simulated_gun_does_but_for_times
     recoil, tmp_path, quick_configs, plugged, name
 ):
     hasty(quick_configs)
+    shorten(quick_configs)
     words = (
         "run",
         quick_configs / f"{name}.toml",

@@ -25,7 +25,7 @@ from tests.at_display import HAND_S, AtDisplay, last_record, needs_display
 from tests.watched_start import wait_for
 
 pytest.importorskip("PyQt6")
-pytestmark = [pytest.mark.slow, needs_display]
+pytestmark = [needs_display, pytest.mark.slow]
 needs_manager = pytest.mark.skipif(shutil.which("openbox") is None, reason="needs a window manager: openbox")
 
 LONG = "a-folder-with-a-name-that-has-no-blank-at-which-a-line-could-be-broken-and-goes-on-and-on"
