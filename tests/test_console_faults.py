@@ -21,8 +21,6 @@ from experiments.study.folders import place
 from tests.at_controls import short_direction
 from tests.faulty_console import PATIENCE_S, SLOW_SYNC_S, child
 
-pytestmark = pytest.mark.slow
-
 pytest.importorskip("PyQt6")
 pytestmark = pytest.mark.slow
 

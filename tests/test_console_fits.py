@@ -13,8 +13,6 @@ from tests.at_display import AtConsole, needs_display, virtual_display
 from tests.at_runs import RUN, words
 from tests.warm_start import warm
 
-pytestmark = pytest.mark.slow
-
 pytest.importorskip("PyQt6")
 pytestmark = pytest.mark.slow
 

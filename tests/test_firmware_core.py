@@ -19,8 +19,6 @@ from device.wire.records import Frame, encode
 from tests.firmware import CORES, built, one_after_the_other, told
 from tests.twin_scripts import TELLING_SEEDS, transcript
 
-pytestmark = pytest.mark.slow
-
 
 def differences(core: str, script: list[str]) -> list[tuple[str, str]]:
     """Where a core's transcript differs from the twin's, as far as both go."""
