@@ -52,6 +52,7 @@ def test_repeated_measures_F_keeps_fifteen_digits_at_scales_that_are_no_powers_o
     assert digits(rm_anova(scores).F, exact_rm_F(scores)) >= 15
 
 
+@pytest.mark.slow
 @given(
     seed=st.integers(0, 2**32 - 1),
     n=st.integers(2, 40),
@@ -104,6 +105,7 @@ def test_sums_of_squares_add_up_to_the_total() -> None:
     assert found.ms_error == pytest.approx(found.ss_error / 26, rel=1e-15)
 
 
+@pytest.mark.slow
 @given(TENTHS)
 def test_tenths_give_the_F_of_exact_arithmetic(counts: np.ndarray) -> None:
     found = rm_anova(counts / 10)
@@ -115,6 +117,7 @@ def test_tenths_give_the_F_of_exact_arithmetic(counts: np.ndarray) -> None:
     assert pytest.approx(expected, rel=1e-11, abs=1e-25) == found.F
 
 
+@pytest.mark.slow
 @given(FINITE)
 def test_the_error_sum_of_squares_is_never_negative_and_p_is_a_probability(scores: np.ndarray) -> None:
     found = rm_anova(scores)

@@ -8,6 +8,8 @@ import pytest
 
 from tests import brute_force as brute
 
+pytestmark = pytest.mark.slow
+
 
 def test_grim_says_what_enumeration_says() -> None:
     assert brute.compared(brute.grim_cases(range(1, 40, 3), 2, 2)) > 1_000
@@ -52,7 +54,6 @@ def test_p_says_what_mpmath_says() -> None:
     assert brute.compared(brute.p_cases(120, 1)) > 80
 
 
-@pytest.mark.slow
 def test_tukey_never_accuses_data_that_exist() -> None:
     assert brute.tukey_accusations(2, 1)[0] == 2
 

@@ -31,6 +31,7 @@ def one(findings: tuple[AuditFinding, ...], check: str, quote: str) -> AuditFind
     return found[0]
 
 
+@pytest.mark.slow
 def test_f_of_experiment_1_is_off_the_lattice_and_rescued_by_readings_only(findings: tuple[AuditFinding, ...]) -> None:
     """By hand: A = 3 (78^2 + 111^2 + 130^2) - 319^2 = 4154, F = 13 A / (14 W - A), W even: 434 and 432 are next."""
     result = one(findings, "repeated-measures F", "28.45").result

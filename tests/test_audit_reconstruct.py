@@ -102,6 +102,7 @@ def test_the_nearest_attainable_f_takes_the_place_of_the_published_one() -> None
     assert attainable_f("28.51", plain)[1] == "28.51"
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("seed", range(5))
 def test_rebuilt_answers_of_experiment_1_give_all_that_is_published(paper: Paper, seed: int) -> None:
     """By other routes than the search: exact fractions, our ANOVA, Tukey and binomial tests."""
@@ -119,6 +120,7 @@ def test_rebuilt_answers_of_experiment_1_give_all_that_is_published(paper: Paper
     assert backward.sum(axis=0).tolist() == [67, 111, 130]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("seed", range(5))
 def test_rebuilt_ratings_of_experiment_2_give_all_that_is_published(paper: Paper, seed: int) -> None:
     table = np.array(rating_grains(paper.preference, MEANS, "0.1", 0.6, seed).rows)

@@ -210,6 +210,7 @@ def test_how_an_unfinished_run_stands_is_given_back(study: StudyFolder) -> None:
     assert (found.state, found.planned) == ("in progress", 60)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("what", "said"),
     [
@@ -229,6 +230,7 @@ def test_who_may_not_begin_is_refused_and_nothing_is_recorded(what: Entered, sai
     assert records(study) == []
 
 
+@pytest.mark.slow
 def test_who_is_excluded_may_not_go_on_until_they_are_readmitted(study: StudyFolder) -> None:
     broken_off(study)
     join(study, "P01", FACTS, VirtualClock())
@@ -239,6 +241,7 @@ def test_who_is_excluded_may_not_go_on_until_they_are_readmitted(study: StudyFol
     assert admit(study, entered(), VirtualClock()).state == "in progress"
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("practice", [False, True])
 def test_a_run_that_is_open_elsewhere_is_neither_gone_on_with_nor_practised_for(
     practice: bool, study: StudyFolder
@@ -250,6 +253,7 @@ def test_a_run_that_is_open_elsewhere_is_neither_gone_on_with_nor_practised_for(
     assert admit(study, entered(), VirtualClock(), practice=practice).state == "in progress"
 
 
+@pytest.mark.slow
 def test_a_damaged_journal_stands_in_the_way_of_its_own_experiment_alone(study: StudyFolder) -> None:
     journal = broken_off(study)
     lines = journal.read_bytes().splitlines(keepends=True)

@@ -29,6 +29,7 @@ TIGHT = {
 """A setting of each peer at which it must agree with us to a millionth."""
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("drive_off", OFF_STATES)
 @pytest.mark.parametrize("family", TIGHT)
 def test_each_peer_finds_what_the_full_model_finds(family: str, drive_off: Any) -> None:

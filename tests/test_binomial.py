@@ -25,6 +25,7 @@ def test_the_papers_binomial_tests_are_reproduced(successes: int, p: float) -> N
     assert binomial_test(successes, 140).p == pytest.approx(p, abs=5e-4)
 
 
+@pytest.mark.slow
 @settings(max_examples=40)
 @given(st.integers(1, 60), st.data(), st.sampled_from([Fraction(1, 2), Fraction(1, 3), Fraction(1, 10)]))
 def test_p_is_the_exact_sum_of_all_outcomes_not_more_likely(n: int, data: st.DataObject, p0: Fraction) -> None:
@@ -51,6 +52,7 @@ def test_certain_chances_give_certain_answers() -> None:
     assert found.p.tolist() == [1.0, 0.0, 1.0, 0.0]
 
 
+@pytest.mark.slow
 def test_p_and_its_logarithm_agree_with_sums_of_mpmath() -> None:
     cases = GOLDEN["tests"]
     found = binomial_test(*([case[name] for case in cases] for name in ("k", "n", "p0")))
@@ -70,6 +72,7 @@ def test_both_intervals_have_fourteen_digits(case: dict[str, Any]) -> None:
         assert digits_of(getattr(found, limit), case[limit]) >= 14
 
 
+@pytest.mark.slow
 @settings(max_examples=40)
 @given(st.integers(0, 400), st.data(), st.sampled_from([1e-9, 0.5, 0.9, 0.999]))
 def test_clopper_pearson_limits_leave_the_tail_they_promise(k: int, data: st.DataObject, confidence: float) -> None:

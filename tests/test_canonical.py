@@ -14,6 +14,7 @@ values = st.recursive(
 )
 
 
+@pytest.mark.slow
 @settings(deadline=None)
 @given(values)
 def test_canonical_json_is_json_of_the_same_value(value: object) -> None:
@@ -28,6 +29,7 @@ def test_the_order_of_keys_does_not_matter(table: dict[str, object], random: obj
     assert canonical_json({key: table[key] for key in keys}) == canonical_json(table)
 
 
+@pytest.mark.slow
 @settings(deadline=None)
 @given(values)
 def test_a_record_is_one_line(value: object) -> None:

@@ -41,6 +41,7 @@ def _read(path: Path, text: str | None = None) -> Logs:
     return read_logs([path], mapping=load(ColumnMap, toml))
 
 
+@pytest.mark.slow
 def test_psychopys_files_give_the_statistics_of_the_same_answers_in_recoils_own(tmp_path: Path) -> None:
     for i in range(1, 4):
         _write(tmp_path / "old" / f"P{i:02d}_gun_2024.csv", _psychopy(trial_rows(f"P{i:02d}", 1000 + i)))

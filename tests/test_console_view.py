@@ -83,6 +83,7 @@ def test_every_state_says_what_to_do_and_none_says_anything_of_how_good_the_part
         assert not [text for text in sitting.window.heard if tells_correctness(text)]
 
 
+@pytest.mark.slow
 def test_whoever_looks_finds_the_word_they_need_in_each_state(tmp_path: Path) -> None:
     needed = {
         State.REARMING: "hold T",

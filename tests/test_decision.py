@@ -23,6 +23,7 @@ CASES = [(1.0, 2.0, 0.5), (-3.0, 1.2, 0.2), (0.0, 1.0, 0.9), (8.0, 3.0, 0.1), (0
 TIMES = (1e-3, 0.05, 0.2999, 0.3001, 1.0, 4.0, 40.0)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("v", "a", "w"), CASES)
 @pytest.mark.parametrize("upper", [True, False])
 def test_the_log_density_agrees_with_the_series_of_200_digits(upper: bool, v: float, a: float, w: float) -> None:
@@ -68,6 +69,7 @@ def test_the_density_integrates_to_one_with_the_closed_moments(v: float, a: floa
     assert second - first**2 == pytest.approx(expected.variance_s2, rel=1e-9)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("v", "a", "w"), CASES)
 @pytest.mark.parametrize("upper", [True, False])
 def test_the_distribution_is_the_integral_of_the_density(upper: bool, v: float, a: float, w: float) -> None:

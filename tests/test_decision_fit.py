@@ -14,6 +14,8 @@ from analysis.times.people import fit_people
 from experiments.design.streams import generator
 from tests.decisions import BOUNDARIES, DRIFTS, INSTRUCTIONS, METHODS, RANGE_S, START, T0_S, TRUTH, decide_all, made
 
+pytestmark = pytest.mark.slow
+
 STUDY = made(1)
 
 

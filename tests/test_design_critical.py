@@ -91,6 +91,7 @@ def test_a_surer_fit_has_a_narrower_band(contour: Contour, layer: Layer, fit: Pe
     assert narrow.voltage_V[some].tolist() == contour.voltage_V[some].tolist()
 
 
+@pytest.mark.slow
 def test_a_fit_without_covariance_has_no_band(layer: Layer, fit: PerceptFit) -> None:
     unknown = replace(fit, covariance=((math.nan,) * 3,) * 3)
     band = band_of(drawn_contours(layer.felt[0.02], np.array(SPACE.voltage_V), unknown, 1, draws=10))

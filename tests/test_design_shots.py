@@ -71,6 +71,7 @@ def test_four_times_the_points_change_the_rate_by_less_than_half_a_thousandth(gu
     assert rate_of(coarse) == pytest.approx(rate_of(exact), abs=5e-4)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("gun", GUNS)
 def test_a_fine_trace_gives_the_same_percept(gun: GunParameters) -> None:
     (felt,) = shot_percepts(gun, simulate(gun), (0.02,))
@@ -85,6 +86,7 @@ def test_a_shot_that_sticks_or_stays_has_no_percept() -> None:
     assert all(math.isnan(shot.period_s) and shot.by_summary is None for shot in found)
 
 
+@pytest.mark.slow
 def test_the_compiled_summaries_give_the_same_shots() -> None:
     """To rounding: the summary and the course then come from two runs of the model."""
     pytest.importorskip("numba")
@@ -136,6 +138,7 @@ def test_both_ways_alike_no_bias_helps() -> None:
     assert float(both_ways(felt, replace(DEFAULT, start=0.7))) < float(rates(felt, fair))
 
 
+@pytest.mark.slow
 def test_a_grids_intervals_are_those_of_a_single_prediction() -> None:
     fit = fit_percept(PAPER_RATES, paper_methods())
     percept = Percept(first=6.0, reaction=2.0, second=1.0)
@@ -144,6 +147,7 @@ def test_a_grids_intervals_are_those_of_a_single_prediction() -> None:
     assert np.isnan([many.rate[1], many.ci_low[1], many.evidence[1]]).all()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("voltage", "pulse", "rate", "limit"),
     [

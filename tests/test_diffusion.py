@@ -31,6 +31,7 @@ def test_a_batch_has_the_accuracy_mean_and_variance_of_theory(v: float, a: float
     assert abs(squares.mean() - expected.variance_s2) < 4.5 * squares.std() / math.sqrt(n)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("v", "a", "w"), [(0.0, 1.0, 0.5), (1.5, 2.0, 0.5), (-3.0, 1.2, 0.8), (40.0, 3.0, 0.05)])
 @pytest.mark.parametrize("how", ["scalar", "batch"])
 def test_times_given_the_answer_follow_the_distribution(v: float, a: float, w: float, how: str) -> None:
@@ -55,6 +56,7 @@ def ks_p(t: np.ndarray, answer: bool, v: float, a: float, w: float) -> float:
     return float(kstwo.sf(distance, t.size))
 
 
+@pytest.mark.slow
 def test_the_scalar_sampler_has_the_accuracy_and_mean_of_theory() -> None:
     for v, a, w in [(0.0, 1.0, 0.5), (1.0, 2.0, 0.5), (-2.0, 1.5, 0.7)]:
         n = 1_000
@@ -136,6 +138,7 @@ def test_the_probability_is_theory_s() -> None:
         assert float(upper_probabilities(v, a, w)) == pytest.approx(float(moments(v, a, w).upper), abs=1e-14)
 
 
+@pytest.mark.slow
 def test_lapses_are_coins_at_uniform_times() -> None:
     lapsing = Diffusion(
         drift=50.0, boundary=3.0, non_decision_s=0.3, lapses=Lapses(rate=0.2, earliest_s=1.0, latest_s=2.0)

@@ -21,6 +21,7 @@ FELT = percepts_of(paper_methods(), MIND.percept.leak_s)
 PLANS = [make_plan(CONFIG, f"P{number:03d}", 5, None) for number in range(100)]
 
 
+@pytest.mark.slow
 def test_participants_who_differ_answer_at_the_mean_rate_of_theory() -> None:
     people = People(drift_factor_sd=0.3, log_boundary_sd=0.2, logit_start_sd=0.3)
     mind = replace(MIND, people=people, lapses=Lapses(rate=0.05))

@@ -248,12 +248,14 @@ steps_of_any_kind = st.one_of([facts(kind) for kind in get_args(Step)])
 outcomes_of_any_kind = st.one_of([facts(kind) for kind in get_args(Outcome)])
 
 
+@pytest.mark.slow
 @settings(deadline=None, max_examples=200)
 @given(steps_of_any_kind)
 def test_any_step_reads_back_from_the_journal(step: Step) -> None:
     assert STEP.validate_python(json.loads(canonical_json(step_record(step)))) == step
 
 
+@pytest.mark.slow
 @settings(deadline=None, max_examples=200)
 @given(outcomes_of_any_kind)
 def test_any_outcome_reads_back_from_the_journal(outcome: Outcome) -> None:

@@ -544,7 +544,6 @@ def on_display(name: str, folder: Path) -> subprocess.CompletedProcess[str]:
     )
 
 
-@pytest.mark.slow
 def test_on_a_display_windows_open_and_injected_keys_come_to_them(display: str, tmp_path: Path) -> None:
     done = on_display(display, tmp_path)
     found = rows(done)
@@ -561,7 +560,6 @@ def test_on_a_display_windows_open_and_injected_keys_come_to_them(display: str, 
     assert all(0 < event < painted for event, painted in zip(keys["to_event_ms"], keys["to_painted_ms"], strict=True))
 
 
-@pytest.mark.slow
 def test_a_display_that_nobody_serves_fails_with_what_to_do_and_stops_nothing(tmp_path: Path) -> None:
     done = on_display(":32000", tmp_path)
     found = rows(done)

@@ -46,13 +46,11 @@ def test_a_killed_run_goes_on_where_it_broke_off_and_ends_with_a_whole_table(
     assert len(table) == 61
 
 
-@pytest.mark.slow
 @pytest.mark.skipif(shutil.which("strace") is None, reason="needs strace")
 def test_the_system_calls_show_a_sync_before_each_acknowledgement(quick_configs: Path, tmp_path: Path) -> None:
     check_syncs(traced_run(quick_configs, tmp_path))
 
 
-@pytest.mark.slow
 def test_a_full_disk_stops_the_run_at_the_last_safe_answer(quick_configs: Path, tmp_path: Path) -> None:
     if not can_mount(tmp_path):
         pytest.skip("no private mounts here")

@@ -53,6 +53,7 @@ def test_dropped_trials_are_counted_by_participant_and_the_first_rule_that_drops
     assert effect.trials["direction"] == KeptTrials(recorded=240, kept=235)
 
 
+@pytest.mark.slow
 def test_statistics_are_over_the_trials_and_people_that_are_kept(effect: ExclusionEffect) -> None:
     found = summarize(effect.logs).to_dict()
     assert found["excluded"] == []
@@ -114,6 +115,7 @@ def test_who_has_no_trial_left_is_listed(tmp_path: Path) -> None:
     ]
 
 
+@pytest.mark.slow
 def test_no_rules_change_nothing(tmp_path: Path) -> None:
     logs = _spoilt(tmp_path)
     effect = apply_rules(logs, Rules())

@@ -163,6 +163,7 @@ def ratings() -> np.ndarray:
     return np.array([[person[name] for name in PAPER] for person in people])
 
 
+@pytest.mark.slow
 def test_mean_ratings_are_near_those_that_the_config_assumes_for_the_paper(ratings: np.ndarray) -> None:
     assumed = [PREFERENCE.config.synthetic.ratings.mean[name] for name in PAPER]
     error = ratings.std(axis=0, ddof=1) / math.sqrt(len(ratings))
@@ -201,6 +202,7 @@ def test_without_noise_a_rating_is_the_law() -> None:
         assert found[name] == pytest.approx(min(10.0, 2.3 + 4.9 * math.log(1 + strength)), abs=0.05 + 1e-9)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("jnd", [0.1, 0.33, 1.0])
 def test_three_of_four_people_tell_which_of_two_shots_a_jnd_apart_is_stronger(jnd: float) -> None:
     # with a criterion as still as can be, a rating tells what is felt; ties of what is felt alike are half right

@@ -184,6 +184,7 @@ def test_a_fit_too_unsure_to_draw_from_is_not_drawn_from() -> None:
 # the judgement
 
 
+@pytest.mark.slow
 def test_the_studies_have_the_published_mean_rates_whoever_the_people_are(cases: list[Case]) -> None:
     """The fit is to those, so their counts lie around the published ones: the forward one is the middle."""
     for case in cases:
@@ -203,17 +204,20 @@ def test_the_backward_count_of_people_alike_is_binomial(cases: list[Case]) -> No
         assert place.ci_low < place.percentile < place.ci_high
 
 
+@pytest.mark.slow
 def test_percentiles_are_those_of_the_seed(cases: list[Case]) -> None:
     one, same, other = judged(cases[1]), judged(cases[1]), judged(cases[1], seed=2)
     assert (one.places, one.claims) == (same.places, same.claims)
     assert one.places != other.places
 
 
+@pytest.mark.slow
 def test_more_different_people_give_a_smaller_f(cases: list[Case]) -> None:
     medians = [judged(case, 3000).places[0].quantiles[2] for case in cases[:3]]
     assert medians[0] > medians[1] > medians[2]
 
 
+@pytest.mark.slow
 def test_the_error_of_the_fit_widens_the_places(cases: list[Case]) -> None:
     plain, drawn = (judged(case, 3000).places[0].quantiles for case in (cases[1], cases[3]))
     assert drawn[0] < plain[0]

@@ -166,6 +166,7 @@ def done(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, Path]:
     return finished.place.journal, finished.place.table
 
 
+@pytest.mark.slow
 def test_the_first_record_and_the_table_hold_each_trials_instruction(done: tuple[Path, Path]) -> None:
     contents = read_journal(done[0])
     planned = [trial.instruction for trial in contents.plan.trials]

@@ -132,6 +132,7 @@ def test_a_full_disk_is_told_with_what_is_safe(path: Path) -> None:
         journal.append("step", body={})
 
 
+@pytest.mark.slow
 def test_a_record_that_was_written_in_part_is_taken_back(path: Path) -> None:
     # a limit on the size of files is the only full disk that a test can make; it binds the process it is set in
     size = path.stat().st_size
@@ -158,6 +159,7 @@ with Journal.reopen(contents, VirtualClock()) as journal:
 # cut off
 
 
+@pytest.mark.slow
 def test_a_journal_cut_at_any_byte_is_read_to_its_last_whole_record(path: Path) -> None:
     data, cut = path.read_bytes(), path.with_name("cut")
     ends = [n + 1 for n, byte in enumerate(data) if byte == 0x0A]
@@ -291,6 +293,7 @@ def test_line_ends_of_another_system_do_no_harm(path: Path) -> None:
 # held by one
 
 
+@pytest.mark.slow
 def test_a_second_holder_is_refused_in_the_same_process(path: Path) -> None:
     with Journal.reopen(read_journal(path), VirtualClock()) as journal:
         with pytest.raises(JournalError, match="another run holds this journal; close that one first"):
@@ -300,6 +303,7 @@ def test_a_second_holder_is_refused_in_the_same_process(path: Path) -> None:
         pass
 
 
+@pytest.mark.slow
 def test_a_second_holder_is_refused_in_another_process_and_loses_nothing(tmp_path: Path) -> None:
     path = tmp_path / "j"
     program = f"""

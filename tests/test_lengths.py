@@ -6,6 +6,8 @@ import ast
 from collections.abc import Iterator
 from pathlib import Path
 
+import pytest
+
 ROOT = Path(__file__).parent.parent
 ROOMS = ("device", "experiments", "analysis", "recoil")
 
@@ -27,6 +29,7 @@ def length(node: ast.FunctionDef) -> int:
     return (body[-1].end_lineno or 0) - body[0].lineno + 1 if body else 0
 
 
+@pytest.mark.slow
 def test_no_function_is_longer_than_45_lines_and_no_module_than_455() -> None:
     trees = dict(modules())
     assert [f"{name}.{one.name}" for name, tree in trees.items() for one in functions(tree) if length(one) > 45] == []

@@ -87,6 +87,7 @@ def test_the_heat_of_a_pulse_is_that_of_its_full_voltage_on_the_resistance():
     assert load_of(Effect(effect=1), 2.9) == Load(on_s=0.0, heat_J=0.0)
 
 
+@pytest.mark.slow
 def test_the_papers_drive_at_five_hertz_stays_below_the_temperature_limit():
     load = load_of(Pulse(voltage_V=16.0, pulse_s=0.010), 2.9)
     history = fired(load, [n / 5 for n in range(10_000)])  # ten time constants

@@ -337,6 +337,7 @@ def test_a_gun_file_by_itself_is_refused_for_a_method_that_never_moves(folder: P
         check(str(folder / GUN), None, 1)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("words", [("check",), ("run", "--participant", "P01", "--screen", "synthetic")])
 def test_check_and_run_refuse_a_method_that_never_moves_with_the_same_words(folder: Path, recoil, words) -> None:
     edit(folder / GUN, "voice_coil.friction_N = 1.12", "voice_coil.friction_N = 200.0")

@@ -134,6 +134,7 @@ def test_what_arrow_reads_the_csv_module_reads_alike(contents: list[bytes]) -> N
         pd.testing.assert_frame_equal(frame, expected_frames[number])
 
 
+@pytest.mark.slow
 @settings(max_examples=15)
 @given(contents=st.lists(_spoilt(), min_size=1, max_size=4))
 def test_a_folder_read_by_the_csv_module_alone_gives_equal_tables_and_problems(
@@ -234,6 +235,7 @@ _DECIMALS = st.one_of(
 )
 
 
+@pytest.mark.slow
 @settings(max_examples=120)
 @given(st.lists(_DECIMALS, min_size=1))
 def test_decimals_are_read_to_the_last_bit_or_doubted(texts: list[str]) -> None:

@@ -66,6 +66,7 @@ def test_a_contrast_is_a_t_test_on_n_minus_1_with_holm_and_an_odds_ratio() -> No
     assert math.log(first.ci_high) == pytest.approx(first.log_odds_difference + half)
 
 
+@pytest.mark.slow
 def test_its_size_holds_for_fourteen_people_who_differ() -> None:
     """No effect, people spread by 0.7 logits: t rejects in 5 % of the studies (3 s.e. of 1000 above: 7.1 %)."""
     rng, rejected = np.random.default_rng(5), 0

@@ -98,6 +98,7 @@ def found() -> dict[str, list[str]]:
     )
 
 
+@pytest.mark.slow
 def test_a_public_name_stands_in_one_module_or_has_a_reason(found: dict[str, list[str]]) -> None:
     unexcused = {
         name: where
@@ -166,12 +167,14 @@ def annotations(node: ast.FunctionDef) -> Iterator[ast.expr]:
         yield node.returns
 
 
+@pytest.mark.slow
 def test_results_have_types_between_the_door_and_the_serialiser() -> None:
     found = {
         name: functions
         for path in modules()
         if (name := str(path.relative_to(ROOT))) not in SPREAD_OUT
-        and (functions := loose(path.read_text(encoding="utf-8")))
+        and "dict[str, Any]" in (source := path.read_text(encoding="utf-8"))
+        and (functions := loose(source))
     }
     assert found == {}
 

@@ -20,6 +20,7 @@ def of(found, name):
     return [one for one in found if one.post_hoc == name]
 
 
+@pytest.mark.slow
 def test_every_post_hoc_keeps_the_error_that_it_claims(found) -> None:
     claimed = [one for one in found if one.claimed is not None]
     assert len(claimed) == 7
@@ -51,6 +52,7 @@ def test_more_data_sets_than_a_chunk_are_all_counted() -> None:
     assert (one.null_error * 5_001) == pytest.approx(round(one.null_error * 5_001), abs=1e-6)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("seed", range(5))
 def test_what_a_post_hoc_finds_is_what_its_own_function_says(seed: int) -> None:
     scores = np.random.default_rng(seed).normal([0.0, 0.4, 0.9], [1.0, 1.0, 2.0], (14, 3))

@@ -24,6 +24,7 @@ def test_t_p_and_interval_equal_r() -> None:
         assert (pair.t, pair.p, pair.ci_low, pair.ci_high) == pytest.approx(numbers, rel=1e-12)
 
 
+@pytest.mark.slow
 def test_holm_equals_r_pingouin_and_statsmodels() -> None:
     p = [1.31e-3, 1e-5, 0.02, 0.03]
     assert holm(p).tolist() == pytest.approx([0.00393, 0.00004, 0.04, 0.04])  # R 4.2.2: p.adjust(p, "holm")

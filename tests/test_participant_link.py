@@ -103,6 +103,7 @@ def test_a_clock_that_is_set_in_mid_question_spoils_the_time_and_is_said(child):
         link.ask_direction(WHICH)
 
 
+@pytest.mark.slow
 def test_a_screen_that_is_never_ready_is_not_waited_for_longer_than_said(child):
     link = child("time.sleep(600)")
     with pytest.raises(ParticipantError, match=r"no answer within 0\.3 s"):  # not how the screen ended
@@ -174,6 +175,7 @@ def test_a_screen_that_is_killed_in_mid_question_is_noticed(child):
     assert "signal 9" in link.failure
 
 
+@pytest.mark.slow
 def test_what_the_screen_itself_fails_at_is_told(child):
     link = child("say(kind='failed', message='the window was closed')\ntime.sleep(600)")
     with pytest.raises(ParticipantError, match="the window was closed"):
@@ -205,6 +207,7 @@ def test_after_a_question_was_called_off_the_next_is_answered(child):
     assert link.ask_rating(AskRating(**fields(SCALE) | {"number": 2}), PATIENCE_S).rating == 0
 
 
+@pytest.mark.slow
 def test_a_screen_that_reads_nothing_keeps_nobody_waiting_and_is_killed(child, monkeypatch):
     monkeypatch.setattr("experiments.screens.participant.link.END_S", 1.0)
     link = child("import signal; signal.signal(signal.SIGTERM, signal.SIG_IGN); ready(); time.sleep(600)")
@@ -229,6 +232,7 @@ def test_a_program_that_is_not_there_is_one_clear_error():
         ParticipantLink.start(command=["no-such-program"])
 
 
+@pytest.mark.slow
 def test_importing_the_link_imports_no_psychopy():
     code = "import sys, experiments.screens.participant.link; sys.exit('psychopy' in sys.modules)"
     assert subprocess.run([sys.executable, "-c", code], check=False).returncode == 0

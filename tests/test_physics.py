@@ -108,6 +108,7 @@ def runge_kutta(gun, h=1e-5):
     raise AssertionError("the reference did not land")
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("friction_N", "drive_off", "emf"), VARIANTS)
 def test_a_plain_fixed_step_integration_agrees(friction_N, drive_off, emf):
     gun = GunParameters(friction_N=friction_N, drive_off=drive_off, emf=emf)
@@ -269,6 +270,7 @@ def test_a_hop_of_a_billionth_of_a_nanometre_does_not_keep_the_magnet_from_home(
     assert simulate(gun).status == "home"
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("extreme", EXTREMES)
 def test_extremes_neither_hang_nor_return_nan(extreme):
     for drive_off in ("shorted", "open"):

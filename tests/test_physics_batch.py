@@ -23,6 +23,7 @@ def engine(request, monkeypatch):
     return request.param
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("drive_off", ["shorted", "open"])
 def test_a_batch_gives_the_digits_of_single_shots(engine, drive_off):
     rng = np.random.default_rng(3)
@@ -79,6 +80,7 @@ def test_a_compiled_shot_has_the_digits_of_an_interpreted_one(fidelity):
             assert (ours is None and theirs is None) or ours == pytest.approx(theirs, rel=1e-13)
 
 
+@pytest.mark.slow
 def test_a_compiled_shot_changes_nothing_for_the_next_interpreted_one():
     code = (
         "import sys; from device.physics import *; gun = GunParameters(); first = simulate(gun);"
@@ -108,6 +110,7 @@ def test_a_session_never_loads_the_compiler():
     assert subprocess.run([sys.executable, "-c", code], check=False).returncode == 0
 
 
+@pytest.mark.slow
 def test_what_one_process_compiled_is_found_by_the_next():
     pytest.importorskip("numba")
     code = "import sys; from device.physics.batch import machine_code; sys.stdout.write(machine_code().__qualname__)"

@@ -12,6 +12,7 @@ from tests.extreme_guns import defects, distance
 SOME = 100
 
 
+@pytest.mark.slow
 def test_neighbouring_guns_shoot_alike():
     assert not defects(1, SOME)
 

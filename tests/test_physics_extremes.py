@@ -33,6 +33,7 @@ def test_hardly_any_inductance_is_no_inductance(L, drive_off):
         assert numbers(small)[name] == pytest.approx(value, rel=1e-6), name
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("friction_N", [1.3999, 1.4, 1.4001, 1e3])
 @pytest.mark.parametrize("drive_off", OFF)
 def test_friction_about_the_pre_load_and_far_above_it(friction_N, drive_off):

@@ -104,6 +104,7 @@ def test_a_collision_at_no_speed_is_none():
             collide(GunParameters(), -1.0)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("friction_N", "drive_off", "emf"), VARIANTS)
 def test_a_gun_too_heavy_to_move_is_the_fixed_gun(friction_N, drive_off, emf):
     gun = GunParameters(friction_N=friction_N, drive_off=drive_off, emf=emf)
@@ -112,6 +113,7 @@ def test_a_gun_too_heavy_to_move_is_the_fixed_gun(friction_N, drive_off, emf):
         assert getattr(held, name) == pytest.approx(getattr(fixed, name), rel=2e-7), name
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("inductance_H", [1e-5, 1e-9, 1e-12])
 def test_a_held_coil_of_hardly_any_inductance_is_the_fixed_one_when_it_cannot_move(inductance_H):
     gun = GunParameters(inductance_H=inductance_H, drive_off="open")
@@ -126,6 +128,7 @@ def test_a_held_shot_that_is_not_followed_to_its_end_is_said(monkeypatch):
         simulate_held(GunParameters())
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("friction_N", "drive_off", "emf"), VARIANTS)
 def test_a_held_gun_kicks_and_keeps_its_momentum(friction_N, drive_off, emf):
     held = simulate_held(GunParameters(friction_N=friction_N, drive_off=drive_off, emf=emf))

@@ -34,6 +34,7 @@ def scenes() -> st.SearchStrategy[Scene]:
     return st.one_of(own, st.sampled_from(list(SCENES.values())))
 
 
+@pytest.mark.slow
 @settings(max_examples=150)
 @given(guns_near_the_paper(), scenes())
 def test_the_picked_model_is_as_near_to_full_as_was_promised_and_as_the_scene_bears(
@@ -47,6 +48,7 @@ def test_the_picked_model_is_as_near_to_full_as_was_promised_and_as_the_scene_be
         assert error <= choice.errors[output] <= borne, (choice.fidelity, output)
 
 
+@pytest.mark.slow
 @settings(max_examples=150)
 @given(guns_near_the_paper(), scenes())
 def test_every_cheaper_model_would_be_beyond_what_the_scene_bears(gun: GunParameters, scene: Scene) -> None:
@@ -128,6 +130,7 @@ def test_simulate_says_what_it_picked_for_a_scene_and_what_it_stands_for(recoil:
     assert "not promised: peak_force_N" in said
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("words", "named"),
     [

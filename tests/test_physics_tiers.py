@@ -21,6 +21,7 @@ def guns(seed, count):
     return {**changes, "friction_N": rng.uniform(*FRICTION_N, count)}
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("drive_off", "emf"), OPTIONS)
 def test_each_model_is_within_its_stated_error(drive_off, emf):
     gun, arrays = GunParameters(drive_off=drive_off, emf=emf), guns(11, 60)

@@ -61,6 +61,7 @@ def test_a_gun_whose_magnet_sticks_has_no_rate():
     assert highest_rate_Hz(GunParameters(friction_N=1.7)) == 0.0
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("emf", "friction_N"), [("printed", 1.094), ("reciprocal", 1.341)])
 def test_the_gentlest_friction_at_five_a_second(emf, friction_N):
     gun = GunParameters(emf=emf)

@@ -53,6 +53,7 @@ def test_anything_else_is_refused_with_value_and_rule(code: str) -> None:
     assert len(message) < 300
 
 
+@pytest.mark.slow
 @settings(deadline=None, max_examples=300)
 @given(st.text() | near_codes, st.sampled_from(EXPERIMENTS))
 def test_no_text_leads_out_of_the_results_folder(code: str, experiment: str) -> None:

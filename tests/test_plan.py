@@ -138,6 +138,7 @@ def either(request: pytest.FixtureRequest) -> list[Facts]:
     return request.getfixturevalue("over_sessions" if request.param == "session" else "over_sets")
 
 
+@pytest.mark.slow
 def test_two_thousand_plans_have_three_sessions_of_four_sets_of_five_trials(either: list[Facts]) -> None:
     assert len(either) == SEEDS
     assert all(plan.numbered for plan in either)

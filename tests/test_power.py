@@ -206,6 +206,7 @@ BAD = {
 }
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("words", BAD)
 def test_what_cannot_be_is_refused_in_one_message(
     words: str, tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
@@ -257,6 +258,7 @@ def test_trials_keep_the_sets_and_the_share_of_forward_trials() -> None:
     assert designs[20] == CONFIG.design
 
 
+@pytest.mark.slow
 def test_a_design_that_keeps_people_too_long_is_shown_and_never_proposed(tmp_path: Path) -> None:
     request = PowerRequest(config="direction", participants="14", trials="20,40", effects="1", studies=200, target=0.75)
     with on_processes(1):
@@ -268,6 +270,7 @@ def test_a_design_that_keeps_people_too_long_is_shown_and_never_proposed(tmp_pat
     assert chosen is None or chosen["trials"] == 20
 
 
+@pytest.mark.slow
 def test_methods_can_be_compared_in_sets(tmp_path: Path) -> None:
     request = PowerRequest(
         config="direction",

@@ -22,6 +22,7 @@ def test_the_claims_are_those_of_statistics_json(experiment: str, participants: 
     assert claims[ANOVA]
 
 
+@pytest.mark.slow
 def test_null_participants_guess_in_their_logs_too(tmp_path: Path) -> None:
     found = through_the_chain(null_setup("direction"), 4, 1, tmp_path)
     pooled = [test["successes"] for tests in found["binomial"].values() for test in tests.values()]

@@ -90,6 +90,7 @@ def test_an_instruction_changes_the_rate_by_its_boundary(tmp_path: Path) -> None
     assert means[:, 0] == pytest.approx(np.mean(rates, axis=0), abs=4 * 0.2 / 200)
 
 
+@pytest.mark.slow
 def test_null_participants_give_five_percent(tmp_path: Path) -> None:
     config = felt_config(tmp_path, spreads=SPREADS)
     grid = make_grid(PowerRequest(config=str(config), participants="14", null=True, studies=20_000))
@@ -100,6 +101,7 @@ def test_null_participants_give_five_percent(tmp_path: Path) -> None:
             assert abs(found[claim] - 0.05) < 4 * np.sqrt(0.05 * 0.95 / 20_000) + 0.003, (cell.design.people, claim)
 
 
+@pytest.mark.slow
 def test_those_who_guess_without_bias_keep_the_exact_test_at_its_size(tmp_path: Path) -> None:
     """The size by its definition: all outcomes of 140 that the test rejects."""
     config = felt_config(tmp_path, spreads=SPREADS)

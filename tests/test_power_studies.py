@@ -58,6 +58,7 @@ def draws(number: int = 1) -> np.random.Generator:
 # people
 
 
+@pytest.mark.slow
 def test_the_answers_are_distributed_as_those_of_the_observer_step_by_step() -> None:
     """Correct counts of a cell, and the sum over all cells, in which people's ability and bias show."""
     people = 200
@@ -140,6 +141,7 @@ def test_half_the_effect_halves_the_distances_and_the_habit() -> None:
 # the planned analysis
 
 
+@pytest.mark.slow
 def test_claims_are_those_of_the_tests_study_by_study() -> None:
     counts = direction_counts(DIRECTION, 9, 60, draws(), 0.6)
     found = analysed_directions(counts, (10, 10), METHODS, FORWARD_ORDER, [1.0, 1.0, 1.0])
@@ -245,6 +247,7 @@ def rates_of(rates: Rates, stream: Stream) -> list[list[float]]:
     ]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("experiment", ["direction", "preference"])
 def test_every_published_claim_recurs_as_often_as_among_people_drawn_one_by_one(experiment: str) -> None:
     config = {"direction": DIRECTION, "preference": PREFERENCE}[experiment]
@@ -258,6 +261,7 @@ def test_every_published_claim_recurs_as_often_as_among_people_drawn_one_by_one(
         assert abs(odds[claim] - share) <= 4 * error + 1e-3, claim
 
 
+@pytest.mark.slow
 def test_null_participants_give_five_percent_and_the_exact_test_its_own_size() -> None:
     """The size of the exact test by its definition: all outcomes of 140 that it rejects."""
     grid = make_grid(PowerRequest(config="direction", participants="14", null=True, studies=20_000))

@@ -37,6 +37,7 @@ def test_a_practice_has_files_of_its_own_that_are_never_analysed(tmp_path: Path)
     assert read_logs([tmp_path]).files == ()
 
 
+@pytest.mark.slow
 def test_a_practice_can_be_done_again_and_leaves_the_run_itself_open(tmp_path: Path) -> None:
     practise(tmp_path)
     practise(tmp_path)

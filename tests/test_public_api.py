@@ -32,6 +32,7 @@ def test_an_unknown_name_is_refused_with_those_there_are() -> None:
         recoil.analyse  # noqa: B018 - the access is what fails
 
 
+@pytest.mark.slow
 def test_importing_it_loads_nothing_and_a_name_what_it_needs() -> None:
     assert loaded("import recoil") == set()
     assert loaded("import recoil\nrecoil.RecoilError") == set()

@@ -21,6 +21,8 @@ from experiments.study.folders import StudyFolder, look_at, open_study, overview
 from recoil.config_files import new_study
 from tests.traced_trial import MOST, traced
 
+pytestmark = pytest.mark.slow
+
 JOURNAL = "sub-{}_task-preference_journal.jsonl"
 
 

@@ -98,6 +98,7 @@ any_entry = st.one_of(
 )
 
 
+@pytest.mark.slow
 @given(st.lists(any_entry))
 def test_the_state_of_a_code_is_what_its_own_last_records_say(entries: list[RegisterEntry]) -> None:
     found = Register(path=Path(REGISTER_FILE), entries=tuple(("2026-01-01T00:00:00Z", one) for one in entries)).members
@@ -155,6 +156,7 @@ def test_a_code_that_differs_from_a_registered_one_in_case_alone_is_refused(resu
 # what was cut off or changed
 
 
+@pytest.mark.slow
 def test_a_register_cut_off_at_any_byte_holds_its_whole_records_and_can_be_gone_on_with(results: Path) -> None:
     data = (results / REGISTER_FILE).read_bytes()
     for length in range(len(data)):
@@ -166,6 +168,7 @@ def test_a_register_cut_off_at_any_byte_holds_its_whole_records_and_can_be_gone_
     assert [one.participant_id for _, one in read_register(results).entries] == ["P01", "P02", "P02", "P02", "P09"]
 
 
+@pytest.mark.slow
 @settings(max_examples=200)
 @given(st.data())
 def test_a_byte_changed_before_the_last_record_is_noticed_and_named(data: st.DataObject) -> None:
@@ -258,6 +261,7 @@ def test_consoles_that_write_at_once_neither_lose_nor_tear_a_record(tmp_path: Pa
         assert own == [f"{name}{number:02d}" for number in range(20)]
 
 
+@pytest.mark.slow
 def test_a_full_disk_is_said_and_leaves_whole_records(results: Path) -> None:
     before = (results / REGISTER_FILE).read_bytes()
     full = appending(results, "A", 1, limit=len(before) + 40)

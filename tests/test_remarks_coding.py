@@ -117,6 +117,7 @@ def test_a_code_for_somebody_who_was_not_analysed_is_refused(book: Codebook) -> 
         code_remarks([], ["P01"], book)
 
 
+@pytest.mark.slow
 def test_analyze_counts_the_codes_of_logs(recoil: Recoil, tmp_path: Path) -> None:
     write_study(tmp_path / "logs", participants=4, seed=1)
     for trials in (tmp_path / "logs").rglob("*_trials.csv"):

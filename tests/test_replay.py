@@ -159,6 +159,7 @@ def test_a_run_broken_off_at_any_record_goes_on_to_the_same_answers(
         check_resumed(whole, broken_off(whole, tmp_path / str(records), records), records)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", SETUPS)
 def test_a_run_broken_off_within_a_record_goes_on_from_the_last_whole_one(
     name: str, unbroken: dict[str, Unbroken], tmp_path: Path
@@ -171,6 +172,7 @@ def test_a_run_broken_off_within_a_record_goes_on_from_the_last_whole_one(
         assert raw(journal)[records]["cut_bytes"] == len(rest)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", SETUPS)
 def test_a_run_may_be_broken_off_and_gone_on_with_many_times(
     name: str, unbroken: dict[str, Unbroken], tmp_path: Path
@@ -398,6 +400,7 @@ def test_a_journal_in_which_nothing_was_acknowledged_is_set_aside(
     assert journal.with_name(f"{journal.stem}.aside-1.jsonl").read_bytes() == b'{"half'
 
 
+@pytest.mark.slow
 def test_a_run_that_another_process_is_at_cannot_be_set_aside(unbroken: dict[str, Unbroken], tmp_path: Path) -> None:
     journal = broken_off(unbroken["preference"], tmp_path, 6)
     with Journal.reopen(read_journal(journal), VirtualClock()), pytest.raises(JournalError, match="another run holds"):

@@ -15,6 +15,7 @@ def direction(tmp_path_factory: pytest.TempPathFactory) -> Section:
     return section
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "words",
     [
@@ -53,6 +54,7 @@ def test_ratings_have_no_model_of_answers(tmp_path: Path) -> None:
     assert "odds" not in " ".join(section.paragraphs)
 
 
+@pytest.mark.slow
 def test_separation_is_told_instead_of_a_table(tmp_path: Path) -> None:
     (section,) = supplement_sections(study_of(tmp_path, ONE_AT_CEILING))
     assert any(
@@ -61,6 +63,7 @@ def test_separation_is_told_instead_of_a_table(tmp_path: Path) -> None:
     assert not any("Odds ratios" in table.caption for table in section.tables)
 
 
+@pytest.mark.slow
 def test_reasons_stand_where_there_are_no_numbers(tmp_path: Path) -> None:
     (section,) = supplement_sections(study_of(tmp_path, CEILING))
     told = "\n".join(section.paragraphs)

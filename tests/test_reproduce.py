@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import shutil
 import subprocess
-import sys
 from pathlib import Path
 
 import numpy as np
@@ -15,6 +14,7 @@ from statsmodels.stats.anova import AnovaRM
 from analysis.logs.reading import read_logs
 from analysis.predict.reproduction import reproduce
 from analysis.predict.synthetic_studies import direction_counts, preference_scores
+from analysis.summary.summary import summarize
 from experiments.design.streams import generator
 from experiments.load import load_setup
 from tests.reproduced import EXPERIMENTS, scores, statistics
@@ -23,8 +23,6 @@ from tests.warm_start import warm
 
 pytestmark = pytest.mark.slow
 
-RECOIL = Path(sys.executable).with_name("recoil")
-"""The program itself: when it is killed it is gone at once."""
 METHODS = ["vibration", "asymmetric-1", "asymmetric-2"]
 
 
@@ -45,12 +43,10 @@ def test_every_table_rebuilt_from_its_journal_is_the_same_byte_for_byte(reproduc
     assert before == {path: path.read_bytes() for path in tmp_path.glob("logs/sub-*/*.csv")}
 
 
-def test_analyze_on_the_tables_alone_gives_the_same_numbers(reproduction: Path, tmp_path: Path) -> None:
+def test_the_tables_alone_give_the_same_numbers(reproduction: Path, tmp_path: Path) -> None:
     for table in reproduction.glob("logs/sub-*/*.csv"):
         (tmp_path / table.name).write_bytes(table.read_bytes())
-    done = subprocess.run(warm("analyze", tmp_path, "--out", tmp_path / "analysis"), check=False, capture_output=True)
-    assert done.returncode == 0
-    assert statistics(tmp_path / "analysis") == statistics(reproduction)
+    assert summarize(read_logs([tmp_path])).to_dict() == statistics(reproduction)
 
 
 @pytest.mark.parametrize("experiment", EXPERIMENTS)
@@ -140,20 +136,18 @@ def test_participants_drawn_by_the_configs_stay_an_option() -> None:
     assert [setup.config.synthetic.observer for setup in other.answering] == ["table", "table"]
 
 
-@pytest.mark.slow
 def test_what_is_killed_is_set_aside_by_another_seed_and_gone_on_with_by_the_same(
     reproduction: Path, tmp_path: Path
 ) -> None:
     out = tmp_path / "out"
     for seed in ("2", "1"):
-        words = ("reproduce", "--out", out, "--seed", seed)
-        with subprocess.Popen([RECOIL, *words], stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL) as killed:
+        words = warm("reproduce", "--out", out, "--seed", seed)
+        with subprocess.Popen(words, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL) as killed:
             wait_for(lambda: len(tables(out)) >= 5 or killed.poll() is not None)
             killed.kill()
     other, begun = tables(tmp_path / "out.aside-1"), tables(out)
     assert {path.name: path.read_bytes() for path in other[:4]} != {path.name: path.read_bytes() for path in begun[:4]}
-    again = warm(*words)
-    with subprocess.Popen(again, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True) as terminated:
+    with subprocess.Popen(words, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True) as terminated:
         wait_for(lambda: len(tables(out)) > len(begun) or terminated.poll() is not None)
         terminated.terminate()
         _, said = terminated.communicate(timeout=PATIENCE_S)
@@ -161,7 +155,7 @@ def test_what_is_killed_is_set_aside_by_another_seed_and_gone_on_with_by_the_sam
     assert "Traceback" not in said
     assert "interrupted" in said
     assert len(tables(out)) < 28
-    subprocess.run(again, check=True, capture_output=True)
+    subprocess.run(words, check=True, capture_output=True)
     assert len(tables(out)) == 28
     assert statistics(out) == statistics(reproduction)
 

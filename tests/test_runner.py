@@ -23,6 +23,8 @@ from experiments.study.folders import place
 from tests.journals import raw
 from tests.sittings import SETUPS, TroubledGun, resumed_rows, sitting
 
+pytestmark = pytest.mark.slow
+
 BOTH = pytest.mark.parametrize("name", SETUPS)
 
 

@@ -39,6 +39,7 @@ def test_it_is_born_disarmed_and_says_who_it_is(pair):
         pair.gun.fire(a_shot())
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("tcp", [False, True])
 def test_a_shot_is_reported_on_the_hosts_clock_to_within_its_bound(tmp_path, tcp):
     with a_pair(tmp_path, Troubles(jitter_s=0.005), speed=1.0, tcp=tcp, drift_ppm=80.0) as pair:
@@ -75,6 +76,7 @@ def test_all_methods_and_ways_are_rendered_as_the_simulated_gun_says(pair):
         assert (true.method, true.way) == (method, "FORW" if direction == "forward" else "BACK")
 
 
+@pytest.mark.slow
 def test_a_trains_shots_are_whole_ticks_of_the_guns_clock_apart_and_never_too_soon(tmp_path):
     with a_pair(tmp_path, Troubles(jitter_s=0.003), speed=0.25, rested=True, drift_ppm=80.0) as pair:
         pair.ready()
@@ -103,6 +105,7 @@ def test_a_shot_too_far_ahead_is_refused_before_a_byte_is_written(slow_pair, ahe
     assert said(pair, "CONF", "TRIG") == []
 
 
+@pytest.mark.slow
 def test_a_shot_that_waits_and_whose_answer_is_lost_is_looked_for_until_it_has_ended(slow_pair):
     pair = slow_pair
     pair.ready()

@@ -20,6 +20,7 @@ def test_a_gun_of_another_version_is_refused_by_name(tmp_path):
         open_gun(f"serial:{socket.address}")
 
 
+@pytest.mark.slow
 def test_a_gun_is_found_by_what_answers_not_by_the_order_of_ports(tmp_path, monkeypatch):
     monkeypatch.setattr("device.serial_gun.gun.PROBE_S", 1.5)  # a busy machine is no silent gun
     for name in ("a", "b", "c"):
@@ -42,6 +43,7 @@ def test_a_gun_is_found_by_what_answers_not_by_the_order_of_ports(tmp_path, monk
     os.close(deaf)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "babble", [b"\x00\xff<0001 \n", b"Recoil,a,b,wire 1\n", b"<0001 OK~00000000\n" * 50, b"A" * 3000]
 )

@@ -24,7 +24,6 @@ from tests.warm_start import warm
 pytestmark = pytest.mark.slow
 
 
-@pytest.mark.slow
 def test_trials_on_a_bad_line_are_each_done_once_or_marked_and_offered_again(tmp_path, quick_configs):
     often = replace(TROUBLES, reset=0.05, busy=0.05, hang=0.05)  # so few trials see each of them
     with a_twin(tmp_path, often, speed=SPEED, drift_ppm=60.0) as (twin, socket):

@@ -19,6 +19,8 @@ from experiments.screens.console import shot_check
 from experiments.screens.console.shot_check import ShotCheck, ShotProgress, report_text, state_text
 from experiments.screens.synthetic import synthetic_screen
 
+pytestmark = pytest.mark.slow
+
 SETUP = load_setup("direction")
 PATIENCE_S = 60.0
 

@@ -39,6 +39,8 @@ from experiments.record import tables
 from tests.decisions import decide_all
 from tests.log_files import METHODS, TextRow, trial_rows, trials_path, write_many, write_rows
 
+pytestmark = pytest.mark.slow
+
 DRIFTS = {"vibration": 0.0, "asymmetric-1": 1.2, "asymmetric-2": 2.0}
 BOUNDARIES = {"speed": 1.0, "": 1.5, "accuracy": 2.0}
 T0_S = 0.35
@@ -386,7 +388,6 @@ def test_whatever_the_log_there_is_a_section_and_no_nan(kind: str, people: int, 
     assert bool(section.pictures) == (kind not in ("no times", "one trial", "one time"))
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize("kind", ["all correct", "told by method"])
 def test_figures_are_drawn_where_there_is_little_to_draw(kind: str, tmp_path: Path) -> None:
     write_rows(trials_path(tmp_path, "P1"), changed(trial_rows("P1", sets=2), kind))
@@ -480,7 +481,6 @@ def test_a_crowd_is_fitted_by_a_sample_of_people_whose_codes_are_evenly_spaced(t
 # The report
 
 
-@pytest.mark.slow
 def test_the_section_shows_figures_tables_and_caveats(statistics: StudyStatistics, tmp_path: Path) -> None:
     section = trade_section(statistics.direction)
     assert [picture.stem for picture in section.pictures] == [CONDITIONAL_ACCURACY, QUANTILE_PROBABILITY]

@@ -40,6 +40,7 @@ def test_a_scale_changes_nothing(power: int) -> None:
     assert pytest.approx(0.542433747971877, rel=1e-10) == found.W
 
 
+@pytest.mark.slow
 def test_epsilon_keeps_its_bounds() -> None:
     rng = np.random.default_rng(1)
     for n, k in ((4, 3), (6, 4), (14, 5), (5, 5)):

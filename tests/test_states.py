@@ -270,6 +270,7 @@ def test_an_event_is_taken_exactly_where_the_table_does_not_say_no() -> None:
 TIMES = st.floats(0, 1e6)
 
 
+@pytest.mark.slow
 @given(now_s=TIMES)
 def test_a_position_gets_a_new_number_if_and_only_if_its_states_change(now_s: float) -> None:
     for stack, kind, later in MOVES:

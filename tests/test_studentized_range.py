@@ -45,6 +45,7 @@ def quantiles(k: int, df: float) -> np.ndarray:
     return np.asarray(studentized_range_isf(SHARES, k, df))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("k", KS)
 @pytest.mark.parametrize("df", DFS)
 def test_a_table_gives_what_the_sums_give(k: int, df: float) -> None:
@@ -71,6 +72,7 @@ def test_with_three_means_and_known_variance_the_tail_is_a_closed_integral() -> 
     assert studentized_range_sf(q, 3, np.inf) == pytest.approx(expected, rel=1e-11, abs=0.0)
 
 
+@pytest.mark.slow
 @given(st.floats(0.01, 500.0), st.floats(2.0, 60.0), st.floats(0.5, 1e6))
 @settings(max_examples=60)
 def test_the_tail_lies_between_that_of_one_pair_and_the_sum_over_all_pairs(q: float, k: float, df: float) -> None:
@@ -171,6 +173,7 @@ def test_a_probability_outside_its_range_is_refused() -> None:
         studentized_range_isf(1.5, 3, 26)
 
 
+@pytest.mark.slow
 def test_importing_it_loads_neither_scipy_stats_nor_scipy_linalg() -> None:
     heavy = "{'scipy.stats', 'scipy.linalg'}"
     code = f"import sys, analysis.stats.studentized_tail\nsys.exit(bool({heavy} & set(sys.modules)))"

@@ -196,6 +196,7 @@ def test_who_is_excluded_never_comes_and_is_replaced_by_a_new_code() -> None:
     assert next_code(*people, gone, someone("P04", "done", "done")) is None
 
 
+@pytest.mark.slow
 @given(st.lists(st.from_regex(r"[Pp]0[0-9]|[A-Za-z0-9]{1,4}", fullmatch=True)))
 def test_a_free_code_is_nobodys_whatever_the_case(taken: list[str]) -> None:
     assert free_code(STUDY, taken).lower() not in {code.lower() for code in taken}
@@ -254,6 +255,7 @@ def begin(results: Path, code: str, setup: Setup[Any]) -> None:
     write_head(where.journal, plan)
 
 
+@pytest.mark.slow
 @settings(max_examples=40)
 @given(st.sampled_from(SQUARES), st.integers(1, 13), st.lists(st.none() | st.integers(0, 12), max_size=25))
 def test_rows_differ_by_one_at_most_once_drop_outs_are_replaced(

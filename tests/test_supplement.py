@@ -38,6 +38,7 @@ def published_like(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Any]:
     return study_of(tmp_path_factory.mktemp("right"), RIGHT, timed=False).to_dict()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("experiment", ["direction", "preference"])
 def test_every_key_is_there_and_plain_json(experiment: str, found: dict[str, Any]) -> None:
     assert {field.name for field in fields(Supplement)} < set(found[experiment])
@@ -114,6 +115,7 @@ DEGENERATE = {
 }
 
 
+@pytest.mark.slow
 def test_supplements_of_any_scores_are_finite_or_have_a_reason() -> None:
     """Nearly degenerate, huge, tiny and far from 0: a warning of a library would fail the test, too."""
     rng = np.random.default_rng(6)
@@ -136,6 +138,7 @@ def _numbers(value: Any) -> list[float]:
     return [value] if isinstance(value, float) else []
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", DEGENERATE)
 def test_degenerate_answers_never_crash_and_never_give_a_silent_number(name: str, tmp_path: Path) -> None:
     statistics = study_of(tmp_path, DEGENERATE[name], timed=False)
@@ -151,6 +154,7 @@ def test_degenerate_answers_never_crash_and_never_give_a_silent_number(name: str
     assert list(supplement_sections(statistics))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", DEGENERATE)
 def test_degenerate_ratings_never_crash_either(name: str, tmp_path: Path) -> None:
     statistics = ratings_of(tmp_path, DEGENERATE[name])

@@ -23,6 +23,7 @@ values = st.recursive(
 )
 
 
+@pytest.mark.slow
 @given(st.dictionaries(texts, values, max_size=6))
 def test_whatever_a_config_can_hold_is_read_back_as_it_was(table: dict[str, Any]) -> None:
     read = tomllib.loads(toml_text(table))

@@ -28,6 +28,7 @@ def lasted_s(rendered: Rendered) -> float:
     return rendered.end_s - rendered.start_s
 
 
+@pytest.mark.slow
 def test_no_shot_that_the_board_shortened_or_lost_is_reported_as_fired_and_none_is_rendered_twice(tmp_path):
     with a_pair(tmp_path, Troubles(late=0.5), seed=3) as pair:
         reports, ledger = fired(pair), pair.twin.body.ledger

@@ -24,6 +24,7 @@ def test_the_error_queue_is_bounded_and_says_so():
     assert hand.error() == '0,"No error"'
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("seed", range(25))
 def test_whatever_is_said_each_pulse_ends_in_time_and_none_comes_too_soon(seed):
     starts, on = [], None
@@ -43,6 +44,7 @@ def test_whatever_is_said_each_pulse_ends_in_time_and_none_comes_too_soon(seed):
     assert all(later - sooner >= 10_000 - LATE_EFFECT_US for sooner, later in pairwise(starts))
 
 
+@pytest.mark.slow
 def test_a_script_gives_the_same_transcript_again_and_reaches_every_error():
     seen = set()
     for seed in TELLING_SEEDS:

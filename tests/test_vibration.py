@@ -83,6 +83,7 @@ def test_the_vibration_starts_from_zero_and_fades():
     assert np.abs(acceleration[1200:]).max() < np.abs(acceleration[:1200]).max() / 2
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("rms", [900.0, 1.0, 1500.0])
 def test_an_rms_that_no_decaying_sinusoids_have_is_refused_with_the_range(rms):
     with pytest.raises(ValueError, match=r"rms_m_s2 / peak_m_s2 .* can have"):

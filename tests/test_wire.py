@@ -112,6 +112,7 @@ def test_a_frame_that_cannot_be_written_cannot_be_built(number, body):
         Frame(number=number, body=body)
 
 
+@pytest.mark.slow
 @settings(max_examples=500)
 @given(st.binary(max_size=2 * MAX_LINE), SENDERS)
 @example(b">0001 A~", "host")
@@ -133,6 +134,7 @@ def test_any_text_is_a_record_or_a_link_error(text):
             read(text)
 
 
+@pytest.mark.slow
 @given(NAMED | SETTINGS | SHOTS | STANDINGS)
 def test_a_record_comes_back_from_its_text_and_fits_a_frame(record):
     assert type(record).parse(record.text()) == record
