@@ -21,7 +21,7 @@ test: full
 
 # What a developer runs every few minutes: all but the tests that are marked slow
 quick: full
-	scripts/test -m "not soak and not slow"
+	scripts/test --numprocesses $(shell nproc) -m "not soak and not slow"
 
 # Lines and branches that the tests reach, the programs that they start included
 coverage: full

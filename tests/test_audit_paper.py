@@ -15,6 +15,8 @@ from analysis.paper.audit.variance_ratios import repeated_f
 from experiments.config.door import ConfigError
 from tests.exact import exact_rm_F
 
+pytestmark = pytest.mark.slow
+
 ROOT = Path(__file__).parent
 EXAMPLE = ROOT.parent / "configs" / "examples" / "audit.toml"
 RATES = ["55.7%", "79.3%", "92.9%"]
@@ -31,7 +33,6 @@ def one(findings: tuple[AuditFinding, ...], check: str, quote: str) -> AuditFind
     return found[0]
 
 
-@pytest.mark.slow
 def test_f_of_experiment_1_is_off_the_lattice_and_rescued_by_readings_only(findings: tuple[AuditFinding, ...]) -> None:
     """By hand: A = 3 (78^2 + 111^2 + 130^2) - 319^2 = 4154, F = 13 A / (14 W - A), W even: 434 and 432 are next."""
     result = one(findings, "repeated-measures F", "28.45").result

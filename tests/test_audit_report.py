@@ -29,6 +29,8 @@ from analysis.paper.audit.run import audit, load_paper_file
 from analysis.report.serial import plain
 from tests.conftest import Recoil
 
+pytestmark = pytest.mark.slow
+
 CONFIGS = Path(__file__).parent.parent / "configs"
 
 
@@ -46,7 +48,6 @@ def text_of(findings: tuple[AuditFinding, ...], printed: str) -> str:
     return " ".join(sentences(found))
 
 
-@pytest.mark.slow
 def test_every_finding_is_told_in_two_sentences(findings: tuple[AuditFinding, ...]) -> None:
     for finding in findings:
         said = sentences(finding)
@@ -118,7 +119,6 @@ def test_predictions_are_named_as_the_comparison_names_its_rows(findings: tuple[
     ]
 
 
-@pytest.mark.slow
 def test_the_command_writes_report_and_json_and_ends_with_1_for_this_paper(recoil: Recoil, tmp_path: Path) -> None:
     done = recoil("audit", "--out", tmp_path / "out")
     assert (done.returncode, done.stderr) == (1, "")
@@ -131,7 +131,6 @@ def test_the_command_writes_report_and_json_and_ends_with_1_for_this_paper(recoi
     assert json.loads(shown.stdout)["findings"] == found["findings"]
 
 
-@pytest.mark.slow
 def test_a_sound_paper_ends_with_0_and_an_example_of_another_field_is_told(recoil: Recoil, tmp_path: Path) -> None:
     text = (CONFIGS / "examples" / "audit.toml").read_text(encoding="utf-8")
     sound = tmp_path / "sound.toml"

@@ -16,6 +16,8 @@ from tests.benchmarks.problem import OFF_STATES, Outputs, PeerError, errors, gun
 from tests.benchmarks.registry import peers
 from tests.benchmarks.timing import Row, measure
 
+pytestmark = pytest.mark.slow
+
 TIGHT = {
     "scipy RK45": "rtol 1e-08",
     "scipy DOP853": "rtol 1e-09",
@@ -29,7 +31,6 @@ TIGHT = {
 """A setting of each peer at which it must agree with us to a millionth."""
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize("drive_off", OFF_STATES)
 @pytest.mark.parametrize("family", TIGHT)
 def test_each_peer_finds_what_the_full_model_finds(family: str, drive_off: Any) -> None:

@@ -24,6 +24,8 @@ from analysis.stats.arrays import FloatArray
 from device.methods import paper_methods
 from experiments.synthetic.percept import percept_of
 
+pytestmark = pytest.mark.slow
+
 SPACE = make_space(DesignRequest(grid=7, voltage="1-24", pulse="0.01"))
 
 
@@ -48,7 +50,6 @@ def points(contour: Contour, space: Space = SPACE) -> list[tuple[float, float]]:
     return [(f, v) for f, v in zip(space.friction_N, contour.voltage_V.tolist(), strict=True) if math.isfinite(v)]
 
 
-@pytest.mark.slow
 def test_on_the_contour_three_of_four_are_right_when_simulated_alone(contour: Contour, fit: PerceptFit) -> None:
     """By the sweep's own sampling to a thousandth; by the fit's route, another sampling of the force, to 0.005."""
     for friction_N, voltage_V in points(contour):
@@ -58,19 +59,16 @@ def test_on_the_contour_three_of_four_are_right_when_simulated_alone(contour: Co
     assert len(points(contour)) >= 4
 
 
-@pytest.mark.slow
 def test_where_no_voltage_brings_the_magnet_home_there_is_no_contour(contour: Contour) -> None:
     assert math.isnan(contour.voltage_V[-1])
     assert math.isnan(contour.band.low_V[-1])
 
 
-@pytest.mark.slow
 def test_the_damper_lowers_the_critical_voltage(contour: Contour) -> None:
     by_friction = dict(points(contour))
     assert by_friction[1.12] < by_friction[0.21] - 3.0
 
 
-@pytest.mark.slow
 def test_the_contour_lies_in_its_band(contour: Contour) -> None:
     some = np.isfinite(contour.voltage_V)
     band = contour.band
@@ -80,7 +78,6 @@ def test_the_contour_lies_in_its_band(contour: Contour) -> None:
     assert (band.each_friction_high_V[some] <= band.high_V[some]).all()
 
 
-@pytest.mark.slow
 def test_a_surer_fit_has_a_narrower_band(contour: Contour, layer: Layer, fit: PerceptFit) -> None:
     surer = replace(fit, covariance=tuple(tuple(x / 25.0 for x in row) for row in fit.covariance))
     narrow = contour_of(SPACE, layer, surer, 1)
@@ -91,7 +88,6 @@ def test_a_surer_fit_has_a_narrower_band(contour: Contour, layer: Layer, fit: Pe
     assert narrow.voltage_V[some].tolist() == contour.voltage_V[some].tolist()
 
 
-@pytest.mark.slow
 def test_a_fit_without_covariance_has_no_band(layer: Layer, fit: PerceptFit) -> None:
     unknown = replace(fit, covariance=((math.nan,) * 3,) * 3)
     band = band_of(drawn_contours(layer.felt[0.02], np.array(SPACE.voltage_V), unknown, 1, draws=10))

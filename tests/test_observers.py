@@ -22,6 +22,8 @@ from experiments.preference.synthetic import synthetic_participant as preference
 from experiments.screens.synthetic import synthetic_screen
 from experiments.session.steps import on_scale
 
+pytestmark = pytest.mark.slow
+
 DIRECTION, PREFERENCE = load_setup("direction"), load_setup("preference")
 PLAN = direction_plan(DIRECTION.config, "P01", 1, None)
 FELT = preference_plan(PREFERENCE.config, "P01", 1, None)
@@ -82,7 +84,6 @@ def crowd(request: pytest.FixtureRequest) -> Crowd:
     return crowd_of(request.param)
 
 
-@pytest.mark.slow
 def test_people_are_right_at_the_configured_rates_in_the_mean(crowd: Crowd) -> None:
     # a bias in the mean comes on top, divided by S = sqrt(1 + sds^2), as P(a + b e > 0) = Phi(a / sqrt(1 + b^2))
     rates, shares = crowd
@@ -259,7 +260,6 @@ def test_ratings_are_on_the_scale_and_its_grain(law: str, minimum: float, maximu
             assert steps == pytest.approx(round(steps), abs=1e-9)
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize("law", SPREADS)
 def test_the_lowest_method_is_a_grain_below_all_others_as_far_as_the_scale_goes(law: str) -> None:
     for ratings in draws(changed(PREFERENCE, synthetic__ratings=SPREADS[law])):
@@ -270,7 +270,6 @@ def test_the_lowest_method_is_a_grain_below_all_others_as_far_as_the_scale_goes(
             assert others - ratings["vibration"] >= 0.1 - 1e-9
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize("share", [0.0, 0.143, 0.5, 1.0])
 def test_so_many_people_give_both_methods_the_same_rating(share: float) -> None:
     # means 4 apart and noise of 0.3: nobody gives both the same rating by chance

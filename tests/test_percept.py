@@ -28,6 +28,8 @@ from experiments.synthetic.percept import (
     percepts_of,
 )
 
+pytestmark = pytest.mark.slow
+
 DEFAULT = PerceptParameters()
 METHODS = paper_methods()
 FELT = percepts_of(METHODS, DEFAULT.leak_s)
@@ -132,7 +134,6 @@ def test_the_diffusion_of_an_evidence_has_its_log_odds() -> None:
     assert math.log(p / (1 - p)) == pytest.approx(1.3)
 
 
-@pytest.mark.slow
 def test_the_mean_rate_over_people_is_that_of_many() -> None:
     people = People(drift_factor_sd=0.4, log_boundary_sd=0.3, logit_start_sd=0.5)
     draws = np.random.Generator(np.random.PCG64(1)).normal(size=(20_000, 3))
@@ -145,7 +146,6 @@ def test_the_mean_rate_over_people_is_that_of_many() -> None:
     assert forward_rates(1.5, 0.56, People(), lapse_rate=1.0) == 0.5
 
 
-@pytest.mark.slow
 def test_the_shipped_numbers_are_the_fit_to_the_paper_s_rates(paper: PerceptFit) -> None:
     for name, fitted in paper.fitted.items():
         assert getattr(DEFAULT, name) == pytest.approx(fitted.value, rel=5e-3)
@@ -198,7 +198,6 @@ def test_with_people_who_differ_the_mean_rates_are_still_met() -> None:
     assert found.parameters.sensitivity > DEFAULT.sensitivity
 
 
-@pytest.mark.slow
 def test_rates_in_the_wrong_order_are_not_met_and_it_is_said() -> None:
     """Confusion can only help the method without a second pulse."""
     found = fit_percept(PAPER_RATES | {"asymmetric-1": 0.97, "asymmetric-2": 0.75}, METHODS)
@@ -207,7 +206,6 @@ def test_rates_in_the_wrong_order_are_not_met_and_it_is_said() -> None:
     assert found.fitted["confusion"].ci_low == 0.0
 
 
-@pytest.mark.slow
 def test_more_trials_make_narrower_intervals(paper: PerceptFit) -> None:
     many = fit_percept(PAPER_RATES, METHODS, trials=14_000)
     for name in paper.fitted:

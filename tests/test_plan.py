@@ -23,6 +23,8 @@ from experiments.direction.session import make_plan as direction_plan
 from experiments.load import load_setup
 from experiments.preference.session import make_plan as preference_plan
 
+pytestmark = pytest.mark.slow
+
 SEEDS = 2_000
 METHODS = ("vibration", "asymmetric-1", "asymmetric-2")
 DIRECTION, PREFERENCE = load_setup("direction").config, load_setup("preference").config
@@ -138,7 +140,6 @@ def either(request: pytest.FixtureRequest) -> list[Facts]:
     return request.getfixturevalue("over_sessions" if request.param == "session" else "over_sets")
 
 
-@pytest.mark.slow
 def test_two_thousand_plans_have_three_sessions_of_four_sets_of_five_trials(either: list[Facts]) -> None:
     assert len(either) == SEEDS
     assert all(plan.numbered for plan in either)

@@ -15,6 +15,8 @@ from analysis.summary.results import StudyStatistics
 from analysis.summary.summary import summarize
 from tests.log_files import METHODS, rating_rows, ratings_path, trial_rows, trials_path, write_rows, write_study
 
+pytestmark = pytest.mark.slow
+
 
 @pytest.fixture(scope="module")
 def logs(tmp_path_factory: pytest.TempPathFactory) -> Logs:
@@ -36,7 +38,6 @@ def _rate(code: str, seed: int, method: str, direction: str) -> float:
     return sum(int(r["correct"]) for r in rows) / len(rows)
 
 
-@pytest.mark.slow
 def test_the_direction_measure_is_the_correct_rate_on_forward_trials(found: dict[str, Any]) -> None:
     found = found["direction"]
     assert found["n"] == 14
@@ -98,7 +99,6 @@ def test_response_times_count_only_where_they_are_the_participants_own(tmp_path:
     }
 
 
-@pytest.mark.slow
 def test_participants_who_miss_an_answer_or_a_method_are_left_out_and_listed(tmp_path: Path) -> None:
     write_study(tmp_path, participants=5)
     trials = trial_rows("P02")
@@ -165,7 +165,6 @@ def test_unknown_methods_are_sorted_by_name(tmp_path: Path) -> None:
     assert summarize(read_logs([tmp_path])).to_dict()["preference"]["methods"] == ["click", "ramp"]
 
 
-@pytest.mark.slow
 def test_order_of_files_changes_nothing(logs: Logs, found: dict[str, Any]) -> None:
     again = read_logs(reversed(logs.files))
     assert summarize(again).to_dict() == found
@@ -199,7 +198,6 @@ def _crowd(participants: int) -> Logs:
     return Logs(trials=trials, ratings=ratings, problems=(), files=())
 
 
-@pytest.mark.slow
 def test_a_thousand_participants_are_counted() -> None:
     found = summarize(_crowd(1_000)).to_dict()
     assert (found["direction"]["n"], found["preference"]["n"]) == (1_000, 1_000)

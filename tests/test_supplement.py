@@ -22,6 +22,8 @@ from tests.log_files import METHODS, write_study
 from tests.made_scores import CEILING, ONE_AT_CEILING, RIGHT, ratings_of, study_of
 from tests.waiting import PATIENCE_S
 
+pytestmark = pytest.mark.slow
+
 
 @pytest.fixture(scope="module")
 def logs(tmp_path_factory: pytest.TempPathFactory) -> Logs:
@@ -38,7 +40,6 @@ def published_like(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Any]:
     return study_of(tmp_path_factory.mktemp("right"), RIGHT, timed=False).to_dict()
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize("experiment", ["direction", "preference"])
 def test_every_key_is_there_and_plain_json(experiment: str, found: dict[str, Any]) -> None:
     assert {field.name for field in fields(Supplement)} < set(found[experiment])
@@ -115,7 +116,6 @@ DEGENERATE = {
 }
 
 
-@pytest.mark.slow
 def test_supplements_of_any_scores_are_finite_or_have_a_reason() -> None:
     """Nearly degenerate, huge, tiny and far from 0: a warning of a library would fail the test, too."""
     rng = np.random.default_rng(6)
@@ -138,7 +138,6 @@ def _numbers(value: Any) -> list[float]:
     return [value] if isinstance(value, float) else []
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize("name", DEGENERATE)
 def test_degenerate_answers_never_crash_and_never_give_a_silent_number(name: str, tmp_path: Path) -> None:
     statistics = study_of(tmp_path, DEGENERATE[name], timed=False)
@@ -154,7 +153,6 @@ def test_degenerate_answers_never_crash_and_never_give_a_silent_number(name: str
     assert list(supplement_sections(statistics))
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize("name", DEGENERATE)
 def test_degenerate_ratings_never_crash_either(name: str, tmp_path: Path) -> None:
     statistics = ratings_of(tmp_path, DEGENERATE[name])
@@ -210,7 +208,6 @@ def test_the_paired_tukey_is_the_one_of_the_core(found: dict[str, Any]) -> None:
     ]
 
 
-@pytest.mark.slow
 def test_nothing_slow_is_imported_before_it_is_used() -> None:
     program = "import sys, analysis.summary.summary; print([m for m in {'pingouin', 'statsmodels'} & {*sys.modules}])"
     done = subprocess.run(

@@ -18,6 +18,8 @@ from experiments.config.door import ConfigError
 from tests.waiting import PATIENCE_S, wait_for
 from tests.warm_start import warm
 
+pytestmark = pytest.mark.slow
+
 GUN = GunParameters()
 
 
@@ -38,7 +40,6 @@ def rows_of(path):
         return list(csv.DictReader(file))
 
 
-@pytest.mark.slow
 def test_every_combination_is_shot_the_last_parameter_fastest(tmp_path):
     table = tmp_path / "shots.csv"
     found = swept(table, "friction_N=0.21:1.12:2", "drive_off=open,shorted", "voltage_V=12,16,20")
