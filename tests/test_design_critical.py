@@ -56,7 +56,7 @@ def test_on_the_contour_three_of_four_are_right_when_simulated_alone(contour: Co
         gun = replace(SPACE.gun, friction_N=friction_N, voltage_V=voltage_V)
         assert rate_at(gun, fit.parameters) == pytest.approx(THRESHOLD_SHARE, abs=1e-3)
         assert predicted_rate(fit, percept_of(gun, 0.02)).value == pytest.approx(THRESHOLD_SHARE, abs=5e-3)
-    assert len(points(contour)) >= 4
+    assert len(points(contour)) >= 6
 
 
 def test_where_no_voltage_brings_the_magnet_home_there_is_no_contour(contour: Contour) -> None:
