@@ -26,7 +26,7 @@ quick: full
 # Lines and branches that the tests reach, the programs that they start included
 coverage: full
 	scripts/system-packages
-	PATH="$(CURDIR)/.venv/bin:$$PATH" .venv/bin/pytest --numprocesses 2 --dist loadfile -m "not soak" --cov --cov-report term
+	scripts/test --cov --cov-report term
 
 # The full figures of every promise, kept as tables under results/soak/
 soak: full

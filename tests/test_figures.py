@@ -5,7 +5,6 @@ import subprocess
 import sys
 from collections.abc import Callable
 from dataclasses import replace
-from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -25,7 +24,7 @@ from analysis.summary.results import Scores, StudyStatistics
 from analysis.summary.summary import summarize
 from tests.log_files import rating_rows, ratings_path, write_rows, write_study
 from tests.made_scores import crowd_of
-from tests.shown_panels import shot_panel
+from tests.shown_panels import saved_as, shot_panel
 
 pytestmark = pytest.mark.slow
 
@@ -44,7 +43,7 @@ def _png_size(path: Path) -> tuple[int, int]:
 @pytest.fixture
 def vectors_alone(monkeypatch: pytest.MonkeyPatch) -> None:
     """Of each figure the SVG, whose text is read here."""
-    monkeypatch.setattr(style, "save", partial(style.save, kinds=("svg",)))
+    monkeypatch.setattr(style, "save", saved_as("svg"))
 
 
 def files_of(draw: Callable[..., None], what: object, stem: Path) -> list[Path]:

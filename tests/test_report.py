@@ -3,7 +3,6 @@ from __future__ import annotations
 import json
 import re
 from dataclasses import replace
-from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -21,7 +20,7 @@ from analysis.summary.sections.sections import write_report
 from analysis.summary.summary import summarize
 from tests.log_files import trial_rows, trials_path, write_rows, write_study
 from tests.made_scores import crowd_of
-from tests.shown_panels import shot_panel
+from tests.shown_panels import saved_as, shot_panel
 
 pytestmark = pytest.mark.slow
 
@@ -64,7 +63,7 @@ def full(report: ReportData, tmp_path_factory: pytest.TempPathFactory) -> Path:
 @pytest.fixture
 def pictures_alone(monkeypatch: pytest.MonkeyPatch) -> None:
     """Of each figure the PNG, which the page shows: for reports of which other files tell nothing new."""
-    monkeypatch.setattr(style, "save", partial(style.save, kinds=("png",)))
+    monkeypatch.setattr(style, "save", saved_as("png"))
 
 
 def _text(html: str) -> str:
@@ -263,7 +262,7 @@ def crowded(logs: Logs) -> ReportData:
 def test_a_report_of_two_thousand_stays_short(
     crowded: ReportData, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(style, "save", partial(style.save, kinds=("png", "svg")))  # a PDF is smaller than its SVG
+    monkeypatch.setattr(style, "save", saved_as("png", "svg"))  # a PDF is smaller than its SVG
     write_report(tmp_path, crowded)
     text = (tmp_path / "report.md").read_text(encoding="utf-8")
     for words in (

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import textwrap
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
@@ -54,32 +54,19 @@ def drawn(path_stem: Path, width_in: float, height_in: float) -> Iterator[Figure
         save(figure, path_stem)
 
 
-def save(figure: Figure, path_stem: Path, kinds: Iterable[str] = ("png", "svg", "pdf")) -> None:
-    """`path_stem`.png, .svg and .pdf in one layout, without dates or versions inside. Folders are made."""
+def save(figure: Figure, path_stem: Path) -> None:
+    """`path_stem`.png, .svg and .pdf, without dates or versions inside. Folders are made."""
     path_stem.parent.mkdir(parents=True, exist_ok=True)
-    for kind in kinds:
-        _WRITERS[kind](figure, path_stem.with_name(f"{path_stem.name}.{kind}"))
-        figure.set_layout_engine("none")
-
-
-def _write_png(figure: Figure, path: Path) -> None:
+    png, svg, pdf = (path_stem.with_name(f"{path_stem.name}.{kind}") for kind in ("png", "svg", "pdf"))
     canvas: Any = FigureCanvasAgg(figure)
     canvas.draw()
     no_program: Any = {"Software": None}
-    imsave(path, canvas.buffer_rgba(), format="png", dpi=PNG_DPI, metadata=no_program)
-
-
-def _write_svg(figure: Figure, path: Path) -> None:
-    canvas: Any = FigureCanvasSVG(figure)  # savefig would draw twice
-    canvas.print_svg(path, metadata={"Date": None, "Creator": None})
-
-
-def _write_pdf(figure: Figure, path: Path) -> None:
-    canvas: Any = FigureCanvasPdf(figure)
-    canvas.print_pdf(path, metadata={"CreationDate": None, "Creator": None, "Producer": None})
-
-
-_WRITERS = {"png": _write_png, "svg": _write_svg, "pdf": _write_pdf}
+    imsave(png, canvas.buffer_rgba(), format="png", dpi=PNG_DPI, metadata=no_program)
+    figure.set_layout_engine("none")  # all three in the one layout; savefig would draw each of them twice
+    canvas = FigureCanvasSVG(figure)
+    canvas.print_svg(svg, metadata={"Date": None, "Creator": None})
+    canvas = FigureCanvasPdf(figure)
+    canvas.print_pdf(pdf, metadata={"CreationDate": None, "Creator": None, "Producer": None})
 
 
 def legend_below(figure: Figure, axes: Axes, columns: int) -> None:

@@ -160,8 +160,9 @@ class Stage:
 
     def measure_refresh(self) -> float | None:
         """The refresh rate in Hz; `None` if frames do not come steadily."""
-        flips = {"nIdentical": _STEADY_FLIPS, "nMaxFrames": _MOST_FLIPS, "nWarmUpFrames": 2}
-        measured = self.window.getActualFrameRate(**flips, infoMsg="")  # nothing of PsychoPy's to read
+        measured = self.window.getActualFrameRate(
+            nIdentical=_STEADY_FLIPS, nMaxFrames=_MOST_FLIPS, nWarmUpFrames=2, infoMsg=""
+        )  # nothing of PsychoPy's to read
         return None if measured is None else round(float(measured), 2)
 
     def put(self, page: Page, *, keep_keys: bool = False) -> None:
