@@ -6,8 +6,9 @@ import csv
 import io
 import json
 import math
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import fields, is_dataclass
+from fractions import Fraction
 from typing import Any, Final
 
 OPTIONAL: Final = {"optional": True}
@@ -19,8 +20,13 @@ def beside(result: type) -> dict[str, type]:
     return {"beside": result}
 
 
+def written(how: Callable[[Any], Any], name: str = "") -> dict[str, Any]:
+    """Metadata of a field that is written as `how` makes it of the value, under another name if one is given."""
+    return {"how": how} | ({"name": name} if name else {})
+
+
 def plain(value: Any) -> Any:
-    """The value for JSON: results and config models as objects, arrays as lists, what is not finite as null.
+    """The value for JSON: results and models as objects, arrays as lists, fractions twice, what is not finite as null.
 
     >>> import numpy as np
     >>> plain({"a": np.array([1.0, np.nan]), "b": (True, None)})
@@ -34,6 +40,8 @@ def plain(value: Any) -> Any:
         return {str(key): plain(one) for key, one in value.items()}
     if isinstance(value, list | tuple):
         return [plain(one) for one in value]
+    if isinstance(value, Fraction):
+        return {"exact": str(value), "value": float(value)}
     if hasattr(value, "tolist"):  # numpy's, which is not imported for this: commands are to answer at once
         return plain(value.tolist())
     return None if isinstance(value, float) and not math.isfinite(value) else value
@@ -80,4 +88,5 @@ def _members(result: Any) -> Iterator[tuple[str, Any]]:
         if inner is not None:
             yield from dict.fromkeys(f.name for f in fields(inner)).items() if value is None else _members(value)
         elif value is not None or not field.metadata.get("optional"):
-            yield field.name, value
+            how = field.metadata.get("how")
+            yield field.metadata.get("name", field.name), how(value) if how else value

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from fractions import Fraction
 from math import sqrt
 from types import MappingProxyType
@@ -13,6 +13,7 @@ from analysis.paper.audit.claims import AuditFinding
 from analysis.paper.audit.printed import ROUNDINGS, AuditVerdict, CheckResult, PrintedNumber, decimal, read_printed
 from analysis.paper.paper import ComparisonRow, ComparisonVerdict, Prediction
 from analysis.report.section import Section, Table
+from analysis.report.serial import beside
 
 _AUDIT_VERDICTS: tuple[AuditVerdict, ...] = get_args(AuditVerdict)
 
@@ -103,62 +104,19 @@ def _proof(result: CheckResult) -> Iterator[str]:
 
 
 @dataclass(frozen=True)
-class Exact:
-    """A fraction, exact as text, and its decimal value."""
-
-    exact: str
-    value: float
-
-
-@dataclass(frozen=True)
 class FindingEntry:
     """A finding with all of its proof, as it stands in `audit.json`."""
 
     place: str
     quote: str
     note: str
-    check: str
-    printed: str
-    verdict: AuditVerdict
     sentences: tuple[str, str]
-    reason: str
-    step: Exact | None
-    below: Exact | None
-    above: Exact | None
-    readings: tuple[str, ...]
-    tried: tuple[str, ...]
-    contradicts: tuple[str, ...]
-    numbers: Mapping[str, str]
-    data: tuple[tuple[str, ...], ...]
-    source: str
+    result: CheckResult = field(metadata=beside(CheckResult))
 
 
 def finding_entry(finding: AuditFinding) -> FindingEntry:
     """What `audit.json` says of a finding."""
-    result = finding.result
-    return FindingEntry(
-        place=finding.place,
-        quote=finding.quote,
-        note=finding.note,
-        check=result.check,
-        printed=result.printed,
-        verdict=result.verdict,
-        sentences=sentences(finding),
-        reason=result.reason,
-        step=_exact(result.step),
-        below=_exact(result.below),
-        above=_exact(result.above),
-        readings=tuple(result.readings),
-        tried=tuple(result.tried),
-        contradicts=tuple(result.contradicts),
-        numbers=dict(result.numbers),
-        data=tuple(tuple(str(value) for value in row) for row in result.witness),
-        source=result.source,
-    )
-
-
-def _exact(value: Fraction | None) -> Exact | None:
-    return None if value is None else Exact(str(value), float(value))
+    return FindingEntry(finding.place, finding.quote, finding.note, sentences(finding), finding.result)
 
 
 def findings_text(findings: Sequence[AuditFinding]) -> str:

@@ -10,13 +10,15 @@ from __future__ import annotations
 
 import re
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from enum import StrEnum
 from fractions import Fraction
 from math import ceil, floor
 from typing import Annotated, Literal
 
 from pydantic import AfterValidator
+
+from analysis.report.serial import written
 
 Relation = Literal["=", "<", "<=", ">", ">="]
 _RELATIONS: dict[str, Relation] = {"": "=", "=": "=", "<": "<", ">": ">", "<=": "<=", ">=": ">=", "≤": "<=", "≥": ">="}
@@ -184,6 +186,12 @@ def decimal(value: Fraction, digits: int = 6) -> str:
 AuditVerdict = Literal["attainable", "only under a reading", "not attainable", "not published", "undecided"]
 Witness = tuple[tuple[Fraction, ...], ...]
 """Data that give the printed numbers: rows of values in the unit of the data."""
+
+
+def _as_texts(rows: Witness) -> list[list[str]]:
+    return [[str(value) for value in row] for row in rows]
+
+
 ORDINARY = (Rounding.HALF_UP, Rounding.HALF_EVEN)
 OTHER = (Rounding.HALF_DOWN, Rounding.TRUNCATION)
 ROUNDINGS = tuple(rounding.value for rounding in Rounding)
@@ -210,8 +218,8 @@ class CheckResult:
     readings: tuple[str, ...] = ()
     tried: tuple[str, ...] = ()
     contradicts: tuple[str, ...] = ()
-    numbers: tuple[tuple[str, str], ...] = ()
-    witness: Witness = ()
+    numbers: tuple[tuple[str, str], ...] = field(default=(), metadata=written(dict))
+    witness: Witness = field(default=(), metadata=written(_as_texts, name="data"))
 
 
 @dataclass(frozen=True, slots=True)
