@@ -6,6 +6,7 @@ A key acts when it goes down and was up before. Auto-repeat never acts, nor does
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Literal
 
@@ -212,6 +213,10 @@ class Presses:
         """Whether a key is down."""
         return key in self._down
 
+    def set_back(self, by_s: float) -> None:
+        """All that was told so far happened so much earlier."""
+        self._up_s = {key: up_s - by_s for key, up_s in self._up_s.items()}
+
     def lost(self) -> set[str]:
         """The window has lost the keys: what was down, which may be let go unseen."""
         were, self._down = self._down, set()
@@ -221,15 +226,20 @@ class Presses:
 class EventClock:
     """When events happened, on the run's clock, from the stamps of the window system, whose zero is its own.
 
-    The stamp can be no later than the event is seen: the smallest difference ever seen is that of the clocks.
+    The stamp can be no later than the event is seen: the smallest difference ever seen is that of the clocks. Where an
+    event shows that those before it were seen late, `earlier` is told by how much: else a key that was pressed while
+    the window was still being drawn, and again a moment later, seems to bounce.
     """
 
-    def __init__(self) -> None:
-        self._offset_s = math.inf
+    def __init__(self, earlier: Callable[[float], None]) -> None:
+        self._offset_s, self._earlier = math.inf, earlier
 
     def at(self, stamp_ms: int, now_s: float) -> float:
         """When an event with a stamp happened that is seen now."""
         stamp_s = stamp_ms / 1000
-        self._offset_s = min(self._offset_s, now_s - stamp_s)
+        if (offset_s := now_s - stamp_s) < self._offset_s:
+            if self._offset_s < math.inf:
+                self._earlier(self._offset_s - offset_s)
+            self._offset_s = offset_s
         at_s = stamp_s + self._offset_s
         return at_s if now_s - at_s < STRANGE_S else now_s

@@ -208,7 +208,8 @@ class Keyboard(QtCore.QObject):
     def __init__(self, hears: Hears, now: Callable[[], float]) -> None:
         super().__init__()
         self._hears, self._now = hears, now
-        self._presses, self._clock = Presses(), EventClock()
+        self._presses = Presses()
+        self._clock = EventClock(self._presses.set_back)
         self._into: dict[str, QWidget | None] = {}
         """Where a key went as text when it went down."""
 
@@ -261,7 +262,8 @@ class FreshShortcuts(QtCore.QObject):
 
     def __init__(self, widget: QWidget, now: Callable[[], float]) -> None:
         super().__init__(widget)
-        self._now, self._presses, self._clock = now, Presses(), EventClock()
+        self._now, self._presses = now, Presses()
+        self._clock = EventClock(self._presses.set_back)
         self._stale = ""
         widget.winId()  # it has no window (`QWindow`) before
         if (window := widget.windowHandle()) is not None:
