@@ -18,7 +18,7 @@ import pytest
 from hypothesis import settings
 
 from experiments.load import shipped_folder
-from tests import warm_start
+from tests import pdfs, warm_start
 from tests.waiting import PATIENCE_S
 
 gc.disable()  # what is collected here stays: six thousand tests and all that they import, gone through again and again
@@ -74,6 +74,12 @@ def recoil(tmp_path: Path) -> Recoil:
     return call
 
 
+@pytest.fixture(scope="session", autouse=True)
+def _no_pdfs() -> None:
+    """But where a test asks for them (`pdfs.drawn`)."""
+    pdfs.leave_out()
+
+
 @pytest.fixture(scope="session")
 def reproduction() -> Path:
     """What `recoil reproduce` leaves, made once for all tests, which only read it; what it said lies beside it."""
@@ -83,9 +89,7 @@ def reproduction() -> Path:
     with (place / "lock").open("w") as lock:
         fcntl.flock(lock, fcntl.LOCK_EX)  # another worker may be making it
         if not said.exists():
-            done = subprocess.run(
-                warm_start.warm("reproduce", "--out", "out"), cwd=place, check=True, capture_output=True
-            )
+            done = subprocess.run([RECOIL, "reproduce", "--out", "out"], cwd=place, check=True, capture_output=True)
             said.write_bytes(done.stdout)
     return place / "out"
 

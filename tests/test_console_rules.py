@@ -13,7 +13,7 @@ from tests.at_controls import SETUPS
 from tests.experimenters import MOVES, Experimenter, check
 
 pytestmark = pytest.mark.slow
-RUNS = 20
+RUNS = 10
 """Of each experiment; `make soak` makes 1,000 of each."""
 
 

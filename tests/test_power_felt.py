@@ -52,7 +52,7 @@ def test_the_answers_are_distributed_as_those_of_the_participant_step_by_step(
 ) -> None:
     """Counts of a cell, and sums and differences over cells, in which people's differences show."""
     setup = load_setup(str(felt_config(tmp_path, instructions, SPREADS)))
-    steps = stepped(setup, 80)
+    steps = stepped(setup, 50)
     felt = felt_people(setup.config, percepts_of_setup(setup), METHODS)
     at_once = felt_counts(felt, (10, 10), 50, 400, generator(1, "test")).reshape(-1, 3, 2)
     summaries = {

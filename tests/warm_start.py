@@ -3,6 +3,8 @@
 A child is a process with its own folder, environment, streams and session. Only the imports, seconds of each start, are
 done once for all tests. Who starts it holds a small process in its stead (`tests/warm_client.py`), which hands on
 signals and the exit code; if that one is killed, so is the child. How programs really start is for `tests/test_cli.py`.
+
+A child saves no figure as PDF: the reproduction does, which is started as users start it.
 """
 
 from __future__ import annotations
@@ -24,6 +26,8 @@ from collections.abc import Callable
 from pathlib import Path
 from types import ModuleType
 from typing import NoReturn
+
+from tests import pdfs
 
 FOLDER = "RECOIL_TESTS_WARM_START"
 """The variable that names the folder of the server's socket."""
@@ -199,6 +203,7 @@ def main(address: Path, owner: int) -> NoReturn:
     """Import everything, then serve until the owner ends."""
     for name in PRELOADED:
         importlib.import_module(name)
+    pdfs.leave_out()
     being = address.with_name("being-made")
     with socket.socket(socket.AF_UNIX) as door:
         door.bind(str(being))
