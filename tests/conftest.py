@@ -11,6 +11,7 @@ import shutil
 import subprocess
 import sys
 import tempfile
+import zlib
 from collections.abc import Callable, Iterator
 from pathlib import Path
 
@@ -34,6 +35,12 @@ def pytest_configure(config: pytest.Config) -> None:
     if not hasattr(config, "workerinput"):
         os.environ[warm_start.OWNER] = str(os.getpid())
         os.environ[warm_start.FOLDER] = tempfile.mkdtemp(prefix="recoil-tests-")
+
+
+def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+    """The modules with slow tests come first, those that wait mixed with those that compute; the quick ones fill up."""
+    slow = {item.path for item in items if item.get_closest_marker("slow")}
+    items.sort(key=lambda item: (item.path not in slow, zlib.crc32(item.path.name.encode())))
 
 
 def pytest_collection_finish(session: pytest.Session) -> None:

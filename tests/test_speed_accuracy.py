@@ -394,7 +394,7 @@ def test_figures_are_drawn_where_there_is_little_to_draw(kind: str, tmp_path: Pa
     found = summarize(read_logs([tmp_path])).direction
     figure_conditional_accuracy(found, tmp_path / "curve")
     figure_quantile_probability(found, tmp_path / "points")
-    kinds = ("png", "svg", "pdf")
+    kinds = ("png", "svg")
     assert all((tmp_path / f"{name}.{kind}").is_file() for name in ("curve", "points") for kind in kinds)
 
 
@@ -501,5 +501,5 @@ def test_the_section_shows_figures_tables_and_caveats(statistics: StudyStatistic
         assert words in text
     for stem in ("conditional-accuracy", "quantile-probability"):
         assert f"figures/figure-{stem}.png" in text
-        for kind in ("png", "svg", "pdf"):
+        for kind in ("png", "svg"):
             assert (tmp_path / "figures" / f"figure-{stem}.{kind}").stat().st_size > 5_000
