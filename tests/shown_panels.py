@@ -1,8 +1,12 @@
-"""Panels of Figure 5."""
+"""Panels of Figure 5, and figures saved in fewer kinds."""
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from pathlib import Path
+
 import numpy as np
+from matplotlib.figure import Figure
 
 from analysis.report.figures.shot import ShotPanel
 
@@ -20,3 +24,14 @@ def shot_panel(collision_N: float = 53.7, landing_s: float = 0.15) -> ShotPanel:
         stage_ends_s=(0.009, 0.075, landing_s),
         collision_force_N=collision_N,
     )
+
+
+def saved_as(*kinds: str) -> Callable[[Figure, Path], None]:
+    """What saves a figure in these kinds alone, for tests that look at no other."""
+
+    def save(figure: Figure, stem: Path) -> None:
+        stem.parent.mkdir(parents=True, exist_ok=True)
+        for kind in kinds:
+            figure.savefig(f"{stem}.{kind}")
+
+    return save

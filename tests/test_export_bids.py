@@ -435,7 +435,12 @@ def test_a_disk_that_fills_leaves_the_earlier_export(tmp_path: Path, monkeypatch
 
 @pytest.mark.skipif(shutil.which("strace") is None, reason="needs strace")
 @pytest.mark.parametrize(
-    ("call", "when", "there"), [("fsync", 20, "old"), ("renameat2", 1, "old"), ("unlinkat", 1, "new")]
+    ("call", "when", "there"),
+    [
+        pytest.param("fsync", 20, "old", marks=pytest.mark.soak),
+        ("renameat2", 1, "old"),
+        pytest.param("unlinkat", 1, "new", marks=pytest.mark.soak),
+    ],
 )
 def test_a_kill_leaves_the_old_data_set_or_the_new_one(
     recoil: Recoil, tmp_path: Path, call: str, when: int, there: str

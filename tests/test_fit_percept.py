@@ -166,7 +166,10 @@ def test_the_command_without_a_name_fits_the_percept(recoil: Recoil, tmp_path: P
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("rates", [(0.5, 1.0, 1.0), (0.0, 0.0, 0.0), (1.0, 0.1, 0.6)])
+@pytest.mark.parametrize(
+    "rates",
+    [(0.5, 1.0, 1.0), *(pytest.param(rates, marks=pytest.mark.soak) for rates in ((0.0,) * 3, (1.0, 0.1, 0.6)))],
+)
 def test_rates_at_the_ends_are_fitted_with_what_intervals_there_are(
     rates: tuple[float, float, float], tmp_path: Path
 ) -> None:

@@ -46,7 +46,7 @@ def stepped(setup: Any, people: int) -> np.ndarray:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("instructions", [(), ("speed", "accuracy")])
+@pytest.mark.parametrize("instructions", [pytest.param((), marks=pytest.mark.soak), ("speed", "accuracy")])
 def test_the_answers_are_distributed_as_those_of_the_participant_step_by_step(
     instructions: tuple[str, ...], tmp_path: Path
 ) -> None:

@@ -13,6 +13,7 @@ from analysis.logs.files import Problem
 from analysis.logs.reading import Logs, read_logs
 from analysis.paper.paper import Paper, load_paper
 from analysis.paper.recurrence import odds_of
+from analysis.report.figures import style
 from analysis.summary.comparison import compare
 from analysis.summary.sections.content import ReportData
 from analysis.summary.sections.sections import write_report
@@ -20,7 +21,7 @@ from analysis.summary.summary import summarize
 from tests import pdfs
 from tests.log_files import trial_rows, trials_path, write_rows, write_study
 from tests.made_scores import crowd_of
-from tests.shown_panels import shot_panel
+from tests.shown_panels import saved_as, shot_panel
 
 pytestmark = pytest.mark.slow
 
@@ -59,6 +60,12 @@ def full(report: ReportData, tmp_path_factory: pytest.TempPathFactory) -> Path:
     with pdfs.drawn():
         write_report(out, report)
     return out
+
+
+@pytest.fixture
+def pictures_alone(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Of each figure the PNG, which the page shows: for reports of which other files tell nothing new."""
+    monkeypatch.setattr(style, "save", saved_as("png"))
 
 
 def _text(html: str) -> str:
@@ -158,6 +165,7 @@ def _titles(out: Path) -> list[str]:
     return re.findall(r"<h2>(.*?)</h2>", (out / "report.html").read_text(encoding="utf-8"))
 
 
+@pytest.mark.usefixtures("pictures_alone")
 def test_sections_without_data_are_left_out(tmp_path: Path) -> None:
     write_study(tmp_path / "study", participants=3)
     logs = read_logs(sorted((tmp_path / "study").rglob("*_ratings.csv")))
@@ -176,6 +184,7 @@ def test_a_report_of_nothing_says_so(tmp_path: Path) -> None:
     assert not (tmp_path / "out" / "figures").exists()
 
 
+@pytest.mark.usefixtures("pictures_alone")
 def test_one_participant_gets_means_and_no_tests(tmp_path: Path) -> None:
     statistics = summarize(read_logs([write_study(tmp_path / "study", participants=1)]))
     write_report(tmp_path / "out", ReportData(title="One", statistics=statistics))
@@ -184,6 +193,7 @@ def test_one_participant_gets_means_and_no_tests(tmp_path: Path) -> None:
     assert "(–)" in text
 
 
+@pytest.mark.usefixtures("pictures_alone")
 def test_files_are_named_below_their_common_folder_not_by_the_machine(tmp_path: Path) -> None:
     write_study(tmp_path / "study", participants=2)
     broken = tmp_path / "study" / "sub-P03_task-direction_trials.csv"
@@ -212,6 +222,7 @@ def test_figures_and_tables_are_numbered_from_one(full: Path) -> None:
             assert len(numbers) >= least
 
 
+@pytest.mark.usefixtures("pictures_alone")
 def test_times_by_the_experimenters_hand_are_no_response_times(tmp_path: Path) -> None:
     for code in ("P01", "P02"):
         rows = [row | {"response_source": "experimenter", "response_time_valid": "0"} for row in trial_rows(code)]

@@ -130,7 +130,7 @@ def test_the_tables_of_reconstructed_answers_seat_the_same_people_again(reproduc
 
 def test_participants_drawn_by_the_configs_stay_an_option() -> None:
     """Loaded, not run: they are the setups of the configs themselves."""
-    study, other = (reproduce.prepared("study", seed, observer) for seed, observer in ((1, "rates"), (2, None)))
+    study, other = reproduce.prepared("study", 1, "rates"), reproduce.prepared("study", 2)
     assert study.answering == study.setups
     assert "other participants were asked for" in study.notes[0]
     assert other.manifest() == reproduce.prepared("study", 2, "reconstructed").manifest()
