@@ -96,7 +96,8 @@ def reproduction() -> Path:
     with (place / "lock").open("w") as lock:
         fcntl.flock(lock, fcntl.LOCK_EX)  # another worker may be making it
         if not said.exists():
-            done = subprocess.run([RECOIL, "reproduce", "--out", "out"], cwd=place, check=True, capture_output=True)
+            words = warm_start.warm("reproduce", "--out", "out")
+            done = subprocess.run(words, cwd=place, check=True, capture_output=True)
             said.write_bytes(done.stdout)
     return place / "out"
 

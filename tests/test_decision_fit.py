@@ -93,6 +93,7 @@ def test_swapping_forward_and_backward_turns_the_bias_round() -> None:
     assert one["drift vibration"].value == pytest.approx(other["drift vibration"].value, abs=1e-4)
 
 
+@pytest.mark.soak
 def test_the_profile_interval_is_wald_s_where_there_are_many_trials() -> None:
     large = made(2, times=5)
     found = fit(large)

@@ -169,7 +169,7 @@ def test_beyond_the_devices_limits_nothing_is_proposed(result: tuple[Path, Desig
     assert "voltage above 24 V" in in_text(feature.in_short(result[1]))
 
 
-@pytest.mark.slow
+@pytest.mark.soak
 def test_without_a_design_to_propose_it_says_so_and_ends_with_1(recoil: Recoil, tmp_path: Path) -> None:
     words = ("--friction", "1.3-1.38", "--voltage", "10-12", "--pulse", "0.01", "--grid", 4, "--workers", 1)
     ended = recoil("design", *words, "--out", "out", "--json")

@@ -104,7 +104,7 @@ def _over_arrays(tables: list[TextTable]) -> tuple[dict[int, pd.DataFrame], dict
 
 
 @pytest.mark.slow
-@settings(max_examples=120)
+@settings(max_examples=60)
 @given(st.lists(_spoilt(), min_size=1, max_size=5))
 def test_checks_over_arrays_say_and_read_what_checks_row_after_row_do(contents: list[bytes]) -> None:
     tables, no_text = text_tables(dict(enumerate(contents)))
@@ -120,7 +120,7 @@ def test_checks_over_arrays_say_and_read_what_checks_row_after_row_do(contents: 
 
 
 @pytest.mark.slow
-@settings(max_examples=120)
+@settings(max_examples=60)
 @given(st.lists(_spoilt(), min_size=1, max_size=5))
 def test_what_arrow_reads_the_csv_module_reads_alike(contents: list[bytes]) -> None:
     tables = arrow_tables(dict(enumerate(contents)))

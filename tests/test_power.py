@@ -121,7 +121,7 @@ def cluster() -> Iterator[str]:
         yield running.scheduler_address
 
 
-@pytest.mark.slow
+@pytest.mark.soak
 def test_two_dask_workers_give_the_same_bytes_as_one_process(
     done: Path, cluster: str, recoil: Recoil, tmp_path: Path
 ) -> None:

@@ -102,12 +102,17 @@ def enter(screen: AtDisplay, code: str = "P01") -> None:
 # it fits
 
 
-SCREENS = [("1024x600", 1, False), ("1366x768", 1, True), ("1920x1080", 1, False), ("1536x1024", 1.5, True)]
+SCREENS = [("1024x600", 1, False), ("1536x1024", 1.5, True)]
+MORE_SCREENS = [("1366x768", 1, True), ("1920x1080", 1, False)]
 
 
 @pytest.mark.parametrize(
     ("size", "scale", "manager"),
-    [pytest.param(*screen, marks=needs_manager if screen[2] else ()) for screen in SCREENS],
+    [
+        pytest.param(*screen, marks=[*([needs_manager] if screen[2] else []), *soak])
+        for screens, soak in ((SCREENS, []), (MORE_SCREENS, [pytest.mark.soak]))
+        for screen in screens
+    ],
 )
 def test_nothing_is_cut_on_a_small_a_usual_a_large_and_a_scaled_screen(
     size: str, scale: float, manager: bool, pilot: Path, monkeypatch: pytest.MonkeyPatch

@@ -4,7 +4,7 @@ A child is a process with its own folder, environment, streams and session. Only
 done once for all tests. Who starts it holds a small process in its stead (`tests/warm_client.py`), which hands on
 signals and the exit code; if that one is killed, so is the child. How programs really start is for `tests/test_cli.py`.
 
-A child saves no figure as PDF: the reproduction does, which is started as users start it.
+A child saves no figure as PDF: those are for `tests/test_figures.py` and `tests/test_report.py`.
 """
 
 from __future__ import annotations
