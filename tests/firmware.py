@@ -445,10 +445,14 @@ def as_on_the_simulated_gun(recoil: Recoil, config: Path, speed: int) -> int:
 
 
 def settings_in_force(chip: Emulated) -> list[str]:
-    """The setting of each shot: the last CONF before each TRIG, among what the core was given."""
-    found, setting = [], ""
+    """The setting of each shot: the last CONF before its TRIG, among what the core was given.
+
+    On a busy machine a trigger may come too late, and is written again with its mark: it is one shot.
+    """
+    found, setting = {}, ""
     for call in chip.calls():
         text = bytes.fromhex(call.split()[2]).decode("latin-1") if call.startswith("in ") else ""
         setting = text if " CONF " in text else setting
-        found += [setting] if " TRIG " in text else []
-    return found
+        if trigger := re.search(r" TRIG (\d+)", text):
+            found[trigger[1]] = setting
+    return [*found.values()]
