@@ -24,6 +24,9 @@ class GunParameters:
     everywhere, `reciprocal` fades with the coil's force, (1 - x/x_c) k_e dx/dt inside the coil and 0 outside, so
     that energy balances. `return_friction_N` is that of a damper which brakes the way back otherwise than the way out
     (the paper's future work). `ValueError` names the field, its value and the rule.
+
+    >>> GunParameters(voltage_V=20.0).friction_N
+    0.21
     """
 
     magnet_mass_kg: float = 0.114  # m, paper

@@ -67,7 +67,7 @@ class Screen(Protocol):
         """Show a position; one of an earlier serial number than the last is out of date."""
 
     def act(self, position: Position, until_s: float | None) -> None:
-        """The run waits now, at most until a time: who works in the run's own thread acts; others just go on."""
+        """The run waits now, until a time at most. A screen in the run's own thread acts here; others return at once."""
 
     def acknowledge(self, step: Step | None, word: Outcome | Remark) -> None:
         """Show that something is safe: its record is on the disk. A remark has no step."""
@@ -198,7 +198,7 @@ class LiveRun:
         self._screen.show(position)
 
     def wait(self, until_s: float | None = None) -> Event | None:
-        """The event that carried the step on; `None` when its time is over, which it never is while it is held.
+        """The event that ended the step; `None` when its time is over, which does not run while the run is held.
 
         `RunStopped`: the run was stopped, or halted; but what was taken before is done first.
         """
@@ -242,7 +242,7 @@ class LiveRun:
                 raise Held(self._position.why)
 
     def settle(self) -> None:
-        """Wait until what began to disarm beside the run is done, so that it does not come too late."""
+        """Wait for a disarm that another thread began, so that it cannot land after the next arming."""
         while self.disarming:
             self.disarming.pop().join(DISARMED_S)
 

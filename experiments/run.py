@@ -16,7 +16,7 @@ from experiments.catalogue import experiment, table
 from experiments.clock import Clock, date_text
 from experiments.config.setup import Setup
 from experiments.design.plan import Plan
-from experiments.design.streams import draw_seed
+from experiments.design.streams import checked_seed, draw_seed
 from experiments.live_run import LiveRun, RunStopped, Screen
 from experiments.load import check_limits
 from experiments.record import replay, storage
@@ -103,7 +103,7 @@ def resolve_seed(request: RunRequest) -> int:
     """The seed of a new run: asked for, else the config's, else drawn from the system."""
     for seed in (request.seed, request.setup.config.seed):
         if seed is not None:
-            return seed
+            return checked_seed(seed)
     return draw_seed()
 
 

@@ -14,11 +14,10 @@ from importlib import import_module
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
-    from analysis.logs.reading import read_logs
     from device.parameters import GunParameters
     from device.physics import simulate
     from device.words import RecoilError
-    from recoil.api import analyze, audit, load_config, plan, power, run_synthetic
+    from recoil.api import analyze, audit, load_config, plan, power, read_logs, run_synthetic
 
     __version__: str
 
@@ -39,7 +38,6 @@ __all__ = [
 _HOMES = {
     "GunParameters": "device.parameters",
     "RecoilError": "device.words",
-    "read_logs": "analysis.logs.reading",
     "simulate": "device.physics",
 }
 

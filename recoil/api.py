@@ -1,6 +1,7 @@
 """What a notebook calls. Each function does what the command of its name does, and gives back what it found.
 
-`RecoilError`, the root of all errors here, says in one message what is wrong, where, and what to do.
+`RecoilError`, the root of all errors here, says in one message what is wrong, where, and what to do. The physics alone
+has errors of its own: parameters that no gun can have are a `ValueError`.
 """
 
 from __future__ import annotations
@@ -10,7 +11,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from analysis.paper.audit.claims import AuditFinding
+    from analysis.logs.reading import Logs
+    from analysis.paper.audit.run import Audited
     from analysis.predict.power.results import Power
     from analysis.summary.results import StudyStatistics
     from experiments.config.setup import Setup
@@ -38,7 +40,11 @@ def plan(setup: Setup[Any], participant: str = "P01", seed: int = 1, order_row: 
     (60, 'forward')
     """
     from experiments.catalogue import experiment
+    from experiments.design.streams import checked_seed
+    from experiments.study.folders import check_code
 
+    check_code(participant)
+    checked_seed(seed)
     return experiment(setup).make_plan(setup.config, participant, seed, order_row)
 
 
@@ -53,15 +59,44 @@ def run_synthetic(
     ['sub-P01_task-preference_ratings.csv']
     """
     from experiments.clock import VirtualClock
+    from experiments.config.door import ConfigError
     from experiments.run import RunRequest, run
     from experiments.screens.synthetic import synthetic_screen
 
+    if isinstance(participants, str):
+        raise ConfigError(f"participants = {participants!r}: must be a list of codes, such as [{participants!r}]")
     requests = (RunRequest(setup=setup, participant_id=code, results=Path(results), seed=seed) for code in participants)
     return [run(request, synthetic_screen, VirtualClock()).place.table for request in requests]
 
 
+def read_logs(*paths: str | Path) -> Logs:
+    """The logs in files and folders: `trials` and `ratings` as DataFrames, and `problems`: what was left out, and why.
+
+    `RecoilError` if there is nothing that can be used.
+
+    >>> from tempfile import TemporaryDirectory
+    >>> with TemporaryDirectory() as folder:
+    ...     tables = run_synthetic(load_config("direction"), ["P01"], folder, seed=1)
+    ...     logs = read_logs(folder)
+    >>> len(logs.trials), logs.problems
+    (60, ())
+    """
+    from analysis.logs.reading import read_logs as reading
+    from experiments.config.door import ConfigError
+
+    if not paths or not all(isinstance(path, str | Path) and str(path) for path in paths):
+        raise ConfigError(f"paths = {paths!r}: must be files or folders with logs, one argument each")
+    logs = reading(paths)
+    if not logs.files:
+        nothing = (f"{', '.join(map(str, paths))}: no logs of Recoil",)
+        raise ConfigError("\n".join(map(str, logs.problems or nothing)))
+    return logs
+
+
 def analyze(*paths: str | Path) -> StudyStatistics:
     """The statistics of all logs in files and folders; `to_frame()`, `to_dict()`, and a table in a notebook.
+
+    What was left out stands in `warnings`. `RecoilError` if there is nothing that can be used.
 
     >>> from tempfile import TemporaryDirectory
     >>> with TemporaryDirectory() as folder:
@@ -70,34 +105,69 @@ def analyze(*paths: str | Path) -> StudyStatistics:
     >>> found.direction.anova.df
     (2, 4)
     """
-    from analysis.logs.reading import read_logs
+    from dataclasses import replace
+
     from analysis.summary.summary import summarize
 
-    return summarize(read_logs(paths))
+    logs = read_logs(*paths)
+    found = summarize(logs)
+    left_out = (f"left out: {problem}" for problem in logs.problems)
+    return replace(found, warnings=(*left_out, *found.warnings))
 
 
-def audit(paper: str | Path = "paper") -> tuple[AuditFinding, ...]:
+def audit(paper: str | Path = "paper") -> Audited:
     """Whether data could give the published numbers: of a paper's file, or of a shipped one.
 
-    >>> findings = audit()
-    >>> findings[0].quote, findings[0].result.verdict
+    >>> found = audit()
+    >>> found.findings[0].quote, found.findings[0].result.verdict
     ('14 participants (7 males and 7 females)', 'attainable')
     """
-    from analysis.paper.audit.run import audit as audited
-    from analysis.paper.audit.run import load_paper_file
-    from experiments.load import find
+    from analysis.paper.audit.run import audit_file
 
-    return audited(load_paper_file(find(str(paper))))
+    return audit_file(str(paper))
 
 
-def power(config: str | Path, *, studies: int = 10_000, seed: int = 1, **options: Any) -> Power:
-    """Simulated power of a config's design, in this process; the options are those of `recoil power`, as text.
+def power(
+    config: str | Path,
+    *,
+    participants: str | int | Sequence[int] = (),
+    trials: str | int | Sequence[int] = (),
+    effects: str | float | Sequence[float] = (),
+    methods: Sequence[str] = (),
+    studies: int = 10_000,
+    target: float = 0.8,
+    seed: int = 1,
+) -> Power:
+    """Simulated power of a config's design, in this process; what is left out is as the config has it.
 
-    >>> found = power("preference", participants="14", studies=50)
+    Numbers may be a list, or text as on the command line, such as `"8,10,14-20"`.
+
+    >>> found = power("preference", participants=14, studies=50)
     >>> {design.participants for design in found.designs}
     {14}
     """
     from analysis.predict.power.grid import PowerRequest
     from analysis.predict.power.run import simulated_power
+    from experiments.config.door import ConfigError
+    from experiments.design.streams import checked_seed
 
-    return simulated_power(PowerRequest(config=str(config), studies=studies, seed=seed, **options))
+    if isinstance(studies, bool) or not isinstance(studies, int) or studies < 1:
+        raise ConfigError(f"studies = {studies!r}: must be a whole number from 1, such as 10_000")
+    request = PowerRequest(
+        config=str(config),
+        participants=_listed(participants),
+        trials=_listed(trials),
+        effects=_listed(effects),
+        methods=tuple(methods),
+        studies=studies,
+        target=target,
+        seed=checked_seed(seed),
+    )
+    return simulated_power(request)
+
+
+def _listed(values: str | float | Sequence[float]) -> str | None:
+    """Numbers as the command line takes them; `None` for none."""
+    if isinstance(values, str | int | float):
+        return str(values)
+    return ",".join(map(str, values)) or None

@@ -76,7 +76,7 @@ def _steps_up(path: Path, name: str) -> int:
     return -lowest
 
 
-def _toml(path: Path, table: Mapping[str, Any]) -> bytes:
+def _toml(path: Path, table: Mapping[str, object]) -> bytes:
     try:
         return toml_text(table).encode()
     except ValueError as error:

@@ -57,6 +57,22 @@ def test_the_same_code_at_two_sites_is_two_people(recoil: Recoil, sites: Path, t
     assert {name: one["preference"]["n"] for name, one in found["studies"].items()} == {"kyoto": 3, "oslo": 2}
 
 
+def test_a_register_that_cannot_be_read_is_a_problem_for_someone_may_be_excluded(sites: Path) -> None:
+    results = sites / "oslo" / "results"
+    (results / "participants.jsonl").write_text("junk\n")
+    (problem,) = read_logs([sites]).problems
+    assert (problem.file, "whom it excludes there is not known" in problem.message) == (
+        results / "participants.jsonl",
+        True,
+    )
+
+
+def test_a_link_to_no_log_is_a_problem(sites: Path) -> None:
+    (sites / "oslo" / "results" / "sub-P09_trials.csv").symlink_to("nowhere.csv")
+    (problem,) = read_logs([sites]).problems
+    assert "a link that leads to no file; fetch what it stands for" in problem.message
+
+
 def test_a_second_log_within_a_study_is_a_problem_and_across_studies_none(sites: Path) -> None:
     copy = sites / "oslo" / "results" / "sub-P01" / "sub-P01_task-direction_run-2_trials.csv"
     write_rows(copy, trial_rows("P01", 99))

@@ -155,6 +155,17 @@ def test_rebuild_sets_an_edited_table_aside(recoil: Recoil, tmp_path: Path) -> N
     assert (tmp_path / TABLE).with_name("sub-P01_task-direction_trials.aside-1.csv").read_bytes() == edited
 
 
+def test_a_journal_or_config_that_is_none_hinders_no_other(recoil: Recoil, tmp_path: Path) -> None:
+    recoil("run", "preference", "--participant", "P01", "--screen", "synthetic")
+    (journal,) = tmp_path.glob("results/sub-P01/*_journal.jsonl")
+    (tmp_path / "junk.jsonl").write_text("junk")
+    journal.with_name(journal.name.replace("_journal.jsonl", "_ratings.csv")).unlink()
+    rebuilt = recoil("rebuild", "junk.jsonl", journal)
+    assert (rebuilt.returncode, "rebuilt" in rebuilt.stdout, "junk.jsonl" in rebuilt.stderr) == (1, True, True)
+    checked = recoil("check", "nowhere.toml", "preference")
+    assert (checked.returncode, "Subjective" in checked.stdout, "nowhere.toml" in checked.stderr) == (1, True, True)
+
+
 def test_rebuild_of_something_else_is_refused(recoil: Recoil, tmp_path: Path) -> None:
     (tmp_path / "notes.jsonl").write_text('{"n": 0, "kind": "note"}\n')
     refused(recoil("rebuild", "notes.jsonl"), "notes.jsonl: line 1", "kind must be one of")

@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+import shutil
 import subprocess
 import sys
 from importlib.metadata import version
+from pathlib import Path
+from typing import Any
 
 import pytest
 
@@ -30,6 +33,65 @@ def test_every_public_name_is_there_and_says_what_it_is() -> None:
 def test_an_unknown_name_is_refused_with_those_there_are() -> None:
     with pytest.raises(AttributeError, match=r"no attribute 'analyse'; it has .*analyze"):
         recoil.analyse  # noqa: B018 - the access is what fails
+
+
+@pytest.fixture(scope="module")
+def logs(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    folder = tmp_path_factory.mktemp("study") / "results"
+    recoil.run_synthetic(recoil.load_config("direction"), ["P01", "P02", "P03"], folder, seed=1)
+    return folder
+
+
+@pytest.mark.slow
+def test_logs_are_read_from_one_path_or_several(logs: Path) -> None:
+    assert len(recoil.read_logs(str(logs)).trials) == len(recoil.read_logs(logs, logs / "sub-P01").trials) == 180
+
+
+@pytest.mark.slow
+def test_whoever_is_left_out_is_named_in_the_warnings(logs: Path, tmp_path: Path) -> None:
+    shutil.copytree(logs, tmp_path / "results")
+    table = next((tmp_path / "results" / "sub-P02").glob("*_trials.csv"))
+    table.write_text(table.read_text().replace("forward,", "sideways,", 1))
+    found = recoil.analyze(tmp_path / "results", tmp_path / "nowhere")
+    assert found.direction is not None
+    assert found.direction.n == 2
+    said = [warning for warning in found.warnings if warning.startswith("left out: ")]
+    assert [str(table) in said[1], "nowhere: no such file or folder" in said[0]] == [True, True]
+
+
+@pytest.mark.slow
+def test_what_found_is_shown_in_a_notebook() -> None:
+    audited = recoil.audit()
+    assert list(audited.to_frame().columns) == ["place", "quote", "verdict", "reason"]
+    assert audited.to_dict()["findings"][0]["quote"] == audited.findings[0].quote
+    assert "<table" in audited._repr_html_()
+    power = recoil.power("preference", participants=[8, 14], studies=50)
+    assert set(power.to_frame().participants) == {8, 14}
+    assert power.to_dict()["studies"] == 50
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    ("call", "said"),
+    [
+        (lambda setup, _: recoil.plan(setup, participant="a b"), "participant code 'a b'"),
+        (lambda setup, _: recoil.plan(setup, seed=-1), "seed = -1: must be a whole number from 0"),
+        (lambda setup, _: recoil.plan(setup, seed=1.5), "seed = 1.5: must be a whole number"),
+        (lambda setup, _: recoil.plan(setup, order_row=9), "order_row = 9: the order is 'random' and has 0 rows"),
+        (lambda setup, folder: recoil.run_synthetic(setup, "P04", folder), "must be a list of codes, such as ['P04']"),
+        (lambda setup, folder: recoil.run_synthetic(setup, ["P07"], folder, seed="x"), "seed = 'x': must be a whole"),
+        (lambda _, __: recoil.analyze("nowhere"), "nowhere: no such file or folder"),
+        (lambda _, __: recoil.analyze(), "must be files or folders with logs"),
+        (lambda _, __: recoil.analyze(""), "must be files or folders with logs"),
+        (lambda _, __: recoil.read_logs(None), "must be files or folders with logs"),
+        (lambda _, __: recoil.power("preference", studies=0), "studies = 0: must be a whole number from 1"),
+    ],
+)
+def test_what_cannot_be_is_one_message_and_leaves_nothing(call: Any, said: str, tmp_path: Path) -> None:
+    with pytest.raises(recoil.RecoilError) as error:
+        call(recoil.load_config("direction"), tmp_path / "results")
+    assert said in str(error.value)
+    assert not (tmp_path / "results").exists()
 
 
 @pytest.mark.slow

@@ -62,7 +62,7 @@ class LeftOutByRule(LeftOut):
 def complete_rows(table: pd.DataFrame, experiment: str, methods: Sequence[str]) -> tuple[pd.DataFrame, list[LeftOut]]:
     """The rows of the participants who answered everything, and the others.
 
-    Every method must be there; for direction with forward trials, because these are what the measure counts. `table` is
+    Every method must be there; in direction with forward trials, the only ones that its measure uses. `table` is
     coded.
     """
     reasons = _incomplete(table, experiment, methods)

@@ -31,6 +31,9 @@ class BadLogError(RecoilError):
         self.message, self.line, self.column = message, line, column
 
 
+_NO_FILE = "a link that leads to no file; fetch what it stands for (`git annex get`, `datalad get`), or delete it"
+
+
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Problem:
     """A file that was left out, the place, and why."""
@@ -66,6 +69,14 @@ def find_logs(paths: Sequence[Path], endings: tuple[str, ...] = ENDINGS) -> tupl
     return {log: study for log, study in found.values() if "practice" not in _name(log).lower()}, problems
 
 
+def names_below(files: Iterable[Path]) -> dict[Path, Path]:
+    """Files by their path below the folder that holds them all: results say nothing of the machine they come from."""
+    every = [*files]
+    folders = {file.absolute().parent for file in every}
+    root = Path(os.path.commonpath(folders)) if folders else Path()
+    return {file: file.absolute().relative_to(root) for file in every}
+
+
 def _name(path: str) -> str:
     return path.rpartition(os.sep)[2]
 
@@ -87,9 +98,12 @@ def _in_folder(folder: Path, endings: tuple[str, ...], problems: list[Problem]) 
                 for entry in entries:
                     if entry.is_dir(follow_symlinks=False):
                         waiting.append((entry.path, f"{real}{os.sep}{entry.name}"))
-                    elif entry.name.endswith(endings) and entry.is_file():
+                    elif entry.name.endswith(endings):
                         target = os.path.realpath(entry.path) if entry.is_symlink() else f"{real}{os.sep}{entry.name}"
-                        logs.append((entry.path, target))
+                        if entry.is_file():
+                            logs.append((entry.path, target))
+                        else:
+                            problems.append(Problem(file=Path(entry.path), line=None, column=None, message=_NO_FILE))
         except OSError as error:
             reason = f"cannot be read: {error.strerror or error}"
             problems.append(Problem(file=Path(place), line=None, column=None, message=reason))

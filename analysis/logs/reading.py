@@ -100,13 +100,21 @@ class _Reading:
         """Take a participant's log of an experiment. `BadLogError`: they are excluded, or have one already."""
         results = one.path.rpartition(os.sep)[0].rpartition(os.sep)[0] or str(one.file.parent.parent)
         if results not in self.excluded:
-            self.excluded[results] = _exclusions(results)
+            self.excluded[results] = self._exclusions(results)
         reason = self.excluded[results].get(log.code)
         if reason is not None:
             raise BadLogError(f"participant {log.code} is excluded: {reason} (`recoil study` readmits them)")
         self._check_new(study, log, number)
         self.studies[number], self.codes[number] = study, log.code
         self.files[number // _LOGS_A_FILE] = one.file
+
+    def _exclusions(self, results: str) -> dict[str, str]:
+        """Who is excluded in a results folder, as far as its register can be read; what cannot is a problem."""
+        found = register.read_register(Path(results))
+        if found.problem:
+            said = f"{found.problem.removeprefix(f'{found.path}: ')}; whom it excludes there is not known"
+            self.problems.append(Problem(file=found.path, line=None, column=None, message=said))
+        return {code: member.excluded for code, member in found.members.items() if member.excluded is not None}
 
     def _check_new(self, study: str, log: Log, number: int) -> None:
         first = self.firsts.setdefault((study, log.experiment, log.code.casefold()), number)
@@ -215,9 +223,3 @@ def _mapped(batch: _Batch, first: int, logs: Sequence[MappedLog], mapping: Colum
         else:
             records[number] = log.records
     return table_of_records(tables.names(mapping.experiment), records)
-
-
-def _exclusions(results: str) -> dict[str, str]:
-    """Who is excluded in a results folder, as far as its register can be read."""
-    members = register.read_register(Path(results)).members
-    return {code: member.excluded for code, member in members.items() if member.excluded is not None}

@@ -9,7 +9,10 @@ import math
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import fields, is_dataclass
 from fractions import Fraction
-from typing import Any, Final
+from typing import TYPE_CHECKING, Any, Final
+
+if TYPE_CHECKING:
+    import pandas as pd
 
 OPTIONAL: Final = {"optional": True}
 """Metadata of a field that is left out where it is None."""
@@ -65,6 +68,31 @@ def undefined(value: Any, place: str = "") -> Iterator[tuple[str, float]]:
             yield from undefined(one, f"{place}[{i}]")
     elif isinstance(value, float) and not math.isfinite(value):
         yield place, value
+
+
+class NotebookResult:
+    """A result in a notebook: rows as a DataFrame and as a table, all of it as plain values."""
+
+    __slots__ = ()
+
+    def rows(self) -> list[dict[str, object]]:
+        """What the table shows."""
+        raise NotImplementedError
+
+    def to_dict(self) -> dict[str, Any]:
+        """The content of the file that its command writes."""
+        written: dict[str, Any] = plain(self)
+        return written
+
+    def to_frame(self) -> pd.DataFrame:
+        """The rows."""
+        import pandas as pd  # noqa: PLC0415 - commands are to answer at once
+
+        return pd.DataFrame(self.rows())
+
+    def _repr_html_(self) -> str:
+        """The rows as a table."""
+        return self.to_frame().to_html(index=False, float_format="{:.4g}".format)
 
 
 def as_json(result: Any) -> bytes:

@@ -8,12 +8,13 @@ import sys
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import AbstractContextManager, contextmanager
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any, TypeVar
 
 import typer
 
 from analysis.report.section import Section, Table
 from analysis.report.serial import as_json as in_json
+from device.words import RecoilError
 
 if TYPE_CHECKING:
     from rich.table import Table as RichTable
@@ -30,6 +31,9 @@ GunConfigOption = Annotated[str, typer.Option(help="Config of a gun, or the name
 ConfigArgument = Annotated[str, typer.Argument(help="File or name of a shipped config.")]
 WorkersOption = Annotated[int | None, typer.Option(min=1, help="Processes; as many as cores unless given.")]
 
+
+_Name = TypeVar("_Name")
+_Found = TypeVar("_Found")
 
 Progress = Callable[[str, int], AbstractContextManager[Callable[[str], None]]]
 """From what is done and of how many parts: a bar, told of each part."""
@@ -75,6 +79,25 @@ def _drawn(table: Table, *, ruled: bool, unfolded: int) -> RichTable:
 def show(result: Any, text: str, as_json: bool) -> None:
     """The result on stdout: for programs, or the text for people."""
     sys.stdout.write(in_json(result).decode() if as_json else f"{text}\n")
+
+
+def each_of(names: Sequence[_Name], do: Callable[[_Name], _Found]) -> tuple[list[_Found], int]:
+    """What came of each, and how many were refused: that is said, and the others are done all the same.
+
+    `RecoilError` if nothing came of any.
+    """
+    found: list[_Found] = []
+    refused: list[RecoilError] = []
+    for name in names:
+        try:
+            found.append(do(name))
+        except RecoilError as error:
+            refused.append(error)
+    if not found:
+        raise RecoilError("\n".join(map(str, refused)))
+    for refusal in refused:
+        say(f"recoil: {refusal}")
+    return found, len(refused)
 
 
 def end(*, exceptions: bool) -> typer.Exit:

@@ -36,7 +36,7 @@ class TrialCells:
 
 
 class Finite(dict[str, Any]):
-    """Numbers by name, finite all of them: so many that they were looked at as an array, not one by one."""
+    """Numbers by name that are known to be finite, so that nobody looks at each of them again."""
 
     finite = True
 

@@ -93,8 +93,8 @@ def summarize(logs: Logs, *, trade: bool = True) -> StudyStatistics:
     """The statistics of `logs`: rates 0 to 1, SD with n - 1.
 
     `trade`: with the measures of speed and accuracy. An experiment without a log is left out. Participants who miss an
-    answer or a method are left out of that experiment and listed in `excluded`. What is not finite is named in
-    `warnings`.
+    answer or a method are left out of that experiment and listed in `excluded`. Numbers that are NaN or infinite
+    are named in `warnings`.
     """
     direction, left_out = _direction(logs.trials, trade=trade) if len(logs.trials) else (None, [])
     preference, also_out = _preference(logs.ratings) if len(logs.ratings) else (None, [])

@@ -4,10 +4,10 @@
     p(t, lower) = a^-2 exp(-v a w - v^2 t / 2) f(t / a^2, w),   p(t, upper | v, w) = p(t, lower | -v, 1 - w)
 
 f is the density without drift from w in (0, 1), by one of two series (Navarro & Fuss 2009, J. Math. Psychol. 53, 222;
-Feller 1968): images for short times, waves for long ones. Where they take the number of terms that keeps the absolute
-error below a bound, here it is fixed: their meeting point `MEET_AT` is such that `IMAGES` and `WAVES` terms leave a
-*relative* error below 1e-18 for w from 1e-6 to 1 - 1e-6, so rounding rules, in the tails as well. Each series is
-divided by its leading exponential, so the logarithm never meets an underflow.
+Feller 1968): images for short times, waves for long ones. They choose the number of terms from a bound on the
+absolute error. Here the number is fixed, and where the series meet, `MEET_AT`, is chosen such that `IMAGES` and
+`WAVES` terms leave a *relative* error below 1e-18 for w from 1e-6 to 1 - 1e-6, so rounding rules, in the tails as well.
+Each series is divided by its leading exponential, so the logarithm never meets an underflow.
 
 With x coth x and x^2 / sinh^2 x of x = a v and x = z v (the logarithm of the transform of the upper exit's time is
 log sinh(z g) - log sinh(a g) + const, g = sqrt(v^2 + 2 lambda), of which these are the first two derivatives):

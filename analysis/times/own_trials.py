@@ -144,7 +144,7 @@ REFUSALS = {
 class Timed:
     """Which trials of a table are answered with a time of the answerer's own, and why the other answered ones are not.
 
-    `by_own_hand` are those with a time that is said to be the answerer's own, also if it is not above 0.
+    `by_own_hand`: the log says that the time is the participant's own, also where it is zero or below.
     """
 
     own: BoolArray

@@ -8,7 +8,7 @@ from dataclasses import asdict, dataclass
 from pydantic import TypeAdapter
 
 from device.words import Direction
-from experiments.config.door import Order
+from experiments.config.door import ConfigError, Order
 from experiments.config.setup import sha256, without_blank_instruction
 from experiments.design.streams import Stream
 
@@ -52,9 +52,12 @@ def next_row(order: Order, count: int, used: Sequence[int]) -> int | None:
 
 def method_order(order: Order, methods: Sequence[str], row: int | None, stream: Stream) -> list[str]:
     """The methods in the order of a row of the square, or shuffled where there is none."""
+    rows = square_rows(order, len(methods))
     if row is None:
         return stream.shuffled(methods)
-    return [methods[place] for place in square_rows(order, len(methods))[row]]
+    if row not in range(len(rows)):
+        raise ConfigError(f"order_row = {row!r}: the order is {order!r} and has {len(rows)} rows, counted from 0")
+    return [methods[place] for place in rows[row]]
 
 
 PLAN_FORMAT = 1

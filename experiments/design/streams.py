@@ -14,6 +14,7 @@ from typing import TypeVar
 
 import numpy as np
 
+from experiments.config.door import ConfigError
 from experiments.config.setup import canonical_json
 
 Item = TypeVar("Item")
@@ -25,6 +26,13 @@ _STANDARD_NORMAL = NormalDist()
 def draw_seed() -> int:
     """A seed from the operating system, for runs that were given none; it is stored like any other."""
     return secrets.randbelow(MAX_SEED + 1)
+
+
+def checked_seed(seed: int) -> int:
+    """The seed, if it is one. `ConfigError`: anything else than a whole number that a config may hold."""
+    if isinstance(seed, bool) or not isinstance(seed, int) or not 0 <= seed <= MAX_SEED:
+        raise ConfigError(f"seed = {seed!r}: must be a whole number from 0 to {MAX_SEED}, such as 1")
+    return seed
 
 
 class Stream:

@@ -73,8 +73,8 @@ def go_on(
 ) -> RunPosition:
     """Where a replayed run goes on.
 
-    A step at which the run broke off is given up, told to the journal through `append`, and its trial presented again:
-    its stimulus was felt, may have been, or was about to be.
+    The step that was interrupted is recorded as given up, through `append`, and its trial is presented again, because
+    its stimulus may have been felt.
     """
     step, announced = position.step, _last_step_is_open(contents)
     if step is None or not (announced or isinstance(step, steps.FireShot | steps.Ask | steps.Present)):

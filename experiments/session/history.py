@@ -74,7 +74,7 @@ class Entry:
 
 
 def trial_at(plan: Plan, history: History, step: steps.Step | None) -> Trial:
-    """The trial of a step, else the last one that was, else the first."""
+    """The trial of a step; if it has none, of the last step that has one; else the first of the plan."""
     backwards = (step, *(one for one, _ in reversed(history)))
     return next((trial for one in backwards if (trial := steps.trial_of(one)) is not None), plan.trials[0])
 

@@ -19,7 +19,7 @@ REARM_HELD_S = 1.0
 class Moment:
     """All that an event is judged by.
 
-    `painted_s` is when the position was on the screen; `guard_s` is for so long after that no hand is taken; `pauses`
+    `painted_s` is when the position was on the screen; a press within `guard_s` after that is ignored; `pauses`
     are begin and end of each.
     """
 
@@ -61,7 +61,7 @@ class Moment:
 
 
 def meant(moment: Moment, event: Event) -> tuple[Event, str]:
-    """An event as it is meant, and what there is to say of it: a correction to what stands there already is none."""
+    """The event as it is meant, and a message. A correction that changes nothing does not count as one."""
     entry = moment.position.correcting
     if isinstance(event, events.Correct) and entry is not None and event.value == entered_value(moment.history, entry):
         return events.Leave(), "That is what stands there: nothing was corrected."

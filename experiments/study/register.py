@@ -115,7 +115,7 @@ def _checked(values: Mapping[str, object]) -> RegisterEntry:
 class Register:
     """What a register holds up to its end, or up to the first line that cannot be trusted, which `problem` names.
 
-    A last line without its end was never acknowledged and is not read. `members` are by code.
+    A last line without a newline was never acknowledged and is ignored. `members` are by code.
     """
 
     path: Path

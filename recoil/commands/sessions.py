@@ -9,7 +9,7 @@ from typing import Annotated
 
 import typer
 
-from analysis.report.terminal import AsJsonOption, SeedOption, end, say, show
+from analysis.report.terminal import AsJsonOption, SeedOption, each_of, end, say, show
 
 
 class ScreenChoice(StrEnum):
@@ -29,8 +29,9 @@ def check(
     """Validate configs; print design, orders, duration, drive and limits. Nothing is run."""
     from analysis.predict import check as feature
 
-    found = [feature.check(name, seed, participants) for name in configs]
+    found, refused = each_of(configs, lambda name: feature.check(name, seed, participants))
     show(found if len(found) > 1 else found[0], "\n\n".join(map(feature.check_text, found)), as_json)
+    raise end(exceptions=refused > 0)
 
 
 ParticipantOption = Annotated[
@@ -129,13 +130,13 @@ def rebuild(
     """Make the CSV again from its journal, byte for byte."""
     from recoil.session import rebuild_table
 
-    built = [rebuild_table(path) for path in journals]
+    built, refused = each_of(journals, rebuild_table)
     for message in (message for one in built for message in one.messages):
         say(f"recoil: {message}")
     shown = [{"table": str(one.table), "rebuilt": one.rebuilt} for one in built]
     text = "\n".join(f"{one.table}: {'rebuilt' if one.rebuilt else 'is as its journal says'}" for one in built)
     show(shown, text, as_json)
-    raise end(exceptions=bool(any(one.messages for one in built)))
+    raise end(exceptions=bool(refused or any(one.messages for one in built)))
 
 
 def configs(

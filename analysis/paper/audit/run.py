@@ -42,6 +42,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 from pydantic import Field
 
@@ -56,7 +57,7 @@ from analysis.paper.audit.claims import (
 from analysis.paper.audit.page import FindingEntry, counts, finding_entry, findings_text, sections
 from analysis.paper.paper import PaperHead, Participants, PublishedDirection, PublishedPreference
 from analysis.report.page import write_page
-from analysis.report.serial import as_json
+from analysis.report.serial import NotebookResult, as_json, plain
 from experiments.config.door import ConfigError, Model, load
 from experiments.config.setup import sha256
 from experiments.load import find
@@ -118,12 +119,24 @@ class AuditRecord:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Audited:
+class Audited(NotebookResult):
     """A paper with what was found of its numbers."""
 
     paper: PaperFile
     findings: tuple[AuditFinding, ...]
     source: Path
+
+    def rows(self) -> list[dict[str, object]]:
+        """A row a number: where it stands, its verdict, and why."""
+        return [
+            {"place": one.place, "quote": one.quote, "verdict": one.result.verdict, "reason": one.result.reason}
+            for one in self.findings
+        ]
+
+    def to_dict(self) -> dict[str, Any]:
+        """The content of `audit.json`."""
+        written: dict[str, Any] = plain(self.record)
+        return written
 
     @property
     def exceptions(self) -> bool:

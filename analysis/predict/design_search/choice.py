@@ -1,7 +1,7 @@
 """Predicted rates of designs, which of them are worth it, and from which voltage a direction is felt at all.
 
-That voltage, at each friction, is the lowest of the sweep from which on the next one of the grid is felt well enough;
--inf if the first that brings the magnet home is, inf if none is, NaN if no voltage brings it home.
+That voltage, at each friction, is the lowest of the sweep above which a direction is felt well enough; -inf if it is at
+the lowest voltage that brings the magnet home already, inf if it never is, NaN if no voltage brings it home.
 """
 
 from __future__ import annotations

@@ -7,6 +7,7 @@ from dataclasses import dataclass, fields
 
 import numpy as np
 
+from analysis.logs.files import names_below
 from analysis.logs.reading import Logs
 from analysis.stats.arrays import FloatArray
 from analysis.times.fit import DiffusionFit, Estimate
@@ -95,7 +96,7 @@ def times_fit(fitted: FittedTimes, logs: Logs, lapses: str, *, bias: bool) -> Ti
     people = tuple(sorted({own.people[code] for code in own.person.tolist()}))
     together = {field.name: getattr(fitted.together, field.name) for field in fields(DiffusionFit)}
     return TimesFit(
-        files=tuple(map(str, logs.files)),
+        files=tuple(name.as_posix() for name in names_below(logs.files).values()),
         people=people,
         methods=tuple(sorted({own.methods[place] for place in own.method.tolist()})),
         instructions=tuple(fitted.trials.instructions),

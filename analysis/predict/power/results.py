@@ -8,7 +8,7 @@ from dataclasses import asdict, dataclass, field
 from analysis.paper.recurrence import SIGNIFICANT, WHOLE_PATTERN, ShareOfStudies
 from analysis.predict.power.grid import PUBLISHED, Grid, GridCell, StudyDesign
 from analysis.predict.power.planned import Precision, Tally, merged, precisions, shares
-from analysis.report.serial import beside
+from analysis.report.serial import NotebookResult, beside, plain
 from experiments.record.provenance import provenance
 
 PATTERN = f"{PUBLISHED}, {WHOLE_PATTERN}"
@@ -64,7 +64,7 @@ class PublishedPattern:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Power:
+class Power(NotebookResult):
     """The content of `power.json`."""
 
     experiment: str
@@ -79,6 +79,14 @@ class Power:
     published_pattern: PublishedPattern | None
     assumptions: tuple[str, ...]
     provenance: dict[str, str]
+
+    def rows(self) -> list[dict[str, object]]:
+        """A row a design and claim: how often the claim held, with its interval."""
+        return [
+            {"participants": one.participants, "trials": one.trials, "effect": one.effect, **plain(claim)}
+            for one in self.designs
+            for claim in one.claims
+        ]
 
 
 def power_of(grid: Grid, tallies: Iterator[Tally], assumptions: Iterable[str]) -> Power:

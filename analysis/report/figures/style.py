@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import textwrap
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -136,12 +137,10 @@ def wrapped(method: str) -> str:
 def named(text: str) -> str:
     """`text` with the paper's methods under the paper's names.
 
-    >>> named("asymmetric-2 above vibration")
-    'Asymmetric Force II above Vibration'
+    >>> named("asymmetric-2 above vibration, asymmetric-10 below")
+    'Asymmetric Force II above Vibration, asymmetric-10 below'
     """
-    for method, name in _DISPLAY_NAMES.items():
-        text = text.replace(method, name)
-    return text
+    return re.sub(r"(?<![\w-])(vibration|asymmetric-[12])(?![\w-])", lambda found: display_name(found[1]), text)
 
 
 def stars(p: float) -> str:

@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 import textwrap
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, Protocol
+from typing import Protocol
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -275,7 +275,7 @@ def _draw_boxes(axes: Axes, times: ResponseTimes, methods: Sequence[str]) -> Non
             spread = times.directions.get(method, {}).get(direction)
             if spread:
                 _draw_box(axes, i + place, spread.percentiles, method_colour(i), filled=direction == "forward")
-                _draw_medians(axes, i + place, times.participants, method, direction)
+                _draw_medians(axes, i + place, times, method, direction)
     axes.set_xlim(-0.6, len(methods) - 0.4)
     axes.set_ylim(bottom=0.0)
     axes.set_xticks(range(len(methods)), [f"{_counts(times, m)}\n{wrapped(m)}" for m in methods])
@@ -306,10 +306,10 @@ def _draw_box(axes: Axes, place: float, percentiles: Sequence[float], colour: st
     )
 
 
-def _draw_medians(axes: Axes, place: float, participants: Mapping[str, Any], method: str, direction: str) -> None:
+def _draw_medians(axes: Axes, place: float, times: ResponseTimes, method: str, direction: str) -> None:
     """A point a participant; beyond 200 of them the boxes stand alone."""
-    medians = [own[method][direction] for own in participants.values() if direction in own.get(method, {})]
-    if len(participants) <= MANY:
+    medians = [own[method][direction] for own in times.participants.values() if direction in own.get(method, {})]
+    if len(times.participants) <= MANY:
         across = place + places(len(medians), 0.11)
         size = 3.2 if len(medians) <= 30 else 2.0
         marker = DIRECTION_MARKERS[direction]

@@ -6,7 +6,7 @@ import os
 from collections import Counter
 from pathlib import Path
 
-from analysis.logs.files import Problem
+from analysis.logs.files import Problem, names_below
 from analysis.paper.paper import AUDITED, ComparisonRow
 from analysis.paper.recurrence import PatternOdds
 from analysis.report import apa
@@ -186,11 +186,7 @@ def _without_folder(problem: Problem, shown: Path) -> str:
 
 
 def _short_names(report: ReportData) -> dict[Path, Path]:
-    """Files by their path below the folder that holds them all: a report says nothing of the machine it was made on."""
-    files = [*report.files, *(problem.file for problem in report.problems)]
-    folders = {file.absolute().parent for file in files}
-    root = Path(os.path.commonpath(folders)) if folders else Path()
-    return {file: file.absolute().relative_to(root) for file in files}
+    return names_below([*report.files, *(problem.file for problem in report.problems)])
 
 
 def _provenance(report: ReportData) -> Section | None:
