@@ -67,7 +67,7 @@ class Screen(Protocol):
         """Show a position; one of an earlier serial number than the last is out of date."""
 
     def act(self, position: Position, until_s: float | None) -> None:
-        """The run waits now, until a time at most. A screen in the run's own thread acts here; others return at once."""
+        """The run waits now, until a time at most. A screen in the run's own thread acts here."""
 
     def acknowledge(self, step: Step | None, word: Outcome | Remark) -> None:
         """Show that something is safe: its record is on the disk. A remark has no step."""
