@@ -2,13 +2,11 @@
 
 from __future__ import annotations
 
-import os
 import shutil
 import signal
-import subprocess
 import time
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, nullcontext
 from pathlib import Path
 from typing import Any
 
@@ -21,7 +19,7 @@ from experiments.screens.synthetic import synthetic_screen
 from experiments.study.register import read_register
 from recoil.config_files import new_study
 from tests import watched_start
-from tests.at_display import HAND_S, AtDisplay, last_record, needs_display
+from tests.at_display import HAND_S, AtDisplay, last_record, needs_display, window_manager, x_server
 from tests.watched_start import wait_for
 
 pytest.importorskip("PyQt6")
@@ -34,21 +32,8 @@ LONG = "a-folder-with-a-name-that-has-no-blank-at-which-a-line-could-be-broken-a
 @contextmanager
 def virtual_screen(size: str, *, manager: bool = False) -> Iterator[str]:
     """A virtual screen of a size, with or without a window manager; its name."""
-    read_end, write_end = os.pipe()
-    words = ["Xvfb", "-displayfd", str(write_end), "-screen", "0", f"{size}x24", "-nolisten", "tcp", "-noreset"]
-    programs = [subprocess.Popen(words, pass_fds=[write_end], stderr=subprocess.DEVNULL)]
-    os.close(write_end)
-    try:
-        with os.fdopen(read_end) as told:
-            name = f":{told.readline().strip()}"
-        if manager:
-            quiet = {"stdout": subprocess.DEVNULL, "stderr": subprocess.DEVNULL}
-            programs.append(subprocess.Popen(["openbox"], env=os.environ | {"DISPLAY": name}, **quiet))
+    with x_server(size) as (name, _), window_manager(name) if manager else nullcontext():
         yield name
-    finally:
-        for program in reversed(programs):
-            program.terminate()
-            program.wait()
 
 
 @pytest.fixture(scope="module")
