@@ -2,8 +2,11 @@
 
 import math
 import re
+import socket
+import struct
 import threading
 import time
+import warnings
 
 import pytest
 
@@ -173,6 +176,19 @@ def test_unplugged_between_shots_it_goes_on_after_replugging(tmp_path, tcp):
         pair.ready()
         pair.gun.fire(a_shot())
         assert len(pair.twin.body.ledger) == 2
+
+
+def test_a_connection_whose_other_end_has_gone_is_closed_all_the_same():
+    with socket.create_server(("127.0.0.1", 0)) as server:
+        port = SerialPort(f"socket://127.0.0.1:{server.getsockname()[1]}")
+        ours, _ = server.accept()
+    ours.setsockopt(socket.SOL_SOCKET, socket.SO_LINGER, struct.pack("ii", 1, 0))
+    ours.close()  # with a reset, at which shutting down our end fails
+    time.sleep(0.05)
+    with warnings.catch_warnings(record=True) as said:
+        warnings.simplefilter("always")
+        port.close()
+    assert [one.message for one in said] == []  # such as of a socket that nobody closed
 
 
 def test_unplugged_in_mid_shot_the_shot_is_found_done(tmp_path):

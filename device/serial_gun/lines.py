@@ -12,6 +12,7 @@ import os
 import threading
 from collections import deque
 from collections.abc import Callable
+from contextlib import suppress
 from dataclasses import dataclass, field
 from typing import Protocol, TypeVar
 
@@ -293,10 +294,11 @@ class SerialPort:
 
     def close(self) -> None:
         """Let go of it; what goes wrong by then does not matter."""
-        try:
+        connection = getattr(self._port, "_socket", None)  # over TCP: pyserial leaves it open if the other end has gone
+        with suppress(OSError):
             self._port.close()
-        except OSError:
-            return
+        if connection is not None:
+            connection.close()
 
     def _read(self) -> bytes:
         first: bytes = self._port.read(1)
