@@ -19,7 +19,7 @@ TIES = {Rounding.HALF_UP.value, Rounding.HALF_EVEN.value, Rounding.HALF_DOWN.val
 
 def rounded_either_way(result: CheckResult) -> bool:
     """Attainable when a tie may fall either way: scrutiny's default."""
-    return result.verdict == "attainable" or bool(TIES & set(result.readings))
+    return result.verdict == "attainable" or bool(TIES & set(result.judged.readings))
 
 
 def rows(kind: str, *columns: str) -> list[Any]:

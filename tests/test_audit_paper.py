@@ -37,7 +37,7 @@ def test_f_of_experiment_1_is_off_the_lattice_and_rescued_by_readings_only(findi
     """By hand: A = 3 (78^2 + 111^2 + 130^2) - 319^2 = 4154, F = 13 A / (14 W - A), W even: 434 and 432 are next."""
     result = one(findings, "repeated-measures F", "28.45").result
     assert result.verdict == "only under a reading"
-    assert result.readings == ("arcsine transform", "scores in steps of 0.05 with other means")
+    assert result.judged.readings == ("arcsine transform", "scores in steps of 0.05 with other means")
     assert result.below == Fraction(13 * 4154, 14 * 434 - 4154)  # 28.10
     assert result.above == Fraction(13 * 4154, 14 * 432 - 4154)  # 28.51
     assert dict(result.numbers)["A"] == "4154"
@@ -51,7 +51,7 @@ def test_no_scores_in_tenths_give_f_of_experiment_1() -> None:
 @pytest.mark.parametrize("F", ["28.51", "28.10"])
 def test_the_neighbours_of_f_have_data_that_give_them(F: str) -> None:
     result = repeated_f(F, 14, 3, RATES, grain="0.1", low="0", high="1")
-    rows = np.array([[int(10 * value) for value in row] for row in result.witness])
+    rows = np.array([[int(10 * value) for value in row] for row in result.judged.witness])
     assert result.verdict == "attainable"
     assert rows.sum(axis=0).tolist() == [78, 111, 130]
     assert rows.min() >= 0
@@ -85,7 +85,7 @@ def test_all_else_stands_or_is_left_open(findings: tuple[AuditFinding, ...]) -> 
 def test_every_attainable_f_has_its_data(findings: tuple[AuditFinding, ...]) -> None:
     second = one(findings, "repeated-measures F", "33.810").result
     assert second.verdict == "attainable"
-    table = [[int(10 * value) for value in row] for row in second.witness]
+    table = [[int(10 * value) for value in row] for row in second.judged.witness]
     assert f"{float(exact_rm_F(np.array(table, dtype=float))):.3f}" == "33.810"
 
 

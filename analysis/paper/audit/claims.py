@@ -12,28 +12,13 @@ from typing import Annotated, Literal
 
 from pydantic import Field
 
+from analysis.paper import paper as publication
 from analysis.paper.audit.freedom import Bound, ComparisonDesign, Term, degrees_of_freedom, total
 from analysis.paper.audit.means import debit, grim, grimmer, percent_of_count, scale_of
 from analysis.paper.audit.p_values import Sides, Statistic, binomial_p, p_against_statistic
-from analysis.paper.audit.printed import CheckResult, PrintedText, Rounding, read_printed
+from analysis.paper.audit.printed import CheckResult, JudgedReadings, PrintedText, Rounding, read_printed
 from analysis.paper.audit.tukey_pattern import ClaimedComparison, tukey_pattern
 from analysis.paper.audit.variance_ratios import between_f, repeated_f
-from analysis.paper.paper import (
-    ANOVA_F,
-    ANOVA_P,
-    PARTICIPANTS,
-    AtLeastOne,
-    Participants,
-    PublishedDirection,
-    PublishedExperiment,
-    PublishedPreference,
-    anova_df,
-    mean_rate,
-    named_in,
-    one_half_p,
-    rated_lowest,
-    tukey_p,
-)
 from experiments.config.door import Model
 
 CHECKS: Mapping[str, Callable[..., CheckResult]] = MappingProxyType(
@@ -91,8 +76,8 @@ class GrimClaim(ScaleClaim):
 
     kind: Literal["grim"]
     mean: PrintedText
-    n: AtLeastOne
-    items: AtLeastOne = 1
+    n: publication.AtLeastOne
+    items: publication.AtLeastOne = 1
 
 
 class PercentClaim(Claim):
@@ -101,7 +86,7 @@ class PercentClaim(Claim):
     kind: Literal["percent"]
     percent: PrintedText
     count: Annotated[int, Field(ge=0)]
-    n: AtLeastOne
+    n: publication.AtLeastOne
 
 
 class GrimmerClaim(GrimClaim):
@@ -117,7 +102,7 @@ class DebitClaim(Claim):
     kind: Literal["debit"]
     mean: PrintedText
     sd: PrintedText
-    n: AtLeastOne
+    n: publication.AtLeastOne
 
 
 class DfClaim(Claim):
@@ -126,7 +111,7 @@ class DfClaim(Claim):
     kind: Literal["df"]
     df: Annotated[list[PrintedText], Field(min_length=1)]
     design: ComparisonDesign
-    counts: Annotated[list[AtLeastOne], Field(min_length=1)]
+    counts: Annotated[list[publication.AtLeastOne], Field(min_length=1)]
 
 
 class PClaim(Claim):
@@ -145,7 +130,7 @@ class BinomialClaim(Claim):
 
     kind: Literal["binomial"]
     p: PrintedText
-    n: AtLeastOne
+    n: publication.AtLeastOne
     chance: str = "1/2"
     counts: list[int] | None = None
 
@@ -154,8 +139,8 @@ class RepeatedFClaim(MeansClaim):
     """F within participants, against its means; see `repeated_f`."""
 
     kind: Literal["repeated-f"]
-    n: AtLeastOne
-    k: AtLeastOne
+    n: publication.AtLeastOne
+    k: publication.AtLeastOne
     transforms: list[str] = Field(default_factory=list)
     other_grains: list[PrintedText] = Field(default_factory=list)
 
@@ -164,14 +149,14 @@ class BetweenFClaim(MeansClaim):
     """F between groups, against their means; see `between_f`."""
 
     kind: Literal["between-f"]
-    sizes: Annotated[list[AtLeastOne], Field(min_length=2)]
+    sizes: Annotated[list[publication.AtLeastOne], Field(min_length=2)]
 
 
 class TukeyClaim(MeansClaim):
     """The pattern of a Tukey test; see `tukey_pattern`."""
 
     kind: Literal["tukey"]
-    sizes: Annotated[list[AtLeastOne], Field(min_length=2)]
+    sizes: Annotated[list[publication.AtLeastOne], Field(min_length=2)]
     comparisons: Annotated[list[ClaimedComparison], Field(min_length=1)]
     repeated: bool = True
     grain: PrintedText | None = None  # type: ignore[assignment]
@@ -198,7 +183,7 @@ class StatedClaim(Claim):
         return CheckResult(
             check="stated",
             printed=f"{self.printed} {self.unit}".strip(),
-            verdict="undecided",
+            judged=JudgedReadings("undecided"),
             reason="no other printed number bears on it",
             source="the paper",
         )
@@ -215,7 +200,7 @@ class UnpublishedClaim(Claim):
         return CheckResult(
             check="unpublished",
             printed="",
-            verdict="not published",
+            judged=JudgedReadings("not published"),
             reason=f"{self.quantity}: not printed",
             source="the paper",
         )
@@ -259,12 +244,12 @@ STARS = {"0.05": "0.01", "0.01": "0.001"}
 """What a star at one level says about the next (caption of Fig. 8)."""
 
 
-def participants_claims(people: Participants) -> Iterator[Claim]:
+def participants_claims(people: publication.Participants) -> Iterator[Claim]:
     """Of who took part: the sexes add up, the ages span their range."""
     place = "III, Participants"
     sexes = [Term(times=[people.male]), Term(times=[people.female])]
     quote = f"{people.n} participants ({people.male} males and {people.female} females)"
-    about = [named_in(name, PARTICIPANTS) for name in ("direction", "preference")]
+    about = [publication.named_in(name, publication.PARTICIPANTS) for name in ("direction", "preference")]
     yield TotalClaim(place=place, quote=quote, about=about, kind="total", printed=str(people.n), terms=sexes)
     low = [Term(times=[people.age_min])]
     quote = f"ages ranged from {people.age_min} to {people.age_max} years"
@@ -272,7 +257,7 @@ def participants_claims(people: Participants) -> Iterator[Claim]:
     yield UnpublishedClaim(place=place, quote=quote, kind="unpublished", quantity="mean and SD of the ages")
 
 
-def direction_claims(paper: PublishedDirection) -> Iterator[Claim]:
+def direction_claims(paper: publication.PublishedDirection) -> Iterator[Claim]:
     """Of experiment 1: its protocol, means, F, post-hoc tests and tests against one half, and what is only drawn."""
     place, protocol = "III.A, Results", paper.protocol
     yield from _protocol(paper)
@@ -281,7 +266,7 @@ def direction_claims(paper: PublishedDirection) -> Iterator[Claim]:
         yield GrimClaim(
             place=place, quote=f"{method}: {mean}%", kind="grim", mean=f"{mean}%", n=paper.n, grain=RATE_GRAIN,
             low="0", high="1", note=f"rates in steps of 1/{trials}",
-            about=[named_in("direction", mean_rate(method))],
+            about=[publication.named_in("direction", publication.mean_rate(method))],
         )  # fmt: skip
     means = [f"{paper.means[method]}%" for method in paper.methods]
     yield from _anova(paper, place, means)
@@ -292,7 +277,8 @@ def direction_claims(paper: PublishedDirection) -> Iterator[Claim]:
         counts = _counts(paper.means[claim.method], n) if forward else None
         yield BinomialClaim(
             place=place, quote=f"{claim.method}, {claim.direction}: p = {claim.p}", kind="binomial", p=claim.p, n=n,
-            counts=counts, note="pooled over participants", about=[named_in("direction", one_half_p(claim))],
+            counts=counts, note="pooled over participants",
+            about=[publication.named_in("direction", publication.one_half_p(claim))],
         )  # fmt: skip
     for method in paper.methods:
         yield UnpublishedClaim(place="Fig. 8(a)", quote=method, kind="unpublished", quantity=f"SD, {method}")
@@ -306,7 +292,7 @@ def _counts(percent: str, n: int) -> list[int]:
     return list(scale_of("1", "0", "1").sums(read_printed(f"{percent}%").interval(Rounding.ANY), n))
 
 
-def _protocol(paper: PublishedDirection) -> Iterator[Claim]:
+def _protocol(paper: publication.PublishedDirection) -> Iterator[Claim]:
     place, protocol = "III.A, Method", paper.protocol
     trials = protocol.forward_trials_per_session + protocol.backward_trials_per_session
     terms = [Term(times=[protocol.sets_per_session, protocol.trials_per_set])]
@@ -326,12 +312,12 @@ def _protocol(paper: PublishedDirection) -> Iterator[Claim]:
     )  # fmt: skip
 
 
-def _anova(paper: PublishedExperiment, place: str, means: list[str] | None) -> Iterator[Claim]:
+def _anova(paper: publication.PublishedExperiment, place: str, means: list[str] | None) -> Iterator[Claim]:
     anova, k = paper.anova, len(paper.methods)
     df = [str(value) for value in anova.df]
     quote = f"F({df[0]},{df[1]})={anova.F}, p<{anova.p_below}"
     name = _name(paper)
-    about = [named_in(name, anova_df(part)) for part in ("effect", "error")]
+    about = [publication.named_in(name, publication.anova_df(part)) for part in ("effect", "error")]
     yield DfClaim(place=place, quote=quote, about=about, kind="df", df=df, design="repeated", counts=[paper.n, k])
     rates = means is not None
     yield RepeatedFClaim(
@@ -339,21 +325,21 @@ def _anova(paper: PublishedExperiment, place: str, means: list[str] | None) -> I
         grain=RATE_GRAIN if rates else RATING_GRAIN, low="0", high="1" if rates else _scale_top(paper),
         transforms=["arcsine"] if rates else [], other_grains=["0.05"] if rates else [],
         note="0.05: both directions pooled, 20 trials" if rates else "grain of the continuous scale assumed",
-        about=[named_in(name, ANOVA_F)],
+        about=[publication.named_in(name, publication.ANOVA_F)],
     )  # fmt: skip
-    p, about = f"< {anova.p_below}", [named_in(name, ANOVA_P)]
+    p, about = f"< {anova.p_below}", [publication.named_in(name, publication.ANOVA_P)]
     yield PClaim(place=place, quote=quote, about=about, kind="p", statistic="F", value=anova.F, df=df, p=p)
 
 
-def _name(paper: PublishedExperiment) -> str:
-    return "preference" if isinstance(paper, PublishedPreference) else "direction"
+def _name(paper: publication.PublishedExperiment) -> str:
+    return "preference" if isinstance(paper, publication.PublishedPreference) else "direction"
 
 
-def _scale_top(paper: PublishedExperiment) -> str:
-    return str(paper.scale_max) if isinstance(paper, PublishedPreference) else "1"
+def _scale_top(paper: publication.PublishedExperiment) -> str:
+    return str(paper.scale_max) if isinstance(paper, publication.PublishedPreference) else "1"
 
 
-def _tukey(paper: PublishedExperiment, place: str, means: list[str] | None) -> Iterator[Claim]:
+def _tukey(paper: publication.PublishedExperiment, place: str, means: list[str] | None) -> Iterator[Claim]:
     index = {method: i for i, method in enumerate(paper.methods)}
     pairs = [
         ClaimedComparison(
@@ -368,11 +354,11 @@ def _tukey(paper: PublishedExperiment, place: str, means: list[str] | None) -> I
         place=place, quote=quote, kind="tukey", F=paper.anova.F, sizes=[paper.n] * len(paper.methods),
         comparisons=pairs, means=means, grain=RATE_GRAIN if rates else None, low="0" if rates else None,
         high="1" if rates else None, note="stars of Fig. 8: p < .05 also says not below .01",
-        about=[named_in(_name(paper), tukey_p(claim)) for claim in paper.tukey],
+        about=[publication.named_in(_name(paper), publication.tukey_p(claim)) for claim in paper.tukey],
     )  # fmt: skip
 
 
-def preference_claims(paper: PublishedPreference) -> Iterator[Claim]:
+def preference_claims(paper: publication.PublishedPreference) -> Iterator[Claim]:
     """Of experiment 2: its protocol, F, post-hoc tests and shares of participants, and what is only drawn."""
     place, n = "III.B, Results", paper.n
     trials = [Term(times=[len(paper.methods)])]
@@ -384,7 +370,7 @@ def preference_claims(paper: PublishedPreference) -> Iterator[Claim]:
     yield PercentClaim(
         place=place, quote=f"{lowest} of the participants gave lower scores for {paper.lowest.method}", kind="percent",
         percent=lowest, count=paper.lowest.participants, n=n,
-        about=[named_in("preference", rated_lowest(paper.lowest))],
+        about=[publication.named_in("preference", publication.rated_lowest(paper.lowest))],
     )  # fmt: skip
     for method in paper.methods:
         yield UnpublishedClaim(place="Fig. 8(b)", quote=method, kind="unpublished", quantity=f"mean and SD, {method}")

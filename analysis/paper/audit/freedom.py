@@ -65,19 +65,16 @@ def degrees_of_freedom(df: Sequence[str], design: ComparisonDesign, counts: Sequ
         (name, partial(_same, printed, other)) for name, other in _readings(design, counts)
     ]
     others += _corrections(printed, design, counts)
-    decision = judge_readings(partial(_same, printed, expected), others)
+    judged = judge_readings(partial(_same, printed, expected), others)
     return CheckResult(
         check="df",
         printed=f"({', '.join(number.text for number in printed)})",
-        verdict=decision.verdict,
+        judged=judged,
         reason=f"a {design} design of {listed(counts)} has df ({', '.join(map(decimal, expected))})",
         source=_SOURCE,
         step=Fraction(1),
-        readings=decision.readings,
-        tried=decision.tried,
-        contradicts=() if decision.verdict == "attainable" else (f"{design} design", f"counts {listed(counts)}"),
+        contradicts=() if judged.verdict == "attainable" else (f"{design} design", f"counts {listed(counts)}"),
         numbers=(("df of the design", ", ".join(map(decimal, expected))),),
-        witness=decision.witness,
     )
 
 
@@ -178,22 +175,19 @@ def total(printed: str, terms: Sequence[Term], bound: Bound = "equals") -> Check
     number = read_printed(printed)
     if not terms:
         raise ValueError("a total needs at least one term")
-    decision = judge_readings(partial(_met, number, terms, bound))
+    judged = judge_readings(partial(_met, number, terms, bound))
     sums = [_sum(terms, rounding) for rounding in (Rounding.HALF_UP, Rounding.ANY)]
     middle = sum((_value(term) for term in terms), Fraction(0))
     return CheckResult(
         check="total",
         printed=number.text,
-        verdict=decision.verdict,
+        judged=judged,
         reason=f"{' + '.join(map(_text, terms))} make {_shown(sums[0])}, and it is to be {_BOUNDS[bound]}",
         source="Moore, Kearfott & Cloud 2009, chapter 2",
         below=middle if middle <= number.value else None,
         above=middle if middle >= number.value else None,
-        readings=decision.readings,
-        tried=decision.tried,
-        contradicts=() if decision.verdict == "attainable" else tuple(map(_text, terms)),
+        contradicts=() if judged.verdict == "attainable" else tuple(map(_text, terms)),
         numbers=(("terms", " + ".join(map(_text, terms))),),
-        witness=decision.witness,
     )
 
 

@@ -84,21 +84,18 @@ def grim(
     """
     printed, scale = read_printed(mean), scale_of(grain, low, high, items)
     check_count(n)
-    decision = judge_readings(partial(_mean_data, printed, n, scale))
+    judged = judge_readings(partial(_mean_data, printed, n, scale))
     below, above = nearest(printed.value, scale.grain / n, scale.origin, scale.ends(n))
     return CheckResult(
         check="grim",
         printed=printed.text,
-        verdict=decision.verdict,
+        judged=judged,
         reason=f"means of {n} scores in steps of {decimal(scale.grain)} lie {decimal(scale.grain / n)} apart",
         source=_GRIM,
         step=scale.grain / n,
         below=below,
         above=above,
-        readings=decision.readings,
-        tried=decision.tried,
-        contradicts=() if decision.witness else (f"n = {n}", f"grain {grain}"),
-        witness=decision.witness,
+        contradicts=() if judged.witness else (f"n = {n}", f"grain {grain}"),
     )
 
 
@@ -149,23 +146,20 @@ def percent_of_count(percent: str, count: int, n: int) -> CheckResult:
         raise ValueError(f"count must lie in 0..{n}, not {count}")
     printed = read_printed(percent if "%" in percent else f"{percent}%")
     others = [(f"out of {m} instead of {n}", _share_attempt(printed, count, m)) for m in _bases(printed, count, n)]
-    decision = judge_readings(_share_attempt(printed, count, n), others)
+    judged = judge_readings(_share_attempt(printed, count, n), others)
     fitting = list(AnswerScale(Fraction(1), low=0, high=1).sums(printed.interval(Rounding.ANY), n))
     below, above = nearest(printed.value, Fraction(1, n), Fraction(0), (0, n))
     return CheckResult(
         check="percent of count",
         printed=f"{count} of {n}, {printed.text}",
-        verdict=decision.verdict,
+        judged=judged,
         reason=f"{count} of {n} is {decimal(Fraction(100 * count, n), 3)} %",
         source="definition of a percentage",
         step=Fraction(1, n),
         below=below,
         above=above,
-        readings=decision.readings,
-        tried=decision.tried,
-        contradicts=() if decision.verdict == "attainable" else (f"count {count}", f"n = {n}"),
+        contradicts=() if judged.verdict == "attainable" else (f"count {count}", f"n = {n}"),
         numbers=((f"counts of {n} that print {printed.text}", listed(fitting) or "none"),),
-        witness=decision.witness,
     )
 
 
@@ -198,27 +192,24 @@ def grimmer(
     that print so are searched for such y. Readings: SD with n, standard error. `ValueError` as in `grim`, or n below 2.
     Sources: Anaya 2016, PeerJ Preprints 4, e2400v1; Allard 2018, Analytic-GRIMMER.
 
-    >>> grimmer("7.3", "2.51", 12).readings, grimmer("5.21", "1.6", 28).verdict
+    >>> grimmer("7.3", "2.51", 12).judged.readings, grimmer("5.21", "1.6", 28).verdict
     (('the printed SD is a standard error',), 'attainable')
     """
     means, spread, scale = read_printed(mean), read_printed(sd), scale_of(grain, low, high, items)
     check_count(n - 1, "n - 1")
     plain, *others = ((name, _spread_attempt(means, spread, n, scale, by(n))) for name, by in DIVISORS)
-    decision = judge_readings(plain[1], others)
+    judged = judge_readings(plain[1], others)
     below, above = _nearest_spreads(means, spread, n, scale)
     return CheckResult(
         check="grimmer",
         printed=f"M = {means.text}, SD = {spread.text}",
-        verdict=decision.verdict,
+        judged=judged,
         reason=f"{n} scores in steps of {decimal(scale.grain)} with one mean have sums of squares 2 steps apart",
         source="Anaya 2016, PeerJ Preprints 4, e2400v1; Allard 2018",
         step=2 * scale.grain**2 / (n - 1),
         below=below,
         above=above,
-        readings=decision.readings,
-        tried=decision.tried,
-        contradicts=() if decision.verdict == "attainable" else (f"M = {means.text}", f"n = {n}"),
-        witness=decision.witness,
+        contradicts=() if judged.verdict == "attainable" else (f"M = {means.text}", f"n = {n}"),
     )
 
 
@@ -306,22 +297,19 @@ def debit(mean: str, sd: str, n: int) -> CheckResult:
     means, spread = read_printed(mean), read_printed(sd)
     check_count(n - 1, "n - 1")
     plain, *others = ((name, partial(_binary_data, means, spread, n, by(n))) for name, by in DIVISORS)
-    decision = judge_readings(plain[1], others)
+    judged = judge_readings(plain[1], others)
     ones = AnswerScale(Fraction(1), low=0, high=1).sums(means.interval(Rounding.ANY), n)
     squares = sorted(_binary_variance(k, n, n - 1) for k in ones)
     return CheckResult(
         check="debit",
         printed=f"M = {means.text}, SD = {spread.text}",
-        verdict=decision.verdict,
+        judged=judged,
         reason=f"the mean fixes the SD of answers of 0 and 1, here with {listed(ones) or 'no whole number of'} ones",
         source="Heathers & Brown 2019, https://osf.io/5vb3u/",
         step=Fraction(1, n),
         below=max((value for value in squares if value <= spread.value**2), default=None),
         above=min((value for value in squares if value >= spread.value**2), default=None),
-        readings=decision.readings,
-        tried=decision.tried,
-        contradicts=() if decision.verdict == "attainable" else (f"M = {means.text}", f"n = {n}"),
-        witness=decision.witness,
+        contradicts=() if judged.verdict == "attainable" else (f"M = {means.text}", f"n = {n}"),
     )
 
 

@@ -150,23 +150,18 @@ def p_against_statistic(
 
     other: Sides = "one-sided" if sides == "two-sided" else "two-sided"
     others = [(f"{other} p", partial(attempt, other))] if statistic in SIDED else []
-    decision = judge_readings(partial(attempt, sides), others)
+    judged = judge_readings(partial(attempt, sides), others)
     outer, _ = p_range(statistic, number.interval(Rounding.HALF_UP), freedom, sides)
     return CheckResult(
         check="p against statistic",
         printed=f"{statistic}({', '.join(df)}) = {number.text}, p {_shown(printed)}",
-        verdict=decision.verdict,
+        judged=judged,
         reason=f"{statistic} = {number.text} means p in {_small(outer)}, {sides}",
         source=_SOURCE,
         below=outer.low,
         above=outer.high,
-        readings=decision.readings,
-        tried=decision.tried,
-        contradicts=()
-        if decision.verdict == "attainable"
-        else (f"{statistic} = {number.text}", f"p {_shown(printed)}"),
+        contradicts=() if judged.verdict == "attainable" else (f"{statistic} = {number.text}", f"p {_shown(printed)}"),
         numbers=(("p of the statistic", _small(outer)),),
-        witness=decision.witness,
     )
 
 
@@ -213,22 +208,19 @@ def binomial_p(p: str, n: int, *, chance: str = "1/2", counts: Sequence[int] | N
     if any(not 0 <= count <= n for count in asked):
         raise ValueError(f"counts must lie in 0..{n}, not {listed(asked)}")
     plain, *others = ((name, partial(_count_data, printed, rule(n, share), asked)) for name, rule in RULES)
-    decision = judge_readings(plain[1], others)
+    judged = judge_readings(plain[1], others)
     exact = [low for low, _ in small_probabilities(n, share)]
     fitting = [k for k in range(n + 1) if printed.interval(Rounding.ANY).holds(exact[k])]
     return CheckResult(
         check="binomial p",
         printed=f"p = {printed.text}",
-        verdict=decision.verdict,
+        judged=judged,
         reason=f"exact two-sided p of {n} against {decimal(share)}, counts asked: {_asked(counts, n)}",
         source="Sterne 1954, Biometrika 41, 275",
         below=max((exact[k] for k in asked if exact[k] <= printed.value), default=None),
         above=min((exact[k] for k in asked if exact[k] >= printed.value), default=None),
-        readings=decision.readings,
-        tried=decision.tried,
-        contradicts=() if decision.verdict == "attainable" else (f"n = {n}", f"counts {_asked(counts, n)}"),
+        contradicts=() if judged.verdict == "attainable" else (f"n = {n}", f"counts {_asked(counts, n)}"),
         numbers=((f"counts of {n} that give p", listed(fitting) or "none"),),
-        witness=decision.witness,
     )
 
 

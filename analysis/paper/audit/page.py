@@ -57,7 +57,12 @@ _MEANING = {
 
 def _questions(asked: Sequence[AuditFinding]) -> Section:
     rows = tuple(
-        (f"{f.place}: “{f.quote}”", f.result.verdict, nearest_text(f.result), "; ".join(f.result.readings) or "none")
+        (
+            f"{f.place}: “{f.quote}”",
+            f.result.verdict,
+            nearest_text(f.result),
+            "; ".join(f.result.judged.readings) or "none",
+        )
         for f in asked
     )
     header = ("Number", "Verdict", "Nearest attainable", "Rescued by")
@@ -179,17 +184,17 @@ def _why_attainable(result: CheckResult) -> str:
         return f"The {result.numbers[0][0]}: {result.numbers[0][1]}."
     if result.check == "Tukey pattern" and result.numbers:
         return "; ".join(f"{pair}: {found}" for pair, found in result.numbers) + "."
-    if result.witness and result.check in _DATA:
+    if result.judged.witness and result.check in _DATA:
         return "It needs no special reading, and data that give it are in audit.json."
     return "It needs no special reading."
 
 
 def _under_a_reading(finding: AuditFinding) -> tuple[str, str]:
     result = finding.result
-    one = len(result.readings) == 1
+    one = len(result.judged.readings) == 1
     note = f" ({finding.note})" if finding.note else ""
     second = "It is attainable under " + ("one reading" if one else "either of these readings")
-    second += f", which the paper would have to state: {', or '.join(result.readings)}{note}."
+    second += f", which the paper would have to state: {', or '.join(result.judged.readings)}{note}."
     return f"{_refused(result)}.", second
 
 
@@ -274,7 +279,7 @@ def _nearest_verb(nearest: str) -> str:
 
 def _tried(result: CheckResult) -> str:
     """The readings in a few words."""
-    others = [name for name in result.tried if name not in ROUNDINGS]
+    others = [name for name in result.judged.tried if name not in ROUNDINGS]
     return ", ".join(["any rounding, truncation", *others])
 
 
@@ -346,7 +351,7 @@ def _nearest(result: CheckResult) -> tuple[float, ...]:
 
 def _note(result: CheckResult) -> str:
     near = nearest_text(result)
-    rescued = f"; attainable by {', or '.join(result.readings)}" if result.readings else ""
+    rescued = f"; attainable by {', or '.join(result.judged.readings)}" if result.judged.readings else ""
     return f"not attainable beside the other numbers{f', nearest {near}' if near else ''}{rescued}"
 
 

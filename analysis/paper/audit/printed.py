@@ -18,7 +18,7 @@ from typing import Annotated, Literal
 
 from pydantic import AfterValidator
 
-from analysis.report.serial import written
+from analysis.report.serial import beside, written
 
 Relation = Literal["=", "<", "<=", ">", ">="]
 _RELATIONS: dict[str, Relation] = {"": "=", "=": "=", "<": "<", ">": ">", "<=": "<=", ">=": ">=", "≤": "<=", "≥": ">="}
@@ -197,29 +197,40 @@ OTHER = (Rounding.HALF_DOWN, Rounding.TRUNCATION)
 ROUNDINGS = tuple(rounding.value for rounding in Rounding)
 
 
+@dataclass(frozen=True, slots=True)
+class JudgedReadings:
+    """A verdict with the readings that rescue, data for the first of them, and all readings tried beside the plain."""
+
+    verdict: AuditVerdict
+    readings: tuple[str, ...] = ()
+    witness: Witness = field(default=(), metadata=written(_as_texts, name="data"))
+    tried: tuple[str, ...] = ()
+
+
 @dataclass(frozen=True, slots=True, kw_only=True)
 class CheckResult:
     """What a check found of one printed number.
 
     `step` is the distance of neighbouring attainable values, `below` and `above` the nearest ones on both sides of the
-    printed value (None where there is none or none was proved), `readings` the readings that rescue it, `tried` all
-    that were tried besides the plain one, `contradicts` the other numbers it cannot stand beside, `numbers` what else
-    the proof rests on, `witness` data that give it.
+    printed value (None where there is none or none was proved), `contradicts` the other numbers it cannot stand
+    beside, `numbers` what else the proof rests on.
     """
 
     check: str
     printed: str
-    verdict: AuditVerdict
+    judged: JudgedReadings = field(metadata=beside(JudgedReadings))
     reason: str
     source: str
     step: Fraction | None = None
     below: Fraction | None = None
     above: Fraction | None = None
-    readings: tuple[str, ...] = ()
-    tried: tuple[str, ...] = ()
     contradicts: tuple[str, ...] = ()
     numbers: tuple[tuple[str, str], ...] = field(default=(), metadata=written(dict))
-    witness: Witness = field(default=(), metadata=written(_as_texts, name="data"))
+
+    @property
+    def verdict(self) -> AuditVerdict:
+        """The verdict."""
+        return self.judged.verdict
 
 
 @dataclass(frozen=True, slots=True)
@@ -233,16 +244,6 @@ class DataExistence:
 NONE_EXISTS, UNKNOWN = DataExistence(False), DataExistence(None)
 Attempt = Callable[[Rounding], DataExistence]
 """Tries one reading: are there data that print so under this rounding?"""
-
-
-@dataclass(frozen=True, slots=True)
-class JudgedReadings:
-    """A verdict with the readings that rescue, and data for the first of them."""
-
-    verdict: AuditVerdict
-    readings: tuple[str, ...] = ()
-    witness: Witness = ()
-    tried: tuple[str, ...] = ()
 
 
 def judge_readings(plain: Attempt, others: Sequence[tuple[str, Attempt]] = ()) -> JudgedReadings:

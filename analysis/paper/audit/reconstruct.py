@@ -21,21 +21,7 @@ from itertools import combinations_with_replacement, islice, product
 from math import comb, exp, prod, sqrt
 from random import Random
 
-from analysis.paper.audit.lattices import (
-    BudgetError,
-    Rows,
-    affordable,
-    candidates,
-    distance,
-    effect,
-    every_sum,
-    greatest_squares,
-    least_squares,
-    numbers_with_sums,
-    of_parity,
-    ratio,
-    within_rows,
-)
+from analysis.paper.audit import lattices
 from analysis.paper.audit.means import AnswerScale
 from analysis.paper.audit.printed import Interval, Rounding, read_printed
 
@@ -55,7 +41,7 @@ def _drawn(total: int, around: list[float], sd: float, top: int, random: Random)
 
 def with_squares(n: int, total: int, squares: range, top: int, random: Random) -> list[int] | None:
     """Numbers with this sum and a sum of squares in `squares`; None if none were met."""
-    least, most = least_squares(n, total), greatest_squares(n, total, 0, top)
+    least, most = lattices.least_squares(n, total), lattices.greatest_squares(n, total, 0, top)
     wanted = range(max(squares.start, least + (squares.start - least) % 2), min(squares.stop, most + 1), squares.step)
     if not wanted:
         return None
@@ -73,7 +59,7 @@ def _walked(values: list[int], wanted: range, top: int, random: Random) -> bool:
         change = 2 * (values[i] - values[j] + 1)
         if i == j or values[i] == top or values[j] == 0:
             continue
-        if distance(now + change, wanted) <= distance(now, wanted) or random.random() < 0.1:
+        if lattices.distance(now + change, wanted) <= lattices.distance(now, wanted) or random.random() < 0.1:
             values[i] += 1
             values[j] -= 1
             now += change
@@ -83,8 +69,8 @@ def _walked(values: list[int], wanted: range, top: int, random: Random) -> bool:
 def _exact(n: int, total: int, wanted: range, top: int, random: Random) -> list[int] | None:
     for squares in random.sample(wanted, min(_EXACT, len(wanted))):
         try:
-            found = numbers_with_sums(n, total, squares, 0, top)
-        except BudgetError:
+            found = lattices.numbers_with_sums(n, total, squares, 0, top)
+        except lattices.BudgetError:
             continue
         if found is not None:
             values = list(found)
@@ -132,7 +118,7 @@ class Reconstruction:
     `space`: how many data sets meet the constraints, the order of participants aside, if all were enumerated.
     """
 
-    data: tuple[Rows, ...]
+    data: tuple[lattices.Rows, ...]
     starts: int
     succeeded: int
     exists: bool | None
@@ -181,7 +167,7 @@ def reconstruct(wanted: Constraints, seed: int = 0, *, count: int = 1, starts: i
     random = Random(seed)  # noqa: S311 a search, no secret
     if _size(wanted) <= _SMALL:
         return _from_all(wanted, count, random)
-    found: dict[Rows, Rows] = {}
+    found: dict[lattices.Rows, lattices.Rows] = {}
     tried = succeeded = 0
     sums = _sums(wanted, random)
     for chosen in islice(sums, starts):
@@ -197,7 +183,7 @@ def reconstruct(wanted: Constraints, seed: int = 0, *, count: int = 1, starts: i
     return Reconstruction(data=data, starts=tried, succeeded=succeeded, exists=exists)
 
 
-def meets(rows: Rows, wanted: Constraints) -> bool:
+def meets(rows: lattices.Rows, wanted: Constraints) -> bool:
     """Do these rows meet every constraint? Exact."""
     sums = tuple(map(sum, zip(*rows, strict=True)))
     return (
@@ -217,12 +203,12 @@ def _spread_fits(values: ColumnSums, column: ConditionColumn) -> bool:
     return column.variance is None or column.variance.holds(Fraction(n * squares - total**2, n * (n - 1)))
 
 
-def _f_fits(rows: Rows, sums: ColumnSums, F: Interval) -> bool:
-    found = ratio(sums, within_rows(rows), len(rows))
+def _f_fits(rows: lattices.Rows, sums: ColumnSums, F: Interval) -> bool:
+    found = lattices.ratio(sums, lattices.within_rows(rows), len(rows))
     return found is not None and F.holds(found)
 
 
-def _order_fits(rows: Rows, order: ColumnOrder) -> bool:
+def _order_fits(rows: lattices.Rows, order: ColumnOrder) -> bool:
     above = sum(row[order.one] > row[order.other] for row in rows)
     tied = sum(row[order.one] == row[order.other] for row in rows)
     return order.above in {None, above} and order.tied in {None, tied}
@@ -252,17 +238,17 @@ def _impossible(wanted: Constraints) -> bool:
 
 def _has_w(wanted: Constraints, sums: ColumnSums) -> bool:
     """False only by proof: these sums have none of the W that F needs."""
-    if wanted.F is None or not affordable(wanted.n, len(sums), wanted.top):
+    if wanted.F is None or not lattices.affordable(wanted.n, len(sums), wanted.top):
         return True
-    exact = every_sum(wanted.n, len(sums), wanted.top).get(sums, 0)
-    return any(exact >> w & 1 for w in candidates(sums, wanted.n, wanted.F, wanted.top))
+    exact = lattices.every_sum(wanted.n, len(sums), wanted.top).get(sums, 0)
+    return any(exact >> w & 1 for w in lattices.candidates(sums, wanted.n, wanted.F, wanted.top))
 
 
 def _possible(wanted: Constraints, sums: ColumnSums) -> bool:
     """Will the sums do, and is there any W for them that gives F?"""
     if wanted.accepts is not None and not wanted.accepts(sums):
         return False
-    return wanted.F is None or bool(candidates(sums, wanted.n, wanted.F, wanted.top))
+    return wanted.F is None or bool(lattices.candidates(sums, wanted.n, wanted.F, wanted.top))
 
 
 def _sums(wanted: Constraints, random: Random) -> Iterator[ColumnSums]:
@@ -280,9 +266,9 @@ def _sums(wanted: Constraints, random: Random) -> Iterator[ColumnSums]:
         yield fitting_one
 
 
-def _searched(wanted: Constraints, sums: ColumnSums, random: Random) -> Rows | None:
+def _searched(wanted: Constraints, sums: ColumnSums, random: Random) -> lattices.Rows | None:
     """One start: columns that meet their own constraints, then moves that keep them until the joint ones are met."""
-    targets = None if wanted.F is None else candidates(sums, wanted.n, wanted.F, wanted.top)
+    targets = None if wanted.F is None else lattices.candidates(sums, wanted.n, wanted.F, wanted.top)
     people = [random.gauss(0, wanted.person_sd) for _ in range(wanted.n)]
     sd = _start_sd(wanted, sums, targets)
     columns = []
@@ -307,14 +293,16 @@ def _start_sd(wanted: Constraints, sums: ColumnSums, targets: range | None) -> f
     if not targets:
         return None
     n, k = wanted.n, len(sums)
-    return sqrt(max((n * targets[0] - effect(sums)) / (n * k * (n - 1) * (k - 1)), 0.0))
+    return sqrt(max((n * targets[0] - lattices.effect(sums)) / (n * k * (n - 1) * (k - 1)), 0.0))
 
 
 def _squares(wanted: Constraints, total: int, variance: Interval) -> range:
     """The sums of squares that go with a sum and a variance, of the sum's parity."""
     n = wanted.n
     interval = variance.mapped(lambda value: value * (n - 1) + Fraction(total**2, n))
-    return of_parity(interval, least_squares(n, total), greatest_squares(n, total, 0, wanted.top), total)
+    return lattices.of_parity(
+        interval, lattices.least_squares(n, total), lattices.greatest_squares(n, total, 0, wanted.top), total
+    )
 
 
 _HOT, _COLD = 1.0, 0.002
@@ -340,13 +328,13 @@ class AnnealedRows:
         self._columns, self._top, self._fixed, self._orders = columns, top, fixed, orders
         self._n, self._k = len(columns[0]), len(columns)
         self._sums = [sum(row) for row in zip(*columns, strict=True)]
-        self._w = within_rows(self.rows)
+        self._w = lattices.within_rows(self.rows)
         self._of = [[order for order in orders if j in (order.one, order.other)] for j in range(self._k)]
         self._above = {order: sum(self._sign(order, row) > 0 for row in range(self._n)) for order in orders}
         self._tied = {order: sum(self._sign(order, row) == 0 for row in range(self._n)) for order in orders}
 
     @property
-    def rows(self) -> Rows:
+    def rows(self) -> lattices.Rows:
         """The rows as they are."""
         return tuple(zip(*self._columns, strict=True))
 
@@ -375,7 +363,7 @@ class AnnealedRows:
         return max(2.0, 4 * max(self._w, targets[-1] if targets else 0) / self._n)
 
     def _energy(self, targets: range | None, unit: float) -> float:
-        energy = 0.0 if targets is None else distance(self._w, targets) / unit
+        energy = 0.0 if targets is None else lattices.distance(self._w, targets) / unit
         for order in self._orders:
             if order.above is not None:
                 energy += abs(self._above[order] - order.above)

@@ -97,19 +97,16 @@ def tukey_pattern(
     others: list[tuple[str, Attempt]] = [(name, partial(_means, pattern, adjust)) for name, adjust in _OTHERS]
     if repeated:
         others.append((OWN_ERROR, partial(_own_error, pattern)))
-    decision = judge_readings(plain, others)
+    judged = judge_readings(plain, others)
     pooled = judge_readings(plain).verdict
     return CheckResult(
         check="Tukey pattern",
         printed="; ".join(f"{c.higher + 1} above {c.lower + 1}: p {c.p}" for c in pattern.comparisons),
-        verdict=decision.verdict,
+        judged=judged,
         reason=f"with the error term implied by F = {pattern.F.text}, df {pattern.df}: {pooled}",
         source=_SOURCE,
-        readings=decision.readings,
-        tried=decision.tried,
-        contradicts=() if decision.verdict in {"attainable", "undecided"} else (f"F = {F}", "the means"),
+        contradicts=() if judged.verdict in {"attainable", "undecided"} else (f"F = {F}", "the means"),
         numbers=_shown(pattern),
-        witness=decision.witness,
     )
 
 

@@ -173,8 +173,8 @@ def repeated_f(
     for step in other_grains:
         free = _claimed(F, None, (n,) * k, scale_of(step, low, high))
         others.append((f"scores in steps of {step} with other means", partial(_data, free, _repeated(free))))
-    decision = judge_readings(partial(_data, claim, _repeated(claim)), others)
-    return _result("repeated-measures F", claim, decision, _neighbours(claim, _w_steps))
+    judged = judge_readings(partial(_data, claim, _repeated(claim)), others)
+    return _result("repeated-measures F", claim, judged, _neighbours(claim, _w_steps))
 
 
 def between_f(
@@ -199,8 +199,8 @@ def between_f(
     claim = _claimed(F, means, tuple(sizes), scale_of(grain, low, high))
     equal = len(set(sizes)) == 1 and claim.n > 1
     others = [("error term of a repeated-measures design", partial(_data, claim, _repeated(claim)))] if equal else []
-    decision = judge_readings(partial(_data, claim, _between(claim)), others)
-    return _result("between-subjects F", claim, decision, _neighbours(claim, _s_steps))
+    judged = judge_readings(partial(_data, claim, _between(claim)), others)
+    return _result("between-subjects F", claim, judged, _neighbours(claim, _s_steps))
 
 
 def _claimed(F: str, means: Sequence[str] | None, sizes: tuple[int, ...], scale: AnswerScale) -> _Claim:
@@ -312,24 +312,21 @@ def _beside(
 
 
 def _result(
-    check: str, claim: _Claim, decision: JudgedReadings, sides: tuple[Fraction | None, Fraction | None]
+    check: str, claim: _Claim, judged: JudgedReadings, sides: tuple[Fraction | None, Fraction | None]
 ) -> CheckResult:
     means = "unprinted means" if claim.means is None else f"means {', '.join(m.text for m in claim.means)}"
     return CheckResult(
         check=check,
         printed=f"F = {claim.F.text}",
-        verdict=decision.verdict,
+        judged=judged,
         reason=f"scores in steps of {decimal(claim.scale.grain)} with {means}: the error's sum of squares comes in "
         f"steps{_next_to(sides)}",
         source=_SOURCE,
         step=2 * claim.scale.grain**2 / (len(claim.sizes) if check.startswith("repeated") else 1),
         below=sides[0],
         above=sides[1],
-        readings=decision.readings,
-        tried=decision.tried,
-        contradicts=() if decision.verdict in {"attainable", "undecided"} else (means, f"sizes {claim.sizes}"),
+        contradicts=() if judged.verdict in {"attainable", "undecided"} else (means, f"sizes {claim.sizes}"),
         numbers=_numbers(claim, check),
-        witness=decision.witness,
     )
 
 
