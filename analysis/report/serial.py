@@ -6,6 +6,7 @@ import csv
 import io
 import json
 import math
+from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import fields, is_dataclass
 from fractions import Fraction
@@ -70,14 +71,14 @@ def undefined(value: Any, place: str = "") -> Iterator[tuple[str, float]]:
         yield place, value
 
 
-class NotebookResult:
+class NotebookResult(ABC):
     """A result in a notebook: rows as a DataFrame and as a table, all of it as plain values."""
 
     __slots__ = ()
 
+    @abstractmethod
     def rows(self) -> list[dict[str, object]]:
         """What the table shows."""
-        raise NotImplementedError
 
     def to_dict(self) -> dict[str, Any]:
         """The content of the file that its command writes."""

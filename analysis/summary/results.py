@@ -12,11 +12,9 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
-import pandas as pd
-
 from analysis.logs.exclusions import KeptTrials, LeftOut
 from analysis.report import apa
-from analysis.report.serial import OPTIONAL, beside, plain
+from analysis.report.serial import OPTIONAL, NotebookResult, beside
 from analysis.stats.cells import ByParticipant
 from analysis.stats.diagnostics import EffectSize, Normality, Sphericity
 from analysis.stats.logit_model import Clustering, LogitModel
@@ -307,7 +305,7 @@ class RulesApplied:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class StudyStatistics:
+class StudyStatistics(NotebookResult):
     """The statistics of logs; None for an experiment without a log. `studies` of each study, if there are several."""
 
     direction: DirectionStatistics | None = field(default=None, metadata=OPTIONAL)
@@ -329,21 +327,16 @@ class StudyStatistics:
         names = ("direction", "preference")
         return {name: found for name in names if (found := self.of(name)) is not None and found.n}
 
-    def to_dict(self) -> dict[str, Any]:
-        """The content of `statistics.json`."""
-        written: dict[str, Any] = plain(self)
-        return written
-
-    def to_frame(self) -> pd.DataFrame:
+    def rows(self) -> list[dict[str, object]]:
         """A row an experiment and method: participants, mean and SD, and the within-subject interval of the mean."""
         blank = ConfidenceInterval(ci_low=math.nan, ci_high=math.nan)
-        rows = [
-            (name, method, found.n, found.means[method], found.sds[method], ends.ci_low, ends.ci_high)
+        return [
+            {"experiment": name, "method": method, "n": found.n, "mean": found.means[method], "sd": found.sds[method]}
+            | {"ci_low": ends.ci_low, "ci_high": ends.ci_high}
             for name, found in self.analysed.items()
             for method in found.methods
             for ends in [(found.within_ci or {}).get(method, blank)]
         ]
-        return pd.DataFrame(rows, columns=["experiment", "method", "n", "mean", "sd", "ci_low", "ci_high"])
 
     def _repr_html_(self) -> str:
         """The table of means with each experiment's F test, for a notebook."""
@@ -352,4 +345,4 @@ class StudyStatistics:
             for name, found in self.analysed.items()
             if (anova := found.anova) is not None
         ]
-        return self.to_frame().to_html(index=False, float_format="{:.4g}".format) + "".join(tests)
+        return NotebookResult._repr_html_(self) + "".join(tests)  # super() fails in a class with slots
