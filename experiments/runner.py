@@ -237,7 +237,7 @@ class _Runner:
         self._live.enter(State.RATING, step)
         match self._live.wait():
             case events.Rating(rating=rating, by=by) | events.ParticipantRated(rating=rating, by=by):
-                return steps.Rated(rating=None if rating is None else _kept(rating, step), rating_by=by)
+                return steps.Rated(rating=None if rating is None else steps.on_scale(rating, step), rating_by=by)
             case events.Repeat(reason=reason):
                 return self._repeat(reason)
             case other:
@@ -285,10 +285,6 @@ class _Runner:
                         return
                 case other:
                     raise Unforeseen(other)
-
-
-def _kept(rating: float, step: steps.Rate) -> float:
-    return steps.on_scale(rating, step)
 
 
 LEAD_S = 0.03

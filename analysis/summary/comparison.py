@@ -6,34 +6,14 @@ import math
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 
-from analysis.paper.paper import (
-    ANOVA_F,
-    ANOVA_P,
-    PARTICIPANTS,
-    ComparisonRow,
-    ComparisonVerdict,
-    Paper,
-    Prediction,
-    PublishedDirection,
-    PublishedExperiment,
-    PublishedPreference,
-    PublishedTukeyTest,
-    anova_df,
-    mean_rate,
-    named_in,
-    one_half_p,
-    one_score,
-    rated_lowest,
-    rounds_to,
-    tukey_p,
-)
+from analysis.paper import paper as publication
 from analysis.report.apa import known
 from analysis.summary.results import DirectionStatistics, Pair, StudyStatistics, WithinStatistics
 
 
 def compare(
-    statistics: StudyStatistics, paper: Paper, predicted: Mapping[str, Prediction] | None = None
-) -> tuple[ComparisonRow, ...]:
+    statistics: StudyStatistics, paper: publication.Paper, predicted: Mapping[str, publication.Prediction] | None = None
+) -> tuple[publication.ComparisonRow, ...]:
     """Every published number against the statistics of a study.
 
     A number agrees if it rounds to the printed digits; a bound or an order, if it is true of the obtained numbers. What
@@ -44,17 +24,19 @@ def compare(
     rows = [*_common("direction", paper.direction, direction), *_direction(paper.direction, direction)]
     rows += [*_common("preference", paper.preference, preference), *_preference(paper.preference, preference)]
     audited = predicted or {}
-    return tuple(_with_audit(row, audited.get(named_in(row.experiment, row.quantity))) for row in rows)
+    return tuple(_with_audit(row, audited.get(publication.named_in(row.experiment, row.quantity))) for row in rows)
 
 
-def _with_audit(row: ComparisonRow, prediction: Prediction | None) -> ComparisonRow:
+def _with_audit(row: publication.ComparisonRow, prediction: publication.Prediction | None) -> publication.ComparisonRow:
     """The row with what the audit says of its number."""
     if prediction is None or row.verdict == "not published":
         return row
     printed = row.published.split(" ", maxsplit=1)[0]
     obtained = row.obtained
     nearest = obtained is not None and any(_alike(obtained, value, printed) for value in prediction.nearest)
-    verdict: ComparisonVerdict = "differs as predicted" if row.verdict == "differs" and nearest else row.verdict
+    verdict: publication.ComparisonVerdict = (
+        "differs as predicted" if row.verdict == "differs" and nearest else row.verdict
+    )
     note = "; ".join(text for text in (row.note, prediction.note) if text)
     return replace(row, verdict=verdict, note=note, audit=prediction.verdict)
 
@@ -65,21 +47,23 @@ def _alike(one: float, other: float, printed: str) -> bool:
     return abs(one - other) < 1e-9 or f"{one:.{digits}f}" == f"{other:.{digits}f}"
 
 
-def _number(experiment: str, quantity: str, printed: str, obtained: float | None, unit: str = "") -> ComparisonRow:
-    verdict: ComparisonVerdict = "not obtained"
+def _number(
+    experiment: str, quantity: str, printed: str, obtained: float | None, unit: str = ""
+) -> publication.ComparisonRow:
+    verdict: publication.ComparisonVerdict = "not obtained"
     if obtained is not None:
-        verdict = "agrees" if rounds_to(obtained, printed) else "differs"
+        verdict = "agrees" if publication.rounds_to(obtained, printed) else "differs"
     return _row(experiment, quantity, f"{printed} {unit}".strip(), obtained, verdict=verdict)
 
 
 def _claim(
     experiment: str, quantity: str, published: str, obtained: float | None, *, truth: bool, note: str = ""
-) -> ComparisonRow:
-    verdict: ComparisonVerdict = "not obtained" if obtained is None else "agrees" if truth else "differs"
+) -> publication.ComparisonRow:
+    verdict: publication.ComparisonVerdict = "not obtained" if obtained is None else "agrees" if truth else "differs"
     return _row(experiment, quantity, published, obtained, verdict=verdict, note=note)
 
 
-def _unpublished(experiment: str, quantity: str, obtained: float | None, note: str) -> ComparisonRow:
+def _unpublished(experiment: str, quantity: str, obtained: float | None, note: str) -> publication.ComparisonRow:
     return _row(experiment, quantity, "", obtained, verdict="not published", note=note)
 
 
@@ -89,10 +73,10 @@ def _row(
     published: str,
     obtained: float | None,
     *,
-    verdict: ComparisonVerdict,
+    verdict: publication.ComparisonVerdict,
     note: str = "",
-) -> ComparisonRow:
-    return ComparisonRow(
+) -> publication.ComparisonRow:
+    return publication.ComparisonRow(
         experiment=experiment,
         quantity=quantity,
         published=published,
@@ -102,20 +86,22 @@ def _row(
     )
 
 
-def _common(name: str, published: PublishedExperiment, found: WithinStatistics | None) -> Iterator[ComparisonRow]:
+def _common(
+    name: str, published: publication.PublishedExperiment, found: WithinStatistics | None
+) -> Iterator[publication.ComparisonRow]:
     anova = found.anova if found is not None else None
-    yield _number(name, PARTICIPANTS, str(published.n), found.n if found is not None else None)
+    yield _number(name, publication.PARTICIPANTS, str(published.n), found.n if found is not None else None)
     for i, (df, kind) in enumerate(zip(published.anova.df, ("effect", "error"), strict=True)):
-        yield _number(name, anova_df(kind), str(df), anova.df[i] if anova is not None else None)
-    yield _number(name, ANOVA_F, published.anova.F, known(anova.F if anova is not None else None))
+        yield _number(name, publication.anova_df(kind), str(df), anova.df[i] if anova is not None else None)
+    yield _number(name, publication.ANOVA_F, published.anova.F, known(anova.F if anova is not None else None))
     p, bound = known(anova.p if anova is not None else None), published.anova.p_below
-    yield _claim(name, ANOVA_P, f"< {bound}", p, truth=p is not None and p < float(bound))
+    yield _claim(name, publication.ANOVA_P, f"< {bound}", p, truth=p is not None and p < float(bound))
     for claim in published.tukey:
         yield _tukey(name, claim, (found.tukey if found is not None else None) or ())
 
 
-def _tukey(name: str, claim: PublishedTukeyTest, pairs: Sequence[Pair]) -> ComparisonRow:
-    quantity, published = tukey_p(claim), f"< {claim.p_below}"
+def _tukey(name: str, claim: publication.PublishedTukeyTest, pairs: Sequence[Pair]) -> publication.ComparisonRow:
+    quantity, published = publication.tukey_p(claim), f"< {claim.p_below}"
     found = next((pair for pair in pairs if {pair.a, pair.b} == {claim.higher, claim.lower}), None)
     if found is None or math.isnan(found.p):
         return _claim(name, quantity, published, None, truth=False)
@@ -124,15 +110,17 @@ def _tukey(name: str, claim: PublishedTukeyTest, pairs: Sequence[Pair]) -> Compa
     return _claim(name, quantity, published, found.p, truth=above and found.p < float(claim.p_below), note=note)
 
 
-def _direction(published: PublishedDirection, found: DirectionStatistics | None) -> Iterator[ComparisonRow]:
+def _direction(
+    published: publication.PublishedDirection, found: DirectionStatistics | None
+) -> Iterator[publication.ComparisonRow]:
     name = "direction"
     means, sds, backward = (found.means, found.sds, found.backward.means) if found is not None else ({}, {}, {})
     for method, printed in published.means.items():
-        yield _number(name, mean_rate(method), printed, _percent(means.get(method)), "%")
+        yield _number(name, publication.mean_rate(method), printed, _percent(means.get(method)), "%")
     for claim in published.binomial:
         tests = found.binomial.get(claim.method, {}) if found is not None else {}
         test = tests.get(claim.direction)
-        yield _number(name, one_half_p(claim), claim.p, test.p if test is not None else None)
+        yield _number(name, publication.one_half_p(claim), claim.p, test.p if test is not None else None)
     for method in published.methods:
         sd = _percent(sds.get(method))
         yield _unpublished(name, f"SD of the correct rate, {method} (%)", sd, "drawn in Fig. 8 (a) only")
@@ -147,18 +135,20 @@ def _percent(share: float | None) -> float | None:
     return None if value is None else 100.0 * value
 
 
-def _preference(published: PublishedPreference, found: WithinStatistics | None) -> Iterator[ComparisonRow]:
+def _preference(
+    published: publication.PublishedPreference, found: WithinStatistics | None
+) -> Iterator[publication.ComparisonRow]:
     name, lowest, same = "preference", published.lowest, published.same_score
     ratings = None if found is None else found.participants.values()
     yield _number(
         name,
-        rated_lowest(lowest),
+        publication.rated_lowest(lowest),
         str(lowest.participants),
         None if ratings is None else sum(_is_lowest(row, lowest.method) for row in ratings),
     )
     yield _number(
         name,
-        one_score(same),
+        publication.one_score(same),
         str(same.participants),
         None if ratings is None else sum(_is_same(row, same.methods) for row in ratings),
     )

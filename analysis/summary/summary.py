@@ -45,33 +45,8 @@ from analysis.stats.paired import (
     paired_t_tests,
     signed_rank_tests,
 )
+from analysis.summary import results
 from analysis.summary.assumptions import assumptions
-from analysis.summary.results import (
-    AnovaTest,
-    BayesFactor,
-    BayesFactors,
-    ConfidenceInterval,
-    Diagnostics,
-    DirectionStatistics,
-    FarScore,
-    FriedmanTest,
-    MeanSd,
-    MedianTime,
-    NamedModel,
-    NotedEffectSize,
-    NotedNormality,
-    Origin,
-    Outliers,
-    OwnErrorPair,
-    Pair,
-    PooledBinomial,
-    PostHoc,
-    Scores,
-    Sensitivity,
-    StudyStatistics,
-    Supplement,
-    WithinStatistics,
-)
 from analysis.times.own_trials import INSTRUCTION, response_times, timed
 from analysis.times.speed_accuracy import speed_accuracy
 from device.words import DIRECTIONS
@@ -89,7 +64,7 @@ BINOMIAL_NOTE = (
 )
 
 
-def summarize(logs: Logs, *, trade: bool = True) -> StudyStatistics:
+def summarize(logs: Logs, *, trade: bool = True) -> results.StudyStatistics:
     """The statistics of `logs`: rates 0 to 1, SD with n - 1.
 
     `trade`: with the measures of speed and accuracy. An experiment without a log is left out. Participants who miss an
@@ -98,7 +73,7 @@ def summarize(logs: Logs, *, trade: bool = True) -> StudyStatistics:
     """
     direction, left_out = _direction(logs.trials, trade=trade) if len(logs.trials) else (None, [])
     preference, also_out = _preference(logs.ratings) if len(logs.ratings) else (None, [])
-    found = StudyStatistics(direction=direction, preference=preference, excluded=(*left_out, *also_out))
+    found = results.StudyStatistics(direction=direction, preference=preference, excluded=(*left_out, *also_out))
     return replace(found, warnings=tuple(_warnings(found)), versions=statistics_versions())
 
 
@@ -122,7 +97,7 @@ def _version(name: str) -> str:
         return "not installed"
 
 
-def _warnings(found: StudyStatistics) -> Iterator[str]:
+def _warnings(found: results.StudyStatistics) -> Iterator[str]:
     """Why there is no test, the violated assumptions that change which number to read, and what is written as null."""
     for experiment in SCALES:
         one = found.of(experiment)
@@ -147,11 +122,11 @@ def _complete(table: pd.DataFrame, experiment: str) -> tuple[pd.DataFrame, list[
     return complete, methods, left_out
 
 
-def _direction(table: pd.DataFrame, *, trade: bool) -> tuple[DirectionStatistics, list[LeftOut]]:
+def _direction(table: pd.DataFrame, *, trade: bool) -> tuple[results.DirectionStatistics, list[LeftOut]]:
     complete, methods, left_out = _complete(table, "direction")
     cells = trial_cells(complete, methods)
     within = _within(cells.rates("forward"), "direction", _origin(complete, "response_source"))
-    found = DirectionStatistics(
+    found = results.DirectionStatistics(
         **{field.name: getattr(within, field.name) for field in fields(within)},
         backward=_scores(cells.rates("backward")),
         binomial={method: _binomials(cells, method) for method in methods},
@@ -166,18 +141,18 @@ def _direction(table: pd.DataFrame, *, trade: bool) -> tuple[DirectionStatistics
     return replace(found, assumptions=assumptions(found)), left_out
 
 
-def _preference(table: pd.DataFrame) -> tuple[WithinStatistics, list[LeftOut]]:
+def _preference(table: pd.DataFrame) -> tuple[results.WithinStatistics, list[LeftOut]]:
     complete, methods, left_out = _complete(table, "preference")
     scores = _table(complete, "rating", methods)
     found = _within(scores, "preference", _origin(complete, "rating_by"))
     return replace(found, assumptions=assumptions(found)), left_out
 
 
-def _origin(complete: pd.DataFrame, source: str) -> Origin:
+def _origin(complete: pd.DataFrame, source: str) -> results.Origin:
     answers, guns = (
         {str(name): count for name, count in complete[column].value_counts().items()} for column in (source, "gun")
     )
-    return Origin(answers=answers, guns=guns)
+    return results.Origin(answers=answers, guns=guns)
 
 
 def _table(rows: pd.DataFrame, measure: str, methods: Sequence[str]) -> pd.DataFrame:
@@ -188,10 +163,10 @@ def _table(rows: pd.DataFrame, measure: str, methods: Sequence[str]) -> pd.DataF
     return cells.unstack("method").reindex(columns=list(methods))
 
 
-def _within(scores: pd.DataFrame, experiment: str, origin: Origin) -> WithinStatistics:
+def _within(scores: pd.DataFrame, experiment: str, origin: results.Origin) -> results.WithinStatistics:
     """What every experiment has: scores, tests on them, supplement."""
     shown, tested = _scores(scores), min(scores.shape) >= 2
-    return WithinStatistics(
+    return results.WithinStatistics(
         n=len(scores),
         methods=shown.participants.names,
         means=shown.means,
@@ -206,9 +181,9 @@ def _within(scores: pd.DataFrame, experiment: str, origin: Origin) -> WithinStat
     )
 
 
-def _scores(scores: pd.DataFrame) -> Scores:
+def _scores(scores: pd.DataFrame) -> results.Scores:
     people, methods = map(str, scores.index), map(str, scores.columns)
-    return Scores(
+    return results.Scores(
         means=_by_method(scores.mean()),
         sds=_by_method(scores.std(ddof=1)),
         participants=ByParticipant(tuple(people), tuple(methods), scores.to_numpy(dtype="float64")),
@@ -219,16 +194,18 @@ def _by_method(row: pd.Series) -> dict[str, float]:
     return {str(method): float(value) for method, value in row.items()}
 
 
-def _within_ci(scores: pd.DataFrame) -> dict[str, ConfidenceInterval]:
+def _within_ci(scores: pd.DataFrame) -> dict[str, results.ConfidenceInterval]:
     """Cousineau-Morey intervals of the means."""
     found = cousineau_morey(scores.to_numpy())
     rows = zip(scores.columns, found.ci_low, found.ci_high, strict=True)
-    return {str(method): ConfidenceInterval(ci_low=float(low), ci_high=float(high)) for method, low, high in rows}
+    return {
+        str(method): results.ConfidenceInterval(ci_low=float(low), ci_high=float(high)) for method, low, high in rows
+    }
 
 
-def _anova(scores: FloatArray) -> AnovaTest:
+def _anova(scores: FloatArray) -> results.AnovaTest:
     found = rm_anova(scores)
-    return AnovaTest(
+    return results.AnovaTest(
         F=float(found.F),
         df=(found.df_effect, found.df_error),
         p=float(found.p),
@@ -239,9 +216,9 @@ def _anova(scores: FloatArray) -> AnovaTest:
     )
 
 
-def _tukey(scores: pd.DataFrame) -> tuple[Pair, ...]:
+def _tukey(scores: pd.DataFrame) -> tuple[results.Pair, ...]:
     return tuple(
-        Pair(
+        results.Pair(
             a=str(pair.a),
             b=str(pair.b),
             **{name: float(getattr(pair, name)) for name in ("difference", "q", "p", "ci_low", "ci_high")},
@@ -250,15 +227,15 @@ def _tukey(scores: pd.DataFrame) -> tuple[Pair, ...]:
     )
 
 
-def _binomials(cells: TrialCells, method: str) -> dict[str, PooledBinomial]:
+def _binomials(cells: TrialCells, method: str) -> dict[str, results.PooledBinomial]:
     """The test of each direction that was presented; empty without complete participants."""
-    result: dict[str, PooledBinomial] = {}
+    result: dict[str, results.PooledBinomial] = {}
     for place, direction in enumerate(DIRECTIONS):
         column = cells.methods.index(method), place
         successes, trials = int(cells.correct[:, *column].sum()), int(cells.trials[:, *column].sum())
         if trials:
             test = binomial_test(successes, trials)
-            result[direction] = PooledBinomial(
+            result[direction] = results.PooledBinomial(
                 successes=successes,
                 trials=trials,
                 **{field.name: float(getattr(test, field.name)) for field in fields(test)},
@@ -267,7 +244,7 @@ def _binomials(cells: TrialCells, method: str) -> dict[str, PooledBinomial]:
     return result
 
 
-def _sensitivity(cells: TrialCells, method: str) -> Sensitivity | None:
+def _sensitivity(cells: TrialCells, method: str) -> results.Sensitivity | None:
     """D' and criterion of those who were presented with both directions; None where nobody was."""
     column = cells.methods.index(method)
     both = np.flatnonzero(cells.trials[:, column].min(axis=1, initial=np.inf))
@@ -277,23 +254,23 @@ def _sensitivity(cells: TrialCells, method: str) -> Sensitivity | None:
     found = yes_no(hits, signals, noises - rejections, noises)
     d_prime, criterion = np.atleast_1d(found.d_prime), np.atleast_1d(found.criterion)
     people = tuple(cells.participants[i] for i in both)
-    return Sensitivity(
+    return results.Sensitivity(
         d_prime=_mean_sd(d_prime),
         criterion=_mean_sd(criterion),
         participants=ByParticipant(people, ("d_prime", "criterion"), np.column_stack([d_prime, criterion])),
     )
 
 
-def _mean_sd(values: FloatArray) -> MeanSd:
-    return MeanSd(mean=float(values.mean()), sd=float(values.std(ddof=1)) if values.size > 1 else math.nan)
+def _mean_sd(values: FloatArray) -> results.MeanSd:
+    return results.MeanSd(mean=float(values.mean()), sd=float(values.std(ddof=1)) if values.size > 1 else math.nan)
 
 
-def _median_times(trials: pd.DataFrame, methods: list[str]) -> dict[str, MedianTime]:
+def _median_times(trials: pd.DataFrame, methods: list[str]) -> dict[str, results.MedianTime]:
     """Median over the times that are the participant's own, by method."""
     valid = timed(trials).own
     times = {method: trials["response_time_s"][valid & (trials["method"] == method)] for method in methods}
     return {
-        method: MedianTime(median=float(own.median()) if len(own) else None, n=len(own))
+        method: results.MedianTime(median=float(own.median()) if len(own) else None, n=len(own))
         for method, own in times.items()
     }
 
@@ -312,7 +289,7 @@ BAYES_NOTE = (
 BEYOND = "The Bayes factor cannot be computed: it is above 1.8e308, or |t| is above 100."
 
 
-def within_supplement(scores: pd.DataFrame, scale: tuple[float, float]) -> Supplement | None:
+def within_supplement(scores: pd.DataFrame, scale: tuple[float, float]) -> results.Supplement | None:
     """Further statistics of scores, participants by methods, on a `scale` from lowest to highest.
 
     None for fewer than two participants or methods, as the ANOVA is.
@@ -321,68 +298,68 @@ def within_supplement(scores: pd.DataFrame, scale: tuple[float, float]) -> Suppl
         return None
     array, methods = scores.to_numpy(dtype="float64"), [str(method) for method in scores.columns]
     pairs = paired_t_tests(array, methods)
-    return Supplement(
+    return results.Supplement(
         sphericity=sphericity(array),
-        effect_size=NotedEffectSize(size=effect_size(rm_anova(unit_scaled(array))), note=EFFECT_SIZE_NOTE),
+        effect_size=results.NotedEffectSize(size=effect_size(rm_anova(unit_scaled(array))), note=EFFECT_SIZE_NOTE),
         friedman=_friedman(array, methods),
         paired_t=pairs,
         tukey_paired=tuple(_finite(pair) for pair in rm_tukey_hsd_paired(array, methods)),
         tukey_paired_note=TUKEY_PAIRED_NOTE,
-        bayes_factors=BayesFactors(
+        bayes_factors=results.BayesFactors(
             r=SCALE, note=BAYES_NOTE, pairs=tuple(_bayes_factor(pair, len(array)) for pair in pairs)
         ),
         diagnostics=_diagnostics(scores, scale),
     )
 
 
-def model(cells: TrialCells) -> NamedModel:
+def model(cells: TrialCells) -> results.NamedModel:
     """The logistic model of the forward answers."""
     place, methods = DIRECTIONS.index("forward"), cells.methods
     if min(len(cells.participants), len(methods)) < 2:
         found = LogitModel(reason="A model needs two participants and two methods.")
     else:
         found = logit_model(cells.correct[..., place], cells.trials[..., place], methods)
-    return NamedModel(name=MODEL_NAME, note=MODEL_NOTE, fit=found)
+    return results.NamedModel(name=MODEL_NAME, note=MODEL_NOTE, fit=found)
 
 
-def _friedman(scores: FloatArray, methods: Sequence[str]) -> FriedmanTest:
+def _friedman(scores: FloatArray, methods: Sequence[str]) -> results.FriedmanTest:
     found = friedman(scores)
-    return FriedmanTest(
+    return results.FriedmanTest(
         chi2=found.chi2,
         df=found.df,
         p=found.p,
         kendall_w=found.kendall_w,
         reason=found.reason,
         mean_ranks=dict(zip(methods, found.mean_ranks, strict=True)),
-        post_hoc=PostHoc(name=SIGNED_RANKS, pairs=signed_rank_tests(scores, methods)),
+        post_hoc=results.PostHoc(name=SIGNED_RANKS, pairs=signed_rank_tests(scores, methods)),
     )
 
 
-def _finite(pair: Comparison) -> OwnErrorPair:
+def _finite(pair: Comparison) -> results.OwnErrorPair:
     """A Tukey comparison with None for q, p and interval where the differences have no variance."""
     a, b, difference, q = str(pair.a), str(pair.b), float(pair.difference), float(pair.q)
     if not math.isfinite(q):
-        return OwnErrorPair(a=a, b=b, difference=difference, reason=CONSTANT if difference else EQUAL)
+        return results.OwnErrorPair(a=a, b=b, difference=difference, reason=CONSTANT if difference else EQUAL)
     p, low, high = float(pair.p), float(pair.ci_low), float(pair.ci_high)
-    return OwnErrorPair(a=a, b=b, difference=difference, q=q, p=p, ci_low=low, ci_high=high)
+    return results.OwnErrorPair(a=a, b=b, difference=difference, q=q, p=p, ci_low=low, ci_high=high)
 
 
-def _bayes_factor(pair: PairedT, n: int) -> BayesFactor:
+def _bayes_factor(pair: PairedT, n: int) -> results.BayesFactor:
     factor = None if pair.t is None else jzs_paired(pair.t, n)
     reason = pair.reason if factor is not None or pair.t is None else BEYOND
-    return BayesFactor(a=str(pair.a), b=str(pair.b), bf10=factor, reason=reason)
+    return results.BayesFactor(a=str(pair.a), b=str(pair.b), bf10=factor, reason=reason)
 
 
-def _diagnostics(scores: pd.DataFrame, scale: tuple[float, float]) -> Diagnostics:
+def _diagnostics(scores: pd.DataFrame, scale: tuple[float, float]) -> results.Diagnostics:
     array, people, methods = scores.to_numpy(dtype="float64"), scores.index, list(map(str, scores.columns))
     at_ends = ends(array, scale)
     far = tuple(
-        FarScore(participant=str(people[o.row]), method=methods[o.column], score=o.score, fence=o.fence)
+        results.FarScore(participant=str(people[o.row]), method=methods[o.column], score=o.score, fence=o.fence)
         for o in outliers(array)
     )
-    return Diagnostics(
-        normality=NotedNormality(test=normality(array), note=NORMALITY_NOTE),
-        outliers=Outliers(rule=OUTLIER_RULE, found=far),
+    return results.Diagnostics(
+        normality=results.NotedNormality(test=normality(array), note=NORMALITY_NOTE),
+        outliers=results.Outliers(rule=OUTLIER_RULE, found=far),
         scale=scale,
         floor=dict(zip(methods, at_ends.floor, strict=True)),
         ceiling=dict(zip(methods, at_ends.ceiling, strict=True)),

@@ -12,23 +12,18 @@ from numpy.typing import ArrayLike
 from scipy import special
 
 from analysis.stats.arrays import FloatArray
-from analysis.times.fit import BEYOND_INTERVAL, DiffusionFit, fit
+from analysis.times.fit import BEYOND_INTERVAL, DiffusionFit, Estimate, fit
 from analysis.times.likelihood import LapseRange, Trials, trials_of
 from analysis.times.own_trials import OwnTrials, ordered, quantiles
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class MeanEstimate:
+class MeanEstimate(Estimate):
     """A parameter's mean over people, its standard error and interval, and the SD of people's estimates.
 
     That SD holds the noise of each person's fit as well as the differences between people.
     """
 
-    name: str
-    value: float
-    se: float
-    ci_low: float
-    ci_high: float
     sd: float
     people: int
 

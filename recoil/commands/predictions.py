@@ -8,19 +8,7 @@ from typing import Annotated
 import typer
 from typer.core import TyperGroup
 
-from analysis.report.terminal import (
-    AsJsonOption,
-    ConfigArgument,
-    FixedSeedOption,
-    GunConfigOption,
-    WorkersOption,
-    end,
-    in_text,
-    progress,
-    say,
-    show,
-    tracked,
-)
+from analysis.report import terminal
 
 ParticipantsOption = Annotated[str | None, typer.Option(metavar="N,N-N", help="How many people, such as 8,10,14-20.")]
 TrialsListOption = Annotated[
@@ -38,7 +26,7 @@ SchedulerOption = Annotated[str | None, typer.Option(metavar="ADDRESS", help="Wo
 
 
 def power(
-    config: ConfigArgument,
+    config: terminal.ConfigArgument,
     *,
     participants: ParticipantsOption = None,
     trials: TrialsListOption = None,
@@ -47,12 +35,12 @@ def power(
     studies: SimulatedOption = 10_000,
     target: Annotated[float, typer.Option(help="Power that a design is to reach.")] = 0.8,
     null: NullOption = False,
-    seed: FixedSeedOption = 1,
+    seed: terminal.FixedSeedOption = 1,
     paper: Annotated[str, typer.Option(help="Published numbers whose pattern may recur.")] = "paper",
-    workers: WorkersOption = None,
+    workers: terminal.WorkersOption = None,
     scheduler: SchedulerOption = None,
     out: Annotated[Path, typer.Option(help="Folder for power.json, figures and report.")] = Path("results/power"),
-    as_json: AsJsonOption = False,
+    as_json: terminal.AsJsonOption = False,
 ) -> None:
     """Simulated power and precision: how many people and trials does it take, and what does it cost?"""
     from analysis.predict.power import run as feature
@@ -69,8 +57,8 @@ def power(
         seed=seed,
         paper=paper,
     )
-    found = feature.power(request, out, progress, workers, scheduler)
-    show(found, f"{in_text(feature.in_short(found))}\nReport: {out / 'report.html'}", as_json)
+    found = feature.power(request, out, terminal.progress, workers, scheduler)
+    terminal.show(found, f"{terminal.in_text(feature.in_short(found))}\nReport: {out / 'report.html'}", as_json)
 
 
 ConfigOrGunArgument = Annotated[str | None, typer.Argument(help="Config whose gun is meant; else the shipped gun.")]
@@ -98,10 +86,10 @@ def design(
     pulse: PulseOption = None,
     rate_above: RateAboveOption = 5.0,
     grid: GridOption = 40,
-    seed: FixedSeedOption = 1,
-    workers: WorkersOption = None,
+    seed: terminal.FixedSeedOption = 1,
+    workers: terminal.WorkersOption = None,
     out: Annotated[Path, typer.Option(help="Folder for design.json, figures and report.")] = Path("results/design"),
-    as_json: AsJsonOption = False,
+    as_json: terminal.AsJsonOption = False,
 ) -> None:
     """Which damper, voltage and pulse would be felt best, and where a direction begins to be felt. Predictions."""
     from analysis.predict.design_search import run as feature
@@ -116,9 +104,9 @@ def design(
         grid=grid,
         seed=seed,
     )
-    found = feature.design(request, workers, out, progress)
-    show(found, f"{in_text(feature.in_short(found))}\nReport: {out / 'report.html'}", as_json)
-    raise end(exceptions=found.best is None)
+    found = feature.design(request, workers, out, terminal.progress)
+    terminal.show(found, f"{terminal.in_text(feature.in_short(found))}\nReport: {out / 'report.html'}", as_json)
+    raise terminal.end(exceptions=found.best is None)
 
 
 class _PerceptUnlessNamed(TyperGroup):
@@ -159,14 +147,14 @@ def percept(
     paper: PaperOption = "paper",
     rates: RatesOption = None,
     trials: TrialsOption = None,
-    gun: GunConfigOption = "gun",
+    gun: terminal.GunConfigOption = "gun",
     spread: SpreadOption = 0.0,
     studies: StudiesOption = 10_000,
-    seed: FixedSeedOption = 1,
+    seed: terminal.FixedSeedOption = 1,
     out: Annotated[Path, typer.Option(help="Folder for fit.json, percept.toml, figures and report.")] = Path(
         "results/fit"
     ),
-    as_json: AsJsonOption = False,
+    as_json: terminal.AsJsonOption = False,
 ) -> None:
     """The percept fitted to forward rates, what they cannot tell, and studies of it against what else is published."""
     from analysis.predict.fit import percept as feature
@@ -174,9 +162,9 @@ def percept(
     request = feature.PerceptRequest(
         paper=paper, rates=rates, trials=trials, gun=gun, spread=spread, studies=studies, seed=seed
     )
-    found = feature.percept(request, out, progress)
-    text = "\n".join(map(in_text, feature.in_short(found)))
-    show(found, f"{text}\nReport: {out / 'report.html'}; for a config: {out / 'percept.toml'}", as_json)
+    found = feature.percept(request, out, terminal.progress)
+    text = "\n".join(map(terminal.in_text, feature.in_short(found)))
+    terminal.show(found, f"{text}\nReport: {out / 'report.html'}; for a config: {out / 'percept.toml'}", as_json)
 
 
 @app.command()
@@ -189,15 +177,15 @@ def times(
     bias: Annotated[bool, typer.Option("--bias/--no-bias", help="Fit the start, or hold it at one half.")] = True,
     profile: Annotated[bool, typer.Option("--profile", help="Likelihood intervals as well; slower.")] = False,
     out: Annotated[Path, typer.Option(help="Folder for fit.json, figure and report.")] = Path("results/fit-times"),
-    as_json: AsJsonOption = False,
+    as_json: terminal.AsJsonOption = False,
 ) -> None:
     """The diffusion model (drift, boundary, start, non-decision time) fitted to people's own response times."""
     from analysis.predict.fit import times as feature
 
     request = feature.TimesRequest(paths=logs, lapses=lapses, bias=bias, profiled=profile)
-    found, problems = feature.times(request, out, tracked, progress)
+    found, problems = feature.times(request, out, terminal.tracked, terminal.progress)
     missing = [*map(str, problems), *feature.left_out(found)]
     for one in missing:
-        say(f"recoil: left out: {one}")
-    show(found, f"{in_text(feature.in_short(found))}\nReport: {out / 'report.html'}", as_json)
-    raise end(exceptions=bool(missing))
+        terminal.say(f"recoil: left out: {one}")
+    terminal.show(found, f"{terminal.in_text(feature.in_short(found))}\nReport: {out / 'report.html'}", as_json)
+    raise terminal.end(exceptions=bool(missing))
