@@ -152,7 +152,9 @@ def test_what_is_killed_is_set_aside_by_another_seed_and_gone_on_with_by_the_sam
     assert {path.name: path.read_bytes() for path in other[:4]} != {path.name: path.read_bytes() for path in begun[:4]}
     _terminated(words, lambda: len(tables(out)) > len(begun))
     assert len(tables(out)) < 28
-    _terminated(words, lambda: len(tables(out)) == 28)  # what follows, from the same tables, `reproduction` has seen
+    with subprocess.Popen(words, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL) as finishing:
+        wait_for(lambda: len(tables(out)) == 28 or finishing.poll() is not None)
+        finishing.kill()  # what follows, from the same tables, `reproduction` has seen
     for experiment in EXPERIMENTS:
         assert scores(out, experiment).equals(scores(reproduction, experiment))
 
