@@ -417,6 +417,8 @@ def logs_of(recoil: Recoil, folder: Path, config: Path, gun: str) -> tuple[list[
     """A run's table but for times and for how many shots a train had time for, and how each shot came about."""
     words = ("--participant", "P01", "--screen", "synthetic", "--seed", 3, "--json", "--results", folder)
     done = recoil("run", config, *words, "--gun", gun)
+    while "Go on with --resume" in done.stderr:  # a busy machine heard the gun too late, three times in a row
+        done = recoil("run", config, *words, "--gun", gun, "--resume")
     assert done.returncode == 0, done.stderr
     paths = {key: config.parent.parent / path for key, path in json.loads(done.stdout).items()}
     table = [{key: cell for key, cell in row.items() if key != "shots"} for row in rows(paths["table"])]
@@ -431,15 +433,19 @@ def driven(chip: Emulated) -> list[int]:
 def as_on_the_simulated_gun(recoil: Recoil, config: Path, speed: int) -> int:
     """The logs of a chip that lives so many times faster than the world are the same but for times.
 
-    Every shot in them was driven, once, when they say. How many.
+    Every shot in them was driven, once, when they say. How many. Where a busy machine heard the gun too late, the trial
+    is marked and was presented again: its first shot, if there was one, is driven and not in the logs.
     """
     simulated, _ = logs_of(recoil, Path("simulated"), config, "simulated")
     with emulated(config.parent.parent, "gun-qemu.elf" if speed == 1 else f"gun-qemu-{speed}.elf") as chip:
         emulated_rows, timings = logs_of(recoil, Path("emulated"), config, f"serial:{chip.port}?speed={speed}")
         starts, settings = driven(chip), settings_in_force(chip)
-    assert emulated_rows == simulated
-    assert starts == [timing["gun_start_us"] for timing in timings]
-    if config.stem == "direction":
+    late = [row for row in emulated_rows if "device-error" in row["flags"]]
+    assert [row | {"flags": ""} for row in emulated_rows] == simulated
+    assert {row["flags"] for row in emulated_rows} <= {"", "device-error", "device-error interrupted"}
+    told = [timing["gun_start_us"] for timing in timings]
+    assert (starts == told) if not late else (set(told) <= set(starts))
+    if config.stem == "direction" and not late:
         assert [call.split(",")[1] for call in settings] == [WAYS[row["direction"]] for row in simulated]
     return len(starts)
 

@@ -11,6 +11,7 @@ import pytest
 from tests.at_runs import SHORT_TRIALS, shorten
 from tests.firmware import FAST, as_on_the_simulated_gun, emulated
 from tests.serial_runs import hasty
+from tests.waiting import wait_for
 
 pytestmark = pytest.mark.slow
 
@@ -32,9 +33,13 @@ def test_a_session_on_the_emulated_chip_logs_what_one_on_the_simulated_gun_does(
 
 
 def test_the_doctor_measures_the_way_to_the_emulated_chip(recoil, tmp_path):
+    def examined(port: str) -> dict[str, object]:
+        done = recoil("doctor", "--json", "--gun", f"serial:{port}")
+        (gun,) = [row for row in json.loads(done.stdout)["checks"] if row["check"] == "gun"]
+        return {} if "within its time" in gun["measured"] else gun  # a busy machine hears it too late: look again
+
     with emulated(tmp_path) as chip:
-        done = recoil("doctor", "--json", "--gun", f"serial:{chip.port}")
-    (gun,) = [row for row in json.loads(done.stdout)["checks"] if row["check"] == "gun"]
+        gun = wait_for(lambda: examined(chip.port), "the gun was never heard in its time")
     assert gun["verdict"] in {"good", "warning"}  # a busy machine makes the way longer
     assert 0 < gun["figures"]["round_trip_ms"]["n"] <= 200  # a busy machine has time for fewer
     assert gun["measured"].startswith("haptic-gun:QEMU-1, disarmed; round trip median")
