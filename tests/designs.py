@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import Any
 
 from experiments.config.door import checked_table
-from experiments.design.language import DesignConfig
+from experiments.design.config import DesignConfig
 
 QUESTION = {"kind": "choice", "text": "Which way?", "answers": ["forward", "backward"]}
 
@@ -16,6 +16,7 @@ def design(**tables: Any) -> DesignConfig:
         "design": "test",
         "title": "A test",
         "gun": "gun.toml",
+        "factors": {"method": {"levels": ["a"]}},
         "questions": {"response": QUESTION},
         "fatigue": {"max_trials_without_break": 10_000, "max_planned_s": 86_400.0},
         "timing": {"hand_over_s": 1.0, "planned_s": 60.0},

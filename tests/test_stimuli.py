@@ -7,7 +7,7 @@ import pytest
 from device.words import Effect, Pulse
 from experiments.config.door import ConfigError
 from experiments.design import stimuli
-from experiments.design.planning import make_plan
+from experiments.design.planning import plan_of
 from experiments.load import load_gun, shipped_folder
 from tests.designs import design
 
@@ -20,7 +20,7 @@ def gun():
 
 
 def shots(config, gun):
-    return [stimuli.intervals(config, gun, trial) for trial in make_plan(config, "P01", 1).trials]
+    return [stimuli.intervals(config, gun, trial) for trial in plan_of(config, "P01", 1).trials]
 
 
 def test_a_method_is_the_guns_own(gun):
@@ -50,7 +50,7 @@ def test_what_a_hand_sets_is_told_to_the_model_and_to_the_experimenter(gun):
             },
         }
     )
-    plan = make_plan(config, "P01", 1)
+    plan = plan_of(config, "P01", 1)
     found = {
         stimuli.settings(config, trial): stimuli.intervals(config, gun, trial)[0].parameters.friction_N
         for trial in plan.trials
@@ -69,7 +69,7 @@ def test_an_interval_without_a_stimulus_is_empty(gun):
     volts = [tuple(one and one.drive.voltage_V for one in held) for held in shots(config, gun)]
     assert sorted(volts, key=str) == [(12.0, None)] * 2 + [(None, 12.0)] * 2
     caught = design(factors={"method": STRONG}, trial={"catch": 1})
-    assert sorted(map(str, shots(caught, gun)))[0] == "(None,)"
+    assert (None,) in shots(caught, gun)
 
 
 @pytest.mark.parametrize(
@@ -80,11 +80,18 @@ def test_an_interval_without_a_stimulus_is_empty(gun):
         ({"method": STRONG, "pulse_s": {"levels": [0.5]}}, "pulse_s"),
         ({"method": STRONG, "voltage_V": {"levels": [0.5]}}, "below_break_away"),
         ({"method": STRONG, "tension_V": {"levels": [1.0]}}, "factors.tension_V: the gun has no such number"),
-        ({"method": {"levels": ["vibration"]}, "voltage_V": {"levels": [12.0]}}, "is a vibration, which has no voltage_V"),
+        (
+            {"method": {"levels": ["vibration"]}, "voltage_V": {"levels": [12.0]}},
+            "is a vibration, which has no voltage_V",
+        ),
         ({"method": STRONG, "damper": {"levels": ["on"], "sets": {"on": {"frction_N": 1.0}}}}, "frction_N"),
         ({"method": STRONG, "damper": {"levels": ["on"], "sets": {"on": {"friction_N": -1.0}}}}, "friction_N is -1.0"),
         (
-            {"method": STRONG, "damper": {"levels": ["on"], "sets": {"on": {"voltage_V": 9.0}}}, "voltage_V": {"levels": [9.0]}},
+            {
+                "method": STRONG,
+                "damper": {"levels": ["on"], "sets": {"on": {"voltage_V": 9.0}}},
+                "voltage_V": {"levels": [9.0]},
+            },
             "factors.damper sets as well",
         ),
     ],

@@ -13,13 +13,14 @@ from itertools import combinations, product
 
 from pydantic import TypeAdapter
 
-from experiments.config.door import ConfigError
+from experiments.config.door import ConfigError, Order
 from experiments.config.setup import sha256
-from experiments.design.language import MAX_TRIALS, BlockOrder, DesignConfig, Level, shown_level
+from experiments.design.config import DesignConfig
+from experiments.design.language import MAX_TRIALS, BlockOrder, Level, shown_level
 from experiments.design.plan import square_rows
 from experiments.design.streams import Stream
 
-Cell = tuple[tuple[str, Level], ...]
+Condition = tuple[tuple[str, Level], ...]
 """Names of factors with their levels, in the order of the file."""
 
 
@@ -34,7 +35,7 @@ class DesignTrial:
     session: int
     set: int
     trial: int
-    levels: Cell
+    levels: Condition
     intervals: tuple[Level, ...] = ()
     odd: int | None = None
     catch: bool = False
@@ -77,12 +78,12 @@ class DesignPlan:
 _PLAN = TypeAdapter(DesignPlan)
 
 
-def cells(design: DesignConfig, names: Sequence[str], given: Cell = ()) -> list[Cell]:
+def cells(design: DesignConfig, names: Sequence[str], given: Condition = ()) -> list[Condition]:
     """Every combination of the factors' levels, nested ones by the level that they are nested in.
 
     `given` are levels that hold already; a factor that is nested in one of them has the levels that it has there.
     """
-    found: list[Cell] = [()]
+    found: list[Condition] = [()]
     for name in _outer_first(design, names):
         factor = design.factors[name]
         found = [
@@ -98,12 +99,12 @@ def _outer_first(design: DesignConfig, names: Sequence[str]) -> list[str]:
     return sorted(names, key=lambda name: design.factors[name].within is not None)
 
 
-def groups(design: DesignConfig) -> list[Cell]:
+def groups(design: DesignConfig) -> list[Condition]:
     """The combinations of levels that vary between people; one empty group if none does."""
     return cells(design, design.between)
 
 
-def rows_of(design: DesignConfig) -> int:
+def square_size(design: DesignConfig) -> int:
     """How many rows the balancing square has; 0 if no order is balanced over participants."""
     return max(
         len(square_rows(_square(design.order.sessions), len(_sessions(design, ())))),
@@ -111,27 +112,29 @@ def rows_of(design: DesignConfig) -> int:
     )
 
 
-def _square(order: BlockOrder) -> str:
+def _square(order: BlockOrder) -> Order:
     return "random" if order == "fixed" else order
 
 
-def _sessions(design: DesignConfig, given: Cell) -> list[Cell]:
+def _sessions(design: DesignConfig, given: Condition) -> list[Condition]:
     return cells(design, design.order.session, given)
 
 
-def _session_cells(design: DesignConfig, given: Cell) -> list[Cell]:
+def _session_cells(design: DesignConfig, given: Condition) -> list[Condition]:
     names = [name for name in design.varying if name != design.trial.compare or design.trial.kind != "pair"]
     return cells(design, names, given)
 
 
-def make_plan(design: DesignConfig, participant_id: str, seed: int, *, row: int | None = None, group: int = 0) -> DesignPlan:
+def plan_of(
+    design: DesignConfig, participant_id: str, seed: int, *, row: int | None = None, group: int = 0
+) -> DesignPlan:
     """The plan that a design, a participant, a seed, a row of the square and a group make; the same for the same.
 
     `ConfigError`: the row or group does not exist, or the design asks for a balance that there is none of.
     """
     given = _chosen("group", groups(design), group)
-    if row is not None and row not in range(rows_of(design)):
-        raise ConfigError(f"order_row = {row!r}: the orders have {rows_of(design)} rows, counted from 0")
+    if row is not None and row not in range(square_size(design)):
+        raise ConfigError(f"order_row = {row!r}: the orders have {square_size(design)} rows, counted from 0")
     who = (design.design, participant_id)
     sessions = _ordered(design.order.sessions, _sessions(design, given), row, Stream(seed, "session-order", *who))
     trials = [
@@ -144,13 +147,13 @@ def make_plan(design: DesignConfig, participant_id: str, seed: int, *, row: int 
     )
 
 
-def _chosen(what: str, among: Sequence[Cell], place: int) -> Cell:
+def _chosen(what: str, among: Sequence[Condition], place: int) -> Condition:
     if place not in range(len(among)):
         raise ConfigError(f"{what} = {place!r}: there are {len(among)}, counted from 0")
     return among[place]
 
 
-def _ordered(order: BlockOrder, items: Sequence[Cell], row: int | None, stream: Stream) -> list[Cell]:
+def _ordered(order: BlockOrder, items: Sequence[Condition], row: int | None, stream: Stream) -> list[Condition]:
     """The items at random, as they stand, or by a row of the square over them."""
     if order == "fixed":
         return list(items)
@@ -173,14 +176,14 @@ class _Streams:
 class _Content:
     """What a trial holds, before its place is known."""
 
-    levels: Cell
+    levels: Condition
     intervals: tuple[Level, ...] = ()
     odd: int | None = None
     catch: bool = False
 
 
 def _session(
-    design: DesignConfig, number: int, given: Cell, streams: _Streams, row: int | None
+    design: DesignConfig, number: int, given: Condition, streams: _Streams, row: int | None
 ) -> Iterator[DesignTrial]:
     sets = design.order.sets
     set_levels = _set_levels(design, given, streams)
@@ -188,7 +191,9 @@ def _session(
     check_sets(design, len(contents))
     shared = _shared(design, contents, streams)
     if design.order.trials == "random":
-        parts = _limited([streams.of("trials", str(place)).shuffled(part) for place, part in enumerate(shared)], design, streams)
+        parts = _limited(
+            [streams.of("trials", str(place)).shuffled(part) for place, part in enumerate(shared)], design, streams
+        )
     else:
         parts = _by_square(design, contents, row, sets)
     place = 0
@@ -208,7 +213,7 @@ def _session(
             )
 
 
-def _set_levels(design: DesignConfig, given: Cell, streams: _Streams) -> list[Cell]:
+def _set_levels(design: DesignConfig, given: Condition, streams: _Streams) -> list[Condition]:
     """The levels of each set: each combination equally often, in random order."""
     found, sets = cells(design, design.order.set, given), design.order.sets
     if sets % len(found):
@@ -224,17 +229,17 @@ def _multiples(value: int, of: int) -> str:
     return " or ".join(str(one) for one in (below, above) if one)
 
 
-def _contents(design: DesignConfig, given: Cell, streams: _Streams) -> list[_Content]:
+def _contents(design: DesignConfig, given: Condition, streams: _Streams) -> list[_Content]:
     """What the trials of a session hold: each cell as often as it is repeated, and the catch trials."""
     found = _session_cells(design, given)
     count = len(found) * design.order.repetitions + design.trial.catch
     if count > MAX_TRIALS:
-        raise ConfigError(f"a session of {count:,} trials is more than the {MAX_TRIALS:,} that are planned; repeat less")
+        raise ConfigError(
+            f"a session of {count:,} trials is more than the {MAX_TRIALS:,} that are planned; repeat less"
+        )
     if design.trial.intervals > 1:
         contents = [
-            one
-            for at, cell in enumerate(found)
-            for one in _compared(design, cell, streams.of("intervals", str(at)))
+            one for at, cell in enumerate(found) for one in _compared(design, cell, streams.of("intervals", str(at)))
         ]
     else:
         contents = [_Content(cell) for cell in found for _ in range(design.order.repetitions)]
@@ -242,7 +247,7 @@ def _contents(design: DesignConfig, given: Cell, streams: _Streams) -> list[_Con
     return contents + [_Content(blank, catch=True)] * design.trial.catch
 
 
-def _compared(design: DesignConfig, cell: Cell, stream: Stream) -> list[_Content]:
+def _compared(design: DesignConfig, cell: Condition, stream: Stream) -> list[_Content]:
     """The repetitions of a cell, with every arrangement of its intervals as equally often as it gets."""
     trial, repetitions = design.trial, design.order.repetitions
     name = trial.compare or ""
@@ -254,7 +259,8 @@ def _compared(design: DesignConfig, cell: Cell, stream: Stream) -> list[_Content
             for first in stream.shuffled([place % 2 == 0 for place in _offset(repetitions, stream)])
         ]
     level, standard = dict(cell)[name], trial.standard
-    assert standard is not None  # the model refuses a comparison without one
+    if standard is None:
+        raise ConfigError(f"trial.standard is missing: kind {trial.kind!r} compares with it")
     forms = _arrangements(trial.kind, level, standard)
     chosen = [forms[place % len(forms)] for place in _offset(repetitions, stream, len(forms))]
     return [_Content(cell, held, odd) for held, odd in stream.shuffled(chosen)]
@@ -284,13 +290,14 @@ def check_sets(design: DesignConfig, trials: int) -> None:
         above = min((n for n in near if n > order.sets), default=None)
         shown = " or ".join(str(n) for n in (below, above) if n)
         raise ConfigError(
-            f"order.sets = {order.sets}: the {trials} trials of a session cannot be shared equally among them; nearest: {shown}"
+            f"order.sets = {order.sets}: the {trials} trials of a session cannot be shared equally among them; "
+            f"nearest: {shown}"
         )
     if order.balance == "set-exact" and order.repetitions % order.sets:
         raise ConfigError(
-            f'order.balance = "set-exact" is impossible: {order.repetitions} repetitions cannot be shared equally among '
-            f'{order.sets} sets; nearest: repetitions = {_multiples(order.repetitions, order.sets)}, or balance = "set" '
-            "for as even as it gets"
+            f'order.balance = "set-exact" is impossible: {order.repetitions} repetitions cannot be shared equally '
+            f"among {order.sets} sets; nearest: repetitions = {_multiples(order.repetitions, order.sets)}, or "
+            'balance = "set" for as even as it gets'
         )
 
 
@@ -300,7 +307,7 @@ def _shared(design: DesignConfig, contents: list[_Content], streams: _Streams) -
     if design.order.balance == "session" or sets == 1:
         mixed = streams.of("session-trials").shuffled(contents)
         return [mixed[place * size : (place + 1) * size] for place in range(sets)]
-    alike: dict[tuple[Cell, bool], list[_Content]] = {}
+    alike: dict[tuple[Condition, bool], list[_Content]] = {}
     for content in contents:
         alike.setdefault((_balanced(content, design), content.catch), []).append(content)
     # what divides goes to every set; what is left over is dealt round in a random order, so sizes stay equal
@@ -318,7 +325,7 @@ def _shared(design: DesignConfig, contents: list[_Content], streams: _Streams) -
     return dealt
 
 
-def _balanced(content: _Content, design: DesignConfig) -> Cell:
+def _balanced(content: _Content, design: DesignConfig) -> Condition:
     """What is balanced of a trial: its cell, or its pair."""
     pair = tuple(sorted(map(shown_level, content.intervals))) if design.trial.kind == "pair" else ()
     return (*content.levels, *(("pair", one) for one in pair))
@@ -326,7 +333,7 @@ def _balanced(content: _Content, design: DesignConfig) -> Cell:
 
 def _by_square(design: DesignConfig, contents: list[_Content], row: int | None, sets: int) -> list[list[_Content]]:
     """The cells in a row of the square, or as they stand, as often as they are repeated."""
-    alike: dict[Cell, list[_Content]] = {}
+    alike: dict[Condition, list[_Content]] = {}
     for content in contents:
         alike.setdefault(_balanced(content, design), []).append(content)
     order = list(alike)
@@ -397,7 +404,9 @@ def _in_limits(part: list[_Content], run: _Run, stream: Stream) -> list[_Content
     done: list[_Content] = []
     while len(done) < len(part):
         total = len(part) - len(done) - 1
-        allowed = [one for one, count in left.items() if count and run.takes(one) and _leaves_room(one, run, levels, total)]
+        allowed = [
+            one for one, count in left.items() if count and run.takes(one) and _leaves_room(one, run, levels, total)
+        ]
         if not allowed:
             return None
         chosen = _drawn(allowed, left, stream)
@@ -428,6 +437,6 @@ def _leaves_room(content: _Content, run: _Run, levels: Mapping[str, Counter[Leve
     return after.fits(left, total)
 
 
-def blocks(design: DesignConfig, given: Cell) -> Iterator[tuple[Cell, Cell]]:
+def blocks(design: DesignConfig, given: Condition) -> Iterator[tuple[Condition, Condition]]:
     """Each session's levels with each of its sets' levels, in the order of the file: what `check` lists."""
     yield from product(_sessions(design, given), cells(design, design.order.set, given))

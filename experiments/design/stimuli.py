@@ -10,33 +10,33 @@ from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, fields, replace
 from typing import cast
 
-from device import LimitError
 from device.methods import Method, drive_of, rendering_of
 from device.parameters import GunParameters, VibrationParameters
-from device.words import Direction, Drive
+from device.words import Direction, Drive, LimitError
 from experiments.config.door import ConfigError
 from experiments.config.setup import GunConfig
+from experiments.design.config import DesignConfig
 from experiments.design.language import (
-    DIRECTION,
-    INSTRUCTION,
-    METHOD,
+    DIRECTION_FACTOR,
+    EMPTY,
+    INSTRUCTION_FACTOR,
+    METHOD_FACTOR,
     TRAIN_INTERVAL,
-    DesignConfig,
     Level,
     shown_level,
 )
-from experiments.design.planning import Cell, DesignTrial, cells, groups
+from experiments.design.planning import Condition, DesignTrial, cells, groups
 
 DRIVEN = ("voltage_V", "pulse_s")
 """What the command of a shot carries."""
 _GUN_NUMBERS = tuple(
     field.name for field in fields(GunParameters) if isinstance(field.default, float) or field.default is None
 )
-_NOT_OF_A_SHOT = (METHOD, DIRECTION, INSTRUCTION, TRAIN_INTERVAL)
+_NOT_OF_A_SHOT = (METHOD_FACTOR, DIRECTION_FACTOR, INSTRUCTION_FACTOR, TRAIN_INTERVAL)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Stimulus:
+class IntervalStimulus:
     """One interval's shot: what the gun is told, and what the model takes the gun to be."""
 
     method: str
@@ -46,10 +46,10 @@ class Stimulus:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class CellLimits:
+class ConditionLimits:
     """What a shot of a cell asks of the gun; `status` is the model's: `home`, `no-break-away`, or `rendered`."""
 
-    levels: Cell
+    levels: Condition
     drive: Drive
     status: str
     settle_s: float
@@ -66,7 +66,7 @@ def settings(design: DesignConfig, trial: DesignTrial) -> tuple[tuple[str, str],
     return tuple((name, design.factors[name].label(level)) for name, level in trial.levels if name in names)
 
 
-def intervals(design: DesignConfig, gun: GunConfig, trial: DesignTrial) -> tuple[Stimulus | None, ...]:
+def intervals(design: DesignConfig, gun: GunConfig, trial: DesignTrial) -> tuple[IntervalStimulus | None, ...]:
     """The stimulus of each interval; `None` for one that is empty. `ConfigError` as `stimulus`."""
     if trial.catch:
         return (None,)
@@ -74,19 +74,19 @@ def intervals(design: DesignConfig, gun: GunConfig, trial: DesignTrial) -> tuple
         return (stimulus(design, gun, trial.levels),)
     compared = design.trial.compare or ""
     return tuple(
-        None if level == "none" else stimulus(design, gun, _with(trial.levels, compared, level))
+        None if level == EMPTY else stimulus(design, gun, _with(trial.levels, compared, level))
         for level in trial.intervals
     )
 
 
-def _with(levels: Cell, name: str, level: Level) -> Cell:
+def _with(levels: Condition, name: str, level: Level) -> Condition:
     return (*(pair for pair in levels if pair[0] != name), (name, level))
 
 
-def stimulus(design: DesignConfig, gun: GunConfig, levels: Cell) -> Stimulus:
+def stimulus(design: DesignConfig, gun: GunConfig, levels: Condition) -> IntervalStimulus:
     """The shot of a cell. `ConfigError`: the gun has no such method or number, or a number is out of range."""
     held = dict(levels)
-    method = str(held[METHOD])
+    method = str(held[METHOD_FACTOR])
     if method not in gun.methods:
         raise ConfigError(f"factors.method: the gun has no method {method!r}; it has {', '.join(gun.methods)}")
     parameters = _changed(gun.rendering(method), _numbers(design, held), method)
@@ -94,9 +94,9 @@ def stimulus(design: DesignConfig, gun: GunConfig, levels: Cell) -> Stimulus:
         drive = drive_of(parameters)
     except LimitError as error:
         raise ConfigError(f"{_place(levels)}: {error}") from error
-    return Stimulus(
+    return IntervalStimulus(
         method=method,
-        direction=cast("Direction", held.get(DIRECTION, "forward")),
+        direction=cast("Direction", held.get(DIRECTION_FACTOR, "forward")),
         parameters=parameters,
         drive=drive,
     )
@@ -120,7 +120,9 @@ def _numbers(design: DesignConfig, held: Mapping[str, Level]) -> dict[str, tuple
                     f"{', '.join(_GUN_NUMBERS)}"
                 )
             if key in found:
-                raise ConfigError(f"factors.{name} sets {key}, which factors.{found[key][0]} sets as well; keep one of them")
+                raise ConfigError(
+                    f"factors.{name} sets {key}, which factors.{found[key][0]} sets as well; keep one of them"
+                )
             found[key] = (name, value)
     return found
 
@@ -137,7 +139,7 @@ def _changed(parameters: Method, numbers: Mapping[str, tuple[str, float]], metho
         factor = next(iter(numbers.values()))[0]
         raise ConfigError(
             f"factors.{factor}: method {method!r} is a vibration, which has no {next(iter(numbers))}; nest the factor: "
-            "within = \"method\""
+            'within = "method"'
         )
     for key, (name, value) in numbers.items():
         try:
@@ -147,7 +149,7 @@ def _changed(parameters: Method, numbers: Mapping[str, tuple[str, float]], metho
     return parameters
 
 
-def limits(design: DesignConfig, gun: GunConfig) -> list[CellLimits]:
+def limits(design: DesignConfig, gun: GunConfig) -> list[ConditionLimits]:
     """What every cell asks of the gun. `ConfigError`: one is beyond a limit, never comes home, or never moves.
 
     A cell whose magnet never moves is let through by a design that says `below_break_away = true`.
@@ -155,18 +157,22 @@ def limits(design: DesignConfig, gun: GunConfig) -> list[CellLimits]:
     return [_limits_of(design, gun, levels) for levels in dict.fromkeys(_shot_cells(design))]
 
 
-def _shot_cells(design: DesignConfig) -> Iterator[Cell]:
-    names = [name for name in design.factors if name not in design.between and name not in (DIRECTION, INSTRUCTION)]
+def _shot_cells(design: DesignConfig) -> Iterator[Condition]:
+    names = [
+        name
+        for name in design.factors
+        if name not in design.between and name not in (DIRECTION_FACTOR, INSTRUCTION_FACTOR)
+    ]
     for given in groups(design):
         for cell in cells(design, names, given):
             levels = (*given, *cell)
             yield levels
             standard = design.trial.standard
-            if standard is not None and standard != "none" and design.trial.compare is not None:
+            if standard is not None and standard != EMPTY and design.trial.compare is not None:
                 yield _with(levels, design.trial.compare, standard)
 
 
-def _limits_of(design: DesignConfig, gun: GunConfig, levels: Cell) -> CellLimits:
+def _limits_of(design: DesignConfig, gun: GunConfig, levels: Condition) -> ConditionLimits:
     shot = stimulus(design, gun, levels)
     try:
         rendering = rendering_of(shot.parameters)
@@ -177,8 +183,8 @@ def _limits_of(design: DesignConfig, gun: GunConfig, levels: Cell) -> CellLimits
             f"{_place(levels)}: no shot of it ever moves the magnet, by the model; raise the voltage or the pulse, or "
             "say `below_break_away = true` if that is what you study"
         )
-    return CellLimits(levels=levels, drive=shot.drive, status=rendering.motion, settle_s=rendering.settle_s)
+    return ConditionLimits(levels=levels, drive=shot.drive, status=rendering.motion, settle_s=rendering.settle_s)
 
 
-def _place(levels: Cell) -> str:
+def _place(levels: Condition) -> str:
     return ", ".join(f"{name} = {shown_level(level)}" for name, level in levels)
