@@ -95,13 +95,22 @@ def test_a_group_keeps_its_level():
     assert {next(iter(plan.trials)).level("grip") for _, plan, _ in people("grip", 2)} == {"one hand", "two hands"}
 
 
+def answered_by(design, laws, plan):
+    person = DesignParticipant(design, checked_table(SyntheticAnswers, {"questions": laws}, "laws.toml"), plan)
+    return [person.answer(next(iter(design.questions)), trial) for trial in plan.trials]
+
+
 @pytest.mark.parametrize(
     ("name", "laws", "said"),
     [
         ("pairs", {"rather": {"law": "rates", "share": {"all": 0.5}}}, "nothing is right for rather"),
         ("pairs", {"rather": {"law": "worth", "factor": "method", "worth": {"soft": 1.0}}}, "no value for vibration"),
         ("direction", {"response": {"law": "guesses"}}, "guesses"),
-        ("direction", {"response": {"law": "rates", "by": ["method"], "share": {"vibration": 0.5}}}, "for 'asymmetric-"),
+        (
+            "direction",
+            {"response": {"law": "rates", "by": ["method"], "share": {"vibration": 0.5}}},
+            "for 'asymmetric-",
+        ),
         ("direction", {"response": {"law": "rates", "share": {"all": 1.0}}}, "less than 1"),
         ("direction", {"answer": {"law": "rates", "share": {"all": 0.5}}}, "questions.response is missing"),
         (
@@ -116,7 +125,5 @@ def test_laws_that_do_not_fit_are_refused_by_name(name, laws, said):
     design, _, _ = loaded(name)
     plan = plan_of(design, "P01", 1)
     with pytest.raises(ConfigError) as raised:
-        person = DesignParticipant(design, checked_table(SyntheticAnswers, {"questions": laws}, "laws.toml"), plan)
-        for trial in plan.trials:
-            person.answer(next(iter(design.questions)), trial)
+        answered_by(design, laws, plan)
     assert said in str(raised.value)

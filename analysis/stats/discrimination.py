@@ -37,17 +37,17 @@ _AREA = 4.5 * _WEIGHTS * np.exp(-(_Z**2) / 2.0) / np.sqrt(2.0 * np.pi)
 
 
 def _two_interval(d: FloatArray) -> FloatArray:
-    return special.ndtr(d / np.sqrt(2.0))
+    return np.asarray(special.ndtr(d / np.sqrt(2.0)))
 
 
 def _abx(d: FloatArray) -> FloatArray:
     one, other = special.ndtr(d / np.sqrt(2.0)), special.ndtr(d / np.sqrt(6.0))
-    return one * other + (1.0 - one) * (1.0 - other)
+    return np.asarray(one * other + (1.0 - one) * (1.0 - other))
 
 
 def _oddity(d: FloatArray) -> FloatArray:
     shift, out = d[..., None] * np.sqrt(2.0 / 3.0), -_Z * np.sqrt(3.0)
-    return 2.0 * ((special.ndtr(out + shift) + special.ndtr(out - shift)) @ _AREA)
+    return np.asarray(2.0 * ((special.ndtr(out + shift) + special.ndtr(out - shift)) @ _AREA))
 
 
 _RIGHT: Mapping[Task, Callable[[FloatArray], FloatArray]] = {
@@ -63,7 +63,7 @@ def share_right(d_prime: ArrayLike, task: Task) -> Values:
     >>> round(float(share_right(1.0, "two-interval")), 4), round(float(share_right(0.0, "oddity")), 4)
     (0.7602, 0.3333)
     """
-    d = numbers("d_prime", d_prime)
+    d = numbers(d_prime, "d_prime")
     if np.any(d < 0):
         raise ValueError("d_prime must be at least 0")
     return float_or_array(_RIGHT[task](np.asarray(d, dtype=float)))
@@ -95,7 +95,7 @@ def discrimination(right: int, trials: int, task: Task) -> Discrimination:
         return Discrimination(d_prime=0.0, se=float("nan"), corrected=corrected)
     found = elementwise.find_root(lambda d: _RIGHT[task](np.asarray(d)) - share, (0.0, MOST_D))
     d = float(found.x)
-    step = 1e-4
-    slope = float((_RIGHT[task](np.asarray(d + step)) - _RIGHT[task](np.asarray(max(d - step, 0.0)))) / (d + step - max(d - step, 0.0)))
+    low, high = max(d - 1e-4, 0.0), d + 1e-4
+    slope = float(np.diff(_RIGHT[task](np.array([low, high])))[0]) / (high - low)
     se = float(np.sqrt(share * (1.0 - share) / trials) / slope) if slope > 0 else float("nan")
     return Discrimination(d_prime=d, se=se, corrected=corrected)

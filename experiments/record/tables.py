@@ -10,11 +10,11 @@ import csv
 import io
 from collections.abc import Iterable
 from dataclasses import dataclass
-from typing import Literal
+from typing import Literal, get_args
 
 from experiments.session import remarks
 from experiments.session.history import TrialHistory, is_attempt
-from experiments.session.steps import Answered, Described, Failed, Fired, Interrupted, Outcome, Presented, Rated
+from experiments.session.steps import Answered, Failed, Fired, Interrupted, Presented, What
 
 ColumnType = Literal["text", "level", "integer", "number", "flag"]
 
@@ -177,23 +177,15 @@ def _flags(events: TrialHistory) -> list[str]:
         "interrupted": any(one.presented and one.cause == "break-off" for one in events.all(Interrupted)),
         "paused": any(one.presented and one.cause == "pause" for one in events.all(Interrupted)),
         "repeated": events.repeated,
-        "corrected": any(_is_corrected(events, given) for given in _CORRECTIONS),
+        "corrected": any(_is_corrected(events.entered(what)) for what in get_args(What)),
     }
     own = [remark.flag for remark in events.all(remarks.Flagged)]
     return list(dict.fromkeys([flag for flag, there in found.items() if there] + own))
 
 
-_CORRECTIONS: dict[type[Outcome], type[remarks.Remark]] = {
-    Answered: remarks.AnswerCorrected,
-    Rated: remarks.RatingCorrected,
-    Described: remarks.DescriptionCorrected,
-}
-
-
-def _is_corrected(events: TrialHistory, given: type[Outcome]) -> bool:
+def _is_corrected(entered: list[Answered | remarks.EntryCorrected]) -> bool:
     """Whether what counts is a correction: what was entered anew, because its trial was presented again, is none."""
-    both = [word for word in events.words if isinstance(word, (given, _CORRECTIONS[given]))]
-    return bool(both) and not isinstance(both[-1], given)
+    return bool(entered) and isinstance(entered[-1], remarks.EntryCorrected)
 
 
 def table_bytes(experiment: str, rows: Iterable[Row]) -> bytes:

@@ -36,7 +36,7 @@ class LogNormalTimes(Model):
 class RatesLaw(Model):
     """Right answers at a rate by the levels of the factors `by`, as `share`'s keys name them, joined by `/`.
 
-    Probit of a person's rate: S z(share) + ability, S = sqrt(1 + ability_sd^2), so that the mean over people is `share`.
+    Probit of a person's rate: S z(share) + ability, S = sqrt(1 + ability_sd^2), so `share` is the mean over people.
     """
 
     law: Literal["rates"]
@@ -98,9 +98,7 @@ class WordsLaw(Model):
     texts: Annotated[tuple[Text, ...], Field(min_length=1)]
 
 
-Law = Annotated[
-    RatesLaw | PsychometricLaw | RatingsLaw | PowerLaw | WorthLaw | WordsLaw, Field(discriminator="law")
-]
+Law = Annotated[RatesLaw | PsychometricLaw | RatingsLaw | PowerLaw | WorthLaw | WordsLaw, Field(discriminator="law")]
 
 
 class SyntheticAnswers(Model):
@@ -138,19 +136,19 @@ _LAWS_OF: Mapping[str, tuple[str, ...]] = {
 
 
 def _check_law(design: DesignConfig, name: str, question: QuestionConfig, law: Law) -> None:
-    known = _LAWS_OF[question.kind]
+    known, where = _LAWS_OF[question.kind], f"questions.{name}"
     if law.law not in known:
-        raise ConfigError(f"questions.{name}.law = {law.law!r}: a question of kind {question.kind!r} has {', '.join(known)}")
+        raise ConfigError(f"{where}.law = {law.law!r}: a question of kind {question.kind!r} has {', '.join(known)}")
     if law.law in {"rates", "psychometric"} and question.correct is None:
-        raise ConfigError(f"questions.{name}.law = {law.law!r}: nothing is right for {name}; give the question `correct`")
-    names = law.by if isinstance(law, RatesLaw | RatingsLaw) else [law.factor] if not isinstance(law, WordsLaw) else []
+        raise ConfigError(f"{where}.law = {law.law!r}: nothing is right for {name}; give the question `correct`")
+    names = law.by if isinstance(law, RatesLaw | RatingsLaw) else () if isinstance(law, WordsLaw) else (law.factor,)
     for factor in names:
         if factor not in design.factors:
-            raise ConfigError(f"questions.{name} names {factor!r}, which is no factor; they are {', '.join(design.factors)}")
+            raise ConfigError(f"{where} names {factor!r}, which is no factor; they are {', '.join(design.factors)}")
     if isinstance(law, WorthLaw):
         missing = [one for one in map(shown_level, design.factors[law.factor].all_levels) if one not in law.worth]
         if missing:
-            raise ConfigError(f"questions.{name}.worth has no value for {', '.join(missing)}; give one for each level")
+            raise ConfigError(f"{where}.worth has no value for {', '.join(missing)}; give one for each level")
 
 
 class DesignParticipant:
