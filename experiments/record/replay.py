@@ -62,7 +62,8 @@ def history(contents: Contents) -> History:
 def _check_value(contents: Contents, line: Record, what: steps.What | None, value: steps.Value) -> None:
     """`JournalError` for an answer that is none to what was asked."""
     if what is None or not fits(what, value):
-        raise JournalError(f"{_place(contents, line)}: value {value!r} is no {what or 'answer'}; the record was changed")
+        place, asked = _place(contents, line), what or "answer"
+        raise JournalError(f"{place}: value {value!r} is no {asked}; the record was changed")
 
 
 def outcomes(history: History) -> list[tuple[steps.Step, steps.Outcome]]:
