@@ -9,6 +9,7 @@ from tests.designs import QUESTION, design
 
 ONE = {"method": {"levels": ["a"]}}
 VOLTS = {"method": {"levels": ["a"]}, "voltage_V": {"levels": [12.0, 20.0]}}
+NESTED = ONE | {"voltage_V": {"levels": {"a": [1.0]}, "within": "method"}}
 INTERVALS = {"kind": "two-interval", "compare": "voltage_V", "standard": 16.0}
 WAYS = {"levels": ["forward", "backward"]}
 
@@ -57,6 +58,23 @@ def asked(**keys):
         ({"order": {"session": ["damper"]}}, "order.session names 'damper', which is no factor"),
         ({"order": {"session": ["method"], "set": ["method"]}}, "name it in `session` only"),
         ({"order": {"longest_run": {"damper": 2}}}, "order.longest_run names 'damper'"),
+        ({"order": {"sessions": "williams", "trials": "williams"}}, "one row of one square"),
+        ({"order": {"trials": "fixed", "longest_run": {"method": 2}}}, "has its own order"),
+        ({"order": {"trials": "fixed"}, "trial": {"catch": 2}}, "would be known"),
+        (
+            {
+                "factors": ONE | {"voltage_V": {"levels": {"a": [1.0]}, "within": "method"}},
+                "order": {"set": ["method"]},
+            },
+            "voltage_V is nested in method",
+        ),
+        (
+            {
+                "factors": ONE | {"voltage_V": {"levels": {"a": [1.0]}, "within": "method"}},
+                "order": {"set": ["voltage_V"]},
+            },
+            "voltage_V is nested in method",
+        ),
         ({"order": {"repetitions": 10**9}}, "order.repetitions = 1000000000"),
         ({"trial": {"kind": "two-interval"}}, "needs `compare`"),
         ({"trial": {"kind": "single", "compare": "method"}}, "compares nothing"),

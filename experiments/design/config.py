@@ -78,6 +78,7 @@ def _problems(design: DesignConfig) -> Iterator[str]:
     """What two tables of a design do not agree on, in words."""
     yield from _name_problems(design)
     yield from _factor_problems(design)
+    yield from _blocking_problems(design)
     yield from _trial_problems(design)
     for name, question in design.questions.items():
         yield from (f"questions.{name}: {problem}" for problem in _right_answer_problems(design, question))
@@ -192,8 +193,31 @@ def _nesting_problems(design: DesignConfig, factor: FactorConfig) -> Iterator[st
         yield f"levels must have one list for each level of {factor.within}; check {', '.join(sorted(off))}"
 
 
+def _blocking_problems(design: DesignConfig) -> Iterator[str]:
+    """A nested factor can be constant only where the one that it is nested in is constant as well."""
+    blocks = ("order.session", "order.set", "the trials")
+    for name, factor in design.factors.items():
+        if factor.within is None or factor.within not in design.factors or factor.within in design.between:
+            continue
+        inner, outer = _block(design, name), _block(design, factor.within)
+        if inner < outer or (outer == 1 and inner > outer):
+            where = f"{name} varies in {blocks[inner]} and {factor.within} in {blocks[outer]}"
+            yield (
+                f"factors.{name} is nested in {factor.within}, but {where}; block both in order.session, both in "
+                f"order.set, or {factor.within} alone in order.session"
+            )
+
+
+def _block(design: DesignConfig, name: str) -> int:
+    """In what a factor is constant: 0 a session, 1 a set, 2 a trial."""
+    return 0 if name in design.order.session else 1 if name in design.order.set else 2
+
+
 def _trial_problems(design: DesignConfig) -> Iterator[str]:
     trial = design.trial
+    if trial.catch and design.order.trials != "random":
+        shown = f"catch trials in an order.trials of {design.order.trials!r} would be known; use random"
+        yield f"trial.catch = {trial.catch}: {shown}"
     if TRAIN_INTERVAL in design.factors and trial.kind != "train":
         yield f"factors.{TRAIN_INTERVAL} is the interval of a train, but trial.kind is {trial.kind!r}"
     if trial.compare is not None and trial.compare in design.factors:

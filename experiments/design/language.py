@@ -145,6 +145,18 @@ class OrderConfig(Model):
             )
         return self
 
+    @model_validator(mode="after")
+    def _one_thing_orders(self) -> Self:
+        squares = {"latin-square", "williams"}
+        if self.sessions in squares and self.trials in squares:
+            raise ValueError(
+                f"sessions = {self.sessions!r} and trials = {self.trials!r}: a participant has one row of one square; "
+                'make one of them "random" or "fixed"'
+            )
+        if self.longest_run and self.trials != "random":
+            raise ValueError(f"longest_run: trials = {self.trials!r} has its own order; remove one of them")
+        return self
+
 
 EMPTY = "none"
 """The standard of a comparison with nothing: that interval has no stimulus."""
