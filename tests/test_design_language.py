@@ -2,9 +2,13 @@
 
 from __future__ import annotations
 
+import re
+from pathlib import Path
+
 import pytest
 
-from experiments.config.door import ConfigError
+from experiments.config.door import ConfigError, tables
+from experiments.design.planning import plan_of
 from tests.designs import QUESTION, design
 
 ONE = {"method": {"levels": ["a"]}}
@@ -141,3 +145,12 @@ def test_it_is_refused_in_words(tables, said):
         design(**tables)
     assert said in str(raised.value)
     assert str(raised.value).startswith("design.toml: ")
+
+
+def test_the_designs_on_the_page_of_the_language_are_designs():
+    page = Path(__file__).parent.parent / "docs" / "design-language.md"
+    shown = re.findall(r"```toml\n(.*?)```", page.read_text(encoding="utf-8"), re.DOTALL)
+    assert len(shown) == 3
+    for text in shown:
+        config = design(**tables(text, page))
+        assert plan_of(config, "P01", 1).trials
