@@ -24,7 +24,7 @@ from experiments.record.journal import Contents, Journal, JournalError, begun, h
 from experiments.record.provenance import provenance
 from experiments.record.replay import RunPosition
 from experiments.runner import Desk, carry_out, gun_name
-from experiments.session.steps import Answered, Rated, Session
+from experiments.session.steps import Answered, Describe, Session
 from experiments.study import folders, register
 from experiments.study.folders import Place, PlaceError
 from experiments.study.register import Register
@@ -290,4 +290,5 @@ def _to_the_end(session: Session, desk: Desk, position: RunPosition, place: Plac
 def _write_table(place: Place, contents: Contents) -> int:
     """Write the table from the journal as it was read back from the disk; the answers in it."""
     storage.write_whole(place.table, table(contents))
-    return sum(isinstance(word, Answered | Rated) for _, word in replay.history(contents))
+    told = replay.history(contents)
+    return sum(isinstance(word, Answered) and not isinstance(step, Describe) for step, word in told)

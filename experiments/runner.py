@@ -207,9 +207,9 @@ class _Runner:
         own = drawn_s is not None or isinstance(answer, events.ParticipantKey)
         paused = self._live.moment.paused_between(self._onset_s, self._onset_s + time_s)
         return steps.Answered(
-            response=answer.response,
+            value=answer.response,
+            by=answer.by,
             response_time_s=time_s,
-            response_source=answer.by,
             response_time_valid=own and not paused,
             key_time_s=key_time_s if drawn_s is not None else None,
         )
@@ -233,21 +233,21 @@ class _Runner:
     def _rested(self, start_s: float, reason: str) -> steps.Rested:
         return steps.Rested(rested_s=round(self._live.clock.now() - start_s, 6), cut_reason=reason)
 
-    def _rate(self, step: steps.Rate) -> steps.Rated | steps.Repeated:
+    def _rate(self, step: steps.Rate) -> steps.Answered | steps.Repeated:
         self._live.enter(State.RATING, step)
         match self._live.wait():
             case events.Rating(rating=rating, by=by) | events.ParticipantRated(rating=rating, by=by):
-                return steps.Rated(rating=None if rating is None else steps.on_scale(rating, step), rating_by=by)
+                return steps.Answered(value=None if rating is None else steps.on_scale(rating, step), by=by)
             case events.Repeat(reason=reason):
                 return self._repeat(reason)
             case other:
                 raise Unforeseen(other)
 
-    def _describe(self, step: steps.Describe) -> steps.Described:
+    def _describe(self, step: steps.Describe) -> steps.Answered:
         self._live.enter(State.DESCRIBING, step)
         match self._live.wait():
-            case events.Description(text=text) | events.ParticipantDescribed(text=text):
-                return steps.Described(comment=text)
+            case events.Description(text=text, by=by) | events.ParticipantDescribed(text=text, by=by):
+                return steps.Answered(value=text, by=by)
             case other:
                 raise Unforeseen(other)
 

@@ -34,7 +34,7 @@ from experiments.screens.console.keys import Name, Presses
 from experiments.screens.console.view import About, Ended, GunSeen, Seen
 from experiments.session import events
 from experiments.session.events import Press
-from experiments.session.remarks import AnswerCorrected, Remark
+from experiments.session.remarks import EntryCorrected, Remark
 from experiments.session.states import Position, State
 from experiments.session.steps import Answered, FireShot, Outcome, Step
 from experiments.study.folders import Place, place
@@ -669,10 +669,10 @@ def raw_answers(contents: Contents) -> list[tuple[str, Trial, Direction]]:
     """Every answer and correction in the order of the journal."""
     found = []
     for step, word in history(contents):
-        if isinstance(word, AnswerCorrected):
-            found.append((word.kind, word.trial, word.response))
+        if isinstance(word, EntryCorrected):
+            found.append((word.kind, word.trial, word.value))
         elif isinstance(word, Answered):
-            found.append((word.kind, step.trial, word.response))
+            found.append((word.kind, step.trial, word.value))
     return found
 
 

@@ -236,7 +236,7 @@ def carry_out(cell: Cell, action: Action, screen: AtConsole) -> Happened:
 
 
 def _answers(journal: Path) -> int:
-    kinds = ("answered", "rated", "described", "answer-corrected", "rating-corrected", "description-corrected")
+    kinds = ("answered", "corrected")
     return sum(record.get("body", {}).get("kind") in kinds for record in records(journal))
 
 

@@ -44,4 +44,4 @@ def rows(folder: Path, stem: str, kind: str) -> list[dict[str, str]]:
 
 
 def answers(journal: Path) -> list[str]:
-    return [outcome.response for _, outcome in history(read_journal(journal)) if isinstance(outcome, Answered)]
+    return [outcome.value for _, outcome in history(read_journal(journal)) if isinstance(outcome, Answered)]

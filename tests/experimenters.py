@@ -23,9 +23,9 @@ from experiments.screens.console.keys import KEY_COMMANDS, Name
 from experiments.session import events
 from experiments.session.events import ACTS
 from experiments.session.history import is_attempt
-from experiments.session.remarks import AnswerCorrected, DescriptionCorrected, RatingCorrected, Refused
+from experiments.session.remarks import EntryCorrected, Refused
 from experiments.session.states import ARMED, State
-from experiments.session.steps import Answered, Described, Rated
+from experiments.session.steps import Answered, asked_for
 from tests.at_controls import GUARD_S, Offered, Sitting, WatchedGun, gated, kept, remarks, tells_correctness
 
 KEYS = (*"MFBPUERGNYLST7", "Space", "Enter", "Esc", "Tab", "F1", "F2")
@@ -400,17 +400,10 @@ def written(contents: Contents) -> Iterator[tuple[str, Trial, Any]]:
     for step, word in history(contents):
         match word:
             case Answered():
-                yield "answered", step.trial, word.response
-            case Rated():
-                yield "rated", step.trial, word.rating
-            case Described():
-                yield "described", step.trial, word.comment
-            case AnswerCorrected():
-                yield "corrected", word.trial, word.response
-            case RatingCorrected():
-                yield "corrected", word.trial, word.rating
-            case DescriptionCorrected():
-                yield "corrected", word.trial, word.comment
+                kind = {"answer": "answered", "rating": "rated", "description": "described"}[asked_for(step)]
+                yield kind, step.trial, word.value
+            case EntryCorrected():
+                yield "corrected", word.trial, word.value
 
 
 def refused(offered: list[Offered]) -> list[tuple[str, str]]:

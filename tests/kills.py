@@ -22,7 +22,7 @@ def words(configs: Path, *more: object) -> list[object]:
 
 
 def answers(contents: Contents) -> str:
-    return "".join(outcome.response[0] for _, outcome in history(contents) if isinstance(outcome, Answered))
+    return "".join(outcome.value[0] for _, outcome in history(contents) if isinstance(outcome, Answered))
 
 
 def in_small_disk(script: str, folder: Path) -> subprocess.CompletedProcess[str]:

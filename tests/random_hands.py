@@ -251,7 +251,7 @@ def _check_guard(written: list[dict[str, Any]]) -> None:
     """Nothing of the hand's was taken before its question had been painted for the guard's time."""
     for record in written:
         body = record.get("body", {})
-        if record["kind"] == "outcome" and body["kind"] in ("prepared", "answered", "rated", "described"):
+        if record["kind"] == "outcome" and body["kind"] in ("prepared", "answered"):
             assert record["monotonic_s"] - record["shown_s"] >= GUARD_S, record
         if body.get("kind") == "presented":
             assert body["exposure_s"] >= 1.0, record
@@ -270,7 +270,7 @@ def _check_rows(hands: RandomHands) -> None:
 
 def _check_said(hands: RandomHands, written: list[dict[str, Any]]) -> None:
     """Every answer that the window acknowledged is in the journal, with its value."""
-    found = {(body["trial"]["trial"], body["response"]) for body in _answers(written)}
+    found = {(body["trial"]["trial"], body["value"]) for body in _answers(written)}
     for text in hands.said:
         match = re.fullmatch(r"Saved\. Trial (\d+)(?: corrected to|:) (FORWARD|BACKWARD)\.", text)
         if match:
@@ -286,7 +286,7 @@ def _answers(written: list[dict[str, Any]]) -> Iterator[dict[str, Any]]:
             step = body
         elif body.get("kind") == "answered":
             yield {"trial": step["trial"], **body}
-        elif body.get("kind") == "answer-corrected":
+        elif body.get("kind") == "corrected":
             yield body
 
 

@@ -156,7 +156,7 @@ def test_undo_flag_note_pause_and_repeat_by_keys(quick_configs: Path, tmp_path: 
     assert (fourth["flags"], fourth["note"]) == ("door-slam", "a dog barked")
     assert first["flags"] == ""
     assert [body["kind"] for body in remarks(journal)] == [
-        "answer-corrected",
+        "corrected",
         "flagged",
         "noted",
         "paused",

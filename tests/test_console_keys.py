@@ -22,8 +22,9 @@ from experiments.screens.console.keys import (
     why_not,
 )
 from experiments.session import events
-from experiments.session.history import Entry, What
+from experiments.session.history import Entry
 from experiments.session.states import TABLE, No, Position, State
+from experiments.session.steps import What
 
 S = State
 LETTERS = sorted({command.key for command in KEY_COMMANDS if len(command.key) == 1})

@@ -120,7 +120,7 @@ def rated_and_half_described(screen: AtConsole, journal: Path, trial: int) -> No
     before = len(screen.watch.looks())
     click(screen, 0.5, BUTTON_Y)
     screen.participant_shows("DescriptionPage")
-    assert records(journal)[-2]["body"]["kind"] == "rated"
+    assert isinstance(records(journal)[-2]["body"]["value"], float)
     look = screen.at("describing")
     assert look.says("Awaited: the participant's description")
     assert not any(look.active for look in screen.watch.looks()[before:])
@@ -158,8 +158,10 @@ def test_a_pause_and_f12_in_a_description_keep_the_rating_and_the_words_so_far(
         code, said = screen.close()
     assert code == 130, said
     assert remarks(journal, "halted") == [{"by": "participant", "kind": "halted"}]
-    rated = [record["body"]["rating"] for record in records(journal) if record.get("body", {}).get("kind") == "rated"]
-    assert rated == [0.0, 0.0]
+    answered = [
+        body["value"] for record in records(journal) if (body := record.get("body", {})).get("kind") == "answered"
+    ]
+    assert [value for value in answered if isinstance(value, float)] == [0.0, 0.0]
     first, second, _ = rows(tmp_path, PREFERENCE, "ratings")
     assert (first["rating"], first["rating_by"], first["comment"]) == ("0.0", "participant", "soft")
     assert second["rating"] == "0.0"

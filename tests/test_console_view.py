@@ -17,12 +17,12 @@ from experiments.design.plan import Plan, Trial
 from experiments.screens.console import progress, view, widgets
 from experiments.screens.console.progress import RunTiming, clock_text, end_text, remaining_s, trials_done
 from experiments.screens.console.view import About, Ended, GunSeen, ParticipantSeen, Seen
-from experiments.session.remarks import AnswerCorrected, Flagged, Noted
+from experiments.session.remarks import EntryCorrected, Flagged, Noted
 from experiments.session.states import Position, State
-from experiments.session.steps import Answered, Ask, Describe, Prepare, Present, Presented, Rate, Rated, Repeated, Rest
+from experiments.session.steps import Answered, Ask, Describe, Prepare, Present, Presented, Rate, Repeated, Rest
 from tests.at_controls import DIRECTION, PREFERENCE, sat_at, tells_correctness
 
-SAID = Answered(response="forward", response_time_s=1.0, response_source="experimenter", response_time_valid=False)
+SAID = Answered(value="forward", by="experimenter", response_time_s=1.0, response_time_valid=False)
 SHOWN = Presented(gun="simulated", onset_utc="", shots=3, exposure_s=2.0, ended_by="next")
 
 
@@ -182,7 +182,7 @@ def test_the_list_of_marks_has_those_of_this_set_and_an_answer_that_was_given_ag
     trials = plan_of(DIRECTION).trials
     first, other = trials[0], trials[-1]
     step, given = ask(first), (ask(first), SAID)
-    corrected = (None, AnswerCorrected(trial=first, response="backward"))
+    corrected = (None, EntryCorrected(trial=first, what="answer", value="backward"))
     spoiled = (Prepare(trial=trials[1], attempt=1, damper=""), Repeated(trial=first, reason="noise"))
     flagged, noted = (None, Flagged(trial=other, flag="late")), (None, Noted(trial=first, text="a dog"))
     here = Position(states=(State.ASKING,), step=step)
@@ -202,7 +202,7 @@ def test_the_list_of_marks_has_those_of_this_set_and_an_answer_that_was_given_ag
 
 def test_the_strip_shows_the_own_hands_times_of_the_session_alone() -> None:
     first, second, *_ = trials = plan_of(DIRECTION).trials
-    own = Answered(response="forward", response_time_s=0.7, response_source="participant", response_time_valid=True)
+    own = Answered(value="forward", by="participant", response_time_s=0.7, response_time_valid=True)
     told = ((ask(first), own), (ask(second), SAID))
     here = Position(states=(State.ASKING,), step=ask(trials[2]))
     assert progress.own_times_s(seen(DIRECTION, here, *told)) == [0.7]
@@ -320,14 +320,14 @@ def test_ratings_still_to_come_are_counted() -> None:
     day.told = [(present(trial), SHOWN) for trial in day.plan.trials]
     assert day.left_s == pytest.approx(len(day.plan.trials) * PREFERENCE.config.rating_s)
     assert day.left_s > 0
-    day.told.append((rate(day.plan.trials[0]), Rated(rating=5.0, rating_by="experimenter")))
+    day.told.append((rate(day.plan.trials[0]), Answered(value=5.0, by="experimenter")))
     assert day.left_s == pytest.approx((len(day.plan.trials) - 1) * PREFERENCE.config.rating_s)
 
 
 def test_how_far_the_run_is_counts_what_was_felt_and_what_was_rated_where_all_is_rated_last() -> None:
     first, second, *_ = plan_of(PREFERENCE).trials
     felt = [(present(trial), SHOWN) for trial in (first, second)]
-    told = (*felt, (rate(first), Rated(rating=None, rating_by="experimenter")))
+    told = (*felt, (rate(first), Answered(value=None, by="experimenter")))
     assert counted(seen(PREFERENCE, Position(step=rate(first)), *told)) == [("felt", 2, 3), ("rated", 1, 3)]
     trials = plan_of(DIRECTION).trials
     answers = tuple((ask(trial), SAID) for trial in trials[:4])

@@ -50,9 +50,7 @@ FAILED, FELT, UNFELT = Failed(cause="no answer"), Interrupted(presented=True), I
 
 
 def answered(trial: Trial) -> Answered:
-    return Answered(
-        response=trial.direction, response_time_s=1.0, response_source="synthetic", response_time_valid=True
-    )
+    return Answered(value=trial.direction, by="synthetic", response_time_s=1.0, response_time_valid=True)
 
 
 def fitting(step: Step) -> Outcome:
@@ -293,9 +291,9 @@ def test_what_is_no_step_is_refused(body: object) -> None:
         None,
         {},
         {"kind": "answered"},
-        step_record(answered(PLAN.trials[0])) | {"response": "left"},
-        step_record(answered(PLAN.trials[0])) | {"response_source": "nobody"},
-        {"kind": "rated", "rating": "good", "rating_by": "participant"},
+        step_record(answered(PLAN.trials[0])) | {"value": ["left"]},
+        step_record(answered(PLAN.trials[0])) | {"by": "nobody"},
+        {"kind": "answered", "value": {}, "by": "participant"},
         step_record(STEPS[0]),
     ],
 )

@@ -117,7 +117,7 @@ TRIAL = Trial(session=1, method="vibration", set=1, trial=1, direction="forward"
 FIRED = Fired(
     gun="a", onset_utc="", requested_s=0.0, pulse_start_s=0.0, pulse_end_s=0.0, home_predicted_s=0.0, motion="home"
 )
-ANSWERED = Answered(response="forward", response_time_s=1.5, response_source="experimenter", response_time_valid=False)
+ANSWERED = Answered(value="forward", by="experimenter", response_time_s=1.5, response_time_valid=False)
 ASK = Ask(trial=TRIAL, attempt=1, question="", forward="", backward="")
 HEAD = Record(n=0, kind="run", utc="", monotonic_s=0.0, clock="real")
 

@@ -21,17 +21,26 @@ from experiments.session import remarks as words
 from experiments.session.events import Event, Press
 from experiments.session.history import Entry
 from experiments.session.remarks import (
-    AnswerCorrected,
+    EntryCorrected,
     Flagged,
     Halted,
     HaltReason,
     Noted,
     Paused,
-    RatingCorrected,
     Refused,
 )
 from experiments.session.states import EMERGENCY, State
-from experiments.session.steps import Failed, FireShot, Interrupted, Prepare, Presented, Rated, Repeated, trial_of
+from experiments.session.steps import (
+    Answered,
+    Failed,
+    FireShot,
+    Interrupted,
+    Prepare,
+    Presented,
+    Rate,
+    Repeated,
+    trial_of,
+)
 from experiments.study.folders import place
 from tests.at_controls import (
     DIRECTION,
@@ -313,7 +322,7 @@ def test_the_participants_own_rating_is_in_the_journal_before_the_description_is
         assert own_rating(sitting)
         assert sitting.state is S.DESCRIBING
         rated, asked = bodies(tmp_path)[-2:]
-        assert (rated["kind"], rated["rating"], rated["rating_by"]) == ("rated", 3.0, "participant")
+        assert (rated["kind"], rated["value"], rated["by"]) == ("answered", 3.0, "participant")
         assert asked["kind"] == "describe"
         assert own_words(sitting)
         assert sitting.state is S.RATING
@@ -350,7 +359,9 @@ def test_what_ends_the_run_before_the_description_keeps_the_rating_and_the_words
         sitting.settle()
         assert not own_words(sitting)
         contents = of_journal(sitting)
-    assert [word.rating for _, word in history(contents) if isinstance(word, Rated)] == [3.0]
+    assert [
+        word.value for step, word in history(contents) if isinstance(step, Rate) and isinstance(word, Answered)
+    ] == [3.0]
     assert isinstance(sitting.error, RunStopped)
     assert sitting.error.saved == 1
     with sat(PREFERENCE, tmp_path, resumed=True) as sitting:
@@ -418,7 +429,7 @@ def test_forward_corrected_to_forward_is_no_correction(tmp_path: Path) -> None:
         assert same == EventVerdict(taken=True, text="That is what stands there: nothing was corrected.")
         assert S.CORRECTING not in sitting.position.states
         contents, rows = to_the_end(sitting)
-    assert not remarks(contents, AnswerCorrected)
+    assert not remarks(contents, EntryCorrected)
     assert rows[0]["flags"] == ""
 
 
@@ -895,7 +906,9 @@ def test_a_presented_trial_can_be_repeated_until_its_rating_is_in(tmp_path: Path
         contents, rows = to_the_end(sitting)
     assert [row["attempts"] for row in rows] == ["2", "1", "1"]
     assert rows[0]["flags"] == "repeated"
-    assert [word.rating for _, word in history(contents) if isinstance(word, Rated)] == [5.0] * 3
+    assert [
+        word.value for step, word in history(contents) if isinstance(step, Rate) and isinstance(word, Answered)
+    ] == [5.0] * 3
 
 
 def test_a_rating_corrected_at_the_very_end_counts(tmp_path: Path) -> None:
@@ -906,7 +919,7 @@ def test_a_rating_corrected_at_the_very_end_counts(tmp_path: Path) -> None:
         assert by_hand(sitting, events.Correct(value=0.0))
         contents, rows = to_the_end(sitting)
     assert (rows[-1]["rating"], rows[-1]["flags"]) == ("0.0", "corrected")
-    assert len(remarks(contents, RatingCorrected)) == 1
+    assert len(remarks(contents, EntryCorrected)) == 1
 
 
 def test_how_often_a_trial_was_presented_is_told_as_the_table_counts_it(tmp_path: Path) -> None:

@@ -7,10 +7,10 @@ from hypothesis import strategies as st
 from experiments.load import load_setup
 from experiments.preference.session import make_plan, session
 from experiments.session.steps import (
+    Answered,
     Close,
     Closed,
     Describe,
-    Described,
     Failed,
     Interrupted,
     Outcome,
@@ -19,7 +19,6 @@ from experiments.session.steps import (
     Present,
     Presented,
     Rate,
-    Rated,
     Repeated,
     Step,
     step_record,
@@ -43,11 +42,11 @@ def fitting(step: Step) -> Outcome:
                 gun="simulated", onset_utc="2024-01-01T00:00:00.000000Z", shots=3, exposure_s=2.5, ended_by="next"
             )
         case Rate():
-            return Rated(rating=0.0, rating_by="participant")
+            return Answered(value=0.0, by="participant")
         case Close():
             return Closed()
         case _:
-            return Described(comment="")
+            return Answered(value="", by="experimenter")
 
 
 def driven(troubles: dict[int, Outcome] | None = None) -> list[Step]:
@@ -122,7 +121,7 @@ def test_a_question_that_was_interrupted_is_asked_again_without_a_new_stimulus(n
 
 @pytest.mark.parametrize("rating", [0.0, None])
 def test_0_is_a_rating_and_none_is_no_answer_and_both_are_answers(rating: float | None) -> None:
-    assert driven({6: Rated(rating=rating, rating_by="participant")}) == STEPS
+    assert driven({6: Answered(value=rating, by="participant")}) == STEPS
 
 
 @settings(deadline=None)

@@ -299,12 +299,12 @@ def test_an_answer_that_was_changed_to_none_is_refused_with_its_line(
     journal = broken_off(whole, tmp_path, 9)
     answer = whole.records[6]
     assert answer["body"]["kind"] == "answered"
-    answer["body"]["response"] = "left"
+    answer["body"]["value"] = "left"
     journal.write_bytes(b"".join([*whole.lines[:6], canonical_json(answer) + b"\n", *whole.lines[7:9]]))
     with pytest.raises(JournalError, match="line 8: does not follow from line 7, which was changed"):
         run(request("direction", tmp_path, "resume"), synthetic_screen, VirtualClock())
     journal.write_bytes(forged([*whole.records[:6], answer, *whole.records[7:9]]))
-    with pytest.raises(JournalError, match=r"line 7: .*response.*the record was changed"):
+    with pytest.raises(JournalError, match=r"line 7: value 'left' is no answer; the record was changed"):
         run(request("direction", tmp_path, "resume"), synthetic_screen, VirtualClock())
 
 

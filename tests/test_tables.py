@@ -13,12 +13,11 @@ from experiments.preference.session import make_plan as preference_plan
 from experiments.preference.session import rows as preference_rows
 from experiments.record import tables
 from experiments.record.tables import Row, guard, table_bytes, unguard
-from experiments.session.remarks import AnswerCorrected
+from experiments.session.remarks import EntryCorrected
 from experiments.session.steps import (
     Answered,
     Ask,
     Describe,
-    Described,
     Failed,
     Fired,
     FireShot,
@@ -29,7 +28,6 @@ from experiments.session.steps import (
     Present,
     Presented,
     Rate,
-    Rated,
     Rest,
     Rested,
     Step,
@@ -151,7 +149,7 @@ def told(place: int, *outcomes: tuple[str, Outcome]) -> list[tuple[Step, Outcome
 
 
 def answer(response: str) -> Answered:
-    return Answered(response=response, response_time_s=0.0, response_source="experimenter", response_time_valid=False)
+    return Answered(value=response, by="experimenter", response_time_s=0.0, response_time_valid=False)
 
 
 def written(history: list[tuple[Step, Outcome]]) -> list[dict[str, str]]:
@@ -201,7 +199,7 @@ def test_attempts_count_stimuli_that_may_have_been_felt_and_flags_say_why_there_
 
 def test_an_answer_is_flagged_corrected_only_if_what_counts_is_a_correction() -> None:
     given = told(0, ("fire", FIRED), ("ask", answer("forward")))
-    corrected = (None, AnswerCorrected(trial=DIRECTION.trials[0], response="backward"))
+    corrected = (None, EntryCorrected(trial=DIRECTION.trials[0], what="answer", value="backward"))
     assert written([*given, corrected])[0]["flags"] == "corrected"
     assert written([*given, corrected, *given])[0]["flags"] == ""
 
@@ -219,8 +217,8 @@ def test_a_rating_of_0_is_written_and_none_leaves_the_cell_empty(rating: float |
     rate = Rate(trial=trial, question="?", minimum=0, maximum=10, minimum_text="a", maximum_text="b", grain=0.1)
     history = [
         (Present(trial=trial, attempt=1, repeat_every_s=1.0, max_shots=120, least_exposure_s=1.0), shown),
-        (rate, Rated(rating=rating, rating_by="participant")),
-        (Describe(trial=trial, question="?"), Described(comment="-soft")),
+        (rate, Answered(value=rating, by="participant")),
+        (Describe(trial=trial, question="?"), Answered(value="-soft", by="experimenter")),
     ]
     rows: list[Row] = preference_rows(PREFERENCE, history)
     first, row, last = read(table_bytes("preference", rows))

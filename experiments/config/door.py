@@ -64,10 +64,15 @@ def tables(text: str, source: Path | str) -> dict[str, Any]:
 
 def checked(model: type[SomeModel], table: dict[str, Any], path: Path) -> SomeModel:
     """The tables of a file as what they mean."""
+    return checked_table(model, table, path, read_text(path))
+
+
+def checked_table(model: type[SomeModel], table: dict[str, Any], source: Path | str, text: str = "") -> SomeModel:
+    """Tables as what they mean; `source` and `text` are what messages take name and line from."""
     try:
         return _validated(model, table)
     except ValidationError as error:
-        raise ConfigError(_findings(error, path, read_text(path))) from error
+        raise ConfigError(_findings(error, source, text)) from error
 
 
 def _validated(model: type[SomeModel], table: dict[str, Any]) -> SomeModel:
@@ -202,6 +207,7 @@ def _distinct(methods: tuple[str, ...]) -> tuple[str, ...]:
 
 Count = Annotated[int, Field(ge=1, le=10_000)]
 Seconds = Annotated[float, Field(ge=0, le=86_400)]
+PositiveSeconds = Annotated[float, Field(gt=0, le=3_600)]
 Share = Annotated[float, Field(ge=0, le=1)]
 InnerShare = Annotated[float, Field(gt=0, lt=1)]
 Spread = Annotated[float, Field(ge=0, le=100)]

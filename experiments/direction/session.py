@@ -13,7 +13,6 @@ from experiments.design.streams import Stream
 from experiments.direction.config import Breaks, Design, DirectionConfig
 from experiments.record.tables import Row, presentation
 from experiments.session.history import History, TrialHistory, by_trial
-from experiments.session.remarks import AnswerCorrected
 from experiments.session.steps import Answered, Ask, Fired, FireShot, Prepare, Presenter, Rest, Session, Step
 
 
@@ -168,23 +167,22 @@ def rows(plan: Plan, history: History) -> list[Row]:
 
 def _answer(trial: Trial, events: TrialHistory) -> Row:
     """The answer that counts: the last one given, or what it was corrected to, whose time is not the participant's."""
-    given = events.last(Answered)
+    entered, given = events.entered("answer"), events.last(Answered)
     if given is None:
         return {}
-    counts = [word for word in events.words if isinstance(word, Answered | AnswerCorrected)][-1]
-    as_given = counts is given
+    counts = entered[-1]
     return {
-        "response": counts.response,
-        "correct": int(counts.response == trial.direction),
+        "response": counts.value,
+        "correct": int(counts.value == trial.direction),
         "response_time_s": given.response_time_s,
-        "response_source": given.response_source if as_given else "experimenter",
-        "response_time_valid": int(given.response_time_valid and as_given),
+        "response_source": given.by if counts is given else "experimenter",
+        "response_time_valid": int(bool(given.response_time_valid) and counts is given),
     }
 
 
 def _marked(row: Row, events: TrialHistory) -> Row:
     """A presentation whose answer came sooner than anybody reacts is marked: it was kept, and it was guessed."""
     given = events.last(Answered)
-    if given is None or given.response_source != "participant" or given.response_time_s >= ANTICIPATION_S:
+    if given is None or given.by != "participant" or (given.response_time_s or 0.0) >= ANTICIPATION_S:
         return row
     return row | {"flags": " ".join(filter(None, (str(row["flags"]), "anticipation")))}

@@ -46,7 +46,7 @@ def latencies(records: Sequence[Record]) -> Latencies:
     return Latencies(
         step_to_screen_ms=tuple(_step_to_screen_ms(records)),
         key_to_disk_ms=tuple(_key_to_disk_ms(records)),
-        trials=sum(record.shown_s is not None and isinstance(_outcome(record), Answered) for record in records),
+        trials=sum(record.shown_s is not None and _time_s(record) is not None for record in records),
     )
 
 
@@ -77,11 +77,17 @@ def _key_to_disk_ms(records: Sequence[Record]) -> Iterator[float]:
             case Fired() as fired:
                 pulse_start_s = fired.pulse_start_s
             case Answered() as answered if record.shown_s is not None and following.synced_s is not None:
-                if pulse_start_s is not None:
-                    key_s = answered.response_time_s if answered.key_time_s is None else answered.key_time_s
+                key_s = answered.response_time_s if answered.key_time_s is None else answered.key_time_s
+                if pulse_start_s is not None and key_s is not None:
                     yield 1000 * (following.synced_s - pulse_start_s - key_s)
             case None if record.kind == "resumed":
                 pulse_start_s = None
+
+
+def _time_s(record: Record) -> float | None:
+    """How long the answer took that a record holds, if it holds one with a time."""
+    outcome = _outcome(record)
+    return outcome.response_time_s if isinstance(outcome, Answered) else None
 
 
 def _outcome(record: Record) -> Outcome | None:

@@ -10,17 +10,15 @@ from experiments.design.streams import Stream
 from experiments.preference.config import PreferenceConfig
 from experiments.record.tables import Row, presentation
 from experiments.session.history import History, TrialHistory, by_trial
-from experiments.session.remarks import DescriptionCorrected, RatingCorrected
 from experiments.session.steps import (
+    Answered,
     Describe,
-    Described,
     Interrupted,
     Prepare,
     Present,
     Presented,
     Presenter,
     Rate,
-    Rated,
     Session,
     Step,
 )
@@ -108,11 +106,9 @@ def _exposure(events: TrialHistory) -> Row:
 
 def _rating(events: TrialHistory) -> Row:
     """The rating that counts, the participant's words, and whose hand entered them."""
-    entered = [word for word in events.words if isinstance(word, Rated | RatingCorrected)]
-    described = [word for word in events.words if isinstance(word, Described | DescriptionCorrected)]
-    row: Row = {"comment": described[-1].comment} if described else {}
+    entered, described = events.entered("rating"), events.entered("description")
+    row: Row = {"comment": described[-1].value} if described else {}
     if not entered:
         return row
     counts = entered[-1]
-    by = counts.rating_by if isinstance(counts, Rated) else "experimenter"
-    return row | {"rating": counts.rating, "rating_by": by}
+    return row | {"rating": counts.value, "rating_by": counts.by if isinstance(counts, Answered) else "experimenter"}

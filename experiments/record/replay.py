@@ -7,8 +7,8 @@ from dataclasses import dataclass, replace
 
 from experiments.record.journal import Contents, JournalError, Record, read_as
 from experiments.session import steps
-from experiments.session.history import History
-from experiments.session.remarks import REMARK, Halted, Remark, TestShot
+from experiments.session.history import History, fits
+from experiments.session.remarks import REMARK, EntryCorrected, Halted, Remark, TestShot
 from experiments.session.states import EMERGENCY
 
 
@@ -44,13 +44,26 @@ def history(contents: Contents) -> History:
         if line.kind == "step":
             step = read_as(steps.STEP, line.body, _place(contents, line))
         elif line.kind == "remark":
-            found.append((None, _remark(contents, line)))
+            remark = _remark(contents, line)
+            if isinstance(remark, EntryCorrected):
+                _check_value(contents, line, remark.what, remark.value)
+            found.append((None, remark))
         elif line.kind == "outcome":
             if step is None:
                 raise JournalError(f"{_place(contents, line)}: an outcome without its step; a line was lost")
-            found.append((step, read_as(steps.OUTCOME, line.body, _place(contents, line))))
+            outcome = read_as(steps.OUTCOME, line.body, _place(contents, line))
+            if isinstance(outcome, steps.Answered):
+                _check_value(contents, line, steps.asked_for(step), outcome.value)
+            found.append((step, outcome))
             step = None
     return found
+
+
+def _check_value(contents: Contents, line: Record, what: steps.What | None, value: steps.Value) -> None:
+    """`JournalError` for an answer that is none to what was asked."""
+    if what is None or not fits(what, value):
+        place, asked = _place(contents, line), what or "answer"
+        raise JournalError(f"{place}: value {value!r} is no {asked}; the record was changed")
 
 
 def outcomes(history: History) -> list[tuple[steps.Step, steps.Outcome]]:

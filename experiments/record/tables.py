@@ -10,11 +10,11 @@ import csv
 import io
 from collections.abc import Iterable
 from dataclasses import dataclass
-from typing import Literal
+from typing import Literal, get_args
 
 from experiments.session import remarks
 from experiments.session.history import TrialHistory, is_attempt
-from experiments.session.steps import Answered, Described, Failed, Fired, Interrupted, Outcome, Presented, Rated
+from experiments.session.steps import Answered, Failed, Fired, Interrupted, Presented, What
 
 ColumnType = Literal["text", "level", "integer", "number", "flag"]
 
@@ -36,63 +36,75 @@ class Column:
     required: bool = False
 
 
-def _level(name: str, levels: tuple[str, ...], description: str, *, required: bool = False) -> Column:
+def level_column(name: str, levels: tuple[str, ...], description: str, *, required: bool = False) -> Column:
+    """A column of named values."""
     return Column(name=name, type="level", levels=levels, description=description, required=required)
 
 
-def _integer(name: str, description: str, *, required: bool = False) -> Column:
+def integer_column(name: str, description: str, *, required: bool = False) -> Column:
+    """A column of whole numbers."""
     return Column(name=name, type="integer", description=description, required=required)
 
 
-def _number(name: str, unit: str, description: str) -> Column:
+def number_column(name: str, unit: str, description: str) -> Column:
+    """A column of numbers in a unit."""
     return Column(name=name, type="number", unit=unit, description=description)
 
 
-def _text(name: str, description: str, *, required: bool = False) -> Column:
+def text_column(name: str, description: str, *, required: bool = False) -> Column:
+    """A column of words."""
     return Column(name=name, type="text", description=description, required=required)
 
 
-def _flag(name: str, description: str) -> Column:
+def flag_column(name: str, description: str) -> Column:
+    """A column of 1 and 0."""
     return Column(name=name, type="flag", levels=("0", "1"), description=description)
 
 
-_PARTICIPANT = _text("participant_id", "participant's code, letters and digits", required=True)
-_METHOD = _level("method", (), "rendering method, as the config names it", required=True)
-_ATTEMPTS = _integer("attempts", "how often the stimulus was presented; more than 1 after a fault, pause or repeat")
-_FLAGS = _text(
+PARTICIPANT = text_column("participant_id", "participant's code, letters and digits", required=True)
+_METHOD = level_column("method", (), "rendering method, as the config names it", required=True)
+ATTEMPTS = integer_column(
+    "attempts", "how often the stimulus was presented; more than 1 after a fault, pause or repeat"
+)
+FLAGS = text_column(
     "flags",
     "marks set on the trial, separated by a blank: `device-error`, `interrupted` (the run broke off), `paused`, "
     "`repeated`, `corrected`, `anticipation` (the participant's key within 0.1 s of the onset), and the experimenter's "
     "own",
 )
-_NOTE = _text("note", "the experimenter's note")
-_ONSET = _text(
+NOTE = text_column("note", "the experimenter's note")
+ONSET = text_column(
     "onset_utc",
     "date and time (UTC, ISO 8601) of the first pulse of the last presentation; empty if none",
 )
-_GUN = _text("gun", "who rendered it: model and serial number of the gun, `simulated` for the simulated one")
+GUN = text_column("gun", "who rendered it: model and serial number of the gun, `simulated` for the simulated one")
+
+PRESENTATION = (ATTEMPTS, FLAGS, NOTE, ONSET, GUN)
+"""How a trial was presented: the last columns of every table."""
+EARLIER_EXPOSURE = number_column(
+    "earlier_exposure_s",
+    "s",
+    "how long the same trial was felt before, at presentations that a pause ended or that were repeated; empty if it "
+    "was not",
+)
 
 TRIALS: tuple[Column, ...] = (
-    _PARTICIPANT,
-    _level("experiment", ("direction",), "which experiment", required=True),
-    _integer("session", "block of trials with one method, 1 to 3 in order of presentation", required=True),
+    PARTICIPANT,
+    level_column("experiment", ("direction",), "which experiment", required=True),
+    integer_column("session", "block of trials with one method, 1 to 3 in order of presentation", required=True),
     _METHOD,
-    _integer("set", "set within the session, from 1", required=True),
-    _integer("trial", "trial within the session, from 1", required=True),
-    _level("direction", ("forward", "backward"), "which way the gun pointed and shot", required=True),
-    _level("response", ("forward", "backward"), "which way the participant said; empty if never answered"),
-    _flag("correct", "1 if the response is the direction, 0 if not; empty without a response"),
-    _number("response_time_s", "s", "time from the onset of the pulse to the answer; empty if there is none"),
-    _level("response_source", ("participant", "experimenter", "synthetic"), "whose hand gave the answer"),
-    _flag(
+    integer_column("set", "set within the session, from 1", required=True),
+    integer_column("trial", "trial within the session, from 1", required=True),
+    level_column("direction", ("forward", "backward"), "which way the gun pointed and shot", required=True),
+    level_column("response", ("forward", "backward"), "which way the participant said; empty if never answered"),
+    flag_column("correct", "1 if the response is the direction, 0 if not; empty without a response"),
+    number_column("response_time_s", "s", "time from the onset of the pulse to the answer; empty if there is none"),
+    level_column("response_source", ("participant", "experimenter", "synthetic"), "whose hand gave the answer"),
+    flag_column(
         "response_time_valid", "1 if the time is the participant's own; 0 if corrected or by the experimenter's hand"
     ),
-    _ATTEMPTS,
-    _FLAGS,
-    _NOTE,
-    _ONSET,
-    _GUN,
-    _level(
+    *PRESENTATION,
+    level_column(
         "instruction",
         (),
         "what the participant was told for this set (`speed`, `accuracy`, ...), as the config names it; empty if "
@@ -101,26 +113,19 @@ TRIALS: tuple[Column, ...] = (
 )
 
 RATINGS: tuple[Column, ...] = (
-    _PARTICIPANT,
-    _level("experiment", ("preference",), "which experiment", required=True),
-    _integer("trial", "order of presentation, from 1", required=True),
+    PARTICIPANT,
+    level_column("experiment", ("preference",), "which experiment", required=True),
+    integer_column("trial", "order of presentation, from 1", required=True),
     _METHOD,
-    _number("rating", "", "0 (dislike very much) to 10 (like very much); 0 is a rating, empty means none was given"),
-    _level("rating_by", ("participant", "experimenter", "synthetic"), "whose hand entered the rating"),
-    _text("comment", "the participant's own words"),
-    _integer("shots", "shots presented until the participant said next"),
-    _number("exposure_s", "s", "from the first pulse until the participant said next, at the last presentation"),
-    _number(
-        "earlier_exposure_s",
-        "s",
-        "how long the same trial was felt before, at presentations that a pause ended or that were repeated; empty if "
-        "it was not",
+    number_column(
+        "rating", "", "0 (dislike very much) to 10 (like very much); 0 is a rating, empty means none was given"
     ),
-    _ATTEMPTS,
-    _FLAGS,
-    _NOTE,
-    _ONSET,
-    _GUN,
+    level_column("rating_by", ("participant", "experimenter", "synthetic"), "whose hand entered the rating"),
+    text_column("comment", "the participant's own words"),
+    integer_column("shots", "shots presented until the participant said next"),
+    number_column("exposure_s", "s", "from the first pulse until the participant said next, at the last presentation"),
+    EARLIER_EXPOSURE,
+    *PRESENTATION,
 )
 
 TABLES: dict[str, tuple[Column, ...]] = {"direction": TRIALS, "preference": RATINGS}
@@ -172,23 +177,15 @@ def _flags(events: TrialHistory) -> list[str]:
         "interrupted": any(one.presented and one.cause == "break-off" for one in events.all(Interrupted)),
         "paused": any(one.presented and one.cause == "pause" for one in events.all(Interrupted)),
         "repeated": events.repeated,
-        "corrected": any(_is_corrected(events, given) for given in _CORRECTIONS),
+        "corrected": any(_is_corrected(events.entered(what)) for what in get_args(What)),
     }
     own = [remark.flag for remark in events.all(remarks.Flagged)]
     return list(dict.fromkeys([flag for flag, there in found.items() if there] + own))
 
 
-_CORRECTIONS: dict[type[Outcome], type[remarks.Remark]] = {
-    Answered: remarks.AnswerCorrected,
-    Rated: remarks.RatingCorrected,
-    Described: remarks.DescriptionCorrected,
-}
-
-
-def _is_corrected(events: TrialHistory, given: type[Outcome]) -> bool:
+def _is_corrected(entered: list[Answered | remarks.EntryCorrected]) -> bool:
     """Whether what counts is a correction: what was entered anew, because its trial was presented again, is none."""
-    both = [word for word in events.words if isinstance(word, (given, _CORRECTIONS[given]))]
-    return bool(both) and not isinstance(both[-1], given)
+    return bool(entered) and isinstance(entered[-1], remarks.EntryCorrected)
 
 
 def table_bytes(experiment: str, rows: Iterable[Row]) -> bytes:

@@ -9,9 +9,9 @@ import unicodedata
 
 from experiments.design.plan import Plan, Trial
 from experiments.session import remarks, steps
-from experiments.session.history import Entry, History, Value, entered_value, is_attempt, of_one_set
+from experiments.session.history import Entry, History, entered_value, is_attempt, of_one_set
 from experiments.session.remarks import MAX_FLAG, Remark
-from experiments.session.steps import Outcome, Prepare, Step, trial_of
+from experiments.session.steps import Outcome, Prepare, Step, Value, What, trial_of
 
 FLAG_RULE = f"A flag is a word of at most {MAX_FLAG} letters, digits and hyphens."
 
@@ -74,7 +74,7 @@ def entry_text(plan: Plan, told: History, entry: Entry) -> str:
     return f"{name}: {value_text(entered_value(told, entry))}"
 
 
-def saved_text(plan: Plan, step: Step | None, word: Outcome | Remark) -> str:  # noqa: C901, PLR0911 - one case a word
+def saved_text(plan: Plan, step: Step | None, word: Outcome | Remark) -> str:
     """That something is on the disk, as it was entered; empty for what needs no answer."""
     trial = trial_of(step)
     match word:
@@ -85,11 +85,7 @@ def saved_text(plan: Plan, step: Step | None, word: Outcome | Remark) -> str:  #
         case _ if trial is None:
             return _remark_text(plan, word)
         case steps.Answered():
-            return f"Saved. Trial {trial.trial}: {value_text(word.response)}."
-        case steps.Rated():
-            return f"Saved. {ordinal(plan, trial)}: {value_text(word.rating)}."
-        case steps.Described():
-            return f"Saved. {ordinal(plan, trial)}: description."
+            return f"Saved. {_entered_text(plan, trial, steps.asked_for(step), word.value)}."
         case steps.Presented():
             return f"Presented and saved. {shots_text(word.shots)}, {word.exposure_s:.1f} s."
         case steps.Failed():
@@ -100,13 +96,19 @@ def saved_text(plan: Plan, step: Step | None, word: Outcome | Remark) -> str:  #
             return ""
 
 
+def _entered_text(plan: Plan, trial: Trial, what: What | None, value: Value) -> str:
+    if what == "answer":
+        return f"Trial {trial.trial}: {value_text(value)}"
+    return f"{ordinal(plan, trial)}: {'description' if what == 'description' else value_text(value)}"
+
+
 def _remark_text(plan: Plan, remark: Outcome | Remark) -> str:
     match remark:
-        case remarks.AnswerCorrected():
-            return f"Saved. Trial {remark.trial.trial} corrected to {value_text(remark.response)}."
-        case remarks.RatingCorrected():
-            return f"Saved. {ordinal(plan, remark.trial)} corrected to {value_text(remark.rating)}."
-        case remarks.DescriptionCorrected():
+        case remarks.EntryCorrected(what="answer"):
+            return f"Saved. Trial {remark.trial.trial} corrected to {value_text(remark.value)}."
+        case remarks.EntryCorrected(what="rating"):
+            return f"Saved. {ordinal(plan, remark.trial)} corrected to {value_text(remark.value)}."
+        case remarks.EntryCorrected():
             return f"Saved. {ordinal(plan, remark.trial)}: description corrected."
         case remarks.Flagged():
             return f"Saved. Trial {remark.trial.trial} flagged {remark.flag}."

@@ -77,6 +77,7 @@ class Description(Event):
     """The participant's words that were told; may be empty."""
 
     text: str
+    by: Hand = "experimenter"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -4,12 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from types import UnionType
-from typing import Literal, TypeVar
+from typing import TypeVar
 
 from experiments.design.plan import Plan, Trial
 from experiments.session import steps
-from experiments.session.remarks import AnswerCorrected, DescriptionCorrected, RatingCorrected, Remark
+from experiments.session.remarks import EntryCorrected, Remark
+from experiments.session.steps import Value, What, asked_for
 
 Word = TypeVar("Word")
 
@@ -37,6 +37,15 @@ class TrialHistory:
         """The last outcome or remark of a kind."""
         return next(reversed(self.all(kind)), None)
 
+    def entered(self, what: What) -> list[steps.Answered | EntryCorrected]:
+        """What was entered of a kind, and corrected, in order: the last counts."""
+        return [
+            word
+            for step, word in self.items
+            if (isinstance(word, EntryCorrected) and word.what == what)
+            or (isinstance(word, steps.Answered) and asked_for(step) == what)
+        ]
+
 
 def by_trial(trials: Sequence[Trial], history: History) -> dict[Trial, TrialHistory]:
     """What the journal tells, by trial."""
@@ -59,10 +68,6 @@ def is_attempt(step: steps.Step | None, word: steps.Outcome | Remark) -> bool:
     return isinstance(step, steps.FireShot | steps.Present) and not (
         isinstance(word, steps.Failed | steps.Interrupted) and not word.presented
     )
-
-
-What = Literal["answer", "rating", "description"]
-Value = str | float | None
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -89,23 +94,15 @@ def entries(history: History, here: Trial) -> list[Entry]:
 
 
 def _entry(step: steps.Step | None, word: steps.Outcome | Remark) -> Entry | None:
-    trial = steps.trial_of(step)
-    if trial is None:
+    trial, what = steps.trial_of(step), asked_for(step)
+    if trial is None or what is None or not isinstance(word, steps.Answered):
         return None
-    match word:
-        case steps.Answered():
-            return Entry(trial=trial, what="answer")
-        case steps.Rated():
-            return Entry(trial=trial, what="rating")
-        case steps.Described():
-            return Entry(trial=trial, what="description")
-        case _:
-            return None
+    return Entry(trial=trial, what=what)
 
 
-def fits(entry: Entry, value: Value) -> bool:
-    """Whether a value is of an entry's kind."""
-    match entry.what:
+def fits(what: What, value: Value) -> bool:
+    """Whether a value is an answer of a kind."""
+    match what:
         case "answer":
             return value in ("forward", "backward")
         case "rating":
@@ -121,35 +118,9 @@ def entered_value(history: History, entry: Entry) -> Value:
 
 
 def _value(step: steps.Step | None, word: steps.Outcome | Remark, entry: Entry) -> tuple[Value] | None:
-    if isinstance(word, AnswerCorrected | RatingCorrected | DescriptionCorrected):
-        return _corrected(word, entry)
-    return _given(word) if _entry(step, word) == entry else None
-
-
-def _corrected(word: AnswerCorrected | RatingCorrected | DescriptionCorrected, entry: Entry) -> tuple[Value] | None:
-    match word:
-        case _ if word.trial != entry.trial:
-            return None
-        case AnswerCorrected() if entry.what == "answer":
-            return (word.response,)
-        case RatingCorrected() if entry.what == "rating":
-            return (word.rating,)
-        case DescriptionCorrected() if entry.what == "description":
-            return (word.comment,)
-        case _:
-            return None
-
-
-def _given(word: steps.Outcome | Remark) -> tuple[Value] | None:
-    match word:
-        case steps.Answered():
-            return (word.response,)
-        case steps.Rated():
-            return (word.rating,)
-        case steps.Described():
-            return (word.comment,)
-        case _:
-            return None
+    if isinstance(word, EntryCorrected):
+        return (word.value,) if (word.trial, word.what) == (entry.trial, entry.what) else None
+    return (word.value,) if isinstance(word, steps.Answered) and _entry(step, word) == entry else None
 
 
 def repeatable(history: History, step: steps.Step | None, here: Trial) -> Trial | None:
@@ -159,23 +130,33 @@ def repeatable(history: History, step: steps.Step | None, here: Trial) -> Trial 
     """
     if isinstance(step, steps.Ask | steps.Rate):
         return step.trial
-    rated, shown = _trials(history, steps.Rated), _trials(history, steps.Answered | steps.Presented)
+    rated, shown = entered_trials(history, "rating"), _shown(history)
     return next((trial for trial in reversed(shown) if of_one_set(trial, here) and trial not in rated), None)
 
 
 def done(history: History) -> set[Trial]:
     """The trials that were answered, or felt until next."""
-    return set(_trials(history, steps.Answered | steps.Presented))
+    return set(_shown(history))
 
 
 def answered(history: History) -> set[Trial]:
     """The trials that were answered or rated, whatever became of the answer."""
-    return set(_trials(history, steps.Answered | steps.Rated))
+    return entered_trials(history, "answer") | entered_trials(history, "rating")
 
 
-def _trials(history: History, outcomes: type[steps.Outcome] | UnionType) -> list[Trial]:
-    """The trials that came to such outcomes, in order."""
-    return [trial for step, word in history if isinstance(word, outcomes) and (trial := steps.trial_of(step))]
+def entered_trials(history: History, what: What) -> set[Trial]:
+    """The trials of which something was entered."""
+    return {entry.trial for step, word in history if (entry := _entry(step, word)) and entry.what == what}
+
+
+def _shown(history: History) -> list[Trial]:
+    """The trials whose stimulus is over: judged, or felt until next; in order."""
+    return [
+        trial
+        for step, word in history
+        if (isinstance(word, steps.Presented) or (isinstance(word, steps.Answered) and isinstance(step, steps.Ask)))
+        and (trial := steps.trial_of(step))
+    ]
 
 
 def of_one_set(one: Trial, other: Trial) -> bool:

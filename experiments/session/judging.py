@@ -107,7 +107,7 @@ def _impossible(moment: Moment, event: Event) -> str:
     match event:
         case _ if isinstance(event, OWN_HAND_EVENTS):
             return _not_asked(moment, event)
-        case events.Correct() if (entry := moment.position.correcting) is not None and not fits(entry, event.value):
+        case events.Correct(value=value) if (entry := moment.position.correcting) and not fits(entry.what, value):
             return f"That is no {entry.what}."
         case events.Undo() if moment.further_back is None:
             return "There is nothing to undo in this set."
@@ -177,13 +177,7 @@ def refused(event: Event, position: Position, because: str) -> remarks.Refused |
     )
 
 
-def _corrected(entry: Entry, event: events.Correct) -> remarks.Remark:
-    match entry.what, event.value:
-        case "answer", "forward" | "backward" as response:
-            return remarks.AnswerCorrected(trial=entry.trial, response=response)
-        case "rating", float() | None as rating:
-            return remarks.RatingCorrected(trial=entry.trial, rating=rating)
-        case "description", str() as comment:
-            return remarks.DescriptionCorrected(trial=entry.trial, comment=comment)
-        case _:
-            raise TypeError(f"{event.value!r} is no {entry.what}")
+def _corrected(entry: Entry, event: events.Correct) -> remarks.EntryCorrected:
+    if not fits(entry.what, event.value):
+        raise TypeError(f"{event.value!r} is no {entry.what}")
+    return remarks.EntryCorrected(trial=entry.trial, what=entry.what, value=event.value)

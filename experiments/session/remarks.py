@@ -10,36 +10,19 @@ from typing import Annotated, Literal
 
 from pydantic import Field, TypeAdapter
 
-from device.words import Direction
 from experiments.config.setup import without_blank_instruction
 from experiments.design.plan import Trial
+from experiments.session.steps import Value, What
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class AnswerCorrected:
-    """The answer to a trial was entered wrongly; this is what the participant had said."""
+class EntryCorrected:
+    """What was entered for a trial was wrong; this is what the participant had said."""
 
     trial: Trial
-    response: Direction
-    kind: Literal["answer-corrected"] = "answer-corrected"
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class RatingCorrected:
-    """A rating was entered wrongly; `None` is no answer."""
-
-    trial: Trial
-    rating: float | None
-    kind: Literal["rating-corrected"] = "rating-corrected"
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class DescriptionCorrected:
-    """A description was entered wrongly; these were the participant's words."""
-
-    trial: Trial
-    comment: str
-    kind: Literal["description-corrected"] = "description-corrected"
+    what: What
+    value: Value
+    kind: Literal["corrected"] = "corrected"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -119,19 +102,7 @@ class TestShot:
     kind: Literal["test-shot"] = "test-shot"
 
 
-Remark = (
-    AnswerCorrected
-    | RatingCorrected
-    | DescriptionCorrected
-    | Flagged
-    | Noted
-    | Paused
-    | Continued
-    | Refused
-    | Halted
-    | HaltReason
-    | TestShot
-)
+Remark = EntryCorrected | Flagged | Noted | Paused | Continued | Refused | Halted | HaltReason | TestShot
 
 MAX_FLAG = 32
 

@@ -13,7 +13,7 @@ from typing import Annotated, Literal, Protocol
 
 from pydantic import Field, TypeAdapter
 
-from device.words import Direction, ShotTiming
+from device.words import ShotTiming
 from experiments.config.setup import without_blank_instruction
 from experiments.design.plan import Trial
 
@@ -133,18 +133,24 @@ class Fired:
     kind: Literal["fired"] = "fired"
 
 
+What = Literal["answer", "rating", "description"]
+"""What is asked for."""
+Value = str | float | None
+"""What was said: a named answer or words, a rating, or `None` for no answer. 0 is a rating; words may be empty."""
+
+
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Answered:
-    """The participant said which way. The time is valid if it came from the participant's own hand.
+    """What the participant said, and whose hand entered it. The time is valid if it came from the participant's own.
 
     `key_time_s` is when the key for it went down, since the onset, where the response time is not that of the key: a
-    synthetic participant's is the observer's.
+    synthetic participant's is the observer's. Ratings and descriptions have no times.
     """
 
-    response: Direction
-    response_time_s: float
-    response_source: Literal["participant", "experimenter", "synthetic"]
-    response_time_valid: bool
+    value: Value
+    by: Literal["participant", "experimenter", "synthetic"]
+    response_time_s: float | None = None
+    response_time_valid: bool | None = None
     key_time_s: float | None = None
     kind: Literal["answered"] = "answered"
 
@@ -185,23 +191,6 @@ class TrainShot:
     motion: str
     timing: ShotTiming | None = None
     kind: Literal["train-shot"] = "train-shot"
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Rated:
-    """A rating, or `None` if the participant gave none. 0 is a rating."""
-
-    rating: float | None
-    rating_by: Literal["participant", "experimenter", "synthetic"]
-    kind: Literal["rated"] = "rated"
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Described:
-    """The participant's own words; may be empty."""
-
-    comment: str
-    kind: Literal["described"] = "described"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -248,13 +237,19 @@ class Repeated:
 
 
 Step = Prepare | FireShot | Ask | Rest | Present | Rate | Describe | Close
-Outcome = (
-    Prepared | Fired | Answered | Rested | Presented | Rated | Described | Closed | Failed | Interrupted | Repeated
-)
+Outcome = Prepared | Fired | Answered | Rested | Presented | Closed | Failed | Interrupted | Repeated
 TrialStep = Prepare | FireShot | Ask | Present | Rate | Describe
 """A step that is about one trial."""
 Session = Generator[Step, Outcome, None]
 """Yields what should happen and is sent what did happen. It opens nothing, waits for nothing and knows no clock."""
+
+
+_ASKED: dict[type, What] = {Ask: "answer", Rate: "rating", Describe: "description"}
+
+
+def asked_for(step: Step | None) -> What | None:
+    """What a step asks for, if it asks."""
+    return _ASKED.get(type(step))
 
 
 def trial_of(step: Step | None) -> Trial | None:
@@ -262,7 +257,15 @@ def trial_of(step: Step | None) -> Trial | None:
     return step.trial if isinstance(step, TrialStep) else None
 
 
-_OPTIONAL_FIELDS = ("damper", "timing", "key_time_s", "shots", "exposure_s")
+_OPTIONAL_FIELDS = (
+    "damper",
+    "timing",
+    "response_time_s",
+    "response_time_valid",
+    "key_time_s",
+    "shots",
+    "exposure_s",
+)
 STEP: TypeAdapter[Step] = TypeAdapter(Annotated[Step, Field(discriminator="kind")])
 """Reads the step that a record holds."""
 OUTCOME: TypeAdapter[Outcome] = TypeAdapter(Annotated[Outcome, Field(discriminator="kind")])

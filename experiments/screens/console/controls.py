@@ -18,11 +18,11 @@ from experiments.screens.console.participant_link import ParticipantSide
 from experiments.screens.texts import FLAG_RULE, short_place, typed_line, typed_number
 from experiments.session import events
 from experiments.session.events import Event, Hand, Press
-from experiments.session.history import Value, entered_value, trial_at
+from experiments.session.history import entered_value, trial_at
 from experiments.session.judging import REARM_HELD_S
 from experiments.session.remarks import flag_word
 from experiments.session.states import EMERGENCY, Position, State
-from experiments.session.steps import Ask
+from experiments.session.steps import Ask, Value
 
 TextField = Literal["line", "number", "words"]
 """What can be typed into."""

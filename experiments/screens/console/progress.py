@@ -11,10 +11,10 @@ from experiments.design.plan import Trial
 from experiments.screens import texts
 from experiments.screens.console.view import About, GunSeen, Seen
 from experiments.session import steps
-from experiments.session.history import done, entries, of_one_set
-from experiments.session.remarks import AnswerCorrected, DescriptionCorrected, Flagged, Noted, RatingCorrected, Remark
+from experiments.session.history import done, entered_trials, entries, of_one_set
+from experiments.session.remarks import EntryCorrected, Flagged, Noted, Remark
 from experiments.session.states import Position, State
-from experiments.session.steps import Outcome, Step, trial_of
+from experiments.session.steps import Outcome, Step
 
 PRIOR_TRIALS = 5
 """The plan counts as much as so many measured trials, so that the estimate does not jump with the first."""
@@ -39,14 +39,10 @@ def trials_done(seen: Seen) -> list[TrialCount]:
     """
     felt, trials, here = done(seen.told), seen.about.plan.trials, seen.here
     if seen.about.rated_last:
-        return [_count("felt", trials, felt), _count("rated", trials, _rated(seen))]
+        return [_count("felt", trials, felt), _count("rated", trials, entered_trials(seen.told, "rating"))]
     session = [trial for trial in trials if trial.session == here.session]
     parts = {"set": [trial for trial in session if of_one_set(trial, here)], "session": session, "experiment": trials}
     return [_count(what, trials, felt) for what, trials in parts.items()]
-
-
-def _rated(seen: Seen) -> set[Trial | None]:
-    return {trial_of(step) for step, word in seen.told if isinstance(word, steps.Rated)}
 
 
 def _count(what: str, trials: Sequence[Trial], finished: Collection[Trial | None]) -> TrialCount:
@@ -95,7 +91,7 @@ def remaining_s(seen: Seen, progress: RunTiming) -> float:
     """Seconds still to go: trials left, breaks left, what is left of this one, and the ratings still to come."""
     config, planned = seen.about.setup.config, len(seen.about.plan.trials)
     left = planned - len(done(seen.told))
-    rated = sum(isinstance(word, steps.Rated) for _, word in seen.told)
+    rated = sum(isinstance(step, steps.Rate) and isinstance(word, steps.Answered) for step, word in seen.told)
     ratings_s = max(0, planned - rated) * config.rating_s
     return float(left * progress.trial_s(config.trial_s) + _breaks_left_s(seen) + ratings_s)
 
@@ -210,11 +206,11 @@ def _mark(word: Outcome | Remark) -> str:
             return f"Trial {word.trial.trial}: flagged {word.flag}"
         case Noted(trial=Trial() as trial):
             return f"Trial {trial.trial}: “{word.text}”"
-        case AnswerCorrected():
-            return f"Trial {word.trial.trial}: corrected to {word.response.upper()}"
-        case RatingCorrected():
-            return f"Trial {word.trial.trial}: rating corrected to {texts.value_text(word.rating)}"
-        case DescriptionCorrected():
+        case EntryCorrected(what="answer"):
+            return f"Trial {word.trial.trial}: corrected to {texts.value_text(word.value)}"
+        case EntryCorrected(what="rating"):
+            return f"Trial {word.trial.trial}: rating corrected to {texts.value_text(word.value)}"
+        case EntryCorrected():
             return f"Trial {word.trial.trial}: description corrected"
         case steps.Repeated():
             return f"Trial {word.trial.trial}: to be presented again ({word.reason})"
@@ -247,6 +243,7 @@ def own_times_s(seen: Seen) -> list[float]:
     times = [
         (step.trial, word.response_time_s)
         for step, word in seen.told
-        if isinstance(step, steps.Ask) and isinstance(word, steps.Answered) and word.response_time_valid
+        if isinstance(step, steps.Ask) and isinstance(word, steps.Answered)
+        if word.response_time_valid and word.response_time_s is not None
     ]
     return [time_s for trial, time_s in times if trial.session == seen.here.session][-STRIP:]

@@ -1,0 +1,101 @@
+"""Analyses of variance of two factors: both within people, or one within and one between. Computed by pingouin."""
+
+from __future__ import annotations
+
+import math
+import warnings
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+import pandas as pd
+from numpy.typing import ArrayLike
+
+from analysis.stats.arrays import numbers, pingouin
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class FactorialEffect:
+    """One effect. `source` names its factors; `p_gg` is corrected by `epsilon` (Greenhouse and Geisser), if it can be.
+
+    `size` is generalised eta squared where both factors are within people, partial eta squared in a mixed design.
+    """
+
+    source: tuple[str, ...]
+    F: float
+    df: tuple[int, int]
+    p: float
+    epsilon: float | None
+    p_gg: float | None
+    size: float
+
+
+def two_within(scores: ArrayLike, names: tuple[str, str]) -> tuple[FactorialEffect, ...]:
+    """The ANOVA of two factors within people: each effect against its own interaction with people.
+
+    `scores`: (n people, a levels, b levels). `ValueError`: fewer than two people or levels, or no finite numbers.
+    Sources: Winer 1971, chapter 7; Olejnik & Algina 2003, Psychological Methods 8, 434.
+    """
+    array = numbers(scores, "scores")
+    if array.ndim != 3 or min(array.shape) < 2:
+        raise ValueError(f"scores must be (people, levels, levels), each at least 2, not {array.shape}")
+    n, a, b = array.shape
+    who, one, other = (part.ravel() for part in np.indices((n, a, b)))
+    table = pd.DataFrame({"who": who, "one": one, "other": other, "score": array.ravel()})
+    found = _silent("rm_anova", table, dv="score", within=["one", "other"], subject="who")
+    sources = ((names[0],), (names[1],), names)
+    return tuple(
+        FactorialEffect(
+            source=source,
+            F=float(row["F"]),
+            df=(int(row["ddof1"]), int(row["ddof2"])),
+            p=float(row["p_unc"]),
+            epsilon=_known(row["eps"]),
+            p_gg=_known(row["p_GG_corr"]),
+            size=float(row["ng2"]),
+        )
+        for source, (_, row) in zip(sources, found.iterrows(), strict=True)
+    )
+
+
+def mixed(scores: ArrayLike, group: Sequence[str], names: tuple[str, str]) -> tuple[FactorialEffect, ...]:
+    """The ANOVA of one factor between people and one within: `names` are theirs, in this order.
+
+    `scores`: (n people, k levels), `group`: each one's group. `ValueError`: fewer than two groups or levels, a group of
+    one, or no finite numbers. Source: Winer 1971, chapter 7.
+    """
+    array = numbers(scores, "scores")
+    if array.ndim != 2 or array.shape[1] < 2 or array.shape[0] != len(group):
+        raise ValueError(f"scores must be (people, levels) with a group for each person, not {array.shape}")
+    sizes = {one: list(group).count(one) for one in group}
+    if len(sizes) < 2 or min(sizes.values()) < 2:
+        raise ValueError(f"at least two groups of two are needed, not {sizes}")
+    n, k = array.shape
+    who, level = (part.ravel() for part in np.indices((n, k)))
+    table = pd.DataFrame({"who": who, "level": level, "group": np.repeat(list(group), k), "score": array.ravel()})
+    found = _silent("mixed_anova", table, dv="score", within="level", between="group", subject="who")
+    sources = ((names[0],), (names[1],), names)
+    return tuple(
+        FactorialEffect(
+            source=source,
+            F=float(row["F"]),
+            df=(int(row["DF1"]), int(row["DF2"])),
+            p=float(row["p_unc"]),
+            epsilon=_known(row["eps"]),
+            p_gg=None,
+            size=float(row["np2"]),
+        )
+        for source, (_, row) in zip(sources, found.iterrows(), strict=True)
+    )
+
+
+def _silent(function: str, table: pd.DataFrame, **asked: object) -> pd.DataFrame:
+    """What a function of pingouin finds; what it warns of is for its authors."""
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")
+        found: pd.DataFrame = pingouin(function)(table, **asked)
+    return found
+
+
+def _known(value: float) -> float | None:
+    return None if math.isnan(value) else float(value)

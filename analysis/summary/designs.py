@@ -1,0 +1,270 @@
+"""The statistics of any design, from its factors and questions: what each condition gave, and what differs.
+
+A question's answers become scores first: 1 and 0 where an answer can be right, ratings as they are, the logarithm of
+numbers. A person's score in a condition is the mean of theirs; whoever lacks a condition is left out of the tests and
+named. Which test there is follows from how many factors vary within and between people.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+import pandas as pd
+from scipy import stats
+
+from analysis.stats.anova import rm_anova
+from analysis.stats.arrays import FloatArray
+from analysis.stats.binomial import binomial_test, yes_no
+from analysis.stats.discrimination import Task, discrimination
+from analysis.stats.factorial import FactorialEffect, mixed, two_within
+from analysis.stats.paired import friedman
+from experiments.design.config import DesignConfig
+from experiments.design.language import Level, QuestionConfig, shown_level
+from experiments.tasks.questions import chance, correct_columns
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ConditionSummary:
+    """One condition. `mean` and `sd` over people (n - 1); of scored answers the count right against chance, exact.
+
+    `mean` of numbers is geometric, `sd` then that of their natural logarithms.
+    """
+
+    levels: Mapping[str, Level]
+    people: int
+    trials: int
+    mean: float | None
+    sd: float | None
+    right: int | None = None
+    p: float | None = None
+    ci_low: float | None = None
+    ci_high: float | None = None
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class DesignTest:
+    """A test or an estimate. `statistic` is what `name` says; `None` with a `reason` where it could not be made."""
+
+    name: str
+    effect: str
+    statistic: float | None = None
+    df: tuple[int, ...] | None = None
+    p: float | None = None
+    size: float | None = None
+    ci_low: float | None = None
+    ci_high: float | None = None
+    reason: str | None = None
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class QuestionSummary:
+    """All that one question gave. `left_out`: who has no score in some condition, and so is in no test."""
+
+    kind: str
+    cells: tuple[ConditionSummary, ...]
+    tests: tuple[DesignTest, ...]
+    left_out: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class DesignSummary:
+    """The statistics of a design: as they stand in `statistics.json` under its name."""
+
+    n: int
+    factors: Mapping[str, tuple[Level, ...]]
+    questions: Mapping[str, QuestionSummary]
+
+
+def summarise(design: DesignConfig, table: pd.DataFrame) -> DesignSummary:
+    """The statistics of a design from its table: one row a trial, the columns of `design_table.columns`.
+
+    Words are not counted here. Rankings and pairs are described, not tested.
+    """
+    asked = {name: question for name, question in design.questions.items() if question.kind != "text"}
+    return DesignSummary(
+        n=int(table["participant_id"].nunique()),
+        factors={name: factor.all_levels for name, factor in design.factors.items()},
+        questions={name: _question(design, name, question, table) for name, question in asked.items()},
+    )
+
+
+def _question(design: DesignConfig, name: str, question: QuestionConfig, table: pd.DataFrame) -> QuestionSummary:
+    column = correct_columns(design.questions).get(name, name)
+    scored = table.assign(score=_scores(question, table[column])).dropna(subset=["score"])
+    factors = _varied(design)
+    cells = tuple(_cell(design, question, some) for some in _conditions(scored, factors))
+    real = scored if "stimulus" not in scored else scored[scored["stimulus"].astype(int) == 1]
+    people, left_out = _complete(real, factors)
+    tests = (*_comparisons(design, question, people, _groups(design, real)), *_sensitivity(design, question, scored))
+    return QuestionSummary(kind=question.kind, cells=cells, tests=tests, left_out=left_out)
+
+
+def _varied(design: DesignConfig) -> list[str]:
+    """The columns by which conditions differ: factors with several levels; of pairs both intervals."""
+    names = [name for name, factor in design.factors.items() if len(factor.all_levels) > 1]
+    if design.trial.kind != "pair":
+        return names
+    compared = design.trial.compare
+    return [one for name in names for one in ([f"{name}_1", f"{name}_2"] if name == compared else [name])]
+
+
+def _scores(question: QuestionConfig, column: pd.Series) -> FloatArray:
+    """The answers as numbers; NaN for none. An unscored choice: 1 for the first answer."""
+    if question.kind in {"rating", "ranking"} or question.correct is not None:
+        return pd.to_numeric(column, errors="coerce").to_numpy(dtype=np.float64)
+    if question.kind == "number":
+        numbers = pd.to_numeric(column, errors="coerce").to_numpy(dtype=np.float64)
+        with np.errstate(divide="ignore", invalid="ignore"):
+            return np.where(numbers > 0, np.log(numbers), np.nan)
+    given = column.isin(question.named_answers)
+    return np.where(given, (column == question.named_answers[0]).to_numpy(dtype=np.float64), np.nan)
+
+
+def _conditions(scored: pd.DataFrame, factors: Sequence[str]) -> Iterator[pd.DataFrame]:
+    """The rows of each condition in the order of their levels; catch trials, which have no level, come last."""
+    if not factors:
+        yield scored
+        return
+    for _, some in scored.groupby(list(factors), sort=True, dropna=False, observed=True):
+        yield some
+
+
+def _cell(design: DesignConfig, question: QuestionConfig, rows: pd.DataFrame) -> ConditionSummary:
+    means = rows.groupby("participant_id")["score"].mean().to_numpy(dtype=np.float64)
+    first = rows.iloc[0]
+    levels = {name: first[name] for name in _varied(design) if not pd.isna(first[name])}
+    mean = float(means.mean()) if means.size else None
+    described = ConditionSummary(
+        levels=levels,
+        people=int(means.size),
+        trials=len(rows),
+        mean=math.exp(mean) if question.kind == "number" and mean is not None else mean,
+        sd=float(means.std(ddof=1)) if means.size > 1 else None,
+    )
+    by_chance = chance(question)
+    if by_chance is None:
+        return described
+    right = int(rows["score"].sum())
+    test = binomial_test(right, len(rows), by_chance)
+    return replace(described, right=right, p=float(test.p), ci_low=float(test.ci_low), ci_high=float(test.ci_high))
+
+
+def _complete(rows: pd.DataFrame, factors: Sequence[str]) -> tuple[pd.DataFrame, tuple[str, ...]]:
+    """Every person's mean score by condition, one row a person; and who lacks one."""
+    within = [name for name in factors if rows.groupby("participant_id")[name].nunique().max() > 1]
+    wide = rows.pivot_table(index="participant_id", columns=within, values="score") if within else pd.DataFrame()
+    lacking = wide.index[wide.isna().any(axis=1)]
+    return wide.drop(index=lacking), tuple(map(str, lacking))
+
+
+def _groups(design: DesignConfig, rows: pd.DataFrame) -> pd.Series | None:
+    """Each person's level of the one factor that varies between people; `None` without one, or with more."""
+    if len(design.between) != 1:
+        return None
+    return rows.groupby("participant_id")[design.between[0]].first()
+
+
+def _comparisons(
+    design: DesignConfig, question: QuestionConfig, people: pd.DataFrame, group: pd.Series | None
+) -> Iterator[DesignTest]:
+    """What differs between conditions, by as many factors as there are."""
+    if people.empty or design.trial.kind == "pair" or question.kind == "ranking":
+        return
+    names = [str(name) for name in people.columns.names]
+    if len(people) < 2:
+        yield DesignTest(name="anova", effect=" × ".join(names), reason="fewer than two people have all conditions")
+        return
+    scores = people.to_numpy(dtype=np.float64)
+    if question.kind == "number" and len(names) == 1:
+        yield from _exponent(names[0], people)
+    if len(names) == 1 and group is not None:
+        yield from _mixed(design.between[0], names[0], scores, [str(group[code]) for code in people.index])
+    elif len(names) == 1:
+        yield from _one_factor(names[0], scores, question)
+    elif len(names) == 2 and group is None:
+        sizes = tuple(people.columns.get_level_values(name).nunique() for name in names)
+        if math.prod(sizes) == scores.shape[1]:
+            yield from map(_effect, two_within(scores.reshape(len(people), *sizes), (names[0], names[1])))
+    else:
+        effect = " × ".join((*design.between, *names))
+        yield DesignTest(name="anova", effect=effect, reason="there is no ANOVA here of more than two factors")
+
+
+def _one_factor(name: str, scores: FloatArray, question: QuestionConfig) -> Iterator[DesignTest]:
+    anova = rm_anova(scores)
+    yield DesignTest(
+        name="anova",
+        effect=name,
+        statistic=float(anova.F),
+        df=(int(anova.df_effect), int(anova.df_error)),
+        p=float(anova.p),
+        reason=str(anova.reason) or None,
+    )
+    if question.kind == "rating":
+        ranks = friedman(scores)
+        yield DesignTest(name="friedman", effect=name, statistic=ranks.chi2, p=ranks.p, reason=ranks.reason)
+
+
+def _mixed(between: str, within: str, scores: FloatArray, group: list[str]) -> Iterator[DesignTest]:
+    if len(set(group)) < 2 or min(map(group.count, group)) < 2:
+        yield DesignTest(name="anova", effect=f"{between} × {within}", reason="a group has fewer than two people")
+        return
+    yield from map(_effect, mixed(scores, group, (between, within)))
+
+
+def _effect(effect: FactorialEffect) -> DesignTest:
+    return DesignTest(
+        name="anova", effect=" × ".join(effect.source), statistic=effect.F, df=effect.df, p=effect.p, size=effect.size
+    )
+
+
+def _exponent(name: str, people: pd.DataFrame) -> Iterator[DesignTest]:
+    """The mean exponent of the power law: each person's slope of log number over log level, tested against 0."""
+    levels = people.columns.to_numpy(dtype=np.float64)
+    if not (levels > 0).all():
+        return
+    slopes = np.polyfit(np.log(levels), people.to_numpy(dtype=np.float64).T, 1)[0]
+    test = stats.ttest_1samp(slopes, 0.0)
+    low, high = test.confidence_interval()
+    yield DesignTest(
+        name="exponent",
+        effect=name,
+        statistic=float(slopes.mean()),
+        df=(len(slopes) - 1,),
+        p=float(test.pvalue),
+        ci_low=float(low),
+        ci_high=float(high),
+    )
+
+
+_TASKS: Mapping[str, Task] = {"two-interval": "two-interval", "pair": "two-interval", "abx": "abx", "oddity": "oddity"}
+
+
+def _sensitivity(design: DesignConfig, question: QuestionConfig, scored: pd.DataFrame) -> Iterator[DesignTest]:
+    """d′ of all people's answers together, by the formula of the task."""
+    if question.correct == "stimulus":
+        yield from _detection(scored)
+    elif question.correct in {"interval", "larger"} and len(scored):
+        found = discrimination(int(scored["score"].sum()), len(scored), _TASKS[design.trial.kind])
+        yield DesignTest(name="d_prime", effect=design.trial.kind, statistic=float(found.d_prime), size=None)
+
+
+def _detection(scored: pd.DataFrame) -> Iterator[DesignTest]:
+    stimulus = scored["stimulus"].astype(int) == 1
+    signal, noise = scored[stimulus]["score"], scored[~stimulus]["score"]
+    if len(signal) and len(noise):
+        found = yes_no(int(signal.sum()), len(signal), int(len(noise) - noise.sum()), len(noise))
+        yield DesignTest(name="d_prime", effect="stimulus", statistic=float(found.d_prime))
+        yield DesignTest(name="criterion", effect="stimulus", statistic=float(found.criterion))
+
+
+def levels_shown(levels: Mapping[str, Level]) -> str:
+    """A condition in words.
+
+    >>> levels_shown({"method": "soft", "voltage_V": 12.0})
+    'method soft, voltage_V 12'
+    """
+    return ", ".join(f"{name} {shown_level(level)}" for name, level in levels.items())

@@ -1,0 +1,284 @@
+"""A whole design, and what its tables must agree on: each disagreement in words, with place, value and what would do.
+
+What only the gun can tell (its methods, its limits) is checked when both are loaded.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import Annotated, Literal, Self, get_args
+
+from pydantic import Field, model_validator
+
+from device.words import Direction
+from experiments.config.door import ConsoleConfig, Model, Text, leaves
+from experiments.design.language import (
+    DIRECTION_FACTOR,
+    EMPTY,
+    INSTRUCTION_FACTOR,
+    INTERVAL_NAMES,
+    METHOD_FACTOR,
+    TRAIN_INTERVAL,
+    BreaksConfig,
+    ColumnName,
+    FactorConfig,
+    FatigueConfig,
+    LineText,
+    OpeningConfig,
+    OrderConfig,
+    PracticeConfig,
+    QuestionConfig,
+    TimingConfig,
+    TrialConfig,
+    shown_level,
+)
+
+
+class DesignConfig(Model):
+    """A design: `docs/design-language.md`."""
+
+    design: Annotated[str, Field(pattern=r"^[a-z]{1,32}$")]
+    title: LineText
+    gun: Text
+    synthetic: Text | None = None
+    table: Literal["trials", "ratings"] = "trials"
+    below_break_away: bool = False
+    seed: Annotated[int, Field(ge=0, le=2**63 - 1)] | None = None
+    assumed: tuple[Text, ...] = ()
+    factors: dict[ColumnName, FactorConfig] = Field(min_length=1, max_length=20)
+    order: OrderConfig = OrderConfig()
+    trial: TrialConfig = TrialConfig()
+    questions: dict[ColumnName, QuestionConfig] = Field(min_length=1, max_length=20)
+    opening: tuple[OpeningConfig, ...] = ()
+    practice: PracticeConfig = PracticeConfig()
+    breaks: BreaksConfig = BreaksConfig()
+    fatigue: FatigueConfig
+    timing: TimingConfig
+    console: ConsoleConfig = ConsoleConfig()
+
+    @property
+    def between(self) -> tuple[str, ...]:
+        """The factors that vary between participants."""
+        return tuple(name for name, factor in self.factors.items() if factor.between)
+
+    @property
+    def varying(self) -> tuple[str, ...]:
+        """The factors that vary from trial to trial, the compared one included."""
+        blocked = {*self.order.session, *self.order.set, *self.between}
+        return tuple(name for name in self.factors if name not in blocked)
+
+    @model_validator(mode="after")
+    def _agrees(self) -> Self:
+        for problem in _problems(self):
+            raise ValueError(problem)
+        return self
+
+
+def _problems(design: DesignConfig) -> Iterator[str]:
+    """What two tables of a design do not agree on, in words."""
+    yield from _name_problems(design)
+    yield from _factor_problems(design)
+    yield from _blocking_problems(design)
+    yield from _trial_problems(design)
+    for name, question in design.questions.items():
+        yield from (f"questions.{name}: {problem}" for problem in _right_answer_problems(design, question))
+    unknown = sorted(set(design.assumed) - set(leaves(design)))
+    if unknown:
+        yield f"assumed names {', '.join(unknown)}, which this design does not have; name existing keys"
+
+
+_COMMON_COLUMNS = frozenset(
+    [
+        "participant_id",
+        "experiment",
+        "session",
+        "set",
+        "trial",
+        "stimulus",
+        "attempts",
+        "flags",
+        "note",
+        "onset_utc",
+        "gun",
+        "shots",
+        "exposure_s",
+        "earlier_exposure_s",
+        "status",
+        "correct",
+    ]
+)
+
+
+def _name_problems(design: DesignConfig) -> Iterator[str]:
+    taken = [name for name in (*design.factors, *design.questions) if name in _COMMON_COLUMNS]
+    if taken:
+        yield f"{', '.join(taken)} is the name of a column that every table has; choose another name"
+    columns = [*_columns_of_factors(design), *_columns_of_questions(design)]
+    both = sorted({name for name in columns if columns.count(name) > 1})
+    if both:
+        yield f"{', '.join(both)} would be two columns of the table, of a factor or question each; rename one"
+    places = {
+        "order.session": design.order.session,
+        "order.set": design.order.set,
+        "order.longest_run": tuple(design.order.longest_run),
+        "practice.of": design.practice.of,
+        "trial.compare": (design.trial.compare,) if design.trial.compare else (),
+    }
+    for place, names in places.items():
+        for name in names:
+            if name not in design.factors:
+                yield f"{place} names {name!r}, which is no factor; the factors are {', '.join(design.factors)}"
+
+
+def _columns_of_factors(design: DesignConfig) -> Iterator[str]:
+    for name in design.factors:
+        yield name
+        if name == design.trial.compare:
+            yield from (f"{name}_{place}" for place in range(1, design.trial.intervals + 1))
+
+
+def _columns_of_questions(design: DesignConfig) -> Iterator[str]:
+    for name, question in design.questions.items():
+        yield name
+        if question.named_answers:
+            yield from (f"{name}_{part}" for part in ("correct", "time_s", "source", "time_valid"))
+        elif question.kind != "text":
+            yield f"{name}_by"
+
+
+def _factor_problems(design: DesignConfig) -> Iterator[str]:
+    if METHOD_FACTOR not in design.factors:
+        yield f"factors.{METHOD_FACTOR} is missing: name the rendering method, one level if there is only one"
+    for name, factor in design.factors.items():
+        found = (*_level_problems(name, factor), *_nesting_problems(design, factor))
+        yield from (f"factors.{name}: {problem}" for problem in found)
+        if factor.between and name in (*design.order.session, *design.order.set, design.trial.compare):
+            yield f"factors.{name}: between = true: it varies between people; take it out of order and trial"
+    told = design.factors.get(INSTRUCTION_FACTOR)
+    if told is not None and INSTRUCTION_FACTOR in design.varying and len(told.all_levels) > 1:
+        yield "order.set: instructions are read out before a set; name it in order.set or order.session"
+
+
+def _level_problems(name: str, factor: FactorConfig) -> Iterator[str]:
+    shown, unit = [shown_level(level) for level in factor.all_levels], name.rsplit("_", 1)[-1]
+    words = isinstance(factor.all_levels[0], str)
+    if name == DIRECTION_FACTOR and not set(shown) <= set(get_args(Direction)):
+        yield f"levels {', '.join(shown)}: directions are {', '.join(get_args(Direction))}"
+    if name in {METHOD_FACTOR, INSTRUCTION_FACTOR} and not words:
+        yield "levels are numbers; name them in words"
+    if unit in _UNITS and words:
+        yield f"levels are words, but the name ends with the unit {unit}; give numbers"
+    missing = [level for level in shown if level not in factor.texts]
+    if name == INSTRUCTION_FACTOR and missing:
+        yield f"texts has no words for {', '.join(missing)}; give what is read out"
+    if name != INSTRUCTION_FACTOR and factor.texts:
+        yield "texts are of the factor `instruction`; use labels here"
+
+
+_UNITS = frozenset(["V", "s", "N", "A", "ohm", "H", "kg", "m", "Hz", "N_m"])
+
+
+def _nesting_problems(design: DesignConfig, factor: FactorConfig) -> Iterator[str]:
+    if factor.within is None:
+        return
+    outer = design.factors.get(factor.within)
+    if outer is None or outer is factor:
+        yield f"within = {factor.within!r} is no other factor; the factors are {', '.join(design.factors)}"
+        return
+    if outer.within is not None:
+        yield f"within = {factor.within!r} is nested itself; one level of nesting is enough"
+    have = set(factor.levels) if isinstance(factor.levels, dict) else set()
+    off = have ^ {shown_level(level) for level in outer.all_levels}
+    if off:
+        yield f"levels must have one list for each level of {factor.within}; check {', '.join(sorted(off))}"
+
+
+def _blocking_problems(design: DesignConfig) -> Iterator[str]:
+    """A nested factor can be constant only where the one that it is nested in is constant as well."""
+    blocks = ("order.session", "order.set", "the trials")
+    for name, factor in design.factors.items():
+        if factor.within is None or factor.within not in design.factors or factor.within in design.between:
+            continue
+        inner, outer = _block(design, name), _block(design, factor.within)
+        if inner < outer or (outer == 1 and inner > outer):
+            where = f"{name} varies in {blocks[inner]} and {factor.within} in {blocks[outer]}"
+            yield (
+                f"factors.{name} is nested in {factor.within}, but {where}; block both in order.session, both in "
+                f"order.set, or {factor.within} alone in order.session"
+            )
+
+
+def _block(design: DesignConfig, name: str) -> int:
+    """In what a factor is constant: 0 a session, 1 a set, 2 a trial."""
+    return 0 if name in design.order.session else 1 if name in design.order.set else 2
+
+
+def _trial_problems(design: DesignConfig) -> Iterator[str]:
+    trial = design.trial
+    if trial.catch and design.order.trials != "random":
+        shown = f"catch trials in an order.trials of {design.order.trials!r} would be known; use random"
+        yield f"trial.catch = {trial.catch}: {shown}"
+    if TRAIN_INTERVAL in design.factors and trial.kind != "train":
+        yield f"factors.{TRAIN_INTERVAL} is the interval of a train, but trial.kind is {trial.kind!r}"
+    if trial.compare is not None and trial.compare in design.factors:
+        yield from _comparison_problems(design, trial.compare, design.factors[trial.compare])
+
+
+def _comparison_problems(design: DesignConfig, compare: str, factor: FactorConfig) -> Iterator[str]:
+    trial = design.trial
+    if compare not in design.varying:
+        yield f"trial.compare = {compare!r} is constant in a block or person; compare one that varies between trials"
+    if factor.within is not None:
+        yield f"trial.compare = {compare!r} is nested; compare one that is not"
+    if trial.kind == "pair" and len(factor.all_levels) < 2:
+        yield f"trial.kind = 'pair': {compare} has one level, which makes no pair"
+    if trial.standard is None:
+        return
+    shown = shown_level(trial.standard)
+    blank = shown == EMPTY and trial.kind == "two-interval"
+    if not blank and isinstance(trial.standard, str) != isinstance(factor.all_levels[0], str):
+        yield f"trial.standard = {trial.standard!r} is not of the kind of {compare}'s levels"
+    if trial.standard in factor.all_levels and trial.kind in {"abx", "oddity"}:
+        yield f"trial.standard = {shown} is a level of {compare} as well: nothing would differ; take it out"
+
+
+def _right_answer_problems(design: DesignConfig, question: QuestionConfig) -> Iterator[str]:
+    if question.correct is None:
+        return
+    if question.correct in {"interval", "larger"}:
+        yield from _interval_problems(design, question)
+    elif question.correct == "stimulus":
+        if question.kind != "yes-no" or not design.trial.catch:
+            yield "correct = 'stimulus' is for yes-no with catch trials; set trial.catch, or remove the key"
+    elif question.correct not in design.factors:
+        yield f"correct = {question.correct!r} is no factor; name a factor, or interval, larger or stimulus"
+    else:
+        answers = question.named_answers
+        levels = sorted(map(shown_level, design.factors[question.correct].all_levels))
+        if not set(levels) <= set(answers):
+            shown = f"its levels {', '.join(levels)} are not all among the answers {', '.join(answers)}"
+            yield f"correct = {question.correct!r}: {shown}"
+    if question.when == "block":
+        yield "when = 'block': a question about remembered trials is not scored; remove `correct`"
+
+
+def _interval_problems(design: DesignConfig, question: QuestionConfig) -> Iterator[str]:
+    trial, correct = design.trial, question.correct
+    if trial.intervals == 1:
+        yield f"correct = {correct!r}: a trial of kind {trial.kind!r} has one interval"
+        return
+    if correct == "larger" and not _numeric(design, trial.compare):
+        yield f"correct = 'larger': the levels of {trial.compare} are no numbers, so none is larger"
+    elif correct == "larger" and isinstance(trial.standard, str):
+        yield f"correct = 'larger': the standard is no number (it is {trial.standard!r}), so none is larger"
+    elif correct == "interval" and trial.kind == "pair":
+        yield "correct = 'interval': of a pair neither is the comparison; say larger, or leave the key out"
+    places = ("a", "b") if trial.kind == "abx" else INTERVAL_NAMES[: trial.intervals]
+    if set(question.named_answers) != set(places):
+        shown = f"the answers must be {', '.join(places)}, not {', '.join(question.named_answers)}"
+        yield f"correct = {correct!r}: {shown}"
+
+
+def _numeric(design: DesignConfig, name: str | None) -> bool:
+    factor = design.factors.get(name or "")
+    return factor is not None and not isinstance(factor.all_levels[0], str)

@@ -1,0 +1,331 @@
+"""The tables of a design: factors, order, trial, questions. `docs/design-language.md` explains them.
+
+What a table can tell by itself is checked here; what two must agree on, where the whole design is (`config`).
+"""
+
+from __future__ import annotations
+
+import unicodedata
+from collections.abc import Iterator, Mapping
+from typing import Annotated, Literal, Self
+
+from pydantic import AfterValidator, Field, model_validator
+
+from experiments.config.door import Model, Text, once
+
+MAX_TRIALS = 10_000
+"""More trials than this are refused."""
+
+
+def _printable(text: str) -> str:
+    """The text; `ValueError` for control characters, marks that turn the direction of writing, and blanks alone."""
+    for letter in text:
+        if unicodedata.category(letter) in {"Cc", "Cf", "Cs", "Zl", "Zp"}:
+            raise ValueError(f"holds the character U+{ord(letter):04X}, which is not printed; remove it")
+    if not text.strip():
+        raise ValueError("is blank; give it words or leave the key out")
+    return text
+
+
+ColumnName = Annotated[str, Field(pattern=r"^[A-Za-z][A-Za-z0-9_]{0,31}$")]
+"""A factor's or question's name: it becomes a column."""
+Level = str | float
+Levels = tuple[Level, ...]
+DurationSeconds = Annotated[float, Field(gt=0, le=86_400)]
+PauseSeconds = Annotated[float, Field(ge=0, le=86_400)]
+ShotCount = Annotated[int, Field(ge=1, le=10_000)]
+LineText = Annotated[str, Field(min_length=1, max_length=200), AfterValidator(_printable)]
+PageText = Annotated[Text, AfterValidator(_printable)]
+
+METHOD_FACTOR, DIRECTION_FACTOR, INSTRUCTION_FACTOR, TRAIN_INTERVAL = (
+    "method",
+    "direction",
+    "instruction",
+    "repeat_every_s",
+)
+
+
+def shown_level(level: Level) -> str:
+    """A level as it stands in tables and messages.
+
+    >>> shown_level(12.0), shown_level("off")
+    ('12', 'off')
+    """
+    return level if isinstance(level, str) else f"{level:.15g}"
+
+
+def _levels(levels: Levels) -> Levels:
+    shown = tuple(shown_level(level) for level in levels)
+    once(shown)
+    if len({isinstance(level, str) for level in levels}) > 1:
+        raise ValueError(f"{', '.join(shown)} mixes words and numbers; use one kind")
+    for level in levels:
+        if isinstance(level, str):
+            _printable(level)
+    return levels
+
+
+SomeLevels = Annotated[Levels, Field(min_length=1, max_length=100), AfterValidator(_levels)]
+
+
+class FactorConfig(Model):
+    """What varies. `levels` by the level of the factor `within`, if it is nested in one.
+
+    `sets`: what a level set by hand means for the model of the gun; `texts`: what is read out under an instruction.
+    """
+
+    levels: SomeLevels | dict[str, SomeLevels]
+    within: ColumnName | None = None
+    between: bool = False
+    labels: dict[str, LineText] = Field(default_factory=dict)
+    texts: dict[str, PageText] = Field(default_factory=dict)
+    sets: dict[str, dict[str, float]] = Field(default_factory=dict)
+
+    @model_validator(mode="after")
+    def _nested_or_not(self) -> Self:
+        if isinstance(self.levels, dict) and self.within is None:
+            raise ValueError("levels is a table, by the levels of another factor: name that one with `within`")
+        if not isinstance(self.levels, dict) and self.within is not None:
+            raise ValueError(f"within = {self.within!r} needs levels as a table: one list for each of its levels")
+        if self.between and self.within is not None:
+            raise ValueError("between = true: what varies between people cannot be nested; remove `within`")
+        return self
+
+    @model_validator(mode="after")
+    def _tables_are_of_levels(self) -> Self:
+        known = {shown_level(level) for level in self.all_levels}
+        named = {"labels": tuple(self.labels), "texts": tuple(self.texts), "sets": tuple(self.sets)}
+        for key, names in named.items():
+            for name in names:
+                if name not in known:
+                    raise ValueError(
+                        f"{key} has {name!r}, which is no level; the levels are {', '.join(sorted(known))}"
+                    )
+        return self
+
+    @property
+    def all_levels(self) -> Levels:
+        """Every level once, in the order of the file."""
+        lists = self.levels.values() if isinstance(self.levels, dict) else [self.levels]
+        return tuple(dict.fromkeys(level for one in lists for level in one))
+
+    def levels_within(self, outer: Level | None) -> Levels:
+        """The levels that there are, in the outer factor's level if it is nested."""
+        if isinstance(self.levels, dict):
+            return self.levels.get(shown_level("" if outer is None else outer), ())
+        return self.levels
+
+    def label(self, level: Level) -> str:
+        """What a level is called."""
+        return self.labels.get(shown_level(level), shown_level(level))
+
+
+BlockOrder = Literal["random", "fixed", "latin-square", "williams"]
+BalancedIn = Literal["session", "set", "set-exact"]
+
+
+class OrderConfig(Model):
+    """What is blocked into sessions and sets, and how often and in which order everything comes."""
+
+    session: Annotated[tuple[ColumnName, ...], AfterValidator(once)] = ()
+    set: Annotated[tuple[ColumnName, ...], AfterValidator(once)] = ()
+    sessions: BlockOrder = "random"
+    trials: BlockOrder = "random"
+    sets: Annotated[int, Field(ge=1, le=MAX_TRIALS)] = 1
+    repetitions: Annotated[int, Field(ge=1, le=MAX_TRIALS)] = 1
+    balance: BalancedIn = "session"
+    longest_run: dict[ColumnName, Annotated[int, Field(ge=1, le=MAX_TRIALS)]] = Field(default_factory=dict)
+
+    @model_validator(mode="after")
+    def _blocked_once(self) -> Self:
+        both = [name for name in self.set if name in self.session]
+        if both:
+            raise ValueError(
+                f"{', '.join(both)} is constant in a session and so in its sets; name it in `session` only"
+            )
+        return self
+
+    @model_validator(mode="after")
+    def _one_thing_orders(self) -> Self:
+        squares = {"latin-square", "williams"}
+        if self.sessions in squares and self.trials in squares:
+            raise ValueError(
+                f"sessions = {self.sessions!r} and trials = {self.trials!r}: a participant has one row of one square; "
+                'make one of them "random" or "fixed"'
+            )
+        if self.longest_run and self.trials != "random":
+            raise ValueError(f"longest_run: trials = {self.trials!r} has its own order; remove one of them")
+        return self
+
+
+EMPTY = "none"
+"""The standard of a comparison with nothing: that interval has no stimulus."""
+INTERVAL_NAMES = ("first", "second", "third")
+"""What the intervals of a trial are called."""
+TrialKind = Literal["single", "train", "two-interval", "pair", "abx", "oddity"]
+INTERVALS: dict[TrialKind, int] = {"single": 1, "train": 1, "two-interval": 2, "pair": 2, "abx": 3, "oddity": 3}
+"""How many intervals a trial of each kind has."""
+
+
+class TrialConfig(Model):
+    """One presentation: a shot, a train until “next”, or several intervals that are compared."""
+
+    kind: TrialKind = "single"
+    compare: ColumnName | None = None
+    standard: Level | None = None
+    gap_s: Annotated[float, Field(gt=0, le=60)] = 1.5
+    repeat_every_s: Annotated[float, Field(gt=0, le=3_600)] = 1.0
+    least_exposure_s: Annotated[float, Field(ge=0, le=3_600)] = 1.0
+    max_shots: ShotCount = 120
+    catch: Annotated[int, Field(ge=0, le=MAX_TRIALS)] = 0
+    feedback: bool = False
+
+    @property
+    def intervals(self) -> int:
+        """How many intervals a trial has."""
+        return INTERVALS[self.kind]
+
+    @model_validator(mode="after")
+    def _says_what_is_compared(self) -> Self:
+        several = self.intervals > 1
+        if several != (self.compare is not None):
+            what = "needs `compare`: the factor that differs between its intervals" if several else "compares nothing"
+            raise ValueError(f"kind = {self.kind!r} {what}")
+        needs_standard = self.kind in {"two-interval", "abx", "oddity"}
+        if needs_standard != (self.standard is not None):
+            what = (
+                "needs `standard`: the level that the others are compared with" if needs_standard else "has no standard"
+            )
+            raise ValueError(f"kind = {self.kind!r} {what}")
+        if self.catch and several:
+            raise ValueError(
+                f"catch = {self.catch}: catch trials are of one interval; kind {self.kind!r} has {self.intervals}"
+            )
+        return self
+
+
+QuestionKind = Literal["choice", "yes-no", "rating", "number", "ranking", "text"]
+YES, NO = "yes", "no"
+
+
+class QuestionConfig(Model):
+    """What is asked. `correct`: the factor whose level is right, or `interval`, `larger` or `stimulus`."""
+
+    kind: QuestionKind
+    text: PageText
+    when: Literal["trial", "block"] = "trial"
+    answers: Annotated[tuple[ColumnName, ...], Field(max_length=26), AfterValidator(once)] = ()
+    labels: dict[str, LineText] = Field(default_factory=dict)
+    keys: dict[str, Annotated[str, Field(pattern=r"^[a-z0-9]$|^(left|right|up|down)$")]] = Field(default_factory=dict)
+    correct: ColumnName | None = None
+    minimum: float | None = None
+    maximum: float | None = None
+    grain: Annotated[float, Field(ge=1e-6)] | None = None
+    minimum_text: LineText | None = None
+    maximum_text: LineText | None = None
+    may_be_skipped: bool = False
+
+    @property
+    def named_answers(self) -> tuple[str, ...]:
+        """The answers to choose among; none of a question without them."""
+        return (YES, NO) if self.kind == "yes-no" else self.answers
+
+    @model_validator(mode="after")
+    def _has_what_its_kind_needs(self) -> Self:
+        for problem in _question_problems(self):
+            raise ValueError(problem)
+        return self
+
+    def label(self, answer: str) -> str:
+        """What an answer is called to the participant."""
+        return self.labels.get(answer, answer)
+
+
+def _question_problems(question: QuestionConfig) -> Iterator[str]:
+    kind, chosen = question.kind, question.kind in {"choice", "yes-no"}
+    if question.correct is not None and not chosen:
+        yield f"correct = {question.correct!r}: only a choice or yes-no can be right; remove the key"
+    if kind == "ranking" and question.when != "block":
+        yield 'a ranking is of a block\'s trials; say when = "block"'
+    yield from _answer_problems(question)
+    yield from _number_problems(question)
+
+
+def _answer_problems(question: QuestionConfig) -> Iterator[str]:
+    kind, named = question.kind, question.named_answers
+    if kind == "choice" and len(question.answers) < 2:
+        yield "answers: a choice is among at least two; name them, or use another kind"
+    if kind != "choice" and question.answers:
+        yield f"answers: a question of kind {kind!r} has none; remove the key"
+    for key, table in {"labels": question.labels, "keys": question.keys}.items():
+        unknown = [name for name in table if name not in named]
+        if unknown:
+            yield f"{key} has {', '.join(unknown)}, which is no answer; the answers are {', '.join(named)}"
+        yield from _doubled(key, table)
+
+
+def _number_problems(question: QuestionConfig) -> Iterator[str]:
+    low, high, grain = question.minimum, question.maximum, question.grain
+    if question.kind == "rating":
+        yield from _scale_problems(low, high, grain)
+    elif question.kind != "number" and (low, high, grain) != (None, None, None):
+        yield f"minimum, maximum and grain are of a rating or a number, not of kind {question.kind!r}"
+    elif low is not None and high is not None and low >= high:
+        yield f"minimum {low:g} and maximum {high:g}: need minimum < maximum"
+
+
+def _doubled(key: str, table: Mapping[str, str]) -> Iterator[str]:
+    doubled = sorted({value for value in table.values() if list(table.values()).count(value) > 1})
+    if doubled:
+        yield f"{key}: {', '.join(map(repr, doubled))} stands for more than one answer; give each its own"
+
+
+def _scale_problems(minimum: float | None, maximum: float | None, grain: float | None) -> Iterator[str]:
+    if minimum is None or maximum is None or grain is None:
+        yield "a rating needs minimum, maximum and grain (1 for points, such as 0.1 for a continuous scale)"
+        return
+    if not -1e6 <= minimum < maximum <= 1e6:
+        yield f"minimum {minimum:g} and maximum {maximum:g}: need -1e6 <= minimum < maximum <= 1e6"
+        return
+    steps = (maximum - minimum) / grain
+    if abs(steps - round(steps)) > 1e-9 * steps:
+        yield f"grain {grain:g} does not divide the scale {minimum:g} to {maximum:g}; use a part, such as 1 or 0.5"
+
+
+class OpeningConfig(Model):
+    """A text for the participant before the first trial, which the experimenter confirms."""
+
+    kind: Literal["instruction", "consent"] = "instruction"
+    text: PageText
+
+
+class PracticeConfig(Model):
+    """Trials before the first session, in files of their own, never analysed: so many of each cell of `of`."""
+
+    repetitions: Annotated[int, Field(ge=0, le=100)] = 0
+    of: Annotated[tuple[ColumnName, ...], AfterValidator(once)] = ()
+    feedback: bool = False
+
+
+class BreaksConfig(Model):
+    """Rests between sets and between sessions."""
+
+    between_sets_s: PauseSeconds = 0.0
+    between_sessions_s: PauseSeconds = 0.0
+
+
+class FatigueConfig(Model):
+    """What a participant is spared: a design beyond it is refused."""
+
+    max_trials_without_break: Annotated[int, Field(ge=1, le=MAX_TRIALS)]
+    max_planned_s: DurationSeconds
+
+
+class TimingConfig(Model):
+    """How long the parts of a run take, and how long the whole is said to take."""
+
+    hand_over_s: PauseSeconds
+    stimulus_s: PauseSeconds = 0.0
+    answer_s: PauseSeconds = 0.0
+    opening_s: PauseSeconds = 0.0
+    planned_s: DurationSeconds

@@ -1,0 +1,168 @@
+"""A design as the Methods section of a paper says it: what varied, in which order, and what was asked. Pure."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+
+from experiments.design.config import DesignConfig
+from experiments.design.language import EMPTY, BlockOrder, FactorConfig, QuestionConfig, shown_level
+from experiments.design.planned import PlannedRun
+from experiments.design.stimuli import by_hand
+
+
+def methods_section(design: DesignConfig, planned: PlannedRun) -> tuple[str, ...]:
+    """The paragraphs: what varied, in which order, what a trial was, what was asked, how long it took."""
+    return (
+        " ".join(_factors(design)),
+        " ".join(_order(design, planned)),
+        " ".join(_trial(design)),
+        " ".join(_questions(design)),
+        " ".join(_rests(design, planned)),
+    )
+
+
+def _factors(design: DesignConfig) -> Iterator[str]:
+    within = [(name, one) for name, one in design.factors.items() if not one.between and len(one.all_levels) > 1]
+    between = [(name, design.factors[name]) for name in design.between]
+    constant = [(name, one) for name, one in design.factors.items() if not one.between and len(one.all_levels) == 1]
+    if within:
+        yield f"{_sentence(within)} varied within participants."
+    if between:
+        yield f"{_sentence(between)} varied between participants."
+    if constant:
+        yield f"{_sentence(constant)} was the same in all trials."
+    hands = [name for name in by_hand(design) if len(design.factors[name].all_levels) > 1]
+    if hands:
+        yield f"The experimenter set {_listed(hands)} by hand."
+
+
+def _sentence(named: Sequence[tuple[str, FactorConfig]]) -> str:
+    told = [
+        f"{_word(name)} ({', '.join(factor.label(level) for level in factor.all_levels)})" for name, factor in named
+    ]
+    text = _listed(told)
+    return text[0].upper() + text[1:]
+
+
+_UNITS = {"V": "V", "s": "s", "N": "N", "A": "A", "ohm": "Ω", "m": "m", "kg": "kg", "Hz": "Hz"}
+
+
+def _word(name: str) -> str:
+    """A factor's name as words, with its unit.
+
+    >>> _word("voltage_V"), _word("posture")
+    ('voltage in V', 'posture')
+    """
+    stem, _, unit = name.rpartition("_")
+    return f"{stem.replace('_', ' ')} in {_UNITS[unit]}" if stem and unit in _UNITS else name.replace("_", " ")
+
+
+def _listed(words: Sequence[str]) -> str:
+    """Words as a sentence lists them.
+
+    >>> _listed(["a"]), _listed(["a", "b"]), _listed(["a", "b", "c"])
+    ('a', 'a and b', 'a, b and c')
+    """
+    return words[0] if len(words) == 1 else f"{', '.join(words[:-1])} and {words[-1]}"
+
+
+_HOW: dict[BlockOrder, str] = {
+    "random": "in random order",
+    "fixed": "in a fixed order",
+    "latin-square": "in an order balanced over participants by a Latin square",
+    "williams": "in an order balanced over participants by a Williams design",
+}
+
+
+def _order(design: DesignConfig, planned: PlannedRun) -> Iterator[str]:
+    order = design.order
+    each = planned.trials // planned.sessions
+    if planned.sessions > 1:
+        blocked = _listed([_word(name) for name in order.session])
+        yield f"There were {planned.sessions} sessions, each of one {blocked}, {_HOW[order.sessions]}."
+    where = "In each session" if planned.sessions > 1 else "In the session"
+    times = {1: "once", 2: "twice"}.get(order.repetitions, f"{order.repetitions} times")
+    yield f"{where} every condition came {times}, {_HOW[order.trials]}: {each} trials{_sets(design, each)}."
+    if order.set:
+        yield f"{_listed([_word(name) for name in order.set]).capitalize()} was constant in a set."
+    for name, most in order.longest_run.items():
+        yield f"No level of {_word(name)} came more than {most} times in a row."
+
+
+def _sets(design: DesignConfig, trials: int) -> str:
+    sets = design.order.sets
+    if sets == 1:
+        return ""
+    balance = {
+        "session": "",
+        "set": ", each condition as evenly over the sets as it goes",
+        "set-exact": ", each condition equally often in every set",
+    }[design.order.balance]
+    return f" in {sets} sets of {trials // sets}{balance}"
+
+
+def _trial(design: DesignConfig) -> Iterator[str]:
+    trial = design.trial
+    yield f"A trial was {_one_interval(design) if trial.intervals == 1 else _several_intervals(design)}."
+    if trial.catch:
+        yield f"{trial.catch} catch trials in a session had no stimulus."
+    yield "Participants were told whether they were right." if trial.feedback else "There was no feedback."
+
+
+def _one_interval(design: DesignConfig) -> str:
+    trial = design.trial
+    if trial.kind == "single":
+        return "one shot"
+    return (
+        f"a train of shots, one every {trial.repeat_every_s:g} s, until the participant said next (after "
+        f"{trial.least_exposure_s:g} s at the earliest, {trial.max_shots} shots at the most)"
+    )
+
+
+def _several_intervals(design: DesignConfig) -> str:
+    trial, compared = design.trial, _word(design.trial.compare or "")
+    gap = f"{trial.gap_s:g} s apart"
+    if trial.kind == "pair":
+        return f"two shots {gap} that differed in {compared}: all pairs, in both orders as often as it goes"
+    standard = shown_level(trial.standard) if trial.standard is not None else ""
+    named = f"the standard ({compared}: {standard})"
+    if trial.kind == "abx":
+        return f"three shots {gap}: A, B and one of them again; one was {named}"
+    if trial.kind == "oddity":
+        return f"three shots {gap}, two at {named}, in random places"
+    if standard == EMPTY:
+        return f"two intervals {gap}, one of them empty, each equally often first"
+    return f"two shots {gap}, one at {named}, each equally often first"
+
+
+def _questions(design: DesignConfig) -> Iterator[str]:
+    for when, opening in (("trial", "After each trial"), ("block", "After a set, about each of its trials,")):
+        asked = [question for question in design.questions.values() if question.when == when]
+        if asked:
+            yield f"{opening} participants were asked: {_listed([_question(question) for question in asked])}."
+
+
+def _question(question: QuestionConfig) -> str:
+    match question.kind:
+        case "choice" | "yes-no":
+            how = " or ".join(question.label(answer) for answer in question.named_answers)
+        case "rating":
+            low = f"{question.minimum:g}" + (f" = {question.minimum_text}" if question.minimum_text else "")
+            high = f"{question.maximum:g}" + (f" = {question.maximum_text}" if question.maximum_text else "")
+            how = f"{low} to {high}, in steps of {question.grain:g}"
+        case "number":
+            how = "a number of their own"
+        case "ranking":
+            how = "an order of the set's trials"
+        case "text":
+            how = "in their own words"
+    return f"“{question.text}” ({how})"
+
+
+def _rests(design: DesignConfig, planned: PlannedRun) -> Iterator[str]:
+    breaks = design.breaks
+    if breaks.between_sets_s and planned.sets > planned.sessions:
+        yield f"Sets were {breaks.between_sets_s:g} s apart."
+    if breaks.between_sessions_s and planned.sessions > 1:
+        yield f"Sessions were {breaks.between_sessions_s:g} s apart."
+    yield f"The {planned.trials} trials took {planned.duration_s / 60:.3g} min as planned."

@@ -1,0 +1,95 @@
+"""What a plan asks of a participant and of the experimenter: how long it takes, rests, and what hands change. Pure."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from itertools import pairwise
+
+from experiments.config.door import ConfigError
+from experiments.design.config import DesignConfig
+from experiments.design.planning import DesignPlan, DesignTrial
+from experiments.design.stimuli import by_hand
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class PlannedRun:
+    """One run as planned: `break_s` of `duration_s` are rests; `hand_changes` is how often hands set something anew."""
+
+    sessions: int
+    sets: int
+    trials: int
+    break_s: float
+    duration_s: float
+    trials_without_break: int
+    hand_changes: int
+
+
+def planned_run(design: DesignConfig, plan: DesignPlan) -> PlannedRun:
+    """What a plan comes to. `ConfigError`: it is more than the design lets a participant be asked for."""
+    timing, trials = design.timing, plan.trials
+    rests_s = [_rest_s(design, before, trial) for before, trial in pairwise(trials)]
+    trial_s = timing.hand_over_s + timing.stimulus_s + timing.answer_s
+    found = PlannedRun(
+        sessions=len({trial.session for trial in trials}),
+        sets=len({(trial.session, trial.set) for trial in trials}),
+        trials=len(trials),
+        break_s=sum(rests_s),
+        duration_s=timing.opening_s + len(trials) * trial_s + sum(rests_s),
+        trials_without_break=max(_stretches(rests_s)),
+        hand_changes=sum(_by_hand(design, one) != _by_hand(design, other) for one, other in pairwise(trials)),
+    )
+    _check_fatigue(design, found)
+    return found
+
+
+def _rest_s(design: DesignConfig, before: DesignTrial, trial: DesignTrial) -> float:
+    """How long the rest is that lies between two trials."""
+    if before.session != trial.session:
+        return design.breaks.between_sessions_s
+    return design.breaks.between_sets_s if before.set != trial.set else 0.0
+
+
+def _stretches(rests_s: list[float]) -> Iterator[int]:
+    """How many trials there are from one rest to the next."""
+    length = 1
+    for rest_s in rests_s:
+        if rest_s > 0:
+            yield length
+            length = 0
+        length += 1
+    yield length
+
+
+def _by_hand(design: DesignConfig, trial: DesignTrial) -> tuple[object, ...]:
+    """What hands set for a trial: its method, which may have a damper, and the factors that are theirs."""
+    return (trial.level("method"), *(trial.level(name) for name in by_hand(design)))
+
+
+def _check_fatigue(design: DesignConfig, found: PlannedRun) -> None:
+    fatigue = design.fatigue
+    if found.trials_without_break > fatigue.max_trials_without_break:
+        raise ConfigError(
+            f"{found.trials_without_break} trials without a break exceed fatigue.max_trials_without_break = "
+            f"{fatigue.max_trials_without_break}; make sets smaller, or breaks.between_sets_s longer than 0"
+        )
+    if found.duration_s > fatigue.max_planned_s:
+        raise ConfigError(
+            f"the planned duration of {found.duration_s:g} s exceeds fatigue.max_planned_s = "
+            f"{fatigue.max_planned_s:g} s; plan fewer or shorter trials and breaks"
+        )
+
+
+def warnings(design: DesignConfig, found: PlannedRun) -> Iterator[str]:
+    """What is allowed and most likely not meant."""
+    if found.duration_s > design.timing.planned_s:
+        yield (
+            f"the plan takes {found.duration_s:g} s, longer than timing.planned_s = {design.timing.planned_s:g} s, "
+            "which is what participants are told"
+        )
+    if found.trials > 1 and by_hand(design) and found.hand_changes > found.trials // 2:
+        names = ", ".join(by_hand(design))
+        yield (
+            f"hands set something anew {found.hand_changes} times in {found.trials} trials ({names}); name the factor "
+            "in order.session to set it once a session"
+        )

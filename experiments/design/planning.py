@@ -1,0 +1,442 @@
+"""From a design to the plan of one participant: cells, sessions, sets, intervals, and the order of everything. Pure.
+
+Every shuffle has a stream of its own, so a change of one factor changes no other factor's order. What cannot be
+balanced as the design asks is refused with the nearest numbers that can.
+"""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import asdict, dataclass
+from itertools import combinations, product
+
+from pydantic import TypeAdapter
+
+from experiments.config.door import ConfigError, Order
+from experiments.config.setup import sha256
+from experiments.design.config import DesignConfig
+from experiments.design.language import MAX_TRIALS, BlockOrder, Level, shown_level
+from experiments.design.plan import square_rows
+from experiments.design.streams import Stream
+
+Condition = tuple[tuple[str, Level], ...]
+"""Names of factors with their levels, in the order of the file."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class DesignTrial:
+    """One planned trial. `session`, `set` and `trial` count from 1; `trial` runs through the session.
+
+    `intervals` are the levels of the compared factor, in the order in which they are felt, and `odd` the place among
+    them (from 0) of the comparison: in ABX of the one that X repeats. A `catch` trial has no stimulus.
+    """
+
+    session: int
+    set: int
+    trial: int
+    levels: Condition
+    intervals: tuple[Level, ...] = ()
+    odd: int | None = None
+    catch: bool = False
+
+    def level(self, name: str) -> Level | None:
+        """The level of a factor; `None` if the trial has none."""
+        return dict(self.levels).get(name)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class DesignPlan:
+    """All trials of one participant: frozen and hashed before the first of them.
+
+    `order_row`: the row of the balancing square, `None` without one. `group`: which combination of the levels that vary
+    between people is this participant's, counted from 0.
+    """
+
+    design: str
+    participant_id: str
+    seed: int
+    order_row: int | None
+    group: int
+    trials: tuple[DesignTrial, ...]
+    format: int = 2
+
+    def record(self) -> dict[str, object]:
+        """The plan as plain JSON values."""
+        return asdict(self)
+
+    @classmethod
+    def from_record(cls, record: object) -> DesignPlan:
+        """The plan that a journal's head holds; `pydantic.ValidationError` if it holds none."""
+        return _PLAN.validate_python(record)
+
+    def sha256(self) -> str:
+        """The hash that names this plan: SHA-256 over its canonical JSON."""
+        return sha256(self.record())
+
+
+_PLAN = TypeAdapter(DesignPlan)
+
+
+def cells(design: DesignConfig, names: Sequence[str], given: Condition = ()) -> list[Condition]:
+    """Every combination of the factors' levels, nested ones by the level that they are nested in.
+
+    `given` are levels that hold already; a factor that is nested in one of them has the levels that it has there.
+    """
+    found: list[Condition] = [()]
+    for name in _outer_first(design, names):
+        factor = design.factors[name]
+        found = [
+            (*cell, (name, level))
+            for cell in found
+            for level in factor.levels_within(dict((*given, *cell)).get(factor.within or ""))
+        ]
+    order = {name: place for place, name in enumerate(design.factors)}
+    return [tuple(sorted(cell, key=lambda pair: order[pair[0]])) for cell in found]
+
+
+def _outer_first(design: DesignConfig, names: Sequence[str]) -> list[str]:
+    return sorted(names, key=lambda name: design.factors[name].within is not None)
+
+
+def groups(design: DesignConfig) -> list[Condition]:
+    """The combinations of levels that vary between people; one empty group if none does."""
+    return cells(design, design.between)
+
+
+def square_size(design: DesignConfig) -> int:
+    """How many rows the balancing square has; 0 if no order is balanced over participants."""
+    return max(
+        len(square_rows(_square(design.order.sessions), len(_sessions(design, ())))),
+        len(square_rows(_square(design.order.trials), len(_session_cells(design, ())))),
+    )
+
+
+def _square(order: BlockOrder) -> Order:
+    return "random" if order == "fixed" else order
+
+
+def _sessions(design: DesignConfig, given: Condition) -> list[Condition]:
+    return cells(design, design.order.session, given)
+
+
+def _session_cells(design: DesignConfig, given: Condition) -> list[Condition]:
+    names = [name for name in design.varying if name != design.trial.compare or design.trial.kind != "pair"]
+    return cells(design, names, given)
+
+
+def plan_of(
+    design: DesignConfig, participant_id: str, seed: int, *, row: int | None = None, group: int = 0
+) -> DesignPlan:
+    """The plan that a design, a participant, a seed, a row of the square and a group make; the same for the same.
+
+    `ConfigError`: the row or group does not exist, or the design asks for a balance that there is none of.
+    """
+    given = _chosen("group", groups(design), group)
+    if row is not None and row not in range(square_size(design)):
+        raise ConfigError(f"order_row = {row!r}: the orders have {square_size(design)} rows, counted from 0")
+    who = (design.design, participant_id)
+    sessions = _ordered(design.order.sessions, _sessions(design, given), row, Stream(seed, "session-order", *who))
+    trials = [
+        trial
+        for number, levels in enumerate(sessions, start=1)
+        for trial in _session(design, number, (*given, *levels), _Streams(seed, (*who, str(number))), row)
+    ]
+    return DesignPlan(
+        design=design.design, participant_id=participant_id, seed=seed, order_row=row, group=group, trials=tuple(trials)
+    )
+
+
+def _chosen(what: str, among: Sequence[Condition], place: int) -> Condition:
+    if place not in range(len(among)):
+        raise ConfigError(f"{what} = {place!r}: there are {len(among)}, counted from 0")
+    return among[place]
+
+
+def _ordered(order: BlockOrder, items: Sequence[Condition], row: int | None, stream: Stream) -> list[Condition]:
+    """The items at random, as they stand, or by a row of the square over them."""
+    if order == "fixed":
+        return list(items)
+    rows = square_rows(order, len(items))
+    if row is None or not rows:
+        return stream.shuffled(items)
+    return [items[place] for place in rows[row % len(rows)]]
+
+
+@dataclass(frozen=True, slots=True)
+class _Streams:
+    seed: int
+    session: tuple[str, ...]
+
+    def of(self, purpose: str, *more: str) -> Stream:
+        return Stream(self.seed, purpose, *self.session, *more)
+
+
+@dataclass(frozen=True, slots=True)
+class _Content:
+    """What a trial holds, before its place is known."""
+
+    levels: Condition
+    intervals: tuple[Level, ...] = ()
+    odd: int | None = None
+    catch: bool = False
+
+
+def _session(
+    design: DesignConfig, number: int, given: Condition, streams: _Streams, row: int | None
+) -> Iterator[DesignTrial]:
+    sets = design.order.sets
+    set_levels = _set_levels(design, given, streams)
+    contents = _contents(design, given, streams)
+    check_sets(design, len(contents))
+    shared = _shared(design, contents, streams)
+    if design.order.trials == "random":
+        parts = _limited(
+            [streams.of("trials", str(place)).shuffled(part) for place, part in enumerate(shared)], design, streams
+        )
+    else:
+        parts = _by_square(design, contents, row, sets)
+    place = 0
+    order = {name: at for at, name in enumerate(design.factors)}
+    for at, part in enumerate(parts):
+        for content in part:
+            place += 1
+            levels = sorted((*given, *set_levels[at], *content.levels), key=lambda pair: order[pair[0]])
+            yield DesignTrial(
+                session=number,
+                set=at + 1,
+                trial=place,
+                levels=tuple(levels),
+                intervals=content.intervals,
+                odd=content.odd,
+                catch=content.catch,
+            )
+
+
+def _set_levels(design: DesignConfig, given: Condition, streams: _Streams) -> list[Condition]:
+    """The levels of each set: each combination equally often, in random order."""
+    found, sets = cells(design, design.order.set, given), design.order.sets
+    if sets % len(found):
+        raise ConfigError(
+            f"order.sets = {sets} cannot be shared equally among the {len(found)} combinations of order.set; "
+            f"nearest: {_multiples(sets, len(found))}"
+        )
+    return streams.of("set-order").shuffled(found * (sets // len(found)))
+
+
+def _multiples(value: int, of: int) -> str:
+    below, above = value // of * of, (value // of + 1) * of
+    return " or ".join(str(one) for one in (below, above) if one)
+
+
+def _contents(design: DesignConfig, given: Condition, streams: _Streams) -> list[_Content]:
+    """What the trials of a session hold: each cell as often as it is repeated, and the catch trials."""
+    found = _session_cells(design, given)
+    count = len(found) * design.order.repetitions + design.trial.catch
+    if count > MAX_TRIALS:
+        raise ConfigError(
+            f"a session of {count:,} trials is more than the {MAX_TRIALS:,} that are planned; repeat less"
+        )
+    if design.trial.intervals > 1:
+        contents = [
+            one for at, cell in enumerate(found) for one in _compared(design, cell, streams.of("intervals", str(at)))
+        ]
+    else:
+        contents = [_Content(cell) for cell in found for _ in range(design.order.repetitions)]
+    blank = tuple(pair for pair in found[0] if len(design.factors[pair[0]].all_levels) == 1) if found else ()
+    return contents + [_Content(blank, catch=True)] * design.trial.catch
+
+
+def _compared(design: DesignConfig, cell: Condition, stream: Stream) -> list[_Content]:
+    """The repetitions of a cell, with every arrangement of its intervals as equally often as it gets."""
+    trial, repetitions = design.trial, design.order.repetitions
+    name = trial.compare or ""
+    if trial.kind == "pair":
+        pairs = list(combinations(design.factors[name].levels_within(None), 2))
+        return [
+            _Content(cell, pair if first else pair[::-1], odd=None)
+            for pair in pairs
+            for first in stream.shuffled([place % 2 == 0 for place in _offset(repetitions, stream)])
+        ]
+    level, standard = dict(cell)[name], trial.standard
+    if standard is None:
+        raise ConfigError(f"trial.standard is missing: kind {trial.kind!r} compares with it")
+    forms = _arrangements(trial.kind, level, standard)
+    chosen = [forms[place % len(forms)] for place in _offset(repetitions, stream, len(forms))]
+    return [_Content(cell, held, odd) for held, odd in stream.shuffled(chosen)]
+
+
+def _offset(count: int, stream: Stream, forms: int = 2) -> range:
+    """So many places in a row, from a random one on: which form comes once more is chance."""
+    start = stream.below(forms)
+    return range(start, start + count)
+
+
+def _arrangements(kind: str, level: Level, standard: Level) -> list[tuple[tuple[Level, ...], int]]:
+    """What the intervals hold, and the place of the comparison: in ABX of the one that X repeats."""
+    if kind == "two-interval":
+        return [((level, standard), 0), ((standard, level), 1)]
+    if kind == "abx":
+        return [((*pair, pair[x]), x) for pair in ((level, standard), (standard, level)) for x in (0, 1)]
+    return [(tuple(level if at == odd else standard for at in range(3)), odd) for odd in range(3)]
+
+
+def check_sets(design: DesignConfig, trials: int) -> None:
+    """`ConfigError` unless the trials of a session share out equally among its sets, as `balance` asks."""
+    order = design.order
+    if trials % order.sets:
+        near = [n for n in range(1, trials + 1) if trials % n == 0]
+        below = max((n for n in near if n < order.sets), default=None)
+        above = min((n for n in near if n > order.sets), default=None)
+        shown = " or ".join(str(n) for n in (below, above) if n)
+        raise ConfigError(
+            f"order.sets = {order.sets}: the {trials} trials of a session cannot be shared equally among them; "
+            f"nearest: {shown}"
+        )
+    if order.balance == "set-exact" and order.repetitions % order.sets:
+        raise ConfigError(
+            f'order.balance = "set-exact" is impossible: {order.repetitions} repetitions cannot be shared equally '
+            f"among {order.sets} sets; nearest: repetitions = {_multiples(order.repetitions, order.sets)}, or "
+            'balance = "set" for as even as it gets'
+        )
+
+
+def _shared(design: DesignConfig, contents: list[_Content], streams: _Streams) -> list[list[_Content]]:
+    """The trials of each set, before they are shuffled."""
+    sets, size = design.order.sets, len(contents) // design.order.sets
+    if design.order.balance == "session" or sets == 1:
+        mixed = streams.of("session-trials").shuffled(contents)
+        return [mixed[place * size : (place + 1) * size] for place in range(sets)]
+    alike: dict[tuple[Condition, bool], list[_Content]] = {}
+    for content in contents:
+        alike.setdefault((_balanced(content, design), content.catch), []).append(content)
+    # what divides goes to every set; what is left over is dealt round in a random order, so sizes stay equal
+    dealt: list[list[_Content]] = [[] for _ in range(sets)]
+    left: list[_Content] = []
+    for cell in streams.of("dealing").shuffled(list(alike)):
+        same = alike[cell]
+        each = len(same) // sets
+        for place in range(sets):
+            dealt[place].extend(same[place * each : (place + 1) * each])
+        left.extend(same[each * sets :])
+    places = streams.of("dealing-sets").shuffled(range(sets))
+    for at, content in enumerate(left):
+        dealt[places[at % sets]].append(content)
+    return dealt
+
+
+def _balanced(content: _Content, design: DesignConfig) -> Condition:
+    """What is balanced of a trial: its cell, or its pair."""
+    pair = tuple(sorted(map(shown_level, content.intervals))) if design.trial.kind == "pair" else ()
+    return (*content.levels, *(("pair", one) for one in pair))
+
+
+def _by_square(design: DesignConfig, contents: list[_Content], row: int | None, sets: int) -> list[list[_Content]]:
+    """The cells in a row of the square, or as they stand, as often as they are repeated."""
+    alike: dict[Condition, list[_Content]] = {}
+    for content in contents:
+        alike.setdefault(_balanced(content, design), []).append(content)
+    order = list(alike)
+    rows = square_rows(_square(design.order.trials), len(order))
+    if rows:
+        order = [order[place] for place in rows[(row or 0) % len(rows)]]
+    flat = [alike[cell][turn] for turn in range(design.order.repetitions) for cell in order if turn < len(alike[cell])]
+    size = len(flat) // sets
+    return [flat[place * size : (place + 1) * size] for place in range(sets)]
+
+
+_TRIES = 200
+
+
+def _limited(parts: list[list[_Content]], design: DesignConfig, streams: _Streams) -> list[list[_Content]]:
+    """The sets in an order that keeps every limit on runs. `ConfigError`: none was found."""
+    limits = design.order.longest_run
+    if not limits:
+        return parts
+    for attempt in range(_TRIES):
+        stream, run, done = streams.of("runs", str(attempt)), _Run(limits), []
+        for part in parts:
+            ordered = _in_limits(part, run, stream)
+            if ordered is None:
+                break
+            done.append(ordered)
+        else:
+            return done
+    shown = ", ".join(f"{name} = {most}" for name, most in limits.items())
+    raise ConfigError(f"order.longest_run ({shown}): no such order was found in {_TRIES} tries; allow longer runs")
+
+
+class _Run:
+    """How long each limited factor's last level has been following itself."""
+
+    def __init__(self, limits: Mapping[str, int]) -> None:
+        self.limits = limits
+        self.last: dict[str, tuple[Level | None, int]] = dict.fromkeys(limits, (None, 0))
+
+    def length(self, name: str, level: Level | None) -> int:
+        """The length of the run that one more of a level makes."""
+        last, length = self.last[name]
+        return length + 1 if last == level else 1
+
+    def takes(self, content: _Content) -> bool:
+        levels = dict(content.levels)
+        return all(self.length(name, levels.get(name)) <= most for name, most in self.limits.items())
+
+    def add(self, content: _Content) -> None:
+        levels = dict(content.levels)
+        self.last = {name: (levels.get(name), self.length(name, levels.get(name))) for name in self.limits}
+
+    def fits(self, left: Mapping[str, Counter[Level | None]], total: int) -> bool:
+        """Can what is left of every level still be placed? Necessary; with one limited factor sufficient."""
+        for name, most in self.limits.items():
+            last, length = self.last[name]
+            for level, count in left[name].items():
+                room = most - length if level == last else most
+                if count > room + most * (total - count):
+                    return False
+        return True
+
+
+def _in_limits(part: list[_Content], run: _Run, stream: Stream) -> list[_Content] | None:
+    """One set in an order that keeps the limits, found from front to back; `None` if it ran into a dead end."""
+    left = Counter(part)
+    levels = {name: Counter(dict(content.levels).get(name) for content in part) for name in run.limits}
+    done: list[_Content] = []
+    while len(done) < len(part):
+        total = len(part) - len(done) - 1
+        allowed = [
+            one for one, count in left.items() if count and run.takes(one) and _leaves_room(one, run, levels, total)
+        ]
+        if not allowed:
+            return None
+        chosen = _drawn(allowed, left, stream)
+        run.add(chosen)
+        left[chosen] -= 1
+        for name in run.limits:
+            levels[name][dict(chosen.levels).get(name)] -= 1
+        done.append(chosen)
+    return done
+
+
+def _drawn(allowed: Sequence[_Content], left: Counter[_Content], stream: Stream) -> _Content:
+    """One of the allowed, the more likely the more there is left of it."""
+    place = stream.below(sum(left[one] for one in allowed))
+    for one in allowed:
+        place -= left[one]
+        if place < 0:
+            return one
+    raise AssertionError("the counts are above 0")
+
+
+def _leaves_room(content: _Content, run: _Run, levels: Mapping[str, Counter[Level | None]], total: int) -> bool:
+    after = _Run(run.limits)
+    after.last = run.last
+    after.add(content)
+    own = dict(content.levels)
+    left = {name: counts - Counter({own.get(name): 1}) for name, counts in levels.items()}
+    return after.fits(left, total)
+
+
+def blocks(design: DesignConfig, given: Condition) -> Iterator[tuple[Condition, Condition]]:
+    """Each session's levels with each of its sets' levels, in the order of the file: what `check` lists."""
+    yield from product(_sessions(design, given), cells(design, design.order.set, given))

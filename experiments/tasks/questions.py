@@ -1,0 +1,140 @@
+"""The questions of a design: their keys, what may be answered, what is right, and chance. Pure."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Mapping, Sequence
+from string import ascii_lowercase, digits
+
+from experiments.design.config import DesignConfig
+from experiments.design.language import (
+    INTERVAL_NAMES,
+    NO,
+    YES,
+    QuestionConfig,
+    shown_level,
+)
+from experiments.design.planning import DesignTrial
+
+AnswerValue = str | float | tuple[int, ...] | None
+"""A named answer or words, a number, the trials of a block in order of rank, or none."""
+
+MAX_TEXT = 2_000
+
+
+def answer_keys(question: QuestionConfig) -> dict[str, str]:
+    """The participant's key for each answer: its own, or the first letter of its label that is free, or a digit.
+
+    >>> q = QuestionConfig(kind="choice", text="?", answers=("f", "b"), labels={"f": "vorwärts", "b": "rückwärts"})
+    >>> answer_keys(q)
+    {'f': 'v', 'b': 'r'}
+    """
+    keys = dict(question.keys)
+    for answer in question.named_answers:
+        if answer not in keys:
+            letters = [letter for letter in question.label(answer).casefold() if letter in ascii_lowercase]
+            taken = set(keys.values())
+            keys[answer] = next(key for key in (*letters, *digits[1:], *ascii_lowercase) if key not in taken)
+    return {answer: keys[answer] for answer in question.named_answers}
+
+
+def right_answer(design: DesignConfig, question: QuestionConfig, trial: DesignTrial) -> str | None:
+    """What is right for a trial; `None` where nothing is, as with equal levels when the larger one is asked for."""
+    match question.correct:
+        case None:
+            return None
+        case "stimulus":
+            return NO if trial.catch else YES
+        case "interval":
+            places = ("a", "b") if design.trial.kind == "abx" else INTERVAL_NAMES
+            return None if trial.odd is None else places[trial.odd]
+        case "larger":
+            return _larger(trial)
+        case factor:
+            level = trial.level(factor)
+            return None if level is None else shown_level(level)
+
+
+def _larger(trial: DesignTrial) -> str | None:
+    numbers = [level for level in trial.intervals if isinstance(level, float)]
+    if len(numbers) != len(trial.intervals) or numbers.count(max(numbers)) > 1:
+        return None
+    return INTERVAL_NAMES[numbers.index(max(numbers))]
+
+
+def chance(question: QuestionConfig) -> float | None:
+    """How often who does not know is right; `None` of a question that nothing is right for."""
+    return None if question.correct is None else 1.0 / len(question.named_answers)
+
+
+def answer_problem(question: QuestionConfig, answer: AnswerValue, *, of: int = 1) -> str:
+    """Why this is no answer to the question, or nothing if it is one. `of`: how many trials are ranked."""
+    if answer is None:
+        return "" if question.may_be_skipped or question.kind == "text" else "an answer is needed"
+    match question.kind:
+        case "choice" | "yes-no":
+            names = question.named_answers
+            return "" if answer in names else f"{answer!r} is none of {', '.join(names)}"
+        case "text":
+            return (
+                ""
+                if isinstance(answer, str) and len(answer) <= MAX_TEXT
+                else f"words of at most {MAX_TEXT} letters are needed"
+            )
+        case "ranking":
+            ranked = isinstance(answer, tuple) and sorted(answer) == list(range(1, of + 1))
+            return "" if ranked else f"each of the numbers 1 to {of} is needed, once"
+        case "rating" | "number":
+            return next(_number_problems(question, answer), "")
+
+
+def _number_problems(question: QuestionConfig, answer: AnswerValue) -> Iterator[str]:
+    if isinstance(answer, bool) or not isinstance(answer, int | float) or not math.isfinite(answer):
+        yield f"{answer!r} is no number"
+    elif question.minimum is not None and answer < question.minimum:
+        yield f"{answer:g} is below {question.minimum:g}"
+    elif question.maximum is not None and answer > question.maximum:
+        yield f"{answer:g} is above {question.maximum:g}"
+
+
+def on_grain(question: QuestionConfig, value: float) -> float:
+    """The nearest value that the question keeps, in whole grains from its minimum.
+
+    A grain such as 0.1 has no exact binary form; rounding to its decimals gives the number a person would write.
+
+    >>> on_grain(QuestionConfig(kind="rating", text="?", minimum=0.0, maximum=10.0, grain=0.1), 7.2500001)
+    7.3
+    """
+    low, high, grain = question.minimum, question.maximum, question.grain
+    if grain is None or low is None or high is None:
+        return value
+    steps = round((min(max(value, low), high) - low) / grain)
+    decimals = max(0, -math.floor(math.log10(grain))) + 2
+    return round(float(low + steps * grain), decimals)
+
+
+def asked_after(design: DesignConfig, when: str) -> Mapping[str, QuestionConfig]:
+    """The questions that come after each trial, or after a block about each of its trials, in the order of the file."""
+    return {name: one for name, one in design.questions.items() if one.when == when and one.kind != "ranking"}
+
+
+def rankings(design: DesignConfig) -> Mapping[str, QuestionConfig]:
+    """The questions that rank the trials of a block."""
+    return {name: one for name, one in design.questions.items() if one.kind == "ranking"}
+
+
+def is_right(design: DesignConfig, question: QuestionConfig, trial: DesignTrial, answer: AnswerValue) -> bool | None:
+    """Whether an answer is right; `None` without one, or where nothing is right."""
+    right = right_answer(design, question, trial)
+    return None if right is None or answer is None else answer == right
+
+
+def correct_columns(questions: Mapping[str, QuestionConfig]) -> dict[str, str]:
+    """The column of each scored question that says whether its answer was right: `correct` for the first.
+
+    >>> q = QuestionConfig(kind="yes-no", text="?", correct="stimulus")
+    >>> correct_columns({"felt": q, "sure": q})
+    {'felt': 'correct', 'sure': 'sure_correct'}
+    """
+    scored: Sequence[str] = [name for name, one in questions.items() if one.correct is not None]
+    return {name: "correct" if place == 0 else f"{name}_correct" for place, name in enumerate(scored)}

@@ -1,0 +1,145 @@
+"""The statistics of designs, of data whose truth is known: drawn by laws, or spelled out."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pandas as pd
+import pytest
+from scipy import stats
+
+from analysis.stats.anova import rm_anova
+from analysis.summary.designs import summarise
+from experiments.config.door import checked_table
+from experiments.synthetic.answers import SyntheticAnswers
+from tests.designs import design
+from tests.tables_of_designs import loaded, simulated
+
+
+def of(name, count=24):
+    config, laws = loaded(name)
+    return config, summarise(config, simulated(config, laws, count))
+
+
+def test_rates_by_condition_have_the_counts_and_the_exact_test_of_their_rows():
+    config, laws = loaded("direction")
+    table = simulated(config, laws, 14)
+    found = summarise(config, table).questions["response"]
+    assert len(found.cells) == 6
+    for cell in found.cells:
+        rows = table[(table["method"] == cell.levels["method"]) & (table["direction"] == cell.levels["direction"])]
+        test = stats.binomtest(int(rows["correct"].sum()), len(rows), 0.5)
+        assert (cell.right, cell.trials, cell.people) == (rows["correct"].sum(), 140, 14)
+        assert cell.p == pytest.approx(test.pvalue, rel=1e-9)
+        low, high = test.proportion_ci()
+        assert (cell.ci_low, cell.ci_high) == pytest.approx((low, high), rel=1e-6)
+
+
+def test_two_factors_within_people_give_three_effects():
+    _, found = of("realism")
+    tests = {test.effect: test for test in found.questions["realism"].tests}
+    assert list(tests) == ["damper", "voltage_V", "damper × voltage_V"]
+    assert tests["damper"].p < 0.001
+    assert tests["voltage_V"].df == (2, 46)
+    assert tests["voltage_V"].p < 0.001
+
+
+def test_one_factor_within_people_is_its_anova_and_ranks():
+    config, laws = loaded("preference")
+    table = simulated(config, laws, 14)
+    found = summarise(config, table).questions["rating"]
+    scores = table.pivot_table(index="participant_id", columns="method", values="rating").to_numpy()
+    anova, friedman = found.tests
+    assert anova.statistic == pytest.approx(float(rm_anova(scores).F), rel=1e-12)
+    assert friedman.statistic == pytest.approx(stats.friedmanchisquare(*scores.T).statistic, rel=1e-9)
+    assert "comment" not in summarise(config, table).questions
+
+
+def test_groups_give_a_mixed_anova():
+    _, found = of("grip")
+    tests = {test.effect: test for test in found.questions["realism"].tests}
+    assert list(tests) == ["grip", "method", "grip × method"]
+    assert tests["grip"].df == (1, 22)
+    assert tests["method"].p < 0.001
+
+
+def test_the_exponent_of_numbers_is_found():
+    _, found = of("magnitude")
+    cells, tests = found.questions["strength"].cells, {test.name: test for test in found.questions["strength"].tests}
+    assert tests["exponent"].ci_low < 1.2 < tests["exponent"].ci_high
+    assert tests["exponent"].statistic == pytest.approx(1.2, abs=0.1)
+    assert [cell.mean for cell in cells] == sorted(cell.mean for cell in cells)
+
+
+def test_numbers_are_averaged_as_their_logarithms():
+    config = design(
+        factors={"method": {"levels": ["a"]}},
+        questions={"q": {"kind": "number", "text": "?"}},
+        order={"repetitions": 2},
+    )
+    table = pd.DataFrame({"participant_id": ["P1", "P1"], "method": ["a", "a"], "q": [2.0, 8.0]})
+    (cell,) = summarise(config, table).questions["q"].cells
+    assert cell.mean == pytest.approx(4.0)
+
+
+def test_detection_has_a_sensitivity_and_a_criterion():
+    _, found = of("detection")
+    tests = {test.name: test for test in found.questions["felt"].tests}
+    assert tests["d_prime"].statistic > 1
+    assert "criterion" in tests
+    assert any(not cell.levels for cell in found.questions["felt"].cells)  # catch trials have no level
+
+
+def test_two_intervals_have_the_d_prime_of_their_task():
+    config, laws = loaded("stronger")
+    table = simulated(config, laws, 10)
+    found = summarise(config, table).questions["stronger"]
+    (d_prime,) = [test for test in found.tests if test.name == "d_prime"]
+    assert d_prime.statistic == pytest.approx(math.sqrt(2) * stats.norm.ppf(table["correct"].mean()), rel=1e-9)
+
+
+def test_pairs_are_described_in_the_order_in_which_they_were_felt():
+    _, found = of("pairs")
+    cells = found.questions["rather"].cells
+    assert {tuple(cell.levels) for cell in cells} == {("method_1", "method_2")}
+    assert sum(cell.trials for cell in cells) == 24 * 20
+
+
+def test_whoever_lacks_a_condition_is_named_and_in_no_test():
+    config, laws = loaded("preference")
+    table = simulated(config, laws, 6)
+    table.loc[0, "rating"] = np.nan
+    found = summarise(config, table).questions["rating"]
+    assert found.left_out == (table.loc[0, "participant_id"],)
+    assert found.tests[0].df == (2, 8)
+    assert sum(cell.trials for cell in found.cells) == 17
+
+
+def test_a_single_person_is_described_and_not_tested():
+    config, laws = loaded("preference")
+    found = summarise(config, simulated(config, laws, 1)).questions["rating"]
+    assert [test.reason for test in found.tests] == ["fewer than two people have all conditions"]
+    assert all(cell.sd is None for cell in found.cells)
+
+
+def test_a_group_of_one_is_not_tested():
+    config, laws = loaded("grip")
+    (test,) = summarise(config, simulated(config, laws, 3)).questions["realism"].tests
+    assert test.reason == "a group has fewer than two people"
+
+
+def test_three_factors_are_described_and_not_tested():
+    config = design(
+        factors={
+            "method": {"levels": ["a", "b"]},
+            "posture": {"levels": ["x", "y"]},
+            "voltage_V": {"levels": [1.0, 2.0]},
+        },
+        questions={"q": {"kind": "rating", "text": "?", "minimum": 1.0, "maximum": 7.0, "grain": 1.0}},
+    )
+    laws = {"questions": {"q": {"law": "ratings", "mean": {"all": 4.0}, "noise_sd": 1.0}}}
+    table = simulated(config, checked_table(SyntheticAnswers, laws, "laws.toml"), 5)
+    found = summarise(config, table).questions["q"]
+    assert len(found.cells) == 8
+    assert [test.reason for test in found.tests] == ["there is no ANOVA here of more than two factors"]

@@ -1,0 +1,86 @@
+"""ANOVAs of two factors, against statsmodels and against sums of squares spelled out."""
+
+from __future__ import annotations
+
+import numpy as np
+import pandas as pd
+import pytest
+from scipy import stats
+from statsmodels.stats.anova import AnovaRM
+
+from analysis.stats.anova import rm_anova
+from analysis.stats.factorial import mixed, two_within
+
+
+def drawn(*shape):
+    return np.random.default_rng(4).normal(size=shape) + np.arange(shape[-1])
+
+
+def test_two_factors_within_people_are_those_of_statsmodels():
+    scores = drawn(9, 2, 4)
+    found = two_within(scores, ("damper", "voltage"))
+    who, one, other = (part.ravel() for part in np.indices(scores.shape))
+    table = pd.DataFrame({"who": who, "one": one, "other": other, "score": scores.ravel()})
+    theirs = AnovaRM(table, "score", "who", within=["one", "other"]).fit().anova_table
+    assert [effect.source for effect in found] == [("damper",), ("voltage",), ("damper", "voltage")]
+    assert [effect.F for effect in found] == pytest.approx(list(theirs["F Value"]), rel=1e-9)
+    assert [effect.df for effect in found] == [*zip(theirs["Num DF"], theirs["Den DF"], strict=True)]
+    assert [effect.p for effect in found] == pytest.approx(list(theirs["Pr > F"]), rel=1e-8)
+    assert all(0 < effect.size < 1 for effect in found)
+
+
+def test_a_factor_with_two_levels_needs_no_correction():
+    damper, voltage, both = two_within(drawn(9, 2, 4), ("damper", "voltage"))
+    assert damper.epsilon == pytest.approx(1)
+    assert 1 / 3 <= voltage.epsilon < 1
+    assert both.p_gg >= 0
+
+
+def test_a_mixed_anova_is_its_sums_of_squares():
+    n, k = 12, 3
+    scores = drawn(n, k)
+    group = ["one"] * 6 + ["two"] * 6
+    scores[:6] += np.array([0.0, 0.4, 0.9])
+    halves, grand = scores.reshape(2, 6, k), scores.mean()
+    people, cells = scores.mean(axis=1).reshape(2, 6), halves.mean(axis=1)
+    of_groups, of_levels = cells.mean(axis=1), scores.mean(axis=0)
+    ss_group = 6 * k * ((of_groups - grand) ** 2).sum()
+    ss_people = k * ((people - of_groups[:, None]) ** 2).sum()
+    ss_levels = n * ((of_levels - grand) ** 2).sum()
+    ss_both = 6 * ((cells - of_groups[:, None] - of_levels + grand) ** 2).sum()
+    ss_error = ((halves - people[:, :, None] - cells[:, None, :] + of_groups[:, None, None]) ** 2).sum()
+    expected = [
+        (ss_group / 1) / (ss_people / 10),
+        (ss_levels / 2) / (ss_error / 20),
+        (ss_both / 2) / (ss_error / 20),
+    ]
+    found = mixed(scores, group, ("grip", "method"))
+    assert [effect.F for effect in found] == pytest.approx(expected, rel=1e-9)
+    assert [effect.df for effect in found] == [(1, 10), (2, 20), (2, 20)]
+    assert found[0].p == pytest.approx(stats.f.sf(expected[0], 1, 10), rel=1e-9)
+
+
+def test_a_mixed_anovas_group_effect_is_that_of_the_means_of_people():
+    scores = drawn(10, 3)
+    group = ["a"] * 5 + ["b"] * 5
+    means = scores.mean(axis=1)
+    assert (
+        pytest.approx(stats.f_oneway(means[:5], means[5:]).statistic, rel=1e-9) == mixed(scores, group, ("g", "m"))[0].F
+    )
+
+
+def test_with_one_level_more_of_nothing_it_is_the_one_factor_anova():
+    scores = drawn(9, 3)
+    both = np.stack([scores, scores + np.random.default_rng(1).normal(size=(9, 1))], axis=1)
+    assert pytest.approx(float(rm_anova(both.mean(axis=1)).F), rel=1e-9) == two_within(both, ("x", "y"))[1].F
+
+
+@pytest.mark.parametrize("shape", [(1, 2, 2), (5, 1, 2), (5, 2)])
+def test_too_few_of_anything_is_refused(shape):
+    with pytest.raises(ValueError, match="scores must be"):
+        two_within(np.zeros(shape), ("a", "b"))
+
+
+def test_groups_of_one_are_refused():
+    with pytest.raises(ValueError, match="two groups of two"):
+        mixed(np.zeros((3, 2)), ["a", "a", "b"], ("g", "m"))

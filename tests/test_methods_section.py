@@ -1,0 +1,58 @@
+"""A design in the words of a Methods section."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from experiments.config.door import load
+from experiments.design.config import DesignConfig
+from experiments.design.methods_section import methods_section
+from experiments.design.planned import planned_run
+from experiments.design.planning import plan_of, square_size
+
+FOLDER = Path(__file__).parent / "ten_designs"
+
+
+def said(name):
+    design = load(DesignConfig, FOLDER / f"{name}.toml")
+    plan = plan_of(design, "P01", 1, row=0 if square_size(design) else None)
+    return "\n".join(methods_section(design, planned_run(design, plan)))
+
+
+def test_the_papers_first_experiment_reads_as_in_the_paper():
+    assert said("direction") == (
+        "Method (vibration, asymmetric-1, asymmetric-2) and direction (forward, backward) varied within participants.\n"
+        "There were 3 sessions, each of one method, in random order. In each session every condition came 10 times, in "
+        "random order: 20 trials in 4 sets of 5.\n"
+        "A trial was one shot. There was no feedback.\n"
+        "After each trial participants were asked: “Which way did the gun shoot?” (forward or backward).\n"
+        "Sets were 20 s apart. Sessions were 300 s apart. The 60 trials took 30 min as planned."
+    )
+
+
+@pytest.mark.parametrize(
+    ("name", "words"),
+    [
+        ("preference", "until the participant said next (after 1 s at the earliest, 120 shots at the most)"),
+        ("preference", "After a set, about each of its trials, participants were asked: “How much"),
+        ("voltages", "Voltage in V (6, 7, 8, 9, 10, 12, 14, 16, 18) and direction (forward, backward) varied"),
+        ("voltages", "Method (asymmetric-1) was the same in all trials."),
+        ("voltages", "each condition as evenly over the sets as it goes"),
+        ("voltages", "No level of direction came more than 4 times in a row."),
+        ("detection", "60 catch trials in a session had no stimulus."),
+        ("stronger", "two shots 1.5 s apart, one at the standard (voltage in V: 14), each equally often first"),
+        ("magnitude", "each condition equally often in every set"),
+        ("realism", "The experimenter set damper by hand."),
+        (
+            "realism",
+            "2 sessions, each of one damper, in an order balanced over participants by a Latin square.",
+        ),
+        ("pairs", "that differed in method: all pairs"),
+        ("grip", "Grip (one hand, two hands) varied between participants."),
+        ("hurry", "Instruction was constant in a set."),
+    ],
+)
+def test_what_a_design_does_is_said(name, words):
+    assert words in said(name)

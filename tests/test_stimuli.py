@@ -1,0 +1,107 @@
+"""What a design's levels come to on the shipped gun."""
+
+from __future__ import annotations
+
+import pytest
+
+from device.words import Effect, Pulse
+from experiments.config.door import ConfigError
+from experiments.design import stimuli
+from experiments.design.planning import plan_of
+from experiments.load import load_gun, shipped_folder
+from tests.designs import design
+
+STRONG = {"levels": ["asymmetric-2"]}
+
+
+@pytest.fixture(scope="module")
+def gun():
+    return load_gun(shipped_folder() / "gun.toml")
+
+
+def shots(config, gun):
+    return [stimuli.intervals(config, gun, trial) for trial in plan_of(config, "P01", 1).trials]
+
+
+def test_a_method_is_the_guns_own(gun):
+    config = design(factors={"method": {"levels": ["vibration", "asymmetric-1", "asymmetric-2"]}})
+    found = {one.method: one for (one,) in shots(config, gun)}
+    assert {name: one.parameters for name, one in found.items()} == gun.renderings((*found,))
+    assert found["vibration"].drive == Effect(effect=1)
+    assert found["asymmetric-2"].drive == Pulse(voltage_V=16.0, pulse_s=0.010)
+    assert all(one.direction == "forward" for one in found.values())
+
+
+def test_a_number_of_the_drive_goes_with_the_command(gun):
+    config = design(factors={"method": STRONG, "voltage_V": {"levels": [12.0, 20.0]}, "pulse_s": {"levels": [0.008]}})
+    drives = {one.drive for (one,) in shots(config, gun)}
+    assert drives == {Pulse(voltage_V=volts, pulse_s=0.008) for volts in (12.0, 20.0)}
+    assert stimuli.by_hand(config) == ()
+
+
+def test_what_a_hand_sets_is_told_to_the_model_and_to_the_experimenter(gun):
+    config = design(
+        factors={
+            "method": {"levels": ["asymmetric-1"]},
+            "damper": {
+                "levels": ["off", "on"],
+                "labels": {"on": "strips on"},
+                "sets": {"off": {"friction_N": 0.21}, "on": {"friction_N": 1.12}},
+            },
+        }
+    )
+    plan = plan_of(config, "P01", 1)
+    found = {
+        stimuli.settings(config, trial): stimuli.intervals(config, gun, trial)[0].parameters.friction_N
+        for trial in plan.trials
+    }
+    assert found == {(("damper", "off"),): 0.21, (("damper", "strips on"),): 1.12}
+
+
+def test_an_interval_without_a_stimulus_is_empty(gun):
+    choice = {"kind": "choice", "text": "When?", "answers": ["first", "second"], "correct": "interval"}
+    config = design(
+        factors={"method": STRONG, "voltage_V": {"levels": [12.0]}},
+        order={"repetitions": 4},
+        trial={"kind": "two-interval", "compare": "voltage_V", "standard": "none"},
+        questions={"when": choice},
+    )
+    volts = [tuple(one and one.drive.voltage_V for one in held) for held in shots(config, gun)]
+    assert sorted(volts, key=str) == [(12.0, None)] * 2 + [(None, 12.0)] * 2
+    caught = design(factors={"method": STRONG}, trial={"catch": 1})
+    assert (None,) in shots(caught, gun)
+
+
+@pytest.mark.parametrize(
+    ("factors", "said"),
+    [
+        ({"method": {"levels": ["asymmetric-3"]}}, "no method 'asymmetric-3'; it has vibration"),
+        ({"method": STRONG, "voltage_V": {"levels": [25.0]}}, "voltage_V"),
+        ({"method": STRONG, "pulse_s": {"levels": [0.5]}}, "pulse_s"),
+        ({"method": STRONG, "voltage_V": {"levels": [0.5]}}, "below_break_away"),
+        ({"method": STRONG, "tension_V": {"levels": [1.0]}}, "factors.tension_V: the gun has no such number"),
+        (
+            {"method": {"levels": ["vibration"]}, "voltage_V": {"levels": [12.0]}},
+            "is a vibration, which has no voltage_V",
+        ),
+        ({"method": STRONG, "damper": {"levels": ["on"], "sets": {"on": {"frction_N": 1.0}}}}, "frction_N"),
+        ({"method": STRONG, "damper": {"levels": ["on"], "sets": {"on": {"friction_N": -1.0}}}}, "friction_N is -1.0"),
+        (
+            {
+                "method": STRONG,
+                "damper": {"levels": ["on"], "sets": {"on": {"voltage_V": 9.0}}},
+                "voltage_V": {"levels": [9.0]},
+            },
+            "factors.damper sets as well",
+        ),
+    ],
+)
+def test_what_the_gun_cannot_do_is_refused_by_name(gun, factors, said):
+    with pytest.raises(ConfigError) as raised:
+        stimuli.limits(design(factors=factors), gun)
+    assert said in str(raised.value)
+
+
+def test_below_break_away_is_listed_where_the_design_asks_for_it(gun):
+    config = design(below_break_away=True, factors={"method": STRONG, "voltage_V": {"levels": [0.5, 16.0]}})
+    assert [one.status for one in stimuli.limits(config, gun)] == ["no-break-away", "home"]

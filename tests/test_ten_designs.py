@@ -1,0 +1,129 @@
+"""The ten designs that a lab is likeliest to want: each loads, fits the gun, plans, and is answered by its people."""
+
+from __future__ import annotations
+
+import statistics
+from collections import defaultdict
+from pathlib import Path
+
+import pytest
+
+from experiments.config.door import ConfigError, checked_table, load
+from experiments.design import stimuli
+from experiments.design.config import DesignConfig
+from experiments.design.planning import groups, plan_of, square_size
+from experiments.load import load_gun
+from experiments.record import design_table
+from experiments.synthetic.answers import DesignParticipant, SyntheticAnswers, check_laws
+from experiments.tasks.questions import answer_problem, is_right
+
+FOLDER = Path(__file__).parent / "ten_designs"
+TRIALS = {
+    "direction": 60, "preference": 3, "voltages": 90, "detection": 120, "stronger": 120, "magnitude": 18,
+    "realism": 12, "pairs": 20, "grip": 9, "hurry": 60,
+}  # fmt: skip
+"""Worked out by hand from each file."""
+
+
+def loaded(name):
+    design = load(DesignConfig, FOLDER / f"{name}.toml")
+    return design, load_gun(FOLDER / design.gun), load(SyntheticAnswers, FOLDER / str(design.synthetic))
+
+
+def people(name, count=1):
+    design, _, laws = loaded(name)
+    rows, kinds = square_size(design), len(groups(design))
+    for number in range(count):
+        plan = plan_of(design, f"P{number:02d}", 1, row=number % rows if rows else None, group=number % kinds)
+        yield design, plan, DesignParticipant(design, laws, plan)
+
+
+@pytest.mark.parametrize("name", TRIALS)
+def test_it_fits_its_gun_and_its_people_answer_every_question(name):
+    design, gun, laws = loaded(name)
+    assert design.design == name
+    check_laws(design, laws)
+    assert all(one.status in {"home", "rendered"} for one in stimuli.limits(design, gun))
+    assert len(design_table.columns(design)) > 8
+    for _, plan, person in people(name, 2):
+        assert len(plan.trials) == TRIALS[name]
+        for trial in plan.trials:
+            assert len(stimuli.intervals(design, gun, trial)) == design.trial.intervals
+            for asked, question in design.questions.items():
+                given = person.answer(asked, trial)
+                assert answer_problem(question, given.value) == ""
+                assert given == person.answer(asked, trial)
+                assert given.response_time_s > 0
+
+
+def means(name, question, key, count=60):
+    found = defaultdict(list)
+    for design, plan, person in people(name, count):
+        for trial in plan.trials:
+            value = person.answer(question, trial).value
+            right = is_right(design, design.questions[question], trial, value)
+            found[key(trial)].append(value if right is None else right)
+    return {level: statistics.fmean(values) for level, values in found.items()}
+
+
+def test_rates_are_met_in_the_mean_over_people():
+    found = means("direction", "response", lambda trial: (trial.level("method"), trial.level("direction")), 200)
+    assert found["vibration", "forward"] == pytest.approx(0.557, abs=0.03)
+    assert found["asymmetric-2", "backward"] == pytest.approx(0.929, abs=0.02)
+
+
+def test_a_psychometric_function_rises_from_chance_to_its_lapses():
+    found = means("voltages", "response", lambda trial: trial.level("voltage_V"))
+    assert found[6.0] == pytest.approx(0.5 + 0.48 * 0.041, abs=0.06)
+    assert found[18.0] == pytest.approx(0.98, abs=0.03)
+
+
+def test_catch_trials_are_falsely_felt_as_often_as_is_said():
+    found = means("detection", "felt", lambda trial: trial.catch, 40)
+    assert 1 - found[True] == pytest.approx(0.1, abs=0.02)
+
+
+def test_who_is_worth_more_is_chosen_more_often():
+    chosen = defaultdict(int)
+    for _, plan, person in people("pairs", 60):
+        for trial in plan.trials:
+            chosen[trial.intervals[("first", "second").index(person.answer("rather", trial).value)]] += 1
+    assert sorted(chosen, key=chosen.get) == ["vibration", "soft", "short", "paper", "strong"]
+
+
+def test_a_group_keeps_its_level():
+    assert {next(iter(plan.trials)).level("grip") for _, plan, _ in people("grip", 2)} == {"one hand", "two hands"}
+
+
+def answered_by(design, laws, plan):
+    person = DesignParticipant(design, checked_table(SyntheticAnswers, {"questions": laws}, "laws.toml"), plan)
+    return [person.answer(next(iter(design.questions)), trial) for trial in plan.trials]
+
+
+@pytest.mark.parametrize(
+    ("name", "laws", "said"),
+    [
+        ("pairs", {"rather": {"law": "rates", "share": {"all": 0.5}}}, "nothing is right for rather"),
+        ("pairs", {"rather": {"law": "worth", "factor": "method", "worth": {"soft": 1.0}}}, "no value for vibration"),
+        ("direction", {"response": {"law": "guesses"}}, "guesses"),
+        (
+            "direction",
+            {"response": {"law": "rates", "by": ["method"], "share": {"vibration": 0.5}}},
+            "for 'asymmetric-",
+        ),
+        ("direction", {"response": {"law": "rates", "share": {"all": 1.0}}}, "less than 1"),
+        ("direction", {"answer": {"law": "rates", "share": {"all": 0.5}}}, "questions.response is missing"),
+        (
+            "voltages",
+            {"response": {"law": "psychometric", "factor": "voltage", "threshold": 9.0, "spread": 0.1}},
+            "names 'voltage', which is no factor",
+        ),
+        ("grip", {"realism": {"law": "words", "texts": ["x"]}}, "a question of kind 'rating' has ratings"),
+    ],
+)
+def test_laws_that_do_not_fit_are_refused_by_name(name, laws, said):
+    design, _, _ = loaded(name)
+    plan = plan_of(design, "P01", 1)
+    with pytest.raises(ConfigError) as raised:
+        answered_by(design, laws, plan)
+    assert said in str(raised.value)
