@@ -191,8 +191,7 @@ def test_the_answers_of_the_hurried_are_quicker(done: tuple[Path, Path]) -> None
 
 def test_the_time_of_a_key_is_in_the_record_only_where_there_is_one() -> None:
     body = {
-        "kind": "answered", "response": "forward", "response_time_s": 0.5, "response_source": "synthetic",
-        "response_time_valid": True,
+        "kind": "answered", "value": "forward", "by": "synthetic", "response_time_s": 0.5, "response_time_valid": True,
     }  # fmt: skip
     answered = OUTCOME.validate_python(body)
     assert step_record(answered) == body
