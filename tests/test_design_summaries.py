@@ -143,3 +143,17 @@ def test_three_factors_are_described_and_not_tested():
     found = summarise(config, table).questions["q"]
     assert len(found.cells) == 8
     assert [test.reason for test in found.tests] == ["there is no ANOVA here of more than two factors"]
+
+
+def test_nested_factors_are_described_and_not_tested():
+    config = design(
+        factors={
+            "method": {"levels": ["a", "b"]},
+            "voltage_V": {"within": "method", "levels": {"a": [1.0, 2.0], "b": [2.0, 3.0]}},
+        },
+        questions={"q": {"kind": "rating", "text": "?", "minimum": 1.0, "maximum": 7.0, "grain": 1.0}},
+    )
+    laws = {"questions": {"q": {"law": "ratings", "mean": {"all": 4.0}, "noise_sd": 1.0}}}
+    table = simulated(config, checked_table(SyntheticAnswers, laws, "laws.toml"), 5)
+    found = summarise(config, table).questions["q"]
+    assert [test.reason for test in found.tests] == ["the factors are nested, not crossed"]

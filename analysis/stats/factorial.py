@@ -43,19 +43,7 @@ def two_within(scores: ArrayLike, names: tuple[str, str]) -> tuple[FactorialEffe
     who, one, other = (part.ravel() for part in np.indices((n, a, b)))
     table = pd.DataFrame({"who": who, "one": one, "other": other, "score": array.ravel()})
     found = _silent("rm_anova", table, dv="score", within=["one", "other"], subject="who")
-    sources = ((names[0],), (names[1],), names)
-    return tuple(
-        FactorialEffect(
-            source=source,
-            F=float(row["F"]),
-            df=(int(row["ddof1"]), int(row["ddof2"])),
-            p=float(row["p_unc"]),
-            epsilon=_known(row["eps"]),
-            p_gg=_known(row["p_GG_corr"]),
-            size=float(row["ng2"]),
-        )
-        for source, (_, row) in zip(sources, found.iterrows(), strict=True)
-    )
+    return _effects(found, names, df=("ddof1", "ddof2"), size="ng2")
 
 
 def mixed(scores: ArrayLike, group: Sequence[str], names: tuple[str, str]) -> tuple[FactorialEffect, ...]:
@@ -74,19 +62,7 @@ def mixed(scores: ArrayLike, group: Sequence[str], names: tuple[str, str]) -> tu
     who, level = (part.ravel() for part in np.indices((n, k)))
     table = pd.DataFrame({"who": who, "level": level, "group": np.repeat(list(group), k), "score": array.ravel()})
     found = _silent("mixed_anova", table, dv="score", within="level", between="group", subject="who")
-    sources = ((names[0],), (names[1],), names)
-    return tuple(
-        FactorialEffect(
-            source=source,
-            F=float(row["F"]),
-            df=(int(row["DF1"]), int(row["DF2"])),
-            p=float(row["p_unc"]),
-            epsilon=_known(row["eps"]),
-            p_gg=None,
-            size=float(row["np2"]),
-        )
-        for source, (_, row) in zip(sources, found.iterrows(), strict=True)
-    )
+    return _effects(found, names, df=("DF1", "DF2"), size="np2")
 
 
 def _silent(function: str, table: pd.DataFrame, **asked: object) -> pd.DataFrame:
@@ -95,6 +71,25 @@ def _silent(function: str, table: pd.DataFrame, **asked: object) -> pd.DataFrame
         warnings.simplefilter("ignore")
         found: pd.DataFrame = pingouin(function)(table, **asked)
     return found
+
+
+def _effects(
+    found: pd.DataFrame, names: tuple[str, str], *, df: tuple[str, str], size: str
+) -> tuple[FactorialEffect, ...]:
+    """The three effects of a table of pingouin, whose columns of freedom and size have these names."""
+    sources = ((names[0],), (names[1],), names)
+    return tuple(
+        FactorialEffect(
+            source=source,
+            F=float(row["F"]),
+            df=(int(row[df[0]]), int(row[df[1]])),
+            p=float(row["p_unc"]),
+            epsilon=_known(row["eps"]),
+            p_gg=_known(row.get("p_GG_corr", math.nan)),
+            size=float(row[size]),
+        )
+        for source, (_, row) in zip(sources, found.iterrows(), strict=True)
+    )
 
 
 def _known(value: float) -> float | None:

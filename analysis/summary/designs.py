@@ -22,7 +22,7 @@ from analysis.stats.discrimination import Task, discrimination
 from analysis.stats.factorial import FactorialEffect, mixed, two_within
 from analysis.stats.paired import friedman
 from experiments.design.config import DesignConfig
-from experiments.design.language import Level, QuestionConfig, shown_level
+from experiments.design.language import Level, QuestionConfig
 from experiments.tasks.questions import chance, correct_columns
 
 
@@ -186,8 +186,10 @@ def _comparisons(
         yield from _one_factor(names[0], scores, question)
     elif len(names) == 2 and group is None:
         sizes = tuple(people.columns.get_level_values(name).nunique() for name in names)
-        if math.prod(sizes) == scores.shape[1]:
-            yield from map(_effect, two_within(scores.reshape(len(people), *sizes), (names[0], names[1])))
+        if math.prod(sizes) != scores.shape[1]:
+            yield DesignTest(name="anova", effect=" × ".join(names), reason="the factors are nested, not crossed")
+            return
+        yield from map(_effect, two_within(scores.reshape(len(people), *sizes), (names[0], names[1])))
     else:
         effect = " × ".join((*design.between, *names))
         yield DesignTest(name="anova", effect=effect, reason="there is no ANOVA here of more than two factors")
@@ -249,7 +251,7 @@ def _sensitivity(design: DesignConfig, question: QuestionConfig, scored: pd.Data
         yield from _detection(scored)
     elif question.correct in {"interval", "larger"} and len(scored):
         found = discrimination(int(scored["score"].sum()), len(scored), _TASKS[design.trial.kind])
-        yield DesignTest(name="d_prime", effect=design.trial.kind, statistic=float(found.d_prime), size=None)
+        yield DesignTest(name="d_prime", effect=design.trial.kind, statistic=float(found.d_prime))
 
 
 def _detection(scored: pd.DataFrame) -> Iterator[DesignTest]:
@@ -259,12 +261,3 @@ def _detection(scored: pd.DataFrame) -> Iterator[DesignTest]:
         found = yes_no(int(signal.sum()), len(signal), int(len(noise) - noise.sum()), len(noise))
         yield DesignTest(name="d_prime", effect="stimulus", statistic=float(found.d_prime))
         yield DesignTest(name="criterion", effect="stimulus", statistic=float(found.criterion))
-
-
-def levels_shown(levels: Mapping[str, Level]) -> str:
-    """A condition in words.
-
-    >>> levels_shown({"method": "soft", "voltage_V": 12.0})
-    'method soft, voltage_V 12'
-    """
-    return ", ".join(f"{name} {shown_level(level)}" for name, level in levels.items())

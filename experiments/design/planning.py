@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass
-from itertools import combinations, product
+from itertools import combinations
 
 from pydantic import TypeAdapter
 
@@ -435,8 +435,3 @@ def _leaves_room(content: _Content, run: _Run, levels: Mapping[str, Counter[Leve
     own = dict(content.levels)
     left = {name: counts - Counter({own.get(name): 1}) for name, counts in levels.items()}
     return after.fits(left, total)
-
-
-def blocks(design: DesignConfig, given: Condition) -> Iterator[tuple[Condition, Condition]]:
-    """Each session's levels with each of its sets' levels, in the order of the file: what `check` lists."""
-    yield from product(_sessions(design, given), cells(design, design.order.set, given))

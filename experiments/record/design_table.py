@@ -21,11 +21,6 @@ def columns(design: DesignConfig) -> tuple[Column, ...]:
     return (*_places(design), *_questions(design), *_presentation(design))
 
 
-def file_suffix(design: DesignConfig) -> str:
-    """How the table's file name ends."""
-    return design.table
-
-
 def _places(design: DesignConfig) -> Iterator[Column]:
     yield tables.PARTICIPANT
     yield tables.level_column("experiment", (design.design,), "which design", required=True)

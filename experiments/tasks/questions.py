@@ -113,16 +113,6 @@ def on_grain(question: QuestionConfig, value: float) -> float:
     return round(float(low + steps * grain), decimals)
 
 
-def asked_after(design: DesignConfig, when: str) -> Mapping[str, QuestionConfig]:
-    """The questions that come after each trial, or after a block about each of its trials, in the order of the file."""
-    return {name: one for name, one in design.questions.items() if one.when == when and one.kind != "ranking"}
-
-
-def rankings(design: DesignConfig) -> Mapping[str, QuestionConfig]:
-    """The questions that rank the trials of a block."""
-    return {name: one for name, one in design.questions.items() if one.kind == "ranking"}
-
-
 def is_right(design: DesignConfig, question: QuestionConfig, trial: DesignTrial, answer: AnswerValue) -> bool | None:
     """Whether an answer is right; `None` without one, or where nothing is right."""
     right = right_answer(design, question, trial)
