@@ -117,13 +117,16 @@ class AtDisplay:
     def focus_on(self, title: str = "Recoil") -> tuple[int, int, int, int]:
         """Give the keys to the newest window of a title; its place and size."""
         place = self.keys.focus_on(title, timeout_s=PATIENCE_S)
-        assert place is not None, f"no window {title!r} was shown"
+        if place is None:
+            ended = self.process.poll()
+            raise AssertionError(f"no window {title!r} was shown (exit code {ended}); the program said: {self.kill()}")
         return place
 
-    def kill(self) -> None:
-        """`kill -9`."""
-        os.killpg(self.process.pid, signal.SIGKILL)
-        self.process.communicate()
+    def kill(self) -> str:
+        """`kill -9`; what was said until then."""
+        with suppress(ProcessLookupError):  # it may have ended by itself
+            os.killpg(self.process.pid, signal.SIGKILL)
+        return self.process.communicate()[0]
 
     def end(self) -> tuple[int, str]:
         """The exit code, and what was said."""
