@@ -8,7 +8,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from experiments.design.plan import Trial
+from experiments.design.plan import Trial, condition
 from experiments.screens.console.keys import (
     BOUNCE_S,
     KEY_COMMANDS,
@@ -28,7 +28,7 @@ from experiments.session.steps import What
 
 S = State
 LETTERS = sorted({command.key for command in KEY_COMMANDS if len(command.key) == 1})
-TRIAL = Trial(session=1, method="vibration", set=1, trial=1, direction="forward")
+TRIAL = Trial(session=1, set=1, trial=1, levels=condition(method="vibration", direction="forward"))
 CORRECTED: tuple[What, ...] = ("answer", "rating", "description")
 
 

@@ -232,7 +232,10 @@ def of_type(hint: Any) -> st.SearchStrategy[Any]:
     if get_origin(hint) is UnionType:
         return st.one_of([of_type(part) for part in get_args(hint)])
     if get_origin(hint) is tuple:
-        return st.lists(of_type(get_args(hint)[0]), max_size=2).map(tuple)
+        kinds = get_args(hint)
+        if kinds[-1] is not Ellipsis:
+            return st.tuples(*map(of_type, kinds))
+        return st.lists(of_type(kinds[0]), max_size=2).map(tuple)
     known = {NoneType: st.none(), str: words, int: st.integers(), float: finite, bool: st.booleans()}
     return known[hint] if hint in known else facts(hint)
 

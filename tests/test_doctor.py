@@ -25,7 +25,7 @@ from device import LinkError
 from experiments.clock import VirtualClock
 from experiments.config.door import ConfigError
 from experiments.config.setup import sha256
-from experiments.design.plan import Trial
+from experiments.design.plan import Trial, condition
 from experiments.doctor import verdicts
 from experiments.doctor.checks import (
     APPENDS,
@@ -113,7 +113,7 @@ def test_no_percentile_of_nothing_and_none_beyond_a_hundred(values: list[float],
 # console latencies
 
 
-TRIAL = Trial(session=1, method="vibration", set=1, trial=1, direction="forward")
+TRIAL = Trial(session=1, set=1, trial=1, levels=condition(method="vibration", direction="forward"))
 FIRED = Fired(
     gun="a", onset_utc="", requested_s=0.0, pulse_start_s=0.0, pulse_end_s=0.0, home_predicted_s=0.0, motion="home"
 )

@@ -28,6 +28,7 @@ from experiments.synthetic.percept import evidence, percepts_of
 from experiments.synthetic.preference import feelings, felt_ratings
 from tests.conftest import Recoil
 from tests.felt_configs import felt_text, written
+from tests.other_trials import with_levels
 
 HURRY = shipped_folder() / "examples" / "hurry.toml"
 PAPER = {"vibration": 0.557, "asymmetric-1": 0.793, "asymmetric-2": 0.929}
@@ -147,7 +148,7 @@ def test_the_same_shot_told_otherwise_is_another_decision_of_the_same_person() -
     plan = plans(setup, 1)[0]
     someone = direction_participant(setup, plan)
     for trial in plan.trials:
-        told = [someone.answer(replace(trial, instruction=name)) for name in ("speed", "neutral", "")]
+        told = [someone.answer(with_levels(trial, instruction=name)) for name in ("speed", "neutral", "")]
         assert told[1] == told[2]  # no instruction is neutral
         assert told[0] != told[1]
 

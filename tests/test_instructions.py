@@ -30,6 +30,7 @@ from experiments.screens.terminal import TerminalScreen
 from experiments.screens.texts import read_out_text
 from experiments.session.states import Position, State
 from experiments.session.steps import OUTCOME, STEP, Prepare, step_record
+from tests.other_trials import with_levels
 
 HURRY = load_setup(str(shipped_folder() / "examples" / "hurry.toml"))
 PLAIN = load_setup("direction")
@@ -71,7 +72,7 @@ def test_instructions_change_nothing_else_of_a_plan(seed: int) -> None:
     names = ("speed", "accuracy")
     instructed = make_plan(with_instructions(PLAIN.config, names, 4), "P01", seed, None)
     plain = make_plan(with_instructions(PLAIN.config, (), 4), "P01", seed, None)
-    assert tuple(replace(trial, instruction="") for trial in instructed.trials) == plain.trials
+    assert tuple(with_levels(trial, instruction="") for trial in instructed.trials) == plain.trials
 
 
 def test_every_order_of_instructions_comes_as_often_as_each_other() -> None:
@@ -95,7 +96,7 @@ def test_a_plan_with_instructions_is_read_back_and_has_a_hash_of_its_own() -> No
     plan = make_plan(HURRY.config, "P01", 1, 0)
     assert {trial.instruction for trial in plan.trials} == {"speed", "neutral", "accuracy"}
     assert Plan.from_record(plan.record()) == plan
-    bare = replace(plan, trials=tuple(replace(trial, instruction="") for trial in plan.trials))
+    bare = replace(plan, trials=tuple(with_levels(trial, instruction="") for trial in plan.trials))
     assert bare.sha256() != plan.sha256()
 
 
@@ -123,7 +124,7 @@ def test_a_hand_over_carries_the_text_of_its_sets_instruction() -> None:
 def test_a_hand_over_without_an_instruction_is_recorded_as_before_there_were_any() -> None:
     step = prepares(PLAIN)[0]
     assert set(step_record(step)) == {"trial", "attempt", "damper", "kind"}
-    assert set(step_record(step)["trial"]) == {"session", "method", "set", "trial", "direction"}
+    assert set(step_record(step)["trial"]) == {"session", "set", "trial", "levels"}
 
 
 def seen(setup: Setup[Any], plan: Plan, step: Prepare) -> Seen:

@@ -11,7 +11,7 @@ from typing import Any
 
 import pytest
 
-from experiments.design.plan import Trial
+from experiments.design.plan import Trial, condition
 from experiments.load import load_setup
 from experiments.screens.console.participant_link import PAUSED, ParticipantSide
 from experiments.screens.participant.link import ParticipantLink
@@ -22,7 +22,7 @@ from tests.waiting import PATIENCE_S, wait_for
 
 SETUP = load_setup("preference")
 PROGRAM = "import sys\nwith open(sys.argv[1], 'wb') as told:\n    for line in sys.stdin.buffer:\n        told.write(line)\n        told.flush()"  # noqa: E501 - a program
-TRIAL = Trial(session=1, method="vibration", set=1, trial=1, direction="forward")
+TRIAL = Trial(session=1, set=1, trial=1, levels=condition(method="vibration", direction="forward"))
 STEP = Rate(trial=TRIAL, question="?", minimum=0, maximum=10, minimum_text="", maximum_text="", grain=0.1)
 
 

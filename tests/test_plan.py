@@ -22,6 +22,7 @@ from experiments.design.plan import Plan
 from experiments.direction.session import make_plan as direction_plan
 from experiments.load import load_setup
 from experiments.preference.session import make_plan as preference_plan
+from tests.other_trials import turned
 
 pytestmark = pytest.mark.slow
 
@@ -261,16 +262,17 @@ def test_a_plan_reads_back_from_its_record(number: int) -> None:
 
 def test_the_hash_covers_every_trial_and_field() -> None:
     plan = plan_of(CASES[0])
-    flipped = replace(plan.trials[-1], direction="forward" if plan.trials[-1].direction == "backward" else "backward")
+    flipped = turned(plan.trials[-1])
     others = [
         replace(plan, trials=(*plan.trials[:-1], flipped)),
         replace(plan, trials=plan.trials[:-1]),
         replace(plan, seed=plan.seed + 1),
         replace(plan, order_row=0),
         replace(plan, participant_id="P99"),
-        replace(plan, format=2),
+        replace(plan, format=3),
+        replace(plan, group=1),
     ]
-    assert len({plan.sha256(), *(other.sha256() for other in others)}) == 7
+    assert len({plan.sha256(), *(other.sha256() for other in others)}) == 8
 
 
 @pytest.mark.parametrize("record", [None, [], {}, {"experiment": "direction"}, "plan"])

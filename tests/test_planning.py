@@ -12,7 +12,8 @@ from hypothesis import strategies as st
 
 from experiments.config.door import ConfigError
 from experiments.design.config import DesignConfig
-from experiments.design.planning import DesignPlan, cells, groups, plan_of, square_size
+from experiments.design.plan import Plan
+from experiments.design.planning import cells, groups, plan_of, square_size
 from tests.designs import design
 
 WAYS = {"levels": ["forward", "backward"]}
@@ -199,8 +200,8 @@ def test_the_same_comes_again_and_reads_back(seed, code):
     )
     plan = plan_of(config, code, seed)
     assert plan == plan_of(config, code, seed)
-    assert DesignPlan.from_record(plan.record()) == plan
-    assert DesignPlan.from_record(plan.record()).sha256() == plan.sha256()
+    assert Plan.from_record(plan.record()) == plan
+    assert Plan.from_record(plan.record()).sha256() == plan.sha256()
 
 
 def test_the_order_of_one_factor_does_not_hang_on_what_another_one_is_called():

@@ -9,8 +9,9 @@ import pytest
 from hypothesis import given, settings
 
 from experiments.config.door import ConfigError
+from experiments.design.plan import Plan
 from experiments.design.planned import planned_run
-from experiments.design.planning import DesignPlan, groups, plan_of, square_size
+from experiments.design.planning import groups, plan_of, square_size
 from experiments.record.design_table import columns
 from experiments.tasks.questions import answer_keys, right_answer
 from tests.designs import design
@@ -32,7 +33,7 @@ def check(given_tables):
     if found is None:
         return False
     config, plan = found
-    assert DesignPlan.from_record(plan.record()) == plan
+    assert Plan.from_record(plan.record()) == plan
     names = [column.name for column in columns(config)]
     assert len(names) == len(set(names))
     assert planned_run(config, plan).trials == len(plan.trials)

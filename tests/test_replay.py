@@ -26,6 +26,7 @@ from experiments.study.folders import PlaceError, place
 from experiments.study.register import RegisterError
 from tests.at_controls import changed
 from tests.journals import raw
+from tests.other_trials import turned
 
 SETUPS = {
     "direction": changed(
@@ -272,8 +273,7 @@ def test_a_plan_that_was_changed_where_no_trial_was_reached_yet_is_refused_by_it
     whole = unbroken[name]
     journal = broken_off(whole, tmp_path, 5)
     last = whole.plan.trials[-1]
-    turned = replace(last, direction="backward" if last.direction == "forward" else "forward")
-    plan = replace(whole.plan, trials=(*whole.plan.trials[:-1], turned))
+    plan = replace(whole.plan, trials=(*whole.plan.trials[:-1], turned(last)))
     journal.write_bytes(with_plan(whole.lines[0], plan.record()) + b"".join(whole.lines[1:5]))
     with pytest.raises(JournalError, match="line 1"):
         run(request(name, tmp_path, "resume"), synthetic_screen, VirtualClock())

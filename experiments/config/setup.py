@@ -169,13 +169,17 @@ def sha256(value: object) -> str:
     return hashlib.sha256(canonical_json(value)).hexdigest()
 
 
-def without_blank_instruction(pairs: Iterable[tuple[str, object]]) -> dict[str, object]:
-    """A `dict_factory` for what has an instruction: where there is none, its record has no such key.
+_BLANKS: dict[str, object] = {"instruction": "", "intervals": (), "odd": None, "catch": False}
+"""What most trials and steps do not have, by the name of its field."""
 
-    >>> without_blank_instruction([("set", 1), ("instruction", "")])
-    {'set': 1}
+
+def without_blanks(pairs: Iterable[tuple[str, object]]) -> dict[str, object]:
+    """A `dict_factory` for trials and steps: of an instruction, intervals or a catch that is not there no key is kept.
+
+    >>> without_blanks([("set", 1), ("instruction", ""), ("odd", 0)])
+    {'set': 1, 'odd': 0}
     """
-    return {key: value for key, value in pairs if key != "instruction" or value}
+    return {key: value for key, value in pairs if key not in _BLANKS or value != _BLANKS[key]}
 
 
 Config_co = TypeVar("Config_co", bound=ExperimentConfig, covariant=True)

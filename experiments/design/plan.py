@@ -9,7 +9,8 @@ from pydantic import TypeAdapter
 
 from device.words import Direction
 from experiments.config.door import ConfigError, Order
-from experiments.config.setup import sha256, without_blank_instruction
+from experiments.config.setup import sha256, without_blanks
+from experiments.design.language import DIRECTION_FACTOR, INSTRUCTION_FACTOR, METHOD_FACTOR, Level
 from experiments.design.streams import Stream
 
 
@@ -60,27 +61,62 @@ def method_order(order: Order, methods: Sequence[str], row: int | None, stream: 
     return [methods[place] for place in rows[row]]
 
 
-PLAN_FORMAT = 1
+PLAN_FORMAT = 2
+Condition = tuple[tuple[str, Level], ...]
+"""Names of factors with their levels."""
+
+
+def condition(**levels: Level) -> Condition:
+    """The levels of factors by name, but for those that are empty.
+
+    >>> condition(method="vibration", instruction="")
+    (('method', 'vibration'),)
+    """
+    return tuple((name, level) for name, level in levels.items() if level != "")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Trial:
-    """One planned trial. `session`, `set` and `trial` count from 1; `trial` runs through the session."""
+    """One planned trial. `session`, `set` and `trial` count from 1; `trial` runs through the session.
+
+    `intervals` are the levels of the compared factor, in the order in which they are felt, and `odd` the place among
+    them (from 0) of the comparison: in ABX of the one that X repeats. A `catch` trial has no stimulus.
+    """
 
     session: int
-    method: str
     set: int
     trial: int
-    direction: Direction
-    instruction: str = ""
-    """The name of what the participant was told for this set; empty if nothing."""
+    levels: Condition
+    intervals: tuple[Level, ...] = ()
+    odd: int | None = None
+    catch: bool = False
+
+    def level(self, name: str) -> Level | None:
+        """The level of a factor; `None` if the trial has none."""
+        return next((level for factor, level in self.levels if factor == name), None)
+
+    @property
+    def method(self) -> str:
+        """The rendering method; empty where the methods are what is compared."""
+        return str(self.level(METHOD_FACTOR) or "")
+
+    @property
+    def direction(self) -> Direction:
+        """Which way the gun points: forward, where the design does not say."""
+        return "backward" if self.level(DIRECTION_FACTOR) == "backward" else "forward"
+
+    @property
+    def instruction(self) -> str:
+        """The name of what the participant was told for this set; empty if nothing."""
+        return str(self.level(INSTRUCTION_FACTOR) or "")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Plan:
     """All trials of one participant in one experiment, and the seed they came from.
 
-    `order_row` is the row of the balancing square; `None` if the order is random.
+    `order_row` is the row of the balancing square; `None` if the order is random. `group`: which combination of the
+    levels that vary between people is this participant's, counted from 0.
     """
 
     experiment: str
@@ -88,6 +124,7 @@ class Plan:
     seed: int
     order_row: int | None
     trials: tuple[Trial, ...]
+    group: int = 0
     format: int = PLAN_FORMAT
 
     @property
@@ -100,8 +137,8 @@ class Plan:
         return trial == next(t for t in self.trials if (t.session, t.set) == (trial.session, trial.set))
 
     def record(self) -> dict[str, object]:
-        """The plan as plain JSON values, without instructions where there are none."""
-        return asdict(self, dict_factory=without_blank_instruction)
+        """The plan as plain JSON values."""
+        return asdict(self, dict_factory=without_blanks)
 
     @classmethod
     def from_record(cls, record: object) -> Plan:

@@ -8,7 +8,7 @@ from itertools import pairwise
 
 from experiments.config.door import ConfigError
 from experiments.design.config import DesignConfig
-from experiments.design.planning import DesignPlan, DesignTrial
+from experiments.design.plan import Plan, Trial
 from experiments.design.stimuli import by_hand
 
 
@@ -25,7 +25,7 @@ class PlannedRun:
     hand_changes: int
 
 
-def planned_run(design: DesignConfig, plan: DesignPlan) -> PlannedRun:
+def planned_run(design: DesignConfig, plan: Plan) -> PlannedRun:
     """What a plan comes to. `ConfigError`: it is more than the design lets a participant be asked for."""
     timing, trials = design.timing, plan.trials
     rests_s = [_rest_s(design, before, trial) for before, trial in pairwise(trials)]
@@ -43,7 +43,7 @@ def planned_run(design: DesignConfig, plan: DesignPlan) -> PlannedRun:
     return found
 
 
-def _rest_s(design: DesignConfig, before: DesignTrial, trial: DesignTrial) -> float:
+def _rest_s(design: DesignConfig, before: Trial, trial: Trial) -> float:
     """How long the rest is that lies between two trials."""
     if before.session != trial.session:
         return design.breaks.between_sessions_s
@@ -61,7 +61,7 @@ def _stretches(rests_s: list[float]) -> Iterator[int]:
     yield length
 
 
-def _by_hand(design: DesignConfig, trial: DesignTrial) -> tuple[object, ...]:
+def _by_hand(design: DesignConfig, trial: Trial) -> tuple[object, ...]:
     """What hands set for a trial: its method, which may have a damper, and the factors that are theirs."""
     return (trial.level("method"), *(trial.level(name) for name in by_hand(design)))
 

@@ -8,74 +8,14 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass
 from itertools import combinations
 
-from pydantic import TypeAdapter
-
 from experiments.config.door import ConfigError, Order
-from experiments.config.setup import sha256
 from experiments.design.config import DesignConfig
 from experiments.design.language import MAX_TRIALS, BlockOrder, Level, shown_level
-from experiments.design.plan import square_rows
+from experiments.design.plan import Condition, Plan, Trial, square_rows
 from experiments.design.streams import Stream
-
-Condition = tuple[tuple[str, Level], ...]
-"""Names of factors with their levels, in the order of the file."""
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class DesignTrial:
-    """One planned trial. `session`, `set` and `trial` count from 1; `trial` runs through the session.
-
-    `intervals` are the levels of the compared factor, in the order in which they are felt, and `odd` the place among
-    them (from 0) of the comparison: in ABX of the one that X repeats. A `catch` trial has no stimulus.
-    """
-
-    session: int
-    set: int
-    trial: int
-    levels: Condition
-    intervals: tuple[Level, ...] = ()
-    odd: int | None = None
-    catch: bool = False
-
-    def level(self, name: str) -> Level | None:
-        """The level of a factor; `None` if the trial has none."""
-        return dict(self.levels).get(name)
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class DesignPlan:
-    """All trials of one participant: frozen and hashed before the first of them.
-
-    `order_row`: the row of the balancing square, `None` without one. `group`: which combination of the levels that vary
-    between people is this participant's, counted from 0.
-    """
-
-    design: str
-    participant_id: str
-    seed: int
-    order_row: int | None
-    group: int
-    trials: tuple[DesignTrial, ...]
-    format: int = 2
-
-    def record(self) -> dict[str, object]:
-        """The plan as plain JSON values."""
-        return asdict(self)
-
-    @classmethod
-    def from_record(cls, record: object) -> DesignPlan:
-        """The plan that a journal's head holds; `pydantic.ValidationError` if it holds none."""
-        return _PLAN.validate_python(record)
-
-    def sha256(self) -> str:
-        """The hash that names this plan: SHA-256 over its canonical JSON."""
-        return sha256(self.record())
-
-
-_PLAN = TypeAdapter(DesignPlan)
 
 
 def cells(design: DesignConfig, names: Sequence[str], given: Condition = ()) -> list[Condition]:
@@ -125,9 +65,7 @@ def _session_cells(design: DesignConfig, given: Condition) -> list[Condition]:
     return cells(design, names, given)
 
 
-def plan_of(
-    design: DesignConfig, participant_id: str, seed: int, *, row: int | None = None, group: int = 0
-) -> DesignPlan:
+def plan_of(design: DesignConfig, participant_id: str, seed: int, *, row: int | None = None, group: int = 0) -> Plan:
     """The plan that a design, a participant, a seed, a row of the square and a group make; the same for the same.
 
     `ConfigError`: the row or group does not exist, or the design asks for a balance that there is none of.
@@ -142,8 +80,13 @@ def plan_of(
         for number, levels in enumerate(sessions, start=1)
         for trial in _session(design, number, (*given, *levels), _Streams(seed, (*who, str(number))), row)
     ]
-    return DesignPlan(
-        design=design.design, participant_id=participant_id, seed=seed, order_row=row, group=group, trials=tuple(trials)
+    return Plan(
+        experiment=design.design,
+        participant_id=participant_id,
+        seed=seed,
+        order_row=row,
+        group=group,
+        trials=tuple(trials),
     )
 
 
@@ -184,7 +127,7 @@ class _Content:
 
 def _session(
     design: DesignConfig, number: int, given: Condition, streams: _Streams, row: int | None
-) -> Iterator[DesignTrial]:
+) -> Iterator[Trial]:
     sets = design.order.sets
     set_levels = _set_levels(design, given, streams)
     contents = _contents(design, given, streams)
@@ -202,7 +145,7 @@ def _session(
         for content in part:
             place += 1
             levels = sorted((*given, *set_levels[at], *content.levels), key=lambda pair: order[pair[0]])
-            yield DesignTrial(
+            yield Trial(
                 session=number,
                 set=at + 1,
                 trial=place,

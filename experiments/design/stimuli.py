@@ -25,7 +25,8 @@ from experiments.design.language import (
     Level,
     shown_level,
 )
-from experiments.design.planning import Condition, DesignTrial, cells, groups
+from experiments.design.plan import Condition, Trial
+from experiments.design.planning import cells, groups
 
 DRIVEN = ("voltage_V", "pulse_s")
 """What the command of a shot carries."""
@@ -60,13 +61,13 @@ def by_hand(design: DesignConfig) -> tuple[str, ...]:
     return tuple(name for name in design.factors if name not in (*_NOT_OF_A_SHOT, *DRIVEN))
 
 
-def settings(design: DesignConfig, trial: DesignTrial) -> tuple[tuple[str, str], ...]:
+def settings(design: DesignConfig, trial: Trial) -> tuple[tuple[str, str], ...]:
     """What is set by hand for a trial, as the experimenter reads it."""
     names = by_hand(design)
     return tuple((name, design.factors[name].label(level)) for name, level in trial.levels if name in names)
 
 
-def intervals(design: DesignConfig, gun: GunConfig, trial: DesignTrial) -> tuple[IntervalStimulus | None, ...]:
+def intervals(design: DesignConfig, gun: GunConfig, trial: Trial) -> tuple[IntervalStimulus | None, ...]:
     """The stimulus of each interval; `None` for one that is empty. `ConfigError` as `stimulus`."""
     if trial.catch:
         return (None,)

@@ -8,7 +8,7 @@ from itertools import pairwise
 
 from device.words import Direction
 from experiments.config.setup import Setup
-from experiments.design.plan import Plan, Trial, method_order
+from experiments.design.plan import Plan, Trial, condition, method_order
 from experiments.design.streams import Stream
 from experiments.direction.config import Breaks, Design, DirectionConfig
 from experiments.record.tables import Row, presentation
@@ -50,7 +50,7 @@ def make_practice(config: DirectionConfig, participant_id: str, seed: int) -> Pl
     forward = len(methods) // 2
     ways = Stream(seed, "practice-directions", *who).shuffled(_ways(forward, len(methods) - forward))
     trials = [
-        Trial(session=1, method=method, set=1, trial=place, direction=way)
+        Trial(session=1, set=1, trial=place, levels=condition(method=method, direction=way))
         for place, (method, way) in enumerate(zip(methods, ways, strict=True), start=1)
     ]
     if not trials:
@@ -65,11 +65,9 @@ def _session(design: Design, session: int, method: str, *, ways: list[Direction]
     return [
         Trial(
             session=session,
-            method=method,
             set=1 + place // design.trials_per_set,
             trial=1 + place,
-            direction=way,
-            instruction=instructed[place // design.trials_per_set],
+            levels=condition(method=method, direction=way, instruction=instructed[place // design.trials_per_set]),
         )
         for place, way in enumerate(ways)
     ]

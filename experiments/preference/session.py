@@ -5,7 +5,7 @@ from __future__ import annotations
 from functools import partial
 
 from experiments.config.setup import Setup
-from experiments.design.plan import Plan, Trial, method_order
+from experiments.design.plan import Plan, Trial, condition, method_order
 from experiments.design.streams import Stream
 from experiments.preference.config import PreferenceConfig
 from experiments.record.tables import Row, presentation
@@ -29,7 +29,7 @@ def make_plan(config: PreferenceConfig, participant_id: str, seed: int, order_ro
     design = config.design
     stream = Stream(seed, "trial-order", config.experiment, participant_id)
     trials = [
-        Trial(session=1, method=method, set=1, trial=place, direction=design.direction)
+        Trial(session=1, set=1, trial=place, levels=condition(method=method, direction=design.direction))
         for place, method in enumerate(method_order(design.order, design.methods, order_row, stream), start=1)
     ]
     return Plan(

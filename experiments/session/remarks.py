@@ -10,7 +10,7 @@ from typing import Annotated, Literal
 
 from pydantic import Field, TypeAdapter
 
-from experiments.config.setup import without_blank_instruction
+from experiments.config.setup import without_blanks
 from experiments.design.plan import Trial
 from experiments.session.steps import Value, What
 
@@ -124,4 +124,4 @@ REMARK: TypeAdapter[Remark] = TypeAdapter(Annotated[Remark, Field(discriminator=
 
 def remark_record(remark: Remark) -> dict[str, object]:
     """A remark as plain JSON values."""
-    return asdict(remark, dict_factory=without_blank_instruction)
+    return asdict(remark, dict_factory=without_blanks)

@@ -14,7 +14,7 @@ from typing import Annotated, Literal, Protocol
 from pydantic import Field, TypeAdapter
 
 from device.words import ShotTiming
-from experiments.config.setup import without_blank_instruction
+from experiments.config.setup import without_blanks
 from experiments.design.plan import Trial
 
 
@@ -274,7 +274,7 @@ OUTCOME: TypeAdapter[Outcome] = TypeAdapter(Annotated[Outcome, Field(discriminat
 
 def step_record(word: Step | Outcome | TrainShot) -> dict[str, object]:
     """A step, outcome or shot as plain JSON values; an instruction, and what is not always known, only where it is."""
-    fields = asdict(word, dict_factory=without_blank_instruction)
+    fields = asdict(word, dict_factory=without_blanks)
     return {key: value for key, value in fields.items() if key not in _OPTIONAL_FIELDS or value is not None}
 
 

@@ -17,7 +17,7 @@ from pydantic import Field
 from experiments.config.door import ConfigError, InnerShare, Model, PositiveSeconds, Seconds, Share, Spread, Text
 from experiments.design.config import DesignConfig
 from experiments.design.language import EMPTY, NO, YES, ColumnName, Level, QuestionConfig, shown_level
-from experiments.design.planning import Condition, DesignPlan, DesignTrial
+from experiments.design.plan import Condition, Plan, Trial
 from experiments.design.streams import Stream
 from experiments.tasks.questions import AnswerValue, on_grain, right_answer
 
@@ -154,13 +154,13 @@ def _check_law(design: DesignConfig, name: str, question: QuestionConfig, law: L
 class DesignParticipant:
     """A person drawn once, by the seed of the plan, who answers every question of a design by its law."""
 
-    def __init__(self, design: DesignConfig, laws: SyntheticAnswers, plan: DesignPlan) -> None:
+    def __init__(self, design: DesignConfig, laws: SyntheticAnswers, plan: Plan) -> None:
         check_laws(design, laws)
         self._design, self._laws, self._seed = design, laws, plan.seed
-        self._who = (plan.design, plan.participant_id)
+        self._who = (plan.experiment, plan.participant_id)
         self._own = {name: Stream(plan.seed, "person", *self._who, name).normal() for name in design.questions}
 
-    def answer(self, name: str, trial: DesignTrial) -> GivenAnswer:
+    def answer(self, name: str, trial: Trial) -> GivenAnswer:
         """The answer to a question about a trial. `ConfigError`: the law has no value for the trial's levels."""
         draws = Stream(self._seed, "answer", *self._who, name, str(trial.session), str(trial.trial))
         value = self._value(name, trial, draws)
@@ -169,7 +169,7 @@ class DesignParticipant:
             value=value, response_time_s=times.shift_s + times.median_s * math.exp(times.sigma * draws.normal())
         )
 
-    def rank(self, name: str, trials: Sequence[DesignTrial]) -> tuple[int, ...]:
+    def rank(self, name: str, trials: Sequence[Trial]) -> tuple[int, ...]:
         """The rank of each trial of a block, from 1: drawn one after another, each with its worth among those left."""
         law = self._laws.questions[name]
         if not isinstance(law, WorthLaw):
@@ -183,7 +183,7 @@ class DesignParticipant:
             left.remove(chosen)
         return tuple(ranks)
 
-    def _value(self, name: str, trial: DesignTrial, draws: Stream) -> AnswerValue:
+    def _value(self, name: str, trial: Trial, draws: Stream) -> AnswerValue:
         question, law = self._design.questions[name], self._laws.questions[name]
         match law:
             case RatesLaw() | PsychometricLaw():
@@ -202,7 +202,7 @@ class DesignParticipant:
                 return law.texts[draws.below(len(law.texts))]
 
     def _chosen(
-        self, name: str, question: QuestionConfig, law: RatesLaw | PsychometricLaw, trial: DesignTrial, draws: Stream
+        self, name: str, question: QuestionConfig, law: RatesLaw | PsychometricLaw, trial: Trial, draws: Stream
     ) -> str:
         """The right answer at its rate, else one of the others; where none is right, any."""
         right, answers = right_answer(self._design, question, trial), question.named_answers
@@ -219,7 +219,7 @@ class DesignParticipant:
         others = [answer for answer in answers if answer != right]
         return others[draws.below(len(others))]
 
-    def _felt(self, name: str, question: QuestionConfig, law: PsychometricLaw, trial: DesignTrial) -> float:
+    def _felt(self, name: str, question: QuestionConfig, law: PsychometricLaw, trial: Trial) -> float:
         """How often the right answer is given."""
         if trial.catch:
             return 1.0 - law.guess
@@ -256,7 +256,7 @@ def _by_condition(values: Mapping[str, float], by: Sequence[str], levels: Condit
     return values[key]
 
 
-def _number(trial: DesignTrial, factor: str) -> float:
+def _number(trial: Trial, factor: str) -> float:
     level = trial.level(factor)
     if not isinstance(level, float) or level <= 0:
         raise ConfigError(f"{factor} = {level!r}: this law needs a number above 0")

@@ -14,7 +14,7 @@ from experiments.design.language import (
     QuestionConfig,
     shown_level,
 )
-from experiments.design.planning import DesignTrial
+from experiments.design.plan import Trial
 
 AnswerValue = str | float | tuple[int, ...] | None
 """A named answer or words, a number, the trials of a block in order of rank, or none."""
@@ -38,7 +38,7 @@ def answer_keys(question: QuestionConfig) -> dict[str, str]:
     return {answer: keys[answer] for answer in question.named_answers}
 
 
-def right_answer(design: DesignConfig, question: QuestionConfig, trial: DesignTrial) -> str | None:
+def right_answer(design: DesignConfig, question: QuestionConfig, trial: Trial) -> str | None:
     """What is right for a trial; `None` where nothing is, as with equal levels when the larger one is asked for."""
     match question.correct:
         case None:
@@ -55,7 +55,7 @@ def right_answer(design: DesignConfig, question: QuestionConfig, trial: DesignTr
             return None if level is None else shown_level(level)
 
 
-def _larger(trial: DesignTrial) -> str | None:
+def _larger(trial: Trial) -> str | None:
     numbers = [level for level in trial.intervals if isinstance(level, float)]
     if len(numbers) != len(trial.intervals) or numbers.count(max(numbers)) > 1:
         return None
@@ -113,7 +113,7 @@ def on_grain(question: QuestionConfig, value: float) -> float:
     return round(float(low + steps * grain), decimals)
 
 
-def is_right(design: DesignConfig, question: QuestionConfig, trial: DesignTrial, answer: AnswerValue) -> bool | None:
+def is_right(design: DesignConfig, question: QuestionConfig, trial: Trial, answer: AnswerValue) -> bool | None:
     """Whether an answer is right; `None` without one, or where nothing is right."""
     right = right_answer(design, question, trial)
     return None if right is None or answer is None else answer == right
