@@ -15,6 +15,7 @@ from experiments.config.setup import Setup
 from experiments.design.plan import Plan
 from experiments.direction import synthetic as direction_synthetic
 from experiments.direction.config import DirectionConfig
+from experiments.direction.session import choices as direction_choices
 from experiments.direction.session import make_plan as direction_plan
 from experiments.direction.session import make_practice as direction_practice
 from experiments.direction.session import rows as direction_rows
@@ -29,17 +30,19 @@ from experiments.record.journal import Contents, JournalError, read_journal
 from experiments.record.tables import FILE_SUFFIX, Row, table_bytes
 from experiments.session.history import History
 from experiments.session.steps import Session
+from experiments.tasks.questions import Choice
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Experiment:
-    """What makes an experiment: config, plan and practice, session, table and synthetic participants."""
+    """What makes an experiment: config, plan and practice, session, table, choices and synthetic participants."""
 
     config: type[ExperimentConfig]
     make_plan: Callable[[Any, str, int, int | None], Plan]
     make_practice: Callable[[Any, str, int], Plan | None]
     session: Callable[[Plan, Setup[Any]], Session]
     rows: Callable[[Plan, History], list[Row]]
+    choices: Callable[[Setup[Any]], tuple[Choice, ...]]
     synthetic_participant: Callable[[Setup[Any], Plan], Any]
     answer_columns: tuple[str, ...]
 
@@ -51,6 +54,7 @@ CATALOGUE: dict[str, Experiment] = {
         make_practice=direction_practice,
         session=direction_session,
         rows=direction_rows,
+        choices=direction_choices,
         synthetic_participant=direction_synthetic.synthetic_participant,
         answer_columns=direction_synthetic.TABLE_COLUMNS,
     ),
@@ -60,6 +64,7 @@ CATALOGUE: dict[str, Experiment] = {
         make_practice=lambda *_: None,
         session=preference_session,
         rows=preference_rows,
+        choices=lambda _: (),
         synthetic_participant=preference_synthetic.synthetic_participant,
         answer_columns=preference_synthetic.TABLE_COLUMNS,
     ),

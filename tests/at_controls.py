@@ -18,6 +18,7 @@ from typing import Any, Literal
 
 from device import Gun, GunStatus, LimitError, LinkError, Shot, ShotReport
 from device.words import Direction
+from experiments import catalogue
 from experiments import run as runs
 from experiments.catalogue import table
 from experiments.config.setup import Setup
@@ -308,7 +309,8 @@ class PaperWindow:
             return verdict
 
         live.offer = watched  # type: ignore[method-assign]
-        self.controls = Controls(live, self._clock, self, scale=getattr(self.about.setup.config, "rating", None))
+        choices = catalogue.experiment(self.about.setup).choices(self.about.setup)
+        self.controls = Controls(live, self._clock, self, choices=choices)
         self._news.put(("show", live.position))
 
     def show(self, position: Position) -> None:

@@ -11,7 +11,7 @@ from dataclasses import replace
 import pytest
 
 from experiments.screens.participant.link import ParticipantError, ParticipantLink
-from experiments.screens.participant.messages import AskDescription, AskDirection, AskRating, Look, arguments
+from experiments.screens.participant.messages import AskChoice, AskDescription, AskRating, KeyedAnswer, Look, arguments
 from tests.waiting import PATIENCE_S, wait_for
 from tests.warm_start import warm
 
@@ -33,12 +33,12 @@ SCALE = AskRating(
     grain=0.1,
 )
 WORDS = AskDescription(number=2, of=3, question="Please describe this feedback in your own words.")
-WHICH = AskDirection(
+WHICH = AskChoice(
     question="Which way did it shoot?",
-    forward="forward",
-    backward="backward",
-    forward_key="f",
-    backward_key="b",
+    answers=(
+        KeyedAnswer(answer="forward", label="forward", key="f"),
+        KeyedAnswer(answer="backward", label="backward", key="b"),
+    ),
     onset_s=0.0,
 )
 LINE_Y, BUTTON_Y, OFF_LINE_Y = 0.56, 0.84, 0.30

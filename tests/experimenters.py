@@ -19,17 +19,17 @@ from experiments.design.plan import Trial
 from experiments.live_run import RunStopped
 from experiments.record.journal import Contents
 from experiments.record.replay import history
-from experiments.screens.console.keys import KEY_COMMANDS, Name
+from experiments.screens.console.keys import ANSWERS, KEY_COMMANDS, Name
 from experiments.session import events
 from experiments.session.events import ACTS
 from experiments.session.history import is_attempt
 from experiments.session.remarks import EntryCorrected, Refused
 from experiments.session.states import ARMED, State
-from experiments.session.steps import Answered, asked_for
+from experiments.session.steps import Answered, what
 from tests.at_controls import GUARD_S, Offered, Sitting, WatchedGun, gated, kept, remarks, tells_correctness
 
 KEYS = (*"MFBPUERGNYLST7", "Space", "Enter", "Esc", "Tab", "F1", "F2")
-BUTTONS = [one.name for one in KEY_COMMANDS if one.name not in ("rearm", "leave", "theme")]
+BUTTONS = [one.name for one in KEY_COMMANDS if one.name not in ("rearm", "leave", "theme", *ANSWERS[2:])]
 When = Literal["before", "within", "after"]
 """A press before what stands there was painted, within the guard's time after it, or later."""
 MOST_SITTINGS = 60
@@ -44,7 +44,7 @@ _DRAWN: dict[str, tuple[int, tuple[st.SearchStrategy[Any], ...]]] = {
     "up": (3, (_KEY,)),
     "double": (4, (_KEY, st.sampled_from((0.005, 0.06, 0.3)), _YES)),
     "click": (6, (st.sampled_from(BUTTONS), _WHEN, _YES)),
-    "double click": (3, (st.sampled_from(("fire", "forward", "next", "damper")), _YES)),
+    "double click": (3, (st.sampled_from(("fire", "answer 1", "next", "damper")), _YES)),
     "held button": (1, (st.sampled_from((0.1, 0.9, 1.2)),)),
     "line": (5, (st.sampled_from("NGREQY"), st.sampled_from(("late", "7", "müde", " ")), _YES)),
     "pause": (3, ()),
@@ -400,7 +400,7 @@ def written(contents: Contents) -> Iterator[tuple[str, Trial, Any]]:
     for step, word in history(contents):
         match word:
             case Answered():
-                kind = {"answer": "answered", "rating": "rated", "description": "described"}[asked_for(step)]
+                kind = {"answer": "answered", "rating": "rated", "description": "described"}[what(step)]
                 yield kind, step.trial, word.value
             case EntryCorrected():
                 yield "corrected", word.trial, word.value

@@ -289,7 +289,7 @@ def start_again(screen: AtConsole) -> None:
     ("experiment", "side", "state", "page"),
     [
         pytest.param("preference", "--participant-screen", "rating", "RatingPage", marks=pytest.mark.soak),
-        ("direction", "--participant-keys", "asking", "DirectionPage"),
+        ("direction", "--participant-keys", "asking", "ChoicePage"),
     ],
 )
 def test_a_participants_screen_that_is_killed_in_a_question_can_be_started_again_and_asks_it(  # noqa: PLR0917 - each is looked at

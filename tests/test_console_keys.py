@@ -10,6 +10,7 @@ from hypothesis import strategies as st
 
 from experiments.design.plan import Trial, condition
 from experiments.screens.console.keys import (
+    ANSWERS,
     BOUNCE_S,
     KEY_COMMANDS,
     STRANGE_S,
@@ -19,28 +20,28 @@ from experiments.screens.console.keys import (
     Typing,
     command_for,
     field_at,
+    shown_key,
     why_not,
 )
 from experiments.session import events
-from experiments.session.history import Entry
 from experiments.session.states import TABLE, No, Position, State
-from experiments.session.steps import What
+from experiments.session.steps import Asking, what
+from tests.asked import WAYS, ask, describe, rate
 
 S = State
 LETTERS = sorted({command.key for command in KEY_COMMANDS if len(command.key) == 1})
 TRIAL = Trial(session=1, set=1, trial=1, levels=condition(method="vibration", direction="forward"))
-CORRECTED: tuple[What, ...] = ("answer", "rating", "description")
+CORRECTED: tuple[Asking, ...] = (ask(TRIAL), rate(TRIAL), describe(TRIAL))
 
 
-def at(state: State, what: What = "answer") -> Position:
+def at(state: State, entry: Asking = CORRECTED[0]) -> Position:
     """A position in a state; a pause and a correction lie over the question of a trial."""
-    entry = Entry(trial=TRIAL, what=what)
     if state is S.CORRECTING:
         return Position(states=(S.ASKING, state), correcting=entry)
     return Position(states=(S.ASKING, state) if state is S.PAUSED else (state,))
 
 
-POSITIONS = [*(at(state) for state in State), *(at(S.CORRECTING, what) for what in CORRECTED[1:])]
+POSITIONS = [*(at(state) for state in State), *(at(S.CORRECTING, entry) for entry in CORRECTED[1:])]
 NO_FIELD = [position for position in POSITIONS if field_at(position) is None]
 FIELD = [position for position in POSITIONS if field_at(position) is not None]
 LINE, IN_FIELD, NOTHING = Typing(line=True), Typing(field=True), Typing()
@@ -48,14 +49,14 @@ LINE, IN_FIELD, NOTHING = Typing(line=True), Typing(field=True), Typing()
 
 def command(key: str, position: Position, *, ctrl: bool = False, line: bool = False) -> Name | None:
     typing = Typing(line=line, field=field_at(position) is not None)
-    return command_for(key, ctrl=ctrl, typing=typing, position=position)
+    return command_for(key, ctrl=ctrl, typing=typing, position=position, choices=WAYS)
 
 
 # which command a key is
 
 
 def test_a_number_is_typed_at_a_rating_words_at_a_description_and_nothing_elsewhere() -> None:
-    assert {(position.state, position.correcting and position.correcting.what) for position in FIELD} == {
+    assert {(position.state, position.correcting and what(position.correcting)) for position in FIELD} == {
         (S.RATING, None),
         (S.DESCRIBING, None),
         (S.CORRECTING, "rating"),
@@ -77,7 +78,7 @@ def test_the_emergency_stop_and_the_keys_of_the_window_are_the_same_everywhere(
 def test_where_nothing_is_typed_a_letter_is_a_command_and_with_ctrl_as_well_but_no_answer(position: Position) -> None:
     pause = "go on" if position.state is S.PAUSED else "pause"
     assert [command(key, position) for key in "FBMEUGNRQLYTSP"] == [
-        *("forward", "backward", "damper", "end break", "undo", "flag", "note", "repeat", "stop", "list"),
+        *("answer 1", "answer 2", "damper", "end break", "undo", "flag", "note", "repeat", "stop", "list"),
         *("reason", "rearm", "restart", pause),
     ]
     for key in LETTERS:
@@ -129,8 +130,11 @@ def test_every_command_that_does_something_somewhere_is_had_by_its_key_there() -
     for one in KEY_COMMANDS:
         ctrl = one.key.startswith("Ctrl+")
         for position in POSITIONS:
-            letters = field_at(position) is not None and len(one.key) == 1
-            found = command(one.key.removeprefix("Ctrl+"), position, ctrl=ctrl or letters)
+            if one.name in ANSWERS[len(WAYS) :]:
+                continue
+            key = shown_key(one.name, letters=False, choices=WAYS)
+            letters = field_at(position) is not None and len(key) == 1
+            found = command(key.removeprefix("Ctrl+"), position, ctrl=ctrl or letters)
             if one.kind is not None and not why_not(one.name, position) and not does_more(one.name, position):
                 assert found == one.name, (one, position)
 
@@ -144,7 +148,7 @@ def test_why_a_command_does_nothing_is_what_the_table_says() -> None:
     for one in KEY_COMMANDS:
         for position in POSITIONS:
             corrects = position.state is S.CORRECTING and (
-                one.name == "no answer" or (one.name in ("forward", "backward") and field_at(position) is None)
+                one.name == "no answer" or (one.name in ANSWERS and field_at(position) is None)
             )
             kind = events.Correct if corrects else one.kind
             if kind is None:

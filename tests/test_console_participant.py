@@ -178,12 +178,12 @@ def test_a_participants_key_is_a_response_time_from_the_onset_of_the_shot_and_in
         screen.stands(RUN)
         for trial, key in enumerate(("Up", "Down"), 1):
             asking = screen.to("asking", trial)
-            screen.participant_shows("DirectionPage", trial)
+            screen.participant_shows("ChoicePage", trial)
             pressed_s.append(screen.keys.press(key))
             screen.until(lambda look, serial=asking.serial: look.serial != serial)
             seen_s.append(time.monotonic())
         asking = screen.to("asking", trial=4)
-        screen.participant_shows("DirectionPage", 4)
+        screen.participant_shows("ChoicePage", 4)
         a_key_goes_into_a_note_and_a_page(screen, journal, shown=4)
         assert screen.look().serial == asking.serial
         screen.keys.press("Down")
@@ -210,7 +210,7 @@ def a_key_goes_into_a_note_and_a_page(screen: AtConsole, journal: Path, shown: i
         wait_for(lambda before=before: len(remarks(journal, "refused")) > before)
         screen.keys.press("Escape")
         screen.until(lambda look: not look.line and not look.page)
-        screen.participant_shows("DirectionPage", count)
+        screen.participant_shows("ChoicePage", count)
 
 
 def onsets_s(journal: Path) -> list[float]:

@@ -19,7 +19,8 @@ from experiments.screens.console.progress import RunTiming, clock_text, end_text
 from experiments.screens.console.view import About, Ended, GunSeen, ParticipantSeen, Seen
 from experiments.session.remarks import EntryCorrected, Flagged, Noted
 from experiments.session.states import Position, State
-from experiments.session.steps import Answered, Ask, Describe, Prepare, Present, Presented, Rate, Repeated, Rest
+from experiments.session.steps import Answered, Prepare, Present, Presented, Repeated, Rest
+from tests.asked import ask, describe, rate
 from tests.at_controls import DIRECTION, PREFERENCE, sat_at, tells_correctness
 
 SAID = Answered(value="forward", by="experimenter", response_time_s=1.0, response_time_valid=False)
@@ -30,16 +31,8 @@ def plan_of(setup: Setup[Any]) -> Plan:
     return catalogue.experiment(setup).make_plan(setup.config, "P01", 1, None)
 
 
-def ask(trial: Trial) -> Ask:
-    return Ask(trial=trial, attempt=1, question="Which way?", forward="forward", backward="backward")
-
-
 def present(trial: Trial) -> Present:
     return Present(trial=trial, attempt=1, repeat_every_s=0.5, max_shots=9, least_exposure_s=1.0)
-
-
-def rate(trial: Trial) -> Rate:
-    return Rate(trial=trial, question="?", minimum=0, maximum=10, minimum_text="", maximum_text="", grain=0.1)
 
 
 def prepare(trial: Trial) -> Prepare:
@@ -117,7 +110,7 @@ def test_rating_and_description_are_awaited_from_the_participants_screen_where_t
     trial = plan_of(PREFERENCE).trials[0]
     for state, step, what in (
         (State.RATING, rate(trial), "rating"),
-        (State.DESCRIBING, Describe(trial=trial, question="?"), "description"),
+        (State.DESCRIBING, describe(trial), "description"),
     ):
         here = seen(PREFERENCE, Position(states=(state,), step=step))
         there = replace(here, about=replace(here.about, participant_rates=True))
@@ -146,7 +139,7 @@ def test_after_an_emergency_stop_nothing_comes_next_and_no_end_is_told() -> None
 
 def test_the_participants_screen_has_the_keys_from_one_rating_or_description_to_the_next_and_no_longer() -> None:
     here = seen(PREFERENCE, Position()).about
-    step = Describe(trial=plan_of(PREFERENCE).trials[0], question="?")
+    step = describe(plan_of(PREFERENCE).trials[0])
     there = replace(here, participant_rates=True)
     typed = {state for state in State if view.typed_there(there, Position(states=(state,), step=step))}
     assert typed == {State.RATING, State.DESCRIBING, State.SAVING}
@@ -182,7 +175,7 @@ def test_the_list_of_marks_has_those_of_this_set_and_an_answer_that_was_given_ag
     trials = plan_of(DIRECTION).trials
     first, other = trials[0], trials[-1]
     step, given = ask(first), (ask(first), SAID)
-    corrected = (None, EntryCorrected(trial=first, what="answer", value="backward"))
+    corrected = (None, EntryCorrected(trial=first, question="response", value="backward"))
     spoiled = (Prepare(trial=trials[1], attempt=1, damper=""), Repeated(trial=first, reason="noise"))
     flagged, noted = (None, Flagged(trial=other, flag="late")), (None, Noted(trial=first, text="a dog"))
     here = Position(states=(State.ASKING,), step=step)

@@ -62,7 +62,6 @@ from experiments.load import find, load_gun
 from experiments.record.journal import Journal, Record
 from experiments.session.steps import (
     Answered,
-    Ask,
     Fired,
     FireShot,
     Outcome,
@@ -75,6 +74,7 @@ from experiments.session.steps import (
 )
 from experiments.study.folders import PlaceError
 from recoil.rig import examination_text
+from tests.asked import ask
 from tests.conftest import RECOIL, Recoil
 from tests.kills import can_mount, in_small_disk
 from tests.waiting import PATIENCE_S
@@ -118,7 +118,7 @@ FIRED = Fired(
     gun="a", onset_utc="", requested_s=0.0, pulse_start_s=0.0, pulse_end_s=0.0, home_predicted_s=0.0, motion="home"
 )
 ANSWERED = Answered(value="forward", by="experimenter", response_time_s=1.5, response_time_valid=False)
-ASK = Ask(trial=TRIAL, attempt=1, question="", forward="", backward="")
+ASK = ask(TRIAL)
 HEAD = Record(n=0, kind="run", utc="", monotonic_s=0.0, clock="real")
 
 

@@ -19,7 +19,6 @@ from experiments.screens.texts import again_text
 from experiments.session import events
 from experiments.session import remarks as words
 from experiments.session.events import Event, Press
-from experiments.session.history import Entry
 from experiments.session.remarks import (
     EntryCorrected,
     Flagged,
@@ -32,6 +31,7 @@ from experiments.session.remarks import (
 from experiments.session.states import EMERGENCY, State
 from experiments.session.steps import (
     Answered,
+    Asking,
     Failed,
     FireShot,
     Interrupted,
@@ -40,6 +40,7 @@ from experiments.session.steps import (
     Rate,
     Repeated,
     trial_of,
+    what,
 )
 from experiments.study.folders import place
 from tests.at_controls import (
@@ -440,7 +441,7 @@ def test_undo_goes_back_one_by_one_through_the_answers_of_the_set_and_stops_at_t
             sitting.press("F")
         first_set = sitting.live.plan.trials[:3]
         assert sitting.state is S.RESTING
-        assert opened(sitting, 4) == [Entry(trial=trial, what="answer") for trial in (*first_set[::-1], first_set[0])]
+        assert opened(sitting, 4) == [(trial, "answer") for trial in (*first_set[::-1], first_set[0])]
         sitting.press("Esc")
         sitting.to(S.PREPARING)
         assert by_hand(sitting, events.Undo()).text == "There is nothing to undo in this set."
@@ -454,16 +455,17 @@ def test_undo_goes_back_through_ratings_and_descriptions_as_they_were_entered(tm
             sitting.type("like a toy")
         one, two, _ = sitting.live.plan.trials
         entered = [(one, "rating"), (one, "description"), (two, "rating"), (two, "description")]
-        back = [Entry(trial=trial, what=what) for trial, what in entered[::-1]]  # type: ignore[arg-type]
-        assert opened(sitting, 5) == [*back, back[-1]]
+        assert opened(sitting, 5) == [*entered[::-1], entered[0]]
 
 
-def opened(sitting: Sitting, times: int) -> list[Entry | None]:
+def opened(sitting: Sitting, times: int) -> list[tuple[Trial, str]]:
     """What an undo opens, one after the other."""
     found = []
     for _ in range(times):
         assert by_hand(sitting, events.Undo())
-        found.append(sitting.position.correcting)
+        entry = sitting.position.correcting
+        assert isinstance(entry, Asking)
+        found.append((entry.trial, what(entry)))
     return found
 
 
@@ -900,7 +902,10 @@ def test_a_presented_trial_can_be_repeated_until_its_rating_is_in(tmp_path: Path
         assert prepare(sitting).trial == sitting.live.plan.trials[0]
         sitting.to(S.RATING)
         sitting.type("5")
-        assert by_hand(sitting, events.Repeat(reason="again")).text == "Its rating is in: it cannot be presented again."
+        assert (
+            by_hand(sitting, events.Repeat(reason="again")).text
+            == "It is being described: it cannot be presented again now."
+        )
         sitting.to(S.CLOSING)
         assert by_hand(sitting, events.Repeat(reason="again")).text == "There is no trial of this set to repeat now."
         contents, rows = to_the_end(sitting)

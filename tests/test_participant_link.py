@@ -7,15 +7,17 @@ import sys
 import threading
 import time
 from contextlib import contextmanager
+from dataclasses import replace
 
 import pytest
 
 from experiments.screens.participant.link import ParticipantError, ParticipantLink
 from experiments.screens.participant.messages import (
+    AskChoice,
     AskDescription,
-    AskDirection,
     AskRating,
     DescriptionGiven,
+    KeyedAnswer,
     RatingGiven,
 )
 from tests.waiting import PATIENCE_S, wait_for
@@ -24,8 +26,13 @@ SCALE = AskRating(
     number=1, of=3, question='"?"\n很', minimum=0, maximum=10, minimum_text="low", maximum_text="high", grain=0.1
 )
 WORDS = AskDescription(number=1, of=3, question='"?"\n很')
-WHICH = AskDirection(
-    question="?", forward="forward", backward="backward", forward_key="f", backward_key="b", onset_s=0.0
+WHICH = AskChoice(
+    question="?",
+    answers=(
+        KeyedAnswer(answer="forward", label="forward", key="f"),
+        KeyedAnswer(answer="backward", label="backward", key="b"),
+    ),
+    onset_s=0.0,
 )
 
 CHILD = """
@@ -36,7 +43,7 @@ def say(**word): print(json.dumps(word), flush=True)
 def ready(): say(kind="ready", psychopy="none", window="1x1", refresh_Hz=None)
 def rate(word, rating=0): say(kind="rating-given", rating=rating, ask=word["ask"])
 def describe(word): say(kind="description-given", comment=word["question"], ask=word["ask"])
-def direct(word): say(kind="direction-given", response="backward", pressed_s=word["onset_s"] + 0.5, ask=word["ask"])
+def direct(word): say(kind="choice-given", response="backward", pressed_s=word["onset_s"] + 0.5, ask=word["ask"])
 def words():
     for line in sys.stdin:
         word = json.loads(line)
@@ -85,7 +92,7 @@ def test_moments_are_mapped_there_and_back(child):
     link = child("ready()\nfor word in words(): direct(word)")
     link.wait_ready(PATIENCE_S)
     onset_s = time.monotonic()
-    given = link.ask_direction(AskDirection(**fields(WHICH) | {"onset_s": onset_s}))
+    given = link.ask_choice(replace(WHICH, onset_s=onset_s))
     assert given.response == "backward"
     assert given.pressed_s == pytest.approx(onset_s + 0.5, abs=1e-6)
     clocks = link.map_clocks()
@@ -100,7 +107,7 @@ def test_a_clock_that_is_set_in_mid_question_spoils_the_time_and_is_said(child):
     link = child("ready()\nfor word in words():\n    step_s = 3600.0\n    direct(word)")
     link.wait_ready(PATIENCE_S)
     with pytest.raises(ParticipantError, match=r"clock was set by (3599|3600)\.\d+ s.*'backward'"):
-        link.ask_direction(WHICH)
+        link.ask_choice(WHICH)
 
 
 @pytest.mark.slow

@@ -192,7 +192,7 @@ def test_a_key_tells_the_direction_and_when_it_went_down(link, hands, console, m
     """After the press and before the answer came, as well as the clocks know; how close to it, `make soak` measures."""
     show(link, "Please wait")
     question = replace(WHICH, onset_s=time.monotonic())
-    answer = hands.changing(lambda: console.submit(link.ask_direction, question))
+    answer = hands.changing(lambda: console.submit(link.ask_choice, question))
     hands.key("x")
     pressed_s = hands.key("b")
     given, unsure_s = answer.result(PATIENCE_S), maps[0].uncertainty_s
@@ -204,10 +204,10 @@ def test_a_key_tells_the_direction_and_when_it_went_down(link, hands, console, m
 def test_a_key_before_the_onset_is_no_answer_but_one_before_the_question_stands_is(link, hands):
     question = replace(WHICH, onset_s=time.monotonic())
     hands.key("b")
-    before = link.ask_direction(question)
+    before = link.ask_choice(question)
     time.sleep(2 * FAR_S)
     hands.key("f")
-    given = link.ask_direction(replace(question, onset_s=before.pressed_s + FAR_S))
+    given = link.ask_choice(replace(question, onset_s=before.pressed_s + FAR_S))
     assert (before.response, given.response) == ("backward", "forward")
     assert given.pressed_s > before.pressed_s + FAR_S
 
@@ -216,7 +216,7 @@ def test_after_a_pause_a_key_counts_once_the_question_stands_there_again(link, h
     show(link, "Paused")
     question = replace(WHICH, onset_s=time.monotonic(), once_seen=True)
     hands.key("b")
-    answer = hands.changing(lambda: console.submit(link.ask_direction, question))
+    answer = hands.changing(lambda: console.submit(link.ask_choice, question))
     hands.key("f")
     assert answer.result(PATIENCE_S).response == "forward"
 

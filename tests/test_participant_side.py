@@ -18,12 +18,13 @@ from experiments.screens.participant.link import ParticipantLink
 from experiments.screens.participant.messages import BETWEEN, Focused, line
 from experiments.session.states import Position, State
 from experiments.session.steps import Describe, Rate
+from tests.asked import describe, rate
 from tests.waiting import PATIENCE_S, wait_for
 
 SETUP = load_setup("preference")
 PROGRAM = "import sys\nwith open(sys.argv[1], 'wb') as told:\n    for line in sys.stdin.buffer:\n        told.write(line)\n        told.flush()"  # noqa: E501 - a program
 TRIAL = Trial(session=1, set=1, trial=1, levels=condition(method="vibration", direction="forward"))
-STEP = Rate(trial=TRIAL, question="?", minimum=0, maximum=10, minimum_text="", maximum_text="", grain=0.1)
+STEP = rate(TRIAL)
 
 
 class Told:
@@ -33,6 +34,7 @@ class Told:
         self._file = folder / "told"
         self.link = ParticipantLink.start(command=(sys.executable, "-c", PROGRAM, str(self._file)))
         self.side = ParticipantSide(self.link, lambda: self.link, SETUP, rates=True, own_keys=False)
+        self.side.planned = 3
 
     def at(self, serial: int, *states: State, step: Rate | Describe = STEP) -> None:
         self.side.follow(Position(states=states, serial=serial, number=3, step=step))
@@ -84,7 +86,7 @@ def test_what_takes_a_question_off_the_participants_screen_stays_on_it(told: Tol
 def test_between_a_rating_and_its_description_the_participants_window_keeps_the_keys_but_not_in_a_pause(
     told: Told,
 ) -> None:
-    described = Describe(trial=TRIAL, question="In your own words?")
+    described = describe(TRIAL)
     told.at(1, State.RATING)
     wait_for(lambda: told.words == ["ask-rating"])
     told.at(2, State.SAVING)
@@ -101,7 +103,7 @@ def test_between_a_rating_and_its_description_the_participants_window_keeps_the_
         BETWEEN: True, PAUSED: False, "end": False
     }  # fmt: skip
     asked = next(word for word in told.all if word["kind"] == "ask-description")
-    assert (asked["number"], asked["of"], asked["question"]) == (1, 3, "In your own words?")
+    assert (asked["number"], asked["of"], asked["question"]) == (1, 3, "?")
 
 
 def test_whose_the_keys_are_is_told_also_if_it_was_said_before_anybody_listened() -> None:

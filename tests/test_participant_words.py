@@ -7,12 +7,13 @@ from pydantic import ValidationError
 
 from experiments.screens.participant.link import ClockMap, RoundTrip, clock_map
 from experiments.screens.participant.messages import (
+    AskChoice,
     AskDescription,
-    AskDirection,
     AskRating,
+    ChoiceGiven,
     CloseScreen,
     DescriptionGiven,
-    DirectionGiven,
+    KeyedAnswer,
     Look,
     Noise,
     NoiseIs,
@@ -51,12 +52,9 @@ TO = st.one_of(
     ),
     st.builds(AskDescription, number=COUNT, of=COUNT, question=TEXT, ask=COUNT),
     st.builds(
-        AskDirection,
+        AskChoice,
         question=TEXT,
-        forward=TEXT,
-        backward=TEXT,
-        forward_key=TEXT,
-        backward_key=TEXT,
+        answers=st.lists(st.builds(KeyedAnswer, answer=TEXT, label=TEXT, key=TEXT)).map(tuple),
         onset_s=NUMBER,
         ask=COUNT,
     ),
@@ -69,7 +67,7 @@ FROM = st.one_of(
     st.builds(Pong, sent_s=NUMBER, there_s=NUMBER),
     st.builds(RatingGiven, rating=NUMBER, ask=COUNT),
     st.builds(DescriptionGiven, comment=TEXT, ask=COUNT),
-    st.builds(DirectionGiven, response=st.sampled_from(["forward", "backward"]), pressed_s=NUMBER, ask=COUNT),
+    st.builds(ChoiceGiven, response=TEXT, pressed_s=NUMBER, ask=COUNT),
     st.builds(NoiseIs, on=st.booleans(), message=TEXT, ask=COUNT),
     st.builds(ScreenFailed, message=TEXT),
 )
@@ -109,7 +107,7 @@ GARBAGE = [
     b'{"kind": "rating-given", "rating": 1e999}',
     b'{"kind": "rating-given", "rating": null}',
     b'{"kind": "description-given", "comment": null}',
-    b'{"kind": "direction-given", "response": "up", "pressed_s": 1}',
+    b'{"kind": "choice-given", "response": 1, "pressed_s": 1}',
     b'{"kind": "failed", "message": "half',
     b"\xff\xfe",
 ]

@@ -89,7 +89,7 @@ def test_a_stimulus_is_repeated_as_the_config_says_until_next() -> None:
 
 def test_the_question_is_the_papers_and_names_no_method() -> None:
     rates = [step for step in STEPS if isinstance(step, Rate)]
-    assert {step.question for step in rates} == {QUESTION}
+    assert {(step.question, step.text) for step in rates} == {("rating", QUESTION)}
     shown = {key: value for key, value in step_record(rates[0]).items() if key != "trial"}
     for method in PLAN.methods:
         for name in (method, SETUP.gun.methods[method].label):

@@ -35,7 +35,7 @@ def test_keys_beside_their_presses(link: ParticipantLink, hands: Any, console: T
 def stamp_ms(link: ParticipantLink, hands: Hands, console: ThreadPoolExecutor) -> float:
     """How much later than its press a key that answers was stamped."""
     question = replace(screen.WHICH, onset_s=time.monotonic())
-    answer = console.submit(link.ask_direction, question)
+    answer = console.submit(link.ask_choice, question)
     time.sleep(0.1)
     pressed_s = hands.key("f")
     return 1000 * (answer.result(PATIENCE_S).pressed_s - pressed_s)

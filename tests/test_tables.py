@@ -16,8 +16,6 @@ from experiments.record.tables import Row, guard, table_bytes, unguard
 from experiments.session.remarks import EntryCorrected
 from experiments.session.steps import (
     Answered,
-    Ask,
-    Describe,
     Failed,
     Fired,
     FireShot,
@@ -27,11 +25,11 @@ from experiments.session.steps import (
     Prepared,
     Present,
     Presented,
-    Rate,
     Rest,
     Rested,
     Step,
 )
+from tests.asked import ask, describe, rate
 
 FORMULA_STARTS = tuple("=+-@\t\r")
 DIRECTION: Plan = direction_plan(load_setup("direction").config, "P01", 1, None)
@@ -143,7 +141,7 @@ def told(place: int, *outcomes: tuple[str, Outcome]) -> list[tuple[Step, Outcome
     steps = {
         "prepare": Prepare(trial=trial, attempt=1, damper=""),
         "fire": FireShot(trial=trial, attempt=1),
-        "ask": Ask(trial=trial, attempt=1, question="?", forward="f", backward="b"),
+        "ask": ask(trial),
     }
     return [(steps[name], outcome) for name, outcome in outcomes]
 
@@ -199,7 +197,7 @@ def test_attempts_count_stimuli_that_may_have_been_felt_and_flags_say_why_there_
 
 def test_an_answer_is_flagged_corrected_only_if_what_counts_is_a_correction() -> None:
     given = told(0, ("fire", FIRED), ("ask", answer("forward")))
-    corrected = (None, EntryCorrected(trial=DIRECTION.trials[0], what="answer", value="backward"))
+    corrected = (None, EntryCorrected(trial=DIRECTION.trials[0], question="response", value="backward"))
     assert written([*given, corrected])[0]["flags"] == "corrected"
     assert written([*given, corrected, *given])[0]["flags"] == ""
 
@@ -214,11 +212,10 @@ def test_what_happens_to_one_trial_or_in_a_break_shows_in_no_other_row() -> None
 def test_a_rating_of_0_is_written_and_none_leaves_the_cell_empty(rating: float | None, cell: str) -> None:
     trial = PREFERENCE.trials[1]
     shown = Presented(gun="simulated", onset_utc="t", shots=12, exposure_s=11.5, ended_by="next")
-    rate = Rate(trial=trial, question="?", minimum=0, maximum=10, minimum_text="a", maximum_text="b", grain=0.1)
     history = [
         (Present(trial=trial, attempt=1, repeat_every_s=1.0, max_shots=120, least_exposure_s=1.0), shown),
-        (rate, Answered(value=rating, by="participant")),
-        (Describe(trial=trial, question="?"), Answered(value="-soft", by="experimenter")),
+        (rate(trial), Answered(value=rating, by="participant")),
+        (describe(trial), Answered(value="-soft", by="experimenter")),
     ]
     rows: list[Row] = preference_rows(PREFERENCE, history)
     first, row, last = read(table_bytes("preference", rows))

@@ -169,7 +169,7 @@ def sha256(value: object) -> str:
     return hashlib.sha256(canonical_json(value)).hexdigest()
 
 
-_BLANKS: dict[str, object] = {"instruction": "", "intervals": (), "odd": None, "catch": False}
+_BLANKS: dict[str, object] = {"instruction": "", "intervals": (), "odd": None, "catch": False, "later": False}
 """What most trials and steps do not have, by the name of its field."""
 
 

@@ -204,6 +204,8 @@ class TrialConfig(Model):
         return self
 
 
+MAX_ANSWERS = 9
+"""So many answers have a button on the console."""
 QuestionKind = Literal["choice", "yes-no", "rating", "number", "ranking", "text"]
 YES, NO = "yes", "no"
 
@@ -214,7 +216,7 @@ class QuestionConfig(Model):
     kind: QuestionKind
     text: PageText
     when: Literal["trial", "block"] = "trial"
-    answers: Annotated[tuple[ColumnName, ...], Field(max_length=26), AfterValidator(once)] = ()
+    answers: Annotated[tuple[ColumnName, ...], Field(max_length=MAX_ANSWERS), AfterValidator(once)] = ()
     labels: dict[str, LineText] = Field(default_factory=dict)
     keys: dict[str, Annotated[str, Field(pattern=r"^[a-z0-9]$|^(left|right|up|down)$")]] = Field(default_factory=dict)
     correct: ColumnName | None = None

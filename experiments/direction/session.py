@@ -14,6 +14,7 @@ from experiments.direction.config import Breaks, Design, DirectionConfig
 from experiments.record.tables import Row, presentation
 from experiments.session.history import History, TrialHistory, by_trial
 from experiments.session.steps import Answered, Ask, Fired, FireShot, Prepare, Presenter, Rest, Session, Step
+from experiments.tasks.questions import Choice, choices_of
 
 
 def make_plan(config: DirectionConfig, participant_id: str, seed: int, order_row: int | None) -> Plan:
@@ -130,14 +131,19 @@ def _steps(setup: Setup[DirectionConfig], texts: Mapping[str, str], trial: Trial
             instruction=texts[trial.instruction],
         ),
         FireShot(trial=trial, attempt=attempt),
-        Ask(
-            trial=trial,
-            attempt=attempt,
-            question=question.text,
-            forward=question.forward,
-            backward=question.backward,
-        ),
+        Ask(trial=trial, question=QUESTION, text=question.text, choices=choices(setup)),
     )
+
+
+QUESTION = "response"
+"""The name of what is asked, which is its column."""
+
+
+def choices(setup: Setup[DirectionConfig]) -> tuple[Choice, ...]:
+    """The two answers; the participant's own keys are the arrows up and down."""
+    question = setup.config.question
+    labels = {"forward": question.forward, "backward": question.backward}
+    return choices_of(labels, {"forward": "up", "backward": "down"})
 
 
 ANTICIPATION_S = 0.1
@@ -165,7 +171,7 @@ def rows(plan: Plan, history: History) -> list[Row]:
 
 def _answer(trial: Trial, events: TrialHistory) -> Row:
     """The answer that counts: the last one given, or what it was corrected to, whose time is not the participant's."""
-    entered, given = events.entered("answer"), events.last(Answered)
+    entered, given = events.entered(QUESTION), events.last(Answered)
     if given is None:
         return {}
     counts = entered[-1]

@@ -19,6 +19,7 @@ from experiments.config.setup import Setup
 from experiments.design.plan import Plan, Trial
 from experiments.design.streams import Stream
 from experiments.direction.config import DirectionConfig, Rates, ResponseTime
+from experiments.direction.session import QUESTION
 from experiments.synthetic.model_based import NEUTRAL, ModelBasedParticipant, ModelParameters
 from experiments.synthetic.percept import Percept, percepts_of
 
@@ -82,7 +83,7 @@ class RatesParticipant:
         self._ability = self._rates.ability_sd * person.normal()
         self._bias = self._rates.bias_sd * person.normal()
 
-    def answer(self, trial: Trial) -> SyntheticAnswer:
+    def answer(self, trial: Trial, question: str = QUESTION) -> SyntheticAnswer:  # noqa: ARG002 - there is one
         """The answer to a shot of this trial's method and direction."""
         draws = _trial_stream(self._seed, self._who, trial)
         towards = self._ability if trial.direction == "forward" else -self._ability
@@ -110,7 +111,7 @@ class TableParticipant:
                 shuffled = Stream(self._seed, "correct", *self._who, method, direction).shuffled(marks)
                 self._correct |= dict(zip(trials, shuffled, strict=True))
 
-    def answer(self, trial: Trial) -> SyntheticAnswer:
+    def answer(self, trial: Trial, question: str = QUESTION) -> SyntheticAnswer:  # noqa: ARG002 - there is one
         """The answer that the table leaves for this trial."""
         other: Direction = "backward" if trial.direction == "forward" else "forward"
         draws = _trial_stream(self._seed, self._who, trial)
@@ -129,7 +130,7 @@ class ModelParticipant:
     def __init__(self, model: ModelParameters, percepts: Mapping[str, Percept], plan: Plan) -> None:
         self._participant = ModelBasedParticipant(model, percepts, plan)
 
-    def answer(self, trial: Trial) -> SyntheticAnswer:
+    def answer(self, trial: Trial, question: str = QUESTION) -> SyntheticAnswer:  # noqa: ARG002 - there is one
         """The answer to a shot of this trial's method and direction."""
         decision = self._participant.decide(trial, trial.instruction or NEUTRAL)
         response: Direction = "forward" if decision.upper else "backward"

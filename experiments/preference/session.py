@@ -48,7 +48,7 @@ def session(plan: Plan, setup: Setup[PreferenceConfig]) -> Session:
         yield from presenter.present(trial)
     for trial in plan.trials:
         yield from presenter.until_done(_rate(trial, setup.config))
-        yield from presenter.until_done(Describe(trial=trial, question=setup.config.description.text))
+        yield from presenter.until_done(_describe(trial, setup.config))
     yield from presenter.close()
 
 
@@ -69,13 +69,19 @@ def _rate(trial: Trial, config: PreferenceConfig) -> Rate:
     scale = config.rating
     return Rate(
         trial=trial,
-        question=scale.question,
+        question="rating",
+        text=scale.question,
         minimum=scale.minimum,
         maximum=scale.maximum,
         minimum_text=scale.minimum_text,
         maximum_text=scale.maximum_text,
         grain=scale.grain,
+        later=True,
     )
+
+
+def _describe(trial: Trial, config: PreferenceConfig) -> Describe:
+    return Describe(trial=trial, question="comment", text=config.description.text, later=True)
 
 
 def rows(plan: Plan, history: History) -> list[Row]:
@@ -106,7 +112,7 @@ def _exposure(events: TrialHistory) -> Row:
 
 def _rating(events: TrialHistory) -> Row:
     """The rating that counts, the participant's words, and whose hand entered them."""
-    entered, described = events.entered("rating"), events.entered("description")
+    entered, described = events.entered("rating"), events.entered("comment")
     row: Row = {"comment": described[-1].value} if described else {}
     if not entered:
         return row

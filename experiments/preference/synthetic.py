@@ -70,7 +70,7 @@ class RatingsParticipant:
         self._plan = plan
         self._ratings = ratings
 
-    def rate(self, trial: Trial) -> float | None:
+    def rate(self, trial: Trial, question: str = "rating") -> float | None:  # noqa: ARG002 - there is one
         """The rating of this trial's method."""
         return self._ratings[trial.method]
 

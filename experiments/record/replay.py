@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 
 from experiments.record.journal import Contents, JournalError, Record, read_as
 from experiments.session import steps
-from experiments.session.history import History, fits
+from experiments.session.history import History, asked
 from experiments.session.remarks import REMARK, EntryCorrected, Halted, Remark, TestShot
 from experiments.session.states import EMERGENCY
 
@@ -46,24 +46,24 @@ def history(contents: Contents) -> History:
         elif line.kind == "remark":
             remark = _remark(contents, line)
             if isinstance(remark, EntryCorrected):
-                _check_value(contents, line, remark.what, remark.value)
+                _check_value(contents, line, asked(found, remark), remark.value)
             found.append((None, remark))
         elif line.kind == "outcome":
             if step is None:
                 raise JournalError(f"{_place(contents, line)}: an outcome without its step; a line was lost")
             outcome = read_as(steps.OUTCOME, line.body, _place(contents, line))
             if isinstance(outcome, steps.Answered):
-                _check_value(contents, line, steps.asked_for(step), outcome.value)
+                _check_value(contents, line, step, outcome.value)
             found.append((step, outcome))
             step = None
     return found
 
 
-def _check_value(contents: Contents, line: Record, what: steps.What | None, value: steps.Value) -> None:
+def _check_value(contents: Contents, line: Record, step: steps.Step | None, value: steps.Value) -> None:
     """`JournalError` for an answer that is none to what was asked."""
-    if what is None or not fits(what, value):
-        place, asked = _place(contents, line), what or "answer"
-        raise JournalError(f"{place}: value {value!r} is no {asked}; the record was changed")
+    if not isinstance(step, steps.Asking) or not steps.is_answer(step, value):
+        kind = steps.what(step) if isinstance(step, steps.Asking) else "answer"
+        raise JournalError(f"{_place(contents, line)}: value {value!r} is no {kind}; the record was changed")
 
 
 def outcomes(history: History) -> list[tuple[steps.Step, steps.Outcome]]:

@@ -10,11 +10,11 @@ import csv
 import io
 from collections.abc import Iterable
 from dataclasses import dataclass
-from typing import Literal, get_args
+from typing import Literal
 
 from experiments.session import remarks
 from experiments.session.history import TrialHistory, is_attempt
-from experiments.session.steps import Answered, Failed, Fired, Interrupted, Presented, What
+from experiments.session.steps import Answered, Failed, Fired, Interrupted, Presented
 
 ColumnType = Literal["text", "level", "integer", "number", "flag"]
 
@@ -177,7 +177,7 @@ def _flags(events: TrialHistory) -> list[str]:
         "interrupted": any(one.presented and one.cause == "break-off" for one in events.all(Interrupted)),
         "paused": any(one.presented and one.cause == "pause" for one in events.all(Interrupted)),
         "repeated": events.repeated,
-        "corrected": any(_is_corrected(events.entered(what)) for what in get_args(What)),
+        "corrected": any(_is_corrected(events.entered(name)) for name in events.questions),
     }
     own = [remark.flag for remark in events.all(remarks.Flagged)]
     return list(dict.fromkeys([flag for flag, there in found.items() if there] + own))

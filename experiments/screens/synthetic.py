@@ -77,7 +77,7 @@ class SyntheticScreen:
                 return self._answer(position, step)
             case State.RATING if isinstance(step, Rate):
                 self._clock.sleep(self._timing.rating_s)
-                return events.Rating(rating=self._observer.rate(step.trial), by="synthetic")
+                return events.Rating(rating=self._observer.rate(step.trial, step.question), by="synthetic")
             case State.DESCRIBING:
                 self._clock.sleep(self._timing.description_s)
                 return events.Description(text="")
@@ -93,7 +93,7 @@ class SyntheticScreen:
 
     def _answer(self, position: Position, step: Ask) -> Event:
         """Answer after the observer's own response time."""
-        answer = self._observer.answer(step.trial)
+        answer = self._observer.answer(step.trial, step.question)
         onset_s = position.onset_s if position.onset_s is not None else self._clock.now()
         self._clock.sleep(onset_s + answer.response_time_s - self._clock.now())
         return events.Answer(response=answer.response, by="synthetic", response_time_s=answer.response_time_s)

@@ -7,7 +7,6 @@ experimenter's hand and are logged as such. Neither correctness nor a score is e
 from __future__ import annotations
 
 import io
-import math
 import sys
 import threading
 from contextlib import suppress
@@ -19,16 +18,14 @@ from experiments.live_run import LiveRun
 from experiments.screens import texts
 from experiments.session import events
 from experiments.session.events import Event, Press
-from experiments.session.history import Entry, entered_value
+from experiments.session.history import entered_value
 from experiments.session.remarks import Remark, flag_word
 from experiments.session.states import Position, State
-from experiments.session.steps import Ask, Describe, Outcome, Prepare, Rate, Rest, Step
+from experiments.session.steps import Ask, Asking, Describe, Outcome, Prepare, Rate, Rest, Step, what
 
 if TYPE_CHECKING:
-    from device.words import Direction
     from experiments.design.plan import Plan
 
-_DIRECTIONS: dict[str, Direction] = {"f": "forward", "forward": "forward", "b": "backward", "backward": "backward"}
 _HELP = """At any time: `!` and Enter is the emergency stop, `stop` and a reason stops. `pause`, `undo`, `repeat` and
 a reason; `flag` and a word, `note` and words. Where words are asked for, put a / in front: /stop, /note ..."""
 _REARMING = (
@@ -40,6 +37,7 @@ _HALTED = (
     "Unless the gun says that it is disarmed, SWITCH OFF ITS POWER.\n"
     "  Type why, and Enter; Enter alone closes the run, which can be resumed: "
 )
+_HOW = {Rate: "a number, or none", Describe: "the words"}
 _COMMANDS = ("stop", "pause", "undo", "repeat", "flag", "note", "skip", "help")
 _TICK_S = 1.0
 
@@ -90,7 +88,7 @@ class TerminalScreen:
 
     def acknowledge(self, step: Step | None, word: Outcome | Remark) -> None:
         """Say that something is safe; say what the gun failed at."""
-        text = texts.saved_text(self._plan, step, word)
+        text = texts.saved_text(self._plan, self._live.history if self._live else (), step, word)
         if text:
             self._say(f"  {text}")
 
@@ -121,12 +119,13 @@ class TerminalScreen:
             case State.TRAIN if position.onset_s is not None:
                 return "\n  Enter when the participant says next: "
             case State.ASKING if isinstance(step, Ask):
-                return f"\n  {step.question} f = {step.forward}, b = {step.backward}: "
+                about = f"{texts.ordinal(self._plan, step.trial)}. " if step.later else ""
+                return f"\n  {about}{step.text} {_keys(step)}: "
             case State.RATING if isinstance(step, Rate):
                 ends = f"{step.minimum:g} = {step.minimum_text}, {step.maximum:g} = {step.maximum_text}"
-                return f"\n{texts.ordinal(self._plan, step.trial)}. {step.question}\n  {ends}; `none` for no answer: "
+                return f"\n{texts.about_text(self._plan, step)}. {step.text}\n  {ends}; `none` for no answer: "
             case State.DESCRIBING if isinstance(step, Describe):
-                return f"\n  {texts.ordinal(self._plan, step.trial)}. {step.question} "
+                return f"\n  {texts.about_text(self._plan, step)}. {step.text} "
             case State.RESTING:
                 return f"\nBreak {_between(position)}. (`skip` and a reason ends it early.)\n"
             case State.CLOSING:
@@ -146,12 +145,12 @@ class TerminalScreen:
         place, again = texts.place_text(self._plan, step.trial), texts.again_text(told, step)
         return f"\n{place}.{f' {again}' if again else ''}{texts.read_out_text(self._plan, step)}"
 
-    def _correction(self, entry: Entry) -> str:
+    def _correction(self, entry: Asking) -> str:
         told = self._live.history if self._live else ()
-        was = texts.value_text(entered_value(told, entry))
-        how = {"answer": "f or b", "rating": "a number, or none", "description": "the words"}[entry.what]
+        was = texts.value_text(entry, entered_value(told, entry))
+        how = _keys(entry) if isinstance(entry, Ask) else _HOW[type(entry)]
         return (
-            f"\n  Correct the {entry.what} of {texts.place_text(self._plan, entry.trial)} (entered: {was}): {how}; "
+            f"\n  Correct the {what(entry)} of {texts.place_text(self._plan, entry.trial)} (entered: {was}): {how}; "
             "`undo` goes further back, Enter leaves it: "
         )
 
@@ -224,7 +223,23 @@ class TerminalScreen:
 
 
 def _corrects_words(position: Position) -> bool:
-    return position.correcting is not None and position.correcting.what == "description"
+    return isinstance(position.correcting, Describe)
+
+
+def _keys(asked: Ask) -> str:
+    """The answers with what is typed for each, as in “f = forward, b = backward”."""
+    return ", ".join(f"{one.key} = {one.label}" for one in asked.choices)
+
+
+def _chosen(asked: Ask, line: str) -> str | None:
+    """The answer that a line means: by its key, its name or its label."""
+    typed = line.casefold()
+    named = ((one.answer, (one.key, one.answer.casefold(), one.label.casefold())) for one in asked.choices)
+    return next((answer for answer, names in named if typed in names), None)
+
+
+def _no_answer(asked: Ask) -> str:
+    return f"Not an answer: type {' or '.join(one.key for one in asked.choices)} and Enter."
 
 
 def _between(position: Position) -> str:
@@ -266,10 +281,9 @@ def _line(line: str, position: Position, now_s: float) -> Event | str | None:  #
             return events.DamperSet() if line.lower() == "d" else "Set the damper, then type d and Enter."
         case State.REARMING:
             return events.Rearm(held_s=None) if line.lower() == "test shot" else "Type `test shot` and Enter."
-        case State.ASKING:
-            response = _DIRECTIONS.get(line.lower())
-            at = "Not an answer: type f or b and Enter."
-            return at if response is None else events.Answer(response=response, at_s=now_s)
+        case State.ASKING if isinstance(position.step, Ask):
+            response = _chosen(position.step, line)
+            return _no_answer(position.step) if response is None else events.Answer(response=response, at_s=now_s)
         case State.RATING:
             return _rating(line, position)
         case State.DESCRIBING:
@@ -293,32 +307,31 @@ def _line(line: str, position: Position, now_s: float) -> Event | str | None:  #
 
 
 def _rating(line: str, position: Position) -> Event | str:
-    step = position.step
-    if line.lower() == "none":
-        return events.Rating(rating=None)
-    if not isinstance(step, Rate):
+    if not isinstance(position.step, Rate):
         return "No rating is asked for."
-    rating = texts.typed_number(line, step.minimum, step.maximum)
-    if rating is None:
-        return f"Not a rating: type a number from {step.minimum:g} to {step.maximum:g}."
-    return events.Rating(rating=rating)
+    rating = _typed_rating(line, position.step)
+    return rating if isinstance(rating, str) else events.Rating(rating=rating)
+
+
+def _typed_rating(line: str, asked: Rate) -> float | str | None:
+    """The rating that a line says, `None` for no answer; or what to say if it is none."""
+    if line.lower() == "none":
+        return None
+    rating = texts.typed_number(line, asked.minimum, asked.maximum)
+    return f"Not a rating: type a number from {asked.minimum:g} to {asked.maximum:g}." if rating is None else rating
 
 
 def _correction(line: str, position: Position) -> Event | str:
     """What a line means for the entry that is open."""
-    if not line or position.correcting is None:
-        return events.Leave()
-    what = position.correcting.what
-    if what == "description":
-        return events.Correct(value=line)
-    if what == "rating":
-        return _corrected_rating(line)
-    response = _DIRECTIONS.get(line.lower())
-    return "Not an answer: type f or b and Enter." if response is None else events.Correct(value=response)
-
-
-def _corrected_rating(line: str) -> Event | str:
-    if line.lower() == "none":
-        return events.Correct(value=None)
-    rating = texts.typed_number(line, -math.inf, math.inf)
-    return "Not a rating: type a number." if rating is None else events.Correct(value=rating)
+    entry = position.correcting
+    match entry:
+        case Describe() if line:
+            return events.Correct(value=line)
+        case Rate() if line:
+            rating = _typed_rating(line, entry)
+            return rating if isinstance(rating, str) else events.Correct(value=rating)
+        case Ask() if line:
+            response = _chosen(entry, line)
+            return _no_answer(entry) if response is None else events.Correct(value=response)
+        case _:
+            return events.Leave()

@@ -9,9 +9,9 @@ import unicodedata
 
 from experiments.design.plan import Plan, Trial
 from experiments.session import remarks, steps
-from experiments.session.history import Entry, History, entered_value, is_attempt, of_one_set
+from experiments.session.history import History, asked, entered_value, is_attempt, of_one_set
 from experiments.session.remarks import MAX_FLAG, Remark
-from experiments.session.steps import Outcome, Prepare, Step, Value, What, trial_of
+from experiments.session.steps import Ask, Asking, Describe, Outcome, Prepare, Step, Value, trial_of, what
 
 FLAG_RULE = f"A flag is a word of at most {MAX_FLAG} letters, digits and hyphens."
 
@@ -59,22 +59,36 @@ def read_out_text(plan: Plan, step: Prepare) -> str:
     return f"\n  {how}: “{step.instruction}”"
 
 
-def value_text(said: Value) -> str:
+def value_text(asked: Asking, said: Value) -> str:
     """What was entered, as text."""
     if said is None:
         return "no answer"
     if isinstance(said, float):
         return f"{said:g}"
-    return said.upper() if said in ("forward", "backward") else f"“{said}”"
+    return asked.label(said).upper() if isinstance(asked, Ask) else f"“{said}”"
 
 
-def entry_text(plan: Plan, told: History, entry: Entry) -> str:
+def about_text(plan: Plan, asked: Asking) -> str:
+    """What was asked about: the trial, or a stimulus by its order of presentation."""
+    return ordinal(plan, asked.trial) if asked.later else f"Trial {asked.trial.trial}"
+
+
+def entry_text(plan: Plan, told: History, entry: Asking) -> str:
     """An entry with what it says."""
-    name = f"Trial {entry.trial.trial}" if entry.what == "answer" else f"{ordinal(plan, entry.trial)}, {entry.what}"
-    return f"{name}: {value_text(entered_value(told, entry))}"
+    about = about_text(plan, entry)
+    name = about if isinstance(entry, Ask) else f"{about}, {what(entry)}"
+    return f"{name}: {value_text(entry, entered_value(told, entry))}"
 
 
-def saved_text(plan: Plan, step: Step | None, word: Outcome | Remark) -> str:
+def corrected_text(told: History, remark: remarks.EntryCorrected) -> str:
+    """That something was corrected, and to what; of words only that they were."""
+    entry = asked(told, remark)
+    if entry is None or isinstance(entry, Describe):
+        return "description corrected"
+    return f"{'' if isinstance(entry, Ask) else f'{what(entry)} '}corrected to {value_text(entry, remark.value)}"
+
+
+def saved_text(plan: Plan, told: History, step: Step | None, word: Outcome | Remark) -> str:
     """That something is on the disk, as it was entered; empty for what needs no answer."""
     trial = trial_of(step)
     match word:
@@ -83,9 +97,9 @@ def saved_text(plan: Plan, step: Step | None, word: Outcome | Remark) -> str:
         case steps.Rested():
             return "The break is over."
         case _ if trial is None:
-            return _remark_text(plan, word)
-        case steps.Answered():
-            return f"Saved. {_entered_text(plan, trial, steps.asked_for(step), word.value)}."
+            return _remark_text(plan, told, word)
+        case steps.Answered() if isinstance(step, Asking):
+            return f"Saved. {_entered_text(plan, step, word.value)}."
         case steps.Presented():
             return f"Presented and saved. {shots_text(word.shots)}, {word.exposure_s:.1f} s."
         case steps.Failed():
@@ -96,20 +110,15 @@ def saved_text(plan: Plan, step: Step | None, word: Outcome | Remark) -> str:
             return ""
 
 
-def _entered_text(plan: Plan, trial: Trial, what: What | None, value: Value) -> str:
-    if what == "answer":
-        return f"Trial {trial.trial}: {value_text(value)}"
-    return f"{ordinal(plan, trial)}: {'description' if what == 'description' else value_text(value)}"
+def _entered_text(plan: Plan, step: Asking, value: Value) -> str:
+    said = "description" if isinstance(step, Describe) else value_text(step, value)
+    return f"{about_text(plan, step)}: {said}"
 
 
-def _remark_text(plan: Plan, remark: Outcome | Remark) -> str:
+def _remark_text(plan: Plan, told: History, remark: Outcome | Remark) -> str:
     match remark:
-        case remarks.EntryCorrected(what="answer"):
-            return f"Saved. Trial {remark.trial.trial} corrected to {value_text(remark.value)}."
-        case remarks.EntryCorrected(what="rating"):
-            return f"Saved. {ordinal(plan, remark.trial)} corrected to {value_text(remark.value)}."
         case remarks.EntryCorrected():
-            return f"Saved. {ordinal(plan, remark.trial)}: description corrected."
+            return _corrected_text(plan, told, remark)
         case remarks.Flagged():
             return f"Saved. Trial {remark.trial.trial} flagged {remark.flag}."
         case remarks.Noted(trial=Trial()):  # one without a trial is the program's own
@@ -120,6 +129,16 @@ def _remark_text(plan: Plan, remark: Outcome | Remark) -> str:
             return f"Test shot failed: {remark.cause}." if remark.cause else "The test shot was fired; the run goes on."
         case _:
             return ""
+
+
+def _corrected_text(plan: Plan, told: History, remark: remarks.EntryCorrected) -> str:
+    entry = asked(told, remark)
+    if entry is None:
+        return ""
+    about = about_text(plan, entry)
+    if isinstance(entry, Describe):
+        return f"Saved. {about}: description corrected."
+    return f"Saved. {about} corrected to {value_text(entry, remark.value)}."
 
 
 def shots_text(count: int) -> str:

@@ -8,7 +8,6 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Literal
 
-from device.words import Direction
 from experiments.design.plan import Trial
 
 Hand = Literal["experimenter", "synthetic"]
@@ -48,12 +47,12 @@ class Fire(Event):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Answer(Event):
-    """The participant said which way; `at_s` is when the key for it went down, if there was one.
+    """The participant chose an answer; `at_s` is when the key for it went down, if there was one.
 
     A synthetic participant's `response_time_s` is drawn, not measured.
     """
 
-    response: Direction
+    response: str
     at_s: float | None = None
     by: Hand = "experimenter"
     response_time_s: float | None = None
@@ -119,7 +118,7 @@ class Undo(Event):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Correct(Event):
-    """What the participant had said: a direction, a rating (`None`: no answer), or words."""
+    """What the participant had said: one of the answers, a rating (`None`: no answer), or words."""
 
     value: str | float | None
 
@@ -184,7 +183,7 @@ class ParticipantKey(Event):
     `typed`: a line or a page was open on the console, which may have been what the key was for.
     """
 
-    response: Direction
+    response: str
     at_s: float
     step: int
     by: OwnHand = "participant"

@@ -9,7 +9,7 @@ from typing import TypeVar
 from experiments.design.plan import Plan, Trial
 from experiments.session import steps
 from experiments.session.remarks import EntryCorrected, Remark
-from experiments.session.steps import Value, What, asked_for
+from experiments.session.steps import Asking, Value
 
 Word = TypeVar("Word")
 
@@ -37,14 +37,19 @@ class TrialHistory:
         """The last outcome or remark of a kind."""
         return next(reversed(self.all(kind)), None)
 
-    def entered(self, what: What) -> list[steps.Answered | EntryCorrected]:
-        """What was entered of a kind, and corrected, in order: the last counts."""
+    def entered(self, question: str) -> list[steps.Answered | EntryCorrected]:
+        """What was answered to a question, and corrected, in order: the last counts."""
         return [
             word
             for step, word in self.items
-            if (isinstance(word, EntryCorrected) and word.what == what)
-            or (isinstance(word, steps.Answered) and asked_for(step) == what)
+            if (isinstance(word, EntryCorrected) and word.question == question)
+            or (isinstance(word, steps.Answered) and isinstance(step, Asking) and step.question == question)
         ]
+
+    @property
+    def questions(self) -> tuple[str, ...]:
+        """The questions that were asked, in order."""
+        return tuple(dict.fromkeys(step.question for step, _ in self.items if isinstance(step, Asking)))
 
 
 def by_trial(trials: Sequence[Trial], history: History) -> dict[Trial, TrialHistory]:
@@ -70,68 +75,57 @@ def is_attempt(step: steps.Step | None, word: steps.Outcome | Remark) -> bool:
     )
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Entry:
-    """Something that was entered for a trial."""
-
-    trial: Trial
-    what: What
-
-
 def trial_at(plan: Plan, history: History, step: steps.Step | None) -> Trial:
     """The trial of a step; if it has none, of the last step that has one; else the first of the plan."""
     backwards = (step, *(one for one, _ in reversed(history)))
     return next((trial for one in backwards if (trial := steps.trial_of(one)) is not None), plan.trials[0])
 
 
-def entries(history: History, here: Trial) -> list[Entry]:
-    """What was entered in the set of a trial, in order: what can be corrected.
+def entries(history: History, here: Trial) -> list[Asking]:
+    """What was entered in the set of a trial, as what asked for it, in order: what can be corrected.
 
     What is entered anew, because its trial was presented again, stands where it was entered first.
     """
-    found = (entry for step, word in history if (entry := _entry(step, word)) is not None)
-    return [entry for entry in dict.fromkeys(found) if of_one_set(entry.trial, here)]
+    found = (step for step, word in history if isinstance(step, Asking) and isinstance(word, steps.Answered))
+    return [step for step in dict.fromkeys(found) if of_one_set(step.trial, here)]
 
 
-def _entry(step: steps.Step | None, word: steps.Outcome | Remark) -> Entry | None:
-    trial, what = steps.trial_of(step), asked_for(step)
-    if trial is None or what is None or not isinstance(word, steps.Answered):
-        return None
-    return Entry(trial=trial, what=what)
+def asked(history: History, about: EntryCorrected) -> Asking | None:
+    """What asked for the entry that a correction is about; `None` if nothing did."""
+    steps_back = (step for step, _ in reversed(history) if isinstance(step, Asking))
+    wanted = (about.trial, about.question)
+    return next((step for step in steps_back if (step.trial, step.question) == wanted), None)
 
 
-def fits(what: What, value: Value) -> bool:
-    """Whether a value is an answer of a kind."""
-    match what:
-        case "answer":
-            return value in ("forward", "backward")
-        case "rating":
-            return value is None or isinstance(value, float)
-        case "description":
-            return isinstance(value, str)
-
-
-def entered_value(history: History, entry: Entry) -> Value:
+def entered_value(history: History, asked: Asking) -> Value:
     """What an entry says, as it counts: the last that was entered. `None`: no answer."""
-    said = [_value(step, word, entry) for step, word in history]
+    said = [_value(step, word, asked) for step, word in history]
     return next((one[0] for one in reversed(said) if one), None)
 
 
-def _value(step: steps.Step | None, word: steps.Outcome | Remark, entry: Entry) -> tuple[Value] | None:
+def _value(step: steps.Step | None, word: steps.Outcome | Remark, asked: Asking) -> tuple[Value] | None:
     if isinstance(word, EntryCorrected):
-        return (word.value,) if (word.trial, word.what) == (entry.trial, entry.what) else None
-    return (word.value,) if isinstance(word, steps.Answered) and _entry(step, word) == entry else None
+        return (word.value,) if (word.trial, word.question) == (asked.trial, asked.question) else None
+    return (word.value,) if isinstance(word, steps.Answered) and step == asked else None
 
 
 def repeatable(history: History, step: steps.Step | None, here: Trial) -> Trial | None:
     """The trial that can be presented again: the one that is asked about, else the last of the set.
 
-    It can be as long as its rating is not in.
+    It can be as long as nothing was told of it from memory, when all of its block were felt.
     """
     if isinstance(step, steps.Ask | steps.Rate):
         return step.trial
-    rated, shown = entered_trials(history, "rating"), _shown(history)
-    return next((trial for trial in reversed(shown) if of_one_set(trial, here) and trial not in rated), None)
+    told, shown = _told_later(history), _shown(history)
+    return next((trial for trial in reversed(shown) if of_one_set(trial, here) and trial not in told), None)
+
+
+def _told_later(history: History) -> set[Trial]:
+    return {
+        step.trial
+        for step, word in history
+        if isinstance(step, Asking) and step.later and isinstance(word, steps.Answered)
+    }
 
 
 def done(history: History) -> set[Trial]:
@@ -140,13 +134,12 @@ def done(history: History) -> set[Trial]:
 
 
 def answered(history: History) -> set[Trial]:
-    """The trials that were answered or rated, whatever became of the answer."""
-    return entered_trials(history, "answer") | entered_trials(history, "rating")
-
-
-def entered_trials(history: History, what: What) -> set[Trial]:
-    """The trials of which something was entered."""
-    return {entry.trial for step, word in history if (entry := _entry(step, word)) and entry.what == what}
+    """The trials that were judged, whatever became of the answer: words alone are no judgement."""
+    return {
+        step.trial
+        for step, word in history
+        if isinstance(step, steps.Ask | steps.Rate) and isinstance(word, steps.Answered)
+    }
 
 
 def _shown(history: History) -> list[Trial]:

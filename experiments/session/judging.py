@@ -8,8 +8,9 @@ from dataclasses import dataclass, replace
 from experiments.design.plan import Plan, Trial
 from experiments.session import events, remarks
 from experiments.session.events import ACTS, OWN_HAND_EVENTS, Event, Press
-from experiments.session.history import Entry, History, entered_value, entries, fits, repeatable, trial_at
+from experiments.session.history import History, entered_value, entries, repeatable, trial_at
 from experiments.session.states import No, Position, State, after, why_after
+from experiments.session.steps import Ask, Asking, is_answer, what
 
 REARM_HELD_S = 1.0
 """For so long a key is held to go on after an emergency stop."""
@@ -38,7 +39,7 @@ class Moment:
         return entry.trial if entry else trial_at(self.plan, self.history, self.position.step)
 
     @property
-    def further_back(self) -> Entry | None:
+    def further_back(self) -> Asking | None:
         """The entry that undo opens: the last of the set, or the one before that which is open."""
         found, here = entries(self.history, self.trial), self.position.correcting
         if here in found:
@@ -107,8 +108,10 @@ def _impossible(moment: Moment, event: Event) -> str:
     match event:
         case _ if isinstance(event, OWN_HAND_EVENTS):
             return _not_asked(moment, event)
-        case events.Correct(value=value) if (entry := moment.position.correcting) and not fits(entry.what, value):
-            return f"That is no {entry.what}."
+        case events.Correct(value=value) if (entry := moment.position.correcting) and not is_answer(entry, value):
+            return f"That is no {what(entry)}."
+        case events.Answer(response=response) if not _is_choice(moment, response):
+            return f"“{response}” is not among the answers."
         case events.Undo() if moment.further_back is None:
             return "There is nothing to undo in this set."
         case events.Repeat() if moment.repeatable is None:
@@ -129,12 +132,20 @@ def _not_asked(
         return "It was the answer to an earlier question."
     if not isinstance(event, events.ParticipantKey):
         return ""
+    if not _is_choice(moment, event.response):
+        return f"“{event.response}” is not among the answers."
     if event.typed:
         return "It went into what is open on the console: leave that (Esc), then have it pressed again."
     onset_s = moment.position.onset_s
     if (onset_s is None or event.at_s >= onset_s) and not moment.paused_between(event.at_s, event.at_s):
         return ""
     return "It went down before the stimulus, or in a pause."
+
+
+def _is_choice(moment: Moment, response: str) -> bool:
+    """Whether an answer is among those that the step asks for."""
+    step = moment.position.step
+    return isinstance(step, Ask) and response in step.answers
 
 
 def remark_of(  # noqa: C901, PLR0911 - one case an event
@@ -177,7 +188,7 @@ def refused(event: Event, position: Position, because: str) -> remarks.Refused |
     )
 
 
-def _corrected(entry: Entry, event: events.Correct) -> remarks.EntryCorrected:
-    if not fits(entry.what, event.value):
-        raise TypeError(f"{event.value!r} is no {entry.what}")
-    return remarks.EntryCorrected(trial=entry.trial, what=entry.what, value=event.value)
+def _corrected(entry: Asking, event: events.Correct) -> remarks.EntryCorrected:
+    if not is_answer(entry, event.value):
+        raise TypeError(f"{event.value!r} is no {what(entry)}")
+    return remarks.EntryCorrected(trial=entry.trial, question=entry.question, value=event.value)

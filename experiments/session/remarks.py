@@ -12,15 +12,15 @@ from pydantic import Field, TypeAdapter
 
 from experiments.config.setup import without_blanks
 from experiments.design.plan import Trial
-from experiments.session.steps import Value, What
+from experiments.session.steps import Value
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class EntryCorrected:
-    """What was entered for a trial was wrong; this is what the participant had said."""
+    """What was entered for a trial's question was wrong; this is what the participant had said."""
 
     trial: Trial
-    what: What
+    question: str
     value: Value
     kind: Literal["corrected"] = "corrected"
 

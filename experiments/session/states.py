@@ -11,8 +11,7 @@ from enum import StrEnum
 
 from experiments.session import events
 from experiments.session.events import Event
-from experiments.session.history import Entry
-from experiments.session.steps import Step
+from experiments.session.steps import Asking, Step
 
 
 class State(StrEnum):
@@ -140,7 +139,7 @@ _ROWS: dict[type[Event], dict[State, Change]] = {
     events.Leave: {**_each(_LIVE, No(_NOT_OPEN)), S.CORRECTING: BACK},
     events.Repeat: {
         **_each((S.SETTING, S.PREPARING, S.ASKING, S.RATING, S.RESTING, S.CLOSING), To(S.SAVING)),
-        S.DESCRIBING: No("Its rating is in: it cannot be presented again."),
+        S.DESCRIBING: No("It is being described: it cannot be presented again now."),
         S.TRAIN: No("End the train first (“next”); then it can be presented again."),
     },
     events.Flag: _each(_LIVE, STAY),
@@ -177,8 +176,8 @@ class Position:
 
     `since_s` is since when the states are as they are; `until_s` is when a break ends, but for the pause that is on;
     `onset_s` is when the last stimulus began; `not_before_s` is from when on the participant's next is taken at all;
-    `paused_s` is since when the run is paused; `correcting` is the entry that is open; `why` is the reason of a pause
-    that nobody asked for, of a halt or of a stop.
+    `paused_s` is since when the run is paused; `correcting` is what asked for the entry that is open; `why` is
+    the reason of a pause that nobody asked for, of a halt or of a stop.
     """
 
     states: tuple[State, ...] = (S.SAVING,)
@@ -190,7 +189,7 @@ class Position:
     onset_s: float | None = None
     not_before_s: float | None = None
     paused_s: float | None = None
-    correcting: Entry | None = None
+    correcting: Asking | None = None
     why: str = ""
 
     @property

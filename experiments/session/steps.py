@@ -16,6 +16,7 @@ from pydantic import Field, TypeAdapter
 from device.words import ShotTiming
 from experiments.config.setup import without_blanks
 from experiments.design.plan import Trial
+from experiments.tasks.questions import Choice
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -43,14 +44,26 @@ class FireShot:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Ask:
-    """Ask which way it shot, and take one of two answers."""
+    """Ask for one of several answers. `question` is its name, `text` its words.
+
+    `later`: all of the block were felt, and the stimulus is named by its order of presentation.
+    """
 
     trial: Trial
-    attempt: int
     question: str
-    forward: str
-    backward: str
+    text: str
+    choices: tuple[Choice, ...]
+    later: bool = False
     kind: Literal["ask"] = "ask"
+
+    @property
+    def answers(self) -> tuple[str, ...]:
+        """What can be answered."""
+        return tuple(choice.answer for choice in self.choices)
+
+    def label(self, answer: Value) -> str:
+        """What an answer is called."""
+        return next((choice.label for choice in self.choices if choice.answer == answer), str(answer))
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -76,24 +89,28 @@ class Present:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Rate:
-    """Ask for a rating of the trial's stimulus, which is named by its order of presentation."""
+    """Ask for a rating of the trial's stimulus. `question`, `text`, `later`: as in `Ask`."""
 
     trial: Trial
     question: str
+    text: str
     minimum: float
     maximum: float
     minimum_text: str
     maximum_text: str
     grain: float
+    later: bool = False
     kind: Literal["rate"] = "rate"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Describe:
-    """Ask for a free description of the trial's stimulus."""
+    """Ask for a free description of the trial's stimulus. `question`, `text`, `later`: as in `Ask`."""
 
     trial: Trial
     question: str
+    text: str
+    later: bool = False
     kind: Literal["describe"] = "describe"
 
 
@@ -133,8 +150,6 @@ class Fired:
     kind: Literal["fired"] = "fired"
 
 
-What = Literal["answer", "rating", "description"]
-"""What is asked for."""
 Value = str | float | None
 """What was said: a named answer or words, a rating, or `None` for no answer. 0 is a rating; words may be empty."""
 
@@ -244,12 +259,26 @@ Session = Generator[Step, Outcome, None]
 """Yields what should happen and is sent what did happen. It opens nothing, waits for nothing and knows no clock."""
 
 
-_ASKED: dict[type, What] = {Ask: "answer", Rate: "rating", Describe: "description"}
+Asking = Ask | Rate | Describe
+"""A step that asks; it says as well what was entered for its trial and question, where that is looked at again."""
+What = Literal["answer", "rating", "description"]
+_WHAT: dict[type[Asking], What] = {Ask: "answer", Rate: "rating", Describe: "description"}
 
 
-def asked_for(step: Step | None) -> What | None:
-    """What a step asks for, if it asks."""
-    return _ASKED.get(type(step))
+def what(asked: Asking) -> What:
+    """What kind of answer is asked for."""
+    return _WHAT[type(asked)]
+
+
+def is_answer(asked: Asking, value: Value) -> bool:
+    """Whether a value is an answer to what was asked."""
+    match asked:
+        case Ask():
+            return value in asked.answers
+        case Rate():
+            return value is None or (isinstance(value, float) and asked.minimum <= value <= asked.maximum)
+        case Describe():
+            return isinstance(value, str)
 
 
 def trial_of(step: Step | None) -> Trial | None:

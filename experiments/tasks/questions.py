@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
 from string import ascii_lowercase, digits
 
 from experiments.design.config import DesignConfig
@@ -22,6 +23,49 @@ AnswerValue = str | float | tuple[int, ...] | None
 MAX_TEXT = 2_000
 
 
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Choice:
+    """One of the answers to choose among: what it is called, the experimenter's key for it, and the participant's."""
+
+    answer: str
+    label: str
+    key: str
+    own_key: str
+
+
+def choices_of(labels: Mapping[str, str], own_keys: Mapping[str, str]) -> tuple[Choice, ...]:
+    """The answers by their labels, the experimenter's keys by `free_keys`.
+
+    >>> [one.key for one in choices_of({"forward": "vorwärts", "backward": "rückwärts"}, {})]
+    ['v', 'r']
+    """
+    keys = free_keys(labels, {})
+    return tuple(
+        Choice(answer=answer, label=label, key=keys[answer], own_key=own_keys.get(answer, keys[answer]))
+        for answer, label in labels.items()
+    )
+
+
+def choices(question: QuestionConfig) -> tuple[Choice, ...]:
+    """The answers of a question to choose among; none of one without."""
+    return choices_of({one: question.label(one) for one in question.named_answers}, answer_keys(question))
+
+
+def free_keys(labels: Mapping[str, str], given: Mapping[str, str]) -> dict[str, str]:
+    """A key for each answer: the one given, or the first letter of its label that is free, or a digit.
+
+    >>> free_keys({"fast": "fast", "faster": "faster", "1": "№"}, {"fast": "x"})
+    {'fast': 'x', 'faster': 'f', '1': '1'}
+    """
+    keys = dict(given)
+    for answer, label in labels.items():
+        if answer not in keys:
+            letters = [letter for letter in label.casefold() if letter in ascii_lowercase]
+            taken = set(keys.values())
+            keys[answer] = next(key for key in (*letters, *digits[1:], *ascii_lowercase) if key not in taken)
+    return {answer: keys[answer] for answer in labels}
+
+
 def answer_keys(question: QuestionConfig) -> dict[str, str]:
     """The participant's key for each answer: its own, or the first letter of its label that is free, or a digit.
 
@@ -29,13 +73,7 @@ def answer_keys(question: QuestionConfig) -> dict[str, str]:
     >>> answer_keys(q)
     {'f': 'v', 'b': 'r'}
     """
-    keys = dict(question.keys)
-    for answer in question.named_answers:
-        if answer not in keys:
-            letters = [letter for letter in question.label(answer).casefold() if letter in ascii_lowercase]
-            taken = set(keys.values())
-            keys[answer] = next(key for key in (*letters, *digits[1:], *ascii_lowercase) if key not in taken)
-    return {answer: keys[answer] for answer in question.named_answers}
+    return free_keys({one: question.label(one) for one in question.named_answers}, question.keys)
 
 
 def right_answer(design: DesignConfig, question: QuestionConfig, trial: Trial) -> str | None:

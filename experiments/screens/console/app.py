@@ -15,6 +15,7 @@ from PyQt6.QtWidgets import QApplication
 
 from device import DeviceError, Gun, GunStatus
 from device.words import RecoilError
+from experiments import catalogue
 from experiments.clock import Clock
 from experiments.config.setup import Setup
 from experiments.design.plan import Plan
@@ -149,7 +150,7 @@ class Console:
             live,
             self.clock,
             window,
-            scale=getattr(window.about.setup.config, "rating", None),
+            choices=catalogue.experiment(window.about.setup).choices(window.about.setup),
             hand=self._hand,
             participant=self.participant,
             observer=self.observer,

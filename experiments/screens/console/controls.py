@@ -8,11 +8,9 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Any, Literal, Protocol
 
-from device.words import Direction
 from experiments.clock import Clock
 from experiments.design.plan import Trial
 from experiments.live_run import EventVerdict, LiveRun
-from experiments.preference.config import RatingScale
 from experiments.screens.console import keys
 from experiments.screens.console.participant_link import ParticipantSide
 from experiments.screens.texts import FLAG_RULE, short_place, typed_line, typed_number
@@ -22,7 +20,8 @@ from experiments.session.history import entered_value, trial_at
 from experiments.session.judging import REARM_HELD_S
 from experiments.session.remarks import flag_word
 from experiments.session.states import EMERGENCY, Position, State
-from experiments.session.steps import Ask, Value
+from experiments.session.steps import Ask, Rate, Value
+from experiments.tasks.questions import Choice
 
 TextField = Literal["line", "number", "words"]
 """What can be typed into."""
@@ -78,6 +77,8 @@ _EVENTS: dict[keys.Name, Event] = {
 class Controls:
     """The experimenter's hands on a live run. `observer` is the synthetic participant, where it answers.
 
+    `choices` are the answers whose keys are known before any is asked for: what comes too soon is told so.
+
     `drawn` is the position on the screen: a press counts for it.
     """
 
@@ -87,13 +88,13 @@ class Controls:
         clock: Clock,
         view: View,
         *,
-        scale: RatingScale | None = None,
+        choices: tuple[Choice, ...] = (),
         hand: Hand = "experimenter",
         participant: ParticipantSide | None = None,
         observer: Any = None,
     ) -> None:
         self._live, self._clock, self._view = live, clock, view
-        self._scale, self._hand, self._participant = scale, hand, participant
+        self._choices, self._hand, self._participant = choices, hand, participant
         self._observer = observer
         self._enter: Callable[[str, Press], bool] | None = None
         self._held: Press | None = None
@@ -119,11 +120,16 @@ class Controls:
         """Whether something that is open takes what is typed: a line, or a page."""
         return self._enter is not None or self.page is not None
 
+    @property
+    def choices(self) -> tuple[Choice, ...]:
+        """The answers whose keys count now."""
+        return keys.choices_at(self.drawn) or self._choices
+
     def command(self, key: str, *, ctrl: bool) -> keys.Name | None:
         """The command that a key is now; `None` if it is none, and so may be text."""
-        return (
-            None if key.startswith("#") else keys.command_for(key, ctrl=ctrl, typing=self.typing, position=self.drawn)
-        )
+        if key.startswith("#"):
+            return None
+        return keys.command_for(key, ctrl=ctrl, typing=self.typing, position=self.drawn, choices=self.choices)
 
     def press(self, at_s: float | None = None) -> Press:
         """A press at this moment, or at an earlier one, for what is on the screen now."""
@@ -200,8 +206,8 @@ class Controls:
         self.uncover()
         if name in _QUESTIONS:
             self._ask_for(name)
-        elif name in ("forward", "backward"):
-            self._answer(name, press)
+        elif name in keys.ANSWERS:
+            self._choose(keys.ANSWERS.index(name), press)
         elif name == "no answer":
             self._rate(None, press)
         elif name == "restart":
@@ -252,7 +258,12 @@ class Controls:
 
     # what is entered
 
-    def _answer(self, response: Direction, press: Press) -> None:
+    def _choose(self, place: int, press: Press) -> None:
+        """Enter the answer at a place among the choices."""
+        if place < len(self.choices):
+            self._answer(self.choices[place].answer, press)
+
+    def _answer(self, response: str, press: Press) -> None:
         drawn_s = self._drawn_s(response)
         answer = events.Answer(response=response, at_s=press.at_s, by=self._hand, response_time_s=drawn_s)
         self._give(answer, response, press)
@@ -261,12 +272,12 @@ class Controls:
         """Offer what was entered, or the same as a correction where one is open."""
         self._offer(events.Correct(value=said) if self.drawn.state is State.CORRECTING else event, press)
 
-    def _drawn_s(self, response: Direction) -> float | None:
+    def _drawn_s(self, response: str) -> float | None:
         """The synthetic participant's response time, if it is its answer that was entered."""
         step = self.drawn.step
         if self._observer is None or not isinstance(step, Ask):
             return None
-        answer = self._observer.answer(step.trial)
+        answer = self._observer.answer(step.trial, step.question)
         return float(answer.response_time_s) if answer.response == response else None
 
     def _entered(self, press: Press) -> None:
@@ -287,11 +298,12 @@ class Controls:
 
     def _number(self, typed: str, press: Press) -> None:
         """A rating as it was typed."""
-        scale = self._scale
-        rating = None if scale is None else typed_number(typed, scale.minimum, scale.maximum)
-        if scale is None or rating is None:
-            ends = "" if scale is None else f" from {scale.minimum:g} to {scale.maximum:g}"
-            self._view.say(f"Not a rating: type a number{ends}.", "bad")
+        scale = self.drawn.correcting or self.drawn.step
+        if not isinstance(scale, Rate):
+            return
+        rating = typed_number(typed, scale.minimum, scale.maximum)
+        if rating is None:
+            self._view.say(f"Not a rating: type a number from {scale.minimum:g} to {scale.maximum:g}.", "bad")
         else:
             self._rate(rating, press)
 
@@ -378,12 +390,15 @@ class Controls:
 
     def help_lines(self) -> list[str]:
         """Every key, what it does, and why it does nothing now."""
-        return [self._help_line(command.name) for command in keys.KEY_COMMANDS]
+        unused = keys.ANSWERS[len(self.choices) :]
+        return [self._help_line(command.name) for command in keys.KEY_COMMANDS if command.name not in unused]
 
     def _help_line(self, name: keys.Name) -> str:
         not_now = self.idle(name)
-        key = keys.shown_key(name, letters=self.typing.letters)
-        return f"{key:<8} {keys.BY_NAME[name].does}{f'   – not now: {not_now}' if not_now else ''}"
+        key = keys.shown_key(name, letters=self.typing.letters, choices=self.choices)
+        answer = name in keys.ANSWERS
+        does = f"enters {self.choices[keys.ANSWERS.index(name)].label}" if answer else keys.BY_NAME[name].does
+        return f"{key:<8} {does}{f'   – not now: {not_now}' if not_now else ''}"
 
 
 # the lines that are typed for a command: what is asked, and which event comes of it

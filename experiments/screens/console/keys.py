@@ -6,13 +6,15 @@ A key acts when it goes down and was up before. Auto-repeat never acts, nor does
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Literal
 
 from experiments.session import events
 from experiments.session.events import Event
 from experiments.session.states import No, Position, State, change_of
+from experiments.session.steps import Ask, Describe, Rate
+from experiments.tasks.questions import Choice
 
 BOUNCE_S = 0.02
 """A key that goes down again so soon was not let go by a hand: an auto-repeat told as two events, or a bounce."""
@@ -24,8 +26,15 @@ Name = Literal[
     "fire",
     "next",
     "damper",
-    "forward",
-    "backward",
+    "answer 1",
+    "answer 2",
+    "answer 3",
+    "answer 4",
+    "answer 5",
+    "answer 6",
+    "answer 7",
+    "answer 8",
+    "answer 9",
     "enter",
     "no answer",
     "end break",
@@ -58,14 +67,26 @@ class KeyCommand:
     kind: type[Event] | None = None
 
 
+ANSWERS: tuple[Name, ...] = (
+    "answer 1",
+    "answer 2",
+    "answer 3",
+    "answer 4",
+    "answer 5",
+    "answer 6",
+    "answer 7",
+    "answer 8",
+    "answer 9",
+)
+"""What enters the first answer of a question, the second, ...: the question has its key, and what it says."""
+
 _C = KeyCommand
 KEY_COMMANDS: tuple[KeyCommand, ...] = (
     _C(name="emergency", key="F12", text="EMERGENCY STOP", does="disarms; fires no more", kind=events.EmergencyStop),
     _C(name="fire", key="Space", text="Fire", does="fires, when the gun is handed over", kind=events.Fire),
     _C(name="next", key="Space", text="“Next” was said", does="ends the train", kind=events.Next),
     _C(name="damper", key="M", text="Damper is set", does="says that the damper is set", kind=events.DamperSet),
-    _C(name="forward", key="F", text="FORWARD", does="enters forward", kind=events.Answer),
-    _C(name="backward", key="B", text="BACKWARD", does="enters backward", kind=events.Answer),
+    *(_C(name=name, key="", text="", does="enters an answer", kind=events.Answer) for name in ANSWERS),
     _C(
         name="enter",
         key="Enter",
@@ -106,10 +127,17 @@ class Typing:
         return self.line or self.field
 
 
-def command_for(key: str, *, ctrl: bool, typing: Typing, position: Position) -> Name | None:
-    """The command that a key is now; `None` if it is none, and so may be text.
+def choices_at(position: Position) -> tuple[Choice, ...]:
+    """The answers that are asked for, or that an open correction chooses among; none if nothing is to be chosen."""
+    asked = position.correcting or position.step
+    return asked.choices if isinstance(asked, Ask) else ()
 
-    Where letters are text, a letter is a command with Ctrl held; elsewhere Ctrl changes nothing, but answers take none.
+
+def command_for(key: str, *, ctrl: bool, typing: Typing, position: Position, choices: Sequence[Choice]) -> Name | None:
+    """The command that a key is now; `None` if it is none, and so may be text. `choices` have keys of their own.
+
+    Where letters are text, a letter is a command with Ctrl held; elsewhere Ctrl changes nothing, but answers take none:
+    a command whose letter is an answer's is done with Ctrl.
     """
     if key in _ALWAYS:
         return _ALWAYS[key]
@@ -119,12 +147,13 @@ def command_for(key: str, *, ctrl: bool, typing: Typing, position: Position) -> 
         return "no answer" if field_at(position) == "number" and not typing.line else None
     if typing.letters and not ctrl:
         return None
-    name = _letter(key, position)
-    return None if ctrl and not typing.letters and name in _ANSWERS else name
+    answers = [one.key.upper() for one in choices]
+    if key in answers and not ctrl:
+        return ANSWERS[answers.index(key)]
+    return _letter(key, position)
 
 
 _ALWAYS: dict[str, Name] = {"F12": "emergency", "F1": "help", "F2": "theme", "Esc": "leave", "Enter": "enter"}
-_ANSWERS: tuple[Name, ...] = ("forward", "backward")
 
 
 def _letter(key: str, position: Position) -> Name | None:
@@ -145,31 +174,37 @@ _LETTERS: dict[str, Name] = {
 def field_at(position: Position) -> Literal["number", "words"] | None:
     """What is typed at a position, apart from a line that was asked for."""
     entry = position.correcting if position.state is State.CORRECTING else None
-    match entry.what if entry is not None else position.state:
-        case "rating" | State.RATING:
+    match entry if entry is not None else position.state:
+        case Rate() | State.RATING:
             return "number"
-        case "description" | State.DESCRIBING:
+        case Describe() | State.DESCRIBING:
             return "words"
         case _:
             return None
 
 
-def shown_key(name: Name, *, letters: bool) -> str:
-    """The key of a command as it stands on its button: letters that are text need Ctrl, a blank first Esc.
+def shown_key(name: Name, *, letters: bool, choices: Sequence[Choice] = ()) -> str:
+    """The key of a command as it stands on its button: letters that are text, or an answer's, need Ctrl.
+
+    A blank that is text needs Esc first.
 
     >>> shown_key("undo", letters=True), shown_key("help", letters=True), shown_key("fire", letters=True)
     ('Ctrl+U', 'F1', 'Esc, then Space')
     """
+    answers = [one.key.upper() for one in choices]
+    if name in ANSWERS:
+        place = ANSWERS.index(name)
+        return answers[place] if place < len(answers) else ""
     key = BY_NAME[name].key
     if letters and key == "Space":
         return f"Esc, then {key}"
-    return f"Ctrl+{key}" if letters and len(key) == 1 else key
+    return f"Ctrl+{key}" if len(key) == 1 and (letters or key in answers) else key
 
 
 def why_not(name: Name, position: Position) -> str:
     """Why a command does nothing at a position; empty if it does something."""
     kind = BY_NAME[name].kind
-    if name in _ANSWERS and position.state is State.CORRECTING:
+    if name in ANSWERS and position.state is State.CORRECTING:
         kind = events.Correct if field_at(position) is None else kind
     if name == "no answer" and position.state is State.CORRECTING:
         kind = events.Correct

@@ -287,7 +287,6 @@ _WATCH_MS = 10
 AGAIN_S = 0.5
 """A key that was refused, because it came too soon, is pressed again after so long."""
 BREAK_REASON = "synthetic participant"
-_KEYS = {"forward": Qt.Key.Key_F, "backward": Qt.Key.Key_B}
 
 
 class VisualParticipant:
@@ -330,10 +329,11 @@ class VisualParticipant:
             return False
         asking = self._console.participant.asking  # only then: what comes later would be done to the next question
         match window.drawn.state:
-            case State.RATING if isinstance(step, Rate) and (rating := self._observer.rate(step.trial)) is not None:
-                if asking:
+            case State.RATING if isinstance(step, Rate):
+                rating = self._observer.rate(step.trial, step.question)
+                if rating is not None and asking:
                     self._rater.rate(step, rating)
-                return True
+                return rating is not None
             case State.DESCRIBING:
                 if asking:
                     self._rater.describe()
@@ -352,7 +352,7 @@ class VisualParticipant:
         if position.state is not State.ASKING or not isinstance(step, Ask):
             return False
         onset_s = position.since_s if position.onset_s is None else position.onset_s
-        return bool(now_s < onset_s + self._observer.answer(step.trial).response_time_s)
+        return bool(now_s < onset_s + self._observer.answer(step.trial, step.question).response_time_s)
 
     def _press(self, window: ConsoleWindow, position: Position) -> None:
         step, handle = position.step, window.windowHandle()
@@ -364,12 +364,13 @@ class VisualParticipant:
             case State.PREPARING | State.TRAIN:
                 _key(handle, Qt.Key.Key_Space)
             case State.ASKING if isinstance(step, Ask):
-                _key(handle, _KEYS[self._observer.answer(step.trial).response])
+                said = self._observer.answer(step.trial, step.question).response
+                QTest.keyClick(handle, next(one.key for one in step.choices if one.answer == said))  # type: ignore[call-overload] # as below
             case State.RESTING:
                 _key(handle, Qt.Key.Key_E)
                 _type(BREAK_REASON, handle)
             case State.RATING if isinstance(step, Rate):
-                self._rate(self._observer.rate(step.trial), window, handle)
+                self._rate(self._observer.rate(step.trial, step.question), window, handle)
             case State.DESCRIBING | State.CLOSING:
                 _key(handle, Qt.Key.Key_Return)
             case _:

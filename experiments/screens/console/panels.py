@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from datetime import datetime
+from textwrap import shorten
 from typing import Protocol
 
 from PyQt6 import QtWidgets
@@ -12,12 +13,12 @@ from PyQt6.QtGui import QMouseEvent, QPainter, QPaintEvent, QResizeEvent, QShowE
 
 from experiments.screens.console import progress, widgets
 from experiments.screens.console.controls import TextField
-from experiments.screens.console.keys import BY_NAME, Name, field_at, shown_key
+from experiments.screens.console.keys import ANSWERS, BY_NAME, Name, choices_at, field_at, shown_key
 from experiments.screens.console.view import About, Instruction, Seen
 from experiments.session.events import Press
-from experiments.session.history import Entry
 from experiments.session.states import Position, State
-from experiments.session.steps import Rate
+from experiments.session.steps import Asking, Rate
+from experiments.tasks.questions import Choice
 
 SIZES_PX = {"title": 46, "damper": 34, "detail": 23}
 FITS = (1.0, 0.88, 0.76, 0.66, 0.56)
@@ -93,7 +94,7 @@ def _size(label: QtWidgets.QLabel, size_px: int, *, bold: bool) -> None:
         label.setStyleSheet(style)
 
 
-_Belongs = tuple[TextField | None, int, Entry | None]
+_Belongs = tuple[TextField | None, int, Asking | None]
 """What a field is for: its kind, the number of the step, and the entry that is corrected."""
 
 
@@ -131,7 +132,7 @@ class TextFields:
         self._keep(self._belongs)
         self._belongs = belongs
         draft = self._drafts.pop(belongs, "") if position.correcting is None else ""
-        if isinstance(step := position.step, Rate):
+        if isinstance(step := position.correcting or position.step, Rate):
             self._ends.setText(f"{step.minimum:g} = {step.minimum_text}     {step.maximum:g} = {step.maximum_text}")
         for field in (self.rating, self.words):
             field.setText(draft or said)
@@ -208,9 +209,9 @@ class CommandButton(QtWidgets.QPushButton):
     def _keep(self) -> None:
         self._press = self._mouse.press()
 
-    def label(self, text: str = "", *, letters: bool = False) -> None:
+    def label(self, text: str = "", *, letters: bool = False, choices: Sequence[Choice] = ()) -> None:
         """Show what it does, and its key below."""
-        shown = f"{text or BY_NAME[self.name].text}\n[{shown_key(self.name, letters=letters)}]"
+        shown = f"{text or BY_NAME[self.name].text}\n[{shown_key(self.name, letters=letters, choices=choices)}]"
         if shown != self.text():
             self.setText(shown)
 
@@ -248,23 +249,44 @@ class Slots(QtWidgets.QWidget):
                 widget.setVisible(widget in shown)
 
 
-_LEFT: tuple[Name, ...] = ("forward", "damper", "restart")
+class AnswerButtons(QtWidgets.QWidget):
+    """Buttons side by side for some of the answers."""
+
+    def __init__(self, mouse: Mouse) -> None:
+        super().__init__()
+        self._buttons = [CommandButton(name, mouse, "large") for name in ANSWERS]
+        across = widgets.fill(QtWidgets.QHBoxLayout(self))
+        for button in self._buttons:
+            across.addWidget(button, 1)
+
+    def put(self, choices: Sequence[Choice], shown: range) -> None:
+        """Show the answers at these places among the choices."""
+        for place, button in enumerate(self._buttons):
+            button.setVisible(place in shown)
+            if place in shown:
+                label = shorten(choices[place].label.upper(), MAX_LABEL // len(shown), placeholder="…")
+                button.label(label, choices=choices)
+                button.setAccessibleName(choices[place].label)
+                button.setToolTip(choices[place].label)
+
+
+MAX_LABEL = 24
+"""So many letters have room on a large button."""
+_LEFT: tuple[Name, ...] = ("damper", "restart")
 _MIDDLE: tuple[Name, ...] = ("fire", "next", "go on", "enter", "rearm", "reason")
-_RIGHT: tuple[Name, ...] = ("backward", "end break", "no answer")
+_RIGHT: tuple[Name, ...] = ("end break", "no answer")
 _ROW: tuple[Name, ...] = ("undo", "repeat", "flag", "note", "list", "pause", "stop", "help")
 _OF_STATE: dict[State, tuple[Name, ...]] = {
     State.REARMING: ("rearm",),
     State.SETTING: ("damper",),
     State.PREPARING: ("fire",),
     State.TRAIN: ("next",),
-    State.ASKING: ("forward", "backward"),
     State.RATING: ("no answer",),
     State.RESTING: ("end break",),
     State.CLOSING: ("enter",),
     State.PAUSED: ("go on",),
     State.HALTED: ("reason",),
 }
-_OF_CORRECTION: dict[str | None, tuple[Name, ...]] = {None: ("forward", "backward"), "number": ("no answer",)}
 
 
 class Buttons:
@@ -272,7 +294,9 @@ class Buttons:
 
     def __init__(self, mouse: Mouse) -> None:
         self._large = {name: CommandButton(name, mouse, "large") for name in (*_LEFT, *_MIDDLE, *_RIGHT)}
-        self.slots = Slots(*([self._large[name] for name in names] for names in (_LEFT, _MIDDLE, _RIGHT)))
+        self._answers = AnswerButtons(mouse), AnswerButtons(mouse)
+        left, middle, right = ([self._large[name] for name in names] for names in (_LEFT, _MIDDLE, _RIGHT))
+        self.slots = Slots([self._answers[0], *left], middle, [self._answers[1], *right])
         self._row = {name: CommandButton(name, mouse) for name in _ROW}
         self.row = QtWidgets.QWidget()
         row = [*((button, 2) for button in self._row.values()), (CommandButton("emergency", mouse, "stop"), 5)]
@@ -285,13 +309,20 @@ class Buttons:
         """
         closes = over or position.base is State.HALTED
         shown = set[str]() if over else set(_shown(position, screen_lost=not idle("restart")))
-        self.slots.show_only({button for name, button in self._large.items() if name in shown})
+        choices = () if over else choices_at(position)
+        asks = bool(choices) and position.state in (State.ASKING, State.CORRECTING)
+        large: set[QtWidgets.QWidget] = {button for name, button in self._large.items() if name in shown}
+        self.slots.show_only(large | set(self._answers if asks else ()))
+        half = (len(choices) + 1) // 2
+        if asks:
+            self._answers[0].put(choices, range(half))
+            self._answers[1].put(choices, range(half, len(choices)))
         for name, button in self._large.items():
             button.label("End the run" if name == "enter" else "", letters=letters)
         for name, button in self._row.items():
             held = name == "pause" and position.state is State.PAUSED
             button.name = "go on" if held else name
-            button.label("Close" if name == "stop" and closes else "", letters=letters)
+            button.label("Close" if name == "stop" and closes else "", letters=letters, choices=choices if asks else ())
             dim = "yes" if idle(button.name) else "no"
             if button.property("dim") != dim:
                 button.setProperty("dim", dim)
@@ -300,7 +331,7 @@ class Buttons:
 
 def _shown(position: Position, *, screen_lost: bool) -> tuple[Name, ...]:
     if position.state is State.CORRECTING:
-        return _OF_CORRECTION.get(field_at(position), ())
+        return ("no answer",) if field_at(position) == "number" else ()
     return (*_OF_STATE.get(position.state, ()), *(("restart",) if screen_lost else ()))
 
 

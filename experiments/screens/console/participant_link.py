@@ -10,9 +10,10 @@ from collections.abc import Callable
 from dataclasses import replace
 from typing import Any
 
-from device.words import Direction
+from experiments import catalogue
 from experiments.config.setup import Setup
 from experiments.live_run import LiveRun
+from experiments.screens.console.keys import choices_at
 from experiments.screens.console.view import Message, ParticipantSeen, Trouble
 from experiments.screens.participant import messages
 from experiments.screens.participant.link import ParticipantError, ParticipantLink
@@ -21,8 +22,6 @@ from experiments.session.events import OwnHand
 from experiments.session.states import Position, State
 from experiments.session.steps import Ask, Describe, Rate
 
-_KEYS: dict[str, Direction] = {"up": "forward", "down": "backward"}
-"""The participant's keys, by PsychoPy's names, and what they say."""
 WAIT, PAUSED, THANKS = "Please wait.", "Paused. Please wait.", "Thank you."
 
 Wanted = Callable[[], bool]
@@ -46,8 +45,11 @@ class ParticipantSide:
         noise: messages.NoiseIs | None = None,
         hand: OwnHand = "participant",
     ) -> None:
-        self._link, self._open_link, self._setup = link, open_link, setup
+        self._link, self._open_link = link, open_link
+        self._choices = catalogue.experiment(setup).choices(setup)
         self.rates, self.own_keys = rates, own_keys
+        self.planned = 0
+        """How many trials there are: known once the run has begun."""
         self._noise, self._hand = noise, hand
         self._lock = threading.RLock()
         self._live: LiveRun | None = None
@@ -61,7 +63,7 @@ class ParticipantSide:
 
     def begin(self, live: LiveRun, tell: Callable[[Message], None]) -> str:
         """Take the place beside a console. Gives back what the record is to say of the noise, if anything."""
-        self._live, self._tell = live, tell
+        self._live, self._tell, self.planned = live, tell, len(live.plan.trials)
         self._tell(ParticipantSeen())
         self._link.listen(self._heard, self._gone)
         if self._noise is None:
@@ -87,11 +89,15 @@ class ParticipantSide:
                 return
             self._shows = shows
             if isinstance(shows, str):
-                told = tuple(_KEYS) if self.own_keys and shows == PAUSED else ()
+                told = tuple(self._said(position)) if self.own_keys and shows == PAUSED else ()
                 self._link.show(shows, tell=told, keep_keys=shows == messages.BETWEEN)
             else:
                 self._link.cancel()
                 threading.Thread(target=self._ask, args=(position,), daemon=True, name="participant").start()
+
+    def _said(self, position: Position) -> dict[str, str]:
+        """The participant's keys, by PsychoPy's names, and what they say: also before anything is asked."""
+        return {one.own_key: one.answer for one in choices_at(position) or self._choices}
 
     def _to_be_shown(self, position: Position) -> str | int:
         base, by_screen = position.base, self.rates and isinstance(position.step, Rate | Describe)
@@ -124,21 +130,20 @@ class ParticipantSide:
     def _judged(self, step: Ask, position: Position, wanted: Wanted) -> None:
         onset_s = position.since_s if position.onset_s is None else position.onset_s
         paused = self._live is not None and self._live.moment.paused_between(onset_s, position.since_s)
-        question = messages.AskDirection(
-            question=step.question,
-            forward=step.forward,
-            backward=step.backward,
-            forward_key="up",
-            backward_key="down",
+        question = messages.AskChoice(
+            question=f"{step.trial.trial}. {step.text}" if step.later else step.text,
+            answers=tuple(
+                messages.KeyedAnswer(answer=one.answer, label=one.label, key=one.own_key) for one in step.choices
+            ),
             onset_s=position.since_s if paused else onset_s,  # a key in a pause is no answer
             once_seen=paused,  # nor one while their screen still says so
         )
         while wanted() and not self._keyed(question, position, wanted):
             question = replace(question, once_seen=True)  # it was refused: the next key counts
 
-    def _keyed(self, question: messages.AskDirection, position: Position, wanted: Wanted) -> bool:
+    def _keyed(self, question: messages.AskChoice, position: Position, wanted: Wanted) -> bool:
         """Have the participant press a key; whether it was taken for the answer."""
-        given = self._link.ask_direction(question, wanted=wanted)
+        given = self._link.ask_choice(question, wanted=wanted)
         key = events.ParticipantKey(
             response=given.response, at_s=given.pressed_s, step=position.number, by=self._hand, typed=self.covered
         )
@@ -151,8 +156,8 @@ class ParticipantSide:
         given = self._link.ask_rating(
             messages.AskRating(
                 number=step.trial.trial,
-                of=self._setup.config.design.trials,
-                question=step.question,
+                of=self.planned,
+                question=step.text,
                 minimum=step.minimum,
                 maximum=step.maximum,
                 minimum_text=step.minimum_text,
@@ -165,9 +170,10 @@ class ParticipantSide:
         self._offer(events.ParticipantRated(rating=given.rating, step=position.number, by=self._hand))
 
     def _described(self, step: Describe, position: Position, wanted: Wanted) -> None:
-        of = self._setup.config.design.trials
         given = self._link.ask_description(
-            messages.AskDescription(number=step.trial.trial, of=of, question=step.question, draft=position.number),
+            messages.AskDescription(
+                number=step.trial.trial, of=self.planned, question=step.text, draft=position.number
+            ),
             wanted=wanted,
         )
         self._offer(events.ParticipantDescribed(text=given.comment, step=position.number, by=self._hand))
@@ -183,9 +189,12 @@ class ParticipantSide:
                 self._offer(events.EmergencyStop(by="participant"))
             case messages.Focused():
                 self._tell(ParticipantSeen(focused=word.on))
-            case messages.KeyPressed() if self._live is not None and word.name in _KEYS:
-                number, now_s = self._live.position.number, self._live.clock.now()
-                self._offer(events.ParticipantKey(response=_KEYS[word.name], at_s=now_s, step=number))
+            case messages.KeyPressed() if self._live is not None:
+                position, now_s = self._live.position, self._live.clock.now()
+                said = self._said(position)
+                if word.name in said:
+                    key = events.ParticipantKey(response=said[word.name], at_s=now_s, step=position.number)
+                    self._offer(key)
 
     def _gone(self, cause: str) -> None:
         """The program has ended, and was not told to."""

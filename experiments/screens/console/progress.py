@@ -11,7 +11,7 @@ from experiments.design.plan import Trial
 from experiments.screens import texts
 from experiments.screens.console.view import About, GunSeen, Seen
 from experiments.session import steps
-from experiments.session.history import done, entered_trials, entries, of_one_set
+from experiments.session.history import History, answered, done, entries, of_one_set
 from experiments.session.remarks import EntryCorrected, Flagged, Noted, Remark
 from experiments.session.states import Position, State
 from experiments.session.steps import Outcome, Step
@@ -39,7 +39,7 @@ def trials_done(seen: Seen) -> list[TrialCount]:
     """
     felt, trials, here = done(seen.told), seen.about.plan.trials, seen.here
     if seen.about.rated_last:
-        return [_count("felt", trials, felt), _count("rated", trials, entered_trials(seen.told, "rating"))]
+        return [_count("felt", trials, felt), _count("rated", trials, answered(seen.told))]
     session = [trial for trial in trials if trial.session == here.session]
     parts = {"set": [trial for trial in session if of_one_set(trial, here)], "session": session, "experiment": trials}
     return [_count(what, trials, felt) for what, trials in parts.items()]
@@ -188,7 +188,9 @@ def answer_lines(seen: Seen) -> list[str]:
 def marks(seen: Seen) -> list[str]:
     """Flags, notes, corrections and repeats of the set at hand, in order."""
     here = seen.here
-    found = [_mark(word) for step, word in seen.told if (trial := _about(step, word)) and _same_set(trial, here)]
+    found = [
+        _mark(seen.told, word) for step, word in seen.told if (trial := _about(step, word)) and _same_set(trial, here)
+    ]
     return list(filter(None, found)) or ["Nothing was flagged, noted, corrected or repeated in this set."]
 
 
@@ -200,18 +202,14 @@ def _same_set(one: Trial, other: Trial) -> bool:
     return (one.session, one.set) == (other.session, other.set)
 
 
-def _mark(word: Outcome | Remark) -> str:
+def _mark(told: History, word: Outcome | Remark) -> str:
     match word:
         case Flagged():
             return f"Trial {word.trial.trial}: flagged {word.flag}"
         case Noted(trial=Trial() as trial):
             return f"Trial {trial.trial}: “{word.text}”"
-        case EntryCorrected(what="answer"):
-            return f"Trial {word.trial.trial}: corrected to {texts.value_text(word.value)}"
-        case EntryCorrected(what="rating"):
-            return f"Trial {word.trial.trial}: rating corrected to {texts.value_text(word.value)}"
         case EntryCorrected():
-            return f"Trial {word.trial.trial}: description corrected"
+            return f"Trial {word.trial.trial}: {texts.corrected_text(told, word)}"
         case steps.Repeated():
             return f"Trial {word.trial.trial}: to be presented again ({word.reason})"
         case _:

@@ -5,7 +5,7 @@ Neither correctness nor a score is in here. The method's name appears only where
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -14,11 +14,11 @@ from experiments.config.setup import Setup
 from experiments.design.plan import Plan, Trial
 from experiments.live_run import LiveRun
 from experiments.screens import texts
-from experiments.screens.console.keys import Name, shown_key
+from experiments.screens.console.keys import Name, choices_at, shown_key
 from experiments.session.history import History, entered_value, trial_at
 from experiments.session.remarks import Remark
 from experiments.session.states import Position, State
-from experiments.session.steps import Ask, Describe, Outcome, Prepare, Present, Rate, Rest, Step
+from experiments.session.steps import Ask, Asking, Describe, Outcome, Prepare, Present, Rate, Rest, Step, what
 
 THANK_PARTICIPANT = "Thank the participant."
 """The last sentence, where nothing else comes next."""
@@ -124,7 +124,7 @@ class Seen:
 
     def key(self, name: Name) -> str:
         """The key of a command as it is now."""
-        return shown_key(name, letters=self.letters)
+        return shown_key(name, letters=self.letters, choices=choices_at(self.position))
 
     @property
     def participant_gone(self) -> bool:
@@ -255,11 +255,28 @@ def _train(seen: Seen) -> Instruction:
 
 def _asking(seen: Seen) -> Instruction:
     step = seen.position.step
-    question = step.question if isinstance(step, Ask) else ""
-    own = "Awaited: the participant's own key, UP for forward or DOWN for backward.\nF or B enters it for them."
-    told = "Enter what the participant says: F or B."
-    detail = _asked_there(seen, own, told) if seen.about.participant_keys else told
-    return Instruction(title=question, detail=detail, mood="ask")
+    if not isinstance(step, Ask):
+        return _MOMENT
+    own_keys = either(f"{one.own_key.upper()} for {one.label}" for one in step.choices)
+    own = f"Awaited: the participant's own key, {own_keys}.\n{_keys(step)} enters it for them."
+    told = f"Enter what the participant says: {_keys(step)}."
+    there = _asked_there(seen, own, told) if seen.about.participant_keys else told
+    about = texts.ordinal(seen.about.plan, step.trial) if step.later else ""
+    return Instruction(title=step.text, detail="\n".join(filter(None, (about, there))), mood="ask")
+
+
+def _keys(asked: Ask) -> str:
+    return either(one.key.upper() for one in asked.choices)
+
+
+def either(words: Iterable[str]) -> str:
+    """Words, one of which is meant.
+
+    >>> either(["F", "B"]), either("123")
+    ('F or B', '1, 2 or 3')
+    """
+    *before, last = words
+    return f"{', '.join(before)} or {last}" if before else last
 
 
 def _asked_there(seen: Seen, awaited: str, here: str) -> str:
@@ -274,8 +291,8 @@ def _rating(seen: Seen) -> Instruction:
     what = "rating" if isinstance(step, Rate) else "description"
     own = f"Awaited: the participant's {what} on their own screen, or type it here."
     there = _asked_there(seen, own, "Type here what they say.") if seen.about.participant_rates else ""
-    detail = "\n".join(filter(None, (step.question, there)))
-    return Instruction(title=texts.ordinal(seen.about.plan, step.trial), detail=detail, mood="ask")
+    detail = "\n".join(filter(None, (step.text, there)))
+    return Instruction(title=texts.about_text(seen.about.plan, step), detail=detail, mood="ask")
 
 
 def _resting(seen: Seen) -> Instruction:
@@ -302,19 +319,23 @@ def _correcting(seen: Seen) -> Instruction:
     entry = seen.position.correcting
     if entry is None:
         return _MOMENT
-    how = {
-        "answer": "Enter what the participant said: F or B.",
-        "rating": "Type what the participant said, Enter saves; Ctrl+X for no answer.",
-        "description": "Type the participant's words; Enter saves.",
-    }[entry.what]
-    further = "Ctrl+U" if entry.what != "answer" else "U"
     return Instruction(
-        title=f"Correct the {entry.what}",
+        title=f"Correct the {what(entry)}",
         damper=texts.place_text(seen.about.plan, entry.trial),
-        detail=f"It was entered as {texts.value_text(entered_value(seen.told, entry))}. {how}\n"
-        f"{further} goes further back, Esc leaves it.",
+        detail=f"It was entered as {texts.value_text(entry, entered_value(seen.told, entry))}. {_entered_how(entry)}\n"
+        f"{seen.key('undo')} goes further back, Esc leaves it.",
         mood="ask",
     )
+
+
+def _entered_how(entry: Asking) -> str:
+    match entry:
+        case Ask():
+            return f"Enter what the participant said: {_keys(entry)}."
+        case Rate():
+            return "Type what the participant said, Enter saves; Ctrl+X for no answer."
+        case Describe():
+            return "Type the participant's words; Enter saves."
 
 
 def _halted(seen: Seen) -> Instruction:

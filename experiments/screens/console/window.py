@@ -137,7 +137,7 @@ class ConsoleWindow(QtWidgets.QMainWindow):
     def _acknowledge(self, message: view.Saved) -> None:
         """Say that it is safe; a tone at the end of a break."""
         self._progress.saved(message.word, self.clock.now())
-        text = saved_text(self.about.plan, message.step, message.word)
+        text = saved_text(self.about.plan, self.seen.told, message.step, message.word)
         if isinstance(message.word, Rested):
             self.say(text, "good")
         elif text:

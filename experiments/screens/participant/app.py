@@ -15,7 +15,7 @@ from pydantic import ValidationError
 
 from experiments.screens.participant import messages
 from experiments.screens.participant.messages import line
-from experiments.screens.participant.pages import DescriptionPage, DirectionPage, Drafts, MessagePage, RatingPage
+from experiments.screens.participant.pages import ChoicePage, DescriptionPage, Drafts, MessagePage, RatingPage
 from experiments.screens.participant.stage import KeyPresses, MaskingNoise, Stage, load_toolkit
 
 
@@ -140,8 +140,8 @@ class App:
                 self._stage.put(RatingPage(self._stage, word, self._drafts_of(word)))
             case messages.AskDescription():
                 self._stage.put(DescriptionPage(self._stage, word, self._drafts_of(word)))
-            case messages.AskDirection():
-                self._stage.put(DirectionPage(self._stage, word, self._keys))
+            case messages.AskChoice():
+                self._stage.put(ChoicePage(self._stage, word, self._keys))
             case messages.Noise():
                 self._wire.say(self._noise.turn(word))
 

@@ -83,8 +83,8 @@ NOISE_S = 15.0
 MAX_CLOCK_STEP_S = 0.02
 """How far the clocks may move against each other while a direction is asked; a clock that was set moves further."""
 
-_Asked = messages.AskRating | messages.AskDescription | messages.AskDirection | messages.Noise
-_Given = TypeVar("_Given", messages.RatingGiven, messages.DescriptionGiven, messages.DirectionGiven, messages.NoiseIs)
+_Asked = messages.AskRating | messages.AskDescription | messages.AskChoice | messages.Noise
+_Given = TypeVar("_Given", messages.RatingGiven, messages.DescriptionGiven, messages.ChoiceGiven, messages.NoiseIs)
 
 
 class ParticipantLink:
@@ -173,17 +173,17 @@ class ParticipantLink:
         with self._alone():
             return self._answer(replace(question, ask=self._mail.open_ask()), messages.DescriptionGiven, None, wanted)
 
-    def ask_direction(
-        self, question: messages.AskDirection, *, wanted: Callable[[], bool] = lambda: True
-    ) -> messages.DirectionGiven:
-        """Have a direction judged. Waits for the participant. `onset_s` and `pressed_s` are on this side's clock.
+    def ask_choice(
+        self, question: messages.AskChoice, *, wanted: Callable[[], bool] = lambda: True
+    ) -> messages.ChoiceGiven:
+        """Have one of several answers chosen. Waits for the participant. `wanted` as of a rating.
 
-        `wanted` as of a rating.
+        `onset_s` and `pressed_s` are on this side's clock.
         """
         with self._alone():
             ask, clocks = self._mail.open_ask(), self.map_clocks()
             asked = replace(question, ask=ask, onset_s=clocks.there(question.onset_s))
-            given = self._answer(asked, messages.DirectionGiven, None, wanted)
+            given = self._answer(asked, messages.ChoiceGiven, None, wanted)
             after = self.map_clocks()
         if surely_moved_s(clocks, after) > MAX_CLOCK_STEP_S:
             moved_s = after.offset_s - clocks.offset_s

@@ -14,8 +14,6 @@ from typing import Annotated, Literal
 
 from pydantic import Field, TypeAdapter
 
-from device.words import Direction
-
 _Finite = Annotated[float, Field(allow_inf_nan=False)]
 _Positive = Annotated[float, Field(gt=0, allow_inf_nan=False)]
 _Share = Annotated[float, Field(ge=0, le=1, allow_inf_nan=False)]
@@ -70,21 +68,27 @@ class AskDescription:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class AskDirection:
-    """Ask which way it shot; a key pressed before `onset_s` is no answer. Keys have PsychoPy's names.
+class KeyedAnswer:
+    """An answer with what it is called and its key, by PsychoPy's name."""
+
+    answer: str
+    label: str
+    key: str
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class AskChoice:
+    """Ask for one of several answers; a key pressed before `onset_s` is none.
 
     `once_seen`: nor is one that was pressed before the question stood there.
     """
 
     question: str
-    forward: str
-    backward: str
-    forward_key: str
-    backward_key: str
+    answers: tuple[KeyedAnswer, ...]
     onset_s: _Finite
     once_seen: bool = False
     ask: int = 0
-    kind: Literal["ask-direction"] = "ask-direction"
+    kind: Literal["ask-choice"] = "ask-choice"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -150,13 +154,13 @@ class DescriptionGiven:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class DirectionGiven:
-    """Which way, and when the key went down."""
+class ChoiceGiven:
+    """Which answer, and when its key went down."""
 
-    response: Direction
+    response: str
     pressed_s: _Finite
     ask: int = 0
-    kind: Literal["direction-given"] = "direction-given"
+    kind: Literal["choice-given"] = "choice-given"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -200,10 +204,10 @@ class ScreenFailed:
     kind: Literal["failed"] = "failed"
 
 
-ToParticipant = Show | AskRating | AskDescription | AskDirection | Ping | Noise | CloseScreen
+ToParticipant = Show | AskRating | AskDescription | AskChoice | Ping | Noise | CloseScreen
 Unasked = EmergencyPressed | Focused | KeyPressed
 """What the participant's screen says without being asked."""
-FromParticipant = Ready | Pong | RatingGiven | DescriptionGiven | DirectionGiven | NoiseIs | Unasked | ScreenFailed
+FromParticipant = Ready | Pong | RatingGiven | DescriptionGiven | ChoiceGiven | NoiseIs | Unasked | ScreenFailed
 
 _TO: TypeAdapter[ToParticipant] = TypeAdapter(Annotated[ToParticipant, Field(discriminator="kind")])
 _FROM: TypeAdapter[FromParticipant] = TypeAdapter(Annotated[FromParticipant, Field(discriminator="kind")])

@@ -29,42 +29,41 @@ class MessagePage(Page):
         self.message.draw()
 
 
-class DirectionPage(Page):
-    """Two answers, each with its key. Keys count from the onset on, even those that went down before the page stood.
+class ChoicePage(Page):
+    """Answers side by side, each with its key.
 
-    After a pause, or where a key was refused, only those that go down once it stands there again.
+    Keys count from the onset on, even those that went down before the page stood. After a pause, or where a key was
+    refused, only those that go down once it stands there again.
     """
 
-    def __init__(self, stage: Stage, asked: messages.AskDirection, keys: KeyPresses) -> None:
+    def __init__(self, stage: Stage, asked: messages.AskChoice, keys: KeyPresses) -> None:
         self._asked, self._keys, self._now = asked, keys, stage.toolkit.now
         self._since_s = math.inf if asked.once_seen else asked.onset_s
-        width, ink = stage.half_width, stage.palette.ink
-        question = TextBox(y=0.4, width=2 * width, height=0.25)
+        all_across, ink = 2 * stage.half_width, stage.palette.ink
+        width = all_across / len(asked.answers)
+        question = TextBox(y=0.4, width=all_across, height=0.25)
         self._drawn = [stage.text(asked.question, question, 0.06, ink)]
-        for x, key, answer in (
-            (-width / 2, asked.forward_key, asked.forward),
-            (width / 2, asked.backward_key, asked.backward),
-        ):
+        for place, answer in enumerate(asked.answers):
+            x = (place + 0.5) * width - all_across / 2
             self._drawn.append(stage.panel(TextBox(x=x, y=-0.12, width=0.9 * width, height=0.4), stage.palette.panel))
             letter = TextBox(x=x, y=-0.06, width=0.8 * width, height=0.16, anchor="center")
-            self._drawn.append(stage.text(_key_text(key), letter, 0.12, stage.palette.accent))
+            self._drawn.append(stage.text(_key_text(answer.key), letter, 0.12, stage.palette.accent))
             words = TextBox(x=x, y=-0.22, width=0.8 * width, height=0.12, anchor="center")
-            self._drawn.append(stage.text(answer, words, 0.055, ink))
+            self._drawn.append(stage.text(answer.label, words, 0.055, ink))
 
     def draw(self) -> None:
-        """The question and both answers."""
+        """The question and its answers."""
         for stimulus in self._drawn:
             stimulus.draw()
         if math.isinf(self._since_s):
             self._since_s = max(self._now(), self._asked.onset_s)
 
-    def outcome(self) -> messages.DirectionGiven | None:
-        """The first of the two keys since the onset."""
+    def outcome(self) -> messages.ChoiceGiven | None:
+        """The first of the answers' keys since the onset."""
+        said = {answer.key: answer.answer for answer in self._asked.answers}
         for press in self._keys.since(self._since_s):
-            if press.name == self._asked.forward_key:
-                return messages.DirectionGiven(response="forward", pressed_s=press.pressed_s, ask=self._asked.ask)
-            if press.name == self._asked.backward_key:
-                return messages.DirectionGiven(response="backward", pressed_s=press.pressed_s, ask=self._asked.ask)
+            if press.name in said:
+                return messages.ChoiceGiven(response=said[press.name], pressed_s=press.pressed_s, ask=self._asked.ask)
         return None
 
 
