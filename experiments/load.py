@@ -5,6 +5,7 @@ from __future__ import annotations
 import csv
 import math
 from collections.abc import Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -17,7 +18,13 @@ from device.words import Drive
 from experiments.catalogue import CATALOGUE
 from experiments.config.door import ConfigError, ExperimentConfig, StudyConfig, checked, load, read_toml
 from experiments.config.setup import GunConfig, Setup
+from experiments.design.config import DesignConfig
+from experiments.design.language import TRAIN_INTERVAL
+from experiments.design.planned import planned_run
+from experiments.design.planning import groups, plan_of
+from experiments.design.stimuli import limits, shown_cell
 from experiments.preference.config import PreferenceConfig
+from experiments.synthetic.answers import SyntheticAnswers, check_laws
 
 
 def shipped_folder() -> Path:
@@ -43,15 +50,42 @@ def load_setup(name: str) -> Setup[Any]:
     """An experiment's config with its gun and its table of answers."""
     path = find(name)
     table = read_toml(path)
+    if "design" in table and not isinstance(table["design"], dict):
+        return _load_design(path)
     kind = table.get("experiment")
     if not isinstance(kind, str) or kind not in CATALOGUE:
         known = ", ".join(CATALOGUE)
         raise ConfigError(f"{path}: experiment = {kind!r}; must be one of {known} (is it the config of a run?)")
-    config = checked(CATALOGUE[kind].config, table, path)
+    config: Any = checked(CATALOGUE[kind].config, table, path)
     gun = load_gun(path.parent / config.gun)
     setup = Setup(config=config, gun=gun, source=path, answers=_answers(path, config))
     _check_methods(path, setup)
     return setup
+
+
+def _load_design(path: Path) -> Setup[Any]:
+    design = load(DesignConfig, path)
+    gun = load_gun(path.parent / design.gun)
+    laws = load(SyntheticAnswers, path.parent / design.synthetic) if design.synthetic else None
+    if laws is not None:
+        with _named(path.parent / str(design.synthetic)):
+            check_laws(design, laws)
+    setup = Setup(config=design, gun=gun, source=path, laws=laws)
+    with _named(path):
+        groups(design)
+        for group in range(len(groups(design))):
+            planned_run(design, plan_of(design, "P01", 0, group=group))
+        limits(design, gun)
+    return setup
+
+
+@contextmanager
+def _named(path: Path) -> Iterator[None]:
+    """What goes wrong inside is said of a file."""
+    try:
+        yield
+    except ConfigError as error:
+        raise ConfigError(f"{path}: {error}") from error
 
 
 def load_gun(path: Path) -> GunConfig:
@@ -70,7 +104,7 @@ def load_study(name: str) -> tuple[StudyConfig, Path]:
 
 def _check_methods(path: Path, setup: Setup[Any]) -> None:
     try:
-        setup.gun.renderings(setup.config.design.methods)
+        setup.gun.renderings(setup.config.methods)
     except ValueError as error:
         raise ConfigError(f"{path}: {error}") from error
 
@@ -109,8 +143,27 @@ class MethodLimits:
 
 def check_limits(setup: Setup[Any]) -> list[MethodLimits]:
     """Each method's drive within the limits, or `ConfigError` with method, value and limit."""
-    found = check_methods(setup.gun, setup.config.design.methods, setup.source.parent / setup.config.gun)
+    if isinstance(setup.config, DesignConfig):
+        return _check_cells(setup)
+    found = check_methods(setup.gun, setup.config.methods, setup.source.parent / setup.config.gun)
     _check_repetition(setup, found)
+    return found
+
+
+def _check_cells(setup: Setup[DesignConfig]) -> list[MethodLimits]:
+    """Each cell of a design within the limits, its trains as well."""
+    with _named(setup.source):
+        cells = limits(setup.config, setup.gun)
+    found = [
+        MethodLimits(method=shown_cell(one.levels), drive=one.drive, load=one.load, settle_s=one.settle_s)
+        for one in cells
+    ]
+    trial = setup.config.trial
+    if trial.kind == "train":
+        for cell, one in zip(cells, found, strict=True):
+            every_s = dict(cell.levels).get(TRAIN_INTERVAL, trial.repeat_every_s)
+            if isinstance(every_s, float):
+                _check_train(setup.source, one, every_s, trial.max_shots, "trial.repeat_every_s")
     return found
 
 
@@ -149,16 +202,20 @@ def _check_repetition(setup: Setup[Any], methods: list[MethodLimits]) -> None:
         return
     every_s, shots = setup.config.stimulus.repeat_every_s, setup.config.fatigue.max_shots_per_trial
     for method in methods:
-        history = DriveHistory()
-        try:
-            for start_s in (shot * every_s for shot in range(min(shots, _ENOUGH_SHOTS))):
-                history = history.record(method.load, start_s, start_s + method.settle_s)
-        except LimitError as error:
-            raise ConfigError(
-                f"{setup.source}: stimulus.repeat_every_s = {every_s:g}: {method.method} needs {method.settle_s:.4g} s "
-                f"until its magnet is home, and no more than {MAX_SHOTS_PER_MINUTE} shots a minute are allowed "
-                f"({error}); repeat more slowly"
-            ) from error
+        _check_train(setup.source, method, every_s, shots, "stimulus.repeat_every_s")
+
+
+def _check_train(source: Path, method: MethodLimits, every_s: float, shots: int, key: str) -> None:
+    history = DriveHistory()
+    try:
+        for start_s in (shot * every_s for shot in range(min(shots, _ENOUGH_SHOTS))):
+            history = history.record(method.load, start_s, start_s + method.settle_s)
+    except LimitError as error:
+        raise ConfigError(
+            f"{source}: {key} = {every_s:g}: {method.method} needs {method.settle_s:.4g} s "
+            f"until its magnet is home, and no more than {MAX_SHOTS_PER_MINUTE} shots a minute are allowed "
+            f"({error}); repeat more slowly"
+        ) from error
 
 
 _ENOUGH_SHOTS = 2 * MAX_SHOTS_PER_MINUTE

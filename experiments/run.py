@@ -15,7 +15,9 @@ from device import Gun, open_gun
 from experiments.catalogue import experiment, table
 from experiments.clock import Clock, date_text
 from experiments.config.setup import Setup
+from experiments.design.config import DesignConfig
 from experiments.design.plan import Plan
+from experiments.design.stimuli import Stimuli, by_hand
 from experiments.design.streams import checked_seed, draw_seed
 from experiments.live_run import LiveRun, RunStopped, Screen
 from experiments.load import check_limits
@@ -110,16 +112,17 @@ def resolve_seed(request: RunRequest) -> int:
 def run(request: RunRequest, make_screen: MakeScreen, clock: Clock) -> Finished:
     """Carry out a run. `PlaceError`, `JournalError`, `ConfigError`, `RunStopped`: nothing acknowledged is ever lost."""
     setup = request.setup
-    drives = {one.method: one.drive for one in check_limits(setup)}
+    check_limits(setup)
+    stimuli = experiment(setup).stimuli(setup)
     registered = register.read_register(request.results)
     place = folders.place(request.results, request.participant_id, setup.config.experiment, registered)
-    place = replace(place, practice=request.practice)
+    place = replace(place, practice=request.practice, suffix=experiment(setup).suffix(setup.config))
     if not place.journal.exists():
         request = replace(request, anew_reason="")
     before = _before(place, request, clock)
     if before is None:
         _refuse_excluded(place, registered)
-    with closing(_open_gun(request, clock)) as gun:
+    with closing(_open_gun(request, stimuli, clock)) as gun:
         plan = _new_plan(request, place, registered) if before is None else _plan_of(before, request)
         session, screen = experiment(setup).session(plan, setup), make_screen(setup, plan, clock)
         with _open(place, before, clock) as journal:
@@ -137,7 +140,7 @@ def run(request: RunRequest, make_screen: MakeScreen, clock: Clock) -> Finished:
                 guard_s=setup.config.console.guard_s,
                 history=position.history,
             )
-            desk = Desk(live=live, gun_name=gun_name(gun.identify()), drives=drives)
+            desk = Desk(live=live, gun_name=gun_name(gun.identify()), shots=stimuli.shots(plan))
             screen.begin(live)
             return Finished(plan=plan, place=place, saved=_to_the_end(session, desk, position, place))
 
@@ -151,10 +154,9 @@ def _refuse_excluded(place: Place, registered: Register) -> None:
         )
 
 
-def _open_gun(request: RunRequest, clock: Clock) -> Gun:
-    methods = request.setup.gun.renderings(request.setup.config.design.methods)
+def _open_gun(request: RunRequest, stimuli: Stimuli, clock: Clock) -> Gun:
     try:
-        return open_gun(request.gun, methods, clock=clock.now)
+        return open_gun(request.gun, stimuli.methods, clock=clock.now)
     except ValueError as error:
         raise PlaceError(f"--gun {request.gun}: {error}") from error
 
@@ -200,10 +202,12 @@ def _new_plan(request: RunRequest, place: Place, registered: Register) -> Plan:
     setup, seed = request.setup, resolve_seed(request)
     if not request.practice:
         row = folders.row_of_next_run(setup, place.results, registered)
-        return experiment(setup).make_plan(setup.config, place.participant_id, seed, row)
-    plan = experiment(setup).make_practice(setup.config, place.participant_id, seed)
+        group = folders.group_of_next_run(setup, place.results, registered)
+        return experiment(setup).make_plan(setup.config, place.participant_id, seed, row, group)
+    group = folders.group_of_next_run(setup, place.results, registered)
+    plan = experiment(setup).make_practice(setup.config, place.participant_id, seed, group)
     if plan is None:
-        raise PlaceError(f"{setup.source}: there is no practice (practice.trials_per_method)")
+        raise PlaceError(f"{setup.source}: there is no practice (table [practice])")
     return plan
 
 
@@ -237,12 +241,13 @@ def _circumstances(setup: Setup[Any], gun: Gun, clock: Clock) -> dict[str, objec
 
     The experimenter cannot be kept from knowing the direction, as they turn the gun, and dampers, set by hand.
     """
-    by_hand = [name for name in setup.config.design.methods if setup.gun.methods[name].damper]
+    dampers = [f"method {name}" for name in setup.config.methods if setup.gun.methods[name].damper]
+    set_by_hand = by_hand(setup.config) if isinstance(setup.config, DesignConfig) else ()
     return {
         "provenance": provenance(),
         "gun": asdict(gun.identify()),
         "clock": clock.name,
-        "experimenter_knows": ["direction", *(f"method {name}" for name in by_hand)],
+        "experimenter_knows": ["direction", *dampers, *set_by_hand],
     }
 
 
@@ -251,7 +256,8 @@ def _begin(
 ) -> RunPosition:
     """Write the head of a new journal."""
     setup, why = request.setup, {"set_aside_reason": request.anew_reason} if request.anew_reason else {}
-    plan_head = {"plan": plan.record(), "plan_sha256": plan.sha256(), **why}
+    laws = {} if setup.laws is None else {"laws": setup.laws.model_dump(mode="json")}
+    plan_head = {"plan": plan.record(), "plan_sha256": plan.sha256(), **why, **laws}
     journal.append("run", **plan_head, setup=setup.record(), setup_sha256=setup.sha256(), **head)
     return RunPosition(step=next(session))
 

@@ -15,7 +15,7 @@ from dataclasses import dataclass
 from typing import Literal
 
 from device import DeviceError, Gun, LimitError, Shot, ShotReport
-from device.words import Drive, Identity
+from device.words import Identity
 from experiments.design.plan import Trial
 from experiments.live_run import Held, LiveRun, RunStopped
 from experiments.record.replay import RunPosition
@@ -23,15 +23,16 @@ from experiments.session import events, steps
 from experiments.session.history import trial_at
 from experiments.session.remarks import TestShot
 from experiments.session.states import State
+from experiments.tasks.questions import on_scale
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Desk:
-    """All that carries steps out: the live run with its gun, what that is called, and how each method drives it."""
+    """All that carries steps out: the live run with its gun, what that is called, and the shot of each interval."""
 
     live: LiveRun
     gun_name: str
-    drives: Mapping[str, Drive]
+    shots: Mapping[tuple[Trial, int], Shot | None]
 
 
 class Train:
@@ -124,8 +125,8 @@ class _Runner:
         self._session, self._desk, self._live = session, desk, desk.live
         self._stimulus = DeskGun(desk)
         self._failures, self._onset_s = 0, math.nan
-        self._damper = ""
-        """As it was set in this sitting; unknown at its beginning."""
+        self._set: dict[str, str] = {}
+        """What was set by hand in this sitting; unknown at its beginning."""
 
     def carry_out(self, position: RunPosition) -> None:
         step = position.step
@@ -150,7 +151,7 @@ class _Runner:
         if isinstance(outcome, steps.Failed) and self._failures == MAX_FAILURES:
             raise RunStopped(f"the gun failed {MAX_FAILURES} times in a row, last: {outcome.cause}")
 
-    def _do(self, step: steps.Step) -> steps.Outcome:  # noqa: C901 - one case a step
+    def _do(self, step: steps.Step) -> steps.Outcome:  # noqa: C901, PLR0911 - one case a step
         match step:
             case steps.Prepare():
                 return self._prepare(step)
@@ -158,6 +159,8 @@ class _Runner:
                 return self._fired(step)
             case steps.Ask():
                 return self._ask(step)
+            case steps.Inform():
+                return self._inform(step)
             case steps.Rest():
                 return self._rest(step)
             case steps.Present():
@@ -172,16 +175,17 @@ class _Runner:
     # steps that wait for a person
 
     def _prepare(self, step: steps.Prepare) -> steps.Prepared | steps.Repeated:
-        to_be_set = step.damper not in ("", self._damper)
-        if to_be_set:
-            self._damper = ""  # it may be set by now, or not: known again when that is said
+        wanted = dict(step.settings)
+        to_be_set = any(self._set.get(name) != value for name, value in wanted.items())
+        if to_be_set:  # they may be set by now, or not: known again when that is said
+            self._set = {name: value for name, value in self._set.items() if name not in wanted}
         self._live.enter(State.SETTING if to_be_set else State.PREPARING, step)
         while True:
             match self._live.wait():
                 case events.DamperSet():
-                    self._damper = step.damper
+                    self._set |= wanted
                 case events.Fire():
-                    return steps.Prepared(damper=step.damper or None)
+                    return steps.Prepared(settings=step.settings)
                 case events.Repeat(reason=reason):
                     return self._repeat(reason)
                 case other:
@@ -191,14 +195,19 @@ class _Runner:
         self._live.enter(State.ASKING, step)
         match self._live.wait():
             case events.Answer() | events.ParticipantKey() as answer:
-                return self._answered(answer)
+                return self._answered(step, answer)
             case events.Repeat(reason=reason):
                 return self._repeat(reason)
             case other:
                 raise Unforeseen(other)
 
-    def _answered(self, answer: events.Answer | events.ParticipantKey) -> steps.Answered:
-        """The answer with its time, which is the participant's own only by their own key, and without a pause."""
+    def _answered(self, step: steps.Ask, answer: events.Answer | events.ParticipantKey) -> steps.Answered:
+        """The answer with its time, which is the participant's own only by their own key, and without a pause.
+
+        Of what was felt a while ago no time says anything.
+        """
+        if step.later:
+            return steps.Answered(value=answer.response, by=answer.by)
         drawn_s = answer.response_time_s if isinstance(answer, events.Answer) else None
         key_time_s = None if answer.at_s is None else round(answer.at_s - self._onset_s, 6)
         time_s = drawn_s if drawn_s is not None else key_time_s
@@ -213,6 +222,16 @@ class _Runner:
             response_time_valid=own and not paused,
             key_time_s=key_time_s if drawn_s is not None else None,
         )
+
+    def _inform(self, step: steps.Inform) -> steps.Informed | steps.Repeated:
+        self._live.enter(State.INFORMING, step)
+        match self._live.wait():
+            case events.Told():
+                return steps.Informed()
+            case events.Repeat(reason=reason):
+                return self._repeat(reason)
+            case other:
+                raise Unforeseen(other)
 
     def _rest(self, step: steps.Rest) -> steps.Rested | steps.Repeated:
         start_s = self._live.clock.now()
@@ -237,7 +256,7 @@ class _Runner:
         self._live.enter(State.RATING, step)
         match self._live.wait():
             case events.Rating(rating=rating, by=by) | events.ParticipantRated(rating=rating, by=by):
-                return steps.Answered(value=None if rating is None else steps.on_scale(rating, step), by=by)
+                return steps.Answered(value=None if rating is None else on_scale(rating, step), by=by)
             case events.Repeat(reason=reason):
                 return self._repeat(reason)
             case other:
@@ -270,7 +289,7 @@ class _Runner:
     # the gun
 
     def _fired(self, step: steps.FireShot) -> steps.Fired | steps.Failed | steps.Interrupted:
-        outcome = self._stimulus.fire(step)
+        outcome = self._stimulus.fire(step, self._onset_s + step.gap_s if step.gap_s else None)
         if isinstance(outcome, steps.Fired):
             self._onset_s = outcome.pulse_start_s
         return outcome
@@ -287,6 +306,10 @@ class _Runner:
                     raise Unforeseen(other)
 
 
+EMPTY_S = 0.05
+"""So long after the key to fire nothing is felt: about as long as a gun takes to arm and fire (assumed)."""
+NOTHING = "none"
+"""The motion of no shot."""
 LEAD_S = 0.03
 """How long before its tick a shot of a train is asked for; a `next` within that time comes too late for it.
 
@@ -308,17 +331,21 @@ class DeskGun:
     def __init__(self, desk: Desk) -> None:
         self._desk, self._live = desk, desk.live
 
-    def fire(self, step: steps.FireShot) -> steps.Fired | steps.Failed | steps.Interrupted:
-        """One shot, armed for it alone."""
-        asked = False
+    def fire(
+        self, step: steps.FireShot, not_before_s: float | None = None
+    ) -> steps.Fired | steps.Failed | steps.Interrupted:
+        """One shot, armed for it alone; in a catch trial, or an empty interval, nothing is armed and nothing fires."""
+        shot, asked, before = self._desk.shots[step.trial, step.interval], False, step.interval > 0
         try:
-            self._get_ready(State.FIRING, step)
+            if shot is None:
+                return self._nothing(step, not_before_s)
+            self._get_ready(State.FIRING, step, not_before_s)
             asked = True
-            onset_utc, report = self._first(step.trial)
+            onset_utc, report = self._first(shot)
         except Held:
-            return steps.Interrupted(presented=False, cause="pause")
+            return steps.Interrupted(presented=before, cause="pause")
         except DeviceError as error:
-            return self._failed(error, felt=asked and not isinstance(error, LimitError))
+            return self._failed(error, felt=before or (asked and not isinstance(error, LimitError)))
         finally:
             disarm(self._live.gun)
         self._live.stimulus_begins(report.pulse_start_s)
@@ -333,18 +360,34 @@ class DeskGun:
             timing=report.timing,
         )
 
+    def _nothing(self, step: steps.FireShot, not_before_s: float | None) -> steps.Fired:
+        """What is felt of no shot, in about the time that one takes. Raises as `allow_shot`."""
+        self._live.enter(State.FIRING, step)
+        self._live.sleep(max(not_before_s or 0.0, self._live.clock.now() + EMPTY_S))
+        utc, now_s = self._live.clock.utc(), self._live.clock.now()
+        self._live.stimulus_begins(now_s)
+        return steps.Fired(
+            gun=self._desk.gun_name,
+            onset_utc=utc,
+            requested_s=now_s,
+            pulse_start_s=now_s,
+            pulse_end_s=now_s,
+            home_predicted_s=now_s,
+            motion=NOTHING,
+        )
+
     def present(self, step: steps.Present) -> steps.Presented | steps.Failed | steps.Interrupted:
         """Shots at whole multiples of the interval since the first, until next is said."""
-        train, asked = Train(step, self._desk), False
+        train, asked, shot = Train(step, self._desk), False, self._shot(step.trial)
         try:
             self._get_ready(State.TRAIN, step)
             asked = True
-            train.began(*self._first(step.trial))
+            train.began(*self._first(shot))
             while (event := self._live.wait((at_s := train.due_s()) - LEAD_S)) is None:
                 if train.shots == step.max_shots:
                     return train.presented("limit")
                 self._live.allow_shot()
-                train.fired(self._shoot(step.trial, at_s))
+                train.fired(self._live.gun.fire(shot, at_s))
         except Held:
             return train.interrupted()
         except DeviceError as error:
@@ -353,8 +396,8 @@ class DeskGun:
             disarm(self._live.gun)
         return train.presented("next") if isinstance(event, events.Next) else train.interrupted()
 
-    def _get_ready(self, state: State, step: steps.FireShot | steps.Present) -> None:
-        """Enter a state in which the gun fires, and arm it. Raises as `allow_shot`.
+    def _get_ready(self, state: State, step: steps.FireShot | steps.Present, not_before_s: float | None = None) -> None:
+        """Enter a state in which the gun fires, and arm it when its time has come. Raises as `allow_shot`.
 
         If the run ends before the shot, it is on the disk that nothing was felt.
         """
@@ -362,9 +405,12 @@ class DeskGun:
             self._live.enter(state, step)
             if state is State.TRAIN:
                 self._live.stimulus_begins(None)
+            if not_before_s is not None:
+                self._live.sleep(not_before_s)
             self._arm()
         except RunStopped:
-            self._live.journal.append("outcome", body=steps.step_record(steps.Interrupted(presented=False)))
+            felt = isinstance(step, steps.FireShot) and step.interval > 0
+            self._live.journal.append("outcome", body=steps.step_record(steps.Interrupted(presented=felt)))
             raise
 
     def _arm(self) -> None:
@@ -374,13 +420,14 @@ class DeskGun:
         self._live.gun.arm()
         self._live.sleep(self._live.gun.status().ready_at_s)
 
-    def _first(self, trial: Trial) -> tuple[str, ShotReport]:
+    def _first(self, shot: Shot) -> tuple[str, ShotReport]:
         """The first shot of a stimulus, and its date and time."""
-        return self._live.clock.utc(), self._shoot(trial)
+        return self._live.clock.utc(), self._live.gun.fire(shot)
 
-    def _shoot(self, trial: Trial, at_s: float | None = None) -> ShotReport:
-        shot = Shot(method=trial.method, direction=trial.direction, drive=self._desk.drives[trial.method])
-        return self._live.gun.fire(shot, at_s)
+    def _shot(self, trial: Trial) -> Shot:
+        """The first shot that is felt of a trial; of a catch trial, that of any other."""
+        own = (shot for (one, _), shot in self._desk.shots.items() if one == trial)
+        return next(shot for shot in (*own, *self._desk.shots.values()) if shot is not None)
 
     def _failed(self, error: DeviceError, *, felt: bool) -> steps.Failed | steps.Interrupted:
         """What became of a stimulus at which the gun failed; a pause that disarmed it is no fault of the gun's."""
@@ -392,15 +439,16 @@ class DeskGun:
 
     def test_shot(self, trial: Trial, held_s: float | None) -> bool:
         """Fire a shot that nobody judges; whether it was fired."""
+        shot = self._shot(trial)
         try:
             self._arm()
-            _, report = self._first(trial)
+            _, report = self._first(shot)
         except (Held, DeviceError) as error:
             cause = str(error) or "paused"
-            self._live.remark(TestShot(method=trial.method, held_s=held_s, cause=cause))
+            self._live.remark(TestShot(method=shot.method, held_s=held_s, cause=cause))
             return False
         finally:
             disarm(self._live.gun)
-        fired = TestShot(method=trial.method, held_s=held_s, pulse_start_s=report.pulse_start_s, motion=report.motion)
+        fired = TestShot(method=shot.method, held_s=held_s, pulse_start_s=report.pulse_start_s, motion=report.motion)
         self._live.remark(fired)
         return True

@@ -75,6 +75,8 @@ def short_direction(sets: int = 2, trials: int = 3, set_break_s: float = 30.0) -
 
 
 DIRECTION, PREFERENCE = short_direction(), load_setup("preference")
+TOLD = load_setup(str(Path(__file__).parent / "ten_designs" / "voltages.toml"))
+"""A design whose participants are told something first."""
 GUARD_S: float = DIRECTION.config.console.guard_s
 
 
@@ -620,6 +622,7 @@ _DUE = {
     State.SETTING: "M",
     State.PREPARING: "Space",
     State.ASKING: "F",
+    State.INFORMING: "Enter",
     State.CLOSING: "Enter",
     State.PAUSED: "P",
     State.HALTED: "Q",
@@ -685,7 +688,7 @@ RATED = (State.TRAIN, State.RATING, State.DESCRIBING)
 @contextmanager
 def sat_at(state: State, results: Path) -> Any:
     """A sitting that has come to a state, whichever it is; after an emergency stop in a run of its own."""
-    setup = PREFERENCE if state in RATED else DIRECTION
+    setup = PREFERENCE if state in RATED else TOLD if state is State.INFORMING else DIRECTION
     if state is State.REARMING:
         with sat(setup, results) as halted:
             halted.to(State.ASKING)

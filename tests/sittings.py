@@ -8,7 +8,7 @@ from typing import Any, NamedTuple
 
 from device import Identity, Shot, ShotReport, open_gun
 from device.words import GunStatus
-from experiments import catalogue, load
+from experiments import catalogue
 from experiments.catalogue import table
 from experiments.clock import Clock, VirtualClock
 from experiments.config.setup import Setup
@@ -103,7 +103,7 @@ class WatchingScreen(SyntheticScreen):
         done, announced = islice((one for line in reversed(lines) if (one := json.loads(line))["kind"] != "shot"), 2)
         assert lines[-1].endswith(b"\n")
         assert (announced["kind"], announced["body"]) == ("step", json.loads(json.dumps(step_record(step))))
-        assert (done["kind"], done["body"]) == ("outcome", step_record(outcome))
+        assert (done["kind"], done["body"]) == ("outcome", json.loads(json.dumps(step_record(outcome))))
         self.acknowledged += 1
         if trouble := self.trouble.get(self.acknowledged):
             raise trouble
@@ -125,8 +125,8 @@ class Sitting(NamedTuple):
         live = LiveRun(
             plan=self.plan, gun=self.gun, journal=self.journal, clock=self.clock, screen=self.screen, guard_s=0.25
         )
-        drives = {one.method: one.drive for one in load.check_limits(self.setup)}
-        desk = Desk(live=live, gun_name="simulated", drives=drives)
+        stimuli = catalogue.experiment(self.setup).stimuli(self.setup)
+        desk = Desk(live=live, gun_name="simulated", shots=stimuli.shots(self.plan))
         self.screen.begin(live)
         with self.journal:
             carry_out(going, desk, RunPosition(step=next(going)))

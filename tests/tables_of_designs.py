@@ -32,7 +32,7 @@ def simulated(design: DesignConfig, laws: SyntheticAnswers, count: int) -> pd.Da
             row |= {f"{design.trial.compare}_{place}": level for place, level in enumerate(trial.intervals, start=1)}
             row |= {"stimulus": int(not trial.catch)} if design.trial.catch else {}
             for name, question in design.questions.items():
-                row[name] = person.answer(name, trial).value
+                row[name] = person.answer(trial, name).value
                 if name in scored:
                     right = is_right(design, question, trial, row[name])
                     row[scored[name]] = None if right is None else int(right)

@@ -150,7 +150,8 @@ def test_why_a_command_does_nothing_is_what_the_table_says() -> None:
             corrects = position.state is S.CORRECTING and (
                 one.name == "no answer" or (one.name in ANSWERS and field_at(position) is None)
             )
-            kind = events.Correct if corrects else one.kind
+            tells = one.name == "enter" and position.state is S.INFORMING
+            kind = events.Correct if corrects else events.Told if tells else one.kind
             if kind is None:
                 assert why_not(one.name, position) == ""
                 continue

@@ -14,6 +14,7 @@ from hypothesis import strategies as st
 from experiments import catalogue
 from experiments.config.setup import Setup
 from experiments.design.plan import Plan, Trial
+from experiments.design.stimuli import damper
 from experiments.screens.console import progress, view, widgets
 from experiments.screens.console.progress import RunTiming, clock_text, end_text, remaining_s, trials_done
 from experiments.screens.console.view import About, Ended, GunSeen, ParticipantSeen, Seen
@@ -36,7 +37,7 @@ def present(trial: Trial) -> Present:
 
 
 def prepare(trial: Trial) -> Prepare:
-    return Prepare(trial=trial, attempt=2, damper=DIRECTION.gun.methods[trial.method].damper)
+    return Prepare(trial=trial, attempt=2, settings=damper(DIRECTION.gun, trial.method))
 
 
 def seen(setup: Setup[Any], position: Position, *told: Any, **more: Any) -> Seen:
@@ -176,7 +177,7 @@ def test_the_list_of_marks_has_those_of_this_set_and_an_answer_that_was_given_ag
     first, other = trials[0], trials[-1]
     step, given = ask(first), (ask(first), SAID)
     corrected = (None, EntryCorrected(trial=first, question="response", value="backward"))
-    spoiled = (Prepare(trial=trials[1], attempt=1, damper=""), Repeated(trial=first, reason="noise"))
+    spoiled = (Prepare(trial=trials[1], attempt=1), Repeated(trial=first, reason="noise"))
     flagged, noted = (None, Flagged(trial=other, flag="late")), (None, Noted(trial=first, text="a dog"))
     here = Position(states=(State.ASKING,), step=step)
     marks = progress.marks(seen(DIRECTION, here, given, corrected, spoiled, flagged, noted))

@@ -149,7 +149,7 @@ def test_a_trial_can_be_presented_again_in_the_break_that_follows_it_which_then_
 
 def test_a_hand_over_names_the_damper_that_the_gun_file_names_for_the_method() -> None:
     hand_overs = [step for step in STEPS if isinstance(step, Prepare)]
-    assert {step.trial.method: step.damper for step in hand_overs} == DAMPERS
+    assert {step.trial.method: dict(step.settings).get("damper", "") for step in hand_overs} == DAMPERS
 
 
 def test_the_question_and_its_answers_are_the_configs_and_name_no_method() -> None:

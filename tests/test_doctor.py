@@ -132,7 +132,7 @@ def recorded(trials: list[tuple[float, float]]) -> list[Record]:
     for number, (paint_ms, key_ms) in enumerate(trials):
         start_s = 10.0 * number
         done: list[tuple[Step, Outcome, float, float]] = [
-            (Prepare(trial=TRIAL, attempt=1, damper=""), Prepared(), start_s, start_s + paint_ms / 1000),
+            (Prepare(trial=TRIAL, attempt=1), Prepared(), start_s, start_s + paint_ms / 1000),
             (
                 FireShot(trial=TRIAL, attempt=1),
                 replace(FIRED, pulse_start_s=start_s + 2),

@@ -123,7 +123,7 @@ def test_a_hand_over_carries_the_text_of_its_sets_instruction() -> None:
 
 def test_a_hand_over_without_an_instruction_is_recorded_as_before_there_were_any() -> None:
     step = prepares(PLAIN)[0]
-    assert set(step_record(step)) == {"trial", "attempt", "damper", "kind"}
+    assert set(step_record(step)) == {"trial", "attempt", "settings", "kind"}
     assert set(step_record(step)["trial"]) == {"session", "set", "trial", "levels"}
 
 

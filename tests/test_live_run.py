@@ -1024,10 +1024,10 @@ def test_a_damper_that_may_have_been_set_is_confirmed_before_anything_fires(tmp_
         first = sitting.position.step
         while sitting.state is not S.SETTING or sitting.position.step == first:
             sitting.go_on()
-        assert sitting.position.step.damper != first.damper
+        assert sitting.position.step.settings != first.settings
         sitting.press("R")
         sitting.type("too short")
-        assert sitting.position.step.damper == first.damper
+        assert sitting.position.step.settings == first.settings
         assert sitting.state is S.SETTING
 
 

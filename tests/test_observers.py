@@ -20,7 +20,7 @@ from experiments.preference.session import make_plan as preference_plan
 from experiments.preference.synthetic import RatingsParticipant, draw_ratings
 from experiments.preference.synthetic import synthetic_participant as preference_participant
 from experiments.screens.synthetic import synthetic_screen
-from experiments.session.steps import on_scale
+from experiments.tasks.questions import on_scale
 
 pytestmark = pytest.mark.slow
 

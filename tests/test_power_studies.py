@@ -42,7 +42,7 @@ from experiments.direction.synthetic import RatesParticipant
 from experiments.load import find, load_setup
 from experiments.preference.config import RatingScale
 from experiments.preference.synthetic import draw_ratings
-from experiments.session.steps import on_scale as one_on_scale
+from experiments.tasks.questions import on_scale as one_on_scale
 from tests.power_chain import homogeneity_p
 
 DIRECTION, PREFERENCE = load_setup("direction").config, load_setup("preference").config

@@ -124,7 +124,7 @@ def test_what_is_no_answer_is_said(keys, answer, problem):
 
 @given(st.floats(-5, 15), st.sampled_from([0.1, 0.25, 0.5, 1.0]))
 def test_a_rating_is_the_nearest_grain_of_its_scale(value, grain):
-    kept = questions.on_grain(question(kind="rating", minimum=0.0, maximum=10.0, grain=grain), value)
+    kept = questions.on_scale(value, question(kind="rating", minimum=0.0, maximum=10.0, grain=grain).scale)
     assert 0 <= kept <= 10
     assert abs(kept - min(max(value, 0), 10)) <= grain / 2 + 1e-9
     assert abs(kept / grain - round(kept / grain)) < 1e-9

@@ -59,8 +59,16 @@ def test_the_journal_says_which_damper_was_asked_for_and_which_was_confirmed(tmp
     desk = sitting("direction", tmp_path)
     desk.carry_out()
     records = raw(desk.where.journal)
-    asked = [one["body"]["damper"] for one in records if one.get("body", {}).get("kind") == "prepare"]
-    confirmed = [one["body"].get("damper", "") for one in records if one.get("body", {}).get("kind") == "prepared"]
+    asked = [
+        dict(one["body"].get("settings", [])).get("damper", "")
+        for one in records
+        if one.get("body", {}).get("kind") == "prepare"
+    ]
+    confirmed = [
+        dict(one["body"].get("settings", [])).get("damper", "")
+        for one in records
+        if one.get("body", {}).get("kind") == "prepared"
+    ]
     methods = [trial.method for trial in desk.plan.trials]
     dampers = {"vibration": "", "asymmetric-1": "off", "asymmetric-2": "on"}
     assert asked == confirmed == [dampers[method] for method in methods]

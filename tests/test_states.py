@@ -38,12 +38,12 @@ ENDS = (events.EmergencyStop, events.Stop, events.DisplayLost, events.ResultsGon
 """What may end a run from wherever it is."""
 CARRY_ON = (
     *(events.DamperSet, events.Fire, events.Answer, events.Next, events.Rating, events.Description, events.EndBreak),
-    *(events.Finish, events.Rearm, events.Repeat, events.BreakOver, *events.OWN_HAND_EVENTS),
+    *(events.Told, events.Finish, events.Rearm, events.Repeat, events.BreakOver, *events.OWN_HAND_EVENTS),
 )
 """What takes a run to its next step."""
 OWN = {S.ASKING: events.ParticipantKey, S.RATING: events.ParticipantRated, S.DESCRIBING: events.ParticipantDescribed}
 """What the participant says by their own hand, and when."""
-STEPS = (S.REARMING, S.SETTING, S.PREPARING, S.ASKING, S.RATING, S.DESCRIBING, S.RESTING, S.CLOSING)
+STEPS = (S.REARMING, S.SETTING, S.PREPARING, S.ASKING, S.RATING, S.DESCRIBING, S.INFORMING, S.RESTING, S.CLOSING)
 """The states that a run enters by itself, apart from those in which it fires."""
 
 
@@ -231,6 +231,7 @@ def test_each_state_takes_what_is_asked_for_there_and_nothing_else_of_the_kind()
         (events.ParticipantRated, S.RATING),
         (events.Description, S.DESCRIBING),
         (events.ParticipantDescribed, S.DESCRIBING),
+        (events.Told, S.INFORMING),
         (events.EndBreak, S.RESTING),
         (events.BreakOver, S.RESTING),
         (events.Finish, S.CLOSING),

@@ -52,7 +52,7 @@ def test_what_a_hand_sets_is_told_to_the_model_and_to_the_experimenter(gun):
     )
     plan = plan_of(config, "P01", 1)
     found = {
-        stimuli.settings(config, trial): stimuli.intervals(config, gun, trial)[0].parameters.friction_N
+        stimuli.settings(config, gun, trial.levels): stimuli.intervals(config, gun, trial)[0].parameters.friction_N
         for trial in plan.trials
     }
     assert found == {(("damper", "off"),): 0.21, (("damper", "strips on"),): 1.12}

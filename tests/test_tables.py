@@ -58,7 +58,7 @@ def test_any_text_is_read_back_and_never_starts_like_a_formula(text: str) -> Non
 @given(st.lists(st.tuples(anything | awkward, anything | awkward), max_size=5))
 def test_any_comment_and_note_survive_the_table(texts: list[tuple[str, str]]) -> None:
     rows = [{"participant_id": "P01", "comment": comment, "note": note} for comment, note in texts]
-    cells = read(table_bytes("preference", rows))
+    cells = read(table_bytes(tables.TABLES["preference"], rows))
     assert [(unguard(row["comment"]), unguard(row["note"])) for row in cells] == texts
     assert not any(cell.startswith(FORMULA_STARTS) for row in cells for cell in row.values())
 
@@ -66,19 +66,19 @@ def test_any_comment_and_note_survive_the_table(texts: list[tuple[str, str]]) ->
 @settings(deadline=None)
 @given(st.floats(allow_nan=False, allow_infinity=False), st.integers())
 def test_numbers_are_written_as_they_are_negative_ones_too(number: float, count: int) -> None:
-    [row] = read(table_bytes("preference", [{"rating": number, "shots": count}]))
+    [row] = read(table_bytes(tables.TABLES["preference"], [{"rating": number, "shots": count}]))
     assert float(row["rating"]) == number
     assert row["shots"] == str(count)
 
 
 def test_a_negative_number_gets_no_apostrophe() -> None:
-    [row] = read(table_bytes("direction", [{"response_time_s": -0.25, "trial": -1}]))
+    [row] = read(table_bytes(tables.TABLES["direction"], [{"response_time_s": -0.25, "trial": -1}]))
     assert (row["response_time_s"], row["trial"]) == ("-0.25", "-1")
 
 
 def test_text_is_guarded_in_every_text_column_and_in_no_other() -> None:
     for experiment, table in tables.TABLES.items():
-        [row] = read(table_bytes(experiment, [{column.name: "=1" for column in table}]))
+        [row] = read(table_bytes(tables.TABLES[experiment], [{column.name: "=1" for column in table}]))
         assert {name for name, cell in row.items() if cell == "'=1"} == {c.name for c in table if c.type == "text"}
         assert {name for name, cell in row.items() if cell == "=1"} == {c.name for c in table if c.type != "text"}
 
@@ -88,25 +88,25 @@ def test_text_is_guarded_in_every_text_column_and_in_no_other() -> None:
 
 @pytest.mark.parametrize("experiment", ["direction", "preference"])
 def test_lines_end_with_cr_lf_and_the_first_one_names_the_columns(experiment: str) -> None:
-    data = table_bytes(experiment, [{}, {}])
+    data = table_bytes(tables.TABLES[experiment], [{}, {}])
     assert data.endswith(b"\r\n")
     assert data.count(b"\r\n") == data.count(b"\n") == 3
     assert data.split(b"\r\n")[0].decode() == ",".join(tables.names(experiment))
 
 
 def test_quotes_are_doubled_and_line_ends_stay_within_quotes() -> None:
-    data = table_bytes("preference", [{"comment": 'so "soft",\nnice'}])
+    data = table_bytes(tables.TABLES["preference"], [{"comment": 'so "soft",\nnice'}])
     assert b'"so ""soft"",\nnice"' in data
 
 
 def test_text_is_utf_8_without_a_byte_order_mark() -> None:
-    data = table_bytes("preference", [{"comment": "weich – schön"}])
+    data = table_bytes(tables.TABLES["preference"], [{"comment": "weich – schön"}])
     assert "weich – schön".encode() in data
     assert data.startswith(b"participant_id")
 
 
 def test_missing_is_empty_and_0_stays_0() -> None:
-    [row] = read(table_bytes("preference", [{"rating": None, "shots": 0, "exposure_s": 0.0}]))
+    [row] = read(table_bytes(tables.TABLES["preference"], [{"rating": None, "shots": 0, "exposure_s": 0.0}]))
     assert (row["rating"], row["shots"], row["exposure_s"], row["comment"]) == ("", "0", "0.0", "")
 
 
@@ -139,7 +139,7 @@ def told(place: int, *outcomes: tuple[str, Outcome]) -> list[tuple[Step, Outcome
     """What happened to the trial at a place of the plan of experiment 1."""
     trial = DIRECTION.trials[place]
     steps = {
-        "prepare": Prepare(trial=trial, attempt=1, damper=""),
+        "prepare": Prepare(trial=trial, attempt=1),
         "fire": FireShot(trial=trial, attempt=1),
         "ask": ask(trial),
     }
@@ -151,7 +151,7 @@ def answer(response: str) -> Answered:
 
 
 def written(history: list[tuple[Step, Outcome]]) -> list[dict[str, str]]:
-    return read(table_bytes("direction", direction_rows(DIRECTION, history)))
+    return read(table_bytes(tables.TABLES["direction"], direction_rows(DIRECTION, history)))
 
 
 def test_trials_that_were_not_reached_have_a_row_with_the_plan_and_no_more() -> None:
@@ -218,7 +218,7 @@ def test_a_rating_of_0_is_written_and_none_leaves_the_cell_empty(rating: float |
         (describe(trial), Answered(value="-soft", by="experimenter")),
     ]
     rows: list[Row] = preference_rows(PREFERENCE, history)
-    first, row, last = read(table_bytes("preference", rows))
+    first, row, last = read(table_bytes(tables.TABLES["preference"], rows))
     assert (row["rating"], row["rating_by"], row["comment"]) == (cell, "participant", "'-soft")
     assert (row["shots"], row["exposure_s"], row["attempts"]) == ("12", "11.5", "1")
     planned = ("participant_id", "experiment", "trial", "method")

@@ -50,9 +50,9 @@ def test_it_fits_its_gun_and_its_people_answer_every_question(name):
         for trial in plan.trials:
             assert len(stimuli.intervals(design, gun, trial)) == design.trial.intervals
             for asked, question in design.questions.items():
-                given = person.answer(asked, trial)
+                given = person.answer(trial, asked)
                 assert answer_problem(question, given.value) == ""
-                assert given == person.answer(asked, trial)
+                assert given == person.answer(trial, asked)
                 assert given.response_time_s > 0
 
 
@@ -60,7 +60,7 @@ def means(name, question, key, count=60):
     found = defaultdict(list)
     for design, plan, person in people(name, count):
         for trial in plan.trials:
-            value = person.answer(question, trial).value
+            value = person.answer(trial, question).value
             right = is_right(design, design.questions[question], trial, value)
             found[key(trial)].append(value if right is None else right)
     return {level: statistics.fmean(values) for level, values in found.items()}
@@ -87,7 +87,7 @@ def test_who_is_worth_more_is_chosen_more_often():
     chosen = defaultdict(int)
     for _, plan, person in people("pairs", 60):
         for trial in plan.trials:
-            chosen[trial.intervals[("first", "second").index(person.answer("rather", trial).value)]] += 1
+            chosen[trial.intervals[("first", "second").index(person.answer(trial, "rather").value)]] += 1
     assert sorted(chosen, key=chosen.get) == ["vibration", "soft", "short", "paper", "strong"]
 
 
@@ -97,7 +97,7 @@ def test_a_group_keeps_its_level():
 
 def answered_by(design, laws, plan):
     person = DesignParticipant(design, checked_table(SyntheticAnswers, {"questions": laws}, "laws.toml"), plan)
-    return [person.answer(next(iter(design.questions)), trial) for trial in plan.trials]
+    return [person.answer(trial, next(iter(design.questions))) for trial in plan.trials]
 
 
 @pytest.mark.parametrize(

@@ -165,7 +165,7 @@ def _experiment(setup: Setup[Any], seed: int | None, codes: Sequence[str]) -> Ex
 def _breaks(config: Any) -> str:
     if not isinstance(config, DirectionConfig):
         return "none"
-    sessions, sets = len(config.design.methods), config.design.sets_per_session
+    sessions, sets = len(config.methods), config.design.sets_per_session
     between = config.breaks
     return f"{sessions * (sets - 1)} x {between.between_sets_s:g} s + {sessions - 1} x {between.between_sessions_s:g} s"
 
@@ -185,12 +185,12 @@ def _felt(setup: Setup[Any]) -> dict[str, dict[str, float]]:
     config = setup.config
     if config.synthetic.observer != "felt":
         return {}
-    row = next_row(config.design.order, len(config.design.methods), [])
+    row = next_row(config.design.order, len(config.methods), [])
     synthetic_participant_of(setup, catalogue.experiment(setup).make_plan(config, "P01", EXAMPLE_SEED, row))
     if not isinstance(config, DirectionConfig):
         return {}
     mind = model_parameters(config)
-    percepts = percepts_of(setup.gun.renderings(config.design.methods), mind.percept.leak_s)
+    percepts = percepts_of(setup.gun.renderings(config.methods), mind.percept.leak_s)
     told = config.design.instructions or (NEUTRAL,)
     return {
         method: {name: rate for name, rate in rates_by_instruction(mind, percept).items() if name in told}
@@ -202,7 +202,7 @@ def _orders(setup: Setup[Any], seed: int, codes: Sequence[str]) -> dict[str, tup
     """Each participant's order of methods, as runs in this order would get it."""
     config, used, found = setup.config, list[int](), dict[str, tuple[str, ...]]()
     for code in codes:
-        row = next_row(config.design.order, len(config.design.methods), used)
+        row = next_row(config.design.order, len(config.methods), used)
         used += [] if row is None else [row]
         found[code] = tuple(catalogue.experiment(setup).make_plan(config, code, seed, row).methods)
     return found

@@ -68,7 +68,7 @@ def preference_scores(
     `effect` is a factor on the distances of the methods' means from their common mean, and, below 1, on the share of
     people who keep the lowest method below all others.
     """
-    law, scale, methods = config.synthetic.ratings, config.rating, config.design.methods
+    law, scale, methods = config.synthetic.ratings, config.rating, config.methods
     person = law.person_sd * draws.standard_normal((studies, n, 1))
     noise = law.noise_sd * draws.standard_normal((studies, n, len(methods)))
     ratings = ratings_on_scale(scaled_means(law, methods, effect) + person + noise, scale)
@@ -92,7 +92,7 @@ def scaled_means(law: Ratings, methods: tuple[str, ...], effect: float) -> Float
 
 
 def ratings_on_scale(values: FloatArray, scale: RatingScale) -> FloatArray:
-    """`experiments.session.steps.on_scale` of many values."""
+    """`experiments.tasks.questions.on_scale` of many values."""
     steps = np.rint((np.clip(values, scale.minimum, scale.maximum) - scale.minimum) / scale.grain)
     decimals = max(0, -int(np.floor(np.log10(scale.grain)))) + 2
     return np.round(scale.minimum + steps * scale.grain, decimals)
@@ -116,7 +116,7 @@ class Felt:
 def percepts_of_setup(setup: Setup[DirectionConfig]) -> dict[str, Percept]:
     """What the gun's shots give to feel, by method."""
     config = setup.config
-    return percepts_of(setup.gun.renderings(config.design.methods), model_parameters(config).percept.leak_s)
+    return percepts_of(setup.gun.renderings(config.methods), model_parameters(config).percept.leak_s)
 
 
 def felt_people(
@@ -250,7 +250,7 @@ def pattern_odds(
     config: DirectionConfig | PreferenceConfig, published: PublishedExperiment, replications: int, seed: int
 ) -> PatternOdds:
     """How often the published claims recur among people of a config, in a study of the paper's size."""
-    draws, n, methods = generator(seed, "odds", config.experiment), published.n, config.design.methods
+    draws, n, methods = generator(seed, "odds", config.experiment), published.n, config.methods
     if isinstance(config, DirectionConfig):
         answers: Counts | FloatArray = direction_counts(config, n, replications, draws)
         trials = config.design.forward_per_session, config.design.backward_per_session

@@ -264,6 +264,15 @@ class ExperimentConfig(Model):
         """Planned time of what is asked of a trial after all were felt."""
         return 0.0
 
+    @property
+    def hand_over_s(self) -> float:
+        """Planned time of a hand-over."""
+        return 0.0
+
+    def asking_s(self, kind: str) -> float:  # noqa: ARG002 - there is none unless an experiment has it
+        """Planned time of a question by the kind of its step, `rate` or `describe`."""
+        return 0.0
+
     @model_validator(mode="after")
     def _assumed_exists(self) -> Self:
         unknown = sorted(set(self.assumed) - set(leaves(self)))

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import hashlib
 import json
-from collections.abc import Iterable
 from dataclasses import Field as DataclassField
 from dataclasses import dataclass, field, fields, replace
 from pathlib import Path
@@ -14,7 +13,7 @@ from pydantic import Field, PrivateAttr, model_validator
 
 from device.methods import Method
 from device.parameters import GunParameters, VibrationParameters, damper_friction
-from experiments.config.door import ExperimentConfig, Model, Text
+from experiments.config.door import Model, Text
 
 Numbers = dict[str, object]
 """A table for one of the device's parameter types, which say what may stand in it."""
@@ -169,30 +168,21 @@ def sha256(value: object) -> str:
     return hashlib.sha256(canonical_json(value)).hexdigest()
 
 
-_BLANKS: dict[str, object] = {"instruction": "", "intervals": (), "odd": None, "catch": False, "later": False}
-"""What most trials and steps do not have, by the name of its field."""
-
-
-def without_blanks(pairs: Iterable[tuple[str, object]]) -> dict[str, object]:
-    """A `dict_factory` for trials and steps: of an instruction, intervals or a catch that is not there no key is kept.
-
-    >>> without_blanks([("set", 1), ("instruction", ""), ("odd", 0)])
-    {'set': 1, 'odd': 0}
-    """
-    return {key: value for key, value in pairs if key not in _BLANKS or value != _BLANKS[key]}
-
-
-Config_co = TypeVar("Config_co", bound=ExperimentConfig, covariant=True)
+Config_co = TypeVar("Config_co", bound=Model, covariant=True)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Setup(Generic[Config_co]):
-    """An experiment's config, its gun and the answers of its table, if a table answers. `source` is its file."""
+    """An experiment's config, its gun and the answers of its table, if a table answers. `source` is its file.
+
+    `laws`: how synthetic people answer a design; no part of the record, as only simulation needs them.
+    """
 
     config: Config_co
     gun: GunConfig
     source: Path
     answers: tuple[dict[str, str], ...] = field(default=())
+    laws: Model | None = None
 
     def record(self) -> dict[str, object]:
         """All of it as plain JSON values."""

@@ -57,6 +57,36 @@ class DesignConfig(Model):
     console: ConsoleConfig = ConsoleConfig()
 
     @property
+    def experiment(self) -> str:
+        """The design's name, as journals and tables have it."""
+        return self.design
+
+    @property
+    def methods(self) -> tuple[str, ...]:
+        """The rendering methods that are met."""
+        return tuple(str(level) for level in self.factors[METHOD_FACTOR].all_levels)
+
+    @property
+    def hand_over_s(self) -> float:
+        """Planned time of a hand-over."""
+        return self.timing.hand_over_s
+
+    def asking_s(self, kind: str) -> float:  # noqa: ARG002 - all take the same
+        """Planned time of a question."""
+        return self.timing.answer_s
+
+    @property
+    def trial_s(self) -> float:
+        """Planned time of a trial, without what is asked after its block."""
+        asked = any(question.when == "trial" for question in self.questions.values())
+        return self.timing.hand_over_s + self.timing.stimulus_s + (self.timing.answer_s if asked else 0.0)
+
+    @property
+    def rating_s(self) -> float:
+        """Planned time of what is asked about a trial after its block."""
+        return self.timing.answer_s * sum(question.when == "block" for question in self.questions.values())
+
+    @property
     def between(self) -> tuple[str, ...]:
         """The factors that vary between participants."""
         return tuple(name for name, factor in self.factors.items() if factor.between)

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import unicodedata
 from collections.abc import Iterator, Mapping
-from typing import Annotated, Literal, Self
+from typing import Annotated, Literal, NamedTuple, Self
 
 from pydantic import AfterValidator, Field, model_validator
 
@@ -210,6 +210,18 @@ QuestionKind = Literal["choice", "yes-no", "rating", "number", "ranking", "text"
 YES, NO = "yes", "no"
 
 
+LARGEST_NUMBER = 1e9
+"""No number that is asked for is larger."""
+
+
+class NumberScale(NamedTuple):
+    """The ends of a scale, and the distance of two of its numbers; 0 where any number will do."""
+
+    minimum: float
+    maximum: float
+    grain: float
+
+
 class QuestionConfig(Model):
     """What is asked. `correct`: the factor whose level is right, or `interval`, `larger` or `stimulus`."""
 
@@ -237,6 +249,13 @@ class QuestionConfig(Model):
         for problem in _question_problems(self):
             raise ValueError(problem)
         return self
+
+    @property
+    def scale(self) -> NumberScale:
+        """What numbers may be answered, and how fine they are kept."""
+        low = -LARGEST_NUMBER if self.minimum is None else self.minimum
+        high = LARGEST_NUMBER if self.maximum is None else self.maximum
+        return NumberScale(minimum=low, maximum=high, grain=self.grain or 0.0)
 
     def label(self, answer: str) -> str:
         """What an answer is called to the participant."""

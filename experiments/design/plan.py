@@ -2,15 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import asdict, dataclass
 
 from pydantic import TypeAdapter
 
 from device.words import Direction
 from experiments.config.door import ConfigError, Order
-from experiments.config.setup import sha256, without_blanks
-from experiments.design.language import DIRECTION_FACTOR, INSTRUCTION_FACTOR, METHOD_FACTOR, Level
+from experiments.config.setup import sha256
+from experiments.design.language import DIRECTION_FACTOR, EMPTY, INSTRUCTION_FACTOR, METHOD_FACTOR, Level
 from experiments.design.streams import Stream
 
 
@@ -75,11 +75,35 @@ def condition(**levels: Level) -> Condition:
     return tuple((name, level) for name, level in levels.items() if level != "")
 
 
+_BLANKS: dict[str, object] = {
+    "practice": False,
+    "instruction": "",
+    "compare": "",
+    "intervals": (),
+    "odd": None,
+    "catch": False,
+    "settings": (),
+    "interval": 0,
+    "gap_s": 0.0,
+    "later": False,
+}
+"""What most trials and steps do not have, by the name of its field."""
+
+
+def without_blanks(pairs: Iterable[tuple[str, object]]) -> dict[str, object]:
+    """A `dict_factory` for trials and steps: of an instruction, intervals or a catch that is not there no key is kept.
+
+    >>> without_blanks([("set", 1), ("instruction", ""), ("odd", 0)])
+    {'set': 1, 'odd': 0}
+    """
+    return {key: value for key, value in pairs if key not in _BLANKS or value != _BLANKS[key]}
+
+
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Trial:
     """One planned trial. `session`, `set` and `trial` count from 1; `trial` runs through the session.
 
-    `intervals` are the levels of the compared factor, in the order in which they are felt, and `odd` the place among
+    `intervals` are the levels of the factor `compare`, in the order in which they are felt, and `odd` the place among
     them (from 0) of the comparison: in ABX of the one that X repeats. A `catch` trial has no stimulus.
     """
 
@@ -87,6 +111,7 @@ class Trial:
     set: int
     trial: int
     levels: Condition
+    compare: str = ""
     intervals: tuple[Level, ...] = ()
     odd: int | None = None
     catch: bool = False
@@ -100,10 +125,25 @@ class Trial:
         """The rendering method; empty where the methods are what is compared."""
         return str(self.level(METHOD_FACTOR) or "")
 
+    def levels_at(self, interval: int) -> Condition | None:
+        """The levels of an interval, counted from 0; `None` if nothing is felt in it."""
+        if self.catch:
+            return None
+        if not self.intervals:
+            return self.levels
+        level = self.intervals[interval]
+        if level == EMPTY:
+            return None
+        return (*(pair for pair in self.levels if pair[0] != self.compare), (self.compare, level))
+
+    def direction_at(self, interval: int) -> Direction:
+        """Which way the gun points in an interval: forward, where the design does not say."""
+        return "backward" if (DIRECTION_FACTOR, "backward") in (self.levels_at(interval) or self.levels) else "forward"
+
     @property
     def direction(self) -> Direction:
-        """Which way the gun points: forward, where the design does not say."""
-        return "backward" if self.level(DIRECTION_FACTOR) == "backward" else "forward"
+        """Which way the gun points first."""
+        return self.direction_at(0)
 
     @property
     def instruction(self) -> str:
@@ -125,6 +165,7 @@ class Plan:
     order_row: int | None
     trials: tuple[Trial, ...]
     group: int = 0
+    practice: bool = False
     format: int = PLAN_FORMAT
 
     @property

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import combinations
 
 from experiments.config.door import ConfigError, Order
@@ -31,8 +31,7 @@ def cells(design: DesignConfig, names: Sequence[str], given: Condition = ()) -> 
             for cell in found
             for level in factor.levels_within(dict((*given, *cell)).get(factor.within or ""))
         ]
-    order = {name: place for place, name in enumerate(design.factors)}
-    return [tuple(sorted(cell, key=lambda pair: order[pair[0]])) for cell in found]
+    return [_in_order(design, cell) for cell in found]
 
 
 def _outer_first(design: DesignConfig, names: Sequence[str]) -> list[str]:
@@ -90,6 +89,74 @@ def plan_of(design: DesignConfig, participant_id: str, seed: int, *, row: int | 
     )
 
 
+def practice_of(design: DesignConfig, participant_id: str, seed: int, *, group: int = 0) -> Plan | None:
+    """The plan of a practice: some trials of each cell of `practice.of`, mixed, in one set; `None` if there are none.
+
+    The levels of the other factors are drawn.
+    """
+    practice, given = design.practice, _chosen("group", groups(design), group)
+    streams = _Streams(seed, (design.design, participant_id, "practice"))
+    alike: dict[Condition, list[_Content]] = {}
+    for content in _everything(design, given, streams):
+        cell = tuple(pair for pair in content.levels if pair[0] in practice.of)
+        alike.setdefault(cell, []).append(content)
+    drawn = [
+        one
+        for at, cell in enumerate(alike)
+        for one in _some(alike[cell], practice.repetitions, streams.of("practice-cell", str(at)))
+    ]
+    trials = [
+        _trial(design, (1, 1, place), content.levels, content)
+        for place, content in enumerate(streams.of("practice").shuffled(drawn), start=1)
+    ]
+    if not trials:
+        return None
+    return Plan(
+        experiment=design.design,
+        participant_id=participant_id,
+        seed=seed,
+        order_row=None,
+        group=group,
+        trials=tuple(trials),
+        practice=True,
+    )
+
+
+def _some(contents: Sequence[_Content], count: int, stream: Stream) -> list[_Content]:
+    """So many of the contents, each as often as the others."""
+    times = -(-count // len(contents))
+    return stream.shuffled(list(contents) * times)[:count]
+
+
+def _everything(design: DesignConfig, given: Condition, streams: _Streams) -> Iterator[_Content]:
+    """Every trial that a participant may meet but catch trials, with all its levels."""
+    for blocked in cells(design, (*design.order.session, *design.order.set), given):
+        held = (*given, *blocked)
+        for content in _contents(design, held, streams):
+            if not content.catch:
+                yield replace(content, levels=_in_order(design, (*held, *content.levels)))
+
+
+def _in_order(design: DesignConfig, levels: Condition) -> Condition:
+    """Levels in the order of the file."""
+    order = {name: at for at, name in enumerate(design.factors)}
+    return tuple(sorted(levels, key=lambda pair: order[pair[0]]))
+
+
+def _trial(design: DesignConfig, place: tuple[int, int, int], levels: Condition, content: _Content) -> Trial:
+    session, part, trial = place
+    return Trial(
+        session=session,
+        set=part,
+        trial=trial,
+        levels=levels,
+        compare=(design.trial.compare or "") if content.intervals else "",
+        intervals=content.intervals,
+        odd=content.odd,
+        catch=content.catch,
+    )
+
+
 def _chosen(what: str, among: Sequence[Condition], place: int) -> Condition:
     if place not in range(len(among)):
         raise ConfigError(f"{what} = {place!r}: there are {len(among)}, counted from 0")
@@ -140,20 +207,11 @@ def _session(
     else:
         parts = _by_square(design, contents, row, sets)
     place = 0
-    order = {name: at for at, name in enumerate(design.factors)}
     for at, part in enumerate(parts):
         for content in part:
             place += 1
-            levels = sorted((*given, *set_levels[at], *content.levels), key=lambda pair: order[pair[0]])
-            yield Trial(
-                session=number,
-                set=at + 1,
-                trial=place,
-                levels=tuple(levels),
-                intervals=content.intervals,
-                odd=content.odd,
-                catch=content.catch,
-            )
+            levels = _in_order(design, (*given, *set_levels[at], *content.levels))
+            yield _trial(design, (number, at + 1, place), levels, content)
 
 
 def _set_levels(design: DesignConfig, given: Condition, streams: _Streams) -> list[Condition]:

@@ -6,13 +6,14 @@ lab's own, is set by the experimenter's hand and confirmed; the model is told wh
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, fields, replace
 from typing import cast
 
+from device.limits import Load
 from device.methods import Method, drive_of, rendering_of
 from device.parameters import GunParameters, VibrationParameters
-from device.words import Direction, Drive, LimitError
+from device.words import Direction, Drive, LimitError, Shot
 from experiments.config.door import ConfigError
 from experiments.config.setup import GunConfig
 from experiments.design.config import DesignConfig
@@ -25,7 +26,7 @@ from experiments.design.language import (
     Level,
     shown_level,
 )
-from experiments.design.plan import Condition, Trial
+from experiments.design.plan import Condition, Plan, Trial
 from experiments.design.planning import cells, groups
 
 DRIVEN = ("voltage_V", "pulse_s")
@@ -52,8 +53,15 @@ class ConditionLimits:
 
     levels: Condition
     drive: Drive
+    load: Load
     status: str
     settle_s: float
+
+
+def damper(gun: GunConfig, method: str) -> tuple[tuple[str, str], ...]:
+    """How the gun's damper is set by hand for a method; nothing if it has none."""
+    wanted = gun.methods[method].damper
+    return (("damper", wanted),) if wanted else ()
 
 
 def by_hand(design: DesignConfig) -> tuple[str, ...]:
@@ -61,23 +69,73 @@ def by_hand(design: DesignConfig) -> tuple[str, ...]:
     return tuple(name for name in design.factors if name not in (*_NOT_OF_A_SHOT, *DRIVEN))
 
 
-def settings(design: DesignConfig, trial: Trial) -> tuple[tuple[str, str], ...]:
-    """What is set by hand for a trial, as the experimenter reads it."""
+def settings(design: DesignConfig, gun: GunConfig, levels: Condition) -> tuple[tuple[str, str], ...]:
+    """What is set by hand for a cell, as the experimenter reads it: the method's damper, unless a factor says how."""
     names = by_hand(design)
-    return tuple((name, design.factors[name].label(level)) for name, level in trial.levels if name in names)
+    held = dict(damper(gun, str(dict(levels)[METHOD_FACTOR])))
+    return tuple((held | {name: design.factors[name].label(level) for name, level in levels if name in names}).items())
 
 
 def intervals(design: DesignConfig, gun: GunConfig, trial: Trial) -> tuple[IntervalStimulus | None, ...]:
     """The stimulus of each interval; `None` for one that is empty. `ConfigError` as `stimulus`."""
-    if trial.catch:
-        return (None,)
-    if not trial.intervals:
-        return (stimulus(design, gun, trial.levels),)
-    compared = design.trial.compare or ""
-    return tuple(
-        None if level == EMPTY else stimulus(design, gun, _with(trial.levels, compared, level))
-        for level in trial.intervals
-    )
+    held = [trial.levels_at(place) for place in range(max(1, len(trial.intervals)))]
+    return tuple(None if levels is None else stimulus(design, gun, levels) for levels in held)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Stimuli:
+    """All that a run can fire: what the gun is opened with, and the shot of an interval, `None` where nothing is felt.
+
+    A rendering that a hand changes the gun for has a name of its own, which a line to a gun can carry.
+    """
+
+    methods: Mapping[str, Method]
+    shot: Callable[[Trial, int], Shot | None]
+
+    def shots(self, plan: Plan) -> dict[tuple[Trial, int], Shot | None]:
+        """The shot of every interval of every trial, the intervals counted from 0."""
+        places = ((trial, place) for trial in plan.trials for place in range(max(1, len(trial.intervals))))
+        return {(trial, place): self.shot(trial, place) for trial, place in places}
+
+
+def stimuli_of_methods(gun: GunConfig, methods: tuple[str, ...]) -> Stimuli:
+    """Every method as the gun has it, and nothing else."""
+    renderings = gun.renderings(methods)
+
+    def shot(trial: Trial, interval: int) -> Shot:
+        method = renderings[trial.method]
+        return Shot(method=trial.method, direction=trial.direction_at(interval), drive=drive_of(method))
+
+    return Stimuli(methods=renderings, shot=shot)
+
+
+def stimuli_of(design: DesignConfig, gun: GunConfig) -> Stimuli:
+    """The stimuli of a design. `ConfigError` as `limits`."""
+    names: dict[Method, str] = {}
+    for levels in dict.fromkeys(_shot_cells(design)):
+        found = stimulus(design, gun, levels)
+        names.setdefault(_undriven(found, gun), _name(found, gun, len(names)))
+
+    def shot(trial: Trial, interval: int) -> Shot | None:
+        levels = trial.levels_at(interval)
+        if levels is None:
+            return None
+        found = stimulus(design, gun, levels)
+        return Shot(method=names[_undriven(found, gun)], direction=found.direction, drive=found.drive)
+
+    return Stimuli(methods={name: method for method, name in names.items()}, shot=shot)
+
+
+def _undriven(found: IntervalStimulus, gun: GunConfig) -> Method:
+    """What a stimulus takes the gun to be, apart from how its method is driven."""
+    own = gun.rendering(found.method)
+    if isinstance(found.parameters, VibrationParameters) or isinstance(own, VibrationParameters):
+        return found.parameters
+    return replace(found.parameters, voltage_V=own.voltage_V, pulse_s=own.pulse_s)
+
+
+def _name(found: IntervalStimulus, gun: GunConfig, number: int) -> str:
+    return found.method if _undriven(found, gun) == gun.rendering(found.method) else f"{found.method[:20]}-{number}"
 
 
 def _with(levels: Condition, name: str, level: Level) -> Condition:
@@ -94,7 +152,7 @@ def stimulus(design: DesignConfig, gun: GunConfig, levels: Condition) -> Interva
     try:
         drive = drive_of(parameters)
     except LimitError as error:
-        raise ConfigError(f"{_place(levels)}: {error}") from error
+        raise ConfigError(f"{shown_cell(levels)}: {error}") from error
     return IntervalStimulus(
         method=method,
         direction=cast("Direction", held.get(DIRECTION_FACTOR, "forward")),
@@ -178,14 +236,17 @@ def _limits_of(design: DesignConfig, gun: GunConfig, levels: Condition) -> Condi
     try:
         rendering = rendering_of(shot.parameters)
     except LimitError as error:
-        raise ConfigError(f"{_place(levels)}: {error}") from error
+        raise ConfigError(f"{shown_cell(levels)}: {error}") from error
     if rendering.motion == "no-break-away" and not design.below_break_away:
         raise ConfigError(
-            f"{_place(levels)}: no shot of it ever moves the magnet, by the model; raise the voltage or the pulse, or "
-            "say `below_break_away = true` if that is what you study"
+            f"{shown_cell(levels)}: no shot of it ever moves the magnet, by the model; raise the voltage or the pulse, "
+            "or say `below_break_away = true` if that is what you study"
         )
-    return ConditionLimits(levels=levels, drive=shot.drive, status=rendering.motion, settle_s=rendering.settle_s)
+    return ConditionLimits(
+        levels=levels, drive=shot.drive, load=rendering.load, status=rendering.motion, settle_s=rendering.settle_s
+    )
 
 
-def _place(levels: Condition) -> str:
+def shown_cell(levels: Condition) -> str:
+    """A cell in words, as messages name it."""
     return ", ".join(f"{name} = {shown_level(level)}" for name, level in levels)

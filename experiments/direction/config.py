@@ -183,6 +183,16 @@ class DirectionConfig(ExperimentConfig):
         return between_sets_s + (sessions - 1) * self.breaks.between_sessions_s
 
     @property
+    def methods(self) -> tuple[str, ...]:
+        """The rendering methods that are met."""
+        return self.design.methods
+
+    @property
+    def hand_over_s(self) -> float:
+        """Planned time of a hand-over."""
+        return self.timing.hand_over_s
+
+    @property
     def trial_s(self) -> float:
         """Planned time of a trial, from its hand-over to its answer."""
         return self.timing.trial_s

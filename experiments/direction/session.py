@@ -3,14 +3,16 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from functools import partial
+from dataclasses import dataclass
 from itertools import pairwise
 
 from device.words import Direction
 from experiments.config.setup import Setup
 from experiments.design.plan import Plan, Trial, condition, method_order
+from experiments.design.stimuli import damper
 from experiments.design.streams import Stream
 from experiments.direction.config import Breaks, Design, DirectionConfig
+from experiments.record.design_table import ANTICIPATION_S
 from experiments.record.tables import Row, presentation
 from experiments.session.history import History, TrialHistory, by_trial
 from experiments.session.steps import Answered, Ask, Fired, FireShot, Prepare, Presenter, Rest, Session, Step
@@ -57,7 +59,12 @@ def make_practice(config: DirectionConfig, participant_id: str, seed: int) -> Pl
     if not trials:
         return None
     return Plan(
-        experiment=config.experiment, participant_id=participant_id, seed=seed, order_row=None, trials=tuple(trials)
+        experiment=config.experiment,
+        participant_id=participant_id,
+        seed=seed,
+        order_row=None,
+        trials=tuple(trials),
+        practice=True,
     )
 
 
@@ -105,8 +112,13 @@ def _ways(forward: int, backward: int) -> list[Direction]:
 
 def session(plan: Plan, setup: Setup[DirectionConfig]) -> Session:
     """The steps of a run, from the first hand-over to its end."""
-    texts = {name: setup.config.instruction_text(name) for name in ("", *setup.config.design.instructions)}
-    presenter = Presenter(partial(_steps, setup, texts))
+    script = _Script(
+        dampers={name: damper(setup.gun, name) for name in setup.config.methods},
+        texts={name: setup.config.instruction_text(name) for name in ("", *setup.config.design.instructions)},
+        question=setup.config.question.text,
+        choices=ways(setup),
+    )
+    presenter = Presenter(script.steps)
     yield from presenter.present(plan.trials[0])
     for before, trial in pairwise(plan.trials):
         yield from _rest(presenter, before, trial, setup.config.breaks)
@@ -121,33 +133,33 @@ def _rest(presenter: Presenter, before: Trial, trial: Trial, breaks: Breaks) -> 
         yield from presenter.until_done(Rest(between="sets", duration_s=breaks.between_sets_s))
 
 
-def _steps(setup: Setup[DirectionConfig], texts: Mapping[str, str], trial: Trial, attempt: int) -> tuple[Step, ...]:
-    question = setup.config.question
-    return (
-        Prepare(
-            trial=trial,
-            attempt=attempt,
-            damper=setup.gun.methods[trial.method].damper,
-            instruction=texts[trial.instruction],
-        ),
-        FireShot(trial=trial, attempt=attempt),
-        Ask(trial=trial, question=QUESTION, text=question.text, choices=choices(setup)),
-    )
+@dataclass(frozen=True, slots=True, kw_only=True)
+class _Script:
+    """What a presentation is made of: how hands set each method, what is told, what is asked."""
+
+    dampers: Mapping[str, tuple[tuple[str, str], ...]]
+    texts: Mapping[str, str]
+    question: str
+    choices: tuple[Choice, ...]
+
+    def steps(self, trial: Trial, attempt: int) -> tuple[Step, ...]:
+        told = self.texts[trial.instruction]
+        return (
+            Prepare(trial=trial, attempt=attempt, settings=self.dampers[trial.method], instruction=told),
+            FireShot(trial=trial, attempt=attempt),
+            Ask(trial=trial, question=QUESTION, text=self.question, choices=self.choices),
+        )
 
 
 QUESTION = "response"
 """The name of what is asked, which is its column."""
 
 
-def choices(setup: Setup[DirectionConfig]) -> tuple[Choice, ...]:
+def ways(setup: Setup[DirectionConfig]) -> tuple[Choice, ...]:
     """The two answers; the participant's own keys are the arrows up and down."""
     question = setup.config.question
     labels = {"forward": question.forward, "backward": question.backward}
     return choices_of(labels, {"forward": "up", "backward": "down"})
-
-
-ANTICIPATION_S = 0.1
-"""A key that comes sooner was not pressed for what was felt: simple reactions to touch take longer (assumed)."""
 
 
 def rows(plan: Plan, history: History) -> list[Row]:

@@ -134,6 +134,20 @@ class PreferenceConfig(ExperimentConfig):
     synthetic: Synthetic
 
     @property
+    def methods(self) -> tuple[str, ...]:
+        """The rendering methods that are met."""
+        return self.design.methods
+
+    @property
+    def hand_over_s(self) -> float:
+        """Planned time of a hand-over."""
+        return self.timing.hand_over_s
+
+    def asking_s(self, kind: str) -> float:
+        """Planned time of a question by the kind of its step, `rate` or `describe`."""
+        return self.timing.rating_s if kind == "rate" else self.timing.description_s
+
+    @property
     def trial_s(self) -> float:
         """Planned time of a trial, from its hand-over to next."""
         return self.timing.hand_over_s + self.timing.exposure_s

@@ -6,14 +6,15 @@ from functools import partial
 
 from experiments.config.setup import Setup
 from experiments.design.plan import Plan, Trial, condition, method_order
+from experiments.design.stimuli import damper
 from experiments.design.streams import Stream
 from experiments.preference.config import PreferenceConfig
+from experiments.record.design_table import exposure
 from experiments.record.tables import Row, presentation
 from experiments.session.history import History, TrialHistory, by_trial
 from experiments.session.steps import (
     Answered,
     Describe,
-    Interrupted,
     Prepare,
     Present,
     Presented,
@@ -54,7 +55,7 @@ def session(plan: Plan, setup: Setup[PreferenceConfig]) -> Session:
 
 def _steps(setup: Setup[PreferenceConfig], trial: Trial, attempt: int) -> tuple[Step, ...]:
     return (
-        Prepare(trial=trial, attempt=attempt, damper=setup.gun.methods[trial.method].damper),
+        Prepare(trial=trial, attempt=attempt, settings=damper(setup.gun, trial.method)),
         Present(
             trial=trial,
             attempt=attempt,
@@ -92,22 +93,12 @@ def rows(plan: Plan, history: History) -> list[Row]:
             "experiment": plan.experiment,
             "trial": trial.trial,
             "method": trial.method,
-            **_exposure(events),
+            **exposure(events),
             **_rating(events),
             **presentation(events, Presented),
         }
         for trial, events in by_trial(plan.trials, history).items()
     ]
-
-
-def _exposure(events: TrialHistory) -> Row:
-    """The last exposure, and how long earlier ones of the same trial were felt before it."""
-    felt = [word.exposure_s for word in events.words if isinstance(word, Presented | Interrupted) and word.exposure_s]
-    shown = events.last(Presented)
-    if shown is None:
-        return {"earlier_exposure_s": sum(felt)} if felt else {}
-    row: Row = {"shots": shown.shots, "exposure_s": shown.exposure_s}
-    return row | ({"earlier_exposure_s": sum(felt[:-1])} if felt[:-1] else {})
 
 
 def _rating(events: TrialHistory) -> Row:

@@ -10,15 +10,13 @@ from experiments.design.plan import Plan, Trial
 from experiments.design.streams import Stream
 from experiments.preference.config import PreferenceConfig, RatingScale
 from experiments.preference.config import Ratings as RatingsLaw
-from experiments.session.steps import on_scale
+from experiments.synthetic.answers import EXPOSURE_SIGMA
 from experiments.synthetic.percept import evidence, percepts_of
 from experiments.synthetic.preference import felt_ratings
+from experiments.tasks.questions import on_scale
 
 TABLE_COLUMNS = ("participant_id", "method", "rating")
 """The table of answers: each participant's rating of each method."""
-
-_EXPOSURE_SIGMA = 0.3
-"""Spread of how long people ask for a stimulus (log-normal); assumed."""
 
 
 def synthetic_participant(setup: Setup[PreferenceConfig], plan: Plan) -> RatingsParticipant:
@@ -74,11 +72,15 @@ class RatingsParticipant:
         """The rating of this trial's method."""
         return self._ratings[trial.method]
 
+    def describe(self, trial: Trial, question: str = "comment") -> str:  # noqa: ARG002 - nobody says anything
+        """No words."""
+        return ""
+
     def exposure_s(self, trial: Trial) -> float:
         """How long the participant asks for a stimulus before saying next."""
         plan = self._plan
         draws = Stream(plan.seed, "exposure", plan.experiment, plan.participant_id, str(trial.trial))
-        return self._mean_s * math.exp(_EXPOSURE_SIGMA * draws.normal() - _EXPOSURE_SIGMA**2 / 2)
+        return self._mean_s * math.exp(EXPOSURE_SIGMA * draws.normal() - EXPOSURE_SIGMA**2 / 2)
 
 
 def _from_table(config: PreferenceConfig, plan: Plan, answers: Sequence[Mapping[str, str]]) -> dict[str, float | None]:

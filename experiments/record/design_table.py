@@ -1,15 +1,31 @@
-"""The log table that a design makes: which columns there are, what each means, and whose values it may hold. Pure."""
+"""The log table that a design makes: which columns there are, what each means, whose values it may hold, and its rows.
+
+Pure.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
 
 from experiments.design.config import DesignConfig
-from experiments.design.language import DIRECTION_FACTOR, METHOD_FACTOR, FactorConfig, QuestionConfig, shown_level
+from experiments.design.language import (
+    DIRECTION_FACTOR,
+    EMPTY,
+    METHOD_FACTOR,
+    FactorConfig,
+    QuestionConfig,
+    shown_level,
+)
+from experiments.design.plan import Plan, Trial
 from experiments.record import tables
-from experiments.record.tables import Column
-from experiments.tasks.questions import correct_columns
+from experiments.record.tables import Column, Row, presentation
+from experiments.session.history import History, TrialHistory, by_trial
+from experiments.session.remarks import EntryCorrected
+from experiments.session.steps import Answered, Fired, Interrupted, Presented
+from experiments.tasks.questions import correct_columns, is_right
 
+ANTICIPATION_S = 0.1
+"""A key that comes sooner was not pressed for what was felt: simple reactions to touch take longer (assumed)."""
 HANDS = ("participant", "experimenter", "synthetic")
 
 
@@ -107,3 +123,82 @@ def _presentation(design: DesignConfig) -> Iterator[Column]:
     if design.below_break_away:
         yield tables.text_column("status", "what the model says of the shot: `home`, `no-break-away` or `rendered`")
     yield from tables.PRESENTATION
+
+
+def design_rows(plan: Plan, history: History, design: DesignConfig) -> list[Row]:
+    """One row a planned trial, in order; what was not reached is empty."""
+    return [
+        {
+            "participant_id": plan.participant_id,
+            "experiment": plan.experiment,
+            "session": trial.session,
+            "set": trial.set,
+            "trial": trial.trial,
+            "stimulus": int(not trial.catch),
+            **dict(trial.levels),
+            **_compared(trial),
+            **_answers(design, trial, events),
+            **exposure(events),
+            **_shown(design, events),
+        }
+        for trial, events in by_trial(plan.trials, history).items()
+    ]
+
+
+def _compared(trial: Trial) -> Row:
+    """The level of each interval, and the one that was compared."""
+    held = {f"{trial.compare}_{place}": level for place, level in enumerate(trial.intervals, start=1)}
+    felt: Row = {name: None if level == EMPTY else level for name, level in held.items()}
+    return felt
+
+
+def _answers(design: DesignConfig, trial: Trial, events: TrialHistory) -> Row:
+    scored, row = correct_columns(design.questions), Row()
+    for name, question in design.questions.items():
+        if entered := events.entered(name):
+            row |= _answered(name, question, entered)
+            right = is_right(design, question, trial, entered[-1].value) if name in scored else None
+            row |= {scored[name]: int(right)} if right is not None else {}
+    return row
+
+
+def _answered(name: str, question: QuestionConfig, entered: list[Answered | EntryCorrected]) -> Row:
+    """The answer that counts: the last one given, or what it was corrected to, whose time is not the participant's."""
+    counts = entered[-1]
+    given = next(one for one in reversed(entered) if isinstance(one, Answered))
+    by = counts.by if isinstance(counts, Answered) else "experimenter"
+    if question.kind == "text":
+        return {name: counts.value}
+    if not question.named_answers:
+        whole = question.kind == "ranking" and isinstance(counts.value, float)
+        return {name: int(counts.value) if whole else counts.value, f"{name}_by": by}  # type: ignore[arg-type] # a float
+    valid = None if given.response_time_s is None else int(bool(given.response_time_valid) and counts is given)
+    return {
+        name: counts.value,
+        f"{name}_time_s": given.response_time_s,
+        f"{name}_source": by,
+        f"{name}_time_valid": valid,
+    }
+
+
+def exposure(events: TrialHistory) -> Row:
+    """The last exposure to a train, and how long earlier ones of the same trial were felt before it."""
+    felt = [word.exposure_s for word in events.words if isinstance(word, Presented | Interrupted) and word.exposure_s]
+    shown = events.last(Presented)
+    if shown is None:
+        return {"earlier_exposure_s": sum(felt)} if felt else {}
+    row: Row = {"shots": shown.shots, "exposure_s": shown.exposure_s}
+    return row | ({"earlier_exposure_s": sum(felt[:-1])} if felt[:-1] else {})
+
+
+def _shown(design: DesignConfig, events: TrialHistory) -> Row:
+    """How the trial was presented. A first answer that came sooner than anybody reacts is marked."""
+    row = presentation(events, Presented if design.trial.kind == "train" else Fired)
+    if (fired := events.last(Fired)) is not None:
+        row |= {"status": fired.motion}
+    given = events.last(Answered)
+    if given is None or given.by != "participant" or given.response_time_s is None:
+        return row
+    if given.response_time_s >= ANTICIPATION_S:
+        return row
+    return row | {"flags": " ".join(filter(None, (str(row["flags"]), "anticipation")))}

@@ -10,6 +10,7 @@ from __future__ import annotations
 import hashlib
 import json
 import os
+from collections.abc import Mapping
 from concurrent.futures import Future, ThreadPoolExecutor
 from contextlib import suppress
 from dataclasses import dataclass
@@ -20,7 +21,7 @@ from pydantic import TypeAdapter, ValidationError
 
 from device.words import RecoilError
 from experiments.clock import Clock
-from experiments.config.setup import canonical_json, sha256
+from experiments.config.setup import sha256
 from experiments.design.plan import Plan
 from experiments.record import storage
 
@@ -163,7 +164,7 @@ class Journal:
         if self._gone:  # what stands written again is whole: nothing more goes where nobody finds it
             raise JournalGone(self._gone)
         try:
-            line = canonical_json({"n": self._count, "link": self._link, "synced_s": self._synced_s, **record}) + b"\n"
+            line = _line({"n": self._count, "link": self._link, "synced_s": self._synced_s, **record})
             storage.write_all(self._descriptor, line)
             storage.sync(self._descriptor)
         except (OSError, ValueError) as error:
@@ -242,6 +243,11 @@ def _held(path: Path, descriptor: int) -> int:
         os.close(descriptor)
         raise JournalError(f"{path}: another run holds this journal; close that one first")
     return descriptor
+
+
+def _line(record: Mapping[str, object]) -> bytes:
+    """A record as JSON with its keys as they stand, so that the order of a design's factors is kept; no NaN."""
+    return json.dumps(record, separators=(",", ":"), ensure_ascii=False, allow_nan=False).encode() + b"\n"
 
 
 def link_of(line: bytes) -> str:

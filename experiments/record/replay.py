@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 
 from experiments.record.journal import Contents, JournalError, Record, read_as
 from experiments.session import steps
-from experiments.session.history import History, asked
+from experiments.session.history import History, asked_before
 from experiments.session.remarks import REMARK, EntryCorrected, Halted, Remark, TestShot
 from experiments.session.states import EMERGENCY
 
@@ -46,7 +46,7 @@ def history(contents: Contents) -> History:
         elif line.kind == "remark":
             remark = _remark(contents, line)
             if isinstance(remark, EntryCorrected):
-                _check_value(contents, line, asked(found, remark), remark.value)
+                _check_value(contents, line, asked_before(found, remark), remark.value)
             found.append((None, remark))
         elif line.kind == "outcome":
             if step is None:
@@ -90,14 +90,20 @@ def go_on(
     its stimulus may have been felt.
     """
     step, announced = position.step, _last_step_is_open(contents)
-    if step is None or not (announced or isinstance(step, steps.FireShot | steps.Ask | steps.Present)):
+    if step is None or not (announced or _after_a_stimulus(step) or isinstance(step, steps.FireShot | steps.Present)):
         return position
     if not announced:
         append("step", body=steps.step_record(step))
-    felt = isinstance(step, steps.Ask) or (announced and isinstance(step, steps.FireShot | steps.Present))
+    felt = _after_a_stimulus(step) or (announced and isinstance(step, steps.FireShot | steps.Present))
     outcome = steps.Interrupted(presented=felt)
     append("outcome", body=steps.step_record(outcome))
     return replace(position, step=steps.step_after(session, outcome), history=[*position.history, (step, outcome)])
+
+
+def _after_a_stimulus(step: steps.Step) -> bool:
+    """Whether the trial of a step was felt, or a part of it: where the run breaks off there, it is presented again."""
+    begun = isinstance(step, steps.Prepare | steps.FireShot) and step.interval > 0
+    return begun or steps.asks_at_once(step)
 
 
 def _last_step_is_open(contents: Contents) -> bool:

@@ -188,11 +188,10 @@ def _is_corrected(entered: list[Answered | remarks.EntryCorrected]) -> bool:
     return bool(entered) and isinstance(entered[-1], remarks.EntryCorrected)
 
 
-def table_bytes(experiment: str, rows: Iterable[Row]) -> bytes:
+def table_bytes(table: tuple[Column, ...], rows: Iterable[Row]) -> bytes:
     """The table as RFC 4180 CSV in UTF-8: CRLF, quotes doubled, text guarded, an empty cell for what is missing."""
     text = io.StringIO(newline="")
     writer = csv.writer(text, lineterminator="\r\n")
-    table = TABLES[experiment]
     writer.writerow(column.name for column in table)
     writer.writerows([_cell(column, row.get(column.name)) for column in table] for row in rows)
     return text.getvalue().encode()

@@ -6,9 +6,11 @@ from typing import Any
 
 from device import GunStatus
 from experiments import catalogue
+from experiments.catalogue import AnyConfig
 from experiments.clock import Clock
-from experiments.config.door import ConfigError, ExperimentConfig
+from experiments.config.door import ConfigError
 from experiments.config.setup import Setup
+from experiments.design.config import DesignConfig
 from experiments.design.plan import Plan
 from experiments.live_run import LiveRun
 from experiments.session import events
@@ -16,7 +18,7 @@ from experiments.session.events import Event
 from experiments.session.judging import REARM_HELD_S
 from experiments.session.remarks import Remark
 from experiments.session.states import EMERGENCY, Position, State
-from experiments.session.steps import Ask, Outcome, Present, Rate, Rest, Step
+from experiments.session.steps import Ask, Describe, Outcome, Present, Rate, Rest, Step
 
 
 def synthetic_participant_of(setup: Setup[Any], plan: Plan) -> Any:
@@ -28,6 +30,8 @@ def synthetic_participant_of(setup: Setup[Any], plan: Plan) -> Any:
         return catalogue.experiment(setup).synthetic_participant(setup, plan)
     except ValueError as error:
         synthetic = setup.config.synthetic
+        if isinstance(setup.config, DesignConfig):
+            raise ConfigError(f"{setup.source.parent / (synthetic or '')}: {error}") from error
         if synthetic.observer == "table":
             raise ConfigError(f"{setup.source.parent / synthetic.table}: {error}") from error
         raise ConfigError(f"{setup.source}: the numbers of [synthetic.*] make nobody: {error}") from error
@@ -41,8 +45,8 @@ def synthetic_screen(setup: Setup[Any], plan: Plan, clock: Clock) -> SyntheticSc
 class SyntheticScreen:
     """Works a run as a person would, in as much time as the config plans for it, in the run's own thread."""
 
-    def __init__(self, config: ExperimentConfig, observer: Any, clock: Clock) -> None:
-        self._timing: Any = getattr(config, "timing", None)
+    def __init__(self, config: AnyConfig, observer: Any, clock: Clock) -> None:
+        self._config = config
         self._observer, self._clock = observer, clock
         self._live: LiveRun | None = None
         self._begun: tuple[int, float] = (0, 0.0)
@@ -69,18 +73,20 @@ class SyntheticScreen:
             case State.SETTING:
                 return events.DamperSet()
             case State.PREPARING:
-                self._clock.sleep(self._timing.hand_over_s)
+                self._clock.sleep(self._config.hand_over_s)
                 return events.Fire()
             case State.TRAIN if isinstance(step, Present):
                 return self._next(position, step, until_s)
             case State.ASKING if isinstance(step, Ask):
                 return self._answer(position, step)
             case State.RATING if isinstance(step, Rate):
-                self._clock.sleep(self._timing.rating_s)
+                self._clock.sleep(self._config.asking_s(step.kind))
                 return events.Rating(rating=self._observer.rate(step.trial, step.question), by="synthetic")
-            case State.DESCRIBING:
-                self._clock.sleep(self._timing.description_s)
-                return events.Description(text="")
+            case State.DESCRIBING if isinstance(step, Describe):
+                self._clock.sleep(self._config.asking_s(step.kind))
+                return events.Description(text=self._observer.describe(step.trial, step.question), by="synthetic")
+            case State.INFORMING:
+                return events.Told()
             case State.RESTING if isinstance(step, Rest):
                 self._clock.sleep(step.duration_s)
                 return None

@@ -21,7 +21,7 @@ from experiments.session.events import Event, Press
 from experiments.session.history import entered_value
 from experiments.session.remarks import Remark, flag_word
 from experiments.session.states import Position, State
-from experiments.session.steps import Ask, Asking, Describe, Outcome, Prepare, Rate, Rest, Step, what
+from experiments.session.steps import Ask, Asking, Describe, Inform, Outcome, Prepare, Rate, Rest, Step, what
 
 if TYPE_CHECKING:
     from experiments.design.plan import Plan
@@ -111,11 +111,12 @@ class TerminalScreen:
             case State.REARMING:
                 return _REARMING
             case State.SETTING if isinstance(step, Prepare):
-                return f"{self._head(step)}\n  Set the damper: {step.damper.upper()}. Then type d and Enter: "
+                return f"{self._head(step)}\n  Set the {texts.settings_text(step)}. Then type d and Enter: "
             case State.PREPARING if isinstance(step, Prepare):
-                damper = f"\n  The damper is {step.damper.upper()}." if step.damper else ""
-                turn = f"Turn the gun to {step.trial.direction.upper()} and hand it over."
-                return f"{self._head(step)}{damper}\n  {turn} Enter fires: "
+                is_set = f"\n  The {texts.settings_text(step)}." if step.settings else ""
+                return f"{self._head(step)}{is_set}\n  {texts.turn_text(step)} and hand it over. Enter fires: "
+            case State.INFORMING if isinstance(step, Inform):
+                return f"\n  Tell the participant: “{step.text}”\n  Enter when that is done: "
             case State.TRAIN if position.onset_s is not None:
                 return "\n  Enter when the participant says next: "
             case State.ASKING if isinstance(step, Ask):
@@ -278,7 +279,7 @@ def _line(line: str, position: Position, now_s: float) -> Event | str | None:  #
     """What a line that is no command means: it is for what is asked there."""
     match position.state:
         case State.SETTING:
-            return events.DamperSet() if line.lower() == "d" else "Set the damper, then type d and Enter."
+            return events.DamperSet() if line.lower() == "d" else "Set it, then type d and Enter."
         case State.REARMING:
             return events.Rearm(held_s=None) if line.lower() == "test shot" else "Type `test shot` and Enter."
         case State.ASKING if isinstance(position.step, Ask):
@@ -296,10 +297,12 @@ def _line(line: str, position: Position, now_s: float) -> Event | str | None:  #
             return events.Reason(text=line) if line else events.Stop(reason="emergency stop")
         case State.RESTING:
             return "To end the break early type `skip` and the reason." if line else None
-        case State.TRAIN | State.CLOSING | State.PREPARING if line:
+        case State.TRAIN | State.CLOSING | State.PREPARING | State.INFORMING if line:
             return "Only Enter, or one of the commands (`help`)."
         case State.TRAIN:
             return events.Next()
+        case State.INFORMING:
+            return events.Told()
         case State.CLOSING:
             return events.Finish()
         case _:

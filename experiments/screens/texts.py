@@ -9,7 +9,7 @@ import unicodedata
 
 from experiments.design.plan import Plan, Trial
 from experiments.session import remarks, steps
-from experiments.session.history import History, asked, entered_value, is_attempt, of_one_set
+from experiments.session.history import History, asked_before, entered_value, is_attempt, of_one_set
 from experiments.session.remarks import MAX_FLAG, Remark
 from experiments.session.steps import Ask, Asking, Describe, Outcome, Prepare, Step, Value, trial_of, what
 
@@ -51,6 +51,24 @@ def _nth(number: int) -> str:
     return {1: "first", 2: "second", 3: "third"}.get(number, f"{number}th")
 
 
+def settings_text(step: Prepare) -> str:
+    """What is set by hand, and how.
+
+    >>> from experiments.design.plan import Trial
+    >>> trial = Trial(session=1, set=1, trial=1, levels=())
+    >>> settings_text(Prepare(trial=trial, attempt=1, settings=(("damper", "on"), ("posture", "kneeling"))))
+    'damper ON, posture KNEELING'
+    """
+    return ", ".join(f"{name} {value.upper()}" for name, value in step.settings)
+
+
+def turn_text(step: Prepare) -> str:
+    """Which way the gun is turned, and for which of several shots."""
+    count = len(step.trial.intervals)
+    which = f" for shot {step.interval + 1} of {count}" if count and step.interval else ""
+    return f"Turn the gun to {step.trial.direction_at(step.interval).upper()}{which}"
+
+
 def read_out_text(plan: Plan, step: Prepare) -> str:
     """What the participant is told: to be read out before a set, and as a reminder at its other trials."""
     if not step.instruction:
@@ -82,7 +100,7 @@ def entry_text(plan: Plan, told: History, entry: Asking) -> str:
 
 def corrected_text(told: History, remark: remarks.EntryCorrected) -> str:
     """That something was corrected, and to what; of words only that they were."""
-    entry = asked(told, remark)
+    entry = asked_before(told, remark)
     if entry is None or isinstance(entry, Describe):
         return "description corrected"
     return f"{'' if isinstance(entry, Ask) else f'{what(entry)} '}corrected to {value_text(entry, remark.value)}"
@@ -132,7 +150,7 @@ def _remark_text(plan: Plan, told: History, remark: Outcome | Remark) -> str:
 
 
 def _corrected_text(plan: Plan, told: History, remark: remarks.EntryCorrected) -> str:
-    entry = asked(told, remark)
+    entry = asked_before(told, remark)
     if entry is None:
         return ""
     about = about_text(plan, entry)

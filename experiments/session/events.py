@@ -80,6 +80,11 @@ class Description(Event):
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
+class Told(Event):
+    """The participant was told what the screen says."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
 class EndBreak(Event):
     """The break is to end early."""
 
@@ -261,6 +266,7 @@ _WORDS: dict[type[Event], str] = {
     Next: "next",
     Rating: "rating",
     Description: "description",
+    Told: "told",
     EndBreak: "end of the break",
     Finish: "end",
     Rearm: "test shot",
@@ -300,6 +306,7 @@ ACTS: tuple[type[Event], ...] = (
     Next,
     Rating,
     Description,
+    Told,
     EndBreak,
     Finish,
     Rearm,

@@ -70,9 +70,8 @@ def _trial(step: steps.Step | None, word: steps.Outcome | Remark) -> Trial | Non
 
 def is_attempt(step: steps.Step | None, word: steps.Outcome | Remark) -> bool:
     """Whether a stimulus was felt, or may have been: what `attempts` counts."""
-    return isinstance(step, steps.FireShot | steps.Present) and not (
-        isinstance(word, steps.Failed | steps.Interrupted) and not word.presented
-    )
+    first = isinstance(step, steps.Present) or (isinstance(step, steps.FireShot) and step.interval == 0)
+    return first and not (isinstance(word, steps.Failed | steps.Interrupted) and not word.presented)
 
 
 def trial_at(plan: Plan, history: History, step: steps.Step | None) -> Trial:
@@ -90,7 +89,7 @@ def entries(history: History, here: Trial) -> list[Asking]:
     return [step for step in dict.fromkeys(found) if of_one_set(step.trial, here)]
 
 
-def asked(history: History, about: EntryCorrected) -> Asking | None:
+def asked_before(history: History, about: EntryCorrected) -> Asking | None:
     """What asked for the entry that a correction is about; `None` if nothing did."""
     steps_back = (step for step, _ in reversed(history) if isinstance(step, Asking))
     wanted = (about.trial, about.question)

@@ -10,7 +10,7 @@ from experiments.session import events, remarks
 from experiments.session.events import ACTS, OWN_HAND_EVENTS, Event, Press
 from experiments.session.history import History, entered_value, entries, repeatable, trial_at
 from experiments.session.states import No, Position, State, after, why_after
-from experiments.session.steps import Ask, Asking, is_answer, what
+from experiments.session.steps import Ask, Asking, Rate, is_answer, what
 
 REARM_HELD_S = 1.0
 """For so long a key is held to go on after an emergency stop."""
@@ -104,12 +104,14 @@ def _mistimed(moment: Moment, event: Event, press: Press | None) -> str:
     return "" if moment.is_ready(press.at_s) else "Too soon after the change: press again."
 
 
-def _impossible(moment: Moment, event: Event) -> str:
+def _impossible(moment: Moment, event: Event) -> str:  # noqa: C901, PLR0911 - one case an event
     match event:
         case _ if isinstance(event, OWN_HAND_EVENTS):
             return _not_asked(moment, event)
         case events.Correct(value=value) if (entry := moment.position.correcting) and not is_answer(entry, value):
             return f"That is no {what(entry)}."
+        case events.Rating(rating=None) if isinstance(step := moment.position.step, Rate) and not step.may_be_skipped:
+            return "An answer is needed here."
         case events.Answer(response=response) if not _is_choice(moment, response):
             return f"“{response}” is not among the answers."
         case events.Undo() if moment.further_back is None:

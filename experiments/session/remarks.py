@@ -10,8 +10,7 @@ from typing import Annotated, Literal
 
 from pydantic import Field, TypeAdapter
 
-from experiments.config.setup import without_blanks
-from experiments.design.plan import Trial
+from experiments.design.plan import Trial, without_blanks
 from experiments.session.steps import Value
 
 

@@ -26,6 +26,7 @@ class State(StrEnum):
     ASKING = "asking"
     RATING = "rating"
     DESCRIBING = "describing"
+    INFORMING = "informing"
     RESTING = "resting"
     CLOSING = "closing"
     PAUSED = "paused"
@@ -91,6 +92,7 @@ WHY_NOT: dict[State, str] = {
     S.ASKING: "The answer is awaited.",
     S.RATING: "The rating is awaited.",
     S.DESCRIBING: "The description is awaited.",
+    S.INFORMING: "The participant is to be told something first.",
     S.RESTING: "It is a break.",
     S.CLOSING: "Everything is answered: the run can be ended.",
     S.PAUSED: "The run is paused: go on first.",
@@ -102,7 +104,7 @@ WHY_NOT: dict[State, str] = {
 
 _NOT_HELD = "There is no pause."
 _NOT_OPEN = "No correction is open."
-_STEPS = (S.SAVING, S.SETTING, S.PREPARING, S.ASKING, S.RATING, S.DESCRIBING, S.RESTING)
+_STEPS = (S.SAVING, S.SETTING, S.PREPARING, S.ASKING, S.RATING, S.DESCRIBING, S.INFORMING, S.RESTING)
 _LIVE = tuple(state for state in State if state is not S.STOPPED)
 
 
@@ -117,6 +119,7 @@ _ROWS: dict[type[Event], dict[State, Change]] = {
     events.Next: {S.TRAIN: To(S.SAVING)},
     events.Rating: {S.RATING: To(S.SAVING)},
     events.Description: {S.DESCRIBING: To(S.SAVING)},
+    events.Told: {S.INFORMING: To(S.SAVING)},
     events.EndBreak: {S.RESTING: To(S.SAVING)},
     events.Finish: {S.CLOSING: To(S.SAVING)},
     events.Rearm: {S.REARMING: To(S.FIRING)},
@@ -130,7 +133,10 @@ _ROWS: dict[type[Event], dict[State, Change]] = {
     events.GoOn: {**_each(_LIVE, No(_NOT_HELD)), S.PAUSED: BACK},
     events.Undo: {
         **_each(
-            (S.SETTING, S.PREPARING, S.ASKING, S.RATING, S.DESCRIBING, S.RESTING, S.CLOSING, S.PAUSED, S.HALTED),
+            (
+                *(S.SETTING, S.PREPARING, S.ASKING, S.RATING, S.DESCRIBING, S.INFORMING),
+                *(S.RESTING, S.CLOSING, S.PAUSED, S.HALTED),
+            ),
             Over(S.CORRECTING),
         ),
         S.CORRECTING: STAY,
@@ -138,7 +144,7 @@ _ROWS: dict[type[Event], dict[State, Change]] = {
     events.Correct: {**_each(_LIVE, No(_NOT_OPEN)), S.CORRECTING: BACK},
     events.Leave: {**_each(_LIVE, No(_NOT_OPEN)), S.CORRECTING: BACK},
     events.Repeat: {
-        **_each((S.SETTING, S.PREPARING, S.ASKING, S.RATING, S.RESTING, S.CLOSING), To(S.SAVING)),
+        **_each((S.SETTING, S.PREPARING, S.ASKING, S.RATING, S.INFORMING, S.RESTING, S.CLOSING), To(S.SAVING)),
         S.DESCRIBING: No("It is being described: it cannot be presented again now."),
         S.TRAIN: No("End the train first (“next”); then it can be presented again."),
     },

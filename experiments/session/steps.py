@@ -5,40 +5,45 @@ Both are frozen facts. `kind` names them in the journal, from which they are rea
 
 from __future__ import annotations
 
-import math
 from collections import Counter
 from collections.abc import Callable, Generator
 from dataclasses import asdict, dataclass
-from typing import Annotated, Literal, Protocol
+from typing import Annotated, Literal
 
 from pydantic import Field, TypeAdapter
 
 from device.words import ShotTiming
-from experiments.config.setup import without_blanks
-from experiments.design.plan import Trial
+from experiments.design.plan import Trial, without_blanks
 from experiments.tasks.questions import Choice
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Prepare:
-    """Take the gun, turn it to the trial's direction, set the damper if one is named, hand it over.
+    """Take the gun, turn it to the direction of the interval, set by hand what is named, hand it over.
 
-    `instruction` is the text of what the participant is told for this set, empty if nothing.
+    `settings` are names and values, such as the damper's. `instruction` is the text of what the participant is told for
+    this set, empty if nothing. `interval` counts from 0.
     """
 
     trial: Trial
     attempt: int
-    damper: str
+    settings: tuple[tuple[str, str], ...] = ()
     instruction: str = ""
+    interval: int = 0
     kind: Literal["prepare"] = "prepare"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class FireShot:
-    """Fire one shot of the trial's method."""
+    """Fire the shot of one of the trial's intervals, counted from 0; of a catch trial, nothing.
+
+    `gap_s`: not sooner than so long after the onset of the interval before.
+    """
 
     trial: Trial
     attempt: int
+    interval: int = 0
+    gap_s: float = 0.0
     kind: Literal["fire"] = "fire"
 
 
@@ -67,6 +72,16 @@ class Ask:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
+class Inform:
+    """Tell the participant something, and go on when that is done. `trial`: whose answer it is about, if any."""
+
+    text: str
+    what: Literal["instruction", "consent", "feedback"]
+    trial: Trial | None = None
+    kind: Literal["inform"] = "inform"
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
 class Rest:
     """A break that cannot be cut short without a recorded reason."""
 
@@ -89,7 +104,10 @@ class Present:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Rate:
-    """Ask for a rating of the trial's stimulus. `question`, `text`, `later`: as in `Ask`."""
+    """Ask for a rating of the trial's stimulus, or for a number. `question`, `text`, `later`: as in `Ask`.
+
+    `grain` is 0 where any number will do. `may_be_skipped`: no answer is one.
+    """
 
     trial: Trial
     question: str
@@ -100,6 +118,7 @@ class Rate:
     maximum_text: str
     grain: float
     later: bool = False
+    may_be_skipped: bool = True
     kind: Literal["rate"] = "rate"
 
 
@@ -123,12 +142,9 @@ class Close:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Prepared:
-    """The gun is in the participant's hand, with the damper set as it was asked for: whoever fires confirms it.
+    """The gun is in the participant's hand, set by hand as it was asked for: whoever fires confirms it."""
 
-    `damper` is `None` where none is set by hand.
-    """
-
-    damper: str | None = None
+    settings: tuple[tuple[str, str], ...] = ()
     kind: Literal["prepared"] = "prepared"
 
 
@@ -168,6 +184,13 @@ class Answered:
     response_time_valid: bool | None = None
     key_time_s: float | None = None
     kind: Literal["answered"] = "answered"
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Informed:
+    """The participant was told."""
+
+    kind: Literal["informed"] = "informed"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -251,9 +274,9 @@ class Repeated:
     kind: Literal["repeat"] = "repeat"
 
 
-Step = Prepare | FireShot | Ask | Rest | Present | Rate | Describe | Close
-Outcome = Prepared | Fired | Answered | Rested | Presented | Closed | Failed | Interrupted | Repeated
-TrialStep = Prepare | FireShot | Ask | Present | Rate | Describe
+Step = Prepare | FireShot | Ask | Inform | Rest | Present | Rate | Describe | Close
+Outcome = Prepared | Fired | Answered | Informed | Rested | Presented | Closed | Failed | Interrupted | Repeated
+TrialStep = Prepare | FireShot | Ask | Inform | Present | Rate | Describe
 """A step that is about one trial."""
 Session = Generator[Step, Outcome, None]
 """Yields what should happen and is sent what did happen. It opens nothing, waits for nothing and knows no clock."""
@@ -276,9 +299,16 @@ def is_answer(asked: Asking, value: Value) -> bool:
         case Ask():
             return value in asked.answers
         case Rate():
-            return value is None or (isinstance(value, float) and asked.minimum <= value <= asked.maximum)
+            if value is None:
+                return asked.may_be_skipped
+            return isinstance(value, float) and asked.minimum <= value <= asked.maximum
         case Describe():
             return isinstance(value, str)
+
+
+def asks_at_once(step: Step | None) -> bool:
+    """Whether a step asks about what was felt just now: where that breaks off, it has to be felt again."""
+    return isinstance(step, Asking) and not step.later
 
 
 def trial_of(step: Step | None) -> Trial | None:
@@ -287,7 +317,6 @@ def trial_of(step: Step | None) -> Trial | None:
 
 
 _OPTIONAL_FIELDS = (
-    "damper",
     "timing",
     "response_time_s",
     "response_time_valid",
@@ -315,47 +344,25 @@ def step_after(session: Session, outcome: Outcome) -> Step | None:
         return None
 
 
-class Scale(Protocol):
-    """The ends of a scale, and how fine a rating is kept."""
-
-    @property
-    def minimum(self) -> float:
-        """The lower end."""
-
-    @property
-    def maximum(self) -> float:
-        """The upper end."""
-
-    @property
-    def grain(self) -> float:
-        """The distance of two ratings, a part of the scale."""
-
-
-def on_scale(value: float, scale: Scale) -> float:
-    """The nearest value of the scale, in whole grains from its minimum.
-
-    A grain such as 0.1 has no exact binary form; rounding to its decimals gives the number a person would write.
-    """
-    steps = round((min(max(value, scale.minimum), scale.maximum) - scale.minimum) / scale.grain)
-    decimals = max(0, -math.floor(math.log10(scale.grain))) + 2
-    return round(float(scale.minimum + steps * scale.grain), decimals)
-
-
 StepsOf = Callable[[Trial, int], tuple[Step, ...]]
 """The steps of one presentation of a trial, by its number."""
 
 
 class Presenter:
-    """Presents trials and counts how often. `steps_of` says what a presentation is made of."""
+    """Presents trials and counts how often. `steps_of` says what a presentation is made of.
+
+    `said`: what was answered to each question of each trial, as it was given last.
+    """
 
     def __init__(self, steps_of: StepsOf) -> None:
         self._steps_of = steps_of
         self._presented: Counter[Trial] = Counter()
+        self.said: dict[tuple[Trial, str], Value] = {}
 
     def present(self, trial: Trial) -> Session:
         """Present a trial until it is done; an earlier one that is to be repeated comes in between."""
         while True:
-            outcome = yield from _attempt(self._steps_of(trial, self._presented[trial] + 1))
+            outcome = yield from self._attempt(self._steps_of(trial, self._presented[trial] + 1))
             if isinstance(outcome, Repeated) and outcome.trial != trial:
                 yield from self.present(outcome.trial)
                 continue
@@ -373,11 +380,12 @@ class Presenter:
         """The end of a run, at which the last trials can still be corrected or presented again."""
         yield from self.until_done(Close())
 
-
-def _attempt(steps: tuple[Step, ...]) -> Generator[Step, Outcome, Outcome]:
-    """One presentation: its last outcome, or the first that breaks it off."""
-    for step in steps:
-        outcome = yield step
-        if isinstance(outcome, Failed | Interrupted | Repeated):
-            break
-    return outcome
+    def _attempt(self, steps: tuple[Step, ...]) -> Generator[Step, Outcome, Outcome]:
+        """One presentation: its last outcome, or the first that breaks it off."""
+        for step in steps:
+            outcome = yield step
+            if isinstance(outcome, Failed | Interrupted | Repeated):
+                break
+            if isinstance(step, Asking) and isinstance(outcome, Answered):
+                self.said[step.trial, step.question] = outcome.value
+        return outcome

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import os
 import re
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -18,7 +18,8 @@ from device.words import RecoilError
 from experiments import catalogue
 from experiments.config.door import CODE, StudyConfig
 from experiments.config.setup import Setup
-from experiments.design import plan
+from experiments.design import plan, planning
+from experiments.design.config import DesignConfig
 from experiments.load import load_setup, load_study
 from experiments.record import journal, replay, storage, tables
 from experiments.record.journal import Contents, Head, JournalError
@@ -42,6 +43,7 @@ class Place:
     participant_id: str
     experiment: str
     practice: bool = False
+    suffix: str = ""
 
     @property
     def folder(self) -> Path:
@@ -62,7 +64,8 @@ class Place:
     @property
     def table(self) -> Path:
         """The table made from it."""
-        return self.folder / f"{self.stem}_{tables.FILE_SUFFIX[self.experiment]}.csv"
+        suffix = self.suffix or tables.FILE_SUFFIX.get(self.experiment, "trials")
+        return self.folder / f"{self.stem}_{suffix}.csv"
 
 
 def is_code(text: str) -> bool:
@@ -123,19 +126,45 @@ def row_of_next_run(
     The least used row over the runs of participants who are not excluded, the first such row. So rows are used equally
     often, to within one, whenever everyone who was excluded has been replaced.
     """
-    design = setup.config.design
-    if design.order == "random":
+    config = setup.config
+    if isinstance(config, DesignConfig):
+        size = planning.square_size(config)
+        return least_used(size, used_rows(results, config.design, registered, head_of)) if size else None
+    if config.design.order == "random":
         return None
-    used = used_rows(results, setup.config.experiment, registered, head_of)
-    return plan.next_row(design.order, len(design.methods), used)
+    used = used_rows(results, config.experiment, registered, head_of)
+    return plan.next_row(config.design.order, len(config.methods), used)
+
+
+def group_of_next_run(setup: Setup[Any], results: Path, registered: Register, head_of: HeadOf = journal.head) -> int:
+    """Which combination of the levels that vary between people the next run gets: the least used, the first such."""
+    config = setup.config
+    count = len(planning.groups(config)) if isinstance(config, DesignConfig) else 1
+    if count == 1:
+        return 0
+    return least_used(count, [one.plan.group for one in _heads(results, config.experiment, registered, head_of)])
+
+
+def least_used(count: int, used: Sequence[int]) -> int:
+    """The number below `count` that was used least, the first of them.
+
+    >>> least_used(3, [0, 1, 1])
+    2
+    """
+    return min(range(count), key=lambda one: (list(used).count(one), one))
 
 
 def used_rows(results: Path, experiment: str, registered: Register, head_of: HeadOf = journal.head) -> list[int]:
     """The rows that runs in this folder have taken; who is excluded gives theirs back."""
-    left_out = registered.excluded()
-    heads = [head_of(path) for path in journals(results, experiment) if _code(path) not in left_out]
-    rows = [one.plan.order_row for one in heads if one is not None]
+    rows = [one.plan.order_row for one in _heads(results, experiment, registered, head_of)]
     return [row for row in rows if row is not None]
+
+
+def _heads(results: Path, experiment: str, registered: Register, head_of: HeadOf) -> list[Head]:
+    """The heads of the runs of people who are not excluded."""
+    left_out = registered.excluded()
+    heads = (head_of(path) for path in journals(results, experiment) if _code(path) not in left_out)
+    return [one for one in heads if one is not None]
 
 
 def _code(journal_path: Path) -> str:
@@ -319,7 +348,9 @@ class _Look:
         row, seed = row_of_next_run(setup, self._study.results, self.registered, self._head), setup.config.seed
         if row is None and seed is None:
             return None
-        return catalogue.experiment(setup).make_plan(setup.config, participant_id, seed or 0, row).methods
+        group = group_of_next_run(setup, self._study.results, self.registered, self._head)
+        plan_of = catalogue.experiment(setup).make_plan
+        return plan_of(setup.config, participant_id, seed or 0, row, group).methods
 
 
 def progress_of(where: Place, contents: Contents | None, *, elsewhere: bool = False) -> RunProgress:

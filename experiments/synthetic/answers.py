@@ -19,9 +19,11 @@ from experiments.design.config import DesignConfig
 from experiments.design.language import EMPTY, NO, YES, ColumnName, Level, QuestionConfig, shown_level
 from experiments.design.plan import Condition, Plan, Trial
 from experiments.design.streams import Stream
-from experiments.tasks.questions import AnswerValue, on_grain, right_answer
+from experiments.tasks.questions import AnswerValue, on_scale, right_answer
 
 _NORMAL = NormalDist()
+EXPOSURE_SIGMA = 0.3
+"""Spread of how long people ask for a stimulus (log-normal); assumed."""
 Positive = Annotated[float, Field(gt=0, le=1e9)]
 
 
@@ -116,6 +118,11 @@ class GivenAnswer:
     value: AnswerValue
     response_time_s: float
 
+    @property
+    def response(self) -> str:
+        """The answer that was chosen."""
+        return str(self.value)
+
 
 def check_laws(design: DesignConfig, laws: SyntheticAnswers) -> None:
     """`ConfigError`: a question without a law, or a law that does not cover it."""
@@ -158,16 +165,33 @@ class DesignParticipant:
         check_laws(design, laws)
         self._design, self._laws, self._seed = design, laws, plan.seed
         self._who = (plan.experiment, plan.participant_id)
+        self._trials = plan.trials
         self._own = {name: Stream(plan.seed, "person", *self._who, name).normal() for name in design.questions}
 
-    def answer(self, name: str, trial: Trial) -> GivenAnswer:
+    def rate(self, trial: Trial, question: str) -> float | None:
+        """The rating, number or rank that a question gets."""
+        if self._design.questions[question].kind == "ranking":
+            block = [one for one in self._trials if (one.session, one.set) == (trial.session, trial.set)]
+            return float(self.rank(question, block)[block.index(trial)])
+        value = self.answer(trial, question).value
+        return float(value) if isinstance(value, int | float) else None
+
+    def describe(self, trial: Trial, question: str) -> str:
+        """The words that a question gets."""
+        return self.answer(trial, question).response
+
+    def exposure_s(self, trial: Trial) -> float:
+        """How long the participant asks for a train before saying next."""
+        draws = Stream(self._seed, "exposure", *self._who, str(trial.session), str(trial.trial))
+        return self._laws.exposure_s * math.exp(EXPOSURE_SIGMA * draws.normal() - EXPOSURE_SIGMA**2 / 2)
+
+    def answer(self, trial: Trial, name: str) -> GivenAnswer:
         """The answer to a question about a trial. `ConfigError`: the law has no value for the trial's levels."""
         draws = Stream(self._seed, "answer", *self._who, name, str(trial.session), str(trial.trial))
         value = self._value(name, trial, draws)
         times = self._laws.times
-        return GivenAnswer(
-            value=value, response_time_s=times.shift_s + times.median_s * math.exp(times.sigma * draws.normal())
-        )
+        time_s = times.shift_s + times.median_s * math.exp(times.sigma * draws.normal())
+        return GivenAnswer(value=value, response_time_s=max(round(time_s, 3), 0.001))
 
     def rank(self, name: str, trials: Sequence[Trial]) -> tuple[int, ...]:
         """The rank of each trial of a block, from 1: drawn one after another, each with its worth among those left."""
@@ -190,11 +214,11 @@ class DesignParticipant:
                 return self._chosen(name, question, law, trial, draws)
             case RatingsLaw():
                 mean = _by_condition(law.mean, law.by, trial.levels, f"questions.{name}.mean")
-                return on_grain(question, mean + law.person_sd * self._own[name] + law.noise_sd * draws.normal())
+                return on_scale(mean + law.person_sd * self._own[name] + law.noise_sd * draws.normal(), question.scale)
             case PowerLaw():
                 spread = law.person_sd * self._own[name] + law.noise_sd * draws.normal()
                 number = law.scale * _number(trial, law.factor) ** law.exponent * math.exp(spread)
-                return on_grain(question, float(f"{number:.3g}"))
+                return on_scale(float(f"{number:.3g}"), question.scale)
             case WorthLaw():
                 worths = [self._worth(law, level, name) for level in trial.intervals]
                 return question.named_answers[_drawn(worths, draws)]

@@ -21,7 +21,7 @@ from pydantic import Field
 
 from experiments.config.door import Model, Spread
 from experiments.design.streams import Stream
-from experiments.session.steps import Scale, on_scale
+from experiments.tasks.questions import Scale, on_scale
 
 Points = Annotated[float, Field(ge=-100, le=100)]
 """Points of the rating scale, and beyond its ends."""

@@ -6,6 +6,7 @@ import math
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from string import ascii_lowercase, digits
+from typing import Protocol
 
 from experiments.design.config import DesignConfig
 from experiments.design.language import (
@@ -135,20 +136,32 @@ def _number_problems(question: QuestionConfig, answer: AnswerValue) -> Iterator[
         yield f"{answer:g} is above {question.maximum:g}"
 
 
-def on_grain(question: QuestionConfig, value: float) -> float:
-    """The nearest value that the question keeps, in whole grains from its minimum.
+class Scale(Protocol):
+    """The ends of a scale, and how fine a rating is kept."""
+
+    @property
+    def minimum(self) -> float:
+        """The lower end."""
+
+    @property
+    def maximum(self) -> float:
+        """The upper end."""
+
+    @property
+    def grain(self) -> float:
+        """The distance of two ratings, a part of the scale; 0 where any number will do."""
+
+
+def on_scale(value: float, scale: Scale) -> float:
+    """The nearest value of the scale, in whole grains from its minimum.
 
     A grain such as 0.1 has no exact binary form; rounding to its decimals gives the number a person would write.
-
-    >>> on_grain(QuestionConfig(kind="rating", text="?", minimum=0.0, maximum=10.0, grain=0.1), 7.2500001)
-    7.3
     """
-    low, high, grain = question.minimum, question.maximum, question.grain
-    if grain is None or low is None or high is None:
+    if not scale.grain:
         return value
-    steps = round((min(max(value, low), high) - low) / grain)
-    decimals = max(0, -math.floor(math.log10(grain))) + 2
-    return round(float(low + steps * grain), decimals)
+    steps = round((min(max(value, scale.minimum), scale.maximum) - scale.minimum) / scale.grain)
+    decimals = max(0, -math.floor(math.log10(scale.grain))) + 2
+    return round(float(scale.minimum + steps * scale.grain), decimals)
 
 
 def is_right(design: DesignConfig, question: QuestionConfig, trial: Trial, answer: AnswerValue) -> bool | None:

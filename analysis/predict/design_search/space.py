@@ -153,7 +153,7 @@ def _gun(request: DesignRequest) -> tuple[Path, GunConfig, tuple[str, ...] | Non
         source = find(request.gun or "gun")
         return source, load_gun(source), None
     setup = load_setup(request.config)
-    return setup.source.parent / setup.config.gun, setup.gun, tuple(setup.config.design.methods)
+    return setup.source.parent / setup.config.gun, setup.gun, tuple(setup.config.methods)
 
 
 def _force_methods(source: Path, gun: GunConfig, names: tuple[str, ...] | None) -> dict[str, GunParameters]:

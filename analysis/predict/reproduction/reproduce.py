@@ -236,7 +236,7 @@ def _report(
 
 
 def _panels(setup: Setup[Any]) -> Iterator[Any]:
-    for method in setup.config.design.methods:
+    for method in setup.config.methods:
         parameters = setup.gun.rendering(method)
         if isinstance(parameters, GunParameters):
             label = setup.gun.methods[method].label
@@ -271,7 +271,7 @@ def misfit(study: StudyConfig, setups: Sequence[Setup[Any]], paper: Paper | None
         published: PublishedExperiment = paper.direction if config.experiment == "direction" else paper.preference
         if study.participants != published.n:
             return f"the study has {study.participants} participants, the paper {published.n}"
-        if sorted(config.design.methods) != sorted(published.methods):
+        if sorted(config.methods) != sorted(published.methods):
             return f"{config.experiment} has other methods than the paper"
         if config.synthetic.observer == "table":
             return f"the answers of {config.experiment} come from a table of its own"

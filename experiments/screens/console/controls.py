@@ -291,6 +291,8 @@ class Controls:
             case "words":
                 text = typed_line(self._view.typed("words"))  # none is an answer as well
                 self._give(events.Description(text=text), text, press)
+            case None if self.drawn.state is State.INFORMING:
+                self._offer(events.Told(), press)
             case None if self.drawn.state is State.CLOSING:
                 self._offer(events.Finish(), press)
             case _:

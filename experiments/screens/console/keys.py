@@ -85,7 +85,13 @@ KEY_COMMANDS: tuple[KeyCommand, ...] = (
     _C(name="emergency", key="F12", text="EMERGENCY STOP", does="disarms; fires no more", kind=events.EmergencyStop),
     _C(name="fire", key="Space", text="Fire", does="fires, when the gun is handed over", kind=events.Fire),
     _C(name="next", key="Space", text="“Next” was said", does="ends the train", kind=events.Next),
-    _C(name="damper", key="M", text="Damper is set", does="says that the damper is set", kind=events.DamperSet),
+    _C(
+        name="damper",
+        key="M",
+        text="It is set",
+        does="says that what is set by hand is set",
+        kind=events.DamperSet,
+    ),
     *(_C(name=name, key="", text="", does="enters an answer", kind=events.Answer) for name in ANSWERS),
     _C(
         name="enter",
@@ -208,6 +214,8 @@ def why_not(name: Name, position: Position) -> str:
         kind = events.Correct if field_at(position) is None else kind
     if name == "no answer" and position.state is State.CORRECTING:
         kind = events.Correct
+    if name == "enter" and position.state is State.INFORMING:
+        kind = events.Told
     if kind is None:
         return ""
     change = change_of(position, kind)

@@ -38,8 +38,9 @@ from experiments.screens.participant.messages import Look, NoiseIs
 from experiments.screens.participant.pages import spot_px
 from experiments.screens.participant.stage import WINDOW_TITLE
 from experiments.session.states import Position, State
-from experiments.session.steps import Ask, Rate, on_scale
+from experiments.session.steps import Ask, Rate
 from experiments.study.folders import PlaceError, StudyFolder, progress_of
+from experiments.tasks.questions import on_scale
 
 _NO_HANDS = "--visual --participant-screen rates by synthetic events, which only an X display takes"
 
@@ -371,7 +372,7 @@ class VisualParticipant:
                 _type(BREAK_REASON, handle)
             case State.RATING if isinstance(step, Rate):
                 self._rate(self._observer.rate(step.trial, step.question), window, handle)
-            case State.DESCRIBING | State.CLOSING:
+            case State.DESCRIBING | State.INFORMING | State.CLOSING:
                 _key(handle, Qt.Key.Key_Return)
             case _:
                 pass

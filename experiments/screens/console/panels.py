@@ -283,6 +283,7 @@ _OF_STATE: dict[State, tuple[Name, ...]] = {
     State.TRAIN: ("next",),
     State.RATING: ("no answer",),
     State.RESTING: ("end break",),
+    State.INFORMING: ("enter",),
     State.CLOSING: ("enter",),
     State.PAUSED: ("go on",),
     State.HALTED: ("reason",),
@@ -318,7 +319,8 @@ class Buttons:
             self._answers[0].put(choices, range(half))
             self._answers[1].put(choices, range(half, len(choices)))
         for name, button in self._large.items():
-            button.label("End the run" if name == "enter" else "", letters=letters)
+            enters = "It was told" if position.state is State.INFORMING else "End the run"
+            button.label(enters if name == "enter" else "", letters=letters)
         for name, button in self._row.items():
             held = name == "pause" and position.state is State.PAUSED
             button.name = "go on" if held else name

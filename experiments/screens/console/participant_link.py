@@ -20,7 +20,7 @@ from experiments.screens.participant.link import ParticipantError, ParticipantLi
 from experiments.session import events
 from experiments.session.events import OwnHand
 from experiments.session.states import Position, State
-from experiments.session.steps import Ask, Describe, Rate
+from experiments.session.steps import Ask, Describe, Inform, Rate
 
 WAIT, PAUSED, THANKS = "Please wait.", "Paused. Please wait.", "Thank you."
 
@@ -105,6 +105,8 @@ class ParticipantSide:
             return PAUSED
         if (base is State.ASKING and self.own_keys) or (base in (State.RATING, State.DESCRIBING) and by_screen):
             return position.number
+        if base is State.INFORMING and isinstance(position.step, Inform):
+            return position.step.text
         if base is State.SAVING and by_screen:
             return messages.BETWEEN
         return THANKS if base in (State.CLOSING, State.STOPPED) else WAIT

@@ -95,7 +95,7 @@ class ShotCheck:
     def _with_gun(self) -> tuple[str, str]:
         """Open, fire, disarm, read back, close; what came of it, and a word for the colour."""
         self._tell(ShotProgress(phase="opening"))
-        methods = self._setup.gun.renderings(self._setup.config.design.methods)
+        methods = self._setup.gun.renderings(self._setup.config.methods)
         drive = drive_of(methods[self._method])
         with closing(open_gun(self._address, methods, clock=self._clock.now)) as gun:
             self._gun = gun
@@ -234,7 +234,7 @@ class ShotPage(QWidget):
         return f"Test shot: {method.label}{damper}"
 
     def _next_method(self, setup: Setup[Any]) -> str:
-        methods: tuple[str, ...] = setup.config.design.methods
+        methods: tuple[str, ...] = setup.config.methods
         return methods[self._method_at % len(methods)]
 
     def begin(self) -> None:

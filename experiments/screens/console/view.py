@@ -18,7 +18,7 @@ from experiments.screens.console.keys import Name, choices_at, shown_key
 from experiments.session.history import History, entered_value, trial_at
 from experiments.session.remarks import Remark
 from experiments.session.states import Position, State
-from experiments.session.steps import Ask, Asking, Describe, Outcome, Prepare, Present, Rate, Rest, Step, what
+from experiments.session.steps import Ask, Asking, Describe, Inform, Outcome, Prepare, Present, Rate, Rest, Step, what
 
 THANK_PARTICIPANT = "Thank the participant."
 """The last sentence, where nothing else comes next."""
@@ -225,21 +225,21 @@ def _turned(seen: Seen, *, damper: str, then: str) -> Instruction:
     again = texts.again_text(seen.told, step)
     told = texts.read_out_text(seen.about.plan, step).strip()
     return Instruction(
-        title=f"Turn the gun to {step.trial.direction.upper()}\nand hand it over",
-        damper=damper.format(damper=step.damper.upper(), method=method_text(seen.about, step.trial)),
+        title=f"{texts.turn_text(step)}\nand hand it over",
+        damper=damper.format(settings=texts.settings_text(step), method=method_text(seen.about, step.trial)),
         detail="\n".join(filter(None, (told, again, then))),
     )
 
 
 def _setting(seen: Seen) -> Instruction:
     return _turned(
-        seen, damper="Set the damper {damper} ({method})", then=f"Confirm the damper with {seen.key('damper')}."
+        seen, damper="Set the {settings} ({method})", then=f"Confirm that it is set with {seen.key('damper')}."
     )
 
 
 def _preparing(seen: Seen) -> Instruction:
     step = seen.position.step
-    damper = "Damper {damper} ({method})" if isinstance(step, Prepare) and step.damper else ""
+    damper = "The {settings} ({method})" if isinstance(step, Prepare) and step.settings else ""
     return _turned(seen, damper=damper, then=f"Then fire with {seen.key('fire')}.")
 
 
@@ -293,6 +293,18 @@ def _rating(seen: Seen) -> Instruction:
     there = _asked_there(seen, own, "Type here what they say.") if seen.about.participant_rates else ""
     detail = "\n".join(filter(None, (step.text, there)))
     return Instruction(title=texts.about_text(seen.about.plan, step), detail=detail, mood="ask")
+
+
+def _telling(seen: Seen) -> Instruction:
+    step = seen.position.step
+    if not isinstance(step, Inform):
+        return _MOMENT
+    title = {
+        "instruction": "Tell the participant",
+        "consent": "Ask the participant for their consent",
+        "feedback": "Tell the participant",
+    }[step.what]
+    return Instruction(title=title, detail=f"“{step.text}”\n{seen.key('enter')} when that is done.", mood="act")
 
 
 def _resting(seen: Seen) -> Instruction:
@@ -364,6 +376,7 @@ _OF_STATE: dict[State, Instruction | Callable[[Seen], Instruction]] = {
     State.ASKING: _asking,
     State.RATING: _rating,
     State.DESCRIBING: _rating,
+    State.INFORMING: _telling,
     State.RESTING: _resting,
     State.CLOSING: Instruction(
         title="Everything is answered",

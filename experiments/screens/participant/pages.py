@@ -11,7 +11,7 @@ from typing import Any, Literal
 
 from experiments.screens.participant import messages
 from experiments.screens.participant.stage import KeyPresses, Page, Stage, TextBox, half_width
-from experiments.session.steps import on_scale
+from experiments.tasks.questions import on_scale
 
 Drafts = dict[int, float | str]
 """What was set or written on a page that was taken off before it was given, by the question's `draft`."""

@@ -1,0 +1,171 @@
+"""The steps of any design: what is told, trials with intervals and questions, breaks, questions about a block."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+from experiments.config.setup import GunConfig, Setup
+from experiments.design.config import DesignConfig
+from experiments.design.language import INSTRUCTION_FACTOR, TRAIN_INTERVAL, QuestionConfig
+from experiments.design.plan import Plan, Trial
+from experiments.design.stimuli import settings
+from experiments.session.steps import (
+    Ask,
+    Asking,
+    Describe,
+    FireShot,
+    Inform,
+    Prepare,
+    Present,
+    Presenter,
+    Rate,
+    Rest,
+    Session,
+    Step,
+)
+from experiments.tasks.questions import choices, correct_columns, right_answer
+
+RIGHT, WRONG = "That was right.", "That was wrong."
+"""What the participant is told after an answer, where the design says so."""
+
+
+def design_session(plan: Plan, setup: Setup[DesignConfig]) -> Session:
+    """The steps of a run of a design, from what is told first to its end. A practice is told nothing first."""
+    script = _Script(design=setup.config, gun=setup.gun, plan=plan)
+    presenter = Presenter(script.presentation)
+    if not plan.practice:
+        for opening in setup.config.opening:
+            yield from presenter.until_done(Inform(text=opening.text, what=opening.kind))
+    before: Trial | None = None
+    for trial in plan.trials:
+        if before is not None and (before.session, before.set) != (trial.session, trial.set):
+            yield from _block_over(presenter, script, before)
+            yield from _rest(presenter, script.design, before, trial)
+        yield from presenter.present(trial)
+        for told in script.feedback(presenter, trial):
+            yield from presenter.until_done(told)
+        before = trial
+    if before is not None:
+        yield from _block_over(presenter, script, before)
+    yield from presenter.close()
+
+
+def _block_over(presenter: Presenter, script: _Script, last: Trial) -> Session:
+    """What is asked about each trial of a set, in order of presentation, once all were felt."""
+    for trial in script.set_of(last):
+        for step in script.questions(trial, when="block"):
+            yield from presenter.until_done(step)
+
+
+def _rest(presenter: Presenter, design: DesignConfig, before: Trial, trial: Trial) -> Session:
+    breaks = design.breaks
+    if trial.session != before.session and breaks.between_sessions_s:
+        yield from presenter.until_done(Rest(between="sessions", duration_s=breaks.between_sessions_s))
+    elif trial.session == before.session and breaks.between_sets_s:
+        yield from presenter.until_done(Rest(between="sets", duration_s=breaks.between_sets_s))
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class _Script:
+    """What the steps of a design's trials are."""
+
+    design: DesignConfig
+    gun: GunConfig
+    plan: Plan
+
+    def set_of(self, trial: Trial) -> list[Trial]:
+        return [one for one in self.plan.trials if (one.session, one.set) == (trial.session, trial.set)]
+
+    def presentation(self, trial: Trial, attempt: int) -> tuple[Step, ...]:
+        """Every interval, with a hand-over where hands have something to do, then the questions."""
+        return (*self._intervals(trial, attempt), *self.questions(trial, when="trial"))
+
+    def _intervals(self, trial: Trial, attempt: int) -> Iterator[Step]:
+        last: object = None
+        for interval in range(max(1, len(trial.intervals))):
+            by_hand = self._by_hand(trial, interval)
+            handed_over = last is None or by_hand not in (None, last)
+            if handed_over:
+                yield Prepare(
+                    trial=trial,
+                    attempt=attempt,
+                    settings=self._settings(trial, interval),
+                    instruction=self._instruction(trial),
+                    interval=interval,
+                )
+            yield self._stimulus(trial, attempt, interval, 0.0 if handed_over else self.design.trial.gap_s)
+            last = last if by_hand is None else by_hand
+            last = () if last is None else last
+
+    def _by_hand(self, trial: Trial, interval: int) -> object:
+        """What hands do for an interval; `None` where nothing is felt, and so nothing is to be done."""
+        levels = trial.levels_at(interval)
+        return None if levels is None else (trial.direction_at(interval), settings(self.design, self.gun, levels))
+
+    def _settings(self, trial: Trial, interval: int) -> tuple[tuple[str, str], ...]:
+        """What is set by hand: of an empty interval, as for one that is not; of a catch trial what does not vary."""
+        held = (trial.levels_at(place) for place in (interval, *range(len(trial.intervals))))
+        levels = next((levels for levels in held if levels is not None), trial.levels)
+        return settings(self.design, self.gun, levels)
+
+    def _instruction(self, trial: Trial) -> str:
+        return self.design.factors[INSTRUCTION_FACTOR].texts[trial.instruction] if trial.instruction else ""
+
+    def _stimulus(self, trial: Trial, attempt: int, interval: int, gap_s: float) -> Step:
+        kind = self.design.trial
+        if kind.kind != "train":
+            return FireShot(trial=trial, attempt=attempt, interval=interval, gap_s=gap_s)
+        every_s = trial.level(TRAIN_INTERVAL)
+        return Present(
+            trial=trial,
+            attempt=attempt,
+            repeat_every_s=every_s if isinstance(every_s, float) else kind.repeat_every_s,
+            max_shots=kind.max_shots,
+            least_exposure_s=kind.least_exposure_s,
+        )
+
+    def questions(self, trial: Trial, *, when: str) -> Iterator[Asking]:
+        """What is asked about a trial at once, or after its block."""
+        for name, question in self.design.questions.items():
+            if question.when == when:
+                yield self._question(name, question, trial)
+
+    def _question(self, name: str, question: QuestionConfig, trial: Trial) -> Asking:
+        later = question.when == "block"
+        match question.kind:
+            case "choice" | "yes-no":
+                return Ask(trial=trial, question=name, text=question.text, choices=choices(question), later=later)
+            case "text":
+                return Describe(trial=trial, question=name, text=question.text, later=later)
+            case "ranking":
+                return _rate(name, question, trial, (1.0, float(len(self.set_of(trial))), 1.0))
+            case _:
+                return _rate(name, question, trial, question.scale)
+
+    def feedback(self, presenter: Presenter, trial: Trial) -> Iterator[Inform]:
+        """Whether the first scored answer was right, where the design has it told."""
+        told = self.design.practice.feedback if self.plan.practice else self.design.trial.feedback
+        scored = next(iter(correct_columns(self.design.questions)), None)
+        if not told or scored is None or (trial, scored) not in presenter.said:
+            return
+        right = right_answer(self.design, self.design.questions[scored], trial)
+        if right is not None:
+            text = RIGHT if presenter.said[trial, scored] == right else WRONG
+            yield Inform(text=text, what="feedback", trial=trial)
+
+
+def _rate(name: str, question: QuestionConfig, trial: Trial, scale: tuple[float, float, float]) -> Rate:
+    minimum, maximum, grain = scale
+    return Rate(
+        trial=trial,
+        question=name,
+        text=question.text,
+        minimum=minimum,
+        maximum=maximum,
+        minimum_text=question.minimum_text or "",
+        maximum_text=question.maximum_text or "",
+        grain=grain,
+        later=question.when == "block",
+        may_be_skipped=question.may_be_skipped,
+    )
