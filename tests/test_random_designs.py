@@ -12,10 +12,17 @@ from experiments.config.door import ConfigError
 from experiments.design.plan import Plan
 from experiments.design.planned import planned_run
 from experiments.design.planning import groups, plan_of, square_size
-from experiments.record.design_table import columns
+from experiments.design.stimuli import limits
+from experiments.load import load_gun, shipped_folder
+from experiments.record.design_table import columns, design_rows
+from experiments.record.tables import table_bytes
+from experiments.session.steps import Interrupted
 from experiments.tasks.questions import answer_keys, right_answer
 from tests.designs import design
+from tests.driven_designs import driven, session_of
 from tests.random_designs import tables
+
+GUN = load_gun(shipped_folder() / "gun.toml")
 
 
 def planned_from(given_tables):
@@ -40,6 +47,7 @@ def check(given_tables):
     for _, some in groupby(plan.trials, lambda trial: trial.session):
         check_session(config, list(some))
     check_right_answers(config, plan)
+    check_run(config, plan)
     return True
 
 
@@ -80,6 +88,33 @@ def check_right_answers(config, plan):
         for trial in plan.trials:
             right = right_answer(config, question, trial)
             assert right is None or right in question.named_answers
+
+
+def check_run(config, plan):
+    """Worked to its end it has all answers, also if it breaks off anywhere; what was done before is done again."""
+    try:
+        limits(config, GUN)
+    except ConfigError:  # the gun cannot: test_stimuli has its words
+        return
+    whole = list(driven(session_of(config, GUN, plan)))
+    check_rows(config, plan, whole)
+    for part in range(5):
+        place = (plan.seed * 31 + part * len(whole)) // 5 % len(whole)
+        outcomes = [outcome for _, outcome in whole[:place]]
+        assert list(driven(session_of(config, GUN, plan), *outcomes)) == whole
+        broken = list(driven(session_of(config, GUN, plan), *outcomes, Interrupted(presented=True)))
+        assert [step for step, _ in broken[: place + 1]] == [step for step, _ in whole[: place + 1]]
+        check_rows(config, plan, broken)
+
+
+def check_rows(config, plan, told):
+    rows = design_rows(plan, told, config)
+    table = columns(config)
+    assert {name for row in rows for name in row} >= {column.name for column in table if column.required}
+    assert len(table_bytes(table, rows).splitlines()) >= len(rows) + 1
+    for row in rows:
+        assert all(row.get(name) is not None for name in config.questions)
+        assert row["attempts"] >= 1
 
 
 @settings(max_examples=150, deadline=None)

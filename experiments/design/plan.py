@@ -170,8 +170,8 @@ class Plan:
 
     @property
     def methods(self) -> tuple[str, ...]:
-        """The methods in the order in which they are met."""
-        return tuple(dict.fromkeys(trial.method for trial in self.trials))
+        """The methods in the order in which they are met, but for those that are compared within a trial."""
+        return tuple(dict.fromkeys(trial.method for trial in self.trials if trial.method))
 
     def opens_set(self, trial: Trial) -> bool:
         """Whether a trial is the first of its set."""

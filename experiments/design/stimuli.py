@@ -71,8 +71,8 @@ def by_hand(design: DesignConfig) -> tuple[str, ...]:
 
 def settings(design: DesignConfig, gun: GunConfig, levels: Condition) -> tuple[tuple[str, str], ...]:
     """What is set by hand for a cell, as the experimenter reads it: the method's damper, unless a factor says how."""
-    names = by_hand(design)
-    held = dict(damper(gun, str(dict(levels)[METHOD_FACTOR])))
+    names, method = by_hand(design), dict(levels).get(METHOD_FACTOR)
+    held = {} if method is None else dict(damper(gun, str(method)))
     return tuple((held | {name: design.factors[name].label(level) for name, level in levels if name in names}).items())
 
 

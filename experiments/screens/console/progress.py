@@ -5,9 +5,12 @@ from __future__ import annotations
 from collections.abc import Collection, Sequence
 from dataclasses import dataclass, field
 from datetime import datetime, timedelta
+from itertools import pairwise
 
 from device import GunStatus
+from experiments.design.config import DesignConfig
 from experiments.design.plan import Trial
+from experiments.design.stimuli import damper, settings
 from experiments.screens import texts
 from experiments.screens.console.view import About, GunSeen, Seen
 from experiments.session import steps
@@ -101,7 +104,8 @@ def _breaks_left_s(seen: Seen) -> float:
     taken_s = sum(
         step.duration_s for step, word in seen.told if isinstance(step, steps.Rest) and isinstance(word, steps.Rested)
     )
-    left_s: float = seen.about.setup.config.break_s - taken_s
+    trials = seen.about.plan.trials
+    left_s = sum(_break_s(seen.about, before, trial) for before, trial in pairwise(trials)) - taken_s
     if position.base is State.RESTING and position.until_s is not None and isinstance(position.step, steps.Rest):
         since_s = seen.now_s if position.paused_s is None else position.paused_s
         left_s -= position.step.duration_s - max(0.0, position.until_s - since_s)
@@ -158,11 +162,18 @@ def coming(seen: Seen, count: int = 3) -> list[str]:
 
 
 def _to_do(about: About, before: Trial, trial: Trial) -> list[str]:
-    methods = about.setup.gun.methods
-    damper, was = methods[trial.method].damper, methods[before.method].damper
+    wanted, was = _set_by_hand(about, trial), _set_by_hand(about, before)
     told = [f"instruction: {trial.instruction}"] if trial.instruction and about.plan.opens_set(trial) else []
-    changed = f", DAMPER {damper.upper()}" if damper and damper != was else ""
+    changed = "".join(f", {name.upper()} {value.upper()}" for name, value in wanted.items() if was.get(name) != value)
     return [*told, f"{trial.direction.upper()}{changed}"]
+
+
+def _set_by_hand(about: About, trial: Trial) -> dict[str, str]:
+    """What is set by hand for a trial, or for its first interval."""
+    config, gun = about.setup.config, about.setup.gun
+    if isinstance(config, DesignConfig):
+        return dict(settings(config, gun, trial.levels_at(0) or trial.levels))
+    return dict(damper(gun, trial.method))
 
 
 def _still_to_rate(seen: Seen, step: steps.Rate | steps.Describe) -> list[str]:
@@ -173,11 +184,16 @@ def _still_to_rate(seen: Seen, step: steps.Rate | steps.Describe) -> list[str]:
 
 
 def _break_between(about: About, before: Trial, trial: Trial) -> list[str]:
+    seconds = _break_s(about, before, trial)
+    return [f"break of {texts.duration_text(seconds)}"] if seconds else []
+
+
+def _break_s(about: About, before: Trial, trial: Trial) -> float:
+    """How long the break between two trials is; 0 without one."""
     breaks = getattr(about.setup.config, "breaks", None)
     if breaks is None or (before.session, before.set) == (trial.session, trial.set):
-        return []
-    seconds = breaks.between_sets_s if before.session == trial.session else breaks.between_sessions_s
-    return [f"break of {texts.duration_text(seconds)}"] if seconds else []
+        return 0.0
+    return float(breaks.between_sets_s if before.session == trial.session else breaks.between_sessions_s)
 
 
 def answer_lines(seen: Seen) -> list[str]:

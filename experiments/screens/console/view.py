@@ -162,9 +162,11 @@ def method_code(plan: Plan, trial: Trial) -> str:
 
 
 def method_text(about: About, trial: Trial) -> str:
-    """The method's name where its damper is set by hand, else its code."""
+    """The method's name where its damper is set by hand, else its code; in brackets, as it stands behind others."""
+    if not trial.method:  # it varies within the trial, or there is no stimulus
+        return ""
     method = about.setup.gun.methods[trial.method]
-    return method.label if method.damper else method_code(about.plan, trial)
+    return f" ({method.label if method.damper else method_code(about.plan, trial)})"
 
 
 def where_text(seen: Seen) -> str:
@@ -172,7 +174,7 @@ def where_text(seen: Seen) -> str:
     if seen.ended is not None and seen.position.step is None:
         return ""
     place = texts.place_text(seen.about.plan, seen.here)
-    return f"{place} ({method_text(seen.about, seen.here)})" if seen.about.plan.trials[-1].session > 1 else place
+    return f"{place}{method_text(seen.about, seen.here)}" if seen.about.plan.trials[-1].session > 1 else place
 
 
 def bands(seen: Seen) -> list[tuple[str, str]]:
@@ -232,14 +234,15 @@ def _turned(seen: Seen, *, damper: str, then: str) -> Instruction:
 
 
 def _setting(seen: Seen) -> Instruction:
-    return _turned(
-        seen, damper="Set the {settings} ({method})", then=f"Confirm that it is set with {seen.key('damper')}."
-    )
+    step = seen.position.step
+    names = " and ".join(name for name, _ in step.settings) if isinstance(step, Prepare) else ""
+    then = f"Confirm the {names} with {seen.key('damper')}."
+    return _turned(seen, damper="Set the {settings}{method}", then=then)
 
 
 def _preparing(seen: Seen) -> Instruction:
     step = seen.position.step
-    damper = "The {settings} ({method})" if isinstance(step, Prepare) and step.settings else ""
+    damper = "The {settings}{method}" if isinstance(step, Prepare) and step.settings else ""
     return _turned(seen, damper=damper, then=f"Then fire with {seen.key('fire')}.")
 
 

@@ -1,0 +1,114 @@
+"""Whole runs of designs from files: each is worked to its end, broken off anywhere and gone on with, and rebuilt."""
+
+from __future__ import annotations
+
+import csv
+import io
+from pathlib import Path
+
+import pytest
+
+from experiments.catalogue import experiment, rebuild
+from experiments.clock import VirtualClock
+from experiments.design.planning import groups, practice_of
+from experiments.load import load_setup
+from experiments.record.journal import read_journal
+from experiments.record.replay import history
+from experiments.run import RunRequest, run
+from experiments.screens.synthetic import synthetic_screen
+from experiments.session.steps import Inform, Prepare, Rest
+from experiments.study.folders import place
+
+FOLDER = Path(__file__).parent / "ten_designs"
+TEN = ("direction", "preference", "voltages", "detection", "stronger", "magnitude", "realism", "pairs", "grip", "hurry")
+SETUPS = {name: load_setup(str(FOLDER / f"{name}.toml")) for name in TEN}
+
+
+def carried_out(name, results, code="P01", again="ask", **more):
+    request = RunRequest(setup=SETUPS[name], participant_id=code, results=results, seed=1, again=again, **more)
+    return run(request, synthetic_screen, VirtualClock())
+
+
+def rows_of(data):
+    return list(csv.DictReader(io.StringIO(data.decode(), newline="")))
+
+
+def answers(name, rows):
+    asked = [*SETUPS[name].config.questions, "correct"]
+    return [{key: row[key] for key in asked if key in row} for row in rows]
+
+
+@pytest.fixture(scope="module", params=TEN)
+def whole(request, tmp_path_factory):
+    results = tmp_path_factory.mktemp(request.param)
+    finished = carried_out(request.param, results)
+    return request.param, finished, finished.place.journal.read_bytes().splitlines(keepends=True)
+
+
+def test_every_planned_trial_has_a_row_with_every_answer(whole):
+    name, finished, _ = whole
+    design = SETUPS[name].config
+    rows = rows_of(finished.place.table.read_bytes())
+    assert finished.place.table.name.endswith(f"_{design.table}.csv")
+    assert [*rows[0]] == [column.name for column in experiment(SETUPS[name]).columns(design)]
+    assert len(rows) == len(finished.plan.trials)
+    for row, trial in zip(rows, finished.plan.trials, strict=True):
+        assert all(row[question] for question in design.questions)
+        assert {row[factor] for factor, level in trial.levels if factor in row and not isinstance(level, float)} == {
+            str(level) for factor, level in trial.levels if factor in row and not isinstance(level, float)
+        }
+        assert row["attempts"] == "1"
+
+
+def test_its_table_is_made_again_from_the_journal_byte_for_byte(whole):
+    _, finished, _ = whole
+    path, data, contents = rebuild(finished.place.journal)
+    assert (path, data) == (finished.place.table, finished.place.table.read_bytes())
+    assert contents.plan == finished.plan
+
+
+def test_broken_off_anywhere_and_gone_on_with_it_has_the_same_answers(whole, tmp_path):
+    name, finished, lines = whole
+    expected = answers(name, rows_of(finished.place.table.read_bytes()))
+    for part in (0.02, 0.31, 0.5, 0.77, 0.99):
+        results = tmp_path / str(part)
+        where = place(results, "P01", name)
+        where.folder.mkdir(parents=True)
+        where.journal.write_bytes(b"".join(lines[: max(1, int(part * len(lines)))]))
+        again = carried_out(name, results, again="resume")
+        assert again.plan == finished.plan
+        assert answers(name, rows_of(again.place.table.read_bytes())) == expected
+
+
+def test_what_the_participant_is_told_first_is_in_the_journal(tmp_path):
+    finished = carried_out("voltages", tmp_path)
+    told = [step.what for step, _ in history(read_journal(finished.place.journal)) if isinstance(step, Inform)]
+    assert told == ["consent", "instruction"]
+
+
+def test_groups_are_filled_in_turn_and_rows_of_the_square_as_well(tmp_path):
+    count = len(groups(SETUPS["grip"].config))
+    found = [carried_out("grip", tmp_path, f"P0{number}").plan for number in range(1, 2 * count + 1)]
+    assert [plan.group for plan in found] == [*range(count)] * 2
+    orders = [carried_out("realism", tmp_path, f"P0{number}").plan.order_row for number in (1, 2, 3)]
+    assert orders == [0, 1, 0]
+
+
+def test_a_hand_sets_the_damper_once_a_session_where_the_design_says_so(tmp_path):
+    finished = carried_out("realism", tmp_path)
+    told = history(read_journal(finished.place.journal))
+    settings = [dict(step.settings)["damper"] for step, _ in told if isinstance(step, Prepare)]
+    assert len(set(settings[:6])) == len(set(settings[6:])) == 1
+    assert settings[0] != settings[-1]
+    assert not any(isinstance(step, Rest) for step, _ in told) or SETUPS["realism"].config.breaks.between_sessions_s
+
+
+def test_a_practice_has_some_of_each_cell_and_is_kept_apart(tmp_path):
+    shipped = SETUPS["direction"].config
+    practice = shipped.practice.model_copy(update={"repetitions": 2, "of": ("method",)})
+    design = shipped.model_copy(update={"practice": practice})
+    plan = practice_of(design, "P01", 1)
+    assert plan is not None
+    assert plan.practice
+    assert sorted(trial.method for trial in plan.trials) == sorted([*design.methods] * 2)
+    assert practice_of(SETUPS["voltages"].config, "P01", 1) is None
