@@ -260,6 +260,11 @@ class ExperimentConfig(Model):
         return 0.0
 
     @property
+    def asks_later(self) -> bool:
+        """Whether something is asked of each trial after all were felt."""
+        return self.rating_s > 0
+
+    @property
     def rating_s(self) -> float:
         """Planned time of what is asked of a trial after all were felt."""
         return 0.0

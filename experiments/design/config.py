@@ -82,6 +82,11 @@ class DesignConfig(Model):
         return self.timing.hand_over_s + self.timing.stimulus_s + (self.timing.answer_s if asked else 0.0)
 
     @property
+    def asks_later(self) -> bool:
+        """Whether something is asked about each trial after its block."""
+        return any(question.when == "block" for question in self.questions.values())
+
+    @property
     def rating_s(self) -> float:
         """Planned time of what is asked about a trial after its block."""
         return self.timing.answer_s * sum(question.when == "block" for question in self.questions.values())

@@ -153,6 +153,11 @@ class PreferenceConfig(ExperimentConfig):
         return self.timing.hand_over_s + self.timing.exposure_s
 
     @property
+    def asks_later(self) -> bool:
+        """Each method is rated after all were felt."""
+        return True
+
+    @property
     def rating_s(self) -> float:
         """Planned time of a trial's rating and description, after all were felt."""
         return self.timing.rating_s + self.timing.description_s

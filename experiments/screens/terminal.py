@@ -123,8 +123,8 @@ class TerminalScreen:
                 about = f"{texts.ordinal(self._plan, step.trial)}. " if step.later else ""
                 return f"\n  {about}{step.text} {_keys(step)}: "
             case State.RATING if isinstance(step, Rate):
-                ends = f"{step.minimum:g} = {step.minimum_text}, {step.maximum:g} = {step.maximum_text}"
-                return f"\n{texts.about_text(self._plan, step)}. {step.text}\n  {ends}; `none` for no answer: "
+                none = "; `none` for no answer" if step.may_be_skipped else ""
+                return f"\n{texts.about_text(self._plan, step)}. {step.text}\n  {texts.ends_text(step)}{none}: "
             case State.DESCRIBING if isinstance(step, Describe):
                 return f"\n  {texts.about_text(self._plan, step)}. {step.text} "
             case State.RESTING:

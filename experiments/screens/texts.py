@@ -7,11 +7,12 @@ from __future__ import annotations
 
 import unicodedata
 
+from experiments.design.language import LARGEST_NUMBER
 from experiments.design.plan import Plan, Trial
 from experiments.session import remarks, steps
 from experiments.session.history import History, asked_before, entered_value, is_attempt, of_one_set
 from experiments.session.remarks import MAX_FLAG, Remark
-from experiments.session.steps import Ask, Asking, Describe, Outcome, Prepare, Step, Value, trial_of, what
+from experiments.session.steps import Ask, Asking, Describe, Outcome, Prepare, Rate, Step, Value, trial_of, what
 
 FLAG_RULE = f"A flag is a word of at most {MAX_FLAG} letters, digits and hyphens."
 
@@ -54,7 +55,8 @@ def _nth(number: int) -> str:
 def settings_text(step: Prepare) -> str:
     """What is set by hand, and how.
 
-    >>> from experiments.design.plan import Trial
+    >>> from experiments.design.language import LARGEST_NUMBER
+    from experiments.design.plan import Trial
     >>> trial = Trial(session=1, set=1, trial=1, levels=())
     >>> settings_text(Prepare(trial=trial, attempt=1, settings=(("damper", "on"), ("posture", "kneeling"))))
     'damper ON, posture KNEELING'
@@ -84,6 +86,20 @@ def value_text(asked: Asking, said: Value) -> str:
     if isinstance(said, float):
         return f"{said:g}"
     return asked.label(said).upper() if isinstance(asked, Ask) else f"“{said}”"
+
+
+def ends_text(asked: Rate) -> str:
+    """The ends of a scale in words, or which numbers may be said."""
+    if asked.minimum_text or asked.maximum_text:
+        return f"{asked.minimum:g} = {asked.minimum_text}     {asked.maximum:g} = {asked.maximum_text}"
+    low = "above 0" if 0 < asked.minimum <= _TINY else f"from {asked.minimum:g}"
+    low = "" if asked.minimum <= -LARGEST_NUMBER else low
+    high = "" if asked.maximum >= LARGEST_NUMBER else f"to {asked.maximum:g}"
+    return " ".join(filter(None, ("a number", low, high)))
+
+
+_TINY = 1e-6
+"""A least number as small as this says that 0 is none."""
 
 
 def about_text(plan: Plan, asked: Asking) -> str:

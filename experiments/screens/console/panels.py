@@ -11,6 +11,7 @@ from PyQt6 import QtWidgets
 from PyQt6.QtCore import QPointF, QRectF, Qt
 from PyQt6.QtGui import QMouseEvent, QPainter, QPaintEvent, QResizeEvent, QShowEvent
 
+from experiments.screens import texts
 from experiments.screens.console import progress, widgets
 from experiments.screens.console.controls import TextField
 from experiments.screens.console.keys import ANSWERS, BY_NAME, Name, choices_at, field_at, shown_key
@@ -133,7 +134,7 @@ class TextFields:
         self._belongs = belongs
         draft = self._drafts.pop(belongs, "") if position.correcting is None else ""
         if isinstance(step := position.correcting or position.step, Rate):
-            self._ends.setText(f"{step.minimum:g} = {step.minimum_text}     {step.maximum:g} = {step.maximum_text}")
+            self._ends.setText(texts.ends_text(step))
         for field in (self.rating, self.words):
             field.setText(draft or said)
             if not draft:
@@ -333,8 +334,12 @@ class Buttons:
 
 def _shown(position: Position, *, screen_lost: bool) -> tuple[Name, ...]:
     if position.state is State.CORRECTING:
-        return ("no answer",) if field_at(position) == "number" else ()
-    return (*_OF_STATE.get(position.state, ()), *(("restart",) if screen_lost else ()))
+        shown: tuple[Name, ...] = ("no answer",) if field_at(position) == "number" else ()
+    else:
+        shown = (*_OF_STATE.get(position.state, ()), *(("restart",) if screen_lost else ()))
+    asked = position.correcting or position.step
+    needed = isinstance(asked, Rate) and not asked.may_be_skipped
+    return tuple(name for name in shown if not (name == "no answer" and needed))
 
 
 LONGEST_S = 3.0

@@ -20,12 +20,17 @@ from experiments.screens.participant.link import ParticipantError, ParticipantLi
 from experiments.session import events
 from experiments.session.events import OwnHand
 from experiments.session.states import Position, State
-from experiments.session.steps import Ask, Describe, Inform, Rate
+from experiments.session.steps import Ask, Describe, Inform, Rate, Step
 
 WAIT, PAUSED, THANKS = "Please wait.", "Paused. Please wait.", "Thank you."
 
 Wanted = Callable[[], bool]
 """Whether a question is still to be asked."""
+
+
+def _has_a_page(step: Step | None) -> bool:
+    """Whether something can be asked on the participant's own screen: a scale or words, not any number."""
+    return isinstance(step, Describe) or (isinstance(step, Rate) and step.grain > 0)
 
 
 class ParticipantSide:
@@ -100,7 +105,7 @@ class ParticipantSide:
         return {one.own_key: one.answer for one in choices_at(position) or self._choices}
 
     def _to_be_shown(self, position: Position) -> str | int:
-        base, by_screen = position.base, self.rates and isinstance(position.step, Rate | Describe)
+        base, by_screen = position.base, self.rates and _has_a_page(position.step)
         if State.PAUSED in position.states:
             return PAUSED
         if (base is State.ASKING and self.own_keys) or (base in (State.RATING, State.DESCRIBING) and by_screen):

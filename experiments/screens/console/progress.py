@@ -94,8 +94,7 @@ def remaining_s(seen: Seen, progress: RunTiming) -> float:
     """Seconds still to go: trials left, breaks left, what is left of this one, and the ratings still to come."""
     config, planned = seen.about.setup.config, len(seen.about.plan.trials)
     left = planned - len(done(seen.told))
-    rated = sum(isinstance(step, steps.Rate) and isinstance(word, steps.Answered) for step, word in seen.told)
-    ratings_s = max(0, planned - rated) * config.rating_s
+    ratings_s = max(0, planned - len(answered(seen.told))) * config.rating_s
     return float(left * progress.trial_s(config.trial_s) + _breaks_left_s(seen) + ratings_s)
 
 
@@ -145,7 +144,7 @@ def coming(seen: Seen, count: int = 3) -> list[str]:
     step = seen.position.step
     if seen.ended is not None or seen.position.base is State.HALTED:
         return []
-    if isinstance(step, steps.Rate | steps.Describe):
+    if isinstance(step, steps.Rate | steps.Describe) and step.later:
         return _still_to_rate(seen, step)[:count]
     if isinstance(step, steps.Close):
         return ["the end"]
@@ -156,7 +155,7 @@ def coming(seen: Seen, count: int = 3) -> list[str]:
         if lines or not isinstance(step, steps.Rest):  # a break that is taken now is not still to come
             lines += _break_between(seen.about, before, trial)
         lines += _to_do(seen.about, before, trial)
-    if len(lines) < count and seen.about.setup.config.rating_s:
+    if len(lines) < count and seen.about.rated_last:
         lines.append("ratings and descriptions")
     return lines[:count] or ["the end"]
 

@@ -104,8 +104,8 @@ class About:
 
     @property
     def rated_last(self) -> bool:
-        """Whether all stimuli are rated after all were felt."""
-        return bool(self.setup.config.rating_s)
+        """Whether all stimuli of a block are rated after all were felt."""
+        return bool(self.setup.config.asks_later)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -291,11 +291,11 @@ def _rating(seen: Seen) -> Instruction:
     step = seen.position.step
     if not isinstance(step, Rate | Describe):
         return _MOMENT
-    what = "rating" if isinstance(step, Rate) else "description"
-    own = f"Awaited: the participant's {what} on their own screen, or type it here."
+    kind = what(step)
+    own = f"Awaited: the participant's {kind} on their own screen, or type it here."
     there = _asked_there(seen, own, "Type here what they say.") if seen.about.participant_rates else ""
-    detail = "\n".join(filter(None, (step.text, there)))
-    return Instruction(title=texts.about_text(seen.about.plan, step), detail=detail, mood="ask")
+    title, *more = (texts.ordinal(seen.about.plan, step.trial), step.text) if step.later else (step.text,)
+    return Instruction(title=title, detail="\n".join(filter(None, (*more, there))), mood="ask")
 
 
 def _telling(seen: Seen) -> Instruction:
