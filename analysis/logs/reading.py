@@ -12,6 +12,7 @@ from pathlib import Path
 import pandas as pd
 
 from analysis.logs.column_map import ColumnMap, MappedLog, is_recoils, read_mapped
+from analysis.logs.design_logs import DesignLog, DesignLogs, is_of_design, joined_designs, read_design_log
 from analysis.logs.files import ENDINGS, BadLogError, Problem, code_in_name, find_logs, read_content, study_names
 from analysis.logs.rules import Log, check_logs
 from analysis.logs.texts import Block, TextTable, joined, table_of_records, text_tables
@@ -43,6 +44,7 @@ class Logs:
     ratings: pd.DataFrame
     problems: tuple[Problem, ...]
     files: tuple[Path, ...]
+    designs: tuple[DesignLogs, ...] = ()
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -91,12 +93,12 @@ class _Reading:
             try:
                 if isinstance(log, BadLogError):
                     raise log
-                self._admit(number, one, log, batch.studies.get(number) or one.study)
+                self.admit(number, one, log, batch.studies.get(number) or one.study)
             except BadLogError as bad:
                 problem = Problem(file=one.file, line=bad.line, column=bad.column, message=bad.message)
                 self.problems.append(problem)
 
-    def _admit(self, number: int, one: _Waiting, log: Log, study: str) -> None:
+    def admit(self, number: int, one: _Waiting, log: Log, study: str) -> None:
         """Take a participant's log of an experiment. `BadLogError`: they are excluded, or have one already."""
         results = one.path.rpartition(os.sep)[0].rpartition(os.sep)[0] or str(one.file.parent.parent)
         if results not in self.excluded:
@@ -135,17 +137,51 @@ def read_logs(paths: Iterable[str | Path], track: Track = iter, mapping: ColumnM
     """
     endings = mapping.files_end_with if mapping else ()
     found, problems = find_logs([Path(path) for path in paths], (*ENDINGS, *endings))
+    designed = {path: study for path, study in found.items() if is_of_design(path)}
+    found = {path: study for path, study in found.items() if path not in designed}
     reading = _Reading(problems=problems)
     for waiting, batch in _checked_batches(_batches(found, track), mapping):
         reading.add(waiting, batch)
+    designs = _designed(reading, designed, track, len(found))
     names = study_names(folder for folder in set(reading.studies.values()) if Path(folder).is_absolute())
     studies = {number: names.get(study, study) for number, study in reading.studies.items()}
     return Logs(
         trials=joined("direction", reading.blocks, studies),
         ratings=joined("preference", reading.blocks, studies),
+        designs=_by_design(reading, designs, studies),
         problems=tuple(reading.problems),
         files=tuple(reading.files.values()),
     )
+
+
+def _designed(reading: _Reading, found: Mapping[str, str], track: Track, first: int) -> dict[int, DesignLog]:
+    """The good logs of designs, numbered behind the others."""
+    logs: dict[int, DesignLog] = {}
+    files = zip(found.items(), track([Path(path) for path in found]), strict=True) if found else ()
+    for number, ((path, study), file) in enumerate(files, start=first):
+        waiting = _Waiting(number=number, file=file, path=path, study=study, content=b"")
+        try:
+            log = read_design_log(path)
+            reading.admit(number * _LOGS_A_FILE, waiting, Log(code=log.code, experiment=log.design.design), study)
+            logs[number * _LOGS_A_FILE] = log
+        except BadLogError as bad:
+            reading.problems.append(Problem(file=file, line=bad.line, column=bad.column, message=bad.message))
+    return logs
+
+
+def _by_design(reading: _Reading, logs: Mapping[int, DesignLog], studies: Mapping[int, str]) -> tuple[DesignLogs, ...]:
+    """The logs by design; one that was made with another design than most of its name is left out."""
+    several = len(set(studies.values())) > 1
+    found, others = joined_designs([(log, studies[number]) for number, log in logs.items()], several=several)
+    for number, log in logs.items():
+        if log.key in others:
+            file = reading.files.pop(number // _LOGS_A_FILE)
+            message = (
+                f"was made with another design {log.design.design!r} than most logs of that name (its factors, order, "
+                "trial or questions differ); analyse it apart"
+            )
+            reading.problems.append(Problem(file=file, line=None, column=None, message=message))
+    return tuple(found)
 
 
 def _batches(found: Mapping[str, str], track: Track) -> Iterator[list[_Waiting]]:

@@ -17,6 +17,8 @@ if TYPE_CHECKING:
 
 OPTIONAL: Final = {"optional": True}
 """Metadata of a field that is left out where it is None."""
+SPREAD: Final = {"spread": True}
+"""Metadata of a mapping whose values stand under their own names beside its neighbours."""
 
 
 def beside(result: type) -> dict[str, type]:
@@ -114,7 +116,9 @@ def _members(result: Any) -> Iterator[tuple[str, Any]]:
     """The names and values of a result as they are written."""
     for field in fields(result):
         value, inner = getattr(result, field.name), field.metadata.get("beside")
-        if inner is not None:
+        if field.metadata.get("spread"):
+            yield from value.items()
+        elif inner is not None:
             yield from dict.fromkeys(f.name for f in fields(inner)).items() if value is None else _members(value)
         elif value is not None or not field.metadata.get("optional"):
             how = field.metadata.get("how")

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 import pandas as pd
@@ -21,61 +21,10 @@ from analysis.stats.binomial import binomial_test, yes_no
 from analysis.stats.discrimination import Task, discrimination
 from analysis.stats.factorial import FactorialEffect, mixed, two_within
 from analysis.stats.paired import friedman
+from analysis.summary.results import ConditionSummary, DesignSummary, DesignTest, QuestionSummary
 from experiments.design.config import DesignConfig
-from experiments.design.language import Level, QuestionConfig
+from experiments.design.language import QuestionConfig
 from experiments.tasks.questions import chance, correct_columns
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class ConditionSummary:
-    """One condition. `mean` and `sd` over people (n - 1); of scored answers the count right against chance, exact.
-
-    `mean` of numbers is geometric, `sd` then that of their natural logarithms.
-    """
-
-    levels: Mapping[str, Level]
-    people: int
-    trials: int
-    mean: float | None
-    sd: float | None
-    right: int | None = None
-    p: float | None = None
-    ci_low: float | None = None
-    ci_high: float | None = None
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class DesignTest:
-    """A test or an estimate. `statistic` is what `name` says; `None` with a `reason` where it could not be made."""
-
-    name: str
-    effect: str
-    statistic: float | None = None
-    df: tuple[int, ...] | None = None
-    p: float | None = None
-    size: float | None = None
-    ci_low: float | None = None
-    ci_high: float | None = None
-    reason: str | None = None
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class QuestionSummary:
-    """All that one question gave. `left_out`: who has no score in some condition, and so is in no test."""
-
-    kind: str
-    cells: tuple[ConditionSummary, ...]
-    tests: tuple[DesignTest, ...]
-    left_out: tuple[str, ...] = ()
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class DesignSummary:
-    """The statistics of a design: as they stand in `statistics.json` under its name."""
-
-    n: int
-    factors: Mapping[str, tuple[Level, ...]]
-    questions: Mapping[str, QuestionSummary]
 
 
 def summarise(design: DesignConfig, table: pd.DataFrame) -> DesignSummary:

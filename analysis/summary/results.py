@@ -14,7 +14,7 @@ from typing import Any
 
 from analysis.logs.exclusions import KeptTrials, LeftOut
 from analysis.report import apa
-from analysis.report.serial import OPTIONAL, NotebookResult, beside
+from analysis.report.serial import OPTIONAL, SPREAD, NotebookResult, beside
 from analysis.stats.cells import ByParticipant
 from analysis.stats.diagnostics import EffectSize, Normality, Sphericity
 from analysis.stats.logit_model import Clustering, LogitModel
@@ -22,6 +22,7 @@ from analysis.stats.paired import PairedT, SignedRanks
 from analysis.summary.remarks_coding import CodedRemarks
 from analysis.times.own_trials import ResponseTimes
 from analysis.times.speed_accuracy import NoSpeedAccuracy, SpeedAccuracy
+from experiments.design.language import Level
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -295,6 +296,58 @@ class DirectionStatistics(WithinStatistics):
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
+class ConditionSummary:
+    """One condition. `mean` and `sd` over people (n - 1); of scored answers the count right against chance, exact.
+
+    `mean` of numbers is geometric, `sd` then that of their natural logarithms.
+    """
+
+    levels: Mapping[str, Level]
+    people: int
+    trials: int
+    mean: float | None
+    sd: float | None
+    right: int | None = None
+    p: float | None = None
+    ci_low: float | None = None
+    ci_high: float | None = None
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class DesignTest:
+    """A test or an estimate. `statistic` is what `name` says; `None` with a `reason` where it could not be made."""
+
+    name: str
+    effect: str
+    statistic: float | None = None
+    df: tuple[int, ...] | None = None
+    p: float | None = None
+    size: float | None = None
+    ci_low: float | None = None
+    ci_high: float | None = None
+    reason: str | None = None
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class QuestionSummary:
+    """All that one question gave. `left_out`: who has no score in some condition, and so is in no test."""
+
+    kind: str
+    cells: tuple[ConditionSummary, ...]
+    tests: tuple[DesignTest, ...]
+    left_out: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class DesignSummary:
+    """The statistics of a design: as they stand in `statistics.json` under its name."""
+
+    n: int
+    factors: Mapping[str, tuple[Level, ...]]
+    questions: Mapping[str, QuestionSummary]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
 class RulesApplied:
     """The rules of exclusion that were asked for, and what they dropped: trials by participant and rule."""
 
@@ -306,10 +359,14 @@ class RulesApplied:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class StudyStatistics(NotebookResult):
-    """The statistics of logs; None for an experiment without a log. `studies` of each study, if there are several."""
+    """The statistics of logs; None for an experiment without a log. `studies` of each study, if there are several.
+
+    `designs` by their names, which stand beside the two experiments in the file.
+    """
 
     direction: DirectionStatistics | None = field(default=None, metadata=OPTIONAL)
     preference: WithinStatistics | None = field(default=None, metadata=OPTIONAL)
+    designs: Mapping[str, DesignSummary] = field(default_factory=dict, metadata=SPREAD)
     excluded: tuple[LeftOut, ...] = ()
     warnings: tuple[str, ...] = ()
     versions: Mapping[str, str] | None = field(default=None, metadata=OPTIONAL)

@@ -47,6 +47,7 @@ from analysis.stats.paired import (
 )
 from analysis.summary import results
 from analysis.summary.assumptions import assumptions
+from analysis.summary.designs import summarise
 from analysis.times.own_trials import INSTRUCTION, response_times, timed
 from analysis.times.speed_accuracy import speed_accuracy
 from device.words import DIRECTIONS
@@ -73,7 +74,10 @@ def summarize(logs: Logs, *, trade: bool = True) -> results.StudyStatistics:
     """
     direction, left_out = _direction(logs.trials, trade=trade) if len(logs.trials) else (None, [])
     preference, also_out = _preference(logs.ratings) if len(logs.ratings) else (None, [])
-    found = results.StudyStatistics(direction=direction, preference=preference, excluded=(*left_out, *also_out))
+    designs = {one.design.design: summarise(one.design, one.table) for one in logs.designs}
+    found = results.StudyStatistics(
+        direction=direction, preference=preference, designs=designs, excluded=(*left_out, *also_out)
+    )
     return replace(found, warnings=tuple(_warnings(found)), versions=statistics_versions())
 
 

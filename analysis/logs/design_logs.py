@@ -1,0 +1,169 @@
+"""The logs of designs: each is read by the design that stands in the first line of its journal, beside it."""
+
+from __future__ import annotations
+
+import csv
+import re
+from collections import Counter
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import pandas as pd
+
+from analysis.logs.files import BadLogError, code_in_name, read_content
+from analysis.logs.rules import cell_fault, cell_value
+from experiments.catalogue import of_head
+from experiments.config.setup import sha256
+from experiments.design.config import DesignConfig
+from experiments.design.plan import Plan
+from experiments.record import journal
+from experiments.record.design_table import columns
+from experiments.record.journal import JournalError
+from experiments.record.tables import TABLES, Column
+from experiments.tasks.questions import correct_columns, is_right
+
+_TASK = re.compile(r"_task-([a-z]+)_[^/\\]*$")
+_JOURNAL = re.compile(r"_[a-z]+\.csv$")
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class DesignLogs:
+    """All logs of one design: a row a trial, with the columns of the design and the study; empty cells are NA."""
+
+    design: DesignConfig
+    table: pd.DataFrame
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class DesignLog:
+    """One log that keeps every rule; `key` is the same for logs that can be analysed together."""
+
+    code: str
+    design: DesignConfig
+    key: str
+    rows: tuple[Mapping[str, object], ...]
+
+
+def is_of_design(path: str) -> bool:
+    """Whether a file's name is that of a design's log: of any experiment but the two that have tables of their own."""
+    found = _TASK.search(path)
+    return found is not None and found[1] not in TABLES
+
+
+def read_design_log(path: str) -> DesignLog:
+    """A log and its design. `BadLogError`: it breaks a rule, or nothing says what its columns mean."""
+    content = read_content(path)
+    design, plan = _design_of(path)
+    rows = tuple(_rows(content, design))
+    code = _code(path, rows)
+    _check_plan(design, plan, rows)
+    return DesignLog(code=code, design=design, key=_key(design), rows=rows)
+
+
+def _design_of(path: str) -> tuple[DesignConfig, Plan]:
+    beside = Path(_JOURNAL.sub("_journal.jsonl", path))
+    if not beside.is_file():
+        raise BadLogError(f"there is no {beside.name} beside it, which says what the columns mean; keep both together")
+    try:
+        head = journal.head(beside)
+        if head is None:
+            raise BadLogError(f"{beside.name} has no whole first line, so nothing says what the columns mean")
+        design = of_head(head)[1]
+        if design is None:
+            raise BadLogError(f"{beside.name} is the journal of another experiment ({head.plan.experiment})")
+    except JournalError as error:
+        raise BadLogError(str(error)) from error
+    return design, head.plan
+
+
+def _key(design: DesignConfig) -> str:
+    parts = {"factors", "order", "trial", "questions", "table"}
+    return sha256(design.model_dump(mode="json", include=parts))
+
+
+def _rows(content: bytes, design: DesignConfig) -> Iterator[dict[str, object]]:
+    try:
+        text = content.decode("utf-8-sig")
+    except UnicodeDecodeError as error:
+        raise BadLogError(f"byte {error.start} is not UTF-8") from error
+    lines = csv.reader(text.splitlines(keepends=True), strict=True)
+    table = columns(design)
+    try:
+        header = next(lines, [])
+        if header != [column.name for column in table]:
+            raise BadLogError(_header_fault(header, table), 1)
+        for cells in lines:
+            if len(cells) != len(table):
+                message = f"{len(cells)} cells (rule: as many as the header's {len(table)})"
+                raise BadLogError(message, lines.line_num)
+            yield {column.name: _cell(column, cell, lines.line_num) for column, cell in zip(table, cells, strict=True)}
+    except csv.Error as error:
+        raise BadLogError(f"not CSV as RFC 4180 has it ({error})", lines.line_num) from error
+
+
+def _header_fault(header: Sequence[str], table: Sequence[Column]) -> str:
+    missing = [column.name for column in table if column.name not in header]
+    surplus = [name for name in header if name not in {column.name for column in table}]
+    said = [f"missing are {', '.join(missing)}"] if missing else []
+    said += [f"surplus are {', '.join(surplus)}"] if surplus else []
+    return f"the header is not that of the design: {'; '.join(said) or 'the order differs'}"
+
+
+def _cell(column: Column, text: str, line: int) -> object:
+    fault = cell_fault(column, text)
+    if fault:
+        raise BadLogError(fault, line, column.name)
+    return cell_value(column, text)
+
+
+def _code(path: str, rows: Sequence[Mapping[str, object]]) -> str:
+    codes = {str(row["participant_id"]) for row in rows}
+    if len(codes) != 1:
+        raise BadLogError(
+            f"participants are {', '.join(sorted(codes)) or 'none'} (rule: one a log)", None, "participant_id"
+        )
+    code, named = codes.pop(), code_in_name(path)
+    if named is not None and named != code:
+        raise BadLogError(f"participant {code!r} in a file named for {named!r}", None, "participant_id")
+    return code
+
+
+def _check_plan(design: DesignConfig, plan: Plan, rows: Sequence[Mapping[str, object]]) -> None:
+    """Every planned trial has its row, and an answer is right where it says so."""
+    if len(rows) != len(plan.trials):
+        raise BadLogError(f"{len(rows)} rows (rule: one for each of the {len(plan.trials)} planned trials)")
+    scored = correct_columns(design.questions)
+    for line, (row, trial) in enumerate(zip(rows, plan.trials, strict=True), start=2):
+        levels = {name: row[name] for name, _ in trial.levels if name in row}
+        wrong = [name for name, level in trial.levels if name in levels and levels[name] != level]
+        if wrong or row["trial"] != trial.trial:
+            name = wrong[0] if wrong else "trial"
+            raise BadLogError(f"{row[name]!r} is not what was planned for this row", line, name)
+        for question, column in scored.items():
+            said: object = row[question]
+            right = is_right(design, design.questions[question], trial, said if isinstance(said, str) else None)
+            if row[column] != (None if right is None else int(right)):
+                raise BadLogError(f"{row[column]!r} does not follow from {question} {said!r}", line, column)
+
+
+def joined_designs(logs: Sequence[tuple[DesignLog, str]], *, several: bool) -> tuple[list[DesignLogs], set[str]]:
+    """The logs by design, each with its study; and the keys of those that most logs of the name do not share.
+
+    With several studies a participant is `study/code`.
+    """
+    by_name: dict[str, Counter[str]] = {}
+    for log, _ in logs:
+        by_name.setdefault(log.design.design, Counter())[log.key] += 1
+    main = {name: keys.most_common(1)[0][0] for name, keys in by_name.items()}
+    found = []
+    for key in main.values():
+        some = [(log, study) for log, study in logs if log.key == key]
+        rows = [
+            {**row, "participant_id": f"{study}/{log.code}" if several else log.code, "study": study}
+            for log, study in some
+            for row in log.rows
+        ]
+        names = [column.name for column in columns(some[0][0].design)]
+        found.append(DesignLogs(design=some[0][0].design, table=pd.DataFrame(rows, columns=["study", *names])))
+    return found, {log.key for log, _ in logs} - set(main.values())
