@@ -8,7 +8,7 @@ named. Which test there is follows from how many factors vary within and between
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -23,7 +23,7 @@ from analysis.stats.factorial import FactorialEffect, mixed, two_within
 from analysis.stats.paired import friedman
 from analysis.summary.results import ConditionSummary, DesignSummary, DesignTest, QuestionSummary
 from experiments.design.config import DesignConfig
-from experiments.design.language import QuestionConfig
+from experiments.design.language import Level, QuestionConfig
 from experiments.tasks.questions import chance, correct_columns
 
 
@@ -34,6 +34,7 @@ def summarise(design: DesignConfig, table: pd.DataFrame) -> DesignSummary:
     """
     asked = {name: question for name, question in design.questions.items() if question.kind != "text"}
     return DesignSummary(
+        title=design.title,
         n=int(table["participant_id"].nunique()),
         factors={name: factor.all_levels for name, factor in design.factors.items()},
         questions={name: _question(design, name, question, table) for name, question in asked.items()},
@@ -44,11 +45,18 @@ def _question(design: DesignConfig, name: str, question: QuestionConfig, table: 
     column = correct_columns(design.questions).get(name, name)
     scored = table.assign(score=_scores(question, table[column])).dropna(subset=["score"])
     factors = _varied(design)
-    cells = tuple(_cell(design, question, some) for some in _conditions(scored, factors))
+    cells = _ordered(design, (_cell(design, question, some) for some in _conditions(scored, factors)))
     real = scored if "stimulus" not in scored else scored[scored["stimulus"].astype(int) == 1]
     people, left_out = _complete(real, factors)
     tests = (*_comparisons(design, question, people, _groups(design, real)), *_sensitivity(design, question, scored))
-    return QuestionSummary(kind=question.kind, cells=cells, tests=tests, left_out=left_out)
+    return QuestionSummary(
+        kind=question.kind,
+        cells=cells,
+        tests=tests,
+        left_out=left_out,
+        chance=chance(question),
+        preferred=_preferred(design, question, scored),
+    )
 
 
 def _varied(design: DesignConfig) -> list[str]:
@@ -58,6 +66,48 @@ def _varied(design: DesignConfig) -> list[str]:
         return names
     compared = design.trial.compare
     return [one for name in names for one in ([f"{name}_1", f"{name}_2"] if name == compared else [name])]
+
+
+def _ordered(design: DesignConfig, cells: Iterable[ConditionSummary]) -> tuple[ConditionSummary, ...]:
+    """The conditions in the order in which the design names its levels; without a level, last."""
+    compared = design.trial.compare or ""
+
+    def place(cell: ConditionSummary) -> list[int]:
+        named = {f"{compared}_1": compared, f"{compared}_2": compared}
+        levels = {name: design.factors[named.get(name, name)].all_levels for name in _varied(design)}
+        return [some.index(cell.levels[name]) if name in cell.levels else len(some) for name, some in levels.items()]
+
+    return tuple(sorted(cells, key=place))
+
+
+def _preferred(
+    design: DesignConfig, question: QuestionConfig, scored: pd.DataFrame
+) -> tuple[ConditionSummary, ...] | None:
+    """How often each level of a pair was chosen: in the mean over people, of all their trials that had it."""
+    compared = design.trial.compare
+    if design.trial.kind != "pair" or compared is None or question.kind != "choice" or question.correct is not None:
+        return None
+    halves = [
+        scored.assign(level=scored[f"{compared}_{place}"], score=scored["score"] if place == 1 else 1 - scored["score"])
+        for place in (1, 2)
+    ]
+    both = pd.concat(halves)
+    return _ordered_levels(design.factors[compared].all_levels, compared, both)
+
+
+def _ordered_levels(levels: Sequence[Level], name: str, rows: pd.DataFrame) -> tuple[ConditionSummary, ...]:
+    found = []
+    for level in levels:
+        some = rows[rows["level"] == level]
+        means = some.groupby("participant_id")["score"].mean().to_numpy(dtype=np.float64)
+        if means.size:
+            sd = float(means.std(ddof=1)) if means.size > 1 else None
+            found.append(
+                ConditionSummary(
+                    levels={name: level}, people=int(means.size), trials=len(some), mean=float(means.mean()), sd=sd
+                )
+            )
+    return tuple(found)
 
 
 def _scores(question: QuestionConfig, column: pd.Series) -> FloatArray:

@@ -330,18 +330,25 @@ class DesignTest:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class QuestionSummary:
-    """All that one question gave. `left_out`: who has no score in some condition, and so is in no test."""
+    """All that one question gave. `left_out`: who has no score in some condition, and so is in no test.
+
+    `chance`: how often who does not know is right; `None` where nothing is right. `preferred`: of pairs, how often each
+    level was chosen of all trials that had it.
+    """
 
     kind: str
     cells: tuple[ConditionSummary, ...]
     tests: tuple[DesignTest, ...]
     left_out: tuple[str, ...] = ()
+    chance: float | None = None
+    preferred: tuple[ConditionSummary, ...] | None = field(default=None, metadata=OPTIONAL)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class DesignSummary:
     """The statistics of a design: as they stand in `statistics.json` under its name."""
 
+    title: str
     n: int
     factors: Mapping[str, tuple[Level, ...]]
     questions: Mapping[str, QuestionSummary]

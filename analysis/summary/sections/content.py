@@ -13,6 +13,7 @@ from analysis.report import apa
 from analysis.report.figures.shot import ShotPanel, figure_5
 from analysis.report.figures.style import named
 from analysis.report.section import Picture, Section
+from analysis.summary.figures.designs import figure_design
 from analysis.summary.figures.results import figure_8, figure_directions
 from analysis.summary.figures.trade import (
     figure_conditional_accuracy,
@@ -21,7 +22,8 @@ from analysis.summary.figures.trade import (
     has_curve,
     has_points,
 )
-from analysis.summary.results import DirectionStatistics, Sensitivity, StudyStatistics, WithinStatistics
+from analysis.summary.results import DesignSummary, DirectionStatistics, Sensitivity, StudyStatistics, WithinStatistics
+from analysis.summary.sections.designs import figure_of
 from analysis.summary.sections.trade import CONDITIONAL_ACCURACY, QUANTILE_PROBABILITY
 from analysis.times.own_trials import TimeSpread
 
@@ -46,8 +48,16 @@ def write_figures(folder: Path, report: ReportData) -> None:
             figure_conditional_accuracy(direction, folder / CONDITIONAL_ACCURACY)
         if has_points(direction):
             figure_quantile_probability(direction, folder / QUANTILE_PROBABILITY)
+    for name, one in drawn_designs(statistics).items():
+        figure_design(one, folder / figure_of(name))
     if report.panels:
         figure_5(report.panels, folder / FIGURE_5)
+
+
+def drawn_designs(statistics: StudyStatistics) -> dict[str, DesignSummary]:
+    """The designs that have something to draw."""
+    found = statistics.designs.items()
+    return {name: one for name, one in found if any(question.cells for question in one.questions.values())}
 
 
 def results_picture(statistics: StudyStatistics) -> Picture:

@@ -16,6 +16,7 @@ from analysis.report.section import LISTED, SHOWN, Section, Table, shortened
 from analysis.report.serial import as_json
 from analysis.summary.results import DirectionStatistics, Origin
 from analysis.summary.sections.content import EXPERIMENTS, ReportData, results_picture, shot_picture, write_figures
+from analysis.summary.sections.designs import design_section
 from analysis.summary.sections.experiments import direction_section, preference_section
 from analysis.summary.sections.supplement import supplement_sections
 from analysis.summary.sections.trade import trade_section
@@ -46,6 +47,7 @@ def sections(report: ReportData) -> tuple[Section, ...]:
             else ()
         ),
         preference_section(preference) if preference is not None else None,
+        *(design_section(name, one) for name, one in statistics.designs.items()),
         *supplement_sections(statistics),
         *report.extra,
         _odds(report.odds) if report.odds else None,
@@ -63,6 +65,7 @@ def _analysed(report: ReportData) -> Section:
         for key, name in EXPERIMENTS.items()
         if (found := report.statistics.of(key)) is not None
     )
+    rows += tuple((one.title, f"{one.n:,}", apa.NO_NUMBER) for one in report.statistics.designs.values())
     table = Table(caption="Participants", header=("Experiment", "Analysed", "Left out as incomplete"), rows=rows)
     files = f"{len(report.files):,} log files were read. " if report.files else ""
     bad = f"Left out, with the reasons listed below: {len(report.problems)}." if report.problems else ""

@@ -1,0 +1,154 @@
+"""What each question of a design gave: curves over a factor of numbers, else marks by level; a panel a question."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+from matplotlib.axes import Axes
+from matplotlib.ticker import ScalarFormatter
+
+from analysis.report.figures.style import METHOD_LINES, display_name, drawn, light_grid, method_colour, reference_line
+from analysis.summary.results import ConditionSummary, DesignSummary, QuestionSummary
+from experiments.design.language import shown_level
+
+_MARKERS = ("o", "s", "^", "D", "v", "P", "X")
+_ACROSS = 2
+_TICKS = 10
+"""So many levels have a tick each."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Mark:
+    """A mean with its ends: over people the SD, of right answers the exact interval."""
+
+    x: float
+    mean: float
+    low: float
+    high: float
+
+
+def figure_design(found: DesignSummary, path_stem: Path) -> None:
+    """A panel for each question; PNG, SVG and PDF are written. `ValueError` if no question has a condition."""
+    shown = {name: question for name, question in found.questions.items() if question.cells}
+    if not shown:
+        raise ValueError("the figure of a design needs a question with an answer")
+    columns = min(_ACROSS, len(shown))
+    rows = -(-len(shown) // columns)
+    with drawn(path_stem, 0.8 + 4.6 * columns, 0.4 + 3.6 * rows) as figure:
+        grid = figure.subplots(rows, columns, squeeze=False).ravel()
+        for spare in grid[len(shown) :]:
+            spare.set_visible(False)
+        for axes, (name, question) in zip(grid, shown.items(), strict=False):
+            _draw(axes, name, question)
+
+
+def across(question: QuestionSummary) -> str | None:
+    """The factor along the axis: the first of three numbers or more, else that of most levels; `None` without one."""
+    levels = {name: {cell.levels.get(name) for cell in question.cells} - {None} for name in _factors(question)}
+    numeric = [name for name, some in levels.items() if len(some) > 2 and all(isinstance(x, float) for x in some)]
+    return next(iter(numeric), max(levels, key=lambda name: len(levels[name]), default=None))
+
+
+def _factors(question: QuestionSummary) -> list[str]:
+    return list(dict.fromkeys(name for cell in question.cells for name in cell.levels))
+
+
+def _draw(axes: Axes, name: str, question: QuestionSummary) -> None:
+    light_grid(axes)
+    if question.preferred:
+        question = replace(question, cells=question.preferred)
+    factor = across(question)
+    cells = [cell for cell in question.cells if factor is None or factor in cell.levels]
+    places = _places([cell.levels[factor] for cell in cells] if factor is not None else ["all"])
+    numeric = all(isinstance(level, float) for level in places)
+    for i, (label, some) in enumerate(_series(cells, factor).items()):
+        marks = sorted(_marks(question, some, factor, places), key=lambda mark: mark.x)
+        _draw_series(axes, marks, i, label, joined=numeric, logarithmic=question.kind == "number")
+    _label(axes, name, question, factor, places)
+
+
+def _places(levels: Sequence[object]) -> dict[object, float]:
+    """Where each level stands: numbers at their value, words one after the other."""
+    there = list(dict.fromkeys(levels))
+    if len(there) > 1 and all(isinstance(level, float) for level in there):
+        return {level: float(str(level)) for level in sorted(there, key=lambda level: float(str(level)))}
+    return {level: float(place) for place, level in enumerate(there)}
+
+
+def _series(cells: Sequence[ConditionSummary], factor: str | None) -> dict[str, list[ConditionSummary]]:
+    """The conditions by the levels of the other factors."""
+    found: dict[str, list[ConditionSummary]] = {}
+    for cell in cells:
+        others = [display_name(shown_level(level)) for name, level in cell.levels.items() if name != factor]
+        found.setdefault(", ".join(others), []).append(cell)
+    return found
+
+
+def _marks(
+    question: QuestionSummary, cells: Sequence[ConditionSummary], factor: str | None, places: Mapping[object, float]
+) -> Iterator[Mark]:
+    for cell in cells:
+        if cell.mean is None:
+            continue
+        x, spread = places[cell.levels[factor] if factor is not None else "all"], cell.sd or 0.0
+        if cell.ci_low is not None and cell.ci_high is not None and cell.right is not None:
+            share = cell.right / cell.trials
+            yield Mark(x=x, mean=100 * share, low=100 * cell.ci_low, high=100 * cell.ci_high)
+        elif question.kind == "number":
+            yield Mark(x=x, mean=cell.mean, low=cell.mean * math.exp(-spread), high=cell.mean * math.exp(spread))
+        elif question.kind in ("choice", "yes-no"):
+            low, high = max(0.0, cell.mean - spread), min(1.0, cell.mean + spread)
+            yield Mark(x=x, mean=100 * cell.mean, low=100 * low, high=100 * high)
+        else:
+            yield Mark(x=x, mean=cell.mean, low=cell.mean - spread, high=cell.mean + spread)
+
+
+def _draw_series(axes: Axes, marks: Sequence[Mark], i: int, label: str, *, joined: bool, logarithmic: bool) -> None:
+    if not marks:
+        return
+    aside = 0.0 if joined else 0.06 * (i - 0.5)  # marks of several series would hide each other
+    line: Any = METHOD_LINES[i % len(METHOD_LINES)] if joined else "none"
+    axes.errorbar(
+        [mark.x + aside for mark in marks],
+        [mark.mean for mark in marks],
+        yerr=[[mark.mean - mark.low for mark in marks], [mark.high - mark.mean for mark in marks]],
+        color=method_colour(i),
+        marker=_MARKERS[i % len(_MARKERS)],
+        markersize=5.0,
+        linestyle=line,
+        capsize=2.5,
+        linewidth=1.2,
+        label=label or None,
+    )
+    if logarithmic:
+        axes.set_yscale("log")
+        axes.yaxis.set_major_formatter(ScalarFormatter())
+        axes.yaxis.set_minor_formatter(ScalarFormatter())
+        if joined and min(mark.x for mark in marks) > 0:
+            axes.set_xscale("log")
+
+
+def _label(
+    axes: Axes, name: str, question: QuestionSummary, factor: str | None, places: Mapping[object, float]
+) -> None:
+    numeric = all(isinstance(level, float) for level in places) and len(places) > 1
+    scored = any(cell.right is not None for cell in question.cells)
+    share = "right [%]" if scored else f"{name} [%]"
+    axes.set_ylabel(share if question.kind in ("choice", "yes-no") else name)
+    axes.set_xlabel(factor or "")
+    axes.set_title(name, loc="left", fontweight="bold", parse_math=False)
+    if scored and question.chance is not None and question.kind == "choice":
+        reference_line(axes, 100.0 * question.chance, "chance")
+    if question.kind in ("choice", "yes-no"):
+        axes.set_ylim(-3.0, 103.0)
+    if len(places) <= _TICKS:
+        axes.set_xticks([*places.values()], [display_name(shown_level(level)) for level in places])  # type: ignore[arg-type]
+        axes.xaxis.minorticks_off()
+    if not numeric:
+        axes.set_xlim(-0.6, len(places) - 0.4)
+    if axes.get_legend_handles_labels()[1]:
+        axes.legend(frameon=False, fontsize=8.0)

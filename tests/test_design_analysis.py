@@ -1,0 +1,138 @@
+"""Logs of designs from a results folder to statistics, figures and report: what is read, left out, and found."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import pytest
+
+from analysis.logs.reading import read_logs
+from analysis.summary.analyze import Request, analyze
+from analysis.summary.summary import summarize
+from experiments.clock import VirtualClock
+from experiments.load import load_setup
+from experiments.run import RunRequest, run
+from experiments.screens.synthetic import synthetic_screen
+
+FOLDER = Path(__file__).parent / "ten_designs"
+NAMES = ("detection", "grip", "hurry", "magnitude", "pairs", "realism", "stronger", "voltages")
+PEOPLE = 4
+
+
+@pytest.fixture(scope="module")
+def results(tmp_path_factory):
+    """A results folder with four people's logs of each design that has no table of its own."""
+    folder = tmp_path_factory.mktemp("results")
+    for name in NAMES:
+        setup = load_setup(str(FOLDER / f"{name}.toml"))
+        for number in range(1, PEOPLE + 1):
+            request = RunRequest(setup=setup, participant_id=f"P0{number}", results=folder, seed=number)
+            run(request, synthetic_screen, VirtualClock())
+    return folder
+
+
+@pytest.fixture(scope="module")
+def found(results):
+    return summarize(read_logs([results])).designs
+
+
+def log(results, name, code="P01"):
+    return next((results / f"sub-{code}").glob(f"*_task-{name}_*.csv"))
+
+
+def test_every_design_is_read_by_its_journal_and_has_its_statistics(results, found):
+    logs = read_logs([results])
+    assert logs.problems == ()
+    assert len(logs.files) == len(NAMES) * PEOPLE
+    assert sorted(found) == sorted(NAMES)
+    assert {one.n for one in found.values()} == {PEOPLE}
+
+
+@pytest.mark.parametrize(
+    ("name", "question", "tests"),
+    [
+        ("voltages", "response", [("anova", "voltage_V"), ("anova", "direction"), ("anova", "voltage_V × direction")]),
+        ("detection", "felt", [("anova", "pulse_s"), ("d_prime", "stimulus"), ("criterion", "stimulus")]),
+        ("magnitude", "strength", [("exponent", "pulse_s"), ("anova", "pulse_s")]),
+        ("realism", "comfort", [("anova", "damper"), ("anova", "voltage_V"), ("anova", "damper × voltage_V")]),
+        ("grip", "realism", [("anova", "grip"), ("anova", "method"), ("anova", "grip × method")]),
+        ("pairs", "rather", []),
+    ],
+)
+def test_which_test_there_is_follows_from_the_factors(found, name, question, tests):
+    said = [(test.name, test.effect) for test in found[name].questions[question].tests]
+    assert said[: len(tests)] == tests
+
+
+def test_conditions_stand_in_the_order_of_the_design(found):
+    cells = found["voltages"].questions["response"].cells
+    levels = found["voltages"].factors
+    assert [tuple(cell.levels.values()) for cell in cells] == [
+        (volts, way) for volts in levels["voltage_V"] for way in levels["direction"]
+    ]
+
+
+def test_of_pairs_each_level_has_how_often_it_was_chosen(found):
+    question = found["pairs"].questions["rather"]
+    assert question.preferred is not None
+    assert [cell.levels["method"] for cell in question.preferred] == list(found["pairs"].factors["method"])
+    assert sum(cell.mean for cell in question.preferred) == pytest.approx(len(question.preferred) / 2)
+
+
+def test_the_file_has_each_design_beside_the_two_experiments_and_the_report_its_figure(results, tmp_path):
+    out = tmp_path / "analysis"
+    analyze(Request(paths=[results], out=out))
+    written = json.loads((out / "statistics.json").read_text())
+    assert set(NAMES) <= set(written)
+    assert set(written["voltages"]) >= {"n", "factors", "questions"}
+    assert set(written["voltages"]["questions"]["response"]) >= {"kind", "cells", "tests"}
+    page = (out / "report.html").read_text()
+    for name in NAMES:
+        assert written[name]["title"] in page
+        assert (out / "figures" / f"figure-{name}.svg").is_file()
+
+
+def test_a_log_without_its_journal_is_left_out_and_the_reason_is_told(results, tmp_path):
+    alone = tmp_path / "sub-P01" / log(results, "grip").name
+    alone.parent.mkdir()
+    alone.write_bytes(log(results, "grip").read_bytes())
+    logs = read_logs([tmp_path])
+    assert logs.files == ()
+    assert "which says what the columns mean" in logs.problems[0].message
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "said"),
+    [
+        (b"P01,grip,1,one hand", b"P01,grip,1,no hand", "not allowed"),
+        (b"P01,grip,1,one hand", b"P01,grip,1,two hands", "not what was planned"),
+        (b"P01,grip,1,one hand", b"P02,grip,1,one hand", "participant"),
+        (b"participant_id,", b"who,", "missing are participant_id"),
+    ],
+)
+def test_an_edited_log_is_left_out_with_its_reason(results, tmp_path, old, new, said):
+    there = log(results, "grip")
+    copy = tmp_path / "sub-P01" / there.name
+    copy.parent.mkdir()
+    content = there.read_bytes()
+    assert old in content
+    copy.write_bytes(content.replace(old, new, 1) if old != b"participant_id," else content.replace(old, new))
+    beside = there.name.replace("_trials.csv", "_journal.jsonl")
+    whole = (there.parent / beside).read_bytes().splitlines(keepends=True)
+    (copy.parent / beside).write_bytes(b"".join(whole[:-1]))  # of an unfinished run the table's hash is not known
+    problems = read_logs([tmp_path]).problems
+    assert len(problems) == 1
+    assert said in problems[0].message
+
+
+def test_logs_of_another_design_under_the_same_name_are_left_out(results, tmp_path):
+    text = (FOLDER / "grip.toml").read_text().replace("maximum = 7.0", "maximum = 9.0")
+    for name in ("gun.toml", "synthetic"):
+        (tmp_path / name).symlink_to(FOLDER / name)
+    (tmp_path / "grip.toml").write_text(text)
+    setup = load_setup(str(tmp_path / "grip.toml"))
+    run(RunRequest(setup=setup, participant_id="X1", results=tmp_path / "r", seed=1), synthetic_screen, VirtualClock())
+    logs = read_logs([results, tmp_path / "r"])
+    assert len(logs.files) == len(NAMES) * PEOPLE
+    assert "another design" in logs.problems[0].message
