@@ -8,18 +8,24 @@ from __future__ import annotations
 
 import csv
 import io
+import json
 import os
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
+from pydantic import BaseModel
+
 from experiments.catalogue import CATALOGUE
-from experiments.config.door import ConfigError, toml_text
+from experiments.config.door import ConfigError, StudyConfig, read_toml, toml_text
+from experiments.config.setup import GunConfig
+from experiments.design.config import DesignConfig
 from experiments.load import load_setup, shipped_folder
 from experiments.record import journal, storage
 from experiments.record.journal import JournalError
 from experiments.study.folders import PlaceError
+from experiments.synthetic.answers import SyntheticAnswers
 
 
 def copy_began_with(path: Path, folder: Path) -> list[Path]:
@@ -32,7 +38,7 @@ def copy_began_with(path: Path, folder: Path) -> list[Path]:
     if head is None:
         raise JournalError(f"{path}: line 1: no whole record, so nothing says what the run began with")
     try:
-        files = _files(path, head.setup_json, folder)
+        files = _files(path, head.setup_json, head.laws_json, folder)
     except (KeyError, TypeError, AttributeError) as error:
         raise JournalError(f"{path}: line 1: no setup of this version of Recoil ({error!r})") from error
     there = [str(file) for file in files if file.exists()]
@@ -42,16 +48,21 @@ def copy_began_with(path: Path, folder: Path) -> list[Path]:
     return list(files)
 
 
-def _files(path: Path, setup: Any, folder: Path) -> dict[Path, bytes]:
+def _files(path: Path, setup: Any, laws: Any, folder: Path) -> dict[Path, bytes]:
     """The files by their places. Names in the config stay as they are, since the hash is over them too."""
     config = setup["experiment"]
-    kind = config.get("experiment")
-    if kind not in CATALOGUE:
-        raise ConfigError(f"{path}: line 1: experiment = {kind!r} is not known to this version of Recoil")
     named = {config["gun"]: _toml(path, setup["gun"])}
-    table = (config.get("synthetic") or {}).get("table")
-    if table is not None:
-        named[table] = _csv(path, setup["answers"], CATALOGUE[kind].answer_columns)
+    if "factors" in config:
+        kind = str(config["design"])
+        if config.get("synthetic") is not None:
+            named[config["synthetic"]] = _toml(path, laws)
+    else:
+        kind = config.get("experiment")
+        if kind not in CATALOGUE:
+            raise ConfigError(f"{path}: line 1: experiment = {kind!r} is not known to this version of Recoil")
+        table = (config.get("synthetic") or {}).get("table")
+        if table is not None:
+            named[table] = _csv(path, setup["answers"], CATALOGUE[kind].answer_columns)
     own = folder.joinpath(*["configs"] * max(_steps_up(path, name) for name in named))
     return {_place(own, f"{kind}.toml"): _toml(path, config)} | {
         _place(own, name): data for name, data in named.items()
@@ -140,14 +151,33 @@ Logs go to `results/`; it is readable by its owner only. Use codes for participa
 """
 
 
+_README_OF_DESIGN = """# {title}
+
+`{name}.toml` is the design: what varies, in which order, what is asked. Edit it, and look at what it comes to:
+
+    recoil check {name}.toml                                  the plan as a Methods section, cells, orders, duration
+    recoil run {name}.toml --participant S01 --screen synthetic --results simulated    one simulated run
+    recoil doctor                                             the rig's self-test
+    recoil run {name}.toml --screen console                   sessions at the console, from its start window
+    recoil study .                                            who is done, in progress, excluded, next
+    recoil analyze results --out analysis                     statistics, figures and report of all logs
+
+Logs go to `results/`; it is readable by its owner only. Use codes for participants, never names. `study.toml` says how
+many people there are; who may take part is asked once you write [eligibility] into it.
+"""
+_KINDS = ("*.toml", "examples/*.toml", "synthetic/*.toml", "schemas/*.json")
+_OF_THE_PAPER = ("direction.toml", "preference.toml", "gun.toml", "study.toml", "paper.toml")
+
+
 def shipped() -> list[Path]:
-    """The shipped configs, and the examples of what else can be given as a file."""
-    return sorted(shipped_folder().glob("*.toml")) + sorted(shipped_folder().glob("examples/*.toml"))
+    """The shipped configs, who answers them in simulations, examples of what else can be given, and the schemas."""
+    return [path for kind in _KINDS for path in sorted(shipped_folder().glob(kind))]
 
 
-def copy_configs(folder: Path) -> list[Path]:
-    """Copy the shipped configs and examples. `PlaceError` if one is there already; then nothing is copied."""
-    copies = [(source, folder / source.relative_to(shipped_folder())) for source in shipped()]
+def copy_configs(folder: Path, sources: Iterable[Path] | None = None) -> list[Path]:
+    """Copy shipped files, all unless some are named. `PlaceError` if one is there already; then nothing is copied."""
+    named = shipped() if sources is None else sources
+    copies = [(source, folder / source.relative_to(shipped_folder())) for source in named]
     there = [str(target) for _, target in copies if target.exists()]
     if there:
         raise PlaceError(f"{', '.join(there)}: already there; nothing is overwritten, so copy to another folder")
@@ -157,12 +187,84 @@ def copy_configs(folder: Path) -> list[Path]:
     return [target for _, target in copies]
 
 
-def new_study(folder: Path) -> list[Path]:
-    """A study's folder: configs, a page that says how to go on, and a private folder for results."""
+def new_study(folder: Path, design: str = "", *, paper: bool = False) -> list[Path]:
+    """A study's folder: configs, a page that says how to go on, and a private folder for results.
+
+    Without a `design` it is the paper's study; with one a study of that alone, for everybody; with `paper` beside the
+    paper's numbers. `ConfigError`: there is no such shipped design.
+    """
     if folder.exists() and (not folder.is_dir() or any(folder.iterdir())):
         raise PlaceError(f"{folder}: exists and is not empty; name a new folder")
-    made = copy_configs(folder)
-    page = folder / "README.md"
-    page.write_text(_README.format(title=folder.name), encoding="utf-8")
-    storage.make_folder(folder / "results")
-    return [*made, page, folder / "results"]
+    page, results = folder / "README.md", folder / "results"
+    if design:
+        made = _study_of(folder, design, paper=paper)
+        page.write_text(_README_OF_DESIGN.format(title=folder.name, name=design), encoding="utf-8")
+    else:
+        its_own = [shipped_folder() / name for name in _OF_THE_PAPER]
+        made = copy_configs(folder, [*its_own, *shipped_folder().glob("examples/*.toml"), *_schemas()])
+        page.write_text(_README.format(title=folder.name), encoding="utf-8")
+    storage.make_folder(results)
+    return [*made, page, results]
+
+
+def _schemas() -> list[Path]:
+    return sorted(shipped_folder().glob("schemas/*.json"))
+
+
+def _study_of(folder: Path, name: str, *, paper: bool) -> list[Path]:
+    """A shipped design with its gun and its synthetic people, and a study that says nothing about who may come."""
+    path = shipped_folder() / f"{name}.toml"
+    setup = load_setup(name) if path.is_file() else None
+    if setup is None or not hasattr(setup.config, "gun"):
+        raise ConfigError(f"--from {name}: no shipped design; there are {', '.join(designs())}")
+    laws = setup.config.synthetic if isinstance(setup.config, DesignConfig) else None
+    named = [setup.config.gun, *([laws] if laws else []), *(["paper.toml"] if paper else [])]
+    made = copy_configs(folder, [path, *(shipped_folder() / one for one in named), *_schemas()])
+    study: dict[str, object] = {"title": f"A study of {setup.config.title}", "participants": 12}
+    study |= {"experiments": [path.name]} | ({"paper": "paper.toml"} if paper else {})
+    (folder / "study.toml").write_text(f"#:schema schemas/study.json\n{toml_text(study)}", encoding="utf-8")
+    return [*made, folder / "study.toml"]
+
+
+def designs() -> list[str]:
+    """The names of the shipped designs and experiments."""
+    return [path.stem for path in sorted(shipped_folder().glob("*.toml")) if _is_run(path)]
+
+
+def _is_run(path: Path) -> bool:
+    table = read_toml(path)
+    return "factors" in table or "experiment" in table
+
+
+def schemas() -> dict[str, bytes]:
+    """A JSON Schema of each kind of config, by file name: an editor that reads them completes and checks keys."""
+    from analysis.logs.column_map import ColumnMap  # noqa: PLC0415 - the lab's own kinds come without the desk
+    from analysis.logs.exclusions import Rules  # noqa: PLC0415
+    from analysis.paper.paper import Paper  # noqa: PLC0415
+    from analysis.summary.remarks_coding import Codebook  # noqa: PLC0415
+
+    kinds: dict[str, type[BaseModel]] = {
+        "design": DesignConfig,
+        "synthetic": SyntheticAnswers,
+        "gun": GunConfig,
+        "study": StudyConfig,
+        **{name: one.config for name, one in CATALOGUE.items()},
+        "paper": Paper,
+        "columns": ColumnMap,
+        "rules": Rules,
+        "codebook": Codebook,
+    }
+    return {f"{name}.json": _schema(name, kind) for name, kind in kinds.items()}
+
+
+def _schema(name: str, kind: type[BaseModel]) -> bytes:
+    head = {"$schema": "https://json-schema.org/draft/2020-12/schema", "title": f"Recoil: {name}"}
+    return (json.dumps(kind.model_json_schema() | head, indent=1, ensure_ascii=False, sort_keys=True) + "\n").encode()
+
+
+def write_schemas(folder: Path) -> list[Path]:
+    """Write the schema of each kind of config into a folder; those that are there are written anew."""
+    folder.mkdir(parents=True, exist_ok=True)
+    for name, content in schemas().items():
+        (folder / name).write_bytes(content)
+    return [folder / name for name in schemas()]

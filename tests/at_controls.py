@@ -75,7 +75,7 @@ def short_direction(sets: int = 2, trials: int = 3, set_break_s: float = 30.0) -
 
 
 DIRECTION, PREFERENCE = short_direction(), load_setup("preference")
-TOLD = load_setup(str(Path(__file__).parent / "ten_designs" / "voltages.toml"))
+TOLD = load_setup("voltages")
 """A design whose participants are told something first."""
 GUARD_S: float = DIRECTION.config.console.guard_s
 

@@ -2,12 +2,20 @@
 
 from __future__ import annotations
 
+from pathlib import Path
 from typing import Any
 
 from experiments.config.door import checked_table
 from experiments.design.config import DesignConfig
+from experiments.load import shipped_folder
 
 QUESTION = {"kind": "choice", "text": "Which way?", "answers": ["forward", "backward"]}
+
+
+def path_of(name: str) -> Path:
+    """Where a design lies: shipped, or the paper's two as designs."""
+    folder = Path(__file__).parent / "ten_designs" if name in ("direction", "preference") else shipped_folder()
+    return folder / f"{name}.toml"
 
 
 def design(**tables: Any) -> DesignConfig:

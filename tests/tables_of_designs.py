@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from pathlib import Path
-
 import pandas as pd
 
 from experiments.config.door import load
@@ -11,13 +9,12 @@ from experiments.design.config import DesignConfig
 from experiments.design.planning import groups, plan_of, square_size
 from experiments.synthetic.answers import DesignParticipant, SyntheticAnswers
 from experiments.tasks.questions import correct_columns, is_right
-
-FOLDER = Path(__file__).parent / "ten_designs"
+from tests.designs import path_of
 
 
 def loaded(name: str) -> tuple[DesignConfig, SyntheticAnswers]:
-    design = load(DesignConfig, FOLDER / f"{name}.toml")
-    return design, load(SyntheticAnswers, FOLDER / str(design.synthetic))
+    design = load(DesignConfig, path_of(name))
+    return design, load(SyntheticAnswers, path_of(name).parent / str(design.synthetic))
 
 
 def simulated(design: DesignConfig, laws: SyntheticAnswers, count: int) -> pd.DataFrame:

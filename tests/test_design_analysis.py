@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-from pathlib import Path
 
 import pytest
 
@@ -11,11 +10,11 @@ from analysis.logs.reading import read_logs
 from analysis.summary.analyze import Request, analyze
 from analysis.summary.summary import summarize
 from experiments.clock import VirtualClock
-from experiments.load import load_setup
+from experiments.load import load_setup, shipped_folder
 from experiments.run import RunRequest, run
 from experiments.screens.synthetic import synthetic_screen
+from tests.designs import path_of
 
-FOLDER = Path(__file__).parent / "ten_designs"
 NAMES = ("detection", "grip", "hurry", "magnitude", "pairs", "realism", "stronger", "voltages")
 PEOPLE = 4
 
@@ -25,7 +24,7 @@ def results(tmp_path_factory):
     """A results folder with four people's logs of each design that has no table of its own."""
     folder = tmp_path_factory.mktemp("results")
     for name in NAMES:
-        setup = load_setup(str(FOLDER / f"{name}.toml"))
+        setup = load_setup(str(path_of(name)))
         for number in range(1, PEOPLE + 1):
             request = RunRequest(setup=setup, participant_id=f"P0{number}", results=folder, seed=number)
             run(request, synthetic_screen, VirtualClock())
@@ -127,9 +126,9 @@ def test_an_edited_log_is_left_out_with_its_reason(results, tmp_path, old, new, 
 
 
 def test_logs_of_another_design_under_the_same_name_are_left_out(results, tmp_path):
-    text = (FOLDER / "grip.toml").read_text().replace("maximum = 7.0", "maximum = 9.0")
+    text = path_of("grip").read_text().replace("maximum = 7.0", "maximum = 9.0")
     for name in ("gun.toml", "synthetic"):
-        (tmp_path / name).symlink_to(FOLDER / name)
+        (tmp_path / name).symlink_to(shipped_folder() / name)
     (tmp_path / "grip.toml").write_text(text)
     setup = load_setup(str(tmp_path / "grip.toml"))
     run(RunRequest(setup=setup, participant_id="X1", results=tmp_path / "r", seed=1), synthetic_screen, VirtualClock())

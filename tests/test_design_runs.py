@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import csv
 import io
-from pathlib import Path
 
 import pytest
 
@@ -18,10 +17,11 @@ from experiments.run import RunRequest, run
 from experiments.screens.synthetic import synthetic_screen
 from experiments.session.steps import Inform, Prepare, Rest
 from experiments.study.folders import place
+from recoil.config_files import copy_began_with
+from tests.designs import path_of
 
-FOLDER = Path(__file__).parent / "ten_designs"
 TEN = ("direction", "preference", "voltages", "detection", "stronger", "magnitude", "realism", "pairs", "grip", "hurry")
-SETUPS = {name: load_setup(str(FOLDER / f"{name}.toml")) for name in TEN}
+SETUPS = {name: load_setup(str(path_of(name))) for name in TEN}
 
 
 def carried_out(name, results, code="P01", again="ask", **more):
@@ -112,3 +112,18 @@ def test_a_practice_has_some_of_each_cell_and_is_kept_apart(tmp_path):
     assert plan.practice
     assert sorted(trial.method for trial in plan.trials) == sorted([*design.methods] * 2)
     assert practice_of(SETUPS["voltages"].config, "P01", 1) is None
+
+
+@pytest.mark.parametrize("name", ["voltages", "pairs", "realism"])
+def test_the_files_that_a_run_began_with_are_given_back_and_it_goes_on_with_them(name, tmp_path):
+    finished = carried_out(name, tmp_path / "r")
+    lines = finished.place.journal.read_bytes().splitlines(keepends=True)
+    copies = copy_began_with(finished.place.journal, tmp_path / "began")
+    assert copies[0].name == f"{name}.toml"
+    assert load_setup(str(copies[0])).sha256() == SETUPS[name].sha256()
+    finished.place.journal.write_bytes(b"".join(lines[: len(lines) // 2]))
+    request = RunRequest(setup=load_setup(str(copies[0])), participant_id="P01", results=tmp_path / "r", again="resume")
+    again = run(request, synthetic_screen, VirtualClock())
+    assert answers(name, rows_of(again.place.table.read_bytes())) == answers(
+        name, rows_of(finished.place.table.read_bytes())
+    )

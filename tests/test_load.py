@@ -11,6 +11,7 @@ from device.words import Pulse
 from experiments.config.door import ConfigError, line_of, read_toml
 from experiments.load import check_limits, find, load_gun, load_setup, load_study, shipped_folder
 
+DESIGNS = ("voltages", "detection", "stronger", "magnitude", "realism", "pairs", "grip", "hurry")
 EXPERIMENTS = ("direction", "preference")
 DIRECTION, PREFERENCE, GUN = "direction.toml", "preference.toml", "gun.toml"
 TABLE = 'observer = "table"\ntable = "answers.csv"'
@@ -53,7 +54,8 @@ def test_a_shipped_config_loads_by_its_name_and_is_within_the_limits(name: str, 
 
 
 def test_every_shipped_config_loads() -> None:
-    assert {path.stem for path in shipped_folder().glob("*.toml")} == {*EXPERIMENTS, "gun", "study", "paper"}
+    known = {*EXPERIMENTS, *DESIGNS, "gun", "gun-five", "study", "paper"}
+    assert {path.stem for path in shipped_folder().glob("*.toml")} == known
     assert list(load_gun(shipped_folder() / GUN).methods) == ["vibration", "asymmetric-1", "asymmetric-2"]
     study, folder = load_study("study")
     assert [load_setup(str(folder / name)).config.experiment for name in study.experiments] == list(EXPERIMENTS)
@@ -74,7 +76,7 @@ def test_a_path_goes_before_a_shipped_name(folder: Path, monkeypatch: pytest.Mon
 
 @pytest.mark.parametrize("name", ["nothing", "", ".", "../configs/direction", "direction.toml.toml", "a\0b"])
 def test_a_name_that_means_no_file_is_refused_with_what_is_shipped(name: str) -> None:
-    with pytest.raises(ConfigError, match=r"(no such file|a folder).*direction, gun, paper, preference, study"):
+    with pytest.raises(ConfigError, match=r"(no such file|a folder).*direction.*gun.*paper, preference.*study"):
         load_setup(name)
 
 
@@ -420,11 +422,11 @@ def test_arrays_within_arrays_beyond_all_reason_are_refused(folder: Path) -> Non
 @pytest.mark.parametrize(
     ("old", "new", "said"),
     [
-        ("participants = 14", "participants = 0", "study.toml:3: participants = 0"),
-        ("participants = 14", "participants = 1000", "study.toml:3: participants = 1000"),
-        ('code_prefix = "P"', 'code_prefix = "../"', "study.toml:4: code_prefix = '../'"),
-        ('experiments = ["direction.toml", "preference.toml"]', "experiments = []", "study.toml:5: experiments"),
-        ("replications = 2000", "repetitions = 2000", "study.toml:7: repetitions = 2000: unknown key"),
+        ("participants = 14", "participants = 0", "study.toml:4: participants = 0"),
+        ("participants = 14", "participants = 1000", "study.toml:4: participants = 1000"),
+        ('code_prefix = "P"', 'code_prefix = "../"', "study.toml:5: code_prefix = '../'"),
+        ('experiments = ["direction.toml", "preference.toml"]', "experiments = []", "study.toml:6: experiments"),
+        ("replications = 2000", "repetitions = 2000", "study.toml:8: repetitions = 2000: unknown key"),
     ],
 )
 def test_a_broken_study_is_refused_with_its_line(folder: Path, old: str, new: str, said: str) -> None:

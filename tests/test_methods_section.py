@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from pathlib import Path
-
 import pytest
 
 from experiments.config.door import load
@@ -11,12 +9,11 @@ from experiments.design.config import DesignConfig
 from experiments.design.methods_section import methods_section
 from experiments.design.planned import planned_run
 from experiments.design.planning import plan_of, square_size
-
-FOLDER = Path(__file__).parent / "ten_designs"
+from tests.designs import path_of
 
 
 def said(name):
-    design = load(DesignConfig, FOLDER / f"{name}.toml")
+    design = load(DesignConfig, path_of(name))
     plan = plan_of(design, "P01", 1, row=0 if square_size(design) else None)
     return "\n".join(methods_section(design, planned_run(design, plan)))
 

@@ -2,17 +2,14 @@
 
 from __future__ import annotations
 
-from pathlib import Path
-
 import pytest
 
 from experiments.config.door import ConfigError, load
 from experiments.design import planned
 from experiments.design.config import DesignConfig
 from experiments.design.planning import plan_of
-from tests.designs import design
+from tests.designs import design, path_of
 
-FOLDER = Path(__file__).parent / "ten_designs"
 WAYS = {"levels": ["forward", "backward"]}
 
 
@@ -21,7 +18,7 @@ def of(config):
 
 
 def test_the_papers_first_experiment_takes_its_half_hour():
-    found = of(load(DesignConfig, FOLDER / "direction.toml"))
+    found = of(load(DesignConfig, path_of("direction")))
     assert (found.sessions, found.sets, found.trials) == (3, 12, 60)
     assert found.break_s == 3 * 3 * 20.0 + 2 * 300.0
     assert found.duration_s == pytest.approx(1800.0)
@@ -29,7 +26,7 @@ def test_the_papers_first_experiment_takes_its_half_hour():
 
 
 def test_the_papers_second_experiment_takes_its_eight_minutes():
-    found = of(load(DesignConfig, FOLDER / "preference.toml"))
+    found = of(load(DesignConfig, path_of("preference")))
     assert (found.trials, found.duration_s) == (3, 480.0)
 
 

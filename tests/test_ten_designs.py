@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import statistics
 from collections import defaultdict
-from pathlib import Path
 
 import pytest
 
@@ -16,8 +15,8 @@ from experiments.load import load_gun
 from experiments.record import design_table
 from experiments.synthetic.answers import DesignParticipant, SyntheticAnswers, check_laws
 from experiments.tasks.questions import answer_problem, is_right
+from tests.designs import path_of
 
-FOLDER = Path(__file__).parent / "ten_designs"
 TRIALS = {
     "direction": 60, "preference": 3, "voltages": 90, "detection": 120, "stronger": 120, "magnitude": 18,
     "realism": 12, "pairs": 20, "grip": 9, "hurry": 60,
@@ -26,8 +25,9 @@ TRIALS = {
 
 
 def loaded(name):
-    design = load(DesignConfig, FOLDER / f"{name}.toml")
-    return design, load_gun(FOLDER / design.gun), load(SyntheticAnswers, FOLDER / str(design.synthetic))
+    design = load(DesignConfig, path_of(name))
+    folder = path_of(name).parent
+    return design, load_gun(folder / design.gun), load(SyntheticAnswers, folder / str(design.synthetic))
 
 
 def people(name, count=1):

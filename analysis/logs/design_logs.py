@@ -147,7 +147,7 @@ def _check_plan(design: DesignConfig, plan: Plan, rows: Sequence[Mapping[str, ob
                 raise BadLogError(f"{row[column]!r} does not follow from {question} {said!r}", line, column)
 
 
-def joined_designs(logs: Sequence[tuple[DesignLog, str]], *, several: bool) -> tuple[list[DesignLogs], set[str]]:
+def logs_by_design(logs: Sequence[tuple[DesignLog, str]], *, several: bool) -> tuple[list[DesignLogs], set[str]]:
     """The logs by design, each with its study; and the keys of those that most logs of the name do not share.
 
     With several studies a participant is `study/code`.

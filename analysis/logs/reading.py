@@ -12,7 +12,7 @@ from pathlib import Path
 import pandas as pd
 
 from analysis.logs.column_map import ColumnMap, MappedLog, is_recoils, read_mapped
-from analysis.logs.design_logs import DesignLog, DesignLogs, is_of_design, joined_designs, read_design_log
+from analysis.logs.design_logs import DesignLog, DesignLogs, is_of_design, logs_by_design, read_design_log
 from analysis.logs.files import ENDINGS, BadLogError, Problem, code_in_name, find_logs, read_content, study_names
 from analysis.logs.rules import Log, check_logs
 from analysis.logs.texts import Block, TextTable, joined, table_of_records, text_tables
@@ -172,7 +172,7 @@ def _designed(reading: _Reading, found: Mapping[str, str], track: Track, first: 
 def _by_design(reading: _Reading, logs: Mapping[int, DesignLog], studies: Mapping[int, str]) -> tuple[DesignLogs, ...]:
     """The logs by design; one that was made with another design than most of its name is left out."""
     several = len(set(studies.values())) > 1
-    found, others = joined_designs([(log, studies[number]) for number, log in logs.items()], several=several)
+    found, others = logs_by_design([(log, studies[number]) for number, log in logs.items()], several=several)
     for number, log in logs.items():
         if log.key in others:
             file = reading.files.pop(number // _LOGS_A_FILE)

@@ -7,9 +7,10 @@ from dataclasses import dataclass, field, fields, replace
 from typing import Any
 
 from analysis.paper.paper import load_paper
+from analysis.predict.check_design import DesignCheck, check_design, design_sections
 from analysis.report.section import Section
 from analysis.report.serial import OPTIONAL, plain
-from analysis.report.terminal import in_text
+from analysis.report.terminal import in_text, with_tables
 from device.limits import MAX_COIL_C, MAX_DUTY, MAX_SHOTS_PER_MINUTE
 from device.parameters import GunParameters
 from device.physics import simulate
@@ -17,6 +18,7 @@ from device.words import MAX_PULSE_S, MAX_VOLTAGE_V, Pulse
 from experiments import catalogue
 from experiments.config.door import EligibilityConfig, Model, participant_codes, read_toml
 from experiments.config.setup import Setup
+from experiments.design.config import DesignConfig
 from experiments.design.plan import next_row
 from experiments.direction.config import Design, DirectionConfig
 from experiments.direction.synthetic import model_parameters
@@ -88,7 +90,7 @@ class StudyCheck:
     study: str
     participants: int
     eligibility: EligibilityConfig
-    experiments: tuple[ExperimentCheck, ...]
+    experiments: tuple[ExperimentCheck | DesignCheck, ...]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -108,14 +110,14 @@ class PaperCheck:
     experiments: dict[str, int]
 
 
-AnyCheck = ExperimentCheck | StudyCheck | GunCheck | PaperCheck
+AnyCheck = ExperimentCheck | DesignCheck | StudyCheck | GunCheck | PaperCheck
 
 
 def check(name: str, seed: int | None, participants: int) -> AnyCheck:
     """What any config means. `ConfigError` names what is wrong with it."""
     path = find(name)
     table = read_toml(path)
-    if "experiment" in table:
+    if "experiment" in table or "factors" in table:
         return _experiment(load_setup(name), seed, participant_codes(participants))
     if "experiments" in table:
         return _study(name, seed)
@@ -138,10 +140,12 @@ def _study(name: str, seed: int | None) -> StudyCheck:
     )
 
 
-def _experiment(setup: Setup[Any], seed: int | None, codes: Sequence[str]) -> ExperimentCheck:
+def _experiment(setup: Setup[Any], seed: int | None, codes: Sequence[str]) -> ExperimentCheck | DesignCheck:
     config = setup.config
-    limits = check_limits(setup)
     chosen = next((s for s in (seed, config.seed) if s is not None), None)
+    if isinstance(config, DesignConfig):
+        return check_design(setup, EXAMPLE_SEED if chosen is None else chosen, codes)
+    limits = check_limits(setup)
     return ExperimentCheck(
         experiment=config.experiment,
         title=config.title,
@@ -224,17 +228,19 @@ def check_text(found: AnyCheck) -> str:
     """What was found, for a person."""
     if isinstance(found, GunCheck | PaperCheck):
         return "\n".join(f"{one.name}: {plain(getattr(found, one.name))}" for one in fields(found))
-    return "\n\n".join(map(in_text, sections(found)))
+    return "\n\n".join(with_tables(one) if one.tables else in_text(one) for one in sections(found))
 
 
-def sections(found: ExperimentCheck | StudyCheck) -> tuple[Section, ...]:
+def sections(found: ExperimentCheck | DesignCheck | StudyCheck) -> tuple[Section, ...]:
     """What a config means: a section for each experiment, that of the study before them."""
+    if isinstance(found, DesignCheck):
+        return design_sections(found)
     if isinstance(found, ExperimentCheck):
         return (_experiment_section(found),)
     asked = found.eligibility.model_dump(mode="json", exclude_none=True)
     rules = ", ".join(f"{key} {value}" for key, value in asked.items() if value)
     title = f"Study: {found.study}, {found.participants} participants; eligibility: {rules or 'everyone'}"
-    return Section(title=title), *map(_experiment_section, found.experiments)
+    return Section(title=title), *(section for one in found.experiments for section in sections(one))
 
 
 def _experiment_section(found: ExperimentCheck) -> Section:

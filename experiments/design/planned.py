@@ -7,9 +7,10 @@ from dataclasses import dataclass
 from itertools import pairwise
 
 from experiments.config.door import ConfigError
+from experiments.config.setup import GunConfig
 from experiments.design.config import DesignConfig
 from experiments.design.plan import Plan, Trial
-from experiments.design.stimuli import by_hand
+from experiments.design.stimuli import by_hand, settings
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -25,8 +26,11 @@ class PlannedRun:
     hand_changes: int
 
 
-def planned_run(design: DesignConfig, plan: Plan) -> PlannedRun:
-    """What a plan comes to. `ConfigError`: it is more than the design lets a participant be asked for."""
+def planned_run(design: DesignConfig, plan: Plan, gun: GunConfig | None = None) -> PlannedRun:
+    """What a plan comes to. `ConfigError`: it is more than the design lets a participant be asked for.
+
+    Which methods have dampers that hands set, the `gun` knows.
+    """
     timing, trials = design.timing, plan.trials
     rests_s = [_rest_s(design, before, trial) for before, trial in pairwise(trials)]
     trial_s = timing.hand_over_s + timing.stimulus_s + timing.answer_s
@@ -37,7 +41,7 @@ def planned_run(design: DesignConfig, plan: Plan) -> PlannedRun:
         break_s=sum(rests_s),
         duration_s=timing.opening_s + len(trials) * trial_s + sum(rests_s),
         trials_without_break=max(_stretches(rests_s)),
-        hand_changes=sum(_by_hand(design, one) != _by_hand(design, other) for one, other in pairwise(trials)),
+        hand_changes=sum(_by_hand(design, gun, one) != _by_hand(design, gun, other) for one, other in pairwise(trials)),
     )
     _check_fatigue(design, found)
     return found
@@ -61,9 +65,11 @@ def _stretches(rests_s: list[float]) -> Iterator[int]:
     yield length
 
 
-def _by_hand(design: DesignConfig, trial: Trial) -> tuple[object, ...]:
-    """What hands set for a trial: its method, which may have a damper, and the factors that are theirs."""
-    return (trial.level("method"), *(trial.level(name) for name in by_hand(design)))
+def _by_hand(design: DesignConfig, gun: GunConfig | None, trial: Trial) -> object:
+    """What hands set for a trial: the factors that are theirs, and the method's damper."""
+    if gun is not None:
+        return settings(design, gun, trial.levels_at(0) or trial.levels)
+    return tuple(trial.level(name) for name in by_hand(design))
 
 
 def _check_fatigue(design: DesignConfig, found: PlannedRun) -> None:
@@ -87,9 +93,10 @@ def warnings(design: DesignConfig, found: PlannedRun) -> Iterator[str]:
             f"the plan takes {found.duration_s:g} s, longer than timing.planned_s = {design.timing.planned_s:g} s, "
             "which is what participants are told"
         )
-    if found.trials > 1 and by_hand(design) and found.hand_changes > found.trials // 2:
-        names = ", ".join(by_hand(design))
+    if found.trials > 1 and found.hand_changes > found.trials // 2:
+        varied = [name for name in by_hand(design) if name in design.varying and len(design.factors[name].levels) > 1]
+        what = ", ".join(varied) or "method"
         yield (
-            f"hands set something anew {found.hand_changes} times in {found.trials} trials ({names}); name the factor "
+            f"hands set something anew {found.hand_changes} times in {found.trials} trials ({what}); name the factor "
             "in order.session to set it once a session"
         )

@@ -9,7 +9,7 @@ from experiments.design.plan import Plan, Trial, condition, method_order
 from experiments.design.stimuli import damper
 from experiments.design.streams import Stream
 from experiments.preference.config import PreferenceConfig
-from experiments.record.design_table import exposure
+from experiments.record.design_table import exposure_row
 from experiments.record.tables import Row, presentation
 from experiments.session.history import History, TrialHistory, by_trial
 from experiments.session.steps import (
@@ -93,7 +93,7 @@ def rows(plan: Plan, history: History) -> list[Row]:
             "experiment": plan.experiment,
             "trial": trial.trial,
             "method": trial.method,
-            **exposure(events),
+            **exposure_row(events),
             **_rating(events),
             **presentation(events, Presented),
         }

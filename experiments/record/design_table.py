@@ -138,7 +138,7 @@ def design_rows(plan: Plan, history: History, design: DesignConfig) -> list[Row]
             **dict(trial.levels),
             **_compared(trial),
             **_answers(design, trial, events),
-            **exposure(events),
+            **exposure_row(events),
             **_shown(design, events),
         }
         for trial, events in by_trial(plan.trials, history).items()
@@ -181,7 +181,7 @@ def _answered(name: str, question: QuestionConfig, entered: list[Answered | Entr
     }
 
 
-def exposure(events: TrialHistory) -> Row:
+def exposure_row(events: TrialHistory) -> Row:
     """The last exposure to a train, and how long earlier ones of the same trial were felt before it."""
     felt = [word.exposure_s for word in events.words if isinstance(word, Presented | Interrupted) and word.exposure_s]
     shown = events.last(Presented)

@@ -60,13 +60,17 @@ class Record:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Head(Record):
-    """The first line of a journal: the frozen plan, and the resolved setup as JSON, with their hashes."""
+    """The first line of a journal: the frozen plan, and the resolved setup as JSON, with their hashes.
+
+    `laws_json`: how synthetic people answer the design, `None` where nothing says so.
+    """
 
     path: Path
     plan_json: object
     plan_sha256: str
     setup_json: object
     setup_sha256: str
+    laws_json: object = None
 
     @property
     def plan(self) -> Plan:
@@ -333,7 +337,7 @@ def head_of(path: Path, data: bytes) -> Head | None:
     for part in ("plan", "setup"):
         if sha256(value[part]) != value.get(f"{part}_sha256"):
             raise JournalError(f"{path}: line 1: {part} does not have the hash {part}_sha256; it was changed")
-    of_head = {"path": path, "plan_json": value["plan"], "setup_json": value["setup"]}
+    of_head = {"path": path, "plan_json": value["plan"], "setup_json": value["setup"], "laws_json": value.get("laws")}
     return read_as(_HEAD, value | of_head, f"{path}: line 1")
 
 

@@ -53,14 +53,7 @@ def _nth(number: int) -> str:
 
 
 def settings_text(step: Prepare) -> str:
-    """What is set by hand, and how.
-
-    >>> from experiments.design.language import LARGEST_NUMBER
-    from experiments.design.plan import Trial
-    >>> trial = Trial(session=1, set=1, trial=1, levels=())
-    >>> settings_text(Prepare(trial=trial, attempt=1, settings=(("damper", "on"), ("posture", "kneeling"))))
-    'damper ON, posture KNEELING'
-    """
+    """What is set by hand, and how, as in “damper ON, posture KNEELING”."""
     return ", ".join(f"{name} {value.upper()}" for name, value in step.settings)
 
 

@@ -144,18 +144,32 @@ def configs(
     journal: Annotated[
         Path | None, typer.Option("--from", metavar="JOURNAL", help="With --copy: the files that its run began with.")
     ] = None,
+    schema: Annotated[
+        Path | None, typer.Option(metavar="DIR", help="Write a JSON Schema of each kind of config, for editors.")
+    ] = None,
 ) -> None:
-    """List the shipped configs, copy them to edit, or give back those that a run began with."""
-    from recoil.config_files import copy_began_with, copy_configs, shipped
+    """List the shipped configs, copy them to edit, give back those that a run began with, or write their schemas."""
+    from recoil.config_files import copy_began_with, copy_configs, shipped, write_schemas
 
+    if schema is not None:
+        if copy is not None or journal is not None:
+            raise typer.BadParameter("--schema stands alone: it copies no configs")
+        sys.stdout.write("".join(f"{path}\n" for path in write_schemas(schema)))
+        return
     if journal is not None and copy is None:
         raise typer.BadParameter("--from goes with --copy DIR, the folder that the files are written to")
     paths = shipped() if copy is None else copy_began_with(journal, copy) if journal else copy_configs(copy)
     sys.stdout.write("".join(f"{path}\n" for path in paths))
 
 
-def new(study: Annotated[Path, typer.Argument(metavar="STUDY", help="The folder to make.")]) -> None:
-    """Make a study's folder from a template."""
+def new(
+    study: Annotated[Path, typer.Argument(metavar="STUDY", help="The folder to make.")],
+    design: Annotated[
+        str, typer.Option("--from", metavar="NAME", help="A shipped design to start from; without: the paper's study.")
+    ] = "",
+    paper: Annotated[bool, typer.Option("--paper", help="With --from: the paper's numbers beside it.")] = False,
+) -> None:
+    """Make a study's folder from a template, or from a shipped design."""
     from recoil.config_files import new_study
 
-    sys.stdout.write("".join(f"{path}\n" for path in new_study(study)))
+    sys.stdout.write("".join(f"{path}\n" for path in new_study(study, design, paper=paper)))

@@ -22,7 +22,7 @@ _TICKS = 10
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Mark:
+class MeanMark:
     """A mean with its ends: over people the SD, of right answers the exact interval."""
 
     x: float
@@ -46,7 +46,7 @@ def figure_design(found: DesignSummary, path_stem: Path) -> None:
             _draw(axes, name, question)
 
 
-def across(question: QuestionSummary) -> str | None:
+def _across(question: QuestionSummary) -> str | None:
     """The factor along the axis: the first of three numbers or more, else that of most levels; `None` without one."""
     levels = {name: {cell.levels.get(name) for cell in question.cells} - {None} for name in _factors(question)}
     numeric = [name for name, some in levels.items() if len(some) > 2 and all(isinstance(x, float) for x in some)]
@@ -61,7 +61,7 @@ def _draw(axes: Axes, name: str, question: QuestionSummary) -> None:
     light_grid(axes)
     if question.preferred:
         question = replace(question, cells=question.preferred)
-    factor = across(question)
+    factor = _across(question)
     cells = [cell for cell in question.cells if factor is None or factor in cell.levels]
     places = _places([cell.levels[factor] for cell in cells] if factor is not None else ["all"])
     numeric = all(isinstance(level, float) for level in places)
@@ -90,24 +90,24 @@ def _series(cells: Sequence[ConditionSummary], factor: str | None) -> dict[str, 
 
 def _marks(
     question: QuestionSummary, cells: Sequence[ConditionSummary], factor: str | None, places: Mapping[object, float]
-) -> Iterator[Mark]:
+) -> Iterator[MeanMark]:
     for cell in cells:
         if cell.mean is None:
             continue
         x, spread = places[cell.levels[factor] if factor is not None else "all"], cell.sd or 0.0
         if cell.ci_low is not None and cell.ci_high is not None and cell.right is not None:
             share = cell.right / cell.trials
-            yield Mark(x=x, mean=100 * share, low=100 * cell.ci_low, high=100 * cell.ci_high)
+            yield MeanMark(x=x, mean=100 * share, low=100 * cell.ci_low, high=100 * cell.ci_high)
         elif question.kind == "number":
-            yield Mark(x=x, mean=cell.mean, low=cell.mean * math.exp(-spread), high=cell.mean * math.exp(spread))
+            yield MeanMark(x=x, mean=cell.mean, low=cell.mean * math.exp(-spread), high=cell.mean * math.exp(spread))
         elif question.kind in ("choice", "yes-no"):
             low, high = max(0.0, cell.mean - spread), min(1.0, cell.mean + spread)
-            yield Mark(x=x, mean=100 * cell.mean, low=100 * low, high=100 * high)
+            yield MeanMark(x=x, mean=100 * cell.mean, low=100 * low, high=100 * high)
         else:
-            yield Mark(x=x, mean=cell.mean, low=cell.mean - spread, high=cell.mean + spread)
+            yield MeanMark(x=x, mean=cell.mean, low=cell.mean - spread, high=cell.mean + spread)
 
 
-def _draw_series(axes: Axes, marks: Sequence[Mark], i: int, label: str, *, joined: bool, logarithmic: bool) -> None:
+def _draw_series(axes: Axes, marks: Sequence[MeanMark], i: int, label: str, *, joined: bool, logarithmic: bool) -> None:
     if not marks:
         return
     aside = 0.0 if joined else 0.06 * (i - 0.5)  # marks of several series would hide each other

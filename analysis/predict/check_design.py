@@ -1,0 +1,209 @@
+"""What a design means, without running it: Methods section, cells, orders, duration, exposure, what is assumed."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, field
+from typing import Any
+
+from analysis.predict.exposure import Exposure, exposure
+from analysis.report.section import Section, Table
+from analysis.report.serial import OPTIONAL
+from device.methods import Method
+from device.parameters import GunParameters
+from device.physics import simulate
+from device.words import Pulse
+from experiments.config.setup import Setup
+from experiments.design.config import DesignConfig
+from experiments.design.language import shown_level
+from experiments.design.methods_section import methods_section
+from experiments.design.plan import Plan, Trial
+from experiments.design.planned import PlannedRun, planned_run, warnings
+from experiments.design.planning import groups, plan_of, square_size
+from experiments.design.stimuli import ConditionLimits, limits, stimulus
+from experiments.load import check_limits
+
+_MOST_CELLS = 60
+"""So many cells are listed."""
+_FIRST = 6
+"""So many trials of an order are shown where sessions do not differ."""
+_EXPECTED_EVEN = 5
+"""Of fewer participants nobody expects first positions to be even."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class CellCheck:
+    """What a shot of a cell asks of the gun."""
+
+    levels: dict[str, str | float]
+    status: str
+    settle_s: float
+    voltage_V: float | None = field(default=None, metadata=OPTIONAL)
+    pulse_s: float | None = field(default=None, metadata=OPTIONAL)
+    effect: int | None = field(default=None, metadata=OPTIONAL)
+    peak_force_N: float | None = field(default=None, metadata=OPTIONAL)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class DesignCheck:
+    """What a design means for some participants. `orders`: what each meets, session by session."""
+
+    experiment: str
+    title: str
+    text: tuple[str, ...]
+    trials: int
+    duration_s: float
+    break_s: float
+    stated_duration_s: float
+    seed: int
+    orders: dict[str, tuple[str, ...]]
+    gun: str
+    cells: tuple[CellCheck, ...]
+    exposure: Exposure
+    warnings: tuple[str, ...]
+    assumed: tuple[str, ...]
+
+
+def check_design(setup: Setup[Any], seed: int, codes: Sequence[str]) -> DesignCheck:
+    """What a design means. `ConfigError` names what is wrong with it."""
+    design: DesignConfig = setup.config
+    check_limits(setup)
+    plans = dict(zip(codes, _plans(design, seed, codes), strict=True))
+    first = next(iter(plans.values()))
+    planned = planned_run(design, first, setup.gun)
+    return DesignCheck(
+        experiment=design.design,
+        title=design.title,
+        text=methods_section(design, planned),
+        trials=planned.trials,
+        duration_s=planned.duration_s,
+        break_s=planned.break_s,
+        stated_duration_s=design.timing.planned_s,
+        seed=seed,
+        orders={code: _order(design, plan) for code, plan in plans.items()},
+        gun=setup.gun.title,
+        cells=tuple(_cell(setup, one) for one in limits(design, setup.gun)),
+        exposure=exposure(_shots(setup, first)),
+        warnings=tuple(_warnings(design, planned, [*plans.values()])),
+        assumed=(*design.assumed, *(f"{design.gun}: {key}" for key in setup.gun.assumed)),
+    )
+
+
+def _plans(design: DesignConfig, seed: int, codes: Sequence[str]) -> Iterator[Plan]:
+    """The plans of people who come in this order: groups and rows of the square are filled in turn."""
+    rows, kinds = square_size(design), len(groups(design))
+    for number, code in enumerate(codes):
+        yield plan_of(design, code, seed, row=number % rows if rows else None, group=number % kinds)
+
+
+def _order(design: DesignConfig, plan: Plan) -> tuple[str, ...]:
+    """What is constant in each session, with the group; of one session the trials."""
+    sessions = {trial.session: trial for trial in reversed(plan.trials)}
+    blocked = [*design.between, *design.order.session]
+    if len(sessions) > 1:
+        return tuple(_levels(sessions[number], blocked) for number in sorted(sessions))
+    return (
+        *((_levels(plan.trials[0], blocked),) if blocked else ()),
+        *(_trial(design, one) for one in plan.trials[:6]),
+    )
+
+
+def _levels(trial: Trial, names: Sequence[str]) -> str:
+    return " ".join(shown_level(level) for name, level in trial.levels if name in names)
+
+
+def _trial(design: DesignConfig, trial: Trial) -> str:
+    if trial.catch:
+        return "catch"
+    varied = [name for name in design.varying if len(design.factors[name].all_levels) > 1 and name != trial.compare]
+    return " ".join(filter(None, (_levels(trial, varied), " – ".join(map(shown_level, trial.intervals))))) or "shot"
+
+
+def _cell(setup: Setup[Any], one: ConditionLimits) -> CellCheck:
+    drive = one.drive
+    parameters = stimulus(setup.config, setup.gun, one.levels).parameters
+    pulse = isinstance(drive, Pulse)
+    return CellCheck(
+        levels=dict(one.levels),
+        status=one.status,
+        settle_s=one.settle_s,
+        voltage_V=drive.voltage_V if isinstance(drive, Pulse) else None,
+        pulse_s=drive.pulse_s if isinstance(drive, Pulse) else None,
+        effect=None if isinstance(drive, Pulse) else drive.effect,
+        peak_force_N=simulate(parameters).peak_force_N if pulse and isinstance(parameters, GunParameters) else None,
+    )
+
+
+def _shots(setup: Setup[Any], plan: Plan) -> list[tuple[Method, int]]:
+    """Every shot that a participant may feel in a run, by what it is."""
+    design: DesignConfig = setup.config
+    each = design.trial.max_shots if design.trial.kind == "train" else 1
+    felt = Counter[Method]()
+    for trial in plan.trials:
+        for place in range(max(1, len(trial.intervals))):
+            if (levels := trial.levels_at(place)) is not None:
+                felt[stimulus(design, setup.gun, levels).parameters] += each
+    return [*felt.items()]
+
+
+def _warnings(design: DesignConfig, planned: PlannedRun, plans: Sequence[Plan]) -> Iterator[str]:
+    yield from warnings(design, planned)
+    if len(plans) >= _EXPECTED_EVEN and design.order.session and design.order.sessions == "random":
+        firsts = Counter(_levels(plan.trials[0], design.order.session) for plan in plans)
+        most, least = max(firsts.values()), min(firsts.values()) if len(firsts) > 1 else 0
+        if most - least > 1:
+            said = ", ".join(f"{name} {count}" for name, count in sorted(firsts.items()))
+            yield (
+                f"chance leaves the first session uneven over {len(plans)} participants ({said}); "
+                'order.sessions = "latin-square" or "williams" balances it'
+            )
+
+
+def design_sections(found: DesignCheck) -> tuple[Section, ...]:
+    """What a design means, for a person."""
+    minutes, stated = found.duration_s / 60, found.stated_duration_s / 60
+    a8 = found.exposure
+    duration = f"{minutes:.1f} min planned ({stated:g} min stated), of which breaks {found.break_s:g} s"
+    shaken = (
+        f"Vibration {a8.a8_m_s2:.2f} m/s² A(8) in this run at the most, beside the action value of {a8.action_m_s2:g} "
+        f"and the limit of {a8.limit_m_s2:g} m/s² of 2002/44/EC; assumed: {a8.assumed}"
+    )
+    return (
+        Section(title=f"{found.title} ({found.experiment})", paragraphs=found.text),
+        Section(
+            title="Plan",
+            items=(
+                f"Duration  {found.trials} trials, {duration}",
+                f"Orders    (seed {found.seed})",
+                *(f"  {code:10} {' > '.join(order)}" for code, order in found.orders.items()),
+                shaken,
+                *(f"Warning   {one}" for one in found.warnings),
+            ),
+        ),
+        Section(title=f"Gun: {found.gun}", tables=(_cells(found.cells),)),
+        *((Section(title="Assumed", items=found.assumed),) if found.assumed else ()),
+    )
+
+
+def _cells(cells: Sequence[CellCheck]) -> Table:
+    names = list(dict.fromkeys(name for cell in cells for name in cell.levels))
+    rows = tuple(
+        (
+            *(shown_level(cell.levels[name]) if name in cell.levels else "" for name in names),
+            _drive(cell),
+            "" if cell.peak_force_N is None else f"{cell.peak_force_N:.1f} N",
+            f"{1000 * cell.settle_s:.0f} ms",
+            cell.status,
+        )
+        for cell in cells[:_MOST_CELLS]
+    )
+    more = f" ({_MOST_CELLS} of {len(cells)})" if len(cells) > _MOST_CELLS else ""
+    header = (*names, "Drive", "Peak force", "Next after", "By the model")
+    return Table(caption=f"Cells{more}; no config can lift the gun's limits", header=header, rows=rows)
+
+
+def _drive(cell: CellCheck) -> str:
+    if cell.voltage_V is None or cell.pulse_s is None:
+        return f"effect {cell.effect}"
+    return f"{cell.voltage_V:g} V, {1000 * cell.pulse_s:g} ms"

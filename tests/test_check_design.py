@@ -1,0 +1,99 @@
+"""`recoil check` of designs: the plan in words, the cells on the gun, exposure, and what is most likely not meant."""
+
+from __future__ import annotations
+
+import json
+import math
+
+import pytest
+
+from analysis.predict.check import check, check_text
+from analysis.predict.exposure import DAY_S, GUN_MASS_KG, exposure
+from analysis.report.serial import as_json
+from device.parameters import GunParameters, VibrationParameters
+from device.physics import simulate
+from experiments.config.door import ConfigError
+from experiments.load import shipped_folder
+from tests.designs import path_of
+
+
+def found(name, people=14):
+    return check(str(path_of(name)), None, people)
+
+
+def written(tmp_path, name, *changes):
+    text = (path_of(name)).read_text()
+    for old, new in changes:
+        assert old in text
+        text = text.replace(old, new)
+    for file in ("gun.toml", "gun-five.toml", "synthetic"):
+        (tmp_path / file).symlink_to(shipped_folder() / file)
+    (tmp_path / f"{name}.toml").write_text(text)
+    return str(tmp_path / f"{name}.toml")
+
+
+def test_a_design_is_told_as_a_methods_section_with_cells_orders_exposure_and_assumptions():
+    text = check_text(found("realism", 4))
+    for said in (
+        "varied within participants",
+        "P01        off > on",
+        "P02        on > off",
+        "A(8)",
+        "26.7 N",
+        "factors.voltage_V.levels",
+        "12 trials",
+    ):
+        assert said in text
+
+
+def test_the_cells_are_what_the_physics_says():
+    cells = found("voltages").cells
+    assert len(cells) == 9
+    for cell in cells:
+        shot = simulate(GunParameters(voltage_V=cell.voltage_V, pulse_s=cell.pulse_s))
+        assert (cell.peak_force_N, cell.status) == (shot.peak_force_N, shot.status)
+
+
+def test_it_is_written_as_json():
+    told = json.loads(as_json(found("grip")))
+    assert told["experiment"] == "grip"
+    assert len(told["orders"]) == 14
+    assert told["exposure"]["limit_m_s2"] == 5.0
+
+
+def test_exposure_adds_energies_shot_by_shot():
+    vibration = VibrationParameters()
+    one = exposure([(vibration, 1)]).a8_m_s2
+    assert one == pytest.approx(math.sqrt(257.54**2 * 0.024 / DAY_S), rel=1e-12)
+    assert exposure([(vibration, 400)]).a8_m_s2 == pytest.approx(20 * one, rel=1e-12)
+
+
+def test_exposure_of_the_voice_coil_is_above_what_the_force_alone_gives():
+    gun = GunParameters()
+    shot = simulate(gun)
+    mean_force_N = shot.recoil_impulse_Ns / shot.recoil_end_s
+    least = mean_force_N**2 * shot.recoil_end_s / GUN_MASS_KG**2
+    assert exposure([(gun, 1)]).a8_m_s2 ** 2 * DAY_S > least
+
+
+def test_hands_that_set_something_anew_at_nearly_every_trial_are_a_warning(tmp_path):
+    often = check(
+        written(
+            tmp_path, "realism", ('session = ["damper"]\nsessions = "latin-square"\n', "longest_run = { damper = 1 }\n")
+        ),
+        None,
+        2,
+    )
+    assert any("hands set something anew" in one for one in often.warnings)
+    assert not found("realism").warnings
+    assert "(method)" in found("grip").warnings[0]  # whose dampers are set by hand
+
+
+def test_first_sessions_that_chance_left_uneven_are_a_warning():
+    assert any("chance leaves the first session uneven" in one for one in found("direction").warnings)
+    assert not any("uneven" in one for one in found("realism").warnings)
+
+
+def test_a_cell_beyond_a_limit_is_refused_with_its_levels(tmp_path):
+    with pytest.raises(ConfigError, match=r"voltage_V = 30.*24"):
+        check(written(tmp_path, "voltages", ("18.0]", "30.0]")), None, 1)
