@@ -12,7 +12,7 @@ from pathlib import Path
 from typing import Any, Literal
 
 from device import Gun, open_gun
-from experiments.catalogue import experiment, table
+from experiments.catalogue import experiment, of_head, table
 from experiments.clock import Clock, date_text
 from experiments.config.setup import Setup
 from experiments.design.config import DesignConfig
@@ -22,6 +22,7 @@ from experiments.design.streams import checked_seed, draw_seed
 from experiments.live_run import LiveRun, RunStopped, Screen
 from experiments.load import check_limits
 from experiments.record import replay, storage
+from experiments.record.dictionary import design_dictionary
 from experiments.record.journal import Contents, Journal, JournalError, begun, hold_journal, read_journal
 from experiments.record.provenance import provenance
 from experiments.record.replay import RunPosition
@@ -296,5 +297,8 @@ def _to_the_end(session: Session, desk: Desk, position: RunPosition, place: Plac
 def _write_table(place: Place, contents: Contents) -> int:
     """Write the table from the journal as it was read back from the disk; the answers in it."""
     storage.write_whole(place.table, table(contents))
+    design = of_head(contents.head)[1]
+    if design is not None:
+        storage.write_whole(place.results / f"task-{design.design}_columns.md", design_dictionary(design).encode())
     told = replay.history(contents)
     return sum(isinstance(word, Answered) and not isinstance(step, Describe) for step, word in told)

@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 import sys
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from pathlib import Path
 
+from experiments.design.config import DesignConfig
+from experiments.record import design_table
 from experiments.record.tables import FILE_SUFFIX, TABLES, Column
 
 _PAGE = Path(__file__).with_name("dictionary.md")
@@ -14,15 +16,22 @@ _PAGE = Path(__file__).with_name("dictionary.md")
 
 def dictionary() -> str:
     """The data dictionary as Markdown."""
-    tables = "\n".join(line for experiment in TABLES for line in _table(experiment))
+    names = {f"sub-<ID>_task-{experiment}_{FILE_SUFFIX[experiment]}.csv": TABLES[experiment] for experiment in TABLES}
+    tables = "\n".join(line for name, columns in names.items() for line in _table(name, columns))
     return _PAGE.read_text(encoding="utf-8").replace("{tables}", tables)
 
 
-def _table(experiment: str) -> Iterator[str]:
-    yield f"## `sub-<ID>_task-{experiment}_{FILE_SUFFIX[experiment]}.csv`\n"
+def design_dictionary(design: DesignConfig) -> str:
+    """The columns of a design's table as Markdown, to lie beside its logs."""
+    head = f"# {design.title}\n\nOne row a planned trial, also those not reached. Empty means missing; 0 is a value.\n"
+    return "\n".join([head, *_table(f"sub-<ID>_task-{design.design}_{design.table}.csv", design_table.columns(design))])
+
+
+def _table(name: str, columns: Iterable[Column]) -> Iterator[str]:
+    yield f"## `{name}`\n"
     yield "| column | type | values | meaning |"
     yield "| --- | --- | --- | --- |"
-    for column in TABLES[experiment]:
+    for column in columns:
         yield f"| `{column.name}` | {column.type} | {_values(column)} | {column.description} |"
     yield ""
 
