@@ -3,9 +3,13 @@
 from __future__ import annotations
 
 import json
+import subprocess
+import sys
+from pathlib import Path
 
 import pytest
 
+from analysis.archive.bids import data_set, runs_of
 from analysis.logs.reading import read_logs
 from analysis.summary.analyze import Request, analyze
 from analysis.summary.summary import summarize
@@ -17,6 +21,7 @@ from tests.designs import path_of
 
 NAMES = ("detection", "grip", "hurry", "magnitude", "pairs", "realism", "stronger", "voltages")
 PEOPLE = 4
+VALIDATOR = Path(sys.executable).with_name("bids-validator-deno")
 
 
 @pytest.fixture(scope="module")
@@ -135,3 +140,29 @@ def test_logs_of_another_design_under_the_same_name_are_left_out(results, tmp_pa
     logs = read_logs([results, tmp_path / "r"])
     assert len(logs.files) == len(NAMES) * PEOPLE
     assert "another design" in logs.problems[0].message
+
+
+def test_designs_are_exported_as_tasks_of_a_bids_data_set(results, tmp_path):
+    logs = read_logs([results])
+    files = data_set(runs_of(logs), {}, "designs", "0")
+    for name in NAMES:
+        told = json.loads(files[f"task-{name}_beh.json"])
+        assert told["TaskName"] == name
+        lines = files[f"sub-P01/beh/sub-P01_task-{name}_beh.tsv"].decode().splitlines()
+        header = lines[0].split("\t")
+        assert set(header) <= set(told)
+        assert "note" not in header
+    felt = files["sub-P01/beh/sub-P01_task-detection_beh.tsv"].decode().splitlines()
+    correct = felt[0].split("\t").index("correct")
+    assert {line.split("\t")[correct] for line in felt[1:]} == {"0", "1"}
+    assert b"\ttrue\n" in files["participants.tsv"]
+
+
+def test_bids_takes_an_exported_design(results, tmp_path):
+    out = tmp_path / "bids"
+    for path, content in data_set(runs_of(read_logs([results])), {}, "designs", "0").items():
+        (out / path).parent.mkdir(parents=True, exist_ok=True)
+        (out / path).write_bytes(content)
+    done = subprocess.run([VALIDATOR, "--json", str(out)], capture_output=True, text=True, check=False)
+    issues = json.loads(done.stdout)["issues"]["issues"]
+    assert [one for one in issues if one["severity"] == "error"] == []

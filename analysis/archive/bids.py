@@ -21,11 +21,9 @@ import pandas as pd
 from analysis.logs.reading import Logs
 from analysis.logs.texts import Cell
 from experiments.record import tables
+from experiments.record.design_table import HANDS, columns
 from experiments.record.tables import Column
 from experiments.study.study import Member
-
-ANSWERED_BY = {"direction": "response_source", "preference": "rating_by"}
-"""The column that says whose hand gave the answer; empty where there is none."""
 
 TASKS = {
     "direction": "Two-alternative forced choice: which way did the gun shoot? One session a rendering method, in sets "
@@ -128,9 +126,10 @@ Please add what a program cannot know to `dataset_description.json`: Authors, Li
 that are added to it, or to a `task-*_beh.json` (Instructions, InstitutionName), and a Name that was changed stay when
 the data set is exported again; everything else, this page too, is then written anew.
 """
-_LEFT_OUT = "Free text (`comment`, `note`) is left out: it might say who someone is."
+_LEFT_OUT = "Free text (notes, and participants' own words) is left out: it might say who someone is."
 _LEFT_IN = (
-    "Free text (`comment`, `note`) is in it: read it before you pass the data set on, it might say who someone is."
+    "Free text (notes, and participants' own words) is in it: read it before you pass the data set on, it might say "
+    "who someone is."
 )
 
 
@@ -139,7 +138,7 @@ def described(column: Column, name: str) -> ColumnDescription:
     text = re.sub(r"\bempty\b", "n/a", column.description).replace("`", "'")
     found: ColumnDescription = {
         "LongName": long_name(name),
-        "Description": f"{text}; {_CLEANED}" if name in ("comment", "note") else text,
+        "Description": f"{text}; {_CLEANED}" if _is_free_text(column) else text,
         "Format": _FORMATS[column.type],
     }
     if column.unit:
@@ -172,7 +171,7 @@ NOT_AVAILABLE = "n/a"
 OLDEST_AGE = 89
 """Ages above are given as this one: people so old are so few that their age might tell who they are."""
 
-_FREE_TEXT = ("comment", "note")
+_NO_FREE_TEXT = ("participant_id", "flags", "onset_utc", "gun", "status")
 _IN_THE_NAME = ("participant_id", "experiment")
 _NAMES = {"response_time_s": "response_time", "onset_utc": "onset"}
 """Columns that BIDS has a name for, and what it means by it."""
@@ -186,16 +185,19 @@ _OURS = re.compile(
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Run:
-    """One participant's rows of one experiment; `None` where the log has none."""
+    """One participant's rows of one experiment, with the table's columns; `None` where the log has none."""
 
     participant_id: str
     experiment: str
     rows: tuple[Mapping[str, Cell], ...]
+    columns: tuple[Column, ...]
+    task: str
 
     @property
     def hands(self) -> set[str]:
         """Whose hands gave the answers."""
-        return {str(row[ANSWERED_BY[self.experiment]]) for row in self.rows if row[ANSWERED_BY[self.experiment]]}
+        said = [column.name for column in self.columns if column.levels == HANDS]
+        return {str(row[name]) for row in self.rows for name in said if row[name]}
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -214,9 +216,12 @@ class Runs:
         return found
 
     @property
-    def experiments(self) -> tuple[str, ...]:
-        """The experiments that anyone has done."""
-        return tuple(dict.fromkeys(run.experiment for run in self.runs))
+    def tasks(self) -> dict[str, Run]:
+        """The experiments that anyone has done, each with the first run of it."""
+        found: dict[str, Run] = {}
+        for run in self.runs:
+            found.setdefault(run.experiment, run)
+        return found
 
 
 def is_ours(path: str) -> bool:
@@ -231,7 +236,7 @@ def is_ours(path: str) -> bool:
 def runs_of(logs: Logs) -> Runs:
     """The runs in the logs. A code that differs from another in case alone would share its folder: it is left out."""
     runs, problems, known = [], list[str](), dict[str, str]()
-    for run in (*_runs("direction", logs.trials), *_runs("preference", logs.ratings)):
+    for run in _all_runs(logs):
         first = known.setdefault(run.participant_id.casefold(), run.participant_id)
         if first != run.participant_id:
             rule = f"differs from {first!r} in case alone (rule: one code a participant)"
@@ -242,13 +247,23 @@ def runs_of(logs: Logs) -> Runs:
     return Runs(runs=tuple(runs), problems=tuple(problems))
 
 
-def _runs(experiment: str, table: pd.DataFrame) -> Iterator[Run]:
-    names = tables.names(experiment)
+def _all_runs(logs: Logs) -> Iterator[Run]:
+    for experiment, table in {"direction": logs.trials, "preference": logs.ratings}.items():
+        yield from _runs(experiment, table, tables.TABLES[experiment], TASKS[experiment])
+    for one in logs.designs:
+        asked = " ".join(question.text for question in one.design.questions.values())
+        yield from _runs(
+            one.design.design, one.table, columns(one.design), f"{one.design.title.rstrip('.?!')}. {asked}"
+        )
+
+
+def _runs(experiment: str, table: pd.DataFrame, of: tuple[Column, ...], task: str) -> Iterator[Run]:
+    names = [column.name for column in of]
     plain = table[names].astype(object).where(table[names].notna(), None)
     for code, rows in plain.groupby("participant_id", sort=False):
         cells = rows.itertuples(index=False, name=None)
         named = tuple(dict(zip(names, row, strict=True)) for row in cells)
-        yield Run(participant_id=str(code), experiment=experiment, rows=named)
+        yield Run(participant_id=str(code), experiment=experiment, rows=named, columns=of, task=task)
 
 
 def _unreadable_onsets(run: Run) -> Iterator[str]:
@@ -269,7 +284,7 @@ def data_set(
         "README": readme(len(people), synthetic, free_text=free_text).encode(),
         "participants.tsv": _tsv(list(people[0]), (person.values() for person in people)),
         "participants.json": json_bytes(PARTICIPANT_COLUMNS),
-        **{f"task-{task}_beh.json": json_bytes(_sidecar(task, free_text)) for task in runs.experiments},
+        **{f"task-{task}_beh.json": json_bytes(_sidecar(run, free_text)) for task, run in runs.tasks.items()},
         **{_path(run): _beh(run, free_text) for run in runs.runs},
     }
 
@@ -303,22 +318,27 @@ def _path(run: Run) -> str:
     return f"sub-{run.participant_id}/beh/sub-{run.participant_id}_task-{run.experiment}_beh.tsv"
 
 
-def _exported(experiment: str, free_text: bool) -> list[Column]:
-    left_out = _IN_THE_NAME if free_text else (*_IN_THE_NAME, *_FREE_TEXT)
-    return [column for column in tables.TABLES[experiment] if column.name not in left_out]
+def _exported(run: Run, free_text: bool) -> list[Column]:
+    shown = [column for column in run.columns if column.name not in _IN_THE_NAME]
+    return [column for column in shown if free_text or not _is_free_text(column)]
+
+
+def _is_free_text(column: Column) -> bool:
+    """Whether somebody's own words stand in a column."""
+    return column.type == "text" and column.name not in _NO_FREE_TEXT
 
 
 def _name(column: Column) -> str:
     return _NAMES.get(column.name, column.name)
 
 
-def _sidecar(experiment: str, free_text: bool) -> dict[str, object]:
-    found = {_name(column): described(column, _name(column)) for column in _exported(experiment, free_text)}
-    return {"TaskName": experiment, "TaskDescription": TASKS[experiment], **found}
+def _sidecar(run: Run, free_text: bool) -> dict[str, object]:
+    found = {_name(column): described(column, _name(column)) for column in _exported(run, free_text)}
+    return {"TaskName": run.experiment, "TaskDescription": run.task, **found}
 
 
 def _beh(run: Run, free_text: bool) -> bytes:
-    table = _exported(run.experiment, free_text)
+    table = _exported(run, free_text)
     rows = [{**row, "onset_utc": onset} for row, onset in zip(run.rows, _onsets(run), strict=True)]
     cells = ([_cell(column, row[column.name]) for column in table] for row in rows)
     return _tsv([_name(column) for column in table], cells)
@@ -343,6 +363,8 @@ def _moment(cell: Cell) -> datetime | None:
 def _cell(column: Column, value: Cell) -> str:
     if value is None:
         return NOT_AVAILABLE
+    if isinstance(value, float) and column.type in ("integer", "flag"):
+        return str(int(value))  # whole numbers beside empty cells
     if isinstance(value, float):
         return repr(float(value))
     text = one_line(str(value))

@@ -61,7 +61,7 @@ def export(folder: Path, out: Path, *, free_text: bool = False, track: Track = i
     runs = bids.runs_of(logs)
     files = bids.data_set(runs, _members(results), _name(results), recoil_version(), free_text=free_text)
     _put(target, files | _filled_in(earlier, files))
-    by_task = {task: [run for run in runs.runs if run.experiment == task] for task in runs.experiments}
+    by_task = {task: [run for run in runs.runs if run.experiment == task] for task in runs.tasks}
     return Exported(
         out=str(out),
         bids_version=bids.BIDS_VERSION,
