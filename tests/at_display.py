@@ -225,8 +225,15 @@ class AtConsole(AtDisplay):
 
     def due(self, look: Look) -> None:
         """Press what is due at a state."""
-        keys = {"setting": "m", "preparing": "space", "train": "space", "closing": "Return", "paused": "p"}
-        keys |= {"asking": self.answer(look.trial), "halted": "q", "correcting": "Escape"}
+        keys = {
+            "setting": "m",
+            "preparing": "space",
+            "train": "space",
+            "closing": "Return",
+            "paused": "p",
+            "informing": "Return",
+        }
+        keys |= {"informing": "Return", "asking": self.answer(look.trial), "halted": "q", "correcting": "Escape"}
         lines = {"rating": self.rating(look.trial), "describing": "like a toy", "resting": "enough"}
         if look.state in keys:
             self.keys.press(keys[look.state])

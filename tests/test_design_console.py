@@ -1,0 +1,156 @@
+"""A design at the real console, by real keys: every kind of question and trial that the paper's two do not have."""
+
+from __future__ import annotations
+
+import csv
+from pathlib import Path
+
+import pytest
+
+from experiments.load import shipped_folder
+from tests.at_display import AtConsole, needs_display, virtual_display
+from tests.at_runs import words
+
+pytest.importorskip("PyQt6")
+pytestmark = [pytest.mark.slow, needs_display]
+
+DESIGN = """
+design = "tiny"
+title = "Which of two, how real, and why"
+gun = "gun.toml"
+
+[factors.method]
+levels = ["asymmetric-1"]
+
+[factors.voltage_V]
+levels = [12.0, 18.0]
+
+[factors.posture]
+levels = ["sitting"]
+
+[trial]
+kind = "two-interval"
+compare = "voltage_V"
+standard = 15.0
+gap_s = 0.5
+feedback = true
+
+[questions.stronger]
+kind = "choice"
+text = "Welcher Schuss war stärker?"
+answers = ["first", "second"]
+correct = "larger"
+labels = { first = "der erste", second = "rechts, der zweite" }
+
+[questions.sure]
+kind = "rating"
+text = "How sure are you?"
+minimum = 1.0
+maximum = 5.0
+grain = 1.0
+
+[questions.why]
+kind = "text"
+when = "block"
+text = "What told them apart?"
+
+[[opening]]
+kind = "consent"
+text = "Do you agree to take part?"
+
+[console]
+guard_s = 0.0
+
+[fatigue]
+max_trials_without_break = 10
+max_planned_s = 600.0
+
+[timing]
+hand_over_s = 1.0
+planned_s = 60.0
+"""
+RUN = "Recoil – P01"
+
+
+@pytest.fixture
+def configs(tmp_path: Path) -> Path:
+    folder = tmp_path / "configs"
+    folder.mkdir()
+    (folder / "gun.toml").write_bytes((shipped_folder() / "gun.toml").read_bytes())
+    (folder / "tiny.toml").write_text(DESIGN)
+    return folder
+
+
+def table(folder: Path) -> list[dict[str, str]]:
+    path = folder / "results" / "sub-P01" / "sub-P01_task-tiny_trials.csv"
+    with path.open(encoding="utf-8", newline="") as file:
+        return list(csv.DictReader(file))
+
+
+def test_a_design_is_run_by_real_keys_from_consent_to_its_last_words(configs: Path, tmp_path: Path) -> None:
+    run = words(configs, "tiny", "--participant", "P01")
+    with virtual_display() as display, AtConsole(run, tmp_path, display) as screen:
+        screen.answer, screen.rating = (lambda trial: "d" if trial == 1 else "r"), (lambda trial: str(3 + trial))
+        screen.stands(RUN)
+        look = screen.at("informing")
+        assert any("consent" in text for text in look.texts), look.texts
+        look = screen.to("setting")
+        assert any("posture SITTING" in text for text in look.texts), look.texts
+        look = screen.to("asking", 1)
+        assert "Welcher Schuss war stärker?" in look.texts
+        assert {name for name in look.places if name.startswith("answer")} == {"answer 1", "answer 2"}
+        screen.keys.press("f")  # no key of this question
+        assert screen.heard().state == "asking"
+        screen.keys.press("u")  # nothing to undo yet
+        assert screen.heard().state == "asking"
+        screen.keys.press("r", "Control_L")  # R alone is an answer here
+        screen.until(lambda look: look.line)
+        screen.keys.type("a cough\n")
+        look = screen.to("rating", 1)
+        assert any(text == "How sure are you?" for text in look.texts)
+        screen.keys.type("7\n")
+        assert screen.heard().state == "rating"
+        screen.keys.press("BackSpace")  # 7 is off the scale
+        screen.to_the_end()
+        code, said = screen.close()
+    assert code == 0, said
+    first, second = table(tmp_path)
+    assert (first["stronger"], second["stronger"]) == ("first", "second")
+    assert (first["sure"], second["sure"]) == ("4.0", "5.0")
+    assert first["why"] == second["why"] == "like a toy"
+    assert (first["attempts"], first["flags"], second["attempts"]) == ("2", "repeated", "1")
+    for row in (first, second):
+        larger = "first" if float(row["voltage_V_1"]) > float(row["voltage_V_2"]) else "second"
+        assert row["correct"] == str(int(row["stronger"] == larger))
+        assert row["stronger_source"] == "experimenter"
+
+
+@pytest.mark.soak
+def test_a_design_on_the_participants_own_screen_and_keys(configs: Path, tmp_path: Path) -> None:
+    pytest.importorskip("psychopy")
+    run = words(configs, "tiny", "--participant", "P01", "--participant-screen", "--participant-keys")
+    with virtual_display() as display, AtConsole(run, tmp_path, display) as screen:
+        screen.rating = lambda trial: str(2 + trial)
+        screen.stands(RUN)
+        screen.at("informing")
+        screen.participant_shows("Do you agree to take part?")
+        asking = screen.to("asking", 1)
+        screen.participant_shows("ChoicePage")
+        screen.keys.press("d")
+        screen.until(lambda look: look.serial != asking.serial)
+        screen.at("rating")
+        screen.participant_shows("RatingPage")
+        screen.focus_on(RUN)
+        screen.until(lambda look: look.active)
+        screen.answer = lambda _: "r"
+        for trial in (1, 2):
+            screen.to("describing", trial)
+            screen.participant_shows("DescriptionPage", trial)
+            screen.focus_on(RUN)  # the experimenter types what is said
+            screen.until(lambda look: look.active)
+        screen.to_the_end()
+        code, said = screen.close()
+    assert code == 0, said
+    first, second = table(tmp_path)
+    assert (first["stronger"], first["stronger_source"], first["stronger_time_valid"]) == ("first", "participant", "1")
+    assert (second["stronger"], second["stronger_source"]) == ("second", "experimenter")
