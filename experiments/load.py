@@ -6,7 +6,7 @@ import csv
 import math
 from collections.abc import Iterator
 from contextlib import contextmanager
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -15,16 +15,16 @@ from device.limits import MAX_SHOTS_PER_MINUTE, DriveHistory, Load
 from device.methods import drive_of, rendering_of
 from device.parameters import GunParameters
 from device.words import Drive
-from experiments.catalogue import CATALOGUE
-from experiments.config.door import ConfigError, ExperimentConfig, StudyConfig, checked, load, read_toml
+from experiments.config.door import ConfigError, StudyConfig, load
 from experiments.config.setup import GunConfig, Setup
 from experiments.design.config import DesignConfig
 from experiments.design.language import TRAIN_INTERVAL
 from experiments.design.planned import planned_run
 from experiments.design.planning import groups, plan_of
 from experiments.design.stimuli import limits, shown_cell
-from experiments.preference.config import PreferenceConfig
-from experiments.synthetic.answers import SyntheticAnswers, check_laws
+from experiments.record.design_table import columns
+from experiments.record.tables import MAY_LACK, TABLES
+from experiments.synthetic.laws import SyntheticAnswers, TableLaw, check_laws
 
 
 def shipped_folder() -> Path:
@@ -46,37 +46,60 @@ def find(name: str) -> Path:
     raise ConfigError(f"{name}: no such file and no shipped config; shipped are {known}")
 
 
-def load_setup(name: str) -> Setup[Any]:
-    """An experiment's config with its gun and its table of answers."""
+def load_setup(name: str) -> Setup[DesignConfig]:
+    """A design with its gun and its synthetic people, held against each other. `ConfigError` names what is wrong."""
     path = find(name)
-    table = read_toml(path)
-    if "design" in table and not isinstance(table["design"], dict):
-        return _load_design(path)
-    kind = table.get("experiment")
-    if not isinstance(kind, str) or kind not in CATALOGUE:
-        known = ", ".join(CATALOGUE)
-        raise ConfigError(f"{path}: experiment = {kind!r}; must be one of {known} (is it the config of a run?)")
-    config: Any = checked(CATALOGUE[kind].config, table, path)
-    gun = load_gun(path.parent / config.gun)
-    setup = Setup(config=config, gun=gun, source=path, answers=_answers(path, config))
-    _check_methods(path, setup)
-    return setup
-
-
-def _load_design(path: Path) -> Setup[Any]:
     design = load(DesignConfig, path)
-    gun = load_gun(path.parent / design.gun)
-    laws = load(SyntheticAnswers, path.parent / design.synthetic) if design.synthetic else None
-    if laws is not None:
-        with _named(path.parent / str(design.synthetic)):
-            check_laws(design, laws)
-    setup = Setup(config=design, gun=gun, source=path, laws=laws)
+    setup = Setup(config=design, gun=load_gun(path.parent / design.gun), source=path)
     with _named(path):
-        groups(design)
-        for group in range(len(groups(design))):
-            planned_run(design, plan_of(design, "P01", 0, group=group))
-        limits(design, gun)
-    return setup
+        _check_known_columns(design)
+        plans = [plan_of(design, "P01", 0, group=group) for group in range(len(groups(design)))]
+        for plan in plans:
+            planned_run(design, plan)
+        limits(design, setup.gun)
+    if not design.synthetic:
+        return setup
+    laws = load(SyntheticAnswers, path.parent / design.synthetic)
+    with _named(path.parent / design.synthetic):
+        check_laws(design, laws, plans)
+    return replace(setup, laws=_with_tables(path, design, laws))
+
+
+def _check_known_columns(design: DesignConfig) -> None:
+    """`ConfigError`: a name whose logs other programs read, with other columns than they know."""
+    if design.design not in TABLES:
+        return
+    wanted = [column.name for column in TABLES[design.design]]
+    have = [column.name for column in columns(design)]
+    missing = [name for name in wanted if name not in have and name not in MAY_LACK]
+    surplus = [name for name in have if name not in wanted]
+    if missing or surplus:
+        told = [f"without {', '.join(missing)}"] if missing else []
+        told += [f"with {', '.join(surplus)}"] if surplus else []
+        raise ConfigError(
+            f"design = {design.design!r}: logs of this name have columns of their own, and this design makes them "
+            f"{' and '.join(told)}; choose another name"
+        )
+
+
+def _with_tables(path: Path, design: DesignConfig, laws: SyntheticAnswers) -> SyntheticAnswers:
+    """The laws with the lines of the tables that they name."""
+    read = {
+        name: law.model_copy(update={"rows": _table_rows(path, law, law.columns(name, scored=scored))})
+        for name, law in laws.questions.items()
+        if isinstance(law, TableLaw)
+        for scored in [design.questions[name].correct is not None]
+    }
+    return laws.model_copy(update={"questions": laws.questions | read})
+
+
+def _table_rows(path: Path, law: TableLaw, columns: tuple[str, ...]) -> tuple[dict[str, str], ...]:
+    table = path.parent / law.file
+    try:
+        with table.open(encoding="utf-8-sig", newline="") as file:
+            return tuple(_answer_rows(table, csv.reader(file, strict=True), columns))
+    except (OSError, ValueError, csv.Error) as error:
+        raise ConfigError(f"{table}: cannot be read ({error}); the law's key `file` names it") from error
 
 
 @contextmanager
@@ -102,25 +125,6 @@ def load_study(name: str) -> tuple[StudyConfig, Path]:
     return load(StudyConfig, path), path.parent
 
 
-def _check_methods(path: Path, setup: Setup[Any]) -> None:
-    try:
-        setup.gun.renderings(setup.config.methods)
-    except ValueError as error:
-        raise ConfigError(f"{path}: {error}") from error
-
-
-def _answers(path: Path, config: ExperimentConfig) -> tuple[dict[str, str], ...]:
-    synthetic = getattr(config, "synthetic", None)
-    if synthetic is None or synthetic.observer != "table":
-        return ()
-    table, columns = path.parent / synthetic.table, CATALOGUE[config.experiment].answer_columns
-    try:
-        with table.open(encoding="utf-8-sig", newline="") as file:
-            return tuple(_answer_rows(table, csv.reader(file, strict=True), columns))
-    except (OSError, ValueError, csv.Error) as error:
-        raise ConfigError(f"{table}: cannot be read ({error}); the config's key synthetic.table names it") from error
-
-
 def _answer_rows(table: Path, lines: Any, columns: tuple[str, ...]) -> Iterator[dict[str, str]]:
     header = tuple(next(lines, ()))
     if header != columns:
@@ -141,17 +145,8 @@ class MethodLimits:
     settle_s: float
 
 
-def check_limits(setup: Setup[Any]) -> list[MethodLimits]:
-    """Each method's drive within the limits, or `ConfigError` with method, value and limit."""
-    if isinstance(setup.config, DesignConfig):
-        return _check_cells(setup)
-    found = check_methods(setup.gun, setup.config.methods, setup.source.parent / setup.config.gun)
-    _check_repetition(setup, found)
-    return found
-
-
-def _check_cells(setup: Setup[DesignConfig]) -> list[MethodLimits]:
-    """Each cell of a design within the limits, its trains as well."""
+def check_limits(setup: Setup[DesignConfig]) -> list[MethodLimits]:
+    """Each cell of a design within the limits, its trains as well. `ConfigError` with cell, value and limit."""
     with _named(setup.source):
         cells = limits(setup.config, setup.gun)
     found = [
@@ -194,15 +189,6 @@ def _never_moves(gun: GunParameters) -> str:
         f"(friction_N {gun.friction_N:g}), and the coil pulls with {pull_N:.4g} N at the most (voltage_V "
         f"{gun.voltage_V:g} for pulse_s {gun.pulse_s:g}); lower the friction, or raise the voltage or the pulse"
     )
-
-
-def _check_repetition(setup: Setup[Any], methods: list[MethodLimits]) -> None:
-    """A whole train against the device's own limits, before any device is opened."""
-    if not isinstance(setup.config, PreferenceConfig):
-        return
-    every_s, shots = setup.config.stimulus.repeat_every_s, setup.config.fatigue.max_shots_per_trial
-    for method in methods:
-        _check_train(setup.source, method, every_s, shots, "stimulus.repeat_every_s")
 
 
 def _check_train(source: Path, method: MethodLimits, every_s: float, shots: int, key: str) -> None:

@@ -9,24 +9,26 @@ from collections.abc import Callable, Mapping
 from contextlib import closing
 from dataclasses import asdict, dataclass, replace
 from pathlib import Path
-from typing import Any, Literal
+from typing import Literal
 
 from device import Gun, open_gun
-from experiments.catalogue import experiment, of_head, table
 from experiments.clock import Clock, date_text
 from experiments.config.setup import Setup
 from experiments.design.config import DesignConfig
 from experiments.design.plan import Plan
-from experiments.design.stimuli import Stimuli, by_hand
+from experiments.design.planning import plan_of, practice_of
+from experiments.design.stimuli import Stimuli, by_hand, stimuli_of
 from experiments.design.streams import checked_seed, draw_seed
 from experiments.live_run import LiveRun, RunStopped, Screen
 from experiments.load import check_limits
+from experiments.rebuild import design_of, table
 from experiments.record import replay, storage
 from experiments.record.dictionary import design_dictionary
 from experiments.record.journal import Contents, Journal, JournalError, begun, hold_journal, read_journal
 from experiments.record.provenance import provenance
 from experiments.record.replay import RunPosition
 from experiments.runner import Desk, carry_out, gun_name
+from experiments.session.design_session import design_session
 from experiments.session.steps import Answered, Describe, Session
 from experiments.study import folders, register
 from experiments.study.folders import Place, PlaceError
@@ -76,7 +78,7 @@ class RunRequest:
     own, and a `visual` run is worked by a synthetic one.
     """
 
-    setup: Setup[Any]
+    setup: Setup[DesignConfig]
     participant_id: str
     results: Path
     gun: str = "simulated"
@@ -99,7 +101,7 @@ class Finished:
     saved: int
 
 
-MakeScreen = Callable[[Setup[Any], Plan, Clock], Screen]
+MakeScreen = Callable[[Setup[DesignConfig], Plan, Clock], Screen]
 
 
 def resolve_seed(request: RunRequest) -> int:
@@ -114,10 +116,10 @@ def run(request: RunRequest, make_screen: MakeScreen, clock: Clock) -> Finished:
     """Carry out a run. `PlaceError`, `JournalError`, `ConfigError`, `RunStopped`: nothing acknowledged is ever lost."""
     setup = request.setup
     check_limits(setup)
-    stimuli = experiment(setup).stimuli(setup)
+    stimuli = stimuli_of(setup.config, setup.gun)
     registered = register.read_register(request.results)
     place = folders.place(request.results, request.participant_id, setup.config.experiment, registered)
-    place = replace(place, practice=request.practice, suffix=experiment(setup).suffix(setup.config))
+    place = replace(place, practice=request.practice, suffix=setup.config.table)
     if not place.journal.exists():
         request = replace(request, anew_reason="")
     before = _before(place, request, clock)
@@ -125,7 +127,7 @@ def run(request: RunRequest, make_screen: MakeScreen, clock: Clock) -> Finished:
         _refuse_excluded(place, registered)
     with closing(_open_gun(request, stimuli, clock)) as gun:
         plan = _new_plan(request, place, registered) if before is None else _plan_of(before, request)
-        session, screen = experiment(setup).session(plan, setup), make_screen(setup, plan, clock)
+        session, screen = design_session(plan, setup), make_screen(setup, plan, clock)
         with _open(place, before, clock) as journal:
             head = _circumstances(setup, gun, clock)
             if before is None:
@@ -201,12 +203,11 @@ def _refuse_finished(where: Place, contents: Contents | None) -> None:
 
 def _new_plan(request: RunRequest, place: Place, registered: Register) -> Plan:
     setup, seed = request.setup, resolve_seed(request)
+    group = folders.group_of_next_run(setup, place.results, registered)
     if not request.practice:
         row = folders.row_of_next_run(setup, place.results, registered)
-        group = folders.group_of_next_run(setup, place.results, registered)
-        return experiment(setup).make_plan(setup.config, place.participant_id, seed, row, group)
-    group = folders.group_of_next_run(setup, place.results, registered)
-    plan = experiment(setup).make_practice(setup.config, place.participant_id, seed, group)
+        return plan_of(setup.config, place.participant_id, seed, row=row, group=group)
+    plan = practice_of(setup.config, place.participant_id, seed, group=group)
     if plan is None:
         raise PlaceError(f"{setup.source}: there is no practice (table [practice])")
     return plan
@@ -237,18 +238,17 @@ def _open(place: Place, before: Contents | None, clock: Clock) -> Journal:
     return Journal.create(place.journal, clock)
 
 
-def _circumstances(setup: Setup[Any], gun: Gun, clock: Clock) -> dict[str, object]:
+def _circumstances(setup: Setup[DesignConfig], gun: Gun, clock: Clock) -> dict[str, object]:
     """What a journal says of how a run began, or went on.
 
     The experimenter cannot be kept from knowing the direction, as they turn the gun, and dampers, set by hand.
     """
     dampers = [f"method {name}" for name in setup.config.methods if setup.gun.methods[name].damper]
-    set_by_hand = by_hand(setup.config) if isinstance(setup.config, DesignConfig) else ()
     return {
         "provenance": provenance(),
         "gun": asdict(gun.identify()),
         "clock": clock.name,
-        "experimenter_knows": ["direction", *dampers, *set_by_hand],
+        "experimenter_knows": ["direction", *dampers, *by_hand(setup.config)],
     }
 
 
@@ -297,8 +297,7 @@ def _to_the_end(session: Session, desk: Desk, position: RunPosition, place: Plac
 def _write_table(place: Place, contents: Contents) -> int:
     """Write the table from the journal as it was read back from the disk; the answers in it."""
     storage.write_whole(place.table, table(contents))
-    design = of_head(contents.head)[1]
-    if design is not None:
-        storage.write_whole(place.results / f"task-{design.design}_columns.md", design_dictionary(design).encode())
+    design = design_of(contents.head)
+    storage.write_whole(place.results / f"task-{design.design}_columns.md", design_dictionary(design).encode())
     told = replay.history(contents)
     return sum(isinstance(word, Answered) and not isinstance(step, Describe) for step, word in told)

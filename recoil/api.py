@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
     from analysis.logs.reading import Logs
@@ -16,13 +16,14 @@ if TYPE_CHECKING:
     from analysis.predict.power.results import Power
     from analysis.summary.results import StudyStatistics
     from experiments.config.setup import Setup
+    from experiments.design.config import DesignConfig
     from experiments.design.plan import Plan
 
 
-def load_config(name: str | Path) -> Setup[Any]:
+def load_config(name: str | Path) -> Setup[DesignConfig]:
     """An experiment with its gun, from a file or the name of a shipped config.
 
-    >>> load_config("direction").config.design.methods
+    >>> load_config("direction").config.methods
     ('vibration', 'asymmetric-1', 'asymmetric-2')
     """
     from experiments.load import load_setup
@@ -30,7 +31,7 @@ def load_config(name: str | Path) -> Setup[Any]:
     return load_setup(str(name))
 
 
-def plan(setup: Setup[Any], participant: str = "P01", seed: int = 1, order_row: int | None = None) -> Plan:
+def plan(setup: Setup[DesignConfig], participant: str = "P01", seed: int = 1, order_row: int | None = None) -> Plan:
     """The trials of one participant in their order; the same seed gives the same plan.
 
     `order_row`: the row of a Latin square or Williams design, which a run takes from the register of the study.
@@ -39,17 +40,17 @@ def plan(setup: Setup[Any], participant: str = "P01", seed: int = 1, order_row: 
     >>> len(found.trials), found.trials[0].direction
     (60, 'forward')
     """
-    from experiments.catalogue import experiment
+    from experiments.design.planning import plan_of
     from experiments.design.streams import checked_seed
     from experiments.study.folders import check_code
 
     check_code(participant)
     checked_seed(seed)
-    return experiment(setup).make_plan(setup.config, participant, seed, order_row)
+    return plan_of(setup.config, participant, seed, row=order_row)
 
 
 def run_synthetic(
-    setup: Setup[Any], participants: Sequence[str], results: str | Path, seed: int | None = None
+    setup: Setup[DesignConfig], participants: Sequence[str], results: str | Path, seed: int | None = None
 ) -> list[Path]:
     """Runs of synthetic participants on the simulated gun, in a clock of their own; gives their tables.
 

@@ -10,22 +10,21 @@ import csv
 import io
 import json
 import os
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
 from pydantic import BaseModel
 
-from experiments.catalogue import CATALOGUE
-from experiments.config.door import ConfigError, StudyConfig, read_toml, toml_text
+from experiments.config.door import ConfigError, StudyConfig, checked_table, read_toml, toml_text
 from experiments.config.setup import GunConfig
 from experiments.design.config import DesignConfig
 from experiments.load import load_setup, shipped_folder
 from experiments.record import journal, storage
 from experiments.record.journal import JournalError
 from experiments.study.folders import PlaceError
-from experiments.synthetic.answers import SyntheticAnswers
+from experiments.synthetic.laws import SyntheticAnswers, TableLaw
 
 
 def copy_began_with(path: Path, folder: Path) -> list[Path]:
@@ -52,21 +51,28 @@ def _files(path: Path, setup: Any, laws: Any, folder: Path) -> dict[Path, bytes]
     """The files by their places. Names in the config stay as they are, since the hash is over them too."""
     config = setup["experiment"]
     named = {config["gun"]: _toml(path, setup["gun"])}
-    if "factors" in config:
-        kind = str(config["design"])
-        if config.get("synthetic") is not None:
-            named[config["synthetic"]] = _toml(path, laws)
-    else:
-        kind = config.get("experiment")
-        if kind not in CATALOGUE:
-            raise ConfigError(f"{path}: line 1: experiment = {kind!r} is not known to this version of Recoil")
-        table = (config.get("synthetic") or {}).get("table")
-        if table is not None:
-            named[table] = _csv(path, setup["answers"], CATALOGUE[kind].answer_columns)
+    if config.get("synthetic") is not None:
+        named |= _people(path, config, laws)
     own = folder.joinpath(*["configs"] * max(_steps_up(path, name) for name in named))
-    return {_place(own, f"{kind}.toml"): _toml(path, config)} | {
+    return {_place(own, f"{config['design']}.toml"): _toml(path, config)} | {
         _place(own, name): data for name, data in named.items()
     }
+
+
+def _people(path: Path, config: Any, laws: Any) -> dict[str, bytes]:
+    """The file of the synthetic people, and the tables that it names."""
+    try:
+        found = checked_table(SyntheticAnswers, laws, f"{path}: line 1")
+    except ConfigError as error:
+        raise JournalError(f"{error}; the journal was changed, or another version of Recoil wrote it") from error
+    tables = {name: law for name, law in found.questions.items() if isinstance(law, TableLaw)}
+    files = {
+        law.file: _csv(path, law.rows, law.columns(name, scored=config["questions"][name].get("correct") is not None))
+        for name, law in tables.items()
+    }
+    for name in tables:
+        del laws["questions"][name]["rows"]
+    return {config["synthetic"]: _toml(path, laws)} | files
 
 
 def _place(own: Path, name: str) -> Path:
@@ -94,7 +100,7 @@ def _toml(path: Path, table: Mapping[str, object]) -> bytes:
         raise ConfigError(f"{path}: line 1: {error}") from error
 
 
-def _csv(path: Path, rows: list[dict[str, str]], columns: tuple[str, ...]) -> bytes:
+def _csv(path: Path, rows: Sequence[Mapping[str, str]], columns: tuple[str, ...]) -> bytes:
     text = io.StringIO(newline="")
     writer = csv.DictWriter(text, columns)
     writer.writeheader()
@@ -214,10 +220,10 @@ def _schemas() -> list[Path]:
 def _study_of(folder: Path, name: str, *, paper: bool) -> list[Path]:
     """A shipped design with its gun and its synthetic people, and a study that says nothing about who may come."""
     path = shipped_folder() / f"{name}.toml"
-    setup = load_setup(name) if path.is_file() else None
-    if setup is None or not hasattr(setup.config, "gun"):
+    setup = load_setup(name) if name in designs() else None
+    if setup is None:
         raise ConfigError(f"--from {name}: no shipped design; there are {', '.join(designs())}")
-    laws = setup.config.synthetic if isinstance(setup.config, DesignConfig) else None
+    laws = setup.config.synthetic
     named = [setup.config.gun, *([laws] if laws else []), *(["paper.toml"] if paper else [])]
     made = copy_configs(folder, [path, *(shipped_folder() / one for one in named), *_schemas()])
     study: dict[str, object] = {"title": f"A study of {setup.config.title}", "participants": 12}
@@ -227,13 +233,8 @@ def _study_of(folder: Path, name: str, *, paper: bool) -> list[Path]:
 
 
 def designs() -> list[str]:
-    """The names of the shipped designs and experiments."""
-    return [path.stem for path in sorted(shipped_folder().glob("*.toml")) if _is_run(path)]
-
-
-def _is_run(path: Path) -> bool:
-    table = read_toml(path)
-    return "factors" in table or "experiment" in table
+    """The names of the shipped designs."""
+    return [path.stem for path in sorted(shipped_folder().glob("*.toml")) if "factors" in read_toml(path)]
 
 
 def schemas() -> dict[str, bytes]:
@@ -248,7 +249,6 @@ def schemas() -> dict[str, bytes]:
         "synthetic": SyntheticAnswers,
         "gun": GunConfig,
         "study": StudyConfig,
-        **{name: one.config for name, one in CATALOGUE.items()},
         "paper": Paper,
         "columns": ColumnMap,
         "rules": Rules,

@@ -7,14 +7,14 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
 
 from device.serial_gun.gun import speed_of
-from experiments.catalogue import rebuild
 from experiments.clock import Clock, RealClock, VirtualClock
 from experiments.config.setup import Setup
+from experiments.design.config import DesignConfig
 from experiments.design.plan import Plan
 from experiments.live_run import RunStopped, Screen
+from experiments.rebuild import rebuild
 from experiments.record import storage
 from experiments.run import Again, Finished, ParticipantOptions, RunRequest, ScreenName, run
 from experiments.screens.synthetic import synthetic_screen
@@ -67,7 +67,7 @@ def check_pace(screen: str, gun: str) -> None:
 
 
 def _at_terminal(request: RunRequest) -> Finished:
-    def screen(_: Setup[Any], plan: Plan, clock: Clock) -> Screen:
+    def screen(_: Setup[DesignConfig], plan: Plan, clock: Clock) -> Screen:
         return TerminalScreen(plan, clock, simulated=request.gun == "simulated")
 
     return run(request, screen, RealClock())

@@ -13,10 +13,10 @@ import pandas as pd
 
 from analysis.logs.files import BadLogError, code_in_name, read_content
 from analysis.logs.rules import cell_fault, cell_value
-from experiments.catalogue import of_head
 from experiments.config.setup import sha256
 from experiments.design.config import DesignConfig
 from experiments.design.plan import Plan
+from experiments.rebuild import design_of
 from experiments.record import journal
 from experiments.record.design_table import columns
 from experiments.record.journal import JournalError
@@ -69,9 +69,7 @@ def _design_of(path: str) -> tuple[DesignConfig, Plan]:
         head = journal.head(beside)
         if head is None:
             raise BadLogError(f"{beside.name} has no whole first line, so nothing says what the columns mean")
-        design = of_head(head)[1]
-        if design is None:
-            raise BadLogError(f"{beside.name} is the journal of another experiment ({head.plan.experiment})")
+        design = design_of(head)
     except JournalError as error:
         raise BadLogError(str(error)) from error
     return design, head.plan

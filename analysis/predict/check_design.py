@@ -3,17 +3,19 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import Any
 
+from analysis.predict.drawn import RatingStudies, drawn
 from analysis.predict.exposure import Exposure, exposure
+from analysis.predict.synthetic_studies import percepts_of_methods
 from analysis.report.section import Section, Table
 from analysis.report.serial import OPTIONAL
 from device.methods import Method
 from device.parameters import GunParameters
 from device.physics import simulate
 from device.words import Pulse
+from experiments.config.door import ConfigError
 from experiments.config.setup import Setup
 from experiments.design.config import DesignConfig
 from experiments.design.language import shown_level
@@ -23,6 +25,9 @@ from experiments.design.planned import PlannedRun, planned_run, warnings
 from experiments.design.planning import groups, plan_of, square_size
 from experiments.design.stimuli import ConditionLimits, limits, stimulus
 from experiments.load import check_limits
+from experiments.screens.synthetic import synthetic_participant_of
+from experiments.synthetic.laws import DiffusionLaw
+from experiments.synthetic.model_based import NEUTRAL, rates_by_instruction
 
 _MOST_CELLS = 60
 """So many cells are listed."""
@@ -47,7 +52,10 @@ class CellCheck:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class DesignCheck:
-    """What a design means for some participants. `orders`: what each meets, session by session."""
+    """What a design means for some participants. `orders`: what each meets, session by session.
+
+    `felt_forward_rates`: of synthetic participants who decide on what the gun does, by method and instruction.
+    """
 
     experiment: str
     title: str
@@ -61,13 +69,14 @@ class DesignCheck:
     gun: str
     cells: tuple[CellCheck, ...]
     exposure: Exposure
+    felt_forward_rates: dict[str, dict[str, float]]
     warnings: tuple[str, ...]
     assumed: tuple[str, ...]
 
 
-def check_design(setup: Setup[Any], seed: int, codes: Sequence[str]) -> DesignCheck:
+def check_design(setup: Setup[DesignConfig], seed: int, codes: Sequence[str]) -> DesignCheck:
     """What a design means. `ConfigError` names what is wrong with it."""
-    design: DesignConfig = setup.config
+    design = setup.config
     check_limits(setup)
     plans = dict(zip(codes, _plans(design, seed, codes), strict=True))
     first = next(iter(plans.values()))
@@ -85,9 +94,28 @@ def check_design(setup: Setup[Any], seed: int, codes: Sequence[str]) -> DesignCh
         gun=setup.gun.title,
         cells=tuple(_cell(setup, one) for one in limits(design, setup.gun)),
         exposure=exposure(_shots(setup, first)),
+        felt_forward_rates=_felt(setup, first),
         warnings=tuple(_warnings(design, planned, [*plans.values()])),
         assumed=(*design.assumed, *(f"{design.gun}: {key}" for key in setup.gun.assumed)),
     )
+
+
+def _felt(setup: Setup[DesignConfig], plan: Plan) -> dict[str, dict[str, float]]:
+    """The forward rates that people who feel the gun will have. `ConfigError`: laws or numbers that make nobody."""
+    if setup.laws is None:
+        return {}
+    synthetic_participant_of(setup, plan)
+    try:
+        studies = drawn(setup)
+    except ConfigError:
+        return {}
+    if isinstance(studies, RatingStudies) or not isinstance(studies.law, DiffusionLaw):
+        return {}
+    mind, told = studies.law.own, studies.instructions or (NEUTRAL,)
+    return {
+        method: {name: rate for name, rate in rates_by_instruction(mind, percept).items() if name in told}
+        for method, percept in percepts_of_methods(setup.gun, studies.methods, studies.law).items()
+    }
 
 
 def _plans(design: DesignConfig, seed: int, codes: Sequence[str]) -> Iterator[Plan]:
@@ -120,7 +148,7 @@ def _trial(design: DesignConfig, trial: Trial) -> str:
     return " ".join(filter(None, (_levels(trial, varied), " – ".join(map(shown_level, trial.intervals))))) or "shot"
 
 
-def _cell(setup: Setup[Any], one: ConditionLimits) -> CellCheck:
+def _cell(setup: Setup[DesignConfig], one: ConditionLimits) -> CellCheck:
     drive = one.drive
     parameters = stimulus(setup.config, setup.gun, one.levels).parameters
     pulse = isinstance(drive, Pulse)
@@ -135,9 +163,9 @@ def _cell(setup: Setup[Any], one: ConditionLimits) -> CellCheck:
     )
 
 
-def _shots(setup: Setup[Any], plan: Plan) -> list[tuple[Method, int]]:
+def _shots(setup: Setup[DesignConfig], plan: Plan) -> list[tuple[Method, int]]:
     """Every shot that a participant may feel in a run, by what it is."""
-    design: DesignConfig = setup.config
+    design = setup.config
     each = design.trial.max_shots if design.trial.kind == "train" else 1
     felt = Counter[Method]()
     for trial in plan.trials:
@@ -182,8 +210,20 @@ def design_sections(found: DesignCheck) -> tuple[Section, ...]:
             ),
         ),
         Section(title=f"Gun: {found.gun}", tables=(_cells(found.cells),)),
+        *_felt_section(found.felt_forward_rates),
         *((Section(title="Assumed", items=found.assumed),) if found.assumed else ()),
     )
+
+
+def _felt_section(rates: Mapping[str, Mapping[str, float]]) -> Iterator[Section]:
+    if rates:
+        lines = (
+            f"{method:14} {', '.join(f'{100 * rate:.1f} % ({name})' for name, rate in told.items())}"
+            for method, told in rates.items()
+        )
+        yield Section(
+            title="Felt: right answers to forward shots, of synthetic participants (by the model)", items=tuple(lines)
+        )
 
 
 def _cells(cells: Sequence[CellCheck]) -> Table:

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from statistics import NormalDist
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -16,16 +17,16 @@ from scipy.special import ndtr
 
 from analysis.paper.paper import PublishedDirection, PublishedExperiment
 from analysis.paper.recurrence import PatternOdds, Recurrence, answers_recur, odds_of, recurs
+from analysis.predict.drawn import DirectionStudies, Drawn, RatingStudies, rates_by_method
 from analysis.stats.arrays import FloatArray
-from device.words import DIRECTIONS
-from experiments.config.setup import Setup
+from device.words import DIRECTIONS, Direction
+from experiments.config.setup import GunConfig
 from experiments.design.streams import generator
-from experiments.direction.config import DirectionConfig, Rates, Synthetic
-from experiments.direction.synthetic import model_parameters, probit_of_forward
-from experiments.preference.config import PreferenceConfig, Ratings, RatingScale
 from experiments.synthetic.diffusion import People, upper_probabilities
+from experiments.synthetic.laws import DiffusionLaw, RatesLaw, RatingsLaw
 from experiments.synthetic.model_based import NEUTRAL
 from experiments.synthetic.percept import Percept, evidence, own_start, percepts_of
+from experiments.tasks.questions import Scale
 
 Counts = NDArray[np.int64]
 
@@ -44,31 +45,44 @@ def piece_sizes(studies: int, participants: int) -> list[int]:
 
 
 def direction_counts(
-    config: DirectionConfig, n: int, studies: int, draws: np.random.Generator, effect: float = 1.0
+    drawn: DirectionStudies, n: int, studies: int, draws: np.random.Generator, effect: float = 1.0
 ) -> Counts:
-    """Correct answers, (studies, n, methods, 2 directions), of people drawn as `RatesParticipant` draws them.
+    """Correct answers, (studies, n, methods, 2 directions), of people drawn as `SyntheticParticipant` draws them.
 
     `effect` is a factor on the probit of each mean correct rate, so on d': at 0 directions are guessed.
     """
-    rates, design = config.synthetic.rates, config.design
-    ability = rates.ability_sd * draws.standard_normal((studies, n, 1, 1))
-    bias = rates.bias_sd * draws.standard_normal((studies, n, 1, 1))
-    says_forward = [[probit_of_forward(rates, method, way) for way in DIRECTIONS] for method in design.methods]
-    felt = rates.bias_mean + effect * (np.array(says_forward) - rates.bias_mean)
+    law = rates_of(drawn)
+    ability = law.ability_sd * draws.standard_normal((studies, n, 1, 1))
+    bias = law.bias_sd * draws.standard_normal((studies, n, 1, 1))
+    says_forward = [[felt_probit(law, method, way) for way in DIRECTIONS] for method in drawn.methods]
+    felt = bias_mean(law) + effect * np.array(says_forward)
     towards = np.array([1.0, -1.0])  # a correct answer is "forward" on forward trials, not "forward" on backward ones
     correct = ndtr(towards * (felt + bias) + ability)
-    return draws.binomial([design.forward_per_session, design.backward_per_session], correct)
+    return draws.binomial(drawn.trials, correct)
+
+
+def felt_probit(law: RatesLaw, method: str, direction: Direction) -> float:
+    """The probit of answering "forward", for a person without own ability and without any bias."""
+    rate = rates_by_method(law, (method,), direction)[method]
+    return law.spread * NormalDist().inv_cdf(rate if direction == "forward" else 1 - rate)
+
+
+def bias_mean(law: RatesLaw) -> float:
+    """The mean bias towards saying "forward", in probit units."""
+    if law.bias is None:
+        return 0.0
+    return law.bias.mean if law.bias.answer == "forward" else -law.bias.mean
 
 
 def preference_scores(
-    config: PreferenceConfig, n: int, studies: int, draws: np.random.Generator, effect: float = 1.0
+    drawn: RatingStudies, n: int, studies: int, draws: np.random.Generator, effect: float = 1.0
 ) -> FloatArray:
     """Ratings, (studies, n, methods), of people drawn as `draw_ratings` draws them.
 
     `effect` is a factor on the distances of the methods' means from their common mean, and, below 1, on the share of
     people who keep the lowest method below all others.
     """
-    law, scale, methods = config.synthetic.ratings, config.rating, config.methods
+    law, scale, methods = drawn.law, drawn.scale, drawn.methods
     person = law.person_sd * draws.standard_normal((studies, n, 1))
     noise = law.noise_sd * draws.standard_normal((studies, n, len(methods)))
     ratings = ratings_on_scale(scaled_means(law, methods, effect) + person + noise, scale)
@@ -76,7 +90,7 @@ def preference_scores(
         first, second = (methods.index(name) for name in law.same)
         alike = draws.random((studies, n)) < law.same_share
         ratings[..., second] = np.where(alike, ratings[..., first], ratings[..., second])
-    if law.lowest in methods:
+    if law.lowest is not None and law.lowest in methods:
         lowest = methods.index(law.lowest)
         below = ratings_on_scale(np.delete(ratings, lowest, axis=-1).min(axis=-1) - scale.grain, scale)
         kept = draws.random((studies, n)) < effect
@@ -84,14 +98,14 @@ def preference_scores(
     return ratings
 
 
-def scaled_means(law: Ratings, methods: tuple[str, ...], effect: float) -> FloatArray:
+def scaled_means(law: RatingsLaw, methods: tuple[str, ...], effect: float) -> FloatArray:
     """The methods' means, their distances from the common mean times `effect`."""
     means = np.array([law.mean[method] for method in methods])
     centre = means.mean()
     return means if effect == 1.0 else centre + effect * (means - centre)
 
 
-def ratings_on_scale(values: FloatArray, scale: RatingScale) -> FloatArray:
+def ratings_on_scale(values: FloatArray, scale: Scale) -> FloatArray:
     """`experiments.tasks.questions.on_scale` of many values."""
     steps = np.rint((np.clip(values, scale.minimum, scale.maximum) - scale.minimum) / scale.grain)
     decimals = max(0, -int(np.floor(np.log10(scale.grain)))) + 2
@@ -113,24 +127,26 @@ class Felt:
     cautions: tuple[float, ...] = (1.0,)
 
 
-def percepts_of_setup(setup: Setup[DirectionConfig]) -> dict[str, Percept]:
+def percepts_of_methods(gun: GunConfig, methods: Sequence[str], law: DiffusionLaw) -> dict[str, Percept]:
     """What the gun's shots give to feel, by method."""
-    config = setup.config
-    return percepts_of(setup.gun.renderings(config.methods), model_parameters(config).percept.leak_s)
+    return percepts_of(gun.renderings(tuple(methods)), law.percept.leak_s)
 
 
 def felt_people(
-    config: DirectionConfig, percepts: Mapping[str, Percept], methods: Sequence[str], effect: float = 1.0
+    law: DiffusionLaw,
+    instructions: Sequence[str],
+    percepts: Mapping[str, Percept],
+    methods: Sequence[str],
+    effect: float = 1.0,
 ) -> Felt:
-    """The participants of a config; `effect` is a factor on the evidence, at 0 nothing is felt."""
-    mind = model_parameters(config)
-    instructions = config.design.instructions or (NEUTRAL,)
+    """The participants of a law; `effect` is a factor on the evidence, at 0 nothing is felt."""
+    mind = law.own
     return Felt(
         log_odds=tuple(effect * evidence(percepts[method], mind.percept) for method in methods),
         start=mind.percept.start,
         people=mind.people,
         lapse_rate=mind.lapses.rate,
-        cautions=tuple(mind.boundaries[name] / mind.boundaries[NEUTRAL] for name in instructions),
+        cautions=tuple(mind.boundaries[name] / mind.boundaries[NEUTRAL] for name in instructions or (NEUTRAL,)),
     )
 
 
@@ -175,40 +191,40 @@ def _under_each(
 # Null participants, in whom there is nothing to be found
 
 
-def null_rates(rates: Rates, *, biased: bool) -> Rates:
-    """People who feel nothing (with effect 0), with the bias that `rates` give them or without any."""
-    bias = {} if biased else {"bias_mean": 0.0, "bias_sd": 0.0}
-    return rates.model_copy(update={"ability_sd": 0.0} | bias)
+def null_rates(law: RatesLaw, *, biased: bool) -> RatesLaw:
+    """People who feel nothing (with effect 0), with the bias that `law` gives them or without any."""
+    return law.model_copy(update={"ability_sd": 0.0} | ({} if biased else {"bias": None}))
 
 
-def null_ratings(law: Ratings) -> Ratings:
+def null_ratings(law: RatingsLaw) -> RatingsLaw:
     """People who like all methods alike (with effect 0): without the habits, which are differences."""
     return law.model_copy(update={"lowest": None, "same": None, "same_share": 0.0})
 
 
-def null_felt(synthetic: Synthetic, *, biased: bool) -> Synthetic:
+def null_felt(law: DiffusionLaw, *, biased: bool) -> DiffusionLaw:
     """People who feel nothing (with effect 0), with the start that they have, or with one of 0.5 for everybody."""
     if biased:
-        return synthetic
-    percept = synthetic.percept.model_copy(update={"start": 0.5})
-    people = synthetic.people.model_copy(update={"logit_start_sd": 0.0})
-    return synthetic.model_copy(update={"percept": percept, "people": people})
+        return law
+    percept = law.percept.model_copy(update={"start": 0.5})
+    people = law.people.model_copy(update={"logit_start_sd": 0.0})
+    return law.model_copy(update={"percept": percept, "people": people})
 
 
 # What is assumed of people, in words
 
 
-def rates_law(rates: Rates) -> Iterator[str]:
+def rates_words(law: RatesLaw, methods: Sequence[str]) -> Iterator[str]:
     """People with correct rates of their own."""
-    for direction, values in (("forward", rates.forward), ("backward", rates.backward)):
+    for direction in DIRECTIONS:
+        values = rates_by_method(law, methods, direction)
         yield f"Mean correct rates, {direction}: {', '.join(f'{name} {value:g}' for name, value in values.items())}."
     yield (
-        f"People differ by an ability of SD {rates.ability_sd:g} and a bias of SD {rates.bias_sd:g} around "
-        f"{rates.bias_mean:g}, in probit units; the same in all methods. Trials are independent given the person."
+        f"People differ by an ability of SD {law.ability_sd:g} and a bias of SD {law.bias_sd:g} around "
+        f"{bias_mean(law):g}, in probit units; the same in all methods. Trials are independent given the person."
     )
 
 
-def ratings_law(law: Ratings, *, with_effect: bool = False) -> Iterator[str]:
+def ratings_words(law: RatingsLaw, *, with_effect: bool = False) -> Iterator[str]:
     """People who rate, also where the distances of the methods are multiplied by an effect."""
     yield f"Mean ratings: {', '.join(f'{name} {value:g}' for name, value in law.mean.items())}."
     yield f"SD between people {law.person_sd:g}, within people {law.noise_sd:g}; kept to the scale and its grain."
@@ -246,19 +262,27 @@ def published_claims(
     return recurs(np.asarray(answers)[:, :, places], published)
 
 
-def pattern_odds(
-    config: DirectionConfig | PreferenceConfig, published: PublishedExperiment, replications: int, seed: int
-) -> PatternOdds:
-    """How often the published claims recur among people of a config, in a study of the paper's size."""
-    draws, n, methods = generator(seed, "odds", config.experiment), published.n, config.methods
-    if isinstance(config, DirectionConfig):
-        answers: Counts | FloatArray = direction_counts(config, n, replications, draws)
-        trials = config.design.forward_per_session, config.design.backward_per_session
-        law, size = rates_law(config.synthetic.rates), f"{trials[0]} forward and {trials[1]} backward trials a method"
-        known = "of their rates only those that the paper prints are its own, all else is assumed"
-    else:
-        answers, trials = preference_scores(config, n, replications, draws), (0, 0)
-        law, size = ratings_law(config.synthetic.ratings), "one rating a method"
+def pattern_odds(drawn: Drawn, published: PublishedExperiment, replications: int, seed: int) -> PatternOdds:
+    """How often the published claims recur among people of a design, in a study of the paper's size."""
+    name, n, methods = drawn.design.design, published.n, drawn.methods
+    draws = generator(seed, "odds", name)
+    if isinstance(drawn, RatingStudies):
+        answers: Counts | FloatArray = preference_scores(drawn, n, replications, draws)
+        trials, law, size = (0, 0), ratings_words(drawn.law), "one rating a method"
         known = "neither means nor SDs are published, so these are assumed"
+    else:
+        answers, trials = direction_counts(drawn, n, replications, draws), drawn.trials
+        law, size = (
+            rates_words(rates_of(drawn), methods),
+            f"{trials[0]} forward and {trials[1]} backward trials a method",
+        )
+        known = "of their rates only those that the paper prints are its own, all else is assumed"
     claims = published_claims(answers, trials, methods, published)
-    return odds_of(config.experiment, claims, f"{n} people, {size}, seed {seed}; {known}. {' '.join(law)}")
+    return odds_of(name, claims, f"{n} people, {size}, seed {seed}; {known}. {' '.join(law)}")
+
+
+def rates_of(drawn: DirectionStudies) -> RatesLaw:
+    """The rates at which people are right. `TypeError`: they answer from what the gun does."""
+    if not isinstance(drawn.law, RatesLaw):
+        raise TypeError(f"{drawn.question}: the law {drawn.law.law} has no rates")
+    return drawn.law

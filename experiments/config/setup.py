@@ -5,7 +5,7 @@ from __future__ import annotations
 import hashlib
 import json
 from dataclasses import Field as DataclassField
-from dataclasses import dataclass, field, fields, replace
+from dataclasses import dataclass, fields, replace
 from pathlib import Path
 from typing import Generic, Literal, Self, TypeVar
 
@@ -96,7 +96,7 @@ class GunConfig(Model):
         unknown = [name for name in methods if name not in self.methods]
         if unknown:
             raise ValueError(
-                f"design.methods: the gun has no method {', '.join(unknown)}; it has {', '.join(self.methods)}"
+                f"factors.method: the gun has no method {', '.join(unknown)}; it has {', '.join(self.methods)}"
             )
         return {name: self.rendering(name) for name in methods}
 
@@ -173,15 +173,14 @@ Config_co = TypeVar("Config_co", bound=Model, covariant=True)
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Setup(Generic[Config_co]):
-    """An experiment's config, its gun and the answers of its table, if a table answers. `source` is its file.
+    """A design and its gun. `source` is the design's file.
 
-    `laws`: how synthetic people answer a design; no part of the record, as only simulation needs them.
+    `laws`: how synthetic people answer; no part of the record, as only simulation needs them.
     """
 
     config: Config_co
     gun: GunConfig
     source: Path
-    answers: tuple[dict[str, str], ...] = field(default=())
     laws: Model | None = None
 
     def record(self) -> dict[str, object]:
@@ -189,7 +188,6 @@ class Setup(Generic[Config_co]):
         return {
             "experiment": self.config.model_dump(mode="json"),
             "gun": self.gun.model_dump(mode="json"),
-            "answers": list(self.answers),
         }
 
     def sha256(self) -> str:

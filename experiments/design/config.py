@@ -71,25 +71,25 @@ class DesignConfig(Model):
         """Planned time of a hand-over."""
         return self.timing.hand_over_s
 
-    def asking_s(self, kind: str) -> float:  # noqa: ARG002 - all take the same
-        """Planned time of a question."""
-        return self.timing.answer_s
+    @property
+    def question_s(self) -> float:
+        """Planned time of one question: `timing.answer_s` is that of all that are asked about a trial."""
+        return self.timing.answer_s / len(self.questions)
 
     @property
     def trial_s(self) -> float:
         """Planned time of a trial, without what is asked after its block."""
-        asked = any(question.when == "trial" for question in self.questions.values())
-        return self.timing.hand_over_s + self.timing.stimulus_s + (self.timing.answer_s if asked else 0.0)
+        return self.timing.hand_over_s + self.timing.stimulus_s + self.timing.answer_s - self.rating_s
+
+    @property
+    def rating_s(self) -> float:
+        """Planned time of what is asked about a trial after its block."""
+        return self.question_s * sum(question.when == "block" for question in self.questions.values())
 
     @property
     def asks_later(self) -> bool:
         """Whether something is asked about each trial after its block."""
         return any(question.when == "block" for question in self.questions.values())
-
-    @property
-    def rating_s(self) -> float:
-        """Planned time of what is asked about a trial after its block."""
-        return self.timing.answer_s * sum(question.when == "block" for question in self.questions.values())
 
     @property
     def between(self) -> tuple[str, ...]:

@@ -31,10 +31,17 @@ def planned_run(design: DesignConfig, plan: Plan, gun: GunConfig | None = None) 
 
     Which methods have dampers that hands set, the `gun` knows.
     """
+    found = counted(design, plan, gun)
+    _check_fatigue(design, found)
+    return found
+
+
+def counted(design: DesignConfig, plan: Plan, gun: GunConfig | None = None) -> PlannedRun:
+    """What a plan comes to, whether or not the design allows it."""
     timing, trials = design.timing, plan.trials
     rests_s = [_rest_s(design, before, trial) for before, trial in pairwise(trials)]
     trial_s = timing.hand_over_s + timing.stimulus_s + timing.answer_s
-    found = PlannedRun(
+    return PlannedRun(
         sessions=len({trial.session for trial in trials}),
         sets=len({(trial.session, trial.set) for trial in trials}),
         trials=len(trials),
@@ -43,8 +50,6 @@ def planned_run(design: DesignConfig, plan: Plan, gun: GunConfig | None = None) 
         trials_without_break=max(_stretches(rests_s)),
         hand_changes=sum(_by_hand(design, gun, one) != _by_hand(design, gun, other) for one, other in pairwise(trials)),
     )
-    _check_fatigue(design, found)
-    return found
 
 
 def _rest_s(design: DesignConfig, before: Trial, trial: Trial) -> float:

@@ -129,7 +129,9 @@ RATINGS: tuple[Column, ...] = (
 )
 
 TABLES: dict[str, tuple[Column, ...]] = {"direction": TRIALS, "preference": RATINGS}
-"""The table of each experiment."""
+"""The tables that other programs know by the name of their design."""
+MAY_LACK = frozenset(["instruction"])
+"""Columns that a design has only if it says so."""
 
 FILE_SUFFIX: dict[str, str] = {"direction": "trials", "preference": "ratings"}
 """How the table's file name ends: `sub-P01_task-direction_trials.csv`."""

@@ -5,8 +5,6 @@ from __future__ import annotations
 from typing import Any
 
 from device import GunStatus
-from experiments import catalogue
-from experiments.catalogue import AnyConfig
 from experiments.clock import Clock
 from experiments.config.door import ConfigError
 from experiments.config.setup import Setup
@@ -19,25 +17,24 @@ from experiments.session.judging import REARM_HELD_S
 from experiments.session.remarks import Remark
 from experiments.session.states import EMERGENCY, Position, State
 from experiments.session.steps import Ask, Describe, Outcome, Present, Rate, Rest, Step
+from experiments.synthetic.answers import SyntheticParticipant
+from experiments.synthetic.laws import SyntheticAnswers
 
 
-def synthetic_participant_of(setup: Setup[Any], plan: Plan) -> Any:
+def synthetic_participant_of(setup: Setup[DesignConfig], plan: Plan) -> SyntheticParticipant:
     """The synthetic participant that a setup asks for, the same in data mode and in visual mode.
 
-    `ConfigError` if its table does not fit, or its numbers make nobody.
+    `ConfigError` if there is none, if a table does not fit, or if the numbers make nobody.
     """
+    if not isinstance(setup.laws, SyntheticAnswers):
+        raise ConfigError(f"{setup.source}: synthetic is missing; it names the file that says how people answer")
     try:
-        return catalogue.experiment(setup).synthetic_participant(setup, plan)
+        return SyntheticParticipant(setup.config, setup.laws, plan, setup.gun)
     except ValueError as error:
-        synthetic = setup.config.synthetic
-        if isinstance(setup.config, DesignConfig):
-            raise ConfigError(f"{setup.source.parent / (synthetic or '')}: {error}") from error
-        if synthetic.observer == "table":
-            raise ConfigError(f"{setup.source.parent / synthetic.table}: {error}") from error
-        raise ConfigError(f"{setup.source}: the numbers of [synthetic.*] make nobody: {error}") from error
+        raise ConfigError(f"{setup.source.parent / (setup.config.synthetic or '')}: {error}") from error
 
 
-def synthetic_screen(setup: Setup[Any], plan: Plan, clock: Clock) -> SyntheticScreen:
+def synthetic_screen(setup: Setup[DesignConfig], plan: Plan, clock: Clock) -> SyntheticScreen:
     """The screen of the synthetic participant that a setup asks for. Raises as `synthetic_participant_of` does."""
     return SyntheticScreen(setup.config, synthetic_participant_of(setup, plan), clock)
 
@@ -45,7 +42,7 @@ def synthetic_screen(setup: Setup[Any], plan: Plan, clock: Clock) -> SyntheticSc
 class SyntheticScreen:
     """Works a run as a person would, in as much time as the config plans for it, in the run's own thread."""
 
-    def __init__(self, config: AnyConfig, observer: Any, clock: Clock) -> None:
+    def __init__(self, config: DesignConfig, observer: Any, clock: Clock) -> None:
         self._config = config
         self._observer, self._clock = observer, clock
         self._live: LiveRun | None = None
@@ -80,10 +77,10 @@ class SyntheticScreen:
             case State.ASKING if isinstance(step, Ask):
                 return self._answer(position, step)
             case State.RATING if isinstance(step, Rate):
-                self._clock.sleep(self._config.asking_s(step.kind))
+                self._clock.sleep(self._config.question_s)
                 return events.Rating(rating=self._observer.rate(step.trial, step.question), by="synthetic")
             case State.DESCRIBING if isinstance(step, Describe):
-                self._clock.sleep(self._config.asking_s(step.kind))
+                self._clock.sleep(self._config.question_s)
                 return events.Description(text=self._observer.describe(step.trial, step.question), by="synthetic")
             case State.INFORMING:
                 return events.Told()

@@ -12,13 +12,11 @@ from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any
 
 from device.words import RecoilError
-from experiments import catalogue
 from experiments.config.door import CODE, StudyConfig
 from experiments.config.setup import Setup
-from experiments.design import plan, planning
+from experiments.design import planning
 from experiments.design.config import DesignConfig
 from experiments.load import load_setup, load_study
 from experiments.record import journal, replay, storage, tables
@@ -119,7 +117,7 @@ HeadOf = Callable[[Path], Head | None]
 
 
 def row_of_next_run(
-    setup: Setup[Any], results: Path, registered: Register, head_of: HeadOf = journal.head
+    setup: Setup[DesignConfig], results: Path, registered: Register, head_of: HeadOf = journal.head
 ) -> int | None:
     """The row of the balancing square that the next run takes; `None` for a random order.
 
@@ -127,19 +125,16 @@ def row_of_next_run(
     often, to within one, whenever everyone who was excluded has been replaced.
     """
     config = setup.config
-    if isinstance(config, DesignConfig):
-        size = planning.square_size(config)
-        return least_used(size, used_rows(results, config.design, registered, head_of)) if size else None
-    if config.design.order == "random":
-        return None
-    used = used_rows(results, config.experiment, registered, head_of)
-    return plan.next_row(config.design.order, len(config.methods), used)
+    size = planning.square_size(config)
+    return least_used(size, used_rows(results, config.design, registered, head_of)) if size else None
 
 
-def group_of_next_run(setup: Setup[Any], results: Path, registered: Register, head_of: HeadOf = journal.head) -> int:
+def group_of_next_run(
+    setup: Setup[DesignConfig], results: Path, registered: Register, head_of: HeadOf = journal.head
+) -> int:
     """Which combination of the levels that vary between people the next run gets: the least used, the first such."""
     config = setup.config
-    count = len(planning.groups(config)) if isinstance(config, DesignConfig) else 1
+    count = len(planning.groups(config))
     if count == 1:
         return 0
     return least_used(count, [one.plan.group for one in _heads(results, config.experiment, registered, head_of)])
@@ -194,7 +189,7 @@ class StudyFolder:
 
     config: StudyConfig
     source: Path
-    setups: tuple[Setup[Any], ...]
+    setups: tuple[Setup[DesignConfig], ...]
     results: Path
 
     @property
@@ -343,14 +338,13 @@ class _Look:
             found[run.experiment] = run.methods or ahead
         return found
 
-    def _next_methods(self, setup: Setup[Any], participant_id: str) -> tuple[str, ...] | None:
+    def _next_methods(self, setup: Setup[DesignConfig], participant_id: str) -> tuple[str, ...] | None:
         """The methods of a participant's next run in their order; `None` if chance decides when the run begins."""
         row, seed = row_of_next_run(setup, self._study.results, self.registered, self._head), setup.config.seed
         if row is None and seed is None:
             return None
         group = group_of_next_run(setup, self._study.results, self.registered, self._head)
-        plan_of = catalogue.experiment(setup).make_plan
-        return plan_of(setup.config, participant_id, seed or 0, row, group).methods
+        return planning.plan_of(setup.config, participant_id, seed or 0, row=row, group=group).methods
 
 
 def progress_of(where: Place, contents: Contents | None, *, elsewhere: bool = False) -> RunProgress:

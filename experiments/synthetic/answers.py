@@ -1,4 +1,4 @@
-"""Who answers a design's questions when nobody sits there: a law for each question, and people who differ. Pure.
+"""Who answers a design's questions when nobody sits there: people who differ, each by the law of each question. Pure.
 
 Every answer has a random stream of its own, so it does not depend on what was answered before, and a trial that is
 presented again is answered as it was.
@@ -7,108 +7,43 @@ presented again is answered as it was.
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from statistics import NormalDist
-from typing import Annotated, Literal
 
-from pydantic import Field
-
-from experiments.config.door import ConfigError, InnerShare, Model, PositiveSeconds, Seconds, Share, Spread, Text
+from experiments.config.door import ConfigError
+from experiments.config.setup import GunConfig
 from experiments.design.config import DesignConfig
-from experiments.design.language import EMPTY, NO, YES, ColumnName, Level, QuestionConfig, shown_level
+from experiments.design.language import EMPTY, NO, YES, Level, NumberScale, QuestionConfig, shown_level
 from experiments.design.plan import Condition, Plan, Trial
+from experiments.design.stimuli import stimulus
 from experiments.design.streams import Stream
+from experiments.synthetic.diffusion import Diffusion, decide, person
+from experiments.synthetic.laws import (
+    AppealLaw,
+    DiffusionLaw,
+    LogNormalTimes,
+    PowerLaw,
+    PsychometricLaw,
+    RatesLaw,
+    RatingsLaw,
+    SharesLaw,
+    SyntheticAnswers,
+    TableLaw,
+    WordsLaw,
+    WorthLaw,
+    cell_of,
+    check_laws,
+    of_condition,
+)
+from experiments.synthetic.model_based import NEUTRAL, own_diffusion
+from experiments.synthetic.percept import Percept, evidence, percept_of
+from experiments.synthetic.preference import felt_ratings
 from experiments.tasks.questions import AnswerValue, on_scale, right_answer
 
 _NORMAL = NormalDist()
 EXPOSURE_SIGMA = 0.3
 """Spread of how long people ask for a stimulus (log-normal); assumed."""
-Positive = Annotated[float, Field(gt=0, le=1e9)]
-
-
-class LogNormalTimes(Model):
-    """A response time: shift + median exp(sigma z), z standard normal."""
-
-    shift_s: Seconds = 0.35
-    median_s: PositiveSeconds = 0.75
-    sigma: Spread = 0.45
-
-
-class RatesLaw(Model):
-    """Right answers at a rate by the levels of the factors `by`, as `share`'s keys name them, joined by `/`.
-
-    Probit of a person's rate: S z(share) + ability, S = sqrt(1 + ability_sd^2), so `share` is the mean over people.
-    """
-
-    law: Literal["rates"]
-    by: tuple[ColumnName, ...] = ()
-    share: dict[str, InnerShare]
-    ability_sd: Spread = 0.0
-
-
-class PsychometricLaw(Model):
-    """A right answer, or yes, with g + (1 - g - lapse) F(ln(x / threshold) / spread), F the standard normal.
-
-    x is the level of `factor`. g is chance for a scored choice, `guess` for yes-no. For a question about the larger of
-    two the threshold is the other interval's level: the larger is chosen with lapse / 2 + (1 - lapse) F(...).
-    """
-
-    law: Literal["psychometric"]
-    factor: ColumnName
-    threshold: Positive
-    spread: Positive
-    guess: Share = 0.05
-    lapse: Share = 0.02
-    log_threshold_sd: Spread = 0.0
-
-
-class RatingsLaw(Model):
-    """Means by the levels of the factors `by`, a person's own leaning, and noise from rating to rating."""
-
-    law: Literal["ratings"]
-    by: tuple[ColumnName, ...] = ()
-    mean: dict[str, Annotated[float, Field(ge=-1e6, le=1e6)]]
-    person_sd: Spread = 0.0
-    noise_sd: Spread = 0.0
-
-
-class PowerLaw(Model):
-    """Stevens: scale x^exponent, times log-normal factors of the person (modulus) and of the answer."""
-
-    law: Literal["power"]
-    factor: ColumnName
-    exponent: Annotated[float, Field(ge=-10, le=10)]
-    scale: Positive = 1.0
-    person_sd: Spread = 0.0
-    noise_sd: Spread = 0.0
-
-
-class WorthLaw(Model):
-    """Bradley and Terry: the first of a pair is chosen with w1 / (w1 + w2); ranks are drawn one after another."""
-
-    law: Literal["worth"]
-    factor: ColumnName
-    worth: dict[str, Positive]
-    log_worth_sd: Spread = 0.0
-
-
-class WordsLaw(Model):
-    """One of some texts, at random."""
-
-    law: Literal["words"]
-    texts: Annotated[tuple[Text, ...], Field(min_length=1)]
-
-
-Law = Annotated[RatesLaw | PsychometricLaw | RatingsLaw | PowerLaw | WorthLaw | WordsLaw, Field(discriminator="law")]
-
-
-class SyntheticAnswers(Model):
-    """A file of `configs/synthetic/`: the law of each question, and how fast people answer."""
-
-    questions: dict[ColumnName, Law]
-    times: LogNormalTimes = LogNormalTimes()
-    exposure_s: PositiveSeconds = 5.0
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -124,54 +59,28 @@ class GivenAnswer:
         return str(self.value)
 
 
-def check_laws(design: DesignConfig, laws: SyntheticAnswers) -> None:
-    """`ConfigError`: a question without a law, or a law that does not cover it."""
-    for name, question in design.questions.items():
-        if name not in laws.questions:
-            raise ConfigError(f"questions.{name} is missing; each question of {design.design} needs a law")
-        _check_law(design, name, question, laws.questions[name])
+class SyntheticParticipant:
+    """A person drawn once, by the seed of the plan, who answers every question of a design by its law.
 
+    `ConfigError`: laws that do not cover the plan. `ValueError`: a table without this person, or numbers that make
+    nobody.
+    """
 
-_LAWS_OF: Mapping[str, tuple[str, ...]] = {
-    "choice": ("rates", "psychometric", "worth"),
-    "yes-no": ("rates", "psychometric"),
-    "rating": ("ratings",),
-    "number": ("power", "ratings"),
-    "ranking": ("worth",),
-    "text": ("words",),
-}
-
-
-def _check_law(design: DesignConfig, name: str, question: QuestionConfig, law: Law) -> None:
-    known, where = _LAWS_OF[question.kind], f"questions.{name}"
-    if law.law not in known:
-        raise ConfigError(f"{where}.law = {law.law!r}: a question of kind {question.kind!r} has {', '.join(known)}")
-    if law.law in {"rates", "psychometric"} and question.correct is None:
-        raise ConfigError(f"{where}.law = {law.law!r}: nothing is right for {name}; give the question `correct`")
-    names = law.by if isinstance(law, RatesLaw | RatingsLaw) else () if isinstance(law, WordsLaw) else (law.factor,)
-    for factor in names:
-        if factor not in design.factors:
-            raise ConfigError(f"{where} names {factor!r}, which is no factor; they are {', '.join(design.factors)}")
-    if isinstance(law, WorthLaw):
-        missing = [one for one in map(shown_level, design.factors[law.factor].all_levels) if one not in law.worth]
-        if missing:
-            raise ConfigError(f"{where}.worth has no value for {', '.join(missing)}; give one for each level")
-
-
-class DesignParticipant:
-    """A person drawn once, by the seed of the plan, who answers every question of a design by its law."""
-
-    def __init__(self, design: DesignConfig, laws: SyntheticAnswers, plan: Plan) -> None:
-        check_laws(design, laws)
-        self._design, self._laws, self._seed = design, laws, plan.seed
+    def __init__(self, design: DesignConfig, laws: SyntheticAnswers, plan: Plan, gun: GunConfig) -> None:
+        check_laws(design, laws, [plan])
+        self._design, self._laws, self._plan, self._gun = design, laws, plan, gun
         self._who = (plan.experiment, plan.participant_id)
-        self._trials = plan.trials
         self._own = {name: Stream(plan.seed, "person", *self._who, name).normal() for name in design.questions}
+        self._leaning = {name: Stream(plan.seed, "bias", *self._who, name).normal() for name in design.questions}
+        self._diffusions = {
+            name: self._decisions(law) for name, law in laws.questions.items() if isinstance(law, DiffusionLaw)
+        }
+        self._given = {name: given for name in design.questions if (given := self._beforehand(name)) is not None}
 
     def rate(self, trial: Trial, question: str) -> float | None:
         """The rating, number or rank that a question gets."""
         if self._design.questions[question].kind == "ranking":
-            block = [one for one in self._trials if (one.session, one.set) == (trial.session, trial.set)]
+            block = [one for one in self._plan.trials if (one.session, one.set) == (trial.session, trial.set)]
             return float(self.rank(question, block)[block.index(trial)])
         value = self.answer(trial, question).value
         return float(value) if isinstance(value, int | float) else None
@@ -182,23 +91,25 @@ class DesignParticipant:
 
     def exposure_s(self, trial: Trial) -> float:
         """How long the participant asks for a train before saying next."""
-        draws = Stream(self._seed, "exposure", *self._who, str(trial.session), str(trial.trial))
+        draws = Stream(self._plan.seed, "exposure", *self._who, str(trial.session), str(trial.trial))
         return self._laws.exposure_s * math.exp(EXPOSURE_SIGMA * draws.normal() - EXPOSURE_SIGMA**2 / 2)
 
     def answer(self, trial: Trial, name: str) -> GivenAnswer:
-        """The answer to a question about a trial. `ConfigError`: the law has no value for the trial's levels."""
-        draws = Stream(self._seed, "answer", *self._who, name, str(trial.session), str(trial.trial))
-        value = self._value(name, trial, draws)
-        times = self._laws.times
-        time_s = times.shift_s + times.median_s * math.exp(times.sigma * draws.normal())
-        return GivenAnswer(value=value, response_time_s=max(round(time_s, 3), 0.001))
+        """The answer to a question about a trial, and its time in whole milliseconds, as a response box gives it."""
+        draws = Stream(self._plan.seed, "answer", *self._who, name, str(trial.session), str(trial.trial))
+        if name in self._diffusions:
+            decision = decide(self._diffusions[name][trial.levels], draws)
+            way = "forward" if decision.upper else "backward"
+            return GivenAnswer(value=way, response_time_s=_as_boxed(decision.time_s))
+        value = self._given[name][trial] if name in self._given else self._value(name, trial, draws)
+        return GivenAnswer(value=value, response_time_s=_time_s(self._laws.times, draws))
 
     def rank(self, name: str, trials: Sequence[Trial]) -> tuple[int, ...]:
         """The rank of each trial of a block, from 1: drawn one after another, each with its worth among those left."""
         law = self._laws.questions[name]
         if not isinstance(law, WorthLaw):
             raise ConfigError(f"questions.{name}.law = {law.law!r}: a ranking has the law worth")
-        draws = Stream(self._seed, "ranking", *self._who, name, str(trials[0].session), str(trials[0].set))
+        draws = Stream(self._plan.seed, "ranking", *self._who, name, str(trials[0].session), str(trials[0].set))
         left, ranks = list(range(len(trials))), [0] * len(trials)
         for rank in range(1, len(trials) + 1):
             worths = [self._worth(law, trials[at].level(law.factor), name) for at in left]
@@ -207,13 +118,75 @@ class DesignParticipant:
             left.remove(chosen)
         return tuple(ranks)
 
+    def _beforehand(self, name: str) -> dict[Trial, AnswerValue] | None:
+        """The answers that are settled before the first trial: those of a table, and those of habit; `None` if none."""
+        question, law = self._design.questions[name], self._laws.questions[name]
+        if isinstance(law, TableLaw):
+            return self._from_table(name, question, law)
+        if isinstance(law, AppealLaw):
+            cells = {trial: "/".join(shown_level(level) for _, level in trial.levels) for trial in self._plan.trials}
+            strengths = {
+                cell: abs(evidence(self._percept(trial.levels, law), law.percept.own)) for trial, cell in cells.items()
+            }
+            stream = Stream(self._plan.seed, "ratings", *self._who, name)
+            felt = felt_ratings(law.appeal, question.scale, strengths, stream)
+            return {trial: felt[cell] for trial, cell in cells.items()}
+        if isinstance(law, RatingsLaw) and law.habitual:
+            cells = {trial: cell_of(law.by, trial.levels) for trial in self._plan.trials}
+            stream = Stream(self._plan.seed, "ratings", *self._who, name)
+            drawn = draw_ratings(law, question.scale, [*dict.fromkeys(cells.values())], stream)
+            return {trial: drawn[cell] for trial, cell in cells.items()}
+        return None
+
+    def _from_table(self, name: str, question: QuestionConfig, law: TableLaw) -> dict[Trial, AnswerValue]:
+        """The table's number of a cell, or so many of its trials right, at random ones."""
+        scored, found = question.correct is not None, dict[Trial, AnswerValue]()
+        for cell in dict.fromkeys(cell_of(law.by, trial.levels) for trial in self._plan.trials):
+            trials = [trial for trial in self._plan.trials if cell_of(law.by, trial.levels) == cell]
+            text = table_cell(law, name, self._plan.participant_id, cell, scored=scored)
+            if not scored:
+                found |= dict.fromkeys(trials, _number_in(text, question.scale, f"{self._who[1]}, {cell}, {name}"))
+                continue
+            correct = _count_in(text, len(trials), f"participant {self._who[1]}, {cell}, correct")
+            marks = [True] * correct + [False] * (len(trials) - correct)
+            stream = Stream(self._plan.seed, "correct", *self._who, name, cell)
+            for trial, mark in zip(trials, stream.shuffled(marks), strict=True):
+                found[trial] = self._right_or_wrong(question, trial, stream, right=mark)
+        return found
+
+    def _right_or_wrong(self, question: QuestionConfig, trial: Trial, draws: Stream, *, right: bool) -> str:
+        """The right answer or one of the others; where none is right, any."""
+        known, answers = right_answer(self._design, question, trial), question.named_answers
+        if right and known is not None:
+            return known
+        others = [answer for answer in answers if answer != known]
+        return others[draws.below(len(others))]
+
+    def _decisions(self, law: DiffusionLaw) -> dict[Condition, Diffusion]:
+        """This person's decision in each cell."""
+        model, someone = law.own, person(law.own.people, Stream(self._plan.seed, "person", *self._who))
+        cells = {trial.levels: trial for trial in self._plan.trials}
+        return {
+            levels: own_diffusion(
+                model, someone, self._percept(levels, law), trial.direction, trial.instruction or NEUTRAL
+            )
+            for levels, trial in cells.items()
+        }
+
+    def _percept(self, levels: Condition, law: DiffusionLaw | AppealLaw) -> Percept:
+        """What the shot of a cell gives to feel."""
+        return percept_of(stimulus(self._design, self._gun, levels).parameters, law.percept.leak_s)
+
     def _value(self, name: str, trial: Trial, draws: Stream) -> AnswerValue:
         question, law = self._design.questions[name], self._laws.questions[name]
         match law:
             case RatesLaw() | PsychometricLaw():
-                return self._chosen(name, question, law, trial, draws)
+                return self._scored(name, question, law, trial, draws)
+            case SharesLaw():
+                shares = of_condition(law.share, law.by, trial.levels, f"questions.{name}.share")
+                return question.named_answers[_drawn([shares[one] for one in question.named_answers], draws)]
             case RatingsLaw():
-                mean = _by_condition(law.mean, law.by, trial.levels, f"questions.{name}.mean")
+                mean = of_condition(law.mean, law.by, trial.levels, f"questions.{name}.mean")
                 return on_scale(mean + law.person_sd * self._own[name] + law.noise_sd * draws.normal(), question.scale)
             case PowerLaw():
                 spread = law.person_sd * self._own[name] + law.noise_sd * draws.normal()
@@ -224,27 +197,31 @@ class DesignParticipant:
                 return question.named_answers[_drawn(worths, draws)]
             case WordsLaw():
                 return law.texts[draws.below(len(law.texts))]
+            case _:
+                raise ConfigError(f"questions.{name}.law = {law.law!r} has no answer to this trial")
 
-    def _chosen(
+    def _scored(
         self, name: str, question: QuestionConfig, law: RatesLaw | PsychometricLaw, trial: Trial, draws: Stream
     ) -> str:
         """The right answer at its rate, else one of the others; where none is right, any."""
         right, answers = right_answer(self._design, question, trial), question.named_answers
         if right is None:
             return answers[draws.below(len(answers))]
-        if isinstance(law, RatesLaw):
-            rate = _by_condition(law.share, law.by, trial.levels, f"questions.{name}.share")
-            probit = math.hypot(1.0, law.ability_sd) * _NORMAL.inv_cdf(rate) + law.ability_sd * self._own[name]
-            share = _NORMAL.cdf(probit)
-        else:
-            share = self._felt(name, question, law, trial)
-        if draws.uniform() < share:
-            return right
-        others = [answer for answer in answers if answer != right]
-        return others[draws.below(len(others))]
+        share = self._rate(name, law, trial, right) if isinstance(law, RatesLaw) else self._felt(name, law, trial)
+        return self._right_or_wrong(question, trial, draws, right=draws.uniform() < share)
 
-    def _felt(self, name: str, question: QuestionConfig, law: PsychometricLaw, trial: Trial) -> float:
+    def _rate(self, name: str, law: RatesLaw, trial: Trial, right: str) -> float:
+        """How often the right answer is given by this person."""
+        rate = of_condition(law.share, law.by, trial.levels, f"questions.{name}.share")
+        probit = law.spread * _NORMAL.inv_cdf(rate) + law.ability_sd * self._own[name]
+        if law.bias is not None:
+            leaning = law.bias.mean + law.bias.sd * self._leaning[name]
+            probit += leaning if right == law.bias.answer else -leaning
+        return _NORMAL.cdf(probit)
+
+    def _felt(self, name: str, law: PsychometricLaw, trial: Trial) -> float:
         """How often the right answer is given."""
+        question = self._design.questions[name]
         if trial.catch:
             return 1.0 - law.guess
         level, threshold = _number(trial, law.factor), law.threshold * math.exp(law.log_threshold_sd * self._own[name])
@@ -258,26 +235,67 @@ class DesignParticipant:
         shown = EMPTY if level is None else shown_level(level)
         if shown not in law.worth:
             raise ConfigError(f"questions.{name}.worth has no value for {shown}; give one for each level")
-        own = Stream(self._seed, "worth", *self._who, name, shown).normal()
+        own = Stream(self._plan.seed, "worth", *self._who, name, shown).normal()
         return law.worth[shown] * math.exp(law.log_worth_sd * own)
+
+
+def draw_ratings(law: RatingsLaw, scale: NumberScale, cells: Sequence[str], stream: Stream) -> dict[str, float]:
+    """One person's ratings: mean + person + noise, kept to the scale and its grain; then the habits.
+
+    With the share `same_share` the two cells of `same` get the first one's rating; the cell named `lowest` is kept
+    at least one grain below all others (all that the scale's lower end leaves).
+    """
+    person = law.person_sd * stream.normal()
+    noise = {cell: law.noise_sd * stream.normal() for cell in sorted(cells)}
+    ratings = {cell: on_scale(law.mean[cell] + person + noise[cell], scale) for cell in cells}
+    if law.same and set(law.same) <= set(cells) and stream.uniform() < law.same_share:
+        ratings[law.same[1]] = ratings[law.same[0]]
+    others = min((rating for cell, rating in ratings.items() if cell != law.lowest), default=scale.maximum)
+    if law.lowest in ratings:
+        ratings[law.lowest] = min(ratings[law.lowest], on_scale(others - scale.grain, scale))
+    return ratings
+
+
+def table_cell(law: TableLaw, question: str, participant: str, cell: str, *, scored: bool) -> str:
+    """What the table has for a participant and cell. `ValueError` unless there is exactly one line."""
+    mine = (row for row in law.rows if row["participant_id"] == participant)
+    rows = [row for row in mine if "/".join(row[name] for name in law.by) == cell]
+    if len(rows) != 1:
+        raise ValueError(f"{len(rows)} rows for participant {participant}, {cell}; there must be one")
+    return rows[0]["correct" if scored else question]
+
+
+def _count_in(text: str, most: int, where: str) -> int:
+    if not (text.isascii() and text.isdigit() and len(text) <= 6):
+        raise ValueError(f"{where} is {text!r}; not a whole number")
+    if int(text) > most:
+        raise ValueError(f"{where} is {text}; the plan has {most} such trials, so it must be 0 to {most}")
+    return int(text)
+
+
+def _number_in(text: str, scale: NumberScale, where: str) -> float | None:
+    if not text:
+        return None
+    try:
+        value = float(text)
+    except ValueError:
+        value = math.nan
+    if not scale.minimum <= value <= scale.maximum:
+        raise ValueError(
+            f"participant {where} is {text!r}; it must be a number from {scale.minimum:g} to {scale.maximum:g}, or "
+            "empty for no answer"
+        )
+    return value
 
 
 def _drawn(weights: Sequence[float], draws: Stream) -> int:
     """A place with a probability in proportion to its weight."""
-    left = draws.uniform() * sum(weights)
+    left = draws.uniform() * math.fsum(weights)
     for place, weight in enumerate(weights):
         left -= weight
         if left < 0:
             return place
-    return len(weights) - 1
-
-
-def _by_condition(values: Mapping[str, float], by: Sequence[str], levels: Condition, where: str) -> float:
-    held = dict(levels)
-    key = "/".join(shown_level(held[name]) for name in by if name in held) or "all"
-    if key not in values:
-        raise ConfigError(f"{where} has no value for {key!r}; it has {', '.join(values)}")
-    return values[key]
+    return max(place for place, weight in enumerate(weights) if weight > 0)
 
 
 def _number(trial: Trial, factor: str) -> float:
@@ -285,3 +303,13 @@ def _number(trial: Trial, factor: str) -> float:
     if not isinstance(level, float) or level <= 0:
         raise ConfigError(f"{factor} = {level!r}: this law needs a number above 0")
     return level
+
+
+def _time_s(law: LogNormalTimes, draws: Stream) -> float:
+    """A shifted log-normal time."""
+    return _as_boxed(law.shift_s + law.median_s * math.exp(law.sigma * draws.normal()))
+
+
+def _as_boxed(time_s: float) -> float:
+    """A time in whole milliseconds as a response box gives it, at least one."""
+    return max(round(time_s, 3), 0.001)

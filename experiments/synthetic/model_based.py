@@ -1,4 +1,4 @@
-"""A synthetic participant who answers from what the gun does, percept then diffusion, and its config."""
+"""Decisions from what the gun does, percept then diffusion: what people are made of, and its config."""
 
 from __future__ import annotations
 
@@ -8,11 +8,9 @@ from typing import Annotated, Self
 
 from pydantic import Field, model_validator
 
-from device.words import DIRECTIONS
+from device.words import Direction
 from experiments.config.door import Model, Share
-from experiments.design.plan import Plan, Trial
-from experiments.design.streams import Stream
-from experiments.synthetic.diffusion import Decision, Diffusion, Lapses, People, decide, person
+from experiments.synthetic.diffusion import Diffusion, Lapses, People, Person
 from experiments.synthetic.percept import Percept, PerceptParameters, diffusion_of, evidence, forward_rates
 
 NEUTRAL = "neutral"
@@ -39,36 +37,18 @@ def rates_by_instruction(model: ModelParameters, percept: Percept) -> dict[str, 
     }
 
 
-class ModelBasedParticipant:
-    """A person drawn once, by the seed, who then decides each trial by its own stream.
+def own_diffusion(
+    model: ModelParameters, someone: Person, percept: Percept, direction: Direction, instruction: str
+) -> Diffusion:
+    """Somebody's decision on a shot that gives this percept when it is fired forward; "upper" is "forward".
 
     The sensitivity is that at the neutral boundary, so a hurried person has the same drift and errs more.
-    `ValueError`: somebody whose drift, boundary or non-decision time is beyond what a `Diffusion` may be.
+    `KeyError`: an instruction without a boundary. `ValueError`: somebody whose drift, boundary or non-decision time is
+    beyond what a `Diffusion` may be.
     """
-
-    def __init__(self, model: ModelParameters, percepts: Mapping[str, Percept], plan: Plan) -> None:
-        self._seed, self._who = plan.seed, (plan.experiment, plan.participant_id)
-        someone = person(model.people, Stream(plan.seed, "person", *self._who))
-        self._diffusions = {
-            (method, direction, instruction): someone.own(replace(_neutral(model, log_odds), boundary=boundary))
-            for method, forward in percepts.items()
-            for direction, log_odds in zip(DIRECTIONS, _log_odds(forward, model.percept), strict=True)
-            for instruction, boundary in model.boundaries.items()
-        }
-
-    def decide(self, trial: Trial, instruction: str = NEUTRAL) -> Decision:
-        """The decision on a shot of this trial's method and direction; "upper" is "forward".
-
-        `KeyError`: a method without a percept or an instruction without a boundary.
-        """
-        draws = Stream(self._seed, "answer", *self._who, str(trial.session), str(trial.trial))
-        return decide(self._diffusions[trial.method, trial.direction, instruction], draws)
-
-
-def _log_odds(percept: Percept, parameters: PerceptParameters) -> tuple[float, float]:
-    """Of "forward" after a forward and after a backward shot, without bias."""
-    forward = evidence(percept, parameters)
-    return forward, -forward
+    forward = evidence(percept, model.percept)
+    neutral = _neutral(model, forward if direction == "forward" else -forward)
+    return someone.own(replace(neutral, boundary=model.boundaries[instruction]))
 
 
 def _neutral(model: ModelParameters, log_odds: float) -> Diffusion:

@@ -52,6 +52,11 @@ def choices(question: QuestionConfig) -> tuple[Choice, ...]:
     return choices_of({one: question.label(one) for one in question.named_answers}, answer_keys(question))
 
 
+def first_choices(design: DesignConfig) -> tuple[Choice, ...]:
+    """The answers of the first question that has some to choose among; none if there is none."""
+    return next(filter(None, map(choices, design.questions.values())), ())
+
+
 def free_keys(labels: Mapping[str, str], given: Mapping[str, str]) -> dict[str, str]:
     """A key for each answer: the one given, or the first letter of its label that is free, or a digit.
 
@@ -157,9 +162,10 @@ def on_scale(value: float, scale: Scale) -> float:
 
     A grain such as 0.1 has no exact binary form; rounding to its decimals gives the number a person would write.
     """
+    value = min(max(value, scale.minimum), scale.maximum)
     if not scale.grain:
         return value
-    steps = round((min(max(value, scale.minimum), scale.maximum) - scale.minimum) / scale.grain)
+    steps = round((value - scale.minimum) / scale.grain)
     decimals = max(0, -math.floor(math.log10(scale.grain))) + 2
     return round(float(scale.minimum + steps * scale.grain), decimals)
 

@@ -4,14 +4,15 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import asdict, dataclass, replace
-from typing import Any, Literal
+from typing import Literal
 
 import numpy as np
 
 from analysis.paper.paper import PublishedExperiment, load_paper
 from analysis.paper.recurrence import with_whole_pattern
+from analysis.predict.drawn import DirectionStudies, Drawn, RatingStudies, drawn
 from analysis.predict.power.planned import Findings, Tally, analysed_directions, analysed_ratings, tallied
 from analysis.predict.synthetic_studies import (
     Counts,
@@ -19,31 +20,28 @@ from analysis.predict.synthetic_studies import (
     direction_counts,
     felt_counts,
     felt_people,
+    felt_probit,
     null_felt,
     null_rates,
     null_ratings,
-    percepts_of_setup,
+    percepts_of_methods,
     piece_sizes,
     preference_scores,
     published_claims,
+    rates_of,
     scaled_means,
 )
 from analysis.stats.arrays import FloatArray
 from device.words import DIRECTIONS
 from experiments.config.door import ConfigError
 from experiments.config.setup import Setup, canonical_json
+from experiments.design.config import DesignConfig
 from experiments.design.streams import generator
-from experiments.direction.config import DirectionConfig, Rates
-from experiments.direction.synthetic import probit_of_forward
 from experiments.load import find, load_setup
-from experiments.preference.config import PreferenceConfig
+from experiments.synthetic.laws import DiffusionLaw, RatesLaw
 from experiments.synthetic.percept import Percept
 
 _LARGEST_EFFECT = 10.0
-FELT = "felt"
-"""The observer of people who answer from what the gun does."""
-_LAWS = {"direction": ("rates", FELT), "preference": ("ratings",)}
-"""The observers that studies can be drawn from."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -70,24 +68,9 @@ def check_scalars(request: PowerRequest) -> None:
         raise ConfigError(f"--null has no effect at all; leave --effect {request.effects} out")
 
 
-def checked_setup(name: str) -> Setup[Any]:
-    """The config with its gun, if its synthetic participants follow a law that studies can be drawn from."""
-    setup = load_setup(name)
-    config = setup.config
-    observer, laws = config.synthetic.observer, _LAWS.get(config.experiment, ())
-    if not isinstance(config, DirectionConfig | PreferenceConfig) or observer not in laws:
-        drawn = " or ".join(f'"{law}"' for law in laws)
-        raise ConfigError(
-            f'{find(name)}: synthetic.observer = "{observer}" has no power; studies are drawn from {drawn}'
-        )
-    if isinstance(config, DirectionConfig) and not config.design.forward_per_session:
-        raise ConfigError(f"{find(name)}: design.forward_per_session = 0; the planned analysis is of forward trials")
-    return setup
-
-
-def method_sets_of(asked: tuple[str, ...], config: DrawnConfig) -> list[tuple[str, ...]]:
+def method_sets_of(asked: tuple[str, ...], config: Drawn) -> list[tuple[str, ...]]:
     """The sets of methods to compare: the config's own unless some are named."""
-    known, sets = config.design.methods, []
+    known, sets = config.methods, []
     for text in asked or (",".join(known),):
         names = [name.strip() for name in text.split(",")]
         strangers = [name for name in names if name not in known]
@@ -97,24 +80,23 @@ def method_sets_of(asked: tuple[str, ...], config: DrawnConfig) -> list[tuple[st
     return list(dict.fromkeys(sets))
 
 
-def trials_per_method(asked: str | None, config: DrawnConfig) -> list[int]:
+def trials_per_method(asked: str | None, config: Drawn) -> list[int]:
     """The trials of one method: the config's own unless some are named."""
-    if isinstance(config, PreferenceConfig):
+    if isinstance(config, RatingStudies):
         if asked is not None:
-            raise ConfigError(f"--trials {asked}: {config.title!r} has one trial a method; leave the option out")
+            raise ConfigError(f"--trials {asked}: {config.design.title!r} has one trial a method; leave the option out")
         return [1]
-    design = config.design
+    forward, backward = config.trials
     if asked is None:
-        return [design.trials_per_session]
-    whole = design.trials_per_session // math.gcd(design.trials_per_session, design.forward_per_session)
-    step = math.lcm(design.trials_per_set * max(1, len(design.instructions)), whole)
+        return [forward + backward]
+    whole = 2 if backward else 1
+    step = math.lcm(config.trials_per_set * max(1, len(config.instructions)), whole)
     found = whole_numbers(asked, "--trials", 1, 10_000)
     uneven = [trials for trials in found if trials % step]
     if uneven and "-" not in asked:
         raise ConfigError(
-            f"--trials {asked}: {uneven[0]} is no multiple of {step}, so it makes no sets of {design.trials_per_set} "
-            f"with forward and backward trials as the config has them ({design.forward_per_session} to "
-            f"{design.backward_per_session})"
+            f"--trials {asked}: {uneven[0]} is no multiple of {step}, so it makes no sets of {config.trials_per_set} "
+            f"with forward and backward trials as the config has them ({forward} to {backward})"
         )
     fitting = [trials for trials in found if trials % step == 0]
     if not fitting:
@@ -171,7 +153,7 @@ class GridCell:
     """A design with the config that it makes, and its cost; `too_long` says why it may not be run, or nothing."""
 
     design: StudyDesign
-    config: DrawnConfig
+    config: Drawn
     duration_s: float
     too_long: str
 
@@ -188,7 +170,7 @@ class Grid:
     `percepts`: what the gun's shots give to feel, by method, if the participants feel it.
     """
 
-    config: DrawnConfig
+    config: Drawn
     cells: tuple[GridCell, ...]
     reference: GridCell | None
     published: PublishedExperiment | None
@@ -222,21 +204,22 @@ class Grid:
         ]
 
     def _felt(self, cell: GridCell) -> Felt | None:
-        if self.percepts is None or not isinstance(cell.config, DirectionConfig):
+        config, design = cell.config, cell.design
+        if self.percepts is None or isinstance(config, RatingStudies) or not isinstance(config.law, DiffusionLaw):
             return None
-        return felt_people(cell.config, self.percepts, cell.design.methods, cell.design.effect)
+        return felt_people(config.law, config.instructions, self.percepts, design.methods, design.effect)
 
 
 def make_grid(request: PowerRequest) -> Grid:
     """The grid of a request. `ConfigError` with a message for people for whatever is wrong with it."""
     check_scalars(request)
-    setup = checked_setup(request.config)
-    config: DrawnConfig = setup.config
+    setup = load_setup(request.config)
+    config = drawn(setup)
     people = request.participants or (NULL_PARTICIPANTS if request.null else DEFAULT_PARTICIPANTS)
     participants = whole_numbers(people, "--participants", 2, _MOST_PEOPLE)
     effects = [0.0] if request.null else factors(request.effects or DEFAULT_EFFECTS)
     designs = [
-        (_varied(config, methods, trials), StudyDesign(participants=n, trials=trials, methods=methods, effect=effect))
+        (config.varied(methods, trials), StudyDesign(participants=n, trials=trials, methods=methods, effect=effect))
         for methods in method_sets_of(request.methods, config)
         for trials in trials_per_method(request.trials, config)
         for effect in effects
@@ -247,76 +230,76 @@ def make_grid(request: PowerRequest) -> Grid:
     published = None if request.null else _published(request.paper, config)
     return Grid(
         config=config,
-        cells=tuple(_cell(*pair) for pair in designs),
+        cells=tuple(_cells(designs)),
         reference=_reference(config, published),
         published=published,
         request=request,
-        percepts=percepts_of_setup(setup) if config.synthetic.observer == FELT else None,
+        percepts=_percepts(setup, config),
     )
 
 
-def _varied(config: DrawnConfig, methods: tuple[str, ...], trials: int) -> DrawnConfig:
-    """The config with these methods and trials; not checked again, so that what it breaks can be told."""
-    changes: dict[str, Any] = {"methods": methods}
-    if isinstance(config, DirectionConfig):
-        design = config.design
-        forward = trials * design.forward_per_session // design.trials_per_session
-        changes |= {
-            "sets_per_session": trials // design.trials_per_set,
-            "forward_per_session": forward,
-            "backward_per_session": trials - forward,
-        }
-    return config.model_copy(update={"design": config.design.model_copy(update=changes)})
+def _percepts(setup: Setup[DesignConfig], config: Drawn) -> dict[str, Percept] | None:
+    law = config.law
+    return percepts_of_methods(setup.gun, config.methods, law) if isinstance(law, DiffusionLaw) else None
 
 
-def _null_people(config: DrawnConfig) -> tuple[PeopleKind, ...]:
-    if isinstance(config, PreferenceConfig):
+def _null_people(config: Drawn) -> tuple[PeopleKind, ...]:
+    if isinstance(config, RatingStudies):
         return ("without preference",)
     return ("guessing", "guessing, with the config's bias")
 
 
-def _null(config: DrawnConfig, design: StudyDesign, people: PeopleKind) -> tuple[DrawnConfig, StudyDesign]:
+def _null(config: Drawn, design: StudyDesign, people: PeopleKind) -> tuple[Drawn, StudyDesign]:
     """The design with null participants."""
-    config = config.model_copy(update={"synthetic": _null_synthetic(config, people)})
-    return config, replace(design, people=people)
+    return _null_config(config, biased="bias" in people), replace(design, people=people)
 
 
-def _null_synthetic(config: DrawnConfig, people: PeopleKind) -> Any:
-    if isinstance(config, PreferenceConfig):
-        return config.synthetic.model_copy(update={"ratings": null_ratings(config.synthetic.ratings)})
-    if config.synthetic.observer == FELT:
-        return null_felt(config.synthetic, biased="bias" in people)
-    return config.synthetic.model_copy(update={"rates": null_rates(config.synthetic.rates, biased="bias" in people)})
+def _null_config(config: Drawn, *, biased: bool) -> Drawn:
+    if isinstance(config, RatingStudies):
+        return replace(config, law=null_ratings(config.law))
+    if isinstance(config.law, DiffusionLaw):
+        return replace(config, law=null_felt(config.law, biased=biased))
+    return replace(config, law=null_rates(config.law, biased=biased))
 
 
-def _cell(config: DrawnConfig, design: StudyDesign) -> GridCell:
-    longest = config.fatigue.max_planned_s
-    longer = config.duration_s > longest
-    reason = f"{config.duration_s:g} s a participant exceed fatigue.max_planned_s = {longest:g} s" if longer else ""
-    return GridCell(design=design, config=config, duration_s=config.duration_s, too_long=reason)
+def _cells(designs: Iterable[tuple[Drawn, StudyDesign]]) -> Iterator[GridCell]:
+    """The cells; a design is planned once for all numbers of people and effects."""
+    planned: dict[tuple[tuple[str, ...], int], float] = {}
+    for config, design in designs:
+        key = (design.methods, design.trials)
+        if key not in planned:
+            planned[key] = config.planned().duration_s
+        yield _cell(config, design, planned[key])
 
 
-def _published(name: str, config: DrawnConfig) -> PublishedExperiment | None:
+def _cell(config: Drawn, design: StudyDesign, duration_s: float) -> GridCell:
+    longest = config.design.fatigue.max_planned_s
+    longer = duration_s > longest
+    reason = f"{duration_s:g} s a participant exceed fatigue.max_planned_s = {longest:g} s" if longer else ""
+    return GridCell(design=design, config=config, duration_s=duration_s, too_long=reason)
+
+
+def _published(name: str, config: Drawn) -> PublishedExperiment | None:
     """The published claims about these methods; `None` if the paper is about others."""
     paper = load_paper(find(name))
-    published: PublishedExperiment = getattr(paper, config.experiment)
-    one_way = isinstance(config, DirectionConfig) and not config.design.backward_per_session
-    return None if one_way or set(published.methods) != set(config.design.methods) else published
+    published: PublishedExperiment = paper.preference if isinstance(config, RatingStudies) else paper.direction
+    one_way = isinstance(config, DirectionStudies) and not config.trials[1]
+    return None if one_way or set(published.methods) != set(config.methods) else published
 
 
 def _is_of(published: PublishedExperiment | None, cell: GridCell) -> bool:
     return published is not None and set(published.methods) == set(cell.design.methods)
 
 
-def _reference(config: DrawnConfig, published: PublishedExperiment | None) -> GridCell | None:
+def _reference(config: Drawn, published: PublishedExperiment | None) -> GridCell | None:
     """The paper's own number of people with the config's trials and effects."""
     if published is None:
         return None
     trials = next(iter(trials_per_method(None, config)))
-    return _cell(config, StudyDesign(participants=published.n, trials=trials, methods=config.design.methods))
+    design = StudyDesign(participants=published.n, trials=trials, methods=config.methods)
+    return _cell(config, design, config.planned().duration_s)
 
 
-DrawnConfig = DirectionConfig | PreferenceConfig
 PeopleKind = Literal["own", "guessing", "guessing, with the config's bias", "without preference"]
 """Who takes part: the config's own synthetic participants, or null participants who feel no difference."""
 
@@ -344,7 +327,7 @@ class StudyDesign:
 class Chunk:
     """So many studies of a design. `config` is that of the design: its methods and trials; `felt` who feel the gun."""
 
-    config: DrawnConfig
+    config: Drawn
     design: StudyDesign
     published: PublishedExperiment | None
     seed: int
@@ -356,17 +339,17 @@ class Chunk:
 def run_chunk(chunk: Chunk) -> Tally:
     """Draw and analyse a chunk's studies."""
     config, design = chunk.config, chunk.design
-    draws = generator(chunk.seed, "power", config.experiment, design.key, str(chunk.number))
-    if isinstance(config, DirectionConfig):
-        return tallied(_directions(config, design, chunk, draws))
-    return tallied(_ratings(config, design, chunk, draws))
+    draws = generator(chunk.seed, "power", config.design.design, design.key, str(chunk.number))
+    if isinstance(config, RatingStudies):
+        return tallied(_ratings(config, design, chunk, draws))
+    return tallied(_directions(config, design, chunk, draws))
 
 
-def _directions(config: DirectionConfig, design: StudyDesign, chunk: Chunk, draws: np.random.Generator) -> Findings:
-    trials = config.design.forward_per_session, config.design.backward_per_session
+def _directions(config: DirectionStudies, design: StudyDesign, chunk: Chunk, draws: np.random.Generator) -> Findings:
+    trials = config.trials
     if chunk.felt is None:
         correct = direction_counts(config, design.participants, chunk.studies, draws, design.effect)
-        expected, expected_d = _expected(config.synthetic.rates, design)
+        expected, expected_d = _expected(rates_of(config), design)
     else:
         correct = felt_counts(chunk.felt, trials, design.participants, chunk.studies, draws)
         expected = expected_d = np.asarray(chunk.felt.log_odds).tolist()  # rates rise with it, and d' has its sign
@@ -374,18 +357,15 @@ def _directions(config: DirectionConfig, design: StudyDesign, chunk: Chunk, draw
     return _with_published(found, correct, trials, chunk)
 
 
-def _expected(rates: Rates, design: StudyDesign) -> tuple[list[float], list[float]]:
+def _expected(rates: RatesLaw, design: StudyDesign) -> tuple[list[float], list[float]]:
     """What is expected of the correct rates on forward shots (their order), and of d' (its sign), by method."""
-    felt = [
-        [design.effect * (probit_of_forward(rates, m, way) - rates.bias_mean) for way in DIRECTIONS]
-        for m in design.methods
-    ]
+    felt = [[design.effect * felt_probit(rates, method, way) for way in DIRECTIONS] for method in design.methods]
     return [row[0] for row in felt], [row[0] - row[1] for row in felt]
 
 
-def _ratings(config: PreferenceConfig, design: StudyDesign, chunk: Chunk, draws: np.random.Generator) -> Findings:
+def _ratings(config: RatingStudies, design: StudyDesign, chunk: Chunk, draws: np.random.Generator) -> Findings:
     scores = preference_scores(config, design.participants, chunk.studies, draws, design.effect)
-    expected = scaled_means(config.synthetic.ratings, design.methods, design.effect)
+    expected = scaled_means(config.law, design.methods, design.effect)
     found = analysed_ratings(scores, design.methods, expected.tolist())
     return _with_published(found, scores, (0, 0), chunk)
 

@@ -7,15 +7,15 @@ from pathlib import Path
 from typing import Literal, TypeVar
 
 from analysis.paper.recurrence import ShareOfStudies
+from analysis.predict.drawn import RatingStudies
 from analysis.predict.power.figures import Curve, Panel, figure_false_positives, figure_power
-from analysis.predict.power.grid import FELT, PUBLISHED, Grid
+from analysis.predict.power.grid import PUBLISHED, Grid
 from analysis.predict.power.planned import ALL_PAIRS, ANOVA, ANY_PAIR
 from analysis.predict.power.results import PATTERN, DesignPower, Power, PublishedPattern, Reached, Smallest
-from analysis.predict.synthetic_studies import rates_law, ratings_law, spread_sentence
+from analysis.predict.synthetic_studies import bias_mean, rates_words, ratings_words, spread_sentence
 from analysis.report import apa
 from analysis.report.section import Picture, Section, Table, origin_table
-from experiments.direction.config import DirectionConfig, Rates
-from experiments.preference.config import PreferenceConfig, Ratings
+from experiments.synthetic.laws import DiffusionLaw, RatesLaw, RatingsLaw
 
 XAxis = Literal["participants", "trials"]
 One = TypeVar("One")
@@ -304,12 +304,12 @@ def _effect(effect: float) -> str:
 def grid_assumptions(grid: Grid) -> list[str]:
     """What the numbers rest on."""
     config, null = grid.config, grid.request.null
-    if isinstance(config, PreferenceConfig):
-        law = list(_null_ratings(config.synthetic.ratings) if null else _ratings(config.synthetic.ratings))
-    elif config.synthetic.observer == FELT:
-        law = list(_felt(config, null=null))
+    if isinstance(config, RatingStudies):
+        law = list(_null_ratings(config.law) if null else _ratings(config.law))
+    elif isinstance(config.law, DiffusionLaw):
+        law = list(_felt(config.law, config.instructions, null=null))
     else:
-        law = list(_null_guessing(config.synthetic.rates) if null else _rates(config.synthetic.rates))
+        law = list(_null_guessing(config.law) if null else _rates(config.law, config.methods))
     return [
         *law,
         "All tests are at 5 %, two-sided; Tukey's test is on the pooled repeated-measures error. A comparison counts "
@@ -322,32 +322,32 @@ def grid_assumptions(grid: Grid) -> list[str]:
     ]
 
 
-def _rates(rates: Rates) -> Iterator[str]:
-    yield from rates_law(rates)
+def _rates(law: RatesLaw, methods: Sequence[str]) -> Iterator[str]:
+    yield from rates_words(law, methods)
     yield "The effect is a factor on the probit of each mean correct rate, so on d′: 1 is the config, 0 guessing."
 
 
-def _null_guessing(rates: Rates) -> Iterator[str]:
+def _null_guessing(law: RatesLaw) -> Iterator[str]:
     yield "Null participants feel no direction: each answer is right with a chance of one half in the mean over people."
     yield (
         "Those with the config's bias differ in their readiness to say forward (SD "
-        f"{rates.bias_sd:g} around {rates.bias_mean:g}, probit units). The pooled binomial test takes trials as "
+        f"{law.bias_sd:g} around {bias_mean(law):g}, probit units). The pooled binomial test takes trials as "
         "independent and rejects them more often than 5 %: trials come in people. The exact test of plain guessers "
         "stays at or below 5 %, as counts are whole numbers."
     )
 
 
-def _felt(config: DirectionConfig, *, null: bool) -> Iterator[str]:
-    percept, people, lapses = config.synthetic.percept, config.synthetic.people, config.synthetic.diffusion.lapses
+def _felt(law: DiffusionLaw, instructions: Sequence[str], *, null: bool) -> Iterator[str]:
+    percept, people, lapses = law.percept, law.people, law.diffusion.lapses
     yield (
         f"People answer from what the gun does: exponent {percept.exponent:g}, leak {percept.leak_s:g} s, sensitivity "
         f"{percept.sensitivity:g}, confusion {percept.confusion:g}, start {percept.start:g} (`recoil fit`): a model's "
         "guess, not a measurement."
     )
     yield f"{spread_sentence(people.own)} Lapses {lapses.rate:g}."
-    if config.design.instructions:
+    if instructions:
         yield (
-            f"Instructions {', '.join(config.design.instructions)}: each takes an equal part of a session's sets and "
+            f"Instructions {', '.join(instructions)}: each takes an equal part of a session's sets and "
             "has its own boundary; the planned analysis counts all trials together."
         )
     if null:
@@ -361,12 +361,12 @@ def _felt(config: DirectionConfig, *, null: bool) -> Iterator[str]:
         yield "The effect is a factor on the evidence (log odds of a right answer): 1 is the config, 0 nothing felt."
 
 
-def _ratings(law: Ratings) -> Iterator[str]:
-    yield from ratings_law(law, with_effect=True)
+def _ratings(law: RatingsLaw) -> Iterator[str]:
+    yield from ratings_words(law, with_effect=True)
     yield "The effect is a factor on the distances of the methods' means from their common mean; 1 is the config."
 
 
-def _null_ratings(law: Ratings) -> Iterator[str]:
+def _null_ratings(law: RatingsLaw) -> Iterator[str]:
     yield (
         f"Null participants like all methods alike: one mean, SD between people {law.person_sd:g}, within people "
         f"{law.noise_sd:g}, none of the habits that set methods apart."

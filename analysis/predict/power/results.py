@@ -95,8 +95,8 @@ def power_of(grid: Grid, tallies: Iterator[Tally], assumptions: Iterable[str]) -
     designs = [_design(cell, merged([next(tallies) for _ in grid.chunks_of(cell)])) for cell in cells]
     own = designs[: len(grid.cells)]
     return Power(
-        experiment=grid.config.experiment,
-        title=grid.config.title,
+        experiment=grid.config.design.design,
+        title=grid.config.design.title,
         seed=request.seed,
         studies=request.studies,
         level=SIGNIFICANT,

@@ -42,7 +42,7 @@ def power(
         tallies = _tallies(chunks, run, kept, tell)
     found = power_of(grid, iter(tallies), grid_assumptions(grid))
     storage.write_whole(out / "power.json", as_json(found))
-    write_page(out, f"Simulated power: {grid.config.title}", sections(found, out / "figures"))
+    write_page(out, f"Simulated power: {grid.config.design.title}", sections(found, out / "figures"))
     kept.unlink(missing_ok=True)
     return found
 
@@ -57,11 +57,17 @@ def job_of(grid: Grid) -> str:
     """The hash of all that the tallies depend on."""
     published = grid.published.model_dump(mode="json") if grid.published else None
     chunks = [
-        (c.design.key, c.number, c.studies, c.config.design.model_dump(mode="json"), c.felt and asdict(c.felt))
+        (
+            c.design.key,
+            c.number,
+            c.studies,
+            c.config.design.model_dump(mode="json"),
+            c.config.law.model_dump(mode="json"),
+            c.felt and asdict(c.felt),
+        )
         for c in grid.chunks()
     ]
-    config = grid.config.model_dump(mode="json")
-    return sha256([provenance(), grid.request.seed, grid.request.null, config, published, chunks])
+    return sha256([provenance(), grid.request.seed, grid.request.null, published, chunks])
 
 
 def _tallies(chunks: Sequence[Chunk], run: RunPieces, kept: Path, tell: Callable[[str], None]) -> list[Tally]:

@@ -28,8 +28,9 @@ from analysis.paper.paper import (
     load_paper,
 )
 from analysis.paper.recurrence import PatternOdds
+from analysis.predict.drawn import DirectionStudies, Drawn, RatingStudies, drawn, rates_by_method
 from analysis.predict.simulate.shot import shot_panel
-from analysis.predict.synthetic_studies import pattern_odds
+from analysis.predict.synthetic_studies import pattern_odds, rates_of
 from analysis.report.serial import as_csv
 from analysis.summary.comparison import compare
 from analysis.summary.results import StudyStatistics
@@ -37,19 +38,19 @@ from analysis.summary.sections.content import ReportData
 from analysis.summary.sections.sections import obtained_text, write_report
 from analysis.summary.summary import summarize
 from device.parameters import GunParameters
-from experiments.catalogue import CATALOGUE, rebuild
 from experiments.clock import VirtualClock
 from experiments.config.door import ConfigError, StudyConfig
 from experiments.config.setup import Setup, sha256
-from experiments.direction.config import DirectionConfig
+from experiments.design.config import DesignConfig
 from experiments.load import load_setup, load_study
-from experiments.preference.config import PreferenceConfig
+from experiments.rebuild import rebuild
 from experiments.record import storage
 from experiments.record.journal import begun
 from experiments.record.provenance import git_commit, provenance, recoil_version
 from experiments.run import RunRequest, run
 from experiments.screens.synthetic import synthetic_screen
 from experiments.study import folders
+from experiments.synthetic.laws import DiffusionLaw, SyntheticAnswers, TableLaw
 
 MANIFEST = "reproduction.json"
 
@@ -68,8 +69,8 @@ class ReproducedStudy:
     """
 
     config: StudyConfig
-    setups: tuple[Setup[Any], ...]
-    answering: tuple[Setup[Any], ...]
+    setups: tuple[Setup[DesignConfig], ...]
+    answering: tuple[Setup[DesignConfig], ...]
     seed: int
     paper: Paper | None
     findings: tuple[AuditFinding, ...] = ()
@@ -81,17 +82,19 @@ class ReproducedStudy:
         return self.answering != self.setups
 
     @property
-    def runs(self) -> list[tuple[Setup[Any], str]]:
+    def runs(self) -> list[tuple[Setup[DesignConfig], str]]:
         """Each experiment with each participant."""
         return [(setup, code) for code in self.config.codes() for setup in self.answering]
 
     def manifest(self) -> dict[str, object]:
         """What makes one reproduction the same as another."""
         setups = sha256([setup.record() for setup in self.answering])
+        people = [setup.laws.model_dump(mode="json") for setup in self.answering if setup.laws is not None]
         return {
             "seed": self.seed,
             "participants": self.config.codes(),
             "setups_sha256": setups,
+            "people_sha256": sha256(people),
             "recoil": recoil_version(),
             "git_commit": git_commit(),
         }
@@ -188,7 +191,7 @@ def _claim(study: ReproducedStudy, out: Path) -> None:
     storage.write_whole(manifest, (json.dumps(wanted, indent=1) + "\n").encode())
 
 
-def _take_part(study: ReproducedStudy, setup: Setup[Any], code: str, results: Path) -> None:
+def _take_part(study: ReproducedStudy, setup: Setup[DesignConfig], code: str, results: Path) -> None:
     """Have a synthetic participant do an experiment, unless the logs hold it already."""
     where = folders.place(results, code, setup.config.experiment)
     if not _finished(where):
@@ -208,10 +211,23 @@ def _odds(study: ReproducedStudy) -> Iterator[PatternOdds]:
     if study.paper is None or not study.config.replications:
         return
     for setup in study.setups:
-        config = setup.config
-        if config.synthetic.observer in ("rates", "ratings"):
-            published: PublishedExperiment = getattr(study.paper, config.experiment)
-            yield pattern_odds(config, published, study.config.replications, study.seed)
+        studies = _drawn(setup)
+        if studies is not None:
+            published = _published(studies, study.paper)
+            yield pattern_odds(studies, published, study.config.replications, study.seed)
+
+
+def _drawn(setup: Setup[DesignConfig]) -> Drawn | None:
+    """The studies of a design whose people are right at rates or rate by means; `None` of others."""
+    try:
+        found = drawn(setup)
+    except ConfigError:
+        return None
+    return None if isinstance(found.law, DiffusionLaw) else found
+
+
+def _published(studies: Drawn, paper: Paper) -> PublishedExperiment:
+    return paper.preference if isinstance(studies, RatingStudies) else paper.direction
 
 
 def _report(
@@ -235,7 +251,7 @@ def _report(
     )
 
 
-def _panels(setup: Setup[Any]) -> Iterator[Any]:
+def _panels(setup: Setup[DesignConfig]) -> Iterator[Any]:
     for method in setup.config.methods:
         parameters = setup.gun.rendering(method)
         if isinstance(parameters, GunParameters):
@@ -255,90 +271,98 @@ def _notes(study: ReproducedStudy) -> Iterator[str]:
     yield f"Assumed for the gun, not in the paper: {', '.join(gun.assumed)}."
 
 
-Answers = tuple[dict[str, str], ...]
 HONESTY = (
     "The participants are reconstructed: one of very many sets of answers that give the published statistics, found by "
     "the seed. They are not the paper's participants, and what is not published of them is assumed."
 )
 
 
-def misfit(study: StudyConfig, setups: Sequence[Setup[Any]], paper: Paper | None) -> str | None:
+def misfit(study: StudyConfig, setups: Sequence[Setup[DesignConfig]], paper: Paper | None) -> str | None:
     """Why the paper's participants do not fit this study; None if they can."""
     if paper is None:
         return "the study names no paper"
     for setup in setups:
-        config = setup.config
-        published: PublishedExperiment = paper.direction if config.experiment == "direction" else paper.preference
-        if study.participants != published.n:
-            return f"the study has {study.participants} participants, the paper {published.n}"
-        if sorted(config.methods) != sorted(published.methods):
-            return f"{config.experiment} has other methods than the paper"
-        if config.synthetic.observer == "table":
-            return f"the answers of {config.experiment} come from a table of its own"
-        if reason := _other_trials(config, paper):
+        studies = _drawn(setup)
+        if studies is None:
+            return f"the people of {setup.config.design} are none whose answers the paper's numbers could replace"
+        if reason := _other_people(study, studies, _published(studies, paper)) or _other_trials(studies, paper):
             return reason
     return None
 
 
-def _other_trials(config: DirectionConfig | PreferenceConfig, paper: Paper) -> str | None:
-    if isinstance(config, DirectionConfig):
-        protocol, design = paper.direction.protocol, config.design
-        planned = (design.forward_per_session, design.backward_per_session)
-        same = planned == (protocol.forward_trials_per_session, protocol.backward_trials_per_session)
-        return None if same else "direction has other numbers of trials than the paper"
+def _other_people(study: StudyConfig, studies: Drawn, published: PublishedExperiment) -> str | None:
+    if study.participants != published.n:
+        return f"the study has {study.participants} participants, the paper {published.n}"
+    same = sorted(studies.methods) == sorted(published.methods)
+    return None if same else f"{studies.design.design} has other methods than the paper"
+
+
+def _other_trials(studies: Drawn, paper: Paper) -> str | None:
+    name = studies.design.design
+    if isinstance(studies, DirectionStudies):
+        protocol = paper.direction.protocol
+        same = studies.trials == (protocol.forward_trials_per_session, protocol.backward_trials_per_session)
+        return None if same else f"{name} has other numbers of trials than the paper"
     scale = paper.preference.scale_min, paper.preference.scale_max
-    return None if (config.rating.minimum, config.rating.maximum) == scale else "preference has another scale"
+    return None if (studies.scale.minimum, studies.scale.maximum) == scale else f"{name} has another scale"
 
 
 def reconstructed_people(
-    study: StudyConfig, setups: Sequence[Setup[Any]], paper: Paper, seed: int
-) -> tuple[tuple[Setup[Any], ...], tuple[str, ...]]:
+    study: StudyConfig, setups: Sequence[Setup[DesignConfig]], paper: Paper, seed: int
+) -> tuple[tuple[Setup[DesignConfig], ...], tuple[str, ...]]:
     """The setups with reconstructed participants, and what is to be said of them.
 
     `ConfigError` if no such participants were found.
     """
     codes, people, notes = study.codes(), [], [HONESTY]
     for setup in setups:
+        studies = drawn(setup)
         try:
-            answers, note = _answers(setup.config, paper, codes, seed)
+            law, note = _answers(studies, table_name(setup), paper, codes, seed)
         except ValueError as error:
             raise ConfigError(f"{setup.source}: {error}; try another --seed, or --observer rates") from error
-        synthetic = setup.config.synthetic.model_copy(update={"observer": "table", "table": table_name(setup)})
-        config = setup.config.model_copy(update={"synthetic": synthetic})
-        people.append(replace(setup, config=config, answers=answers))
+        people.append(replace(setup, laws=_with_law(setup, studies.question, law)))
         notes.append(note)
     return tuple(people), tuple(notes)
 
 
-def table_name(setup: Setup[Any]) -> str:
+def _with_law(setup: Setup[DesignConfig], question: str, law: TableLaw) -> SyntheticAnswers:
+    laws = setup.laws if isinstance(setup.laws, SyntheticAnswers) else SyntheticAnswers(questions={})
+    return laws.model_copy(update={"questions": laws.questions | {question: law}})
+
+
+def table_name(setup: Setup[DesignConfig]) -> str:
     """The file that holds an experiment's answers."""
     return f"reconstructed_{setup.config.experiment}.csv"
 
 
-def answers_table(setup: Setup[Any]) -> bytes:
-    """The answers as CSV: a table for `synthetic.table` of a config."""
-    columns = CATALOGUE[setup.config.experiment].answer_columns
-    return as_csv(columns, ([row[name] for name in columns] for row in setup.answers))
+def answers_table(setup: Setup[DesignConfig]) -> bytes:
+    """The answers as CSV: a table for the law `table`."""
+    laws = setup.laws.questions if isinstance(setup.laws, SyntheticAnswers) else {}
+    name, law = next((name, law) for name, law in laws.items() if isinstance(law, TableLaw))
+    columns = law.columns(name, scored=setup.config.questions[name].correct is not None)
+    return as_csv(columns, ([row[column] for column in columns] for row in law.rows))
 
 
-def _answers(config: Any, paper: Paper, codes: Sequence[str], seed: int) -> tuple[Answers, str]:
-    if isinstance(config, DirectionConfig):
-        return _direction(config, paper.direction, codes, seed)
-    return _preference(config, paper.preference, codes, seed)
+def _answers(studies: Drawn, file: str, paper: Paper, codes: Sequence[str], seed: int) -> tuple[TableLaw, str]:
+    if isinstance(studies, DirectionStudies):
+        return _direction(studies, file, paper.direction, codes, seed)
+    return _preference(studies, file, paper.preference, codes, seed)
 
 
 def _direction(
-    config: DirectionConfig, paper: PublishedDirection, codes: Sequence[str], seed: int
-) -> tuple[Answers, str]:
+    studies: DirectionStudies, file: str, paper: PublishedDirection, codes: Sequence[str], seed: int
+) -> tuple[TableLaw, str]:
     forward = forward_counts(paper, seed)
-    backward = backward_counts(paper, config.synthetic.rates.backward, seed)
-    both = zip(_grain_cells(codes, paper, forward.rows), _grain_cells(codes, paper, backward.data[0]), strict=True)
-    answers = tuple(
-        {"participant_id": code, "method": method, "forward_correct": str(right), "backward_correct": str(back)}
-        for (code, method, right), (_, _, back) in both
+    backward = backward_counts(paper, rates_by_method(rates_of(studies), studies.methods, "backward"), seed)
+    ways = {"forward": forward.rows, "backward": backward.data[0]}
+    rows = tuple(
+        {"participant_id": code, "method": method, "direction": way, "correct": str(right)}
+        for way, counts in ways.items()
+        for code, method, right in _grain_cells(codes, paper, counts)
     )
     each, also = paper.protocol.forward_trials_per_session, paper.protocol.backward_trials_per_session
-    return answers, (
+    return TableLaw(law="table", file=file, by=("method", "direction"), rows=rows), (
         f"Direction, forward: {_totals(paper, forward.rows)} correct of {paper.n * each} give the published means, "
         f"{_f_words(paper, forward)}. Backward: {_totals(paper, backward.data[0])} correct of {paper.n * also}; those "
         "without a published binomial p are assumed."
@@ -346,17 +370,17 @@ def _direction(
 
 
 def _preference(
-    config: PreferenceConfig, paper: PublishedPreference, codes: Sequence[str], seed: int
-) -> tuple[Answers, str]:
-    law, grain = config.synthetic.ratings, Fraction(str(config.rating.grain))
-    rebuilt = rating_grains(paper, law.mean, str(config.rating.grain), law.person_sd, seed)
-    least = Fraction(str(config.rating.minimum))
-    answers = tuple(
-        {"participant_id": code, "method": method, "rating": f"{float(least + grain * steps):g}"}
+    studies: RatingStudies, file: str, paper: PublishedPreference, codes: Sequence[str], seed: int
+) -> tuple[TableLaw, str]:
+    law, scale = studies.law, studies.scale
+    least, grain = Fraction(str(scale.minimum)), Fraction(str(scale.grain))
+    rebuilt = rating_grains(paper, law.mean, str(scale.grain), law.person_sd, seed)
+    rows = tuple(
+        {"participant_id": code, "method": method, studies.question: f"{float(least + grain * steps):g}"}
         for code, method, steps in _grain_cells(codes, paper, rebuilt.rows)
     )
     means = ", ".join(f"{method} {law.mean[method]:g}" for method in paper.methods)
-    return answers, (
+    return TableLaw(law="table", file=file, rows=rows), (
         f"Preference: ratings in steps of {float(grain):g} (assumed) with means within {float(MEAN_SLACK):g} of "
         f"{means} (assumed; neither means nor SDs are published), {_f_words(paper, rebuilt)}; "
         f"{paper.lowest.participants} rate {paper.lowest.method} lowest, {paper.same_score.participants} give "

@@ -15,9 +15,9 @@ from PyQt6.QtWidgets import QApplication
 
 from device import DeviceError, Gun, GunStatus
 from device.words import RecoilError
-from experiments import catalogue
 from experiments.clock import Clock
 from experiments.config.setup import Setup
+from experiments.design.config import DesignConfig
 from experiments.design.plan import Plan
 from experiments.live_run import LiveRun, RunStopped, Screen
 from experiments.run import Finished, RunRequest, run
@@ -33,6 +33,7 @@ from experiments.session.remarks import Noted, Remark
 from experiments.session.states import Position
 from experiments.session.steps import Outcome, Step
 from experiments.study.folders import PlaceError
+from experiments.tasks.questions import first_choices
 
 GUN_LOOK_S = 0.2
 """How often the gun's state is looked at."""
@@ -150,7 +151,7 @@ class Console:
             live,
             self.clock,
             window,
-            choices=catalogue.experiment(window.about.setup).choices(window.about.setup),
+            choices=first_choices(window.about.setup.config),
             hand=self._hand,
             participant=self.participant,
             observer=self.observer,
@@ -189,7 +190,7 @@ class Console:
             reason = None if self._error is None else str(self._error) or type(self._error).__name__
             self._tell(view.Ended(reason=reason, saved=saved))
 
-    def _make_screen(self, setup: Setup[Any], plan: Plan, clock: Clock) -> Screen:
+    def _make_screen(self, setup: Setup[DesignConfig], plan: Plan, clock: Clock) -> Screen:
         del clock
         self.observer = synthetic_participant_of(setup, plan) if self._hand == "synthetic" else None
         about = view.About(

@@ -20,6 +20,7 @@ from PyQt6.QtWidgets import QDialog, QLabel, QPushButton, QVBoxLayout
 from device.words import RecoilError
 from experiments.clock import RealClock
 from experiments.config.setup import Setup
+from experiments.design.config import DesignConfig
 from experiments.live_run import RunStopped
 from experiments.load import load_setup, load_study
 from experiments.record.journal import JournalError
@@ -136,7 +137,7 @@ def study_of(request: RunRequest) -> StudyFolder:
     """
     own = request.setup.source.parent / "study.toml"
     config, folder = load_study(str(own) if own.is_file() else "study")
-    setups: tuple[Setup[Any], ...] = (request.setup,)
+    setups: tuple[Setup[DesignConfig], ...] = (request.setup,)
     if request.setup.source.resolve() in [(folder / name).resolve() for name in config.experiments]:
         setups = tuple(load_setup(str(folder / name)) for name in config.experiments)
     return StudyFolder(config=config, source=folder / "study.toml", setups=setups, results=request.results)

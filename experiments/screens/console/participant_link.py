@@ -8,10 +8,9 @@ from __future__ import annotations
 import threading
 from collections.abc import Callable
 from dataclasses import replace
-from typing import Any
 
-from experiments import catalogue
 from experiments.config.setup import Setup
+from experiments.design.config import DesignConfig
 from experiments.live_run import LiveRun
 from experiments.screens.console.keys import choices_at
 from experiments.screens.console.view import Message, ParticipantSeen, Trouble
@@ -21,6 +20,7 @@ from experiments.session import events
 from experiments.session.events import OwnHand
 from experiments.session.states import Position, State
 from experiments.session.steps import Ask, Describe, Inform, Rate, Step
+from experiments.tasks.questions import first_choices
 
 WAIT, PAUSED, THANKS = "Please wait.", "Paused. Please wait.", "Thank you."
 
@@ -43,7 +43,7 @@ class ParticipantSide:
         self,
         link: ParticipantLink,
         open_link: Callable[[], ParticipantLink],
-        setup: Setup[Any],
+        setup: Setup[DesignConfig],
         *,
         rates: bool,
         own_keys: bool,
@@ -51,7 +51,7 @@ class ParticipantSide:
         hand: OwnHand = "participant",
     ) -> None:
         self._link, self._open_link = link, open_link
-        self._choices = catalogue.experiment(setup).choices(setup)
+        self._choices = first_choices(setup.config)
         self.rates, self.own_keys = rates, own_keys
         self.planned = 0
         """How many trials there are: known once the run has begun."""

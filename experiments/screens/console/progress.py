@@ -189,8 +189,8 @@ def _break_between(about: About, before: Trial, trial: Trial) -> list[str]:
 
 def _break_s(about: About, before: Trial, trial: Trial) -> float:
     """How long the break between two trials is; 0 without one."""
-    breaks = getattr(about.setup.config, "breaks", None)
-    if breaks is None or (before.session, before.set) == (trial.session, trial.set):
+    breaks = about.setup.config.breaks
+    if (before.session, before.set) == (trial.session, trial.set):
         return 0.0
     return float(breaks.between_sets_s if before.session == trial.session else breaks.between_sessions_s)
 

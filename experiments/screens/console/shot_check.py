@@ -10,7 +10,7 @@ import threading
 from collections.abc import Callable, Iterator
 from contextlib import closing, suppress
 from dataclasses import dataclass
-from typing import Any, Literal
+from typing import Literal
 
 from PyQt6.QtCore import Qt, pyqtSignal
 from PyQt6.QtWidgets import QVBoxLayout, QWidget
@@ -20,6 +20,7 @@ from device.methods import drive_of
 from device.words import Drive, Effect
 from experiments.clock import Clock
 from experiments.config.setup import Setup
+from experiments.design.config import DesignConfig
 from experiments.screens.console import widgets
 from experiments.screens.console.widgets import TextLines
 
@@ -43,7 +44,7 @@ class ShotCheck:
 
     def __init__(
         self,
-        setup: Setup[Any],
+        setup: Setup[DesignConfig],
         method: str,
         address: str,
         clock: Clock,
@@ -185,7 +186,7 @@ class ShotPage(QWidget):
         super().__init__()
         self._gun, self._clock = gun, clock
         self._check: ShotCheck | None = None
-        self._setup: Setup[Any] | None = None
+        self._setup: Setup[DesignConfig] | None = None
         self.stopped = False
         """The emergency stop: nothing is fired from this page until it was left, and entered on purpose."""
         self._method_at = 0
@@ -220,7 +221,7 @@ class ShotPage(QWidget):
         """The page was entered anew."""
         self.stopped = False
 
-    def choose(self, setup: Setup[Any]) -> None:
+    def choose(self, setup: Setup[DesignConfig]) -> None:
         """Test the methods of an experiment, from the first on."""
         if self._setup is not setup:
             self._setup, self._method_at = setup, 0
@@ -233,7 +234,7 @@ class ShotPage(QWidget):
         damper = f", damper {method.damper.upper()}" if method.damper else ""
         return f"Test shot: {method.label}{damper}"
 
-    def _next_method(self, setup: Setup[Any]) -> str:
+    def _next_method(self, setup: Setup[DesignConfig]) -> str:
         methods: tuple[str, ...] = setup.config.methods
         return methods[self._method_at % len(methods)]
 

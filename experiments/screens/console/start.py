@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import Any
 
 from PyQt6 import QtWidgets
 from PyQt6.QtCore import QEventLoop, pyqtSignal
@@ -11,6 +10,7 @@ from PyQt6.QtGui import QCloseEvent, QResizeEvent
 
 from experiments.clock import Clock
 from experiments.config.setup import Setup
+from experiments.design.config import DesignConfig
 from experiments.record.journal import JournalError
 from experiments.run import Again, RunRequest
 from experiments.screens.console import people, widgets, windows
@@ -276,7 +276,7 @@ class StartWindow(QtWidgets.QWidget):
             )
             self.close()
 
-    def _setup(self) -> Setup[Any]:
+    def _setup(self) -> Setup[DesignConfig]:
         return next(s for s in self._study.setups if s.config.experiment == self.form.experiment.currentText())
 
     # excluding

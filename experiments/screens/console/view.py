@@ -7,10 +7,10 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass, field
-from typing import Any
 
 from device import GunStatus
 from experiments.config.setup import Setup
+from experiments.design.config import DesignConfig
 from experiments.design.plan import Plan, Trial
 from experiments.live_run import LiveRun
 from experiments.screens import texts
@@ -94,7 +94,7 @@ class About:
     does on a screen of their own.
     """
 
-    setup: Setup[Any]
+    setup: Setup[DesignConfig]
     plan: Plan
     band: str = ""
     last: str = THANK_PARTICIPANT

@@ -1,1 +1,0 @@
-"""Experiment 2: how do you like it? Each method felt until `next`, then rated and described."""
