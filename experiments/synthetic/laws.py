@@ -151,7 +151,7 @@ class WordsLaw(Model):
 
 
 class DiffusionLaw(Model):
-    """Which way it shot, from what the gun does: the percept of each shot, then a diffusion, hurried by instructions."""
+    """Which way it shot, from what the gun does: each shot's percept, then a diffusion, hurried by instructions."""
 
     law: Literal["diffusion"]
     percept: PerceptConfig = PerceptConfig()
