@@ -11,20 +11,20 @@ import re
 import threading
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any, Literal
 
 from device import Gun, GunStatus, LimitError, LinkError, Shot, ShotReport
 from device.words import Direction
-from experiments import catalogue
 from experiments import run as runs
-from experiments.catalogue import table
 from experiments.config.setup import Setup
+from experiments.design.config import DesignConfig
 from experiments.design.plan import Plan, Trial
 from experiments.live_run import LiveRun, Screen
 from experiments.load import load_setup
+from experiments.rebuild import table
 from experiments.record import storage
 from experiments.record.journal import Contents, read_journal
 from experiments.record.replay import history
@@ -39,6 +39,8 @@ from experiments.session.remarks import EntryCorrected, Remark
 from experiments.session.states import Position, State
 from experiments.session.steps import Answered, FireShot, Outcome, Step
 from experiments.study.folders import Place, place
+from experiments.tasks.questions import first_choices
+from tests.designs import direction_with
 from tests.waiting import PATIENCE_S, wait_for
 
 MOST_DEEDS = 2000
@@ -56,22 +58,10 @@ def tells_correctness(text: str) -> bool:
     return CORRECTNESS.search(CORRECTION.sub("", text)) is not None
 
 
-def changed(name: str, **changes: dict[str, Any]) -> Setup[Any]:
-    """A shipped setup with some values of its config changed."""
-    setup = load_setup(name)
-    config = setup.config.model_dump()
-    for part, values in changes.items():
-        config[part] |= values
-    return replace(setup, config=type(setup.config).model_validate(config))
-
-
-def short_direction(sets: int = 2, trials: int = 3, set_break_s: float = 30.0) -> Setup[Any]:
+def short_direction(sets: int = 2, trials: int = 3, set_break_s: float = 30.0) -> Setup[DesignConfig]:
     """Experiment 1 with two methods, one of them with a damper."""
-    half, rest = divmod(sets * trials, 2)
-    design = {"methods": ("vibration", "asymmetric-2"), "sets_per_session": sets, "trials_per_set": trials}
-    design |= {"forward_per_session": half + rest, "backward_per_session": half}
     breaks = {"between_sets_s": set_break_s, "between_sessions_s": 60.0}
-    return changed("direction", design=design, breaks=breaks, fatigue={"max_trials_without_break": 60})
+    return direction_with(("vibration", "asymmetric-2"), sets, sets * trials // 2, breaks=breaks)
 
 
 DIRECTION, PREFERENCE = short_direction(), load_setup("preference")
@@ -278,7 +268,7 @@ class Offered:
 class PaperWindow:
     """A window that draws nothing but remembers what it would show; the keys reach the controls as in the real one."""
 
-    def __init__(self, setup: Setup[Any], plan: Plan, clock: OwnClock) -> None:
+    def __init__(self, setup: Setup[DesignConfig], plan: Plan, clock: OwnClock) -> None:
         self.about = About(setup=setup, plan=plan)
         self._clock = clock
         self._news: queue.SimpleQueue[tuple[str, Any]] = queue.SimpleQueue()
@@ -311,7 +301,7 @@ class PaperWindow:
             return verdict
 
         live.offer = watched  # type: ignore[method-assign]
-        choices = catalogue.experiment(self.about.setup).choices(self.about.setup)
+        choices = first_choices(self.about.setup.config)
         self.controls = Controls(live, self._clock, self, choices=choices)
         self._news.put(("show", live.position))
 
@@ -443,7 +433,7 @@ class PaperWindow:
 class Sitting:
     """One run at the console, from its start to its end or stop: the run in a thread, the hands in ours."""
 
-    setup: Setup[Any]
+    setup: Setup[DesignConfig]
     results: Path
     resumed: bool = False
     clock: OwnClock = field(default_factory=OwnClock)
@@ -490,7 +480,7 @@ class Sitting:
         finally:
             runs.open_gun = opened
 
-    def _make_screen(self, setup: Setup[Any], plan: Plan, clock: Any) -> Screen:
+    def _make_screen(self, setup: Setup[DesignConfig], plan: Plan, clock: Any) -> Screen:
         self._window = PaperWindow(setup, plan, clock)
         window, guns, made = self._window, self.guns, self._made
         begin = window.begin
@@ -642,7 +632,7 @@ def gated() -> Iterator[SyncGate]:
 
 
 @contextmanager
-def sat(setup: Setup[Any], results: Path, *, resumed: bool = False, gate: SyncGate | None = None) -> Any:
+def sat(setup: Setup[DesignConfig], results: Path, *, resumed: bool = False, gate: SyncGate | None = None) -> Any:
     """A sitting that a test leaves in the middle."""
     sitting = Sitting(setup, results, resumed=resumed, gate=gate)
     try:

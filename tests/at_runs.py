@@ -23,11 +23,9 @@ def shorten(configs: Path) -> None:
     config = configs / "direction.toml"
     text = config.read_text()
     for key, value in (
-        ("methods", '["vibration", "asymmetric-2"]'),
-        ("sets_per_session", "2"),
-        ("trials_per_set", "2"),
-        ("forward_per_session", "2"),
-        ("backward_per_session", "2"),
+        ("levels", '["vibration", "asymmetric-2"]'),
+        ("sets", "2"),
+        ("repetitions", "2"),
     ):
         text = re.sub(rf"^{key} = [^#\n]*", f"{key} = {value} ", text, count=1, flags=re.MULTILINE)
     config.write_text(text)

@@ -110,16 +110,18 @@ def quick_configs(tmp_path: Path) -> Path:
     """
     folder = tmp_path / "configs"
     folder.mkdir()
-    for source in shipped_folder().glob("*.toml"):
-        (folder / source.name).write_text(
+    (folder / "synthetic").mkdir()
+    for source in [*shipped_folder().glob("*.toml"), *shipped_folder().glob("synthetic/*.toml")]:
+        (folder / source.relative_to(shipped_folder())).write_text(
             source.read_text()
             .replace("guard_s = 0.25", "guard_s = 0.0")
             .replace("least_exposure_s = 1.0", "least_exposure_s = 0.0")
         )
-    config = folder / "direction.toml"
+    people, config = folder / "synthetic/direction.toml", folder / "direction.toml"
+    quick = people.read_text().replace("shift_s = 0.35", "shift_s = 0.01").replace("median_s = 0.75", "median_s = 0.02")
+    people.write_text(quick)
     text = re.sub(r"between_(sets|sessions)_s = [\d.]+", r"between_\1_s = 0.0", config.read_text())
-    text = text.replace("max_trials_without_break = 10", "max_trials_without_break = 60")
-    config.write_text(text.replace("shift_s = 0.35", "shift_s = 0.01").replace("median_s = 0.75", "median_s = 0.02"))
+    config.write_text(text.replace("max_trials_without_break = 10", "max_trials_without_break = 60"))
     return folder
 
 

@@ -2,20 +2,57 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 from experiments.config.door import checked_table
+from experiments.config.setup import Setup
 from experiments.design.config import DesignConfig
-from experiments.load import shipped_folder
+from experiments.load import load_setup, shipped_folder
+from experiments.synthetic.laws import SyntheticAnswers
+
+Tables = Mapping[str, Any]
 
 QUESTION = {"kind": "choice", "text": "Which way?", "answers": ["forward", "backward"]}
 
 
 def path_of(name: str) -> Path:
-    """Where a design lies: shipped, or the paper's two as designs."""
-    folder = Path(__file__).parent / "ten_designs" if name in ("direction", "preference") else shipped_folder()
-    return folder / f"{name}.toml"
+    """Where a shipped design lies."""
+    return shipped_folder() / f"{name}.toml"
+
+
+def changed(name: str, laws: Tables | None = None, **tables: Any) -> Setup[DesignConfig]:
+    """A shipped setup with some values of its design changed, table by table, and of its synthetic people."""
+    setup = load_setup(name)
+    config = DesignConfig.model_validate(merged(setup.config.model_dump(), tables))
+    if setup.laws is None:
+        return replace(setup, config=config)
+    people = SyntheticAnswers.model_validate(merged(setup.laws.model_dump(), laws or {}))
+    return replace(setup, config=config, laws=people)
+
+
+def merged(values: Tables, changes: Tables) -> dict[str, Any]:
+    """Tables with some values changed, those of inner tables beside what they hold."""
+    found = dict(values)
+    for key, value in changes.items():
+        old = found.get(key)
+        found[key] = merged(old, value) if isinstance(old, dict) and isinstance(value, dict) else value
+    return found
+
+
+def direction_with(
+    methods: tuple[str, ...] = ("vibration", "asymmetric-1", "asymmetric-2"),
+    sets: int = 4,
+    repetitions: int = 10,
+    **more: Any,
+) -> Setup[DesignConfig]:
+    """The shipped direction with these methods, and so many sets and repetitions of both directions a session."""
+    order = {"sets": sets, "repetitions": repetitions} | more.pop("order", {})
+    factors = merged({"method": {"levels": methods}}, more.pop("factors", {}))
+    fatigue = {"max_trials_without_break": 1000, "max_planned_s": 86_400.0} | more.pop("fatigue", {})
+    return changed("direction", factors=factors, order=order, fatigue=fatigue, **more)
 
 
 def design(**tables: Any) -> DesignConfig:

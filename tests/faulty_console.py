@@ -17,9 +17,9 @@ from pathlib import Path
 from typing import Any
 
 from device import Gun, LinkError, Shot, ShotReport
-from experiments import catalogue
 from experiments import run as runs
 from experiments.clock import RealClock
+from experiments.design.planning import plan_of
 from experiments.live_run import RunStopped
 from experiments.load import load_setup
 from experiments.record import storage
@@ -171,7 +171,7 @@ def program(case: str, folder: Path) -> dict[str, Any]:
     if case == "slow-disk":
         slow_disk(syncs)
 
-    setup = short_direction(sets=1, trials=3, set_break_s=0.0)
+    setup = short_direction(sets=1, trials=4, set_break_s=0.0)
     request = RunRequest(setup=setup, participant_id="P01", results=folder, seed=1, screen="console", visual=True)
     console = Console(request, RealClock())
     watcher = Watcher(console, guns, case, syncs)
@@ -205,7 +205,7 @@ def window_alone() -> dict[str, Any]:
     from experiments.screens.console.window import ConsoleWindow
 
     app, setup = application(), load_setup("preference")
-    plan = catalogue.experiment(setup).make_plan(setup.config, "P01", 1, None)
+    plan = plan_of(setup.config, "P01", 1)
     window = ConsoleWindow(About(setup=setup, plan=plan), RealClock())
     window.show()
     window.say("bad news", "bad")

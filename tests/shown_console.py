@@ -27,7 +27,7 @@ from experiments.screens.console import app
 from experiments.screens.console.view import Ended, ParticipantSeen
 from experiments.session import events
 from experiments.session.states import State
-from tests.at_controls import changed, short_direction
+from tests.at_controls import short_direction
 
 LOOK_MS = 5
 SETTLE = 8

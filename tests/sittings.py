@@ -8,30 +8,30 @@ from typing import Any, NamedTuple
 
 from device import Identity, Shot, ShotReport, open_gun
 from device.words import GunStatus
-from experiments import catalogue
-from experiments.catalogue import table
 from experiments.clock import Clock, VirtualClock
 from experiments.config.setup import Setup
+from experiments.design.config import DesignConfig
 from experiments.design.plan import Plan
+from experiments.design.planning import plan_of
+from experiments.design.stimuli import stimuli_of
 from experiments.live_run import LiveRun
 from experiments.load import load_setup
+from experiments.rebuild import table
 from experiments.record import replay, storage
 from experiments.record.journal import Journal, read_journal
 from experiments.record.replay import RunPosition
 from experiments.run import RunRequest, run
 from experiments.runner import Desk, carry_out
-from experiments.screens.synthetic import SyntheticScreen, synthetic_screen
+from experiments.screens.synthetic import SyntheticScreen, synthetic_participant_of, synthetic_screen
+from experiments.session.design_session import design_session
 from experiments.session.remarks import Remark
 from experiments.session.states import Position, State
 from experiments.session.steps import Outcome, Step, step_record
 from experiments.study.folders import Place, place
-from tests.at_controls import changed
+from tests.designs import direction_with
 
 SETUPS = {
-    "direction": changed(
-        "direction",
-        design={"sets_per_session": 2, "trials_per_set": 2, "forward_per_session": 2, "backward_per_session": 2},
-    ),
+    "direction": direction_with(sets=2, repetitions=2),
     "preference": load_setup("preference"),
 }
 """Experiment 1 with three sessions of two sets of two trials."""
@@ -43,8 +43,10 @@ class TroubledGun:
     `troubles["fire", 3]` is raised at the third `fire`, before the simulated gun hears of it.
     """
 
-    def __init__(self, setup: Setup[Any], clock: Clock, troubles: dict[tuple[str, int], BaseException]) -> None:
-        methods = setup.gun.renderings(setup.config.design.methods)
+    def __init__(
+        self, setup: Setup[DesignConfig], clock: Clock, troubles: dict[tuple[str, int], BaseException]
+    ) -> None:
+        methods = setup.gun.renderings(setup.config.methods)
         self._gun = open_gun("simulated", methods, clock=clock.now)
         self._troubles = troubles
         self.asked: list[str] = []
@@ -113,7 +115,7 @@ class Sitting(NamedTuple):
     """A desk with all that lies on it."""
 
     plan: Plan
-    setup: Setup[Any]
+    setup: Setup[DesignConfig]
     where: Place
     gun: TroubledGun
     screen: WatchingScreen
@@ -121,11 +123,11 @@ class Sitting(NamedTuple):
     journal: Journal
 
     def carry_out(self) -> list[tuple[Step, Outcome]]:
-        going = catalogue.CATALOGUE[self.plan.experiment].session(self.plan, self.setup)
+        going = design_session(self.plan, self.setup)
         live = LiveRun(
             plan=self.plan, gun=self.gun, journal=self.journal, clock=self.clock, screen=self.screen, guard_s=0.25
         )
-        stimuli = catalogue.experiment(self.setup).stimuli(self.setup)
+        stimuli = stimuli_of(self.setup.config, self.setup.gun)
         desk = Desk(live=live, gun_name="simulated", shots=stimuli.shots(self.plan))
         self.screen.begin(live)
         with self.journal:
@@ -141,14 +143,14 @@ def sitting(
     name: str, results: Path, troubles: dict[tuple[str, int], BaseException] | None = None, **changes: Any
 ) -> Sitting:
     setup, clock = changes.get("setup", SETUPS[name]), VirtualClock()
-    plan = catalogue.CATALOGUE[name].make_plan(setup.config, "P01", 1, None)
+    plan = plan_of(setup.config, "P01", 1)
     where = place(results, "P01", name)
     storage.make_folder(where.folder)
     journal = Journal.create(where.journal, clock)
     heads = {"plan": plan.record(), "plan_sha256": plan.sha256()}
     journal.append("run", **heads, setup=setup.record(), setup_sha256=setup.sha256())
     gun = TroubledGun(setup, clock, troubles or {})
-    observer = catalogue.CATALOGUE[name].synthetic_participant(setup, plan)
+    observer = synthetic_participant_of(setup, plan)
     screen = WatchingScreen(setup.config, observer, clock, gun, where.journal)
     return Sitting(plan, setup, where, gun, screen, clock, journal)
 

@@ -97,7 +97,7 @@ def test_what_was_fired_when_the_gun_vanished_is_marked_and_presented_again_on_r
     from experiments.screens.synthetic import synthetic_screen
 
     case("vanishes")
-    setup = short_direction(sets=1, trials=3, set_break_s=0.0)
+    setup = short_direction(sets=1, trials=4, set_break_s=0.0)
     request = RunRequest(setup=setup, participant_id="P01", results=tmp_path, again="resume")
     done = runs.run(request, synthetic_screen, VirtualClock())
     with done.place.table.open(newline="", encoding="utf-8") as file:

@@ -12,7 +12,7 @@ from scipy import stats
 from analysis.stats.anova import rm_anova
 from analysis.summary.designs import summarise
 from experiments.config.door import checked_table
-from experiments.synthetic.answers import SyntheticAnswers
+from experiments.synthetic.laws import SyntheticAnswers
 from tests.designs import design
 from tests.tables_of_designs import loaded, simulated
 

@@ -9,7 +9,6 @@ import numpy as np
 import pytest
 
 from device.methods import paper_methods
-from experiments.direction.session import make_plan
 from experiments.load import load_setup
 from experiments.synthetic.diffusion import Lapses, People
 from experiments.synthetic.model_based import NEUTRAL, ModelBasedParticipant, ModelParameters

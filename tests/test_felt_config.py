@@ -6,12 +6,11 @@ import re
 from pathlib import Path
 
 import pytest
+from experiments.direction.synthetic import model_parameters
 
 from analysis.predict.check import ExperimentCheck, check, check_text
 from experiments.clock import VirtualClock
 from experiments.config.door import ConfigError
-from experiments.direction.session import make_plan
-from experiments.direction.synthetic import model_parameters
 from experiments.load import load_setup
 from experiments.screens.synthetic import synthetic_screen
 from experiments.synthetic.model_based import ModelParameters

@@ -11,18 +11,17 @@ from typing import Any
 
 import numpy as np
 import pytest
+from experiments.direction.synthetic import ModelParticipant, model_parameters
+from experiments.direction.synthetic import synthetic_participant as direction_participant
+from experiments.preference.session import make_plan as preference_plan
+from experiments.preference.synthetic import strengths
+from experiments.preference.synthetic import synthetic_participant as preference_participant
 
 from analysis.logs.reading import read_logs
 from experiments.config.setup import Setup
 from experiments.design.plan import Plan
 from experiments.design.streams import Stream
-from experiments.direction.session import make_plan
-from experiments.direction.synthetic import ModelParticipant, model_parameters
-from experiments.direction.synthetic import synthetic_participant as direction_participant
 from experiments.load import load_setup, shipped_folder
-from experiments.preference.session import make_plan as preference_plan
-from experiments.preference.synthetic import strengths
-from experiments.preference.synthetic import synthetic_participant as preference_participant
 from experiments.synthetic.model_based import rates_by_instruction
 from experiments.synthetic.percept import evidence, percepts_of
 from experiments.synthetic.preference import feelings, felt_ratings

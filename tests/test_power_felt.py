@@ -8,15 +8,14 @@ from typing import Any
 
 import numpy as np
 import pytest
+from experiments.direction.config import DirectionConfig
+from experiments.direction.synthetic import model_parameters
 from scipy import stats
 
 from analysis.predict.power.grid import PowerRequest, make_grid, run_chunk
 from analysis.predict.power.planned import ANOVA, ANY_PAIR, merged, shares
 from analysis.predict.synthetic_studies import Felt, felt_counts, felt_people, percepts_of_setup
 from experiments.design.streams import generator
-from experiments.direction.config import DirectionConfig
-from experiments.direction.session import make_plan
-from experiments.direction.synthetic import model_parameters
 from experiments.load import load_setup
 from experiments.synthetic.diffusion import People
 from experiments.synthetic.model_based import ModelBasedParticipant

@@ -9,6 +9,10 @@ from statistics import NormalDist
 
 import numpy as np
 import pytest
+from experiments.direction.config import Rates
+from experiments.direction.synthetic import RatesParticipant
+from experiments.preference.config import RatingScale
+from experiments.preference.synthetic import draw_ratings
 from scipy import stats
 
 from analysis.paper.paper import load_paper
@@ -36,12 +40,7 @@ from analysis.predict.synthetic_studies import (
 )
 from analysis.stats.anova import rm_tukey_hsd
 from experiments.design.streams import Stream, generator
-from experiments.direction.config import Rates
-from experiments.direction.session import make_plan
-from experiments.direction.synthetic import RatesParticipant
 from experiments.load import find, load_setup
-from experiments.preference.config import RatingScale
-from experiments.preference.synthetic import draw_ratings
 from experiments.tasks.questions import on_scale as one_on_scale
 from tests.power_chain import homogeneity_p
 

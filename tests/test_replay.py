@@ -12,10 +12,10 @@ from typing import Any, NamedTuple
 import pytest
 
 from experiments import catalogue
-from experiments.catalogue import rebuild
 from experiments.clock import VirtualClock
 from experiments.config.setup import Setup, canonical_json
 from experiments.design.plan import Plan
+from experiments.rebuild import rebuild
 from experiments.record.journal import Journal, JournalError, link_of, read_journal
 from experiments.record.replay import go_on, history, replay
 from experiments.run import Again, RunRequest, run
@@ -24,7 +24,7 @@ from experiments.session.states import EMERGENCY
 from experiments.study import register
 from experiments.study.folders import PlaceError, place
 from experiments.study.register import RegisterError
-from tests.at_controls import changed
+from tests.designs import changed
 from tests.journals import raw
 from tests.other_trials import turned
 

@@ -16,7 +16,6 @@ import pytest
 from scipy.stats import studentized_range
 from statsmodels.stats.anova import AnovaRM
 
-from experiments.direction.session import make_plan
 from experiments.load import load_setup
 from experiments.record.journal import JournalError, read_journal
 from tests import kills, reproduced

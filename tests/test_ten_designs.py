@@ -13,7 +13,7 @@ from experiments.design.config import DesignConfig
 from experiments.design.planning import groups, plan_of, square_size
 from experiments.load import load_gun
 from experiments.record import design_table
-from experiments.synthetic.answers import DesignParticipant, SyntheticAnswers, check_laws
+from experiments.synthetic.laws import SyntheticAnswers, check_laws
 from experiments.tasks.questions import answer_problem, is_right
 from tests.designs import path_of
 

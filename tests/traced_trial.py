@@ -57,7 +57,7 @@ def traced(results: Path) -> Trace:
     threading.setprofile(trace)
     sys.setprofile(trace)
     try:
-        with sat(short_direction(sets=1, trials=3, set_break_s=0.0), results) as sitting:
+        with sat(short_direction(sets=1, trials=4, set_break_s=0.0), results) as sitting:
             hand_over(sitting)
             sitting.go_on()
             hand_over(sitting)
