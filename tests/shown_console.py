@@ -28,6 +28,7 @@ from experiments.screens.console.view import Ended, ParticipantSeen
 from experiments.session import events
 from experiments.session.states import State
 from tests.at_controls import short_direction
+from tests.designs import changed
 
 LOOK_MS = 5
 SETTLE = 8

@@ -11,8 +11,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from experiments import catalogue
 from experiments.config.setup import Setup
+from experiments.design import planning
+from experiments.design.config import DesignConfig
 from experiments.design.plan import Plan, Trial
 from experiments.design.stimuli import damper
 from experiments.screens.console import progress, view, widgets
@@ -28,8 +29,8 @@ SAID = Answered(value="forward", by="experimenter", response_time_s=1.0, respons
 SHOWN = Presented(gun="simulated", onset_utc="", shots=3, exposure_s=2.0, ended_by="next")
 
 
-def plan_of(setup: Setup[Any]) -> Plan:
-    return catalogue.experiment(setup).make_plan(setup.config, "P01", 1, None)
+def plan_of(setup: Setup[DesignConfig]) -> Plan:
+    return planning.plan_of(setup.config, "P01", 1)
 
 
 def present(trial: Trial) -> Present:
@@ -40,7 +41,7 @@ def prepare(trial: Trial) -> Prepare:
     return Prepare(trial=trial, attempt=2, settings=damper(DIRECTION.gun, trial.method))
 
 
-def seen(setup: Setup[Any], position: Position, *told: Any, **more: Any) -> Seen:
+def seen(setup: Setup[DesignConfig], position: Position, *told: Any, **more: Any) -> Seen:
     return Seen(about=About(setup=setup, plan=plan_of(setup)), position=position, told=told, **more)
 
 
@@ -59,7 +60,7 @@ def test_a_method_is_named_only_where_its_damper_is_set_by_hand(number: int) -> 
         trial = plan_of(DIRECTION).trials[number]
         here = seen(DIRECTION, Position(states=(state,), step=make_step(trial)))
         said = "\n".join(shown_texts(here)).lower()
-        for name in DIRECTION.config.design.methods:
+        for name in DIRECTION.config.methods:
             method = DIRECTION.gun.methods[name]
             if not (method.damper and trial.method == name):
                 assert name not in said
@@ -245,7 +246,7 @@ def test_contrast_is_that_of_the_published_definition() -> None:
 class Day:
     """A run whose trials take what they are told to."""
 
-    def __init__(self, setup: Setup[Any]) -> None:
+    def __init__(self, setup: Setup[DesignConfig]) -> None:
         self.setup, self.plan, self.so_far = setup, plan_of(setup), RunTiming()
         self.told: list[Any] = []
         self.now_s = 100.0

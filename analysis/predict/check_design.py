@@ -31,8 +31,6 @@ from experiments.synthetic.model_based import NEUTRAL, rates_by_instruction
 
 _MOST_CELLS = 60
 """So many cells are listed."""
-_FIRST = 6
-"""So many trials of an order are shown where sessions do not differ."""
 _EXPECTED_EVEN = 5
 """Of fewer participants nobody expects first positions to be even."""
 

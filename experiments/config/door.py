@@ -215,19 +215,6 @@ Text = Annotated[str, Field(min_length=1, max_length=2_000)]
 Methods = Annotated[tuple[Text, ...], Field(min_length=1, max_length=26), AfterValidator(_distinct)]
 
 
-class SyntheticConfig(Model):
-    """Who answers when nobody sits there: an observer, or the answers of a table."""
-
-    observer: str
-    table: Text | None = None
-
-    @model_validator(mode="after")
-    def _table_is_named(self) -> Self:
-        if self.observer == "table" and self.table is None:
-            raise ValueError('observer = "table" needs the key `table`: the CSV file with the answers')
-        return self
-
-
 class ConsoleConfig(Model):
     """What the experimenter's screen does.
 
@@ -237,53 +224,6 @@ class ConsoleConfig(Model):
 
     guard_s: Annotated[float, Field(ge=0, le=5)] = 0.25
     response_times: bool = False
-
-
-class ExperimentConfig(Model):
-    """What every experiment's config says."""
-
-    experiment: str
-    title: Text
-    gun: Text
-    console: ConsoleConfig = ConsoleConfig()
-    assumed: tuple[Text, ...] = ()
-    seed: Annotated[int, Field(ge=0, le=2**63 - 1)] | None = None
-
-    @property
-    def trial_s(self) -> float:
-        """Planned time of a trial; 0 where none is planned."""
-        return 0.0
-
-    @property
-    def break_s(self) -> float:
-        """All planned breaks together; there are none unless an experiment has them."""
-        return 0.0
-
-    @property
-    def asks_later(self) -> bool:
-        """Whether something is asked of each trial after all were felt."""
-        return self.rating_s > 0
-
-    @property
-    def rating_s(self) -> float:
-        """Planned time of what is asked of a trial after all were felt."""
-        return 0.0
-
-    @property
-    def hand_over_s(self) -> float:
-        """Planned time of a hand-over."""
-        return 0.0
-
-    def asking_s(self, kind: str) -> float:  # noqa: ARG002 - there is none unless an experiment has it
-        """Planned time of a question by the kind of its step, `rate` or `describe`."""
-        return 0.0
-
-    @model_validator(mode="after")
-    def _assumed_exists(self) -> Self:
-        unknown = sorted(set(self.assumed) - set(leaves(self)))
-        if unknown:
-            raise ValueError(f"assumed names {', '.join(unknown)}, which this config does not have; name existing keys")
-        return self
 
 
 AgeYears = Annotated[int, Field(ge=1, le=120)]
@@ -373,19 +313,3 @@ def _inner_leaves(value: object, prefix: str) -> Iterator[str]:
         for key, inner in value.items():
             yield f"{prefix}{key}"
             yield from _inner_leaves(inner, f"{prefix}{key}.")
-
-
-def check_covered(where: str, values: dict[str, float], methods: tuple[str, ...]) -> None:
-    """Refuse a table that lacks one of the design's methods."""
-    missing = [name for name in methods if name not in values]
-    if missing:
-        raise ValueError(f"{where} has no value for {', '.join(missing)}; give one for each of design.methods")
-
-
-def check_duration(duration_s: float, max_planned_s: float) -> None:
-    """Refuse a plan that takes longer than a participant is to be kept."""
-    if duration_s > max_planned_s:
-        raise ValueError(
-            f"the planned duration of {duration_s:g} s exceeds fatigue.max_planned_s = {max_planned_s:g} s; "
-            "plan fewer or shorter trials and breaks"
-        )

@@ -8,10 +8,9 @@ from dataclasses import asdict, dataclass
 from pydantic import TypeAdapter
 
 from device.words import Direction
-from experiments.config.door import ConfigError, Order
+from experiments.config.door import Order
 from experiments.config.setup import sha256
 from experiments.design.language import DIRECTION_FACTOR, EMPTY, INSTRUCTION_FACTOR, METHOD_FACTOR, Level
-from experiments.design.streams import Stream
 
 
 def square_rows(order: Order, count: int) -> list[list[int]]:
@@ -49,16 +48,6 @@ def next_row(order: Order, count: int, used: Sequence[int]) -> int | None:
     if not square:
         return None
     return min(range(len(square)), key=lambda row: (list(used).count(row), row))
-
-
-def method_order(order: Order, methods: Sequence[str], row: int | None, stream: Stream) -> list[str]:
-    """The methods in the order of a row of the square, or shuffled where there is none."""
-    rows = square_rows(order, len(methods))
-    if row is None:
-        return stream.shuffled(methods)
-    if row not in range(len(rows)):
-        raise ConfigError(f"order_row = {row!r}: the order is {order!r} and has {len(rows)} rows, counted from 0")
-    return [methods[place] for place in rows[row]]
 
 
 PLAN_FORMAT = 2

@@ -98,17 +98,6 @@ class Stimuli:
         return {(trial, place): self.shot(trial, place) for trial, place in places}
 
 
-def stimuli_of_methods(gun: GunConfig, methods: tuple[str, ...]) -> Stimuli:
-    """Every method as the gun has it, and nothing else."""
-    renderings = gun.renderings(methods)
-
-    def shot(trial: Trial, interval: int) -> Shot:
-        method = renderings[trial.method]
-        return Shot(method=trial.method, direction=trial.direction_at(interval), drive=drive_of(method))
-
-    return Stimuli(methods=renderings, shot=shot)
-
-
 def stimuli_of(design: DesignConfig, gun: GunConfig) -> Stimuli:
     """The stimuli of a design. `ConfigError` as `limits`."""
     names: dict[Method, str] = {}
