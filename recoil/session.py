@@ -27,6 +27,8 @@ def run_session(request: RunRequest) -> Place:
     check_code(request.participant_id)
     _check_screen(request)
     check_pace(request.screen, request.gun)
+    if request.practice and request.again == "resume":
+        raise PlaceError("--resume: a practice is begun anew each time; leave --resume or --practice out")
     if request.again == "resume":
         _check_resumable(request)
     try:
@@ -103,8 +105,10 @@ def run_lab_day(request: RunRequest) -> None:
     """The start window at the console, and one run after the other from it; `request` is without a participant."""
     if request.screen != "console":
         raise PlaceError("give --participant CODE, or --screen console for its start window")
-    if request.again != "ask" or request.visual:
-        raise PlaceError("--resume, --fresh and --visual go with --participant CODE; the start window asks by itself")
+    if request.again != "ask" or request.visual or request.practice:
+        raise PlaceError(
+            "--resume, --fresh, --practice and --visual go with --participant CODE; the start window asks by itself"
+        )
     check_pace("console", request.gun)
     with _needs_gui():
         from experiments.screens.console import live  # noqa: PLC0415 - Qt is an extra, and slow

@@ -32,9 +32,9 @@ NEXT_STATE = {S.FIRING: ("asking", "train"), S.SAVING: ("setting", "preparing"),
 def short_configs(folder: Path) -> Path:
     """The shipped configs, experiment 1 with two methods of two sets of two trials, the guard as it is."""
     configs = folder / "configs"
-    configs.mkdir(exist_ok=True)
-    for source in shipped_folder().glob("*.toml"):
-        (configs / source.name).write_text(source.read_text())
+    (configs / "synthetic").mkdir(parents=True, exist_ok=True)
+    for source in [*shipped_folder().glob("*.toml"), *shipped_folder().glob("synthetic/*.toml")]:
+        (configs / source.relative_to(shipped_folder())).write_text(source.read_text())
     shorten(configs)
     config = configs / "direction.toml"
     config.write_text(config.read_text().replace("between_sets_s = 20.0", "between_sets_s = 600.0"))

@@ -33,6 +33,9 @@ TICK_MS = 5
 HANG_S = 1.0
 SLOW_SYNC_S = 0.2
 PATIENCE_S = 60.0
+SETUP = short_direction(sets=1, trials=4, set_break_s=0.0)
+TRIALS = 8
+"""Two methods of four trials."""
 
 
 # the program
@@ -171,8 +174,7 @@ def program(case: str, folder: Path) -> dict[str, Any]:
     if case == "slow-disk":
         slow_disk(syncs)
 
-    setup = short_direction(sets=1, trials=4, set_break_s=0.0)
-    request = RunRequest(setup=setup, participant_id="P01", results=folder, seed=1, screen="console", visual=True)
+    request = RunRequest(setup=SETUP, participant_id="P01", results=folder, seed=1, screen="console", visual=True)
     console = Console(request, RealClock())
     watcher = Watcher(console, guns, case, syncs)
     try:

@@ -16,30 +16,30 @@ from analysis.summary.summary import summarize
 from experiments.clock import VirtualClock
 from experiments.config.door import participant_codes
 from experiments.config.setup import Setup
+from experiments.design.config import DesignConfig
 from experiments.load import load_setup
 from experiments.run import RunRequest, run
 from experiments.screens.synthetic import synthetic_screen
+from experiments.synthetic.laws import RatesLaw, RatingsLaw, SyntheticAnswers
 
 EQUAL = [0.0, 0.0, 0.0]
 
 
-def null_setup(experiment: str) -> Setup[Any]:
-    """The shipped config with null participants, as steps and logs know them: guessing, or without preference."""
+def null_setup(experiment: str) -> Setup[DesignConfig]:
+    """The shipped design with null participants, as steps and logs know them: guessing, or without preference."""
     setup = load_setup(experiment)
-    config = make_grid(PowerRequest(config=experiment, participants="14", null=True)).cells[0].config
-    methods = config.design.methods
-    if config.experiment == "direction":
-        half = dict.fromkeys(methods, 0.5)
-        law = {"rates": config.synthetic.rates.model_copy(update={"forward": half, "backward": half})}
-    else:
-        means = config.synthetic.ratings.mean
-        middle = sum(means.values()) / len(means)
-        law = {"ratings": config.synthetic.ratings.model_copy(update={"mean": dict.fromkeys(methods, middle)})}
-    changed = config.model_copy(update={"synthetic": config.synthetic.model_copy(update=law)})
-    return replace(setup, config=type(config).model_validate(changed.model_dump()))
+    null = make_grid(PowerRequest(config=experiment, participants="14", null=True)).cells[0].config
+    if isinstance(null.law, RatesLaw):
+        alike: dict[str, object] = {"share": dict.fromkeys(null.law.share, 0.5)}
+    elif isinstance(null.law, RatingsLaw):
+        means = null.law.mean.values()
+        alike = {"mean": dict.fromkeys(null.law.mean, sum(means) / len(means))}
+    laws = setup.laws.model_dump()
+    laws["questions"][null.question] = null.law.model_dump() | alike
+    return replace(setup, laws=SyntheticAnswers.model_validate(laws))
 
 
-def through_the_chain(setup: Setup[Any], participants: int, seed: int, folder: Path) -> dict[str, Any]:
+def through_the_chain(setup: Setup[DesignConfig], participants: int, seed: int, folder: Path) -> dict[str, Any]:
     """The statistics of a study whose every answer went through a session, a journal and a table."""
     for code in participant_codes(participants):
         asked = RunRequest(setup=setup, participant_id=code, results=folder, seed=seed, again="resume")

@@ -279,7 +279,7 @@ class Turns:
 
     def preference(self) -> Iterator[str]:
         self._guns[-1].released.set()
-        yield from self.at(State.SETTING)
+        yield from self._until(lambda: self.window.drawn.state in (State.SETTING, State.PREPARING))
         for trial in range(3):
             yield from self.fire(State.TRAIN)
             yield "train" if trial == 0 else ""

@@ -18,8 +18,7 @@ from experiments.record.replay import history
 from experiments.run import RunRequest
 from experiments.session.steps import Answered, Ask, Failed, Fired, FireShot
 from experiments.study.folders import place
-from tests.at_controls import short_direction
-from tests.faulty_console import PATIENCE_S, SLOW_SYNC_S, child
+from tests.faulty_console import PATIENCE_S, SETUP, SLOW_SYNC_S, TRIALS, child
 
 pytest.importorskip("PyQt6")
 pytestmark = pytest.mark.slow
@@ -67,7 +66,7 @@ def test_a_shot_that_fails_is_marked_said_and_presented_again_while_the_window_s
     check_answers(contents)
     failed = [(step, word) for step, word in history(contents) if isinstance(word, Failed)]
     assert [(step.trial.trial, word.cause) for step, word in failed] == [(2, cause)]
-    assert [(row["attempts"], row["flags"]) for row in rows] == [("1", ""), ("2", "device-error"), *[("1", "")] * 4]
+    assert [(row["attempts"], row["flags"]) for row in rows] == [("1", ""), ("2", "device-error"), *[("1", "")] * (TRIALS - 2)]
     assert all(row["response"] for row in rows)
     assert any(cause in line for line in seen["lines"])
     assert contents.finished
@@ -77,7 +76,7 @@ def test_a_gun_that_answers_late_changes_nothing_but_the_time(case: Case) -> Non
     seen, contents, rows = case("late")
     check_awake(seen)
     check_answers(contents)
-    assert [(row["attempts"], row["flags"]) for row in rows] == [("1", "")] * 6
+    assert [(row["attempts"], row["flags"]) for row in rows] == [("1", "")] * TRIALS
     assert "Firing" in seen["titles"]
 
 
@@ -86,7 +85,7 @@ def test_a_gun_that_vanishes_stops_the_run_with_nothing_answered_for_it(case: Ca
     check_answers(contents)
     assert "switch off its power" in seen["stopped"]
     assert contents.records[-1].kind == "stopped"
-    assert [bool(row["response"]) for row in rows] == [True] + [False] * 5
+    assert [bool(row["response"]) for row in rows] == [True] + [False] * (TRIALS - 1)
     assert "Stopped" in seen["titles"]
 
 
@@ -97,8 +96,7 @@ def test_what_was_fired_when_the_gun_vanished_is_marked_and_presented_again_on_r
     from experiments.screens.synthetic import synthetic_screen
 
     case("vanishes")
-    setup = short_direction(sets=1, trials=4, set_break_s=0.0)
-    request = RunRequest(setup=setup, participant_id="P01", results=tmp_path, again="resume")
+    request = RunRequest(setup=SETUP, participant_id="P01", results=tmp_path, again="resume")
     done = runs.run(request, synthetic_screen, VirtualClock())
     with done.place.table.open(newline="", encoding="utf-8") as file:
         rows = list(csv.DictReader(file))
@@ -114,7 +112,7 @@ def test_the_emergency_stop_disarms_at_once_while_a_shot_hangs_and_stops_the_run
     assert first_s <= seen["hung_until_s"] < seen["pressed_s"] + PATIENCE_S  # it hangs until it is disarmed
     assert seen["shots"] == 2
     assert seen["stopped"] == "emergency stop"
-    assert [bool(row["response"]) for row in rows] == [True] + [False] * 5
+    assert [bool(row["response"]) for row in rows] == [True] + [False] * (TRIALS - 1)
     assert contents.records[-1].reason == "emergency stop"
 
 
@@ -124,7 +122,7 @@ def test_a_disk_whose_sync_takes_200_ms_keeps_no_window_waiting(case: Case) -> N
     check_answers(contents)
     times = [record.monotonic_s for record in contents.records]
     assert times[-1] - times[0] > SLOW_SYNC_S * (len(times) - 1)
-    assert [(row["attempts"], row["flags"]) for row in rows] == [("1", "")] * 6
+    assert [(row["attempts"], row["flags"]) for row in rows] == [("1", "")] * TRIALS
 
 
 def test_bad_news_have_their_colour() -> None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import csv
+import re
 import subprocess
 from collections.abc import Iterator
 from pathlib import Path
@@ -13,13 +14,18 @@ from experiments.record.journal import read_journal
 from experiments.record.replay import history
 from experiments.session.steps import Answered
 from tests.at_display import AtDisplay, needs_display, virtual_display
-from tests.felt_configs import felt_text, written
+from tests.at_runs import SHORT_TRIALS, shorten
 from tests.warm_start import warm
 
 pytest.importorskip("PyQt6")
 pytestmark = [needs_display, pytest.mark.slow]
 
 STEM = "sub-P01/sub-P01_task-direction"
+TOLD = """
+[factors.instruction]
+levels = ["speed", "accuracy"]
+texts = { speed = "Answer as fast as you can.", accuracy = "Be sure." }
+"""
 ANSWER = (
     "session", "method", "set", "trial", "direction", "instruction", "response", "correct", "response_time_s",
     "response_source", "response_time_valid",
@@ -37,11 +43,25 @@ def answers(results: Path) -> list[list[str]]:
         return [[row[name] for name in ANSWER] for row in csv.DictReader(table)]
 
 
-def test_data_mode_and_the_console_give_the_same_answers_in_the_same_times(tmp_path: Path, display: str) -> None:
-    short = {"sets_per_session": 2, "trials_per_set": 2, "forward_per_session": 2, "backward_per_session": 2}
-    breaks = {"between_sets_s": 0.0, "between_sessions_s": 0.0, "max_trials_without_break": 60}
-    methods = {"methods": '["asymmetric-1", "asymmetric-2"]', "non_decision_s": 0.2, "guard_s": 0.0}
-    config = written(tmp_path, felt_text(("speed", "accuracy"), **short, **breaks, **methods))
+def felt(configs: Path, people: dict[str, object], text: str | None = None) -> Path:
+    """Experiment 1, or this text of it, answered by people who feel the gun, with some of their numbers changed."""
+    config, answers = configs / "direction.toml", configs / "synthetic/direction-felt.toml"
+    design = config.read_text() if text is None else text
+    config.write_text(design.replace("synthetic/direction.toml", "synthetic/direction-felt.toml", 1))
+    numbers = answers.read_text()
+    for key, value in people.items():
+        numbers, found = re.subn(rf"^{key} = [\d.]+", f"{key} = {value}", numbers, count=1, flags=re.MULTILINE)
+        assert found, key
+    answers.write_text(numbers)
+    return config
+
+
+def test_data_mode_and_the_console_give_the_same_answers_in_the_same_times(
+    quick_configs: Path, tmp_path: Path, display: str
+) -> None:
+    shorten(quick_configs)
+    short = (quick_configs / "direction.toml").read_text().replace("[order]", f'{TOLD}\n[order]\nset = ["instruction"]')
+    config = felt(quick_configs, {"non_decision_s": 0.2}, short)
     words = ["run", config, "--participant", "P01", "--seed", "3"]
     data = [*words, "--screen", "synthetic", "--results", tmp_path / "data"]
     subprocess.run(warm(*data), cwd=tmp_path, check=True, capture_output=True)
@@ -49,7 +69,7 @@ def test_data_mode_and_the_console_give_the_same_answers_in_the_same_times(tmp_p
     with AtDisplay(seen, tmp_path, display) as screen:
         code, said = screen.end()
     assert code == 0, said
-    assert len(answers(tmp_path / "data")) == 8
+    assert len(answers(tmp_path / "data")) == SHORT_TRIALS
     assert answers(tmp_path / "seen") == answers(tmp_path / "data")
     given = [
         word
@@ -59,11 +79,13 @@ def test_data_mode_and_the_console_give_the_same_answers_in_the_same_times(tmp_p
     assert all(word.key_time_s is not None and word.key_time_s >= word.response_time_s for word in given)
 
 
-def test_numbers_that_make_nobody_end_the_console_with_one_message(tmp_path: Path, display: str) -> None:
-    config = written(tmp_path, felt_text(sensitivity=1e6))
+def test_numbers_that_make_nobody_end_the_console_with_one_message(
+    quick_configs: Path, tmp_path: Path, display: str
+) -> None:
+    config = felt(quick_configs, {"sensitivity": 1e6})
     words = ["run", config, "--participant", "P01", "--seed", "3", "--screen", "console", "--visual"]
     with AtDisplay([*words, "--results", tmp_path / "seen"], tmp_path, display) as screen:
         code, said = screen.end()
     assert code == 2
-    assert f"{config}: the numbers of [synthetic.*] make nobody: drift is" in said
+    assert f"{quick_configs / 'synthetic/direction-felt.toml'}: the numbers make nobody: drift is" in said
     assert "Traceback" not in said

@@ -281,8 +281,8 @@ def test_the_estimate_moves_from_the_plan_towards_what_is_measured_and_never_bey
         # a trial less; the others by at most a sixth of what this one was off, as the plan counts like five trials
         assert abs(before_s - day.left_s - planned_s) <= (left + 1) * 300 / 6
     measured_s = (5 * planned_s + sum(durations)) / (5 + len(durations))
-    left = len(day.plan.trials) - len(durations)
-    assert day.left_s == pytest.approx(left * measured_s + DIRECTION.config.break_s)
+    left, breaks_s = len(day.plan.trials) - len(durations), 30.0 + 60.0 + 30.0
+    assert day.left_s == pytest.approx(left * measured_s + breaks_s)
 
 
 @pytest.mark.parametrize("pause_s", [60.0, 3600.0])

@@ -150,7 +150,13 @@ def test_it_is_refused_in_words(tables, said):
 def test_the_designs_on_the_page_of_the_language_are_designs():
     page = Path(__file__).parent.parent / "docs" / "design-language.md"
     shown = re.findall(r"```toml\n(.*?)```", page.read_text(encoding="utf-8"), re.DOTALL)
-    assert len(shown) == 3
+    factors = {
+        "method": {"levels": ["a"]},
+        "direction": {"levels": ["forward", "backward"]},
+        "voltage_V": {"levels": [12.0, 20.0]},
+    }
+    shared = {"factors": factors, "questions": {"response": QUESTION | {"correct": "direction"}}}
+    assert shown
     for text in shown:
-        config = design(**tables(text, page))
+        config = design(**(shared | tables(text, page)))
         assert plan_of(config, "P01", 1).trials

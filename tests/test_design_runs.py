@@ -7,10 +7,11 @@ import io
 
 import pytest
 
-from experiments.catalogue import experiment, rebuild
 from experiments.clock import VirtualClock
 from experiments.design.planning import groups, practice_of
 from experiments.load import load_setup
+from experiments.rebuild import rebuild
+from experiments.record.design_table import columns
 from experiments.record.journal import read_journal
 from experiments.record.replay import history
 from experiments.run import RunRequest, run
@@ -18,10 +19,12 @@ from experiments.screens.synthetic import synthetic_screen
 from experiments.session.steps import Inform, Prepare, Rest
 from experiments.study.folders import place
 from recoil.config_files import copy_began_with
-from tests.designs import path_of
+from tests.designs import changed, path_of
 
 TEN = ("direction", "preference", "voltages", "detection", "stronger", "magnitude", "realism", "pairs", "grip", "hurry")
 SETUPS = {name: load_setup(str(path_of(name))) for name in TEN}
+SETUPS["preference"] = changed("preference", laws={"questions": {"comment": {"texts": ("soft",)}}})
+"""Whose people say something, so every question has an answer."""
 
 
 def carried_out(name, results, code="P01", again="ask", **more):
@@ -50,7 +53,7 @@ def test_every_planned_trial_has_a_row_with_every_answer(whole):
     design = SETUPS[name].config
     rows = rows_of(finished.place.table.read_bytes())
     assert finished.place.table.name.endswith(f"_{design.table}.csv")
-    assert [*rows[0]] == [column.name for column in experiment(SETUPS[name]).columns(design)]
+    assert [*rows[0]] == [column.name for column in columns(design)]
     assert len(rows) == len(finished.plan.trials)
     for row, trial in zip(rows, finished.plan.trials, strict=True):
         assert all(row[question] for question in design.questions)

@@ -10,9 +10,12 @@ from hypothesis import strategies as st
 from pydantic import ValidationError
 
 from experiments.config.setup import Setup, canonical_json
+from experiments.design.config import DesignConfig
 from experiments.design.plan import Plan, Trial
-from experiments.direction.session import make_plan, session
+from experiments.design.planned import planned_run
+from experiments.design.planning import plan_of
 from experiments.load import load_setup
+from experiments.session.design_session import design_session
 from experiments.session.steps import (
     OUTCOME,
     STEP,
@@ -33,9 +36,10 @@ from experiments.session.steps import (
     Step,
     step_record,
 )
+from tests.designs import changed
 
 SETUP = load_setup("direction")
-PLAN = make_plan(SETUP.config, "P01", 1, None)
+PLAN = plan_of(SETUP.config, "P01", 1)
 DAMPERS = {"vibration": "", "asymmetric-1": "off", "asymmetric-2": "on"}
 FIRED = Fired(
     gun="simulated",
@@ -68,16 +72,16 @@ def fitting(step: Step) -> Outcome:
             return Rested(rested_s=step.duration_s)
 
 
-def driven(plan: Plan, setup: Setup[Any], troubles: dict[int, Outcome] | None = None) -> list[Step]:
+def driven(plan: Plan, setup: Setup[DesignConfig], troubles: dict[int, Outcome] | None = None) -> list[Step]:
     """All steps of a session but its close; the n-th is sent `troubles[n]` instead of what fits."""
     steps = to_the_end(plan, setup, troubles)
     assert steps[-1] == Close()
     return [step for step in steps if step != Close()]
 
 
-def to_the_end(plan: Plan, setup: Setup[Any], troubles: dict[int, Outcome] | None = None) -> list[Step]:
+def to_the_end(plan: Plan, setup: Setup[DesignConfig], troubles: dict[int, Outcome] | None = None) -> list[Step]:
     """All steps of a session; the n-th is sent `troubles[n]` instead of what fits."""
-    going, steps = session(plan, setup), []
+    going, steps = design_session(plan, setup), []
     step = next(going)
     while step is not None:
         steps.append(step)
@@ -89,12 +93,11 @@ def to_the_end(plan: Plan, setup: Setup[Any], troubles: dict[int, Outcome] | Non
     return steps
 
 
-def with_breaks(between_sets_s: float, between_sessions_s: float) -> Setup[Any]:
-    breaks = SETUP.config.breaks.model_copy(
-        update={"between_sets_s": between_sets_s, "between_sessions_s": between_sessions_s}
+def with_breaks(between_sets_s: float, between_sessions_s: float) -> Setup[DesignConfig]:
+    return changed(
+        "direction",
+        breaks={"between_sets_s": between_sets_s, "between_sessions_s": between_sessions_s},
     )
-    config = SETUP.config.model_copy(update={"breaks": breaks})
-    return Setup(config=config, gun=SETUP.gun, source=SETUP.source)
 
 
 def attempt_of(step: Step) -> int | None:
@@ -122,7 +125,7 @@ def test_there_are_nine_rests_of_20_s_between_sets_and_two_of_300_s_between_sess
         ("sessions", 300.0),
         *one_session,
     ]
-    assert sum(rest.duration_s for rest in rests) == SETUP.config.break_s == 780
+    assert sum(rest.duration_s for rest in rests) == planned_run(SETUP.config, PLAN).break_s == 780
 
 
 def test_a_rest_follows_every_fifth_trial_but_the_last() -> None:

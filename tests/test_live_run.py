@@ -49,7 +49,6 @@ from tests.at_controls import (
     PATIENCE_S,
     PREFERENCE,
     Sitting,
-    changed,
     gated,
     kept,
     raw_answers,
@@ -58,12 +57,13 @@ from tests.at_controls import (
     sat_at,
 )
 from tests.at_display import records
+from tests.designs import changed
 from tests.waiting import wait_for
 
 pytestmark = pytest.mark.slow
 
 S = State
-LEAST_S: float = PREFERENCE.config.stimulus.least_exposure_s
+LEAST_S: float = PREFERENCE.config.trial.least_exposure_s
 DUE: dict[State, Event] = {
     S.REARMING: events.Rearm(held_s=1.0),
     S.SETTING: events.DamperSet(),
@@ -1017,9 +1017,8 @@ def test_what_is_no_flag_stays_to_be_typed_over(tmp_path: Path) -> None:
 
 
 def test_a_damper_that_may_have_been_set_is_confirmed_before_anything_fires(tmp_path: Path) -> None:
-    ratings = PREFERENCE.config.model_dump()["synthetic"]["ratings"] | {"lowest": None, "same": None}
-    both = {"methods": ("asymmetric-1", "asymmetric-2")}
-    with sat(changed("preference", design=both, synthetic={"ratings": ratings}), tmp_path) as sitting:
+    both = {"method": {"levels": ("asymmetric-1", "asymmetric-2")}}
+    with sat(changed("preference", factors=both), tmp_path) as sitting:
         sitting.to(S.SETTING)
         first = sitting.position.step
         while sitting.state is not S.SETTING or sitting.position.step == first:

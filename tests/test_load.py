@@ -10,18 +10,28 @@ from analysis.predict.check import check
 from device.words import Pulse
 from experiments.config.door import ConfigError, line_of, read_toml
 from experiments.load import check_limits, find, load_gun, load_setup, load_study, shipped_folder
+from experiments.synthetic.laws import SyntheticAnswers, TableLaw
 
-DESIGNS = ("voltages", "detection", "stronger", "magnitude", "realism", "pairs", "grip", "hurry")
-EXPERIMENTS = ("direction", "preference")
+OF_THE_PAPER = ("direction", "preference")
+DESIGNS = ("voltages", "detection", "stronger", "magnitude", "realism", "pairs", "grip", "hurry", *OF_THE_PAPER)
 DIRECTION, PREFERENCE, GUN = "direction.toml", "preference.toml", "gun.toml"
-TABLE = 'observer = "table"\ntable = "answers.csv"'
-DIRECTION_HEADER = "participant_id,method,forward_correct,backward_correct\n"
+ANSWERING, RATING = "synthetic/direction.toml", "synthetic/preference.toml"
+"""Who answers the two."""
+TABLE = """
+[questions.response]
+law = "table"
+file = "answers.csv"
+by = ["method", "direction"]
+"""
+HEADER = "participant_id,method,direction,correct\n"
 
 
 @pytest.fixture
 def folder(tmp_path: Path) -> Path:
-    for source in shipped_folder().glob("*.toml"):
-        shutil.copy(source, tmp_path)
+    for source in [*shipped_folder().glob("*.toml"), shipped_folder() / ANSWERING, shipped_folder() / RATING]:
+        target = tmp_path / source.relative_to(shipped_folder())
+        target.parent.mkdir(exist_ok=True)
+        shutil.copy(source, target)
     return tmp_path
 
 
@@ -44,27 +54,28 @@ def refusal(path: Path) -> str:
 # what is shipped
 
 
-@pytest.mark.parametrize("name", EXPERIMENTS)
+@pytest.mark.parametrize("name", OF_THE_PAPER)
 @pytest.mark.parametrize("ending", ["", ".toml"])
 def test_a_shipped_config_loads_by_its_name_and_is_within_the_limits(name: str, ending: str) -> None:
     setup = load_setup(f"{name}{ending}")
     assert setup.config.experiment == name
     assert setup.source.parent == shipped_folder()
-    assert [limits.method for limits in check_limits(setup)] == ["vibration", "asymmetric-1", "asymmetric-2"]
+    methods = ("vibration", "asymmetric-1", "asymmetric-2")
+    assert [limits.method for limits in check_limits(setup)] == [f"method = {method}" for method in methods]
 
 
 def test_every_shipped_config_loads() -> None:
-    known = {*EXPERIMENTS, *DESIGNS, "gun", "gun-five", "study", "paper"}
+    known = {*DESIGNS, "gun", "gun-five", "study", "paper"}
     assert {path.stem for path in shipped_folder().glob("*.toml")} == known
     assert list(load_gun(shipped_folder() / GUN).methods) == ["vibration", "asymmetric-1", "asymmetric-2"]
     study, folder = load_study("study")
-    assert [load_setup(str(folder / name)).config.experiment for name in study.experiments] == list(EXPERIMENTS)
+    assert [load_setup(str(folder / name)).config.experiment for name in study.experiments] == list(OF_THE_PAPER)
 
 
 def test_the_shipped_gun_keeps_the_drive_within_a_tenth_of_the_time() -> None:
     driven = check_limits(load_setup("direction"))
     duties = [one.drive.pulse_s / one.settle_s for one in driven if isinstance(one.drive, Pulse)]
-    assert [one.method for one in driven if not isinstance(one.drive, Pulse)] == ["vibration"]
+    assert [one.method for one in driven if not isinstance(one.drive, Pulse)] == ["method = vibration"]
     assert 0 < max(duties) <= 0.10
 
 
@@ -103,12 +114,10 @@ BROKEN = {
         "between_set_s",
     ),
     "missing key": Broken(
-        DIRECTION, DIRECTION, "trial_s = 17.0 ", "# ", ("timing.trial_s: is missing",), "[timing]"
+        DIRECTION, DIRECTION, "hand_over_s = 15.8 ", "# ", ("timing.hand_over_s: is missing",), "[timing]"
     ),
     "unknown table": Broken(DIRECTION, DIRECTION, "[breaks]", "[brakes]", ("brakes: unknown key",), "[brakes]"),
-    "missing table": Broken(
-        PREFERENCE, PREFERENCE, "[description]\ntext", "[rating.description]\ntext", ("description: is missing",)
-    ),
+    "missing table": Broken(PREFERENCE, PREFERENCE, "[timing]", "[questions.comment.timing]", ("timing: is missing",)),
     "text for a number": Broken(
         DIRECTION, DIRECTION, "= 20.0", '= "20"', ("breaks.between_sets_s = '20'", "valid number"), 'sets_s = "20"'
     ),
@@ -118,8 +127,7 @@ BROKEN = {
         DIRECTION, DIRECTION, "= 20.0", "= true", ("breaks.between_sets_s = True", "valid number"), "sets_s = true"
     ),
     "fraction for a count": Broken(
-        DIRECTION, DIRECTION, "sets_per_session = 4", "sets_per_session = 4.5",
-        ("design.sets_per_session = 4.5", "integer"), "sets_per_session",
+        DIRECTION, DIRECTION, "sets = 4", "sets = 4.5", ("order.sets = 4.5", "integer"), "sets = 4.5"
     ),
     "date for a text": Broken(
         DIRECTION, DIRECTION, 'title = "Direction recognition of a shot"', "title = 1979-05-27", ("title", "string"),
@@ -139,70 +147,78 @@ BROKEN = {
         DIRECTION, DIRECTION, "= 20.0", "= 1e999", ("breaks.between_sets_s = inf", "finite"), "sets_s = 1e999"
     ),
     "mean rating that is no number": Broken(
-        PREFERENCE, PREFERENCE, "vibration = 2.4", "vibration = nan", ("synthetic.ratings.mean.vibration = nan",
-        "finite"), "mean =",
+        PREFERENCE, RATING, "vibration = 2.4", "vibration = nan", ("questions.rating.mean.vibration = nan", "finite"),
+        "mean =",
     ),
     "no trials": Broken(
-        DIRECTION, DIRECTION, "sets_per_session = 4", "sets_per_session = 0",
-        ("design.sets_per_session = 0", "greater than or equal to 1"), "sets_per_session",
+        DIRECTION, DIRECTION, "repetitions = 10", "repetitions = 0",
+        ("order.repetitions = 0", "greater than or equal to 1"), "repetitions = 0",
+    ),
+    "no sets": Broken(
+        DIRECTION, DIRECTION, "sets = 4", "sets = 0", ("order.sets = 0", "greater than or equal to 1"), "sets = 0"
     ),
     "no methods": Broken(
         PREFERENCE, PREFERENCE, '["vibration", "asymmetric-1", "asymmetric-2"]', "[]",
-        ("design.methods", "at least 1 item"), "methods = []",
+        ("factors.method.levels", "at least 1 item"), "levels = []",
     ),
     "unknown order": Broken(
-        DIRECTION, DIRECTION, 'session_order = "random"', 'session_order = "reversed"',
-        ("design.session_order = 'reversed'", "'random', 'williams' or 'latin-square'"), "session_order",
+        DIRECTION, DIRECTION, 'sessions = "random"', 'sessions = "reversed"',
+        ("order.sessions = 'reversed'", "'random', 'fixed', 'latin-square' or 'williams'"), 'sessions = "reversed"',
     ),
     "unknown direction": Broken(
-        PREFERENCE, PREFERENCE, 'direction = "forward"', 'direction = "up"',
-        ("design.direction = 'up'", "'forward' or 'backward'"), "direction =",
+        PREFERENCE, PREFERENCE, "[order]", '[factors.direction]\nlevels = ["up"]\n\n[order]',
+        ("factors.direction: levels up", "forward, backward"),
     ),
     "not TOML": Broken(DIRECTION, DIRECTION, "[breaks]", "[breaks", ("not TOML", "(at line ")),
-    "key twice": Broken(DIRECTION, DIRECTION, "[timing]", "[timing]\ntrial_s = 1.0", ("not TOML", "overwrite")),
+    "key twice": Broken(DIRECTION, DIRECTION, "[timing]", "[timing]\nanswer_s = 1.0", ("not TOML", "overwrite")),
     "number of 5000 digits": Broken(DIRECTION, DIRECTION, "= 20.0", "= " + "9" * 5000, ()),
-    "unknown experiment": Broken(
-        DIRECTION, DIRECTION, 'experiment = "direction"', 'experiment = "directions"',
-        ("experiment = 'directions'", "one of direction, preference"),
+    "name of two words": Broken(
+        DIRECTION, DIRECTION, 'design = "direction"', 'design = "two words"', ("design = 'two words'", "match pattern"),
+        "design =",
     ),
-    "no experiment": Broken(
-        DIRECTION, DIRECTION, 'experiment = "direction"', "", ("experiment = None", "one of direction, preference")
+    "no name": Broken(DIRECTION, DIRECTION, 'design = "direction"', "", ("design: is missing",)),
+    "list for the name": Broken(
+        DIRECTION, DIRECTION, 'design = "direction"', 'design = ["direction"]', ("design: ", "valid string"), "design ="
     ),
-    "list for the experiment": Broken(
-        DIRECTION, DIRECTION, 'experiment = "direction"', 'experiment = ["direction"]',
-        ("experiment", "one of direction, preference"),
+    "table for the name": Broken(
+        DIRECTION, DIRECTION, 'design = "direction"', 'design = { name = "direction" }', ("design: ", "valid string"),
+        "design =",
     ),
-    "table for the experiment": Broken(
-        DIRECTION, DIRECTION, 'experiment = "direction"', 'experiment = { name = "direction" }',
-        ("experiment", "one of direction, preference"),
+    "name of other columns": Broken(
+        PREFERENCE, PREFERENCE, 'table = "ratings"', "",
+        ("design = 'preference': logs of this name have columns of their own", "choose another name"),
     ),
     "method twice": Broken(
         DIRECTION, DIRECTION, '"asymmetric-2"]', '"asymmetric-1"]',
-        ("design.methods", "asymmetric-1 stands there more than once", "each method once"), "methods =",
+        ("factors.method.levels", "asymmetric-1 stands there more than once", "name each once"), "levels =",
     ),
     "method without a rate": Broken(
-        DIRECTION, DIRECTION, "asymmetric-2 = 0.929 }", "laser = 0.929 }",
-        ("synthetic.rates.forward has no value for asymmetric-2", "each of design.methods"),
+        DIRECTION, ANSWERING, '"asymmetric-2/forward"', '"laser/forward"',
+        ("questions.response.share has no value for 'asymmetric-2/forward'", "it has vibration/forward"),
     ),
     "method without a mean rating": Broken(
-        PREFERENCE, PREFERENCE, "asymmetric-2 = 7.8 }", "laser = 7.8 }",
-        ("synthetic.ratings.mean has no value for asymmetric-2", "each of design.methods"),
+        PREFERENCE, RATING, "asymmetric-2 = 7.8 }", "laser = 7.8 }",
+        ("questions.rating.mean has no value for 'asymmetric-2'", "it has vibration"),
     ),
     "rate of 1": Broken(
-        DIRECTION, DIRECTION, "vibration = 0.557", "vibration = 1.0",
-        ("synthetic.rates.forward.vibration = 1.0", "less than 1"), "forward = {",
+        DIRECTION, ANSWERING, "= 0.557", "= 1.0",
+        ("questions.response.share.vibration/forward = 1.0", "less than 1"), '"vibration/forward" =',
     ),
     "habit of a method that is not there": Broken(
-        PREFERENCE, PREFERENCE, 'lowest = "vibration"', 'lowest = "laser"',
-        ("synthetic.ratings names 'laser'", "not among design.methods"),
+        PREFERENCE, RATING, 'lowest = "vibration"', 'lowest = "laser"',
+        ("questions.rating names 'laser'", "no level of method"),
+    ),
+    "bias to an answer that is not there": Broken(
+        DIRECTION, ANSWERING, 'bias = { answer = "forward"', 'bias = { answer = "upward"',
+        ("questions.response.bias.answer = 'upward'", "one of two answers; there are forward, backward"),
     ),
     "trials that do not add up": Broken(
-        DIRECTION, DIRECTION, "forward_per_session = 10", "forward_per_session = 11",
-        ("design: 11 forward and 10 backward make 21 trials, but 4 sets of 5 make 20", "make them equal"), "[design]",
+        DIRECTION, DIRECTION, "repetitions = 10", "repetitions = 11",
+        ("order.sets = 4: the 22 trials of a session cannot be shared equally", "nearest: 2 or 11"),
     ),
     "impossible set-exact": Broken(
         DIRECTION, DIRECTION, 'balance = "session"', 'balance = "set-exact"',
-        ('design: balance = "set-exact" is impossible', "10 forward trials", "4 sets of 5", 'use "set"'), "[design]",
+        ('order.balance = "set-exact" is impossible', "10 repetitions", "4 sets", "8 or 12", 'balance = "set"'),
     ),
     "too many trials without a break": Broken(
         DIRECTION, DIRECTION, "between_sets_s = 20.0", "between_sets_s = 0.0",
@@ -213,36 +229,42 @@ BROKEN = {
         ("5 trials without a break", "fatigue.max_trials_without_break = 4"),
     ),
     "too long": Broken(
-        DIRECTION, DIRECTION, "trial_s = 17.0", "trial_s = 170.0", ("10980 s", "fatigue.max_planned_s = 2700 s")
+        DIRECTION, DIRECTION, "hand_over_s = 15.8 ", "hand_over_s = 168.8 ",
+        ("10980 s", "fatigue.max_planned_s = 2700 s"),
     ),
     "too long to rate": Broken(
-        PREFERENCE, PREFERENCE, "exposure_s = 40.0", "exposure_s = 400.0", ("1560 s", "fatigue.max_planned_s = 1200 s")
+        PREFERENCE, PREFERENCE, "stimulus_s = 40.0", "stimulus_s = 400.0", ("1560 s", "fatigue.max_planned_s = 1200 s")
     ),
     "assumed key that is not there": Broken(
-        DIRECTION, DIRECTION, '"question.text",', '"question.texts",', ("assumed names question.texts", "existing keys")
+        DIRECTION, DIRECTION, '"questions.response.text"', '"questions.response.texts"',
+        ("assumed names questions.response.texts", "existing keys"),
     ),
     "grain that does not divide": Broken(
-        PREFERENCE, PREFERENCE, "grain = 0.1 ", "grain = 0.3 ", ("rating: grain 0.3 does not divide the scale",),
-        "[rating]",
+        PREFERENCE, PREFERENCE, "grain = 0.1 ", "grain = 0.3 ",
+        ("questions.rating: grain 0.3 does not divide the scale",), "[questions.rating]",
     ),
     "grain beyond all doubles": Broken(
-        PREFERENCE, PREFERENCE, "grain = 0.1 ", "grain = 1e-320 ", ("rating.grain = 1e-320",), "grain = "
+        PREFERENCE, PREFERENCE, "grain = 0.1 ", "grain = 1e-320 ", ("questions.rating.grain = 1e-320",), "grain = "
     ),
     "scale upside down": Broken(
         PREFERENCE, PREFERENCE, "minimum = 0.0", "minimum = 11.0",
-        ("rating: minimum 11 and maximum 10: need 0 <= minimum < maximum <= 10",), "[rating]",
+        ("questions.rating: minimum 11 and maximum 10: need -1e6 <= minimum < maximum <= 1e6",), "[questions.rating]",
     ),
     "repeat faster than the magnet is home": Broken(
         PREFERENCE, PREFERENCE, "repeat_every_s = 1.0", "repeat_every_s = 0.2",
-        ("stimulus.repeat_every_s = 0.2: asymmetric-2 needs 0.211 s",),
+        ("trial.repeat_every_s = 0.2: method = asymmetric-2 needs 0.211 s",),
     ),
-    "table observer without table": Broken(
-        DIRECTION, DIRECTION, 'observer = "rates"', 'observer = "table"',
-        ('synthetic: observer = "table" needs the key `table`',), "[synthetic]",
+    "table of answers without a file": Broken(
+        PREFERENCE, RATING, 'law = "words"', 'law = "table"', ("questions.comment.file: is missing",),
+        "[questions.comment]",
     ),
-    "unknown observer": Broken(
-        DIRECTION, DIRECTION, 'observer = "rates"', 'observer = "ratings"',
-        ("synthetic.observer = 'ratings'", "'rates', 'table' or 'felt'"), 'observer = "ratings"',
+    "unknown law": Broken(
+        DIRECTION, ANSWERING, 'law = "rates"', 'law = "rating"', ("questions.response", "'rating'", "'rates', 'shares'"),
+        "[questions.response]",
+    ),
+    "law of another kind of question": Broken(
+        PREFERENCE, RATING, 'law = "words"', 'law = "worth"\nfactor = "method"\nworth = { vibration = 1.0 }',
+        ("questions.comment.law = 'worth': a question of kind 'text' has words",),
     ),
 }  # fmt: skip
 
@@ -285,7 +307,7 @@ BROKEN_GUNS = {
     ),
     "method that the gun has not": Broken(
         PREFERENCE, GUN, "[methods.asymmetric-2]", "[methods.asymmetric-3]",
-        ("design.methods: the gun has no method asymmetric-2", "vibration, asymmetric-1, asymmetric-3"),
+        ("factors.method: the gun has no method 'asymmetric-2'", "vibration, asymmetric-1, asymmetric-3"),
     ),
     "30 V": Broken(
         DIRECTION, GUN, "voltage_V = 16.0", "voltage_V = 30.0",
@@ -351,13 +373,28 @@ def test_check_and_run_refuse_a_method_that_never_moves_with_the_same_words(fold
     assert not (folder / "results").exists()
 
 
+@pytest.mark.parametrize(
+    ("levels", "said"),
+    [
+        ("[]", "factors.method.levels: "),
+        ('["vibration", "vibration"]', "factors.method.levels: vibration stands there more than once; name each once"),
+        ('["vibration", true]', "factors.method.levels.1"),
+    ],
+)
+def test_levels_that_will_not_do_are_one_finding_of_the_key_in_the_file(folder: Path, levels: str, said: str) -> None:
+    edit(folder / PREFERENCE, '["vibration", "asymmetric-1", "asymmetric-2"]', levels)
+    message = refusal(folder / PREFERENCE)
+    assert message.startswith(f"{folder / PREFERENCE}:{line(folder / PREFERENCE, 'levels =')}: {said}")
+    assert len(message.splitlines()) == 1
+
+
 def test_several_findings_are_told_at_once_a_line_each(folder: Path) -> None:
     edit(folder / DIRECTION, "between_sets_s = 20.0", "between_sets_s = -1.0")
-    edit(folder / DIRECTION, "trial_s = 17.0", 'trial_s = "17"')
+    edit(folder / DIRECTION, "hand_over_s = 15.8", 'hand_over_s = "15"')
     findings = refusal(folder / DIRECTION).splitlines()
     assert len(findings) == 2
     assert f"{DIRECTION}:{line(folder / DIRECTION, 'between_sets_s')}: breaks.between_sets_s = -1.0: " in findings[0]
-    assert f"{DIRECTION}:{line(folder / DIRECTION, 'trial_s =')}: timing.trial_s = '17': " in findings[1]
+    assert f"{DIRECTION}:{line(folder / DIRECTION, 'hand_over_s =')}: timing.hand_over_s = '15': " in findings[1]
 
 
 def test_a_wrong_type_in_the_gun_is_one_finding(folder: Path) -> None:
@@ -367,8 +404,8 @@ def test_a_wrong_type_in_the_gun_is_one_finding(folder: Path) -> None:
 
 def test_shots_that_would_exceed_300_a_minute_are_refused_before_any_device_is_opened(folder: Path) -> None:
     edit(folder / PREFERENCE, '["vibration", "asymmetric-1", "asymmetric-2"]', '["vibration"]')
-    edit(folder / PREFERENCE, 'same = ["asymmetric-1", "asymmetric-2"]', "")
-    edit(folder / PREFERENCE, "max_shots_per_trial = 120", "max_shots_per_trial = 1000")
+    edit(folder / RATING, 'same = ["asymmetric-1", "asymmetric-2"]', "")
+    edit(folder / PREFERENCE, "max_shots = 120", "max_shots = 1000")
     edit(folder / PREFERENCE, "repeat_every_s = 1.0", "repeat_every_s = 0.1")
     assert "300 shots" in refusal(folder / PREFERENCE)
 
@@ -376,7 +413,7 @@ def test_shots_that_would_exceed_300_a_minute_are_refused_before_any_device_is_o
 # files
 
 
-@pytest.mark.parametrize("name", [DIRECTION, GUN])
+@pytest.mark.parametrize("name", [DIRECTION, GUN, ANSWERING])
 def test_a_file_that_is_not_utf_8_is_refused_with_the_byte(folder: Path, name: str) -> None:
     with (folder / name).open("ab") as file:
         size = file.tell()
@@ -391,6 +428,14 @@ def test_a_gun_file_that_is_not_there_is_refused_with_the_key_that_names_it(fold
     message = refusal(folder / DIRECTION)
     what = "a folder, not a file" if name == "." else "no such file"
     assert f"{what}; the config's key `gun` names it" in message
+    assert str(folder) in message
+
+
+@pytest.mark.parametrize("name", ["nobody.toml", ".", "sub/nobody.toml", "a\\u0000b"])
+def test_synthetic_people_who_are_not_there_are_refused_with_the_key_that_names_them(folder: Path, name: str) -> None:
+    edit(folder / DIRECTION, f'synthetic = "{ANSWERING}"', f'synthetic = "{name}"')
+    message = refusal(folder / DIRECTION)
+    assert "the config's key `synthetic` names it" in message
     assert str(folder) in message
 
 
@@ -415,7 +460,7 @@ def test_a_shipped_file_that_is_no_experiment_is_refused_as_a_run(name: str) -> 
 
 
 def test_arrays_within_arrays_beyond_all_reason_are_refused(folder: Path) -> None:
-    edit(folder / DIRECTION, 'methods = ["vibration"', "methods = [" + "[" * 3000 + "]" * 3000 + ', "vibration"')
+    edit(folder / DIRECTION, 'levels = ["vibration"', "levels = [" + "[" * 3000 + "]" * 3000 + ', "vibration"')
     assert str(folder / DIRECTION) in refusal(folder / DIRECTION)
 
 
@@ -441,62 +486,66 @@ def test_a_broken_study_is_refused_with_its_line(folder: Path, old: str, new: st
 
 @pytest.fixture
 def answers(folder: Path) -> Path:
-    edit(folder / DIRECTION, 'observer = "rates"', TABLE)
+    (folder / ANSWERING).write_text(TABLE)
     return folder / "answers.csv"
 
 
 def test_a_table_of_answers_is_read_with_a_byte_order_mark_and_either_line_end(answers: Path) -> None:
     rows = []
     for ends in ("\n", "\r\n"):
-        text = f"{DIRECTION_HEADER}P01,vibration,6,5\nP02,vibration,10,0\n".replace("\n", ends)
+        text = f"{HEADER}P01,vibration,forward,6\nP02,vibration,backward,10\n".replace("\n", ends)
         answers.write_bytes(text.encode("utf-8-sig"))
-        rows.append(load_setup(str(answers.parent / DIRECTION)).answers)
+        laws = load_setup(str(answers.parent / DIRECTION)).laws
+        assert isinstance(laws, SyntheticAnswers)
+        law = laws.questions["response"]
+        assert isinstance(law, TableLaw)
+        rows.append(law.rows)
     assert rows[0] == rows[1]
-    assert [row["forward_correct"] for row in rows[0]] == ["6", "10"]
+    assert [row["correct"] for row in rows[0]] == ["6", "10"]
 
 
 def test_a_table_that_is_not_there_is_refused_with_the_key_that_names_it(answers: Path) -> None:
     message = refusal(answers.parent / DIRECTION)
     assert message.startswith(f"{answers}: cannot be read")
-    assert "synthetic.table" in message
+    assert "the law's key `file` names it" in message
 
 
-def test_a_table_whose_name_no_file_can_have_is_refused(folder: Path) -> None:
-    edit(folder / DIRECTION, 'observer = "rates"', 'observer = "table"\ntable = "a\\u0000.csv"')
-    assert "synthetic.table" in refusal(folder / DIRECTION)
+def test_a_table_whose_name_no_file_can_have_is_refused(answers: Path) -> None:
+    edit(answers.parent / ANSWERING, "answers.csv", "a\\u0000.csv")
+    assert "the law's key `file` names it" in refusal(answers.parent / DIRECTION)
 
 
 @pytest.mark.parametrize(
     "header",
     [
-        "participant_id,method,forward_correct",
-        "participant_id,method,forward_correct,backward_correct,note",
-        "participant_id,method,backward_correct,forward_correct",
-        "participant,method,forward_correct,backward_correct",
-        "participant_id;method;forward_correct;backward_correct",
+        "participant_id,method,direction",
+        "participant_id,method,direction,correct,note",
+        "participant_id,direction,method,correct",
+        "participant,method,direction,correct",
+        "participant_id;method;direction;correct",
         "",
     ],
 )
 def test_a_table_with_another_header_is_refused_with_the_columns_it_must_have(answers: Path, header: str) -> None:
-    answers.write_text(f"{header}\nP01,vibration,6,5\n")
+    answers.write_text(f"{header}\nP01,vibration,forward,6\n")
     message = refusal(answers.parent / DIRECTION)
     assert f"{answers}: line 1: columns are" in message
-    assert "they must be participant_id, method, forward_correct, backward_correct" in message
+    assert "they must be participant_id, method, direction, correct" in message
 
 
-@pytest.mark.parametrize("row", ["P01,vibration,6", "P01", "P01,vibration,6,5,4"])
+@pytest.mark.parametrize("row", ["P01,vibration,forward", "P01", "P01,vibration,forward,6,5"])
 def test_a_row_with_too_few_or_too_many_fields_is_refused_with_its_line(answers: Path, row: str) -> None:
-    answers.write_text(f"{DIRECTION_HEADER}P01,asymmetric-1,6,5\n{row}\n")
+    answers.write_text(f"{HEADER}P01,asymmetric-1,forward,6\n{row}\n")
     assert refusal(answers.parent / DIRECTION) == f"{answers}: line 3: {1 + row.count(',')} fields; there must be 4"
 
 
 def test_the_line_of_a_short_row_is_right_behind_an_empty_line(answers: Path) -> None:
-    answers.write_text(f"{DIRECTION_HEADER}\nP01,asymmetric-1,6,5\n\nP01,vibration,6\n")
+    answers.write_text(f"{HEADER}\nP01,asymmetric-1,forward,6\n\nP01,vibration,forward\n")
     assert "line 5: 3 fields; there must be 4" in refusal(answers.parent / DIRECTION)
 
 
 @pytest.mark.parametrize(
-    "data", [b"participant_id,method\xff\n", b'"participant_id\n', DIRECTION_HEADER.encode("utf-16")]
+    "data", [b"participant_id,method\xff\n", b'"participant_id\n', HEADER.encode("utf-16")]
 )
 def test_a_table_that_is_no_csv_in_utf_8_is_refused(answers: Path, data: bytes) -> None:
     answers.write_bytes(data)

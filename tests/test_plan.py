@@ -1,7 +1,7 @@
 """The golden hashes in golden_plans.json were made once, in tests/, by
 
-    ../.venv/bin/python -c "import json, test_plan as t; print(json.dumps([case | {'sha256': t.plan_of(case).sha256()}
-    for case in t.CASES], indent=1))" > golden_plans.json
+    ../.venv/bin/python -c "import json, test_plan as t; print(json.dumps([case | {'sha256':
+    t.plan_of_case(case).sha256()} for case in t.CASES], indent=1))" > golden_plans.json
 
 A plan that was made by one version of Recoil must be made by every other one: do not make them again.
 """
@@ -18,30 +18,41 @@ import pytest
 from pydantic import ValidationError
 
 from experiments.config.setup import canonical_json
+from experiments.design.config import DesignConfig
 from experiments.design.plan import Plan
-from experiments.direction.session import make_plan as direction_plan
-from experiments.load import load_setup
-from experiments.preference.session import make_plan as preference_plan
+from experiments.design.planning import plan_of
+from tests.designs import changed
 from tests.other_trials import turned
 
 pytestmark = pytest.mark.slow
 
 SEEDS = 2_000
 METHODS = ("vibration", "asymmetric-1", "asymmetric-2")
-DIRECTION, PREFERENCE = load_setup("direction").config, load_setup("preference").config
+DIRECTION, PREFERENCE = changed("direction").config, changed("preference").config
 LARGEST_SEED = 2**63 - 1
+ORDERED_BY_SESSION = frozenset(["direction", "hurry", "realism"])
+"""The designs whose order of methods or of dampers is one of sessions."""
 
 
 def case(
-    experiment: str, participant_id: str, seed: int, order: str = "random", balance: str = "", *, row: int | None = None
+    design: str,
+    participant_id: str,
+    seed: int,
+    order: str = "",
+    balance: str = "",
+    *,
+    row: int | None = None,
+    group: int = 0,
 ) -> dict[str, object]:
+    """A shipped design, with another order of its blocks and another balance where they are named."""
     return {
-        "experiment": experiment,
+        "design": design,
         "participant_id": participant_id,
         "seed": seed,
         "order": order,
         "balance": balance,
         "row": row,
+        "group": group,
     }
 
 
@@ -61,26 +72,41 @@ CASES = [
     case("direction", "P01", 1, "latin-square", "session", row=0),
     case("direction", "P02", 7, "latin-square", "set", row=1),
     case("direction", "P03", 7, "latin-square", "set-exact", row=2),
-    case("preference", "P01", 1),
-    case("preference", "P02", 1),
-    case("preference", "P01", LARGEST_SEED),
-    case("preference", "P05", 1, "williams", "", row=4),
-    case("preference", "P03", 9, "latin-square", "", row=2),
+    case("preference", "P01", 1, "random"),
+    case("preference", "P02", 1, "random"),
+    case("preference", "P01", LARGEST_SEED, "random"),
+    case("preference", "P05", 1, "williams", row=4),
+    case("preference", "P03", 9, "latin-square", row=2),
+    case("voltages", "P01", 1),
+    case("detection", "P01", 1),
+    case("detection", "P02", 3, "random", "set"),
+    case("stronger", "P01", 1),
+    case("magnitude", "P01", 1),
+    case("realism", "P01", 1, row=0),
+    case("realism", "P02", 5, row=1),
+    case("pairs", "P01", 1),
+    case("pairs", "P02", LARGEST_SEED),
+    case("grip", "P01", 1, row=0),
+    case("grip", "P02", 1, row=1, group=1),
+    case("hurry", "P01", 1, row=0),
+    case("hurry", "P04", 9, "random", "set"),
 ]
 
 
-def direction_config(order: str, balance: str):
-    exact = {"sets_per_session": 5, "trials_per_set": 4} if balance == "set-exact" else {}  # two and two in each set
-    changes = {"session_order": order, "balance": balance, **exact}
-    return DIRECTION.model_copy(update={"design": DIRECTION.design.model_copy(update=changes)})
+def config_of(design: str, order: str, balance: str) -> DesignConfig:
+    changes = {"sessions" if design in ORDERED_BY_SESSION else "trials": order} if order else {}
+    changes |= {"balance": balance} if balance else {}
+    changes |= {"sets": 5} if balance == "set-exact" else {}  # two and two in each set
+    return changed(design, order=changes).config
 
 
-def plan_of(wanted: dict[str, object]) -> Plan:
-    who = (wanted["participant_id"], wanted["seed"], wanted["row"])
-    if wanted["experiment"] == "direction":
-        return direction_plan(direction_config(wanted["order"], wanted["balance"]), *who)
-    design = PREFERENCE.design.model_copy(update={"trial_order": wanted["order"]})
-    return preference_plan(PREFERENCE.model_copy(update={"design": design}), *who)
+def plan_of_case(wanted: dict[str, object]) -> Plan:
+    config = config_of(wanted["design"], wanted["order"], wanted["balance"])
+    return plan_of(config, wanted["participant_id"], wanted["seed"], row=wanted["row"], group=wanted["group"])
+
+
+def direction_config(order: str, balance: str) -> DesignConfig:
+    return config_of("direction", order, balance)
 
 
 @pytest.fixture(scope="module")
@@ -88,13 +114,14 @@ def golden() -> list[dict[str, object]]:
     return json.loads((Path(__file__).parent / "golden_plans.json").read_text(encoding="utf-8"))
 
 
-@pytest.mark.parametrize("number", range(20))
+@pytest.mark.parametrize("number", range(len(CASES)))
 def test_a_plan_has_the_hash_that_it_had_in_the_first_release(golden: list[dict[str, object]], number: int) -> None:
-    assert plan_of(golden[number]).sha256() == golden[number]["sha256"]
+    assert plan_of_case(golden[number]).sha256() == golden[number]["sha256"]
 
 
-def test_there_are_twenty_golden_hashes_all_different(golden: list[dict[str, object]]) -> None:
-    assert len({entry["sha256"] for entry in golden}) == 20
+def test_there_are_golden_hashes_of_ten_designs_and_all_of_them_differ(golden: list[dict[str, object]]) -> None:
+    assert len({entry["design"] for entry in golden}) == 10
+    assert len({entry["sha256"] for entry in golden}) == 33
     assert [{key: entry[key] for key in entry if key != "sha256"} for entry in golden] == CASES
 
 
@@ -123,7 +150,7 @@ def facts(plan: Plan) -> Facts:
 
 def all_plans(balance: str) -> list[Facts]:
     config = direction_config("random", balance)
-    return [facts(direction_plan(config, "P01", seed, None)) for seed in range(SEEDS)]
+    return [facts(plan_of(config, "P01", seed)) for seed in range(SEEDS)]
 
 
 @pytest.fixture(scope="module")
@@ -202,18 +229,10 @@ def test_sessions_have_directions_of_their_own(over_sessions: list[Facts]) -> No
     assert alike < SEEDS / 10
 
 
-def test_set_exact_has_the_same_count_in_every_set() -> None:
-    for seed in range(50):
-        plan = direction_plan(direction_config("random", "set-exact"), "P01", seed, None)
-        counts = Counter((trial.session, trial.set) for trial in plan.trials if trial.direction == "forward")
-        assert set(counts.values()) == {2}
-        assert len(counts) == 15
-
-
 def test_the_same_seed_and_participant_make_the_same_plan_and_others_another() -> None:
     config = direction_config("random", "session")
-    hashes = [direction_plan(config, who, seed, None).sha256() for seed in range(60) for who in ("P01", "P02")]
-    again = [direction_plan(config, who, seed, None).sha256() for seed in range(60) for who in ("P01", "P02")]
+    hashes = [plan_of(config, who, seed).sha256() for seed in range(60) for who in ("P01", "P02")]
+    again = [plan_of(config, who, seed).sha256() for seed in range(60) for who in ("P01", "P02")]
     assert hashes == again
     assert len(set(hashes)) == 120
 
@@ -221,8 +240,8 @@ def test_the_same_seed_and_participant_make_the_same_plan_and_others_another() -
 def test_another_participant_has_other_directions_not_only_another_name() -> None:
     config = direction_config("random", "session")
     same = sum(
-        [trial.direction for trial in direction_plan(config, "P01", seed, None).trials]
-        == [trial.direction for trial in direction_plan(config, "P02", seed, None).trials]
+        [trial.direction for trial in plan_of(config, "P01", seed).trials]
+        == [trial.direction for trial in plan_of(config, "P02", seed).trials]
         for seed in range(60)
     )
     assert same == 0
@@ -230,14 +249,14 @@ def test_another_participant_has_other_directions_not_only_another_name() -> Non
 
 def test_a_row_of_a_square_fixes_the_methods_whatever_the_seed() -> None:
     config = direction_config("williams", "session")
-    orders = [{direction_plan(config, "P01", seed, row).methods for seed in range(20)} for row in range(6)]
+    orders = [{plan_of(config, "P01", seed, row=row).methods for seed in range(20)} for row in range(6)]
     assert all(len(met) == 1 for met in orders)
     assert set.union(*orders) == set(permutations(METHODS))
 
 
 def test_preference_meets_each_method_once_in_one_direction() -> None:
     for seed in range(50):
-        plan = preference_plan(PREFERENCE, "P01", seed, None)
+        plan = plan_of(PREFERENCE, "P01", seed)
         assert sorted(plan.methods) == sorted(METHODS)
         assert [(trial.session, trial.set, trial.trial) for trial in plan.trials] == [(1, 1, 1), (1, 1, 2), (1, 1, 3)]
         assert {trial.direction for trial in plan.trials} == {"forward"}
@@ -247,32 +266,31 @@ def test_the_orders_of_both_experiments_are_independent() -> None:
     # each of the 36 pairs of orders about 720 / 36 times; agreement alone would be 1 in 6
     seeds = 720
     pairs = Counter(
-        (direction_plan(DIRECTION, "P01", seed, None).methods, preference_plan(PREFERENCE, "P01", seed, None).methods)
-        for seed in range(seeds)
+        (plan_of(DIRECTION, "P01", seed).methods, plan_of(PREFERENCE, "P01", seed).methods) for seed in range(seeds)
     )
     assert len(pairs) == 36
     assert sum((count - seeds / 36) ** 2 for count in pairs.values()) / (seeds / 36) < 78  # chi-square, 35 df, p = 4e-5
 
 
-@pytest.mark.parametrize("number", range(0, 20, 4))
+@pytest.mark.parametrize("number", range(0, len(CASES), 4))
 def test_a_plan_reads_back_from_its_record(number: int) -> None:
-    plan = plan_of(CASES[number])
-    assert Plan.from_record(json.loads(canonical_json(plan.record()))) == plan
+    made = plan_of_case(CASES[number])
+    assert Plan.from_record(json.loads(canonical_json(made.record()))) == made
 
 
 def test_the_hash_covers_every_trial_and_field() -> None:
-    plan = plan_of(CASES[0])
-    flipped = turned(plan.trials[-1])
+    made = plan_of_case(CASES[0])
+    flipped = turned(made.trials[-1])
     others = [
-        replace(plan, trials=(*plan.trials[:-1], flipped)),
-        replace(plan, trials=plan.trials[:-1]),
-        replace(plan, seed=plan.seed + 1),
-        replace(plan, order_row=0),
-        replace(plan, participant_id="P99"),
-        replace(plan, format=3),
-        replace(plan, group=1),
+        replace(made, trials=(*made.trials[:-1], flipped)),
+        replace(made, trials=made.trials[:-1]),
+        replace(made, seed=made.seed + 1),
+        replace(made, order_row=0),
+        replace(made, participant_id="P99"),
+        replace(made, format=3),
+        replace(made, group=1),
     ]
-    assert len({plan.sha256(), *(other.sha256() for other in others)}) == 8
+    assert len({made.sha256(), *(other.sha256() for other in others)}) == 8
 
 
 @pytest.mark.parametrize("record", [None, [], {}, {"experiment": "direction"}, "plan"])

@@ -2,44 +2,81 @@
 
 from __future__ import annotations
 
+import shutil
+from collections.abc import Mapping
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pytest
-from experiments.direction.config import DirectionConfig
-from experiments.direction.synthetic import model_parameters
 from scipy import stats
 
+from analysis.predict.drawn import DirectionStudies, drawn
 from analysis.predict.power.grid import PowerRequest, make_grid, run_chunk
 from analysis.predict.power.planned import ANOVA, ANY_PAIR, merged, shares
-from analysis.predict.synthetic_studies import Felt, felt_counts, felt_people, percepts_of_setup
+from analysis.predict.synthetic_studies import Felt, felt_counts, felt_people, percepts_of_methods
+from experiments.config.setup import Setup
+from experiments.design.config import DesignConfig
+from experiments.design.planning import plan_of
 from experiments.design.streams import generator
-from experiments.load import load_setup
+from experiments.load import load_setup, shipped_folder
+from experiments.screens.synthetic import synthetic_participant_of
 from experiments.synthetic.diffusion import People
-from experiments.synthetic.model_based import ModelBasedParticipant
+from experiments.synthetic.laws import DiffusionLaw
 from experiments.synthetic.percept import forward_rates
 from tests.conftest import Recoil
-from tests.felt_configs import felt_config
 from tests.power_chain import homogeneity_p
 
-SETUP = load_setup("direction")
-METHODS = SETUP.config.design.methods
+METHODS = ("vibration", "asymmetric-1", "asymmetric-2")
 SPREADS = {"drift_factor_sd": 0.3, "log_boundary_sd": 0.2, "logit_start_sd": 0.4}
 
 
-def stepped(setup: Any, people: int) -> np.ndarray:
+def felt_config(folder: Path, instructions: tuple[str, ...] = (), spreads: Mapping[str, float] | None = None) -> Path:
+    """The shipped experiment 1 with people who feel the gun, differ so much, and are told so before their sets."""
+    for name in ("gun.toml", "direction.toml", "synthetic/direction-felt.toml"):
+        (folder / name).parent.mkdir(exist_ok=True)
+        shutil.copy(shipped_folder() / name, folder / name)
+    path, people = folder / "direction.toml", folder / "synthetic" / "direction-felt.toml"
+    text = edited(path.read_text(encoding="utf-8"), "synthetic/direction.toml", "synthetic/direction-felt.toml")
+    if instructions:
+        texts = "".join(f'texts.{name} = "Answer with {name}."\n' for name in instructions)
+        factor = f"[factors.instruction]\nlevels = {[*instructions]}\n{texts}\n[order]\nset = ['instruction']"
+        text = edited(text, "[order]", factor)
+    path.write_text(text, encoding="utf-8")
+    law = people.read_text(encoding="utf-8")
+    for name, sd in (spreads or {}).items():
+        law = edited(law, f"{name} = 0.0", f"{name} = {sd}")
+    people.write_text(law, encoding="utf-8")
+    return path
+
+
+def edited(text: str, old: str, new: str) -> str:
+    assert old in text
+    return text.replace(old, new, 1)
+
+
+def felt_of(setup: Setup[DesignConfig], effect: float = 1.0) -> Felt:
+    """The participants of a setup, as power draws them."""
+    found = drawn(setup)
+    assert isinstance(found, DirectionStudies)
+    law = law_of(setup)
+    return felt_people(law, found.instructions, percepts_of_methods(setup.gun, METHODS, law), METHODS, effect)
+
+
+def law_of(setup: Setup[DesignConfig]) -> DiffusionLaw:
+    law = drawn(setup).law
+    assert isinstance(law, DiffusionLaw)
+    return law
+
+
+def stepped(setup: Setup[DesignConfig], people: int) -> np.ndarray:
     """Correct answers (people, methods, 2 directions) of people who answer trial by trial."""
-    config: DirectionConfig = setup.config
-    mind, percepts = model_parameters(config), percepts_of_setup(setup)
     steps = np.zeros((people, len(METHODS), 2), dtype=np.int64)
     for person in range(people):
-        plan = make_plan(config, f"P{person}", person, None)
-        someone = ModelBasedParticipant(mind, percepts, plan)
+        plan = plan_of(setup.config, f"P{person}", person)
+        someone = synthetic_participant_of(setup, plan)
         for trial in plan.trials:
-            decision = someone.decide(trial, trial.instruction or "neutral")
-            right = decision.upper == (trial.direction == "forward")
+            right = someone.answer(trial, "response").response == trial.direction
             steps[person, METHODS.index(trial.method), int(trial.direction == "backward")] += right
     return steps
 
@@ -52,8 +89,7 @@ def test_the_answers_are_distributed_as_those_of_the_participant_step_by_step(
     """Counts of a cell, and sums and differences over cells, in which people's differences show."""
     setup = load_setup(str(felt_config(tmp_path, instructions, SPREADS)))
     steps = stepped(setup, 50)
-    felt = felt_people(setup.config, percepts_of_setup(setup), METHODS)
-    at_once = felt_counts(felt, (10, 10), 50, 400, generator(1, "test")).reshape(-1, 3, 2)
+    at_once = felt_counts(felt_of(setup), (10, 10), 50, 400, generator(1, "test")).reshape(-1, 3, 2)
     summaries = {
         **{str(cell): (steps[:, *cell], at_once[:, *cell]) for cell in np.ndindex(3, 2)},
         "drift": (steps[:, 1:].sum(axis=(1, 2)), at_once[:, 1:].sum(axis=(1, 2))),
@@ -72,17 +108,16 @@ def test_mean_rates_are_those_of_the_quadrature() -> None:
     assert means == pytest.approx(np.column_stack([forward, backward]), abs=4 * 0.2 / 200)
 
 
-def test_the_effect_is_a_factor_on_the_evidence() -> None:
-    percepts = percepts_of_setup(SETUP)
-    one, half = (felt_people(SETUP.config, percepts, METHODS, effect) for effect in (1.0, 0.5))
+def test_the_effect_is_a_factor_on_the_evidence(tmp_path: Path) -> None:
+    setup = load_setup(str(felt_config(tmp_path)))
+    one, half = (felt_of(setup, effect) for effect in (1.0, 0.5))
     assert half.log_odds == pytest.approx([0.5 * value for value in one.log_odds])
     assert half.log_odds[METHODS.index("vibration")] == 0.0
 
 
 def test_an_instruction_changes_the_rate_by_its_boundary(tmp_path: Path) -> None:
     setup = load_setup(str(felt_config(tmp_path, ("speed", "accuracy"))))
-    boundaries = setup.config.synthetic.diffusion.boundaries
-    felt = felt_people(setup.config, percepts_of_setup(setup), METHODS)
+    boundaries, felt = law_of(setup).diffusion.boundaries, felt_of(setup)
     assert felt.cautions == pytest.approx([boundaries[n] / boundaries["neutral"] for n in ("speed", "accuracy")])
     means = felt_counts(felt, (10, 10), 100, 400, generator(3, "test")).mean(axis=(0, 1)) / 10
     rates = [forward_rates(np.array(felt.log_odds) * caution, felt.start, felt.people) for caution in felt.cautions]
@@ -117,7 +152,8 @@ def test_a_piece_travels_with_all_that_it_needs(tmp_path: Path) -> None:
     grid = make_grid(PowerRequest(config=str(felt_config(tmp_path)), participants="14", effects="0.5", studies=10))
     chunk = grid.chunks()[0]
     assert chunk.felt is not None
-    again = run_chunk(replace(chunk, config=chunk.config.model_copy(update={"gun": "gone.toml"})))
+    gone = chunk.config.design.model_copy(update={"gun": "gone.toml", "synthetic": "gone.toml"})
+    again = run_chunk(replace(chunk, config=replace(chunk.config, design=gone)))
     assert again == run_chunk(chunk)
 
 

@@ -1,4 +1,4 @@
-"""The studies behind `recoil power`: people as the config's observers draw them, analysed as logs are."""
+"""The studies behind `recoil power`: people as the laws of a design draw them, analysed as logs are."""
 
 from __future__ import annotations
 
@@ -9,14 +9,11 @@ from statistics import NormalDist
 
 import numpy as np
 import pytest
-from experiments.direction.config import Rates
-from experiments.direction.synthetic import RatesParticipant
-from experiments.preference.config import RatingScale
-from experiments.preference.synthetic import draw_ratings
 from scipy import stats
 
 from analysis.paper.paper import load_paper
 from analysis.paper.recurrence import WHOLE_PATTERN, answers_recur, recurs, with_whole_pattern
+from analysis.predict.drawn import DirectionStudies, Drawn, RatingStudies, drawn
 from analysis.predict.power.grid import Chunk, PowerRequest, StudyDesign, make_grid, run_chunk
 from analysis.predict.power.planned import (
     ALL_PAIRS,
@@ -39,13 +36,37 @@ from analysis.predict.synthetic_studies import (
     ratings_on_scale,
 )
 from analysis.stats.anova import rm_tukey_hsd
+from experiments.config.setup import Setup
+from experiments.design.config import DesignConfig
+from experiments.design.planning import plan_of
 from experiments.design.streams import Stream, generator
 from experiments.load import find, load_setup
+from experiments.screens.synthetic import synthetic_participant_of
+from experiments.synthetic.answers import draw_ratings
+from experiments.synthetic.laws import RatesLaw
 from experiments.tasks.questions import on_scale as one_on_scale
+from tests.designs import changed
 from tests.power_chain import homogeneity_p
 
-DIRECTION, PREFERENCE = load_setup("direction").config, load_setup("preference").config
-METHODS = DIRECTION.design.methods
+
+def directions(setup: Setup[DesignConfig]) -> DirectionStudies:
+    found = drawn(setup)
+    assert isinstance(found, DirectionStudies)
+    return found
+
+
+def rated(setup: Setup[DesignConfig]) -> RatingStudies:
+    found = drawn(setup)
+    assert isinstance(found, RatingStudies)
+    return found
+
+
+SETUP = load_setup("direction")
+DIRECTION, PREFERENCE = directions(SETUP), rated(load_setup("preference"))
+DRAWN: Mapping[str, Drawn] = {"direction": DIRECTION, "preference": PREFERENCE}
+assert isinstance(DIRECTION.law, RatesLaw)
+RATES, RATINGS = DIRECTION.law, PREFERENCE.law
+METHODS = DIRECTION.methods
 PAPER = load_paper(find("paper"))
 FORWARD_ORDER = [0.557, 0.793, 0.929]
 
@@ -61,12 +82,12 @@ def draws(number: int = 1) -> np.random.Generator:
 def test_the_answers_are_distributed_as_those_of_the_observer_step_by_step() -> None:
     """Correct counts of a cell, and the sum over all cells, in which people's ability and bias show."""
     people = 200
-    plan = make_plan(DIRECTION, "P01", 1, None)
+    plan = plan_of(DIRECTION.design, "P01", 1)
     steps = np.zeros((people, 3, 2), dtype=np.int64)
     for person in range(people):
-        someone = RatesParticipant(DIRECTION, replace(plan, seed=person, participant_id=f"P{person}"))
+        someone = synthetic_participant_of(SETUP, replace(plan, seed=person, participant_id=f"P{person}"))
         for trial in plan.trials:
-            right = someone.answer(trial).response == trial.direction
+            right = someone.answer(trial, DIRECTION.question).response == trial.direction
             steps[person, METHODS.index(trial.method), int(trial.direction == "backward")] += right
     at_once = direction_counts(DIRECTION, 40, 500, draws())[..., :, :].reshape(-1, 3, 2)
     summaries = {
@@ -80,19 +101,16 @@ def test_the_answers_are_distributed_as_those_of_the_observer_step_by_step() -> 
 
 def test_mean_correct_rates_are_those_of_the_config() -> None:
     counts = direction_counts(DIRECTION, 100, 400, draws())
-    rates = DIRECTION.synthetic.rates
-    wanted = np.array([[rates.forward[m], rates.backward[m]] for m in METHODS])
+    wanted = np.array([[RATES.share[f"{m}/{way}"] for way in ("forward", "backward")] for m in METHODS])
     assert np.abs(counts.mean(axis=(0, 1)) / 10 - wanted).max() < 4 * 0.17 / 200
 
 
 def test_the_effect_is_a_factor_on_the_probit_of_the_mean_rates() -> None:
-    sharp = DIRECTION.synthetic.rates.model_copy(update={"ability_sd": 0.0, "bias_sd": 0.0})
-    config = DIRECTION.model_copy(update={"synthetic": DIRECTION.synthetic.model_copy(update={"rates": sharp})})
-    phi = NormalDist()
+    sharp, phi = replace(DIRECTION, law=RATES.model_copy(update={"ability_sd": 0.0, "bias": None})), NormalDist()
     for effect in (0.0, 0.5, 2.0):
-        means = direction_counts(config, 100, 400, draws(), effect).mean(axis=(0, 1)) / 10
+        means = direction_counts(sharp, 100, 400, draws(), effect).mean(axis=(0, 1)) / 10
         for method, mean in zip(METHODS, means[:, 0], strict=True):
-            wanted = phi.cdf(effect * phi.inv_cdf(sharp.forward[method]))
+            wanted = phi.cdf(effect * phi.inv_cdf(RATES.share[f"{method}/forward"]))
             assert mean == pytest.approx(wanted, abs=4 * 0.5 / np.sqrt(400_000)), (effect, method)
 
 
@@ -105,7 +123,7 @@ class Fed(Stream):
 
 def test_ratings_are_those_of_the_observer_for_the_same_draws() -> None:
     """The very numbers: the observer is fed what the generator draws, in its own order (methods by name)."""
-    people, law = 3000, PREFERENCE.synthetic.ratings
+    people = 3000
     at_once = preference_scores(PREFERENCE, people, 1, draws())[0]
     same = draws()
     person, noise = same.standard_normal(people), same.standard_normal((people, 3))
@@ -113,25 +131,22 @@ def test_ratings_are_those_of_the_observer_for_the_same_draws() -> None:
     by_name = [METHODS.index(name) for name in sorted(METHODS)]
     for i in range(people):
         fed = Fed(iter([person[i], *noise[i][by_name]]), iter([alike[i]]))
-        assert list(draw_ratings(law, PREFERENCE.rating, METHODS, fed).values()) == at_once[i].tolist()
+        assert list(draw_ratings(RATINGS, PREFERENCE.scale, METHODS, fed).values()) == at_once[i].tolist()
 
 
 @pytest.mark.parametrize("grain", [0.1, 0.5, 1.0, 0.025, 1e-4])
 def test_a_scale_of_many_ratings_is_the_scale_of_one(grain: float) -> None:
-    scale = RatingScale.model_validate({**PREFERENCE.rating.model_dump(), "grain": grain})
+    scale = PREFERENCE.scale._replace(grain=grain)
     values = draws().uniform(-2, 12, 2000)
     assert ratings_on_scale(values, scale).tolist() == [one_on_scale(value, scale) for value in values]
 
 
 def test_half_the_effect_halves_the_distances_and_the_habit() -> None:
-    wide = PREFERENCE.rating.model_copy(update={"minimum": -1000.0, "maximum": 1000.0})
-    law = PREFERENCE.synthetic.ratings
-    config = PREFERENCE.model_copy(update={"rating": wide})
-    scores = preference_scores(config, 200, 500, draws(), 0.5).reshape(-1, 3)
+    wide = rated(changed("preference", questions={"rating": {"minimum": -1000.0, "maximum": 1000.0}}))
+    scores = preference_scores(wide, 200, 500, draws(), 0.5).reshape(-1, 3)
     lowest = (scores[:, 0] < scores[:, 1:].min(axis=1)).mean()
-    free = law.model_copy(update={"lowest": None})
-    config = config.model_copy(update={"synthetic": config.synthetic.model_copy(update={"ratings": free})})
-    without = preference_scores(config, 200, 500, draws(), 0.5).reshape(-1, 3)
+    free = replace(wide, law=RATINGS.model_copy(update={"lowest": None}))
+    without = preference_scores(free, 200, 500, draws(), 0.5).reshape(-1, 3)
     unforced = (without[:, 0] < without[:, 1:].min(axis=1)).mean()
     assert lowest == pytest.approx(0.5 + 0.5 * unforced, abs=0.01)
     assert without[:, 1].mean() - without[:, 0].mean() == pytest.approx(0.5 * (6.0 - 2.4), abs=0.04)
@@ -210,10 +225,9 @@ def test_tallies_add_up_in_any_order() -> None:
 
 
 def tally_of(experiment: str, studies: int) -> Mapping[str, float]:
-    config = {"direction": DIRECTION, "preference": PREFERENCE}[experiment]
     design = StudyDesign(participants=14, trials=20, methods=METHODS)
     published = getattr(PAPER, experiment)
-    chunk = Chunk(config=config, design=design, published=published, seed=1, number=0, studies=studies)
+    chunk = Chunk(config=DRAWN[experiment], design=design, published=published, seed=1, number=0, studies=studies)
     return {share.claim: share.share for share in shares(run_chunk(chunk))}
 
 
@@ -221,26 +235,28 @@ def one_by_one(experiment: str, studies: int) -> Mapping[str, float]:
     """The claims' shares among people who are drawn one after the other, as a session draws them."""
     stream, published = Stream(5, "test"), getattr(PAPER, experiment)
     if experiment == "preference":
-        law, scale = PREFERENCE.synthetic.ratings, PREFERENCE.rating
-        people = [draw_ratings(law, scale, published.methods, stream) for _ in range(studies * published.n)]
+        people = [
+            draw_ratings(RATINGS, PREFERENCE.scale, published.methods, stream) for _ in range(studies * published.n)
+        ]
         ratings = [[person[method] for method in published.methods] for person in people]
         claims = recurs(np.array(ratings).reshape(studies, published.n, 3), published)
     else:
-        people = [rates_of(DIRECTION.synthetic.rates, stream) for _ in range(studies * published.n)]
+        people = [chances_of(RATES, stream) for _ in range(studies * published.n)]
         shares = np.array(people).reshape(studies, published.n, 3, 2)
         correct = draws(6).random((*shares.shape, 10)) < shares[..., None]
         claims = answers_recur(correct.sum(axis=-1), (10, 10), published)
     return {claim: float(held.mean()) for claim, held in with_whole_pattern(claims).items()}
 
 
-def rates_of(rates: Rates, stream: Stream) -> list[list[float]]:
+def chances_of(rates: RatesLaw, stream: Stream) -> list[list[float]]:
     """A person's chances of being right, by method and direction: own ability and bias around the mean rates."""
-    phi, spread = NormalDist(), np.sqrt(1 + rates.ability_sd**2 + rates.bias_sd**2)
-    ability, bias = rates.ability_sd * stream.normal(), rates.bias_mean + rates.bias_sd * stream.normal()
+    assert rates.bias is not None
+    phi, spread = NormalDist(), np.sqrt(1 + rates.ability_sd**2 + rates.bias.sd**2)
+    ability, bias = rates.ability_sd * stream.normal(), rates.bias.mean + rates.bias.sd * stream.normal()
     return [
         [
-            phi.cdf(spread * phi.inv_cdf(rates.forward[method]) + ability + bias),
-            phi.cdf(spread * phi.inv_cdf(rates.backward[method]) + ability - bias),
+            phi.cdf(spread * phi.inv_cdf(rates.share[f"{method}/{way}"]) + ability + towards * bias)
+            for way, towards in (("forward", 1), ("backward", -1))
         ]
         for method in METHODS
     ]
@@ -249,9 +265,8 @@ def rates_of(rates: Rates, stream: Stream) -> list[list[float]]:
 @pytest.mark.slow
 @pytest.mark.parametrize("experiment", ["direction", "preference"])
 def test_every_published_claim_recurs_as_often_as_among_people_drawn_one_by_one(experiment: str) -> None:
-    config = {"direction": DIRECTION, "preference": PREFERENCE}[experiment]
     theirs, ours = one_by_one(experiment, 2000), tally_of(experiment, 10_000)
-    odds = {row.claim: row.share for row in pattern_odds(config, getattr(PAPER, experiment), 5000, 1).rows}
+    odds = {row.claim: row.share for row in pattern_odds(DRAWN[experiment], getattr(PAPER, experiment), 5000, 1).rows}
     assert WHOLE_PATTERN in theirs
     assert odds.keys() == theirs.keys()
     for claim, share in theirs.items():
@@ -277,9 +292,8 @@ def test_null_participants_give_five_percent_and_the_exact_test_its_own_size() -
 
 
 def test_null_people_differ_in_their_bias_alone() -> None:
-    rates = DIRECTION.synthetic.rates
-    assert null_rates(rates, biased=False).bias_sd == null_rates(rates, biased=True).ability_sd == 0
-    assert null_rates(rates, biased=True).bias_sd == rates.bias_sd
+    assert null_rates(RATES, biased=False).bias_sd == null_rates(RATES, biased=True).ability_sd == 0
+    assert null_rates(RATES, biased=True).bias_sd == RATES.bias_sd > 0
 
 
 def test_a_chunk_has_a_stream_of_its_own() -> None:

@@ -7,7 +7,7 @@ import pytest
 
 from analysis.logs.reading import read_logs
 from experiments.clock import VirtualClock
-from experiments.direction.session import make_practice
+from experiments.design.planning import practice_of
 from experiments.load import load_setup
 from experiments.run import RunRequest, run
 from experiments.screens.synthetic import synthetic_screen
@@ -21,10 +21,10 @@ def practise(results: Path, setup: object = DIRECTION) -> Path:
     return run(request, synthetic_screen, VirtualClock()).place.table
 
 
-def test_a_practice_has_as_many_trials_of_each_method_as_the_config_says() -> None:
-    plan = make_practice(DIRECTION.config, "P01", 1)
+def test_a_practice_has_as_many_trials_of_each_method_and_direction_as_the_config_says() -> None:
+    plan = practice_of(DIRECTION.config, "P01", 1)
     assert plan is not None
-    assert Counter(trial.method for trial in plan.trials) == dict.fromkeys(DIRECTION.config.design.methods, 2)
+    assert Counter(trial.method for trial in plan.trials) == dict.fromkeys(DIRECTION.config.methods, 2)
     assert Counter(trial.direction for trial in plan.trials) == {"forward": 3, "backward": 3}
     assert {(trial.session, trial.set) for trial in plan.trials} == {(1, 1)}
 

@@ -4,8 +4,9 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from experiments.design.planning import plan_of
 from experiments.load import load_setup
-from experiments.preference.session import make_plan, session
+from experiments.session.design_session import design_session
 from experiments.session.steps import (
     Answered,
     Close,
@@ -25,7 +26,7 @@ from experiments.session.steps import (
 )
 
 SETUP = load_setup("preference")
-PLAN = make_plan(SETUP.config, "P01", 1, None)
+PLAN = plan_of(SETUP.config, "P01", 1)
 FAILED, FELT, UNFELT = Failed(cause="no answer"), Interrupted(presented=True), Interrupted(presented=False)
 QUESTION = (
     "How much do you like such haptic feedback for simulating shooting recoil in a first-person shooting game "
@@ -57,7 +58,7 @@ def driven(troubles: dict[int, Outcome] | None = None) -> list[Step]:
 
 
 def to_the_end(troubles: dict[int, Outcome] | None = None) -> list[Step]:
-    going, steps = session(PLAN, SETUP), []
+    going, steps = design_session(PLAN, SETUP), []
     step: Step | None = next(going)
     while step is not None:
         steps.append(step)

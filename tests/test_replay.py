@@ -11,29 +11,28 @@ from typing import Any, NamedTuple
 
 import pytest
 
-from experiments import catalogue
 from experiments.clock import VirtualClock
 from experiments.config.setup import Setup, canonical_json
+from experiments.design.config import DesignConfig
 from experiments.design.plan import Plan
+from experiments.design.planning import plan_of
 from experiments.rebuild import rebuild
 from experiments.record.journal import Journal, JournalError, link_of, read_journal
 from experiments.record.replay import go_on, history, replay
 from experiments.run import Again, RunRequest, run
 from experiments.screens.synthetic import synthetic_screen
+from experiments.session.design_session import design_session
 from experiments.session.states import EMERGENCY
 from experiments.study import register
 from experiments.study.folders import PlaceError, place
 from experiments.study.register import RegisterError
-from tests.designs import changed
+from tests.designs import changed, direction_with
 from tests.journals import raw
 from tests.other_trials import turned
 
 SETUPS = {
-    "direction": changed(
-        "direction",
-        design={"sets_per_session": 2, "trials_per_set": 2, "forward_per_session": 2, "backward_per_session": 2},
-    ),
-    "preference": changed("preference", timing={"exposure_s": 5.0}),
+    "direction": direction_with(sets=2, repetitions=2),
+    "preference": changed("preference", laws={"exposure_s": 5.0}),
 }
 """Of every step several: three sessions of two sets of two trials; three trains of a few shots."""
 ANSWERS = {
@@ -209,16 +208,15 @@ def test_the_head_of_a_resumption_says_what_it_goes_on_with(
 # refused
 
 
-def others(name: str) -> Iterator[Setup[Any]]:
+def others(name: str) -> Iterator[Setup[DesignConfig]]:
     setup = SETUPS[name]
     yield replace(setup, config=setup.config.model_copy(update={"title": "another"}))
     yield replace(setup, gun=setup.gun.model_copy(update={"title": "another"}))
-    yield replace(setup, answers=({"participant_id": "P01"},))
 
 
 @pytest.mark.parametrize("name", SETUPS)
 @pytest.mark.parametrize("records", [1, 8])
-def test_another_config_gun_or_table_of_answers_is_refused(
+def test_another_config_or_gun_is_refused(
     name: str, records: int, unbroken: dict[str, Unbroken], tmp_path: Path
 ) -> None:
     journal = broken_off(unbroken[name], tmp_path, records)
@@ -258,7 +256,7 @@ def test_another_plan_is_refused_at_the_first_step_that_does_not_follow(
 ) -> None:
     whole = unbroken[name]
     journal = broken_off(whole, tmp_path, 20)
-    other = catalogue.CATALOGUE[name].make_plan(SETUPS[name].config, "P01", 3, None)
+    other = plan_of(SETUPS[name].config, "P01", 3)
     assert other.trials[0] != whole.plan.trials[0]
     head = json.loads(with_plan(whole.lines[0], other.record(), plan_sha256=other.sha256()))
     journal.write_bytes(forged([head, *whole.records[1:20]]))
@@ -325,7 +323,7 @@ def test_an_emergency_stop_that_the_disk_did_not_take_is_known_from_the_reason_o
     journal = broken_off(whole, tmp_path, 1)
     for reason, halted in ((EMERGENCY, True), ("lunch", False)):
         journal.write_bytes(forged([*(whole.records[number] for number in (0, 1, 2)), stopped | {"reason": reason}]))
-        session = catalogue.CATALOGUE["direction"].session(read_journal(journal).plan, SETUPS["direction"])
+        session = design_session(read_journal(journal).plan, SETUPS["direction"])
         assert replay(session, read_journal(journal)).halted == halted
 
 
@@ -423,7 +421,7 @@ def test_a_finished_run_is_never_done_again(again: Again, unbroken: dict[str, Un
 def test_replaying_a_whole_journal_stands_at_the_end(name: str, unbroken: dict[str, Unbroken], tmp_path: Path) -> None:
     whole = unbroken[name]
     contents = read_journal(broken_off(whole, tmp_path, len(whole.lines) - 1))
-    session = catalogue.CATALOGUE[name].session(whole.plan, SETUPS[name])
+    session = design_session(whole.plan, SETUPS[name])
     standing = replay(session, contents)
     assert standing.step is None
     told: list[object] = []

@@ -2,24 +2,24 @@ import csv
 from collections import Counter
 from contextlib import closing, suppress
 from pathlib import Path
-from typing import Any
 
 import pytest
 
 from device import LimitError, LinkError, Shot, ShotReport
-from experiments import catalogue
 from experiments.clock import Clock, VirtualClock
 from experiments.config.setup import Setup
+from experiments.design.config import DesignConfig
 from experiments.design.plan import Plan
 from experiments.live_run import RunStopped
 from experiments.load import load_setup
 from experiments.record.journal import Journal, read_journal
 from experiments.run import RunRequest, run
 from experiments.runner import MAX_FAILURES
-from experiments.screens.synthetic import SyntheticScreen, synthetic_screen
+from experiments.screens.synthetic import SyntheticScreen, synthetic_participant_of, synthetic_screen
 from experiments.session.remarks import Remark
 from experiments.session.steps import Outcome, Step
 from experiments.study.folders import place
+from tests.designs import changed
 from tests.journals import raw
 from tests.sittings import SETUPS, TroubledGun, resumed_rows, sitting
 
@@ -149,11 +149,7 @@ def test_a_fault_within_a_train_presents_the_whole_train_again(tmp_path: Path) -
 
 def test_a_train_that_ends_with_the_most_shots_does_not_shorten_the_next(tmp_path: Path) -> None:
     # nobody says next within 5 s of about 40: each of the three trains goes to its limit
-    setup = SETUPS["preference"]
-    fatigue = setup.config.fatigue.model_copy(update={"max_shots_per_trial": 5})
-    config = setup.config.model_copy(update={"fatigue": fatigue})
-    capped = Setup(config=config, gun=setup.gun, source=setup.source)
-    desk = sitting("preference", tmp_path, setup=capped)
+    desk = sitting("preference", tmp_path, setup=changed("preference", trial={"max_shots": 5}))
     done = desk.carry_out()
     told = [(outcome.shots, outcome.ended_by) for _, outcome in done if outcome.kind == "presented"]
     assert told == [(5, "limit")] * 3
@@ -251,8 +247,8 @@ def test_an_interrupted_run_leaves_a_reason_and_a_table_of_what_was_answered(tmp
             if outcome.kind == "answered":
                 raise KeyboardInterrupt
 
-    def impatient(setup: Setup[Any], plan: Plan, clock: Clock) -> SyntheticScreen:
-        return Impatient(setup.config, catalogue.experiment(setup).synthetic_participant(setup, plan), clock)
+    def impatient(setup: Setup[DesignConfig], plan: Plan, clock: Clock) -> SyntheticScreen:
+        return Impatient(setup.config, synthetic_participant_of(setup, plan), clock)
 
     request = RunRequest(setup=SETUPS["direction"], participant_id="P01", results=tmp_path, seed=1)
     with pytest.raises(KeyboardInterrupt):

@@ -15,6 +15,7 @@ from hypothesis import strategies as st
 from experiments.clock import VirtualClock
 from experiments.config.door import ConfigError, EligibilityConfig, Handedness, Sex, StudyConfig
 from experiments.config.setup import Setup
+from experiments.design.config import DesignConfig
 from experiments.design.plan import Plan
 from experiments.load import load_setup, load_study, shipped_folder
 from experiments.study.folders import place, row_of_next_run, used_rows
@@ -31,6 +32,7 @@ from experiments.study.study import (
     unasked,
     who_is_next,
 )
+from tests.designs import changed
 from tests.journals import write_head
 
 PAPER = load_study("study")[0].eligibility
@@ -232,21 +234,13 @@ def test_nobody_comes_before_someone_in_progress_and_no_more_come_than_planned(d
 # balance
 
 
-def balanced(experiment: str, key: str, order: str) -> Setup[Any]:
-    with tempfile.TemporaryDirectory() as folder:
-        for source in shipped_folder().glob("*.toml"):
-            text = source.read_text(encoding="utf-8").replace(f'{key} = "random"', f'{key} = "{order}"')
-            (Path(folder) / source.name).write_text(text, encoding="utf-8")
-        return load_setup(str(Path(folder) / f"{experiment}.toml"))
-
-
 SQUARES = [
-    (balanced("preference", "trial_order", "latin-square"), 3),
-    (balanced("direction", "session_order", "williams"), 6),
+    (changed("preference", order={"trials": "latin-square"}), 3),
+    (changed("direction", order={"sessions": "williams"}), 6),
 ]
 
 
-def begin(results: Path, code: str, setup: Setup[Any]) -> None:
+def begin(results: Path, code: str, setup: Setup[DesignConfig]) -> None:
     """The head of a run that takes the next row, as the program would write it."""
     where = place(results, code, setup.config.experiment)
     where.folder.mkdir(parents=True)
@@ -259,7 +253,7 @@ def begin(results: Path, code: str, setup: Setup[Any]) -> None:
 @settings(max_examples=40)
 @given(st.sampled_from(SQUARES), st.integers(1, 13), st.lists(st.none() | st.integers(0, 12), max_size=25))
 def test_rows_differ_by_one_at_most_once_drop_outs_are_replaced(
-    square: tuple[Setup[Any], int], planned: int, happenings: list[int | None]
+    square: tuple[Setup[DesignConfig], int], planned: int, happenings: list[int | None]
 ) -> None:
     """`None`: the next one comes, if there is a place; a number: one of those taking part drops out."""
     setup, rows = square

@@ -6,12 +6,10 @@ from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
 from experiments.design.plan import Plan
-from experiments.direction.session import make_plan as direction_plan
-from experiments.direction.session import rows as direction_rows
+from experiments.design.planning import plan_of
 from experiments.load import load_setup
-from experiments.preference.session import make_plan as preference_plan
-from experiments.preference.session import rows as preference_rows
 from experiments.record import tables
+from experiments.record.design_table import columns, design_rows
 from experiments.record.tables import Row, guard, table_bytes, unguard
 from experiments.session.remarks import EntryCorrected
 from experiments.session.steps import (
@@ -32,8 +30,9 @@ from experiments.session.steps import (
 from tests.asked import ask, describe, rate
 
 FORMULA_STARTS = tuple("=+-@\t\r")
-DIRECTION: Plan = direction_plan(load_setup("direction").config, "P01", 1, None)
-PREFERENCE: Plan = preference_plan(load_setup("preference").config, "P01", 1, None)
+DESIGNS = {name: load_setup(name).config for name in ("direction", "preference")}
+DIRECTION: Plan = plan_of(DESIGNS["direction"], "P01", 1)
+PREFERENCE: Plan = plan_of(DESIGNS["preference"], "P01", 1)
 anything = st.text(st.characters(codec="utf-8"))
 awkward = st.text(st.sampled_from("=+-@\t\r\n'\"; ,aé\0"), max_size=8)
 
@@ -58,7 +57,7 @@ def test_any_text_is_read_back_and_never_starts_like_a_formula(text: str) -> Non
 @given(st.lists(st.tuples(anything | awkward, anything | awkward), max_size=5))
 def test_any_comment_and_note_survive_the_table(texts: list[tuple[str, str]]) -> None:
     rows = [{"participant_id": "P01", "comment": comment, "note": note} for comment, note in texts]
-    cells = read(table_bytes(tables.TABLES["preference"], rows))
+    cells = read(table_bytes(columns(DESIGNS["preference"]), rows))
     assert [(unguard(row["comment"]), unguard(row["note"])) for row in cells] == texts
     assert not any(cell.startswith(FORMULA_STARTS) for row in cells for cell in row.values())
 
@@ -151,7 +150,7 @@ def answer(response: str) -> Answered:
 
 
 def written(history: list[tuple[Step, Outcome]]) -> list[dict[str, str]]:
-    return read(table_bytes(tables.TABLES["direction"], direction_rows(DIRECTION, history)))
+    return read(table_bytes(columns(DESIGNS["direction"]), design_rows(DIRECTION, history, DESIGNS["direction"])))
 
 
 def test_trials_that_were_not_reached_have_a_row_with_the_plan_and_no_more() -> None:
@@ -217,8 +216,8 @@ def test_a_rating_of_0_is_written_and_none_leaves_the_cell_empty(rating: float |
         (rate(trial), Answered(value=rating, by="participant")),
         (describe(trial), Answered(value="-soft", by="experimenter")),
     ]
-    rows: list[Row] = preference_rows(PREFERENCE, history)
-    first, row, last = read(table_bytes(tables.TABLES["preference"], rows))
+    rows: list[Row] = design_rows(PREFERENCE, history, DESIGNS["preference"])
+    first, row, last = read(table_bytes(columns(DESIGNS["preference"]), rows))
     assert (row["rating"], row["rating_by"], row["comment"]) == (cell, "participant", "'-soft")
     assert (row["shots"], row["exposure_s"], row["attempts"]) == ("12", "11.5", "1")
     planned = ("participant_id", "experiment", "trial", "method")

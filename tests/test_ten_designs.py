@@ -13,6 +13,7 @@ from experiments.design.config import DesignConfig
 from experiments.design.planning import groups, plan_of, square_size
 from experiments.load import load_gun
 from experiments.record import design_table
+from experiments.synthetic.answers import SyntheticParticipant
 from experiments.synthetic.laws import SyntheticAnswers, check_laws
 from experiments.tasks.questions import answer_problem, is_right
 from tests.designs import path_of
@@ -31,11 +32,11 @@ def loaded(name):
 
 
 def people(name, count=1):
-    design, _, laws = loaded(name)
+    design, gun, laws = loaded(name)
     rows, kinds = square_size(design), len(groups(design))
     for number in range(count):
         plan = plan_of(design, f"P{number:02d}", 1, row=number % rows if rows else None, group=number % kinds)
-        yield design, plan, DesignParticipant(design, laws, plan)
+        yield design, plan, SyntheticParticipant(design, laws, plan, gun)
 
 
 @pytest.mark.parametrize("name", TRIALS)
@@ -67,7 +68,7 @@ def means(name, question, key, count=60):
 
 
 def test_rates_are_met_in_the_mean_over_people():
-    found = means("direction", "response", lambda trial: (trial.level("method"), trial.level("direction")), 200)
+    found = means("direction", "response", lambda trial: (trial.level("method"), trial.level("direction")), 1000)
     assert found["vibration", "forward"] == pytest.approx(0.557, abs=0.03)
     assert found["asymmetric-2", "backward"] == pytest.approx(0.929, abs=0.02)
 
@@ -95,15 +96,19 @@ def test_a_group_keeps_its_level():
     assert {next(iter(plan.trials)).level("grip") for _, plan, _ in people("grip", 2)} == {"one hand", "two hands"}
 
 
-def answered_by(design, laws, plan):
-    person = DesignParticipant(design, checked_table(SyntheticAnswers, {"questions": laws}, "laws.toml"), plan)
+def answered_by(design, gun, laws, plan):
+    person = SyntheticParticipant(design, checked_table(SyntheticAnswers, {"questions": laws}, "laws.toml"), plan, gun)
     return [person.answer(trial, next(iter(design.questions))) for trial in plan.trials]
 
 
 @pytest.mark.parametrize(
     ("name", "laws", "said"),
     [
-        ("pairs", {"rather": {"law": "rates", "share": {"all": 0.5}}}, "nothing is right for rather"),
+        (
+            "pairs",
+            {"rather": {"law": "rates", "share": {"all": 0.5}}},
+            "questions.rather.law = 'rates': nothing is right here",
+        ),
         ("pairs", {"rather": {"law": "worth", "factor": "method", "worth": {"soft": 1.0}}}, "no value for vibration"),
         ("direction", {"response": {"law": "guesses"}}, "guesses"),
         (
@@ -119,11 +124,36 @@ def answered_by(design, laws, plan):
             "names 'voltage', which is no factor",
         ),
         ("grip", {"realism": {"law": "words", "texts": ["x"]}}, "a question of kind 'rating' has ratings"),
+        (
+            "direction",
+            {"response": {"law": "rates", "share": {"all": 0.5}, "bias": {"answer": "up"}}},
+            "questions.response.bias.answer = 'up': must be one of two answers; there are forward, backward",
+        ),
+        (
+            "pairs",
+            {"rather": {"law": "shares", "share": {"all": {"first": 1.0}}}},
+            "questions.rather.share.all has first; it must have each of first, second",
+        ),
+        (
+            "pairs",
+            {"rather": {"law": "shares", "share": {"all": {"first": 0.5, "second": 0.6}}}},
+            "share.all: 0.5, 0.6 must sum to 1",
+        ),
+        (
+            "preference",
+            {"rating": {"law": "ratings", "by": ["method"], "mean": {"all": 5.0}, "lowest": "hammer"}},
+            "questions.rating names 'hammer', which is no level of method",
+        ),
+        (
+            "preference",
+            {"rating": {"law": "ratings", "mean": {"all": 5.0}, "lowest": "vibration"}},
+            "lowest and same are levels of one factor; name it alone in `by`",
+        ),
     ],
 )
 def test_laws_that_do_not_fit_are_refused_by_name(name, laws, said):
-    design, _, _ = loaded(name)
+    design, gun, _ = loaded(name)
     plan = plan_of(design, "P01", 1)
     with pytest.raises(ConfigError) as raised:
-        answered_by(design, laws, plan)
+        answered_by(design, gun, laws, plan)
     assert said in str(raised.value)

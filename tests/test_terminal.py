@@ -30,10 +30,8 @@ def short_configs(quick_configs: Path) -> Path:
     """Experiment 1 with a session of two sets of two trials a method, and breaks of a second."""
     config = quick_configs / "direction.toml"
     changes = {
-        "sets_per_session": "2",
-        "trials_per_set": "2",
-        "forward_per_session": "2",
-        "backward_per_session": "2",
+        "sets": "2",
+        "repetitions": "2",
         "between_sets_s": "1.0",
         "between_sessions_s": "60.0",
     }

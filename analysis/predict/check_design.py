@@ -11,10 +11,11 @@ from analysis.predict.exposure import Exposure, exposure
 from analysis.predict.synthetic_studies import percepts_of_methods
 from analysis.report.section import Section, Table
 from analysis.report.serial import OPTIONAL
+from device.limits import MAX_COIL_C, MAX_DUTY, MAX_SHOTS_PER_MINUTE
 from device.methods import Method
 from device.parameters import GunParameters
 from device.physics import simulate
-from device.words import Pulse
+from device.words import MAX_PULSE_S, MAX_VOLTAGE_V, Pulse
 from experiments.config.door import ConfigError
 from experiments.config.setup import Setup
 from experiments.design.config import DesignConfig
@@ -23,7 +24,7 @@ from experiments.design.methods_section import methods_section
 from experiments.design.plan import Plan, Trial
 from experiments.design.planned import PlannedRun, planned_run, warnings
 from experiments.design.planning import groups, plan_of, square_size
-from experiments.design.stimuli import ConditionLimits, limits, stimulus
+from experiments.design.stimuli import ConditionLimits, limits, settings, stimulus
 from experiments.load import check_limits
 from experiments.screens.synthetic import synthetic_participant_of
 from experiments.synthetic.laws import DiffusionLaw
@@ -37,9 +38,10 @@ _EXPECTED_EVEN = 5
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class CellCheck:
-    """What a shot of a cell asks of the gun."""
+    """What a shot of a cell asks of the gun, and of hands."""
 
     levels: dict[str, str | float]
+    settings: dict[str, str]
     status: str
     settle_s: float
     voltage_V: float | None = field(default=None, metadata=OPTIONAL)
@@ -79,6 +81,7 @@ def check_design(setup: Setup[DesignConfig], seed: int, codes: Sequence[str]) ->
     plans = dict(zip(codes, _plans(design, seed, codes), strict=True))
     first = next(iter(plans.values()))
     planned = planned_run(design, first, setup.gun)
+    cells = limits(design, setup.gun)
     return DesignCheck(
         experiment=design.design,
         title=design.title,
@@ -90,10 +93,10 @@ def check_design(setup: Setup[DesignConfig], seed: int, codes: Sequence[str]) ->
         seed=seed,
         orders={code: _order(design, plan) for code, plan in plans.items()},
         gun=setup.gun.title,
-        cells=tuple(_cell(setup, one) for one in limits(design, setup.gun)),
+        cells=tuple(_cell(setup, one) for one in cells),
         exposure=exposure(_shots(setup, first)),
         felt_forward_rates=_felt(setup, first),
-        warnings=tuple(_warnings(design, planned, [*plans.values()])),
+        warnings=tuple(_warnings(design, planned, [*plans.values()], cells)),
         assumed=(*design.assumed, *(f"{design.gun}: {key}" for key in setup.gun.assumed)),
     )
 
@@ -152,6 +155,7 @@ def _cell(setup: Setup[DesignConfig], one: ConditionLimits) -> CellCheck:
     pulse = isinstance(drive, Pulse)
     return CellCheck(
         levels=dict(one.levels),
+        settings=dict(settings(setup.config, setup.gun, one.levels)),
         status=one.status,
         settle_s=one.settle_s,
         voltage_V=drive.voltage_V if isinstance(drive, Pulse) else None,
@@ -173,8 +177,13 @@ def _shots(setup: Setup[DesignConfig], plan: Plan) -> list[tuple[Method, int]]:
     return [*felt.items()]
 
 
-def _warnings(design: DesignConfig, planned: PlannedRun, plans: Sequence[Plan]) -> Iterator[str]:
+def _warnings(
+    design: DesignConfig, planned: PlannedRun, plans: Sequence[Plan], cells: Sequence[ConditionLimits]
+) -> Iterator[str]:
     yield from warnings(design, planned)
+    slowest_s = max(one.settle_s for one in cells)
+    if design.trial.intervals > 1 and not planned.hands_within and design.trial.gap_s < slowest_s:
+        yield f"trial.gap_s = {design.trial.gap_s:g} s will be longer: the gun needs {slowest_s:.3g} s between two shots"
     if len(plans) >= _EXPECTED_EVEN and design.order.session and design.order.sessions == "random":
         firsts = Counter(_levels(plan.trials[0], design.order.session) for plan in plans)
         most, least = max(firsts.values()), min(firsts.values()) if len(firsts) > 1 else 0
@@ -190,7 +199,7 @@ def design_sections(found: DesignCheck) -> tuple[Section, ...]:
     """What a design means, for a person."""
     minutes, stated = found.duration_s / 60, found.stated_duration_s / 60
     a8 = found.exposure
-    duration = f"{minutes:.1f} min planned ({stated:g} min stated), of which breaks {found.break_s:g} s"
+    duration = f"{minutes:.1f} min planned ({stated:.3g} min stated), of which breaks {found.break_s:g} s"
     shaken = (
         f"Vibration {a8.a8_m_s2:.2f} m/s² A(8) in this run at the most, beside the action value of {a8.action_m_s2:g} "
         f"and the limit of {a8.limit_m_s2:g} m/s² of 2002/44/EC; assumed: {a8.assumed}"
@@ -207,7 +216,7 @@ def design_sections(found: DesignCheck) -> tuple[Section, ...]:
                 *(f"Warning   {one}" for one in found.warnings),
             ),
         ),
-        Section(title=f"Gun: {found.gun}", tables=(_cells(found.cells),)),
+        Section(title=f"Gun: {found.gun}", items=(_LIMITS,), tables=(_cells(found.cells),)),
         *_felt_section(found.felt_forward_rates),
         *((Section(title="Assumed", items=found.assumed),) if found.assumed else ()),
     )
@@ -225,10 +234,11 @@ def _felt_section(rates: Mapping[str, Mapping[str, float]]) -> Iterator[Section]
 
 
 def _cells(cells: Sequence[CellCheck]) -> Table:
-    names = list(dict.fromkeys(name for cell in cells for name in cell.levels))
+    names, by_hand = list(dict.fromkeys(name for cell in cells for name in cell.levels)), any(c.settings for c in cells)
     rows = tuple(
         (
             *(shown_level(cell.levels[name]) if name in cell.levels else "" for name in names),
+            *((", ".join(f"{name} {how}" for name, how in cell.settings.items()),) if by_hand else ()),
             _drive(cell),
             "" if cell.peak_force_N is None else f"{cell.peak_force_N:.1f} N",
             f"{1000 * cell.settle_s:.0f} ms",
@@ -237,8 +247,14 @@ def _cells(cells: Sequence[CellCheck]) -> Table:
         for cell in cells[:_MOST_CELLS]
     )
     more = f" ({_MOST_CELLS} of {len(cells)})" if len(cells) > _MOST_CELLS else ""
-    header = (*names, "Drive", "Peak force", "Next after", "By the model")
-    return Table(caption=f"Cells{more}; no config can lift the gun's limits", header=header, rows=rows)
+    header = (*names, *(("Set by hand",) if by_hand else ()), "Drive", "Peak force", "Next after", "By the model")
+    return Table(caption=f"Cells{more}", header=header, rows=rows)
+
+
+_LIMITS = (
+    f"Limits that no config can lift: {MAX_VOLTAGE_V:g} V, pulse {1000 * MAX_PULSE_S:g} ms, duty {100 * MAX_DUTY:g} % over "
+    f"any second, {MAX_SHOTS_PER_MINUTE:g} shots a minute, coil {MAX_COIL_C:g} °C"
+)
 
 
 def _drive(cell: CellCheck) -> str:

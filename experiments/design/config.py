@@ -115,6 +115,7 @@ def _problems(design: DesignConfig) -> Iterator[str]:
     yield from _factor_problems(design)
     yield from _blocking_problems(design)
     yield from _trial_problems(design)
+    yield from _feedback_problems(design)
     for name, question in design.questions.items():
         yield from (f"questions.{name}: {problem}" for problem in _right_answer_problems(design, question))
     unknown = sorted(set(design.assumed) - set(leaves(design)))
@@ -145,6 +146,10 @@ _COMMON_COLUMNS = frozenset(
 
 
 def _name_problems(design: DesignConfig) -> Iterator[str]:
+    named = list(dict.fromkeys((*design.factors, *design.questions)))
+    alike = [name for name in named if sum(one.casefold() == name.casefold() for one in named) > 1]
+    if alike:
+        yield f"{', '.join(alike)} differ in case alone; rename one"
     taken = [name for name in (*design.factors, *design.questions) if name in _COMMON_COLUMNS]
     if taken:
         yield f"{', '.join(taken)} is the name of a column that every table has; choose another name"
@@ -277,6 +282,14 @@ def _comparison_problems(design: DesignConfig, compare: str, factor: FactorConfi
         yield f"trial.standard = {shown} is a level of {compare} as well: nothing would differ; take it out"
 
 
+def _feedback_problems(design: DesignConfig) -> Iterator[str]:
+    scored = any(question.correct and question.when == "trial" for question in design.questions.values())
+    told = {"trial.feedback": design.trial.feedback, "practice.feedback": design.practice.feedback}
+    for key, asked in told.items():
+        if asked and not scored:
+            yield f"{key} = true: nothing is right or wrong; give a question `correct`, or remove {key}"
+
+
 def _right_answer_problems(design: DesignConfig, question: QuestionConfig) -> Iterator[str]:
     if question.correct is None:
         return
@@ -306,6 +319,8 @@ def _interval_problems(design: DesignConfig, question: QuestionConfig) -> Iterat
         yield f"correct = 'larger': the levels of {trial.compare} are no numbers, so none is larger"
     elif correct == "larger" and isinstance(trial.standard, str):
         yield f"correct = 'larger': the standard is no number (it is {trial.standard!r}), so none is larger"
+    elif correct == "interval" and trial.standard in design.factors[trial.compare or ""].all_levels:
+        yield f"correct = 'interval': the standard {trial.standard} is a level as well, where neither is the comparison"
     elif correct == "interval" and trial.kind == "pair":
         yield "correct = 'interval': of a pair neither is the comparison; say larger, or leave the key out"
     places = ("a", "b") if trial.kind == "abx" else INTERVAL_NAMES[: trial.intervals]

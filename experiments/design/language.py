@@ -62,6 +62,10 @@ def _levels(levels: Levels) -> Levels:
     for level in levels:
         if isinstance(level, str):
             _printable(level)
+            if level[0] in "=+-@'":
+                raise ValueError(
+                    f"{level!r} begins with {level[0]!r}, which a spreadsheet takes for a formula; rename it"
+                )
     return levels
 
 
@@ -89,6 +93,8 @@ class FactorConfig(Model):
             raise ValueError(f"within = {self.within!r} needs levels as a table: one list for each of its levels")
         if self.between and self.within is not None:
             raise ValueError("between = true: what varies between people cannot be nested; remove `within`")
+        if self.between and len(self.all_levels) == 1:
+            raise ValueError("between = true with one level: nothing varies between people; remove `between`")
         return self
 
     @model_validator(mode="after")
@@ -167,6 +173,17 @@ INTERVALS: dict[TrialKind, int] = {"single": 1, "train": 1, "two-interval": 2, "
 """How many intervals a trial of each kind has."""
 
 
+_OF_A_TRAIN, _OF_SEVERAL = ("repeat_every_s", "least_exposure_s", "max_shots"), ("gap_s",)
+_UNUSED: dict[TrialKind, tuple[str, ...]] = {
+    "single": (*_OF_A_TRAIN, *_OF_SEVERAL),
+    "train": _OF_SEVERAL,
+    "two-interval": _OF_A_TRAIN,
+    "pair": _OF_A_TRAIN,
+    "abx": _OF_A_TRAIN,
+    "oddity": _OF_A_TRAIN,
+}
+
+
 class TrialConfig(Model):
     """One presentation: a shot, a train until “next”, or several intervals that are compared."""
 
@@ -197,6 +214,15 @@ class TrialConfig(Model):
                 "needs `standard`: the level that the others are compared with" if needs_standard else "has no standard"
             )
             raise ValueError(f"kind = {self.kind!r} {what}")
+        unused = [key for key in _UNUSED[self.kind] if getattr(self, key) != type(self).model_fields[key].default]
+        if unused:
+            raise ValueError(f"{', '.join(unused)}: a trial of kind {self.kind!r} has none; remove it")
+        longest_s = self.max_shots * self.repeat_every_s
+        if self.kind == "train" and self.least_exposure_s > longest_s:
+            raise ValueError(
+                f"least_exposure_s = {self.least_exposure_s:g} is longer than the longest train, max_shots = "
+                f"{self.max_shots} shots every {self.repeat_every_s:g} s ({longest_s:g} s)"
+            )
         if self.catch and several:
             raise ValueError(
                 f"catch = {self.catch}: catch trials are of one interval; kind {self.kind!r} has {self.intervals}"
@@ -268,6 +294,8 @@ def _question_problems(question: QuestionConfig) -> Iterator[str]:
         yield f"correct = {question.correct!r}: only a choice or yes-no can be right; remove the key"
     if kind == "ranking" and question.when != "block":
         yield 'a ranking is of a block\'s trials; say when = "block"'
+    if kind == "ranking" and question.minimum_text is None:
+        yield 'a ranking needs minimum_text: what rank 1 means, such as "most comfortable"'
     yield from _answer_problems(question)
     yield from _number_problems(question)
 
@@ -326,6 +354,13 @@ class PracticeConfig(Model):
     repetitions: Annotated[int, Field(ge=0, le=100)] = 0
     of: Annotated[tuple[ColumnName, ...], AfterValidator(once)] = ()
     feedback: bool = False
+
+    @model_validator(mode="after")
+    def _of_something(self) -> Self:
+        if bool(self.repetitions) != bool(self.of):
+            missing = "of: the factors whose cells are practised" if self.repetitions else "repetitions: how often"
+            raise ValueError(f"a practice needs {missing}")
+        return self
 
 
 class BreaksConfig(Model):

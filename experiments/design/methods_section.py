@@ -11,11 +11,11 @@ from experiments.design.stimuli import by_hand
 
 
 def methods_section(design: DesignConfig, planned: PlannedRun) -> tuple[str, ...]:
-    """The paragraphs: what varied, in which order, what a trial was, what was asked, how long it took."""
+    """The paragraphs: what varied, in which order, what a trial was, what was asked, practice, how long it took."""
     return (
         " ".join(_factors(design)),
         " ".join(_order(design, planned)),
-        " ".join(_trial(design)),
+        " ".join(_trial(design, planned)),
         " ".join(_questions(design)),
         " ".join(_rests(design, planned)),
     )
@@ -101,12 +101,16 @@ def _sets(design: DesignConfig, trials: int) -> str:
     return f" in {sets} sets of {trials // sets}{balance}"
 
 
-def _trial(design: DesignConfig) -> Iterator[str]:
+def _trial(design: DesignConfig, planned: PlannedRun) -> Iterator[str]:
     trial = design.trial
-    yield f"A trial was {_one_interval(design) if trial.intervals == 1 else _several_intervals(design)}."
+    yield f"A trial was {_one_interval(design) if trial.intervals == 1 else _several_intervals(design, planned)}."
     if trial.catch:
         yield f"{trial.catch} catch trials in a session had no stimulus."
     yield "Participants were told whether they were right." if trial.feedback else "There was no feedback."
+    if design.practice.repetitions:
+        each = _listed([_word(name) for name in design.practice.of])
+        told = ", with feedback" if design.practice.feedback else ""
+        yield f"{design.practice.repetitions} of each {each} could be practised first{told}; that was not analysed."
 
 
 def _one_interval(design: DesignConfig) -> str:
@@ -119,9 +123,9 @@ def _one_interval(design: DesignConfig) -> str:
     )
 
 
-def _several_intervals(design: DesignConfig) -> str:
+def _several_intervals(design: DesignConfig, planned: PlannedRun) -> str:
     trial, compared = design.trial, _word(design.trial.compare or "")
-    gap = f"{trial.gap_s:g} s apart"
+    gap = "with a hand-over between" if planned.hands_within else f"{trial.gap_s:g} s apart"
     if trial.kind == "pair":
         return f"two shots {gap} that differed in {compared}: all pairs, in both orders as often as it goes"
     standard = shown_level(trial.standard) if trial.standard is not None else ""

@@ -75,6 +75,7 @@ _BLANKS: dict[str, object] = {
     "interval": 0,
     "gap_s": 0.0,
     "later": False,
+    "distinct": False,
 }
 """What most trials and steps do not have, by the name of its field."""
 

@@ -2,20 +2,24 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
 
 from experiments.config.door import ConfigError
 from experiments.config.setup import GunConfig
 from experiments.design.config import DesignConfig
-from experiments.design.plan import Plan, Trial
+from experiments.design.language import DIRECTION_FACTOR
+from experiments.design.plan import Condition, Plan, Trial
 from experiments.design.stimuli import by_hand, settings
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class PlannedRun:
-    """One run as planned: `break_s` of `duration_s` are rests; `hand_changes` is how often hands set something anew."""
+    """One run as planned: `break_s` of `duration_s` are rests; `hand_changes` is how often hands set something anew.
+
+    `hands_within`: whether they have something to set or to turn between the intervals of a trial.
+    """
 
     sessions: int
     sets: int
@@ -24,6 +28,7 @@ class PlannedRun:
     duration_s: float
     trials_without_break: int
     hand_changes: int
+    hands_within: bool
 
 
 def planned_run(design: DesignConfig, plan: Plan, gun: GunConfig | None = None) -> PlannedRun:
@@ -49,6 +54,7 @@ def counted(design: DesignConfig, plan: Plan, gun: GunConfig | None = None) -> P
         duration_s=timing.opening_s + len(trials) * trial_s + sum(rests_s),
         trials_without_break=max(_stretches(rests_s)),
         hand_changes=sum(_by_hand(design, gun, one) != _by_hand(design, gun, other) for one, other in pairwise(trials)),
+        hands_within=any(_hands_within(design, gun, trial) for trial in trials),
     )
 
 
@@ -75,6 +81,21 @@ def _by_hand(design: DesignConfig, gun: GunConfig | None, trial: Trial) -> objec
     if gun is not None:
         return settings(design, gun, trial.levels_at(0) or trial.levels)
     return tuple(trial.level(name) for name in by_hand(design))
+
+
+def _hands_within(design: DesignConfig, gun: GunConfig | None, trial: Trial) -> bool:
+    """Whether the intervals of a trial differ in what hands do."""
+    held = [levels for place in range(len(trial.intervals)) if (levels := trial.levels_at(place)) is not None]
+    hands = by_hand(design)
+    done = [
+        (dict(levels).get(DIRECTION_FACTOR), settings(design, gun, levels) if gun else _of(levels, hands))
+        for levels in held
+    ]
+    return any(one != done[0] for one in done)
+
+
+def _of(levels: Condition, names: Sequence[str]) -> Condition:
+    return tuple(pair for pair in levels if pair[0] in names)
 
 
 def _check_fatigue(design: DesignConfig, found: PlannedRun) -> None:

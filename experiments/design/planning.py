@@ -199,13 +199,13 @@ def _session(
     set_levels = _set_levels(design, given, streams)
     contents = _contents(design, given, streams)
     check_sets(design, len(contents))
-    shared = _shared(design, contents, streams)
-    if design.order.trials == "random":
-        parts = _limited(
-            [streams.of("trials", str(place)).shuffled(part) for place, part in enumerate(shared)], design, streams
-        )
-    else:
+    if design.order.trials != "random":
         parts = _by_square(design, contents, row, sets)
+    elif design.order.longest_run:
+        parts = _limited(design, contents, streams)
+    else:
+        shared = _shared(design, contents, streams)
+        parts = [streams.of("trials", str(place)).shuffled(part) for place, part in enumerate(shared)]
     place = 0
     for at, part in enumerate(parts):
         for content in part:
@@ -285,6 +285,9 @@ def _arrangements(kind: str, level: Level, standard: Level) -> list[tuple[tuple[
 def check_sets(design: DesignConfig, trials: int) -> None:
     """`ConfigError` unless the trials of a session share out equally among its sets, as `balance` asks."""
     order = design.order
+    ranked = [name for name, question in design.questions.items() if question.kind == "ranking"]
+    if ranked and trials == order.sets:
+        raise ConfigError(f"questions.{ranked[0]}: sets of one trial leave nothing to rank; make order.sets smaller")
     if trials % order.sets:
         near = [n for n in range(1, trials + 1) if trials % n == 0]
         below = max((n for n in near if n < order.sets), default=None)
@@ -349,14 +352,16 @@ def _by_square(design: DesignConfig, contents: list[_Content], row: int | None, 
 _TRIES = 200
 
 
-def _limited(parts: list[list[_Content]], design: DesignConfig, streams: _Streams) -> list[list[_Content]]:
-    """The sets in an order that keeps every limit on runs. `ConfigError`: none was found."""
+def _limited(design: DesignConfig, contents: list[_Content], streams: _Streams) -> list[list[_Content]]:
+    """The sets in an order that keeps every limit on runs. `ConfigError`: none was found.
+
+    What is in which set is drawn anew at each try, as far as `balance` leaves it open.
+    """
     limits = design.order.longest_run
-    if not limits:
-        return parts
     for attempt in range(_TRIES):
+        drawn = _Streams(streams.seed, (*streams.session, "runs", str(attempt)))
         stream, run, done = streams.of("runs", str(attempt)), _Run(limits), []
-        for part in parts:
+        for part in _shared(design, contents, drawn):
             ordered = _in_limits(part, run, stream)
             if ordered is None:
                 break

@@ -19,7 +19,8 @@ FLAG_RULE = f"A flag is a word of at most {MAX_FLAG} letters, digits and hyphens
 
 def ordinal(plan: Plan, trial: Trial) -> str:
     """How a stimulus is named that is rated after all were felt: by its order, not by its method."""
-    return f"Feedback {trial.trial} of {len(plan.trials)}"
+    block = [other for other in plan.trials if of_one_set(other, trial)]
+    return f"Feedback {block.index(trial) + 1} of {len(block)}"
 
 
 def place_text(plan: Plan, trial: Trial) -> str:

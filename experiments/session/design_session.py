@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from experiments.config.setup import GunConfig, Setup
 from experiments.design.config import DesignConfig
@@ -139,7 +139,7 @@ class _Script:
             case "text":
                 return Describe(trial=trial, question=name, text=question.text, later=later)
             case "ranking":
-                return _rate(name, question, trial, (1.0, float(len(self.set_of(trial))), 1.0))
+                return replace(_rate(name, question, trial, (1.0, float(len(self.set_of(trial))), 1.0)), distinct=True)
             case _:
                 return _rate(name, question, trial, question.scale)
 

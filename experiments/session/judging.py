@@ -8,9 +8,9 @@ from dataclasses import dataclass, replace
 from experiments.design.plan import Plan, Trial
 from experiments.session import events, remarks
 from experiments.session.events import ACTS, OWN_HAND_EVENTS, Event, Press
-from experiments.session.history import History, entered_value, entries, repeatable, trial_at
+from experiments.session.history import History, entered_value, entries, of_one_set, repeatable, trial_at
 from experiments.session.states import No, Position, State, after, why_after
-from experiments.session.steps import Ask, Asking, Rate, is_answer, what
+from experiments.session.steps import Answered, Ask, Asking, Rate, is_answer, what
 
 REARM_HELD_S = 1.0
 """For so long a key is held to go on after an emergency stop."""
@@ -112,6 +112,8 @@ def _impossible(moment: Moment, event: Event) -> str:  # noqa: C901, PLR0911 - o
             return f"That is no {what(entry)}."
         case events.Rating(rating=None) if isinstance(step := moment.position.step, Rate) and not step.may_be_skipped:
             return "An answer is needed here."
+        case events.Rating(rating=float() as rank) if _is_taken(moment, rank):
+            return f"{rank:g} was given to another one of this set: each has a rank of its own."
         case events.Answer(response=response) if not _is_choice(moment, response):
             return f"“{response}” is not among the answers."
         case events.Undo() if moment.further_back is None:
@@ -142,6 +144,23 @@ def _not_asked(
     if (onset_s is None or event.at_s >= onset_s) and not moment.paused_between(event.at_s, event.at_s):
         return ""
     return "It went down before the stimulus, or in a pause."
+
+
+def _is_taken(moment: Moment, rank: float) -> bool:
+    """Whether another trial of the set has this rank, where each has one of its own."""
+    asked = moment.position.step
+    if not isinstance(asked, Rate) or not asked.distinct:
+        return False
+    others = {
+        step.trial: step
+        for step, word in moment.history
+        if isinstance(step, Rate) and isinstance(word, Answered) and step.question == asked.question
+    }
+    return any(
+        entered_value(moment.history, step) == rank
+        for trial, step in others.items()
+        if of_one_set(trial, asked.trial) and trial != asked.trial
+    )
 
 
 def _is_choice(moment: Moment, response: str) -> bool:

@@ -106,7 +106,8 @@ class Present:
 class Rate:
     """Ask for a rating of the trial's stimulus, or for a number. `question`, `text`, `later`: as in `Ask`.
 
-    `grain` is 0 where any number will do. `may_be_skipped`: no answer is one.
+    `grain` is 0 where any number will do. `may_be_skipped`: no answer is one. `distinct`: each trial of the set has a
+    number of its own, as ranks are.
     """
 
     trial: Trial
@@ -119,6 +120,7 @@ class Rate:
     grain: float
     later: bool = False
     may_be_skipped: bool = True
+    distinct: bool = False
     kind: Literal["rate"] = "rate"
 
 

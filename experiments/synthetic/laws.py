@@ -259,6 +259,7 @@ def _problems(design: DesignConfig, question: QuestionConfig, law: Law) -> Itera
         case SharesLaw():
             yield from _share_problems(question, law)
         case RatingsLaw():
+            yield from _mean_problems(question, law)
             yield from _habit_problems(design, law)
         case WorthLaw():
             yield from _worth_problems(design, question, law)
@@ -290,6 +291,13 @@ def _share_problems(question: QuestionConfig, law: SharesLaw) -> Iterator[str]:
 
 def _listed(question: QuestionConfig) -> str:
     return ", ".join(question.named_answers)
+
+
+def _mean_problems(question: QuestionConfig, law: RatingsLaw) -> Iterator[str]:
+    scale = question.scale
+    for cell, mean in law.mean.items():
+        if not scale.minimum <= mean <= scale.maximum:
+            yield f".mean.{cell} = {mean:g} is off the scale, {scale.minimum:g} to {scale.maximum:g}"
 
 
 def _habit_problems(design: DesignConfig, law: RatingsLaw) -> Iterator[str]:

@@ -43,6 +43,7 @@ ResultsOption = Annotated[Path, typer.Option(help="Folder for the logs.")]
 ResumeOption = Annotated[bool, typer.Option("--resume", help="Go on with an unfinished run.")]
 FreshOption = Annotated[bool, typer.Option("--fresh", help="Set an unfinished run aside and start anew.")]
 WhyFreshOption = Annotated[str, typer.Option(help="With --fresh: why, for the register; never a name.")]
+PracticeOption = Annotated[bool, typer.Option("--practice", help="The design's practice, in files of its own.")]
 VisualOption = Annotated[bool, typer.Option("--visual", help="A synthetic participant works the console.")]
 OwnScreenOption = Annotated[
     bool, typer.Option("--participant-screen", help="The participant rates on a screen of their own (PsychoPy).")
@@ -68,6 +69,7 @@ def run(
     resume: ResumeOption = False,
     fresh: FreshOption = False,
     reason: WhyFreshOption = "",
+    practice: PracticeOption = False,
     visual: VisualOption = False,
     participant_screen: OwnScreenOption = False,
     participant_keys: OwnKeysOption = False,
@@ -88,6 +90,7 @@ def run(
         seed=seed,
         again=session.again(resume=resume, fresh=fresh, reason=reason),
         anew_reason=reason,
+        practice=practice,
         screen=screen.value,
         visual=visual,
         options=ParticipantOptions(
