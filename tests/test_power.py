@@ -5,6 +5,7 @@ from __future__ import annotations
 import contextlib
 import json
 import os
+import shutil
 import signal
 import subprocess
 from collections.abc import Iterator
@@ -14,20 +15,23 @@ from typing import Any
 import psutil
 import pytest
 
+from analysis.predict.drawn import DirectionStudies, drawn
 from analysis.predict.jobs import on_cluster, on_processes
 from analysis.predict.power import run as feature
-from analysis.predict.power.grid import PowerRequest, make_grid
+from analysis.predict.power.grid import PowerRequest, make_grid, run_chunk
 from analysis.predict.power.planned import ALL_PAIRS, ANOVA
 from analysis.report.serial import plain
 from experiments.config.door import ConfigError, leaves
 from experiments.load import load_setup, shipped_folder
+from experiments.synthetic.laws import SyntheticAnswers
 from tests.conftest import RECOIL, Recoil
 from tests.power_files import files
 from tests.waiting import PATIENCE_S, wait_for
 from tests.warm_start import warm
 
 SMALL = ("--participants", "8,14", "--effect", "0.75,1", "--studies", "300")
-CONFIG = load_setup("direction").config
+SETUP = load_setup("direction")
+DURATION_S = drawn(SETUP).planned().duration_s
 
 
 @pytest.fixture(scope="module")
@@ -65,7 +69,7 @@ def test_every_design_has_its_claims_with_intervals_and_its_cost(found: Any) -> 
         (14, 1.0),
     ]
     for one in found["designs"]:
-        assert one["lab_hours"] == pytest.approx(one["participants"] * CONFIG.duration_s / 3600)
+        assert one["lab_hours"] == pytest.approx(one["participants"] * DURATION_S / 3600)
         assert all(0 <= c["ci_low"] <= c["share"] == c["held"] / 300 <= c["ci_high"] <= 1 for c in one["claims"])
         assert all(p["half_width"] > p["mc_error"] > 0 for p in one["precision"])
 
@@ -238,24 +242,66 @@ def test_experiment_2_has_one_trial_a_method() -> None:
         make_grid(PowerRequest(config="preference", trials="5"))
 
 
+def copied(folder: Path, *edits: tuple[str, str, str]) -> str:
+    """The shipped experiment 1 in a folder of its own, with texts of its files replaced by others."""
+    shutil.copytree(shipped_folder(), folder, dirs_exist_ok=True)
+    for name, old, new in edits:
+        text = (folder / name).read_text(encoding="utf-8")
+        assert old in text
+        (folder / name).write_text(text.replace(old, new), encoding="utf-8")
+    return str(folder / "direction.toml")
+
+
 def test_answers_from_a_table_have_no_power(tmp_path: Path) -> None:
-    for source in shipped_folder().glob("*.toml"):
-        (tmp_path / source.name).write_bytes(source.read_bytes())
-    config = tmp_path / "direction.toml"
-    config.write_text(config.read_text().replace('observer = "rates"', 'observer = "table"\ntable = "answers.csv"'))
-    (tmp_path / "answers.csv").write_text("participant_id,method,forward_correct,backward_correct\n")
-    with pytest.raises(ConfigError, match='observer = "table" has no power'):
-        make_grid(PowerRequest(config=str(config)))
+    config = copied(tmp_path)
+    table = '[questions.response]\nlaw = "table"\nfile = "answers.csv"\nby = ["method", "direction"]\n'
+    (tmp_path / "synthetic" / "direction.toml").write_text(table)
+    (tmp_path / "answers.csv").write_text("participant_id,method,direction,correct\n")
+    with pytest.raises(ConfigError, match=r'direction\.toml: questions\.response: the law "table" has no power'):
+        make_grid(PowerRequest(config=config))
+
+
+def test_without_forward_trials_there_is_no_power(tmp_path: Path) -> None:
+    levels = ("direction.toml", 'levels = ["forward", "backward"]', 'levels = ["backward"]')
+    config = copied(tmp_path, levels, ("direction.toml", "sets = 4", "sets = 2"))
+    with pytest.raises(ConfigError, match=r"factors\.direction has no level forward; .* is of forward trials"):
+        make_grid(PowerRequest(config=config))
+
+
+def test_without_backward_trials_there_is_no_d_prime_and_no_published_pattern(tmp_path: Path) -> None:
+    levels = ("direction.toml", 'levels = ["forward", "backward"]', 'levels = ["forward"]')
+    config = copied(tmp_path, levels, ("direction.toml", "sets = 4", "sets = 2"))
+    grid = make_grid(PowerRequest(config=config, participants="8", effects="1", studies=50))
+    (chunk,) = grid.chunks()
+    assert chunk.published is None
+    assert chunk.design.trials == 10
+    claims = run_chunk(chunk).held
+    assert ALL_PAIRS in claims
+    assert not any("d′" in claim or "backward" in claim for claim in claims)
+
+
+@pytest.mark.parametrize("name", ["voltages", "pairs", "magnitude", "grip"])
+def test_a_design_that_asks_something_else_has_no_power(name: str) -> None:
+    with pytest.raises(ConfigError, match=f"{name}\\.toml: .*simulate others run by run: --screen synthetic"):
+        make_grid(PowerRequest(config=name))
+
+
+def test_a_design_without_synthetic_people_has_no_power(tmp_path: Path) -> None:
+    config = copied(tmp_path, ("direction.toml", 'synthetic = "synthetic/direction.toml"', ""))
+    with pytest.raises(ConfigError, match=r"direction\.toml: synthetic is missing"):
+        make_grid(PowerRequest(config=config))
 
 
 def test_trials_keep_the_sets_and_the_share_of_forward_trials() -> None:
     grid = make_grid(PowerRequest(config="direction", participants="8", trials="10-40", effects="1"))
-    designs = {cell.design.trials: cell.config.design for cell in grid.cells}
-    assert list(designs) == [10, 20, 30, 40]
-    for trials, design in designs.items():
-        assert design.trials_per_session == trials
-        assert design.forward_per_session == design.backward_per_session == trials // 2
-    assert designs[20] == CONFIG.design
+    found = {cell.design.trials: cell.config for cell in grid.cells}
+    assert list(found) == [10, 20, 30, 40]
+    for trials, studies in found.items():
+        assert isinstance(studies, DirectionStudies)
+        assert studies.trials == (trials // 2, trials // 2)
+        assert studies.trials_per_set == 5
+        assert studies.planned().trials == 3 * trials
+    assert found[20].design == SETUP.config
 
 
 @pytest.mark.slow
@@ -284,7 +330,7 @@ def test_methods_can_be_compared_in_sets(tmp_path: Path) -> None:
         ["vibration", "asymmetric-2"],
         ["asymmetric-1", "asymmetric-2"],
     ]
-    assert found["designs"][0]["duration_s"] < CONFIG.duration_s
+    assert found["designs"][0]["duration_s"] < DURATION_S
     assert found["published_pattern"]["participants"] == 14
     assert (tmp_path / "figures" / "power-2.png").is_file()
 
@@ -315,7 +361,8 @@ def test_assumptions_are_told(found: Any) -> None:
     told = " ".join(found["assumptions"])
     assert "0.557" in told
     assert "ability of SD 0.2" in told
-    assert "synthetic.rates.ability_sd" in set(leaves(CONFIG))
+    assert isinstance(SETUP.laws, SyntheticAnswers)
+    assert "questions.response.ability_sd" in set(leaves(SETUP.laws)) & set(SETUP.laws.assumed)
 
 
 def _silent(_: str, __: int) -> Any:

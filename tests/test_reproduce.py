@@ -13,6 +13,7 @@ from scipy.stats import studentized_range
 from statsmodels.stats.anova import AnovaRM
 
 from analysis.logs.reading import read_logs
+from analysis.predict.drawn import DirectionStudies, RatingStudies, drawn
 from analysis.predict.reproduction import reproduce
 from analysis.predict.synthetic_studies import direction_counts, preference_scores
 from analysis.summary.summary import summarize
@@ -25,6 +26,8 @@ from tests.warm_start import warm
 pytestmark = pytest.mark.slow
 
 METHODS = ["vibration", "asymmetric-1", "asymmetric-2"]
+QUESTIONS = ["response", "rating"]
+"""What each experiment asks first."""
 
 
 def test_it_leaves_28_logs_with_their_journals_and_a_report(reproduction: Path) -> None:
@@ -104,13 +107,29 @@ def test_every_published_number_carries_its_verdict_on_the_page_and_on_the_termi
     assert "They are not the paper's participants" in page
 
 
+LAWS_OF_TABLES = {
+    "direction": """
+[questions.response]
+law = "table"
+file = "reconstructed_direction.csv"
+by = ["method", "direction"]
+""",
+    "preference": """
+[questions.rating]
+law = "table"
+file = "reconstructed_preference.csv"
+
+[questions.comment]
+law = "words"
+""",
+}
+
+
 def test_the_tables_of_reconstructed_answers_seat_the_same_people_again(reproduction: Path, tmp_path: Path) -> None:
     subprocess.run(warm("configs", "--copy", tmp_path), check=True, capture_output=True)
     for name in EXPERIMENTS:
         config, table = tmp_path / f"{name}.toml", f"reconstructed_{name}.csv"
-        text = config.read_text(encoding="utf-8")
-        drawn = next(f'observer = "{word}"' for word in ("rates", "ratings") if f'observer = "{word}"' in text)
-        config.write_text(text.replace(drawn, f'observer = "table"\ntable = "{table}"'), encoding="utf-8")
+        (tmp_path / "synthetic" / f"{name}.toml").write_text(LAWS_OF_TABLES[name], encoding="utf-8")
         (tmp_path / table).write_bytes((reproduction / table).read_bytes())
         run = (
             "run",
@@ -135,7 +154,8 @@ def test_participants_drawn_by_the_configs_stay_an_option() -> None:
     assert "other participants were asked for" in study.notes[0]
     assert other.manifest() == reproduce.prepared("study", 2, "reconstructed").manifest()
     assert other.manifest() != study.manifest()
-    assert [setup.config.synthetic.observer for setup in other.answering] == ["table", "table"]
+    laws = [setup.laws.questions[question] for setup, question in zip(other.answering, QUESTIONS, strict=True)]
+    assert [law.law for law in laws] == ["table", "table"]
 
 
 def test_what_is_killed_is_set_aside_by_another_seed_and_gone_on_with_by_the_same(
@@ -193,19 +213,22 @@ def test_a_strangers_folder_is_refused(tmp_path: Path) -> None:
 
 def test_the_odds_draw_the_same_kind_of_people_as_the_session(reproduction: Path) -> None:
     """The people behind the odds are drawn without a session; here they have the session's rates and spread."""
-    config = load_setup("direction").config
-    counts = direction_counts(config, 14, 2000, generator(1, "odds", "direction"))
-    rates = config.synthetic.rates
+    studies = drawn(load_setup("direction"))
+    assert isinstance(studies, DirectionStudies)
+    counts = direction_counts(studies, 14, 2000, generator(1, "odds", "direction"))
+    rates = studies.law.share
     for place, method in enumerate(METHODS):
-        assert counts[:, :, place, 0].mean() / 10 == pytest.approx(rates.forward[method], abs=0.004)
-        assert counts[:, :, place, 1].mean() / 10 == pytest.approx(rates.backward[method], abs=0.004)
+        assert counts[:, :, place, 0].mean() / 10 == pytest.approx(rates[f"{method}/forward"], abs=0.004)
+        assert counts[:, :, place, 1].mean() / 10 == pytest.approx(rates[f"{method}/backward"], abs=0.004)
     seen = statistics(reproduction)["direction"]["means"]
     for place, method in enumerate(METHODS):
-        studies = counts[:, :, place, 0].mean(axis=1) / 10
-        assert studies.min() <= seen[method] <= studies.max()
+        means = counts[:, :, place, 0].mean(axis=1) / 10
+        assert means.min() <= seen[method] <= means.max()
 
 
 def test_simulated_ratings_keep_the_published_habits() -> None:
-    ratings = preference_scores(load_setup("preference").config, 14, 300, generator(1, "test"))
+    studies = drawn(load_setup("preference"))
+    assert isinstance(studies, RatingStudies)
+    ratings = preference_scores(studies, 14, 300, generator(1, "test"))
     assert (ratings[..., 0] <= ratings[..., 1:].min(axis=-1)).all()
     assert (ratings[..., 1] == ratings[..., 2]).mean() == pytest.approx(0.143, abs=0.03)

@@ -7,12 +7,14 @@ import pytest
 
 from experiments.config.setup import canonical_json, sha256
 from experiments.load import load_setup, shipped_folder
+from experiments.synthetic.laws import SyntheticAnswers, TableLaw
 
 
 @pytest.fixture
 def folder(tmp_path: Path) -> Path:
-    for source in shipped_folder().glob("*.toml"):
-        shutil.copy(source, tmp_path)
+    (tmp_path / "synthetic").mkdir()
+    for source in [*shipped_folder().glob("*.toml"), *shipped_folder().glob("synthetic/*.toml")]:
+        shutil.copy(source, tmp_path / source.relative_to(shipped_folder()))
     return tmp_path
 
 
@@ -48,25 +50,29 @@ def test_any_change_of_config_or_gun_changes_the_hash(folder: Path, file: str, o
     assert load_setup(str(folder / "direction.toml")).sha256() != load_setup("direction").sha256()
 
 
-def test_the_answers_of_a_table_are_part_of_the_setup(folder: Path) -> None:
-    edit(folder / "preference.toml", 'observer = "ratings"', 'observer = "table"\ntable = "answers.csv"')
-    hashes = set()
+def test_who_answers_in_simulations_is_read_with_the_setup_and_no_part_of_its_hash(folder: Path) -> None:
+    table = 'law = "table"\nfile = "answers.csv"\n'
+    people = f'[questions.rating]\n{table}[questions.comment]\nlaw = "words"\n'
+    (folder / "synthetic" / "preference.toml").write_text(people)
     for rating in ("1", "2"):
         (folder / "answers.csv").write_text(f"participant_id,method,rating\nP01,vibration,{rating}\n")
         setup = load_setup(str(folder / "preference.toml"))
-        assert setup.record()["answers"] == [{"participant_id": "P01", "method": "vibration", "rating": rating}]
-        hashes.add(setup.sha256())
-    assert len(hashes) == 2
+        assert isinstance(setup.laws, SyntheticAnswers)
+        law = setup.laws.questions["rating"]
+        assert isinstance(law, TableLaw)
+        assert law.rows == ({"participant_id": "P01", "method": "vibration", "rating": rating},)
+        assert setup.sha256() == load_setup("preference").sha256()
 
 
-@pytest.mark.parametrize("name", ["direction", "preference"])
+@pytest.mark.parametrize("name", ["direction", "preference", "realism"])
 def test_a_setup_is_plain_json_and_its_hash_is_of_that(name: str) -> None:
     setup = load_setup(name)
     read_back = json.loads(canonical_json(setup.record()))
     assert setup.sha256() == sha256(read_back)
 
 
-def test_a_setup_is_never_changed() -> None:
+@pytest.mark.parametrize("name", ["config", "gun", "source", "laws"])
+def test_a_setup_is_never_changed(name: str) -> None:
     setup = load_setup("direction")
     with pytest.raises(FrozenInstanceError):
-        setup.answers = ()
+        setattr(setup, name, None)

@@ -109,12 +109,12 @@ def bench(monkeypatch: pytest.MonkeyPatch) -> Bench:
 # as the run drives it
 
 
-@pytest.mark.parametrize("method", SETUP.config.design.methods)
+@pytest.mark.parametrize("method", SETUP.config.methods)
 def test_a_method_is_driven_as_the_run_drives_it(method: str, monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
     bench = Bench(monkeypatch, method)
     over = bench.carry_out()
     assert over.fired
-    assert bench.methods == SETUP.gun.renderings(SETUP.config.design.methods)
+    assert bench.methods == SETUP.gun.renderings(SETUP.config.methods)
     (shot,) = bench.guns[0].shots
     spied: list[Spied] = []
 

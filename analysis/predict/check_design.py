@@ -183,7 +183,7 @@ def _warnings(
     yield from warnings(design, planned)
     slowest_s = max(one.settle_s for one in cells)
     if design.trial.intervals > 1 and not planned.hands_within and design.trial.gap_s < slowest_s:
-        yield f"trial.gap_s = {design.trial.gap_s:g} s will be longer: the gun needs {slowest_s:.3g} s between two shots"
+        yield f"trial.gap_s = {design.trial.gap_s:g} s: it will be longer, as the gun needs {slowest_s:.3g} s"
     if len(plans) >= _EXPECTED_EVEN and design.order.session and design.order.sessions == "random":
         firsts = Counter(_levels(plan.trials[0], design.order.session) for plan in plans)
         most, least = max(firsts.values()), min(firsts.values()) if len(firsts) > 1 else 0
@@ -252,8 +252,8 @@ def _cells(cells: Sequence[CellCheck]) -> Table:
 
 
 _LIMITS = (
-    f"Limits that no config can lift: {MAX_VOLTAGE_V:g} V, pulse {1000 * MAX_PULSE_S:g} ms, duty {100 * MAX_DUTY:g} % over "
-    f"any second, {MAX_SHOTS_PER_MINUTE:g} shots a minute, coil {MAX_COIL_C:g} °C"
+    f"Limits that no config can lift: {MAX_VOLTAGE_V:g} V, pulse {1000 * MAX_PULSE_S:g} ms, duty {100 * MAX_DUTY:g} % "
+    f"over any second, {MAX_SHOTS_PER_MINUTE:g} shots a minute, coil {MAX_COIL_C:g} °C"
 )
 
 

@@ -21,7 +21,7 @@ from analysis.stats.binomial import binomial_test, yes_no
 from analysis.stats.discrimination import Task, discrimination
 from analysis.stats.factorial import FactorialEffect, mixed, two_within
 from analysis.stats.paired import friedman
-from analysis.summary.results import ConditionSummary, DesignSummary, DesignTest, QuestionSummary
+from analysis.summary.results import ConditionSummary, DesignSummary, DesignTest, Origin, QuestionSummary
 from experiments.design.config import DesignConfig
 from experiments.design.language import Level, QuestionConfig
 from experiments.tasks.questions import chance, correct_columns
@@ -30,7 +30,7 @@ from experiments.tasks.questions import chance, correct_columns
 def summarise(design: DesignConfig, table: pd.DataFrame) -> DesignSummary:
     """The statistics of a design from its table: one row a trial, the columns of `design_table.columns`.
 
-    Words are not counted here. Rankings and pairs are described, not tested.
+    Rankings and pairs are described, not tested.
     """
     asked = {name: question for name, question in design.questions.items() if question.kind != "text"}
     return DesignSummary(
@@ -38,14 +38,32 @@ def summarise(design: DesignConfig, table: pd.DataFrame) -> DesignSummary:
         n=int(table["participant_id"].nunique()),
         factors={name: factor.all_levels for name, factor in design.factors.items()},
         questions={name: _question(design, name, question, table) for name, question in asked.items()},
+        origin=_hands(design, table),
+        words={name: int(table[name].notna().sum()) for name in design.questions if name not in asked},
+        assumed=design.assumed,
     )
+
+
+def _hands(design: DesignConfig, table: pd.DataFrame) -> Origin:
+    """Who answered the first question that says so."""
+    named = (f"{name}_{part}" for name in design.questions for part in ("source", "by"))
+    source = next((name for name in named if name in table), None)
+    return Origin(answers={}, guns={}) if source is None else origin_of(table.dropna(subset=[source]), source)
+
+
+def origin_of(rows: pd.DataFrame, source: str) -> Origin:
+    """Whose hands stand in the column `source`, and the guns."""
+    answers, guns = (
+        {str(name): count for name, count in rows[column].value_counts().items()} for column in (source, "gun")
+    )
+    return Origin(answers=answers, guns=guns)
 
 
 def _question(design: DesignConfig, name: str, question: QuestionConfig, table: pd.DataFrame) -> QuestionSummary:
     column = correct_columns(design.questions).get(name, name)
     scored = table.assign(score=_scores(question, table[column])).dropna(subset=["score"])
     factors = _varied(design)
-    cells = _ordered(design, (_cell(design, question, some) for some in _conditions(scored, factors)))
+    cells = _ordered(design, (_cell(design, name, question, some) for some in _conditions(scored, factors)))
     real = scored if "stimulus" not in scored else scored[scored["stimulus"].astype(int) == 1]
     people, left_out = _complete(real, factors)
     tests = (*_comparisons(design, question, people, _groups(design, real)), *_sensitivity(design, question, scored))
@@ -131,10 +149,10 @@ def _conditions(scored: pd.DataFrame, factors: Sequence[str]) -> Iterator[pd.Dat
         yield some
 
 
-def _cell(design: DesignConfig, question: QuestionConfig, rows: pd.DataFrame) -> ConditionSummary:
+def _cell(design: DesignConfig, name: str, question: QuestionConfig, rows: pd.DataFrame) -> ConditionSummary:
     means = rows.groupby("participant_id")["score"].mean().to_numpy(dtype=np.float64)
     first = rows.iloc[0]
-    levels = {name: first[name] for name in _varied(design) if not pd.isna(first[name])}
+    levels = {factor: first[factor] for factor in _varied(design) if not pd.isna(first[factor])}
     mean = float(means.mean()) if means.size else None
     described = ConditionSummary(
         levels=levels,
@@ -142,6 +160,7 @@ def _cell(design: DesignConfig, question: QuestionConfig, rows: pd.DataFrame) ->
         trials=len(rows),
         mean=math.exp(mean) if question.kind == "number" and mean is not None else mean,
         sd=float(means.std(ddof=1)) if means.size > 1 else None,
+        answers={one: int((rows[name] == one).sum()) for one in question.named_answers} or None,
     )
     by_chance = chance(question)
     if by_chance is None:
@@ -173,8 +192,8 @@ def _comparisons(
     if people.empty or design.trial.kind == "pair" or question.kind == "ranking":
         return
     names = [str(name) for name in people.columns.names]
-    if len(people) < 2:
-        yield DesignTest(name="anova", effect=" × ".join(names), reason="fewer than two people have all conditions")
+    if why := _untested(question, people):
+        yield DesignTest(name="anova", effect=" × ".join(names), reason=why)
         return
     scores = people.to_numpy(dtype=np.float64)
     if question.kind == "number" and len(names) == 1:
@@ -192,6 +211,13 @@ def _comparisons(
     else:
         effect = " × ".join((*design.between, *names))
         yield DesignTest(name="anova", effect=effect, reason="there is no ANOVA here of more than two factors")
+
+
+def _untested(question: QuestionConfig, people: pd.DataFrame) -> str:
+    """Why there is no test of a question's conditions; empty if there is one."""
+    if question.correct is None and len(question.named_answers) > 2:
+        return "more than two answers and none is right: they are counted"
+    return "fewer than two people have all conditions" if len(people) < 2 else ""
 
 
 def _one_factor(name: str, scores: FloatArray, question: QuestionConfig) -> Iterator[DesignTest]:

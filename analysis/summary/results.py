@@ -311,6 +311,7 @@ class ConditionSummary:
     p: float | None = None
     ci_low: float | None = None
     ci_high: float | None = None
+    answers: Mapping[str, int] | None = field(default=None, metadata=OPTIONAL)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -346,12 +347,18 @@ class QuestionSummary:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class DesignSummary:
-    """The statistics of a design: as they stand in `statistics.json` under its name."""
+    """The statistics of a design: as they stand in `statistics.json` under its name.
+
+    `words`: how many texts were said to each question that asks for them; `assumed`: what the design says it assumes.
+    """
 
     title: str
     n: int
     factors: Mapping[str, tuple[Level, ...]]
     questions: Mapping[str, QuestionSummary]
+    origin: Origin
+    words: Mapping[str, int] = field(default_factory=dict)
+    assumed: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

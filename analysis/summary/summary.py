@@ -47,7 +47,7 @@ from analysis.stats.paired import (
 )
 from analysis.summary import results
 from analysis.summary.assumptions import assumptions
-from analysis.summary.designs import summarise
+from analysis.summary.designs import origin_of, summarise
 from analysis.times.own_trials import INSTRUCTION, response_times, timed
 from analysis.times.speed_accuracy import speed_accuracy
 from device.words import DIRECTIONS
@@ -129,7 +129,7 @@ def _complete(table: pd.DataFrame, experiment: str) -> tuple[pd.DataFrame, list[
 def _direction(table: pd.DataFrame, *, trade: bool) -> tuple[results.DirectionStatistics, list[LeftOut]]:
     complete, methods, left_out = _complete(table, "direction")
     cells = trial_cells(complete, methods)
-    within = _within(cells.rates("forward"), "direction", _origin(complete, "response_source"))
+    within = _within(cells.rates("forward"), "direction", origin_of(complete, "response_source"))
     found = results.DirectionStatistics(
         **{field.name: getattr(within, field.name) for field in fields(within)},
         backward=_scores(cells.rates("backward")),
@@ -148,15 +148,8 @@ def _direction(table: pd.DataFrame, *, trade: bool) -> tuple[results.DirectionSt
 def _preference(table: pd.DataFrame) -> tuple[results.WithinStatistics, list[LeftOut]]:
     complete, methods, left_out = _complete(table, "preference")
     scores = _table(complete, "rating", methods)
-    found = _within(scores, "preference", _origin(complete, "rating_by"))
+    found = _within(scores, "preference", origin_of(complete, "rating_by"))
     return replace(found, assumptions=assumptions(found)), left_out
-
-
-def _origin(complete: pd.DataFrame, source: str) -> results.Origin:
-    answers, guns = (
-        {str(name): count for name, count in complete[column].value_counts().items()} for column in (source, "gun")
-    )
-    return results.Origin(answers=answers, guns=guns)
 
 
 def _table(rows: pd.DataFrame, measure: str, methods: Sequence[str]) -> pd.DataFrame:

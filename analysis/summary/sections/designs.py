@@ -31,7 +31,12 @@ def design_section(name: str, found: DesignSummary) -> Section:
     people = f"{found.n} participant{'' if found.n == 1 else 's'}"
     return Section(
         title=found.title or name.capitalize(),
-        paragraphs=(f"Design `{name}`: {people}. {_factors(found)}", *_left_out(found)),
+        paragraphs=(
+            f"Design `{name}`: {people}. {_factors(found)}",
+            *_assumed(found),
+            *_words(found),
+            *_left_out(found),
+        ),
         pictures=(_picture(name, found),) if any(question.cells for question in found.questions.values()) else (),
         tables=tuple(table for asked, question in found.questions.items() for table in _tables(asked, question)),
     )
@@ -43,6 +48,15 @@ def _factors(found: DesignSummary) -> str:
     return f"What varied: {named(said)}." if said else "Nothing varied."
 
 
+def _assumed(found: DesignSummary) -> tuple[str, ...]:
+    return (f"Assumed, as the design says: {', '.join(found.assumed)}.",) if found.assumed else ()
+
+
+def _words(found: DesignSummary) -> Iterator[str]:
+    for name, said in found.words.items():
+        yield f"{name}: {said} answer{'' if said == 1 else 's'} in words; they stand in the logs."
+
+
 def _left_out(found: DesignSummary) -> tuple[str, ...]:
     return tuple(
         f"In no test of {asked}, as a condition is missing: {', '.join(question.left_out)}."
@@ -52,9 +66,10 @@ def _left_out(found: DesignSummary) -> tuple[str, ...]:
 
 
 def _picture(name: str, found: DesignSummary) -> Picture:
-    spread = (
-        "Whiskers: of right answers the exact 95 % interval of all trials together, else the SD between participants."
-    )
+    scored = [question for question in found.questions.values() if question.chance is not None]
+    parts = ["the exact 95 % interval of all trials together"] if scored else []
+    parts += ["the SD between participants"] if len(scored) < len(found.questions) else []
+    spread = f"Whiskers: {' of right answers, else '.join(parts)}."
     means = "; ".join(
         f"{asked}: {', '.join(f'{_condition(cell)} {_mean(question, cell)}' for cell in question.cells)}"
         for asked, question in found.questions.items()
@@ -86,21 +101,21 @@ def _conditions(name: str, question: QuestionSummary) -> Table:
     factors = list(dict.fromkeys(factor for cell in question.cells for factor in cell.levels))
     scored = any(cell.right is not None for cell in question.cells)
     last = ("95 % interval", "p against chance") if scored else ("SD",)
+    answers = () if question.preferred is not None else tuple(next(iter(question.cells)).answers or ())
     rows = tuple(
         (
-            *(
-                named(shown_level(cell.levels[factor])) if factor in cell.levels else apa.NO_NUMBER
-                for factor in factors
-            ),
+            *(_level(cell, factor) for factor in factors),
             str(cell.people),
             str(cell.trials),
+            *(str((cell.answers or {})[answer]) for answer in answers),
             _mean(question, cell),
             *_spread(cell, scored=scored),
         )
         for cell in question.cells
     )
-    mean = {"number": "Geometric mean", "choice": "Share", "yes-no": "Share"}.get(question.kind, "Mean")
-    header = (*factors, "People", "Trials", "Right" if scored else mean, *last)
+    first = f"Share of {answers[0]}" if answers else "Share"
+    mean = {"number": "Geometric mean", "choice": first, "yes-no": first}.get(question.kind, "Mean")
+    header = (*factors, "People", "Trials", *answers, "Right" if scored else mean, *last)
     return Table(caption=f"{name} by condition", header=header, rows=rows)
 
 

@@ -71,7 +71,14 @@ def _analysed(report: ReportData) -> Section:
     bad = f"Left out, with the reasons listed below: {len(report.problems)}." if report.problems else ""
     text = (files + bad).strip()
     nothing = () if rows else ("There was nothing to analyse.",)
-    origins = tuple(_origin(EXPERIMENTS[key], found.origin) for key, found in report.statistics.analysed.items())
+    origins = tuple(
+        _origin(name, origin)
+        for name, origin in (
+            *((EXPERIMENTS[key], found.origin) for key, found in report.statistics.analysed.items()),
+            *((name, found.origin) for name, found in report.statistics.designs.items()),
+        )
+        if origin.answers
+    )
     return Section(
         title="What was analysed",
         paragraphs=(*((text,) if text else ()), *nothing, *origins),
