@@ -91,6 +91,11 @@ class RunRequest:
     visual: bool = False
     options: ParticipantOptions = ParticipantOptions()
 
+    @property
+    def simulated(self) -> bool:
+        """Whether a synthetic participant answers."""
+        return self.screen == "synthetic" or self.visual
+
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Finished:
@@ -223,6 +228,12 @@ def _plan_of(before: Contents, request: RunRequest) -> Plan:
             f"resume with the files it began with, which {given_back} gives back, or start anew (--fresh)"
         )
     plan = before.plan
+    people = request.setup.laws.model_dump(mode="json") if request.setup.laws is not None else None
+    if request.simulated and before.head.laws_json not in (None, people):
+        raise PlaceError(
+            f"{before.path}: the run began with other synthetic people than {request.setup.config.synthetic} has now; "
+            "`recoil configs --from` gives theirs back, or start anew (--fresh)"
+        )
     if request.seed is not None and request.seed != plan.seed:
         raise PlaceError(f"{before.path}: the run began with seed {plan.seed}, not {request.seed}; leave out --seed")
     return plan

@@ -172,7 +172,11 @@ Logs go to `results/`; it is readable by its owner only. Use codes for participa
 many people there are; who may take part is asked once you write [eligibility] into it.
 """
 _KINDS = ("*.toml", "examples/*.toml", "synthetic/*.toml", "schemas/*.json")
-_OF_THE_PAPER = ("direction.toml", "preference.toml", "gun.toml", "study.toml", "paper.toml")
+_PEOPLE = ("direction", "direction-felt", "preference", "preference-felt", "hurry-felt")
+_OF_THE_PAPER = (
+    *("direction.toml", "preference.toml", "gun.toml", "study.toml", "paper.toml"),
+    *(f"synthetic/{name}.toml" for name in _PEOPLE),
+)
 
 
 def shipped() -> list[Path]:
@@ -207,7 +211,7 @@ def new_study(folder: Path, design: str = "", *, paper: bool = False) -> list[Pa
         page.write_text(_README_OF_DESIGN.format(title=folder.name, name=design), encoding="utf-8")
     else:
         its_own = [shipped_folder() / name for name in _OF_THE_PAPER]
-        made = copy_configs(folder, [*its_own, *shipped_folder().glob("examples/*.toml"), *_schemas()])
+        made = copy_configs(folder, [*its_own, *sorted(shipped_folder().glob("examples/*.toml")), *_schemas()])
         page.write_text(_README.format(title=folder.name), encoding="utf-8")
     storage.make_folder(results)
     return [*made, page, results]

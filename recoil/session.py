@@ -15,10 +15,12 @@ from experiments.design.config import DesignConfig
 from experiments.design.plan import Plan
 from experiments.live_run import RunStopped, Screen
 from experiments.rebuild import rebuild
-from experiments.record import storage
+from experiments.record import replay, storage
+from experiments.record.journal import begun
 from experiments.run import Again, Finished, ParticipantOptions, RunRequest, ScreenName, run
 from experiments.screens.synthetic import synthetic_screen
 from experiments.screens.terminal import TerminalScreen
+from experiments.session.steps import Answered
 from experiments.study.folders import Place, PlaceError, check_code, place, set_aside_file
 
 
@@ -46,6 +48,22 @@ def _check_resumable(request: RunRequest) -> None:
         raise PlaceError(
             f"{where.journal}: there is no run of {where.experiment} by {where.participant_id} to resume here; "
             "look at --participant and --results, or leave out --resume to begin one"
+        )
+    _check_same_kind(request, where)
+
+
+def _check_same_kind(request: RunRequest, where: Place) -> None:
+    """`PlaceError` if a synthetic participant would go on for a person, or a person for a synthetic one."""
+    contents = begun(where.journal)
+    told = () if contents is None else replay.history(contents)
+    hands = {word.by for _, word in told if isinstance(word, Answered)}
+    if hands and request.simulated != (hands == {"synthetic"}):
+        who, other = (
+            ("a person", "a synthetic participant") if request.simulated else ("a synthetic participant", "you")
+        )
+        raise PlaceError(
+            f"{where.journal}: {who} has answered this run so far, and {other} would go on with it; choose the screen "
+            "that it began at, or another participant"
         )
 
 

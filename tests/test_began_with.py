@@ -23,14 +23,15 @@ from tests.conftest import Recoil
 
 pytestmark = pytest.mark.slow
 
-ODD = 'A "quoted" \\ title,\n\tin two lines: 反冲 é \x7f'
+ODD = 'A "quoted" \\ title, [in] {brackets} # no comment: 反冲 é ∞'
+MANY_LINES = f"{ODD}\n\tin two lines \x7f"
 
 
 def configs(folder: Path) -> Path:
     """The shipped configs, as a laboratory would have them in a folder of its own."""
-    folder.mkdir()
-    for source in shipped_folder().glob("*.toml"):
-        (folder / source.name).write_bytes(source.read_bytes())
+    (folder / "synthetic").mkdir(parents=True)
+    for source in [*shipped_folder().glob("*.toml"), *shipped_folder().glob("synthetic/*.toml")]:
+        (folder / source.relative_to(shipped_folder())).write_bytes(source.read_bytes())
     return folder
 
 
@@ -49,17 +50,17 @@ def journal_of(config: Path, results: Path) -> Path:
     return done.place.journal
 
 
-def with_a_table(folder: Path) -> Path:
-    from experiments.catalogue import CATALOGUE
+TABLE = '[questions.rating]\nlaw = "table"\nfile = "answers/mine.csv"\n[questions.comment]\nlaw = "words"\n'
 
-    columns = CATALOGUE["preference"].answer_columns
+
+def with_a_table(folder: Path) -> Path:
     rows = ["P01,vibration,2.5", '"P01","asymmetric-1","6.25"', "P01,asymmetric-2,10"]
-    assert len(columns) == 3, columns
     (folder / "answers").mkdir()
-    (folder / "answers" / "mine.csv").write_text("\n".join([",".join(columns), *rows]) + "\n", encoding="utf-8-sig")
-    return edited(
-        folder / "preference.toml", ('observer = "ratings"', 'observer = "table"\ntable = "answers/mine.csv"')
+    (folder / "answers" / "mine.csv").write_text(
+        "\n".join(["participant_id,method,rating", *rows]) + "\n", encoding="utf-8-sig"
     )
+    (folder / "synthetic" / "preference.toml").write_text(TABLE)
+    return folder / "preference.toml"
 
 
 def one_up(folder: Path) -> Path:
@@ -72,14 +73,28 @@ def one_up(folder: Path) -> Path:
 CASES: dict[str, Any] = {
     "direction as shipped": lambda folder: folder / "direction.toml",
     "preference as shipped": lambda folder: folder / "preference.toml",
-    "a title that has all that is hard to write": lambda folder: edited(
-        folder / "direction.toml", ('"Direction recognition of a shot"', json.dumps(ODD))
-    ),
-    "numbers that must come back exactly": lambda folder: edited(
-        folder / "direction.toml",
-        ("shift_s = 0.35", "shift_s = 0.30000000000000004"),
-        ("trial_s = 17.0", "trial_s = 17"),
-    ),
+    "what hands set": lambda folder: folder / "realism.toml",
+    "people of two groups": lambda folder: folder / "grip.toml",
+    "pairs, a gun of another name": lambda folder: folder / "pairs.toml",
+    "a title that has all that is hard to write": lambda folder: (
+        edited(folder / "gun.toml", ('label = "Vibration"', f"label = {json.dumps(MANY_LINES)}")),
+        edited(folder / "direction.toml", ('"Direction recognition of a shot"', json.dumps(ODD))),
+    )[1],
+    "words that are hard to write": lambda folder: (
+        edited(
+            folder / "synthetic" / "preference.toml",
+            ('law = "words"', f'law = "words"\ntexts = ["", {json.dumps(MANY_LINES)}]'),
+        ),
+        folder / "preference.toml",
+    )[1],
+    "numbers that must come back exactly": lambda folder: (
+        edited(folder / "synthetic" / "direction.toml", ("shift_s = 0.35", "shift_s = 0.30000000000000004")),
+        edited(
+            folder / "direction.toml",
+            ("guard_s = 0.25", "guard_s = 0.30000000000000004"),
+            ("hand_over_s = 15.8", "hand_over_s = 15"),
+        ),
+    )[1],
     "a gun with strips and whole numbers": lambda folder: (
         edited(
             folder / "gun.toml",
@@ -91,7 +106,9 @@ CASES: dict[str, Any] = {
         ),
         folder / "direction.toml",
     )[1],
-    "a seed of its own": lambda folder: edited(folder / "direction.toml", ("[design]", "seed = 7\n[design]")),
+    "a seed of its own": lambda folder: edited(
+        folder / "direction.toml", ("[factors.method]", "seed = 7\n[factors.method]")
+    ),
     "a table of answers in a folder below": with_a_table,
     "a gun in the folder above, instructions, who feels": one_up,
 }
@@ -103,6 +120,7 @@ def test_the_files_that_a_run_began_with_load_to_the_same_setup(case: str, tmp_p
     journal = journal_of(config, tmp_path / "results")
     copied = copy_began_with(journal, tmp_path / "back")
     assert load_setup(str(copied[0])).record() == load_setup(str(config)).record()
+    assert load_setup(str(copied[0])).laws == load_setup(str(config)).laws is not None
     assert load_setup(str(copied[0])).sha256() == read_journal(journal).head.setup_sha256
     assert all(path.is_relative_to(tmp_path / "back") for path in copied)
 
@@ -124,7 +142,7 @@ def test_a_resume_that_was_refused_names_the_command_that_makes_it_possible(reco
     assert command is not None, refused.stderr
     given = recoil(*shlex.split(command[1]), "back")
     assert given.returncode == 0, given.stderr
-    assert given.stdout.splitlines() == ["back/direction.toml", "back/gun.toml"]
+    assert given.stdout.splitlines() == ["back/direction.toml", "back/gun.toml", "back/synthetic/direction.toml"]
     assert resume("back/direction.toml").returncode == 0
     assert read_journal(journal).finished
 
@@ -140,15 +158,24 @@ def test_nothing_is_overwritten_and_then_nothing_is_written(tmp_path: Path) -> N
 
 
 def forged(journal: Path, **changes: Any) -> Path:
-    """The journal with another setup at its head, hashed as it should be."""
+    """The journal with another setup, or other synthetic people, at its head, hashed as it should be."""
     head = json.loads(journal.read_bytes().splitlines()[0])
     for part, values in changes.items():
-        head["setup"][part] |= values
+        table = head["laws"]["questions"] if part == "laws" else head["setup"][part]
+        table |= values
     head["setup_sha256"] = sha256(head["setup"])
     journal.write_bytes(canonical_json(head) + b"\n")
     return journal
 
 
+def naming(key: str, name: str) -> dict[str, Any]:
+    """What names a file by a key: of the design, or of a law."""
+    if key == "file":
+        return {"laws": {"response": {"law": "table", "file": name, "by": ["method"], "rows": []}}}
+    return {"experiment": {key: name}}
+
+
+@pytest.mark.parametrize("key", ["gun", "synthetic", "file"])
 @pytest.mark.parametrize(
     ("name", "error", "said"),
     [
@@ -157,26 +184,27 @@ def forged(journal: Path, **changes: Any) -> Path:
         ("direction.toml", ConfigError, "does not load here"),
     ],
 )
-def test_a_gun_that_cannot_lie_beside_its_config_is_refused(
-    name: str, error: type[Exception], said: str, tmp_path: Path
+def test_a_file_that_cannot_lie_beside_its_config_is_refused(
+    key: str, name: str, error: type[Exception], said: str, tmp_path: Path
 ) -> None:
     journal = journal_of(configs(tmp_path / "lab") / "direction.toml", tmp_path / "results")
     with pytest.raises(error, match=said):
-        copy_began_with(forged(journal, experiment={"gun": name}), tmp_path / "back")
+        copy_began_with(forged(journal, **naming(key, name)), tmp_path / "back")
     assert not list(tmp_path.rglob("back/**/*.toml"))
 
 
-@pytest.mark.parametrize("name", ["../gun.toml", "../../guns/gun.toml", "guns/../../gun.toml"])
-def test_no_name_of_a_gun_leads_out_of_the_folder_of_copies(name: str, tmp_path: Path) -> None:
+@pytest.mark.parametrize("key", ["gun", "synthetic", "file"])
+@pytest.mark.parametrize("name", ["../one.toml", "../../ones/one.toml", "ones/../../one.toml"])
+def test_no_name_of_a_file_leads_out_of_the_folder_of_copies(key: str, name: str, tmp_path: Path) -> None:
     journal = journal_of(configs(tmp_path / "lab") / "direction.toml", tmp_path / "results")
     (tmp_path / "back").mkdir()
     before = {path for path in tmp_path.rglob("*") if not path.is_relative_to(tmp_path / "back")}
     try:
-        copied = copy_began_with(forged(journal, experiment={"gun": name}), tmp_path / "back")
+        copied = copy_began_with(forged(journal, **naming(key, name)), tmp_path / "back")
     except ConfigError:
         copied = []
     assert {path for path in tmp_path.rglob("*") if not path.is_relative_to(tmp_path / "back")} == before
-    assert bool(copied) is not name.startswith("guns/")
+    assert bool(copied) is not name.startswith("ones/")
 
 
 def test_what_does_not_load_to_the_same_hash_is_taken_away_again(tmp_path: Path) -> None:

@@ -1,166 +1,232 @@
-"""Participants who feel the gun, and instructions, as configs: defaults, hashes, and refusals that name the place."""
+"""Participants who feel the gun, and instructions, as configs: defaults, records, and refusals that name the place."""
 
 from __future__ import annotations
 
-import re
+import shutil
 from pathlib import Path
+from typing import NamedTuple
 
 import pytest
-from experiments.direction.synthetic import model_parameters
 
-from analysis.predict.check import ExperimentCheck, check, check_text
+from analysis.predict.check import check, check_text
+from analysis.predict.check_design import DesignCheck
 from experiments.clock import VirtualClock
 from experiments.config.door import ConfigError
-from experiments.load import load_setup
+from experiments.design.planning import plan_of
+from experiments.load import load_setup, shipped_folder
+from experiments.record.journal import read_journal
+from experiments.run import RunRequest, run
 from experiments.screens.synthetic import synthetic_screen
+from experiments.synthetic.laws import AppealLaw, DiffusionLaw, SyntheticAnswers
 from experiments.synthetic.model_based import ModelParameters
 from experiments.synthetic.percept import PerceptConfig
 from experiments.synthetic.preference import Appeal
-from tests.felt_configs import BALANCE, changed, felt_text, shipped_text, written
 
-FELT = re.compile(r"\n\[synthetic\.(percept|diffusion|people|appeal)\].*", re.DOTALL)
-"""The sections of what is felt, which come last."""
-
-
-def without_sections(name: str) -> str:
-    """A config from before anybody could feel the gun."""
-    text = FELT.sub("\n", shipped_text(name))
-    return re.sub(r'    "synthetic\.(percept|diffusion|people|appeal)[^\n]*\n', "", text)
+DIRECTION, PREFERENCE, HURRY = "direction.toml", "preference.toml", "examples/hurry.toml"
+DECIDING, LIKING, HURRIED = (f"synthetic/{name}-felt.toml" for name in ("direction", "preference", "hurry"))
+METHODS = ("vibration", "asymmetric-1", "asymmetric-2")
 
 
-def test_sections_that_are_left_out_are_the_models_own_numbers(tmp_path: Path) -> None:
-    direction = load_setup(str(written(tmp_path, without_sections("direction")))).config
-    preference = load_setup(str(written(tmp_path, without_sections("preference"), "preference"))).config
-    assert model_parameters(direction) == ModelParameters()
-    assert preference.synthetic.percept.own == ModelParameters().percept
-    assert preference.synthetic.appeal == Appeal()
+@pytest.fixture
+def folder(tmp_path: Path) -> Path:
+    """The shipped configs; those of the paper are answered by people who feel the gun."""
+    shutil.copytree(shipped_folder(), tmp_path / "configs")
+    for name in ("direction", "preference"):
+        edit(tmp_path / "configs" / f"{name}.toml", f'"synthetic/{name}.toml"', f'"synthetic/{name}-felt.toml"')
+    return tmp_path / "configs"
 
 
-def test_the_shipped_sections_say_the_same_numbers() -> None:
-    direction, preference = load_setup("direction").config, load_setup("preference").config
-    assert model_parameters(direction) == ModelParameters()
-    assert preference.synthetic.percept == direction.synthetic.percept == PerceptConfig()
-    assert preference.synthetic.appeal == Appeal()
+def edit(path: Path, old: str, new: str) -> None:
+    text = path.read_text(encoding="utf-8")
+    assert old in text, f"no {old!r} in {path.name}"
+    path.write_text(text.replace(old, new, 1), encoding="utf-8")
 
 
-@pytest.mark.parametrize(("name", "observer"), [("direction", "rates"), ("preference", "ratings")])
-def test_who_feels_the_gun_is_recorded_with_all_their_numbers(tmp_path: Path, name: str, observer: str) -> None:
-    text = changed(without_sections(name), (f'observer = "{observer}"', 'observer = "felt"'))
-    record = load_setup(str(written(tmp_path, text, name))).record()["experiment"]["synthetic"]
-    assert record["percept"]["sensitivity"] == ModelParameters().percept.sensitivity
-    assert ("boundaries" in record["diffusion"]) if name == "direction" else ("gain" in record["appeal"])
+def people(config: Path | str) -> SyntheticAnswers:
+    laws = load_setup(str(config)).laws
+    assert isinstance(laws, SyntheticAnswers)
+    return laws
 
 
-def test_instructions_are_recorded_with_their_texts(tmp_path: Path) -> None:
-    setup = load_setup(str(written(tmp_path, felt_text(("speed", "accuracy")))))
-    record = setup.record()["experiment"]
-    assert record["design"]["instructions"] == ["speed", "accuracy"]
-    assert record["instructions"]["speed"] == {"text": "Answer as fast as you can."}
-    assert setup.config.instruction_text("speed") == "Answer as fast as you can."
-    assert setup.config.instruction_text("") == ""
+def deciding(config: Path | str) -> DiffusionLaw:
+    law = people(config).questions["response"]
+    assert isinstance(law, DiffusionLaw)
+    return law
 
 
-BOTH = ("speed", "accuracy")
+def liking(config: Path | str) -> AppealLaw:
+    law = people(config).questions["rating"]
+    assert isinstance(law, AppealLaw)
+    return law
+
+
+def test_sections_that_are_left_out_are_the_models_own_numbers(folder: Path) -> None:
+    (folder / DECIDING).write_text('[questions.response]\nlaw = "diffusion"\n')
+    (folder / LIKING).write_text('[questions.rating]\nlaw = "appeal"\n[questions.comment]\nlaw = "words"\n')
+    assert deciding(folder / DIRECTION).own == ModelParameters()
+    law = liking(folder / PREFERENCE)
+    assert law.percept.own == ModelParameters().percept
+    assert law.appeal == Appeal()
+
+
+def test_the_shipped_sections_say_the_same_numbers(folder: Path) -> None:
+    direction, preference = deciding(folder / DIRECTION), liking(folder / PREFERENCE)
+    assert direction.own == ModelParameters()
+    assert preference.percept == direction.percept == PerceptConfig()
+    assert preference.appeal == Appeal()
+    hurried = deciding(folder / HURRY)
+    assert hurried.percept == direction.percept
+    assert hurried.diffusion.boundaries == direction.diffusion.boundaries
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    ("config", "question", "key", "numbers"),
+    [(DIRECTION, "response", "diffusion", "boundaries"), (PREFERENCE, "rating", "appeal", "gain")],
+)
+def test_who_feels_the_gun_is_recorded_with_all_their_numbers(
+    folder: Path, config: str, question: str, key: str, numbers: str
+) -> None:
+    (folder / DECIDING).write_text('[questions.response]\nlaw = "diffusion"\n')
+    (folder / LIKING).write_text('[questions.rating]\nlaw = "appeal"\n[questions.comment]\nlaw = "words"\n')
+    request = RunRequest(setup=load_setup(str(folder / config)), participant_id="P01", results=folder, seed=1)
+    recorded = read_journal(run(request, synthetic_screen, VirtualClock()).place.journal).head.laws_json
+    assert isinstance(recorded, dict)
+    law = recorded["questions"][question]
+    assert law["percept"]["sensitivity"] == ModelParameters().percept.sensitivity
+    assert numbers in law[key]
+    assert SyntheticAnswers.model_validate_json(people(folder / config).model_dump_json()).model_dump(mode="json") == (
+        recorded
+    )
+
+
+def test_instructions_are_recorded_with_their_texts(folder: Path) -> None:
+    setup = load_setup(str(folder / HURRY))
+    told = setup.config.factors["instruction"]
+    assert setup.record()["experiment"]["factors"]["instruction"] == told.model_dump(mode="json")  # type: ignore[index]
+    assert told.levels == ("speed", "neutral", "accuracy")
+    assert told.texts["neutral"] == "Answer fast and well."
+
+
+class Broken(NamedTuple):
+    """An edit of a file, what the refusal must say, and words on the line that it must name, if there is one."""
+
+    config: str
+    file: str
+    old: str
+    new: str
+    said: tuple[str, ...]
+    at: str | None = None
+
+
+def of_a_law(old: str, new: str, *said: str, at: str = "") -> Broken:
+    return Broken(DIRECTION, DECIDING, old, new, said, at or new)
+
+
+PERCEPT, DIFFUSION, PEOPLE = (f"questions.response.{key}" for key in ("percept", "diffusion", "people"))
+ALL_BOUNDARIES = "speed = 1.0, neutral = 1.5, accuracy = 2.2"
 REFUSED = {
-    "no power law": (felt_text(exponent=0.0), "exponent =", ("synthetic.percept.exponent = 0.0", "greater than 0")),
-    "no leak": (felt_text(leak_s=-0.02), "leak_s =", ("synthetic.percept.leak_s = -0.02", "greater than 0")),
-    "endless leak": (felt_text(leak_s="inf"), "leak_s =", ("synthetic.percept.leak_s = inf", "finite")),
-    "backward evidence": (felt_text(sensitivity=-1.0), "sensitivity =", ("synthetic.percept.sensitivity = -1.0",)),
-    "no confusion number": (felt_text(confusion='"much"'), "confusion =", ("synthetic.percept.confusion = 'much'",)),
-    "start at the end": (felt_text(start=1.0), "start =", ("synthetic.percept.start = 1.0", "less than 1")),
-    "misspelt": (changed(felt_text(), ("\nleak_s =", "\nleaks_s =")), "leaks_s =", ("unknown key",)),
-    "no boundary": (
-        felt_text(boundaries="{ neutral = 0.0 }"), "boundaries =",
-        ("synthetic.diffusion.boundaries.neutral = 0.0", "greater than 0"),
+    "no power law": of_a_law("exponent = 1.7", "exponent = 0.0", f"{PERCEPT}.exponent = 0.0", "greater than 0"),
+    "no leak": of_a_law("leak_s = 0.02", "leak_s = -0.02", f"{PERCEPT}.leak_s = -0.02", "greater than 0"),
+    "endless leak": of_a_law("leak_s = 0.02", "leak_s = inf", f"{PERCEPT}.leak_s = inf", "finite"),
+    "backward evidence": of_a_law("sensitivity = 0.213", "sensitivity = -1.0", f"{PERCEPT}.sensitivity = -1.0"),
+    "no confusion number": of_a_law("confusion = 2.44", 'confusion = "much"', f"{PERCEPT}.confusion = 'much'"),
+    "start at the end": of_a_law("start = 0.557", "start = 1.0", f"{PERCEPT}.start = 1.0", "less than 1"),
+    "misspelt": of_a_law("\nleak_s =", "\nleaks_s =", f"{PERCEPT}.leaks_s = 0.02", "unknown key", at="leaks_s ="),
+    "no boundary": of_a_law(
+        ALL_BOUNDARIES, "neutral = 0.0", f"{DIFFUSION}.boundaries.neutral = 0.0", "greater than 0", at="boundaries ="
     ),
-    "no neutral boundary": (
-        felt_text(boundaries="{ speed = 1.0 }"), "[synthetic.diffusion]",
-        ("synthetic.diffusion: boundaries has no value for neutral", "give one"),
+    "no neutral boundary": of_a_law(
+        ALL_BOUNDARIES, "speed = 1.0", f"{DIFFUSION}: boundaries has no value for neutral", "give one",
+        at="[questions.response.diffusion]",
     ),
-    "negative time": (felt_text(non_decision_s=-0.1), "non_decision_s =", ("non_decision_s = -0.1", "equal to 0")),
-    "lapses beyond all": (
-        felt_text(lapses="{ rate = 1.5 }"), "lapses =", ("synthetic.diffusion.lapses.rate = 1.5", "equal to 1")
+    "negative time": of_a_law(
+        "non_decision_s = 0.35", "non_decision_s = -0.1", f"{DIFFUSION}.non_decision_s = -0.1", "equal to 0"
     ),
-    "lapses backward": (
-        felt_text(lapses="{ earliest_s = 3.0, latest_s = 0.2 }"), "lapses =",
-        ("synthetic.diffusion.lapses: earliest_s = 3 must be below latest_s = 0.2",),
+    "lapses beyond all": of_a_law(
+        "rate = 0.0", "rate = 1.5", f"{DIFFUSION}.lapses.rate = 1.5", "equal to 1", at="lapses ="
     ),
-    "people of no spread": (
-        felt_text(log_boundary_sd=-0.1), "log_boundary_sd =", ("synthetic.people.log_boundary_sd = -0.1", "equal to 0")
+    "lapses backward": of_a_law(
+        "earliest_s = 0.2, latest_s = 3.0", "earliest_s = 3.0, latest_s = 0.2",
+        f"{DIFFUSION}.lapses: earliest_s = 3 must be below latest_s = 0.2",
     ),
-    "sets that cannot be shared": (
-        felt_text(("speed", "neutral", "accuracy")), "[design]",
-        ("design: sets_per_session = 4 cannot be shared equally among 3 instructions", "make it a multiple of 3"),
+    "people of no spread": of_a_law(
+        "log_boundary_sd = 0.0", "log_boundary_sd = -0.1", f"{PEOPLE}.log_boundary_sd = -0.1", "equal to 0"
     ),
-    "an instruction without words": (
-        changed(felt_text(BOTH), ("\n[instructions.accuracy]", "\n[instructions.care]")), "",
-        ("design.instructions names accuracy, but there is no table [instructions.accuracy]", "add it"),
+    "an appeal without a difference": Broken(
+        PREFERENCE, LIKING, "jnd = 0.33", "jnd = -0.1", ("questions.rating.appeal.jnd = -0.1", "equal to 0"), "jnd ="
     ),
-    "an empty text": (
-        changed(felt_text(BOTH), ('"Be sure."', '""')), 'text = ""',
-        ("instructions.accuracy.text = ''", "at least 1 character"),
+    "who decides on no direction": Broken(
+        PREFERENCE, LIKING, 'law = "words"', 'law = "diffusion"', ("questions.comment.law = 'diffusion'", "has words")
     ),
-    "an instruction twice": (
-        changed(felt_text(BOTH), ('"accuracy"]', '"speed"]')), "instructions =",
-        ("design.instructions: speed stands there more than once",),
+    "sets that cannot be shared": Broken(
+        HURRY, HURRY, "sets = 6", "sets = 4",
+        ("order.sets = 4 cannot be shared equally among the 3 combinations of order.set", "nearest: 3 or 6"),
     ),
-    "a name with a comma": (
-        changed(felt_text(BOTH), ('"accuracy"]', '"fast, please"]')), "instructions =",
-        ("design.instructions.1 = 'fast, please'", "match pattern"),
+    "instructions that are in no set": Broken(
+        HURRY, HURRY, 'set = ["instruction"]', "", ("order.set: instructions are read out before a set", "name it in"),
     ),
-    "an instruction without a boundary": (
-        felt_text(BOTH, boundaries="{ neutral = 1.5, speed = 1.0 }"), "",
-        ("synthetic.diffusion.boundaries has no value for accuracy", "one for each of design.instructions"),
+    "an instruction without words": Broken(
+        HURRY, HURRY, "texts.accuracy", "# ", ("factors.instruction: texts has no words for accuracy", "give what is")
+    ),
+    "words of no instruction": Broken(
+        HURRY, HURRY, "texts.accuracy", "texts.care",
+        ("factors.instruction: texts has 'care', which is no level", "accuracy, neutral, speed"),
+        "[factors.instruction]",
+    ),
+    "an empty text": Broken(
+        HURRY, HURRY, '"Answer fast and well."', '""',
+        ("factors.instruction.texts.neutral = ''", "at least 1 character"), 'texts.neutral = ""',
+    ),
+    "an instruction twice": Broken(
+        HURRY, HURRY, '"accuracy"]', '"speed"]', ("factors.instruction.levels", "speed stands there more than once"),
+        'levels = ["speed"',
+    ),
+    "an instruction without a boundary": Broken(
+        HURRY, HURRIED, ", accuracy = 2.2", "",
+        ("questions.response.diffusion.boundaries has no value for accuracy", "one for each instruction"),
     ),
 }  # fmt: skip
 
 
-@pytest.mark.parametrize("case", REFUSED)
-def test_one_refusal_names_file_place_key_value_and_rule(tmp_path: Path, case: str) -> None:
-    text, at, said = REFUSED[case]
-    path = written(tmp_path, text)
+@pytest.mark.parametrize("broken", [pytest.param(broken, id=name) for name, broken in REFUSED.items()])
+def test_one_refusal_names_file_place_key_value_and_rule(folder: Path, broken: Broken) -> None:
+    edit(folder / broken.file, broken.old, broken.new)
     with pytest.raises(ConfigError) as refused:
-        load_setup(str(path))
-    place = next((n for n, line in enumerate(text.splitlines(), start=1) if at and line.startswith(at)), None)
-    assert f"{path}{f':{place}' if place else ''}: " in str(refused.value)
-    for words in said:
+        load_setup(str(folder / broken.config))
+    lines = enumerate((folder / broken.file).read_text().splitlines(), start=1)
+    place = next((f":{n}" for n, line in lines if broken.at and broken.at.strip() in line), "")
+    assert f"{broken.file}{place}: " in str(refused.value)
+    for words in broken.said:
         assert words in str(refused.value)
 
 
-def test_an_appeal_without_a_difference_is_refused(tmp_path: Path) -> None:
-    path = written(tmp_path, changed(shipped_text("preference"), ("jnd = 0.33", "jnd = -0.1")), "preference")
-    with pytest.raises(ConfigError, match=r"synthetic\.appeal\.jnd = -0\.1: .*equal to 0"):
-        load_setup(str(path))
+def test_observers_who_do_not_heed_instructions_need_no_boundary(folder: Path) -> None:
+    edit(folder / HURRY, "hurry-felt.toml", "hurry.toml")
+    edit(folder / HURRIED, ", accuracy = 2.2", "")
+    assert load_setup(str(folder / HURRY)).config.factors["instruction"].levels == ("speed", "neutral", "accuracy")
 
 
-def test_observers_who_do_not_heed_instructions_need_no_boundary(tmp_path: Path) -> None:
-    text = felt_text(BOTH, boundaries="{ neutral = 1.5 }", observer='"rates"')
-    assert load_setup(str(written(tmp_path, text))).config.design.instructions == BOTH
+def test_numbers_that_make_nobody_are_refused_with_their_file(folder: Path) -> None:
+    edit(folder / DECIDING, "sensitivity = 0.213", "sensitivity = 1e6")
+    setup = load_setup(str(folder / DIRECTION))
+    with pytest.raises(ConfigError, match=rf"{folder / DECIDING}: .* make nobody: drift is .* within 1e\+06"):
+        synthetic_screen(setup, plan_of(setup.config, "P01", 1), VirtualClock())
 
 
-def test_a_text_that_no_set_uses_is_no_fault(tmp_path: Path) -> None:
-    text = changed(felt_text(("speed", "accuracy")), (f'{BALANCE}\ninstructions = ["speed", "accuracy"]', BALANCE))
-    assert load_setup(str(written(tmp_path, text))).config.design.instructions == ()
-
-
-def test_numbers_that_make_nobody_are_refused_with_the_config(tmp_path: Path) -> None:
-    path = written(tmp_path, felt_text(sensitivity=1e6))
-    setup = load_setup(str(path))
-    with pytest.raises(ConfigError, match=rf"{path}: .* make nobody: drift is .* within 1e\+06"):
-        synthetic_screen(setup, make_plan(setup.config, "P01", 1, None), VirtualClock())
-
-
-@pytest.mark.parametrize("name", ["direction", "preference"])
-def test_a_check_tells_of_who_feels_the_gun(tmp_path: Path, name: str) -> None:
-    text = changed(shipped_text(name), ('"rates"' if name == "direction" else '"ratings"', '"felt"'))
-    found = check(str(written(tmp_path, text, name)), None, 2)
-    assert isinstance(found, ExperimentCheck)
+@pytest.mark.parametrize(
+    ("config", "instructions"),
+    [(DIRECTION, ("neutral",)), (HURRY, ("speed", "neutral", "accuracy")), (PREFERENCE, ())],
+)
+def test_a_check_tells_of_who_feels_the_gun(folder: Path, config: str, instructions: tuple[str, ...]) -> None:
+    found = check(str(folder / config), None, 2)
+    assert isinstance(found, DesignCheck)
     told = {method: set(rates) for method, rates in found.felt_forward_rates.items()}
-    methods = ("vibration", "asymmetric-1", "asymmetric-2")
-    assert told == ({method: {"neutral"} for method in methods} if name == "direction" else {})
-    assert ("Felt  " in check_text(found)) == (name == "direction")
+    assert told == ({method: set(instructions) for method in METHODS} if instructions else {})
+    assert ("Felt: right answers" in check_text(found)) == bool(instructions)
 
 
-def test_a_check_refuses_numbers_that_make_nobody(tmp_path: Path) -> None:
+def test_a_check_refuses_numbers_that_make_nobody(folder: Path) -> None:
+    edit(folder / DECIDING, "sensitivity = 0.213", "sensitivity = 1e6")
     with pytest.raises(ConfigError, match="make nobody"):
-        check(str(written(tmp_path, felt_text(sensitivity=1e6))), None, 2)
+        check(str(folder / DIRECTION), None, 2)

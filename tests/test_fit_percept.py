@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import re
+import shutil
 import tomllib
 from collections.abc import Callable
 from contextlib import AbstractContextManager, nullcontext
@@ -34,6 +35,7 @@ from device.methods import paper_methods
 from experiments.config.door import ConfigError
 from experiments.load import find, load_setup, shipped_folder
 from experiments.synthetic.diffusion import People
+from experiments.synthetic.laws import DiffusionLaw, SyntheticAnswers
 from experiments.synthetic.percept import PerceptParameters
 from tests.conftest import Recoil
 
@@ -71,16 +73,22 @@ def judged(case: Case, studies: int = 300, seed: int = 1) -> Judged:
     return judge(case, METHODS, PUBLISHED, studies=studies, seed=seed, tell=lambda _: None)[0]
 
 
-def pasted(text: str, folder: Path) -> Any:
-    """`synthetic` of the shipped config whose own sections are replaced by those of a fragment."""
-    for source in shipped_folder().glob("*.toml"):
-        (folder / source.name).write_bytes(source.read_bytes())
-    path = folder / "direction.toml"
-    shipped = path.read_text(encoding="utf-8")
-    for section in tomllib.loads(text)["synthetic"]:
-        shipped = re.sub(rf"\[synthetic\.{section}\].*?(?=\n\[|\Z)", "", shipped, flags=re.DOTALL)
-    path.write_text(f"{shipped}\n{text}", encoding="utf-8")
-    return load_setup(str(path)).config.synthetic
+def pasted(text: str, folder: Path) -> DiffusionLaw:
+    """The law of the shipped people who feel the gun, with their own sections replaced by those of a fragment."""
+    shutil.copytree(shipped_folder(), folder, dirs_exist_ok=True)
+    design, people = folder / "direction.toml", folder / "synthetic" / "direction-felt.toml"
+    design.write_text(design.read_text(encoding="utf-8").replace("direction.toml", "direction-felt.toml"))
+    shipped = people.read_text(encoding="utf-8")
+    for section in tomllib.loads(text)["questions"]["response"]:
+        table = re.escape(f"[questions.response.{section}]")
+        shipped, found = re.subn(rf"{table}.*?(?=\n\[|\Z)", "", shipped, flags=re.DOTALL)
+        assert found == 1
+    people.write_text(f"{shipped}\n{text}", encoding="utf-8")
+    laws = load_setup(str(design)).laws
+    assert isinstance(laws, SyntheticAnswers)
+    law = laws.questions["response"]
+    assert isinstance(law, DiffusionLaw)
+    return law
 
 
 # what it leaves
@@ -142,10 +150,10 @@ def test_the_page_and_the_figures_are_there(found: Any, folder: Path) -> None:
 
 @pytest.mark.slow
 def test_the_fragment_loads_back_through_the_config(found: Any, folder: Path, tmp_path: Path) -> None:
-    synthetic = pasted((folder / "percept.toml").read_text(encoding="utf-8"), tmp_path)
+    law = pasted((folder / "percept.toml").read_text(encoding="utf-8"), tmp_path)
     for name, one in found["fitted"].items():
-        assert getattr(synthetic.percept.own, name) == pytest.approx(one["value"], rel=1e-5)
-    assert synthetic.people.own == People()
+        assert getattr(law.percept.own, name) == pytest.approx(one["value"], rel=1e-5)
+    assert law.people.own == People()
 
 
 @pytest.mark.slow

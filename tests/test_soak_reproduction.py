@@ -16,6 +16,8 @@ import pytest
 from scipy.stats import studentized_range
 from statsmodels.stats.anova import AnovaRM
 
+from experiments.design.planned import PlannedRun, planned_run
+from experiments.design.planning import plan_of
 from experiments.load import load_setup
 from experiments.record.journal import JournalError, read_journal
 from tests import kills, reproduced
@@ -75,7 +77,7 @@ def test_statistics_against_other_programs(out: Path, soak: Soak, experiment: st
 def test_plans_over_10_000_seeds(soak: Soak) -> None:
     config, broken = load_setup("direction").config, 0
     for seed in range(10_000):
-        trials = make_plan(config, "P01", seed, None).trials
+        trials = plan_of(config, "P01", seed).trials
         sessions = [[t for t in trials if t.session == number] for number in (1, 2, 3)]
         kept = all(
             len(session) == 20
@@ -91,10 +93,12 @@ def test_plans_over_10_000_seeds(soak: Soak) -> None:
 
 @pytest.mark.parametrize(("python", "numpy"), [("3.12", "2.0.2"), ("3.11", "2.2.6")])
 def test_golden_plan_hashes_hold_elsewhere(tmp_path: Path, soak: Soak, python: str, numpy: str) -> None:
+    count = len(json.loads((ROOT / "tests" / "golden_plans.json").read_text(encoding="utf-8")))
+    all_hold = f"{count} of {count}"
     uv = shutil.which("uv") or str(ROOT / ".tools" / "bin" / "uv")
     environment = tmp_path / "venv"
     if subprocess.run([uv, "venv", "-q", "--python", python, environment], check=False).returncode:
-        soak(f"golden plan hashes on Python {python}, numpy {numpy}", "not tried", "20 of 20", "no such Python here")
+        soak(f"golden plan hashes on Python {python}, numpy {numpy}", "not tried", all_hold, "no such Python here")
         pytest.skip(f"no Python {python} here, and none to be fetched")
     needs = [f"numpy=={numpy}", "scipy", "pydantic", "pytest", "hypothesis"]
     there = environment / "bin" / "python"
@@ -103,16 +107,20 @@ def test_golden_plan_hashes_hold_elsewhere(tmp_path: Path, soak: Soak, python: s
     alone = ("-c", os.devnull, "--rootdir", ROOT, "-p", "no:cacheprovider", "--noconftest")
     words = [there, "-m", "pytest", "-q", *alone, "tests/test_plan.py", "-k", "first_release"]
     done = subprocess.run(words, cwd=ROOT, capture_output=True, text=True, check=False)
-    held = done.returncode == 0 and done.stdout.startswith("." * 20)
-    soak(
-        f"golden plan hashes on Python {python}, numpy {numpy}", "20 of 20" if held else "differ", "20 of 20", "pytest"
-    )
+    held = done.returncode == 0 and done.stdout.startswith("." * count)
+    soak(f"golden plan hashes on Python {python}, numpy {numpy}", all_hold if held else "differ", all_hold, "pytest")
     assert held, done.stdout
 
 
+def planned(name: str) -> PlannedRun:
+    """What a run of a shipped design comes to."""
+    design = load_setup(name).config
+    return planned_run(design, plan_of(design, "P01", 1))
+
+
 def test_planned_breaks_and_durations(soak: Soak) -> None:
-    direction, preference = load_setup("direction").config, load_setup("preference").config
-    trial_s = (1800 - direction.break_s) / direction.design.trials
+    direction, preference = planned("direction"), planned("preference")
+    trial_s = (1800 - direction.break_s) / direction.trials
     soak("planned breaks of experiment 1", f"{direction.break_s:g} s", "780 s", "9 x 20 s + 2 x 300 s")
     soak("a trial of experiment 1, fitted to 30 minutes", f"{trial_s:g} s", "about 17 s", "(1800 s - breaks) / 60")
     soak("planned duration of experiment 2", f"{preference.duration_s / 60:g} min", "about 8 min", "`recoil check`")

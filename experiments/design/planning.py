@@ -13,7 +13,7 @@ from itertools import combinations
 
 from experiments.config.door import ConfigError, Order
 from experiments.design.config import DesignConfig
-from experiments.design.language import MAX_TRIALS, BlockOrder, Level, shown_level
+from experiments.design.language import INSTRUCTION_FACTOR, MAX_TRIALS, BlockOrder, Level, shown_level
 from experiments.design.plan import Condition, Plan, Trial, square_rows
 from experiments.design.streams import Stream
 
@@ -92,7 +92,7 @@ def plan_of(design: DesignConfig, participant_id: str, seed: int, *, row: int | 
 def practice_of(design: DesignConfig, participant_id: str, seed: int, *, group: int = 0) -> Plan | None:
     """The plan of a practice: some trials of each cell of `practice.of`, mixed, in one set; `None` if there are none.
 
-    The levels of the other factors are drawn.
+    The levels of the other factors are drawn. A practice is of the gun: it has no instruction.
     """
     practice, given = design.practice, _chosen("group", groups(design), group)
     streams = _Streams(seed, (design.design, participant_id, "practice"))
@@ -106,7 +106,7 @@ def practice_of(design: DesignConfig, participant_id: str, seed: int, *, group: 
         for one in _some(alike[cell], practice.repetitions, streams.of("practice-cell", str(at)))
     ]
     trials = [
-        _trial(design, (1, 1, place), content.levels, content)
+        _trial(design, (1, 1, place), _without(INSTRUCTION_FACTOR, content.levels), content)
         for place, content in enumerate(streams.of("practice").shuffled(drawn), start=1)
     ]
     if not trials:
@@ -120,6 +120,10 @@ def practice_of(design: DesignConfig, participant_id: str, seed: int, *, group: 
         trials=tuple(trials),
         practice=True,
     )
+
+
+def _without(name: str, levels: Condition) -> Condition:
+    return tuple(pair for pair in levels if pair[0] != name)
 
 
 def _some(contents: Sequence[_Content], count: int, stream: Stream) -> list[_Content]:

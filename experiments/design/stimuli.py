@@ -118,7 +118,11 @@ def stimuli_of(design: DesignConfig, gun: GunConfig) -> Stimuli:
 def _undriven(found: IntervalStimulus, gun: GunConfig) -> Method:
     """What a stimulus takes the gun to be, apart from how its method is driven."""
     own = gun.rendering(found.method)
-    if isinstance(found.parameters, VibrationParameters) or isinstance(own, VibrationParameters):
+    if (
+        found.parameters is own
+        or isinstance(own, VibrationParameters)
+        or isinstance(found.parameters, VibrationParameters)
+    ):
         return found.parameters
     return replace(found.parameters, voltage_V=own.voltage_V, pulse_s=own.pulse_s)
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 from experiments.config.setup import GunConfig, Setup
 from experiments.design.config import DesignConfig
@@ -32,7 +32,7 @@ RIGHT, WRONG = "That was right.", "That was wrong."
 
 def design_session(plan: Plan, setup: Setup[DesignConfig]) -> Session:
     """The steps of a run of a design, from what is told first to its end. A practice is told nothing first."""
-    script = _Script(design=setup.config, gun=setup.gun, plan=plan)
+    script = _Script(setup.config, setup.gun, plan)
     presenter = Presenter(script.presentation)
     if not plan.practice:
         for opening in setup.config.opening:
@@ -66,22 +66,42 @@ def _rest(presenter: Presenter, design: DesignConfig, before: Trial, trial: Tria
         yield from presenter.until_done(Rest(between="sets", duration_s=breaks.between_sets_s))
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
 class _Script:
-    """What the steps of a design's trials are."""
+    """What the steps of a design's trials are, all of them made before the first."""
 
-    design: DesignConfig
-    gun: GunConfig
-    plan: Plan
+    def __init__(self, design: DesignConfig, gun: GunConfig, plan: Plan) -> None:
+        self.design, self.gun, self.plan = design, gun, plan
+        self._stimuli = {trial: tuple(self._intervals(trial)) for trial in plan.trials}
+        self._asked = {
+            (trial, when): tuple(self._questions(trial, when)) for trial in plan.trials for when in ("trial", "block")
+        }
+        scored = next(iter(correct_columns(design.questions)), "")
+        told = design.practice.feedback if plan.practice else design.trial.feedback
+        self._scored = scored if told else ""
+        self._right = {
+            trial: right_answer(design, design.questions[scored], trial) for trial in plan.trials if self._scored
+        }
 
     def set_of(self, trial: Trial) -> list[Trial]:
         return [one for one in self.plan.trials if (one.session, one.set) == (trial.session, trial.set)]
 
     def presentation(self, trial: Trial, attempt: int) -> tuple[Step, ...]:
         """Every interval, with a hand-over where hands have something to do, then the questions."""
-        return (*self._intervals(trial, attempt), *self.questions(trial, when="trial"))
+        stimuli = (replace(step, attempt=attempt) for step in self._stimuli[trial])
+        return (*stimuli, *self.questions(trial, when="trial"))
 
-    def _intervals(self, trial: Trial, attempt: int) -> Iterator[Step]:
+    def questions(self, trial: Trial, *, when: str) -> tuple[Asking, ...]:
+        """What is asked about a trial at once, or after its block."""
+        return self._asked[trial, when]
+
+    def feedback(self, presenter: Presenter, trial: Trial) -> Iterator[Inform]:
+        """Whether the first scored answer was right, where the design has it told."""
+        right = self._right.get(trial)
+        if right is not None and (trial, self._scored) in presenter.said:
+            text = RIGHT if presenter.said[trial, self._scored] == right else WRONG
+            yield Inform(text=text, what="feedback", trial=trial)
+
+    def _intervals(self, trial: Trial) -> Iterator[Prepare | FireShot | Present]:
         last: object = None
         for interval in range(max(1, len(trial.intervals))):
             by_hand = self._by_hand(trial, interval)
@@ -89,12 +109,12 @@ class _Script:
             if handed_over:
                 yield Prepare(
                     trial=trial,
-                    attempt=attempt,
+                    attempt=1,
                     settings=self._settings(trial, interval),
                     instruction=self._instruction(trial),
                     interval=interval,
                 )
-            yield self._stimulus(trial, attempt, interval, 0.0 if handed_over else self.design.trial.gap_s)
+            yield self._stimulus(trial, interval, 0.0 if handed_over else self.design.trial.gap_s)
             last = last if by_hand is None else by_hand
             last = () if last is None else last
 
@@ -112,21 +132,20 @@ class _Script:
     def _instruction(self, trial: Trial) -> str:
         return self.design.factors[INSTRUCTION_FACTOR].texts[trial.instruction] if trial.instruction else ""
 
-    def _stimulus(self, trial: Trial, attempt: int, interval: int, gap_s: float) -> Step:
+    def _stimulus(self, trial: Trial, interval: int, gap_s: float) -> FireShot | Present:
         kind = self.design.trial
         if kind.kind != "train":
-            return FireShot(trial=trial, attempt=attempt, interval=interval, gap_s=gap_s)
+            return FireShot(trial=trial, attempt=1, interval=interval, gap_s=gap_s)
         every_s = trial.level(TRAIN_INTERVAL)
         return Present(
             trial=trial,
-            attempt=attempt,
+            attempt=1,
             repeat_every_s=every_s if isinstance(every_s, float) else kind.repeat_every_s,
             max_shots=kind.max_shots,
             least_exposure_s=kind.least_exposure_s,
         )
 
-    def questions(self, trial: Trial, *, when: str) -> Iterator[Asking]:
-        """What is asked about a trial at once, or after its block."""
+    def _questions(self, trial: Trial, when: str) -> Iterator[Asking]:
         for name, question in self.design.questions.items():
             if question.when == when:
                 yield self._question(name, question, trial)
@@ -142,17 +161,6 @@ class _Script:
                 return replace(_rate(name, question, trial, (1.0, float(len(self.set_of(trial))), 1.0)), distinct=True)
             case _:
                 return _rate(name, question, trial, question.scale)
-
-    def feedback(self, presenter: Presenter, trial: Trial) -> Iterator[Inform]:
-        """Whether the first scored answer was right, where the design has it told."""
-        told = self.design.practice.feedback if self.plan.practice else self.design.trial.feedback
-        scored = next(iter(correct_columns(self.design.questions)), None)
-        if not told or scored is None or (trial, scored) not in presenter.said:
-            return
-        right = right_answer(self.design, self.design.questions[scored], trial)
-        if right is not None:
-            text = RIGHT if presenter.said[trial, scored] == right else WRONG
-            yield Inform(text=text, what="feedback", trial=trial)
 
 
 def _rate(name: str, question: QuestionConfig, trial: Trial, scale: tuple[float, float, float]) -> Rate:
