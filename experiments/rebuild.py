@@ -11,7 +11,7 @@ from experiments.record.journal import Contents, Head, JournalError, read_journa
 from experiments.record.tables import table_bytes
 
 
-def design_of(head: Head) -> DesignConfig:
+def began_with(head: Head) -> DesignConfig:
     """The design that a run began with. `JournalError`: the journal's head holds none of this version."""
     setup = head.setup_json if isinstance(head.setup_json, dict) else {}
     design = setup.get("experiment")
@@ -24,8 +24,8 @@ def design_of(head: Head) -> DesignConfig:
 
 
 def table(contents: Contents) -> bytes:
-    """The CSV that a journal makes. `JournalError` as `design_of`."""
-    design = design_of(contents.head)
+    """The CSV that a journal makes. `JournalError` as `began_with`."""
+    design = began_with(contents.head)
     rows = design_table.design_rows(contents.plan, replay.history(contents), design)
     return table_bytes(design_table.columns(design), rows)
 
@@ -33,5 +33,5 @@ def table(contents: Contents) -> bytes:
 def rebuild(path: Path) -> tuple[Path, bytes, Contents]:
     """The table of a journal: where it belongs, its bytes, and what the journal holds."""
     contents = read_journal(path)
-    name = path.name.replace("_journal", f"_{design_of(contents.head).table}")
+    name = path.name.replace("_journal", f"_{began_with(contents.head).table}")
     return path.with_name(name).with_suffix(".csv"), table(contents), contents

@@ -21,7 +21,7 @@ from experiments.design.stimuli import Stimuli, by_hand, stimuli_of
 from experiments.design.streams import checked_seed, draw_seed
 from experiments.live_run import LiveRun, RunStopped, Screen
 from experiments.load import check_limits
-from experiments.rebuild import design_of, table
+from experiments.rebuild import began_with, table
 from experiments.record import replay, storage
 from experiments.record.dictionary import design_dictionary
 from experiments.record.journal import Contents, Journal, JournalError, begun, hold_journal, read_journal
@@ -308,7 +308,7 @@ def _to_the_end(session: Session, desk: Desk, position: RunPosition, place: Plac
 def _write_table(place: Place, contents: Contents) -> int:
     """Write the table from the journal as it was read back from the disk; the answers in it."""
     storage.write_whole(place.table, table(contents))
-    design = design_of(contents.head)
+    design = began_with(contents.head)
     storage.write_whole(place.results / f"task-{design.design}_columns.md", design_dictionary(design).encode())
     told = replay.history(contents)
     return sum(isinstance(word, Answered) and not isinstance(step, Describe) for step, word in told)

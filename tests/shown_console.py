@@ -14,7 +14,6 @@ import tempfile
 import threading
 from collections.abc import Callable, Iterator
 from contextlib import suppress
-from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -27,8 +26,7 @@ from experiments.screens.console import app
 from experiments.screens.console.view import Ended, ParticipantSeen
 from experiments.session import events
 from experiments.session.states import State
-from tests.at_controls import short_direction
-from tests.designs import changed
+from tests.designs import changed, direction_with
 
 LOOK_MS = 5
 SETTLE = 8
@@ -374,11 +372,15 @@ def _setup(experiment: str) -> Any:
     """A short run of an experiment, with an instruction that takes two lines."""
     if experiment == "preference":
         return changed("preference", console={"guard_s": 0.0})
-    setup = short_direction(sets=2, trials=3, set_break_s=600.0)
-    config = setup.config.model_copy(
-        update={"console": setup.config.console.model_copy(update={"guard_s": 0.0, "response_times": True})}
+    return direction_with(
+        ("vibration", "asymmetric-2"),
+        sets=2,
+        repetitions=3,
+        factors={"instruction": {"levels": ("speed",), "texts": {"speed": HURRY}}},
+        order={"set": ("instruction",)},
+        breaks={"between_sets_s": 600.0, "between_sessions_s": 60.0},
+        console={"guard_s": 0.0, "response_times": True},
     )
-    return replace(setup, config=config)
 
 
 def sizes_from(words: list[str]) -> list[tuple[int, int]]:

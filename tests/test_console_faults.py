@@ -66,7 +66,11 @@ def test_a_shot_that_fails_is_marked_said_and_presented_again_while_the_window_s
     check_answers(contents)
     failed = [(step, word) for step, word in history(contents) if isinstance(word, Failed)]
     assert [(step.trial.trial, word.cause) for step, word in failed] == [(2, cause)]
-    assert [(row["attempts"], row["flags"]) for row in rows] == [("1", ""), ("2", "device-error"), *[("1", "")] * (TRIALS - 2)]
+    assert [(row["attempts"], row["flags"]) for row in rows] == [
+        ("1", ""),
+        ("2", "device-error"),
+        *[("1", "")] * (TRIALS - 2),
+    ]
     assert all(row["response"] for row in rows)
     assert any(cause in line for line in seen["lines"])
     assert contents.finished

@@ -23,8 +23,8 @@ def test_the_papers_first_experiment_reads_as_in_the_paper():
         "Method (vibration, asymmetric-1, asymmetric-2) and direction (forward, backward) varied within participants.\n"
         "There were 3 sessions, each of one method, in random order. In each session every condition came 10 times, in "
         "random order: 20 trials in 4 sets of 5.\n"
-        "A trial was one shot. There was no feedback. 1 of each method and direction could be practised first; that was "
-        "not analysed.\n"
+        "A trial was one shot. There was no feedback. 1 of each method and direction could be practised first; that "
+        "was not analysed.\n"
         "After each trial participants were asked: “Which way did the gun shoot?” (forward or backward).\n"
         "Sets were 20 s apart. Sessions were 300 s apart. The 60 trials took 30 min as planned."
     )

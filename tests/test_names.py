@@ -37,10 +37,6 @@ EXCEPTIONS = {
     "each feature's own sections and summary, asked for by its module": Shared(
         names="in_short sections", among=("analysis/*",)
     ),
-    "the experiments give the same parts under the same names; the catalogue puts them together": Shared(
-        names="Design Fatigue Synthetic TABLE_COLUMNS Timing make_plan rows session synthetic_participant",
-        among=("experiments/direction/*", "experiments/preference/*"),
-    ),
     "each program of the doctor is asked in the same way": Shared(
         names="look", among=("experiments/doctor/programs/*",)
     ),

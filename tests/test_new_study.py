@@ -25,6 +25,27 @@ def test_a_study_of_a_shipped_design_is_for_everybody_and_knows_no_paper(name, t
     assert [load_setup(str(there / one)).config.experiment for one in study.experiments] == [name]
 
 
+def test_the_papers_study_has_all_that_its_designs_and_its_examples_name(tmp_path):
+    made = new_study(tmp_path / "study")
+    study, there = load_study(str(tmp_path / "study" / "study.toml"))
+    assert (there / str(study.paper)).exists()
+    loaded = [load_setup(str(there / one)) for one in (*study.experiments, "examples/hurry.toml")]
+    assert [setup.config.experiment for setup in loaded] == ["direction", "preference", "direction"]
+    assert all(setup.laws is not None for setup in loaded)
+    for path in made:
+        first = path.read_text().splitlines()[:1] if path.suffix == ".toml" else []
+        if first and first[0].startswith("#:schema "):
+            assert (path.parent / first[0].removeprefix("#:schema ")).exists()
+
+
+@pytest.mark.parametrize("name", ["direction", "preference"])
+def test_people_who_feel_the_gun_are_one_edit_away_in_the_papers_study(name, tmp_path):
+    new_study(tmp_path / "study")
+    design = tmp_path / "study" / f"{name}.toml"
+    design.write_text(design.read_text().replace(f'"synthetic/{name}.toml"', f'"synthetic/{name}-felt.toml"', 1))
+    assert load_setup(str(design)).config.synthetic == f"synthetic/{name}-felt.toml"
+
+
 def test_with_the_paper_its_numbers_are_beside_it(tmp_path):
     new_study(tmp_path / "study", "direction", paper=True)
     assert load_study(str(tmp_path / "study" / "study.toml"))[0].paper == "paper.toml"

@@ -5,8 +5,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from experiments.design.plan import method_order, next_row, square_rows
-from experiments.design.streams import Stream
+from experiments.design.plan import square_rows
+from experiments.study.folders import least_used
 
 COUNTS = range(2, 9)
 SQUARES = ("latin-square", "williams")
@@ -43,13 +43,12 @@ def test_every_row_of_a_square_is_a_permutation(count: int) -> None:
 
 def test_a_random_order_has_no_rows() -> None:
     assert square_rows("random", 3) == []
-    assert next_row("random", 3, []) is None
 
 
 def test_the_first_participants_take_the_rows_in_turn() -> None:
     used: list[int] = []
     for _ in range(12):
-        used.append(next_row("williams", 3, used))
+        used.append(least_used(6, used))
     assert used == [*range(6), *range(6)]
 
 
@@ -60,11 +59,11 @@ def test_counts_stay_within_one_after_any_drop_outs(order: str, count: int, even
     used: list[int] = []
     for event in events:
         if event is None:
-            used.append(next_row(order, count, used))
+            used.append(least_used(len(square_rows(order, count)), used))
         elif used:
             used.pop(event % len(used))
     for _ in range(len(used) + 2 * len(square_rows(order, count))):
-        used.append(next_row(order, count, used))
+        used.append(least_used(len(square_rows(order, count)), used))
     times = Counter(used)
     assert len(times) == len(square_rows(order, count))
     assert max(times.values()) - min(times.values()) <= 1
@@ -75,7 +74,7 @@ def test_counts_stay_within_one_after_any_drop_outs(order: str, count: int, even
 def test_without_drop_outs_counts_differ_by_one_at_most_at_any_time(order: str, count: int, people: int) -> None:
     used: list[int] = []
     for _ in range(people):
-        used.append(next_row(order, count, used))
+        used.append(least_used(len(square_rows(order, count)), used))
     times = [used.count(row) for row in range(len(square_rows(order, count)))]
     assert max(times) - min(times) <= 1
 
@@ -85,17 +84,5 @@ def test_without_drop_outs_counts_differ_by_one_at_most_at_any_time(order: str, 
 def test_the_next_row_is_one_that_no_other_was_used_less_than(order: str, count: int, taken: list[int]) -> None:
     square = square_rows(order, count)
     used = [row % len(square) for row in taken]
-    row = next_row(order, count, used)
+    row = least_used(len(square), used)
     assert used.count(row) == min(used.count(other) for other in range(len(square)))
-
-
-def test_a_row_puts_the_methods_in_its_order_and_draws_nothing() -> None:
-    methods = ("vibration", "asymmetric-1", "asymmetric-2")
-    stream = Stream(1, "order")
-    assert method_order("latin-square", methods, 1, stream) == ["asymmetric-1", "asymmetric-2", "vibration"]
-    assert stream.below(2**64) == Stream(1, "order").below(2**64)
-
-
-def test_without_a_row_the_methods_are_shuffled() -> None:
-    methods = ("vibration", "asymmetric-1", "asymmetric-2")
-    assert method_order("random", methods, None, Stream(1, "order")) == Stream(1, "order").shuffled(methods)

@@ -15,7 +15,7 @@ from typing import Any
 import psutil
 import pytest
 
-from analysis.predict.drawn import DirectionStudies, drawn
+from analysis.predict.drawn import DirectionStudies, studies_of
 from analysis.predict.jobs import on_cluster, on_processes
 from analysis.predict.power import run as feature
 from analysis.predict.power.grid import PowerRequest, make_grid, run_chunk
@@ -31,7 +31,7 @@ from tests.warm_start import warm
 
 SMALL = ("--participants", "8,14", "--effect", "0.75,1", "--studies", "300")
 SETUP = load_setup("direction")
-DURATION_S = drawn(SETUP).planned().duration_s
+DURATION_S = studies_of(SETUP).planned().duration_s
 
 
 @pytest.fixture(scope="module")

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 from scipy import stats
 
-from analysis.predict.drawn import DirectionStudies, drawn
+from analysis.predict.drawn import DirectionStudies, studies_of
 from analysis.predict.power.grid import PowerRequest, make_grid, run_chunk
 from analysis.predict.power.planned import ANOVA, ANY_PAIR, merged, shares
 from analysis.predict.synthetic_studies import Felt, felt_counts, felt_people, percepts_of_methods
@@ -57,14 +57,14 @@ def edited(text: str, old: str, new: str) -> str:
 
 def felt_of(setup: Setup[DesignConfig], effect: float = 1.0) -> Felt:
     """The participants of a setup, as power draws them."""
-    found = drawn(setup)
+    found = studies_of(setup)
     assert isinstance(found, DirectionStudies)
     law = law_of(setup)
     return felt_people(law, found.instructions, percepts_of_methods(setup.gun, METHODS, law), METHODS, effect)
 
 
 def law_of(setup: Setup[DesignConfig]) -> DiffusionLaw:
-    law = drawn(setup).law
+    law = studies_of(setup).law
     assert isinstance(law, DiffusionLaw)
     return law
 

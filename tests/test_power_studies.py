@@ -13,7 +13,7 @@ from scipy import stats
 
 from analysis.paper.paper import load_paper
 from analysis.paper.recurrence import WHOLE_PATTERN, answers_recur, recurs, with_whole_pattern
-from analysis.predict.drawn import DirectionStudies, Drawn, RatingStudies, drawn
+from analysis.predict.drawn import DirectionStudies, Drawn, RatingStudies, studies_of
 from analysis.predict.power.grid import Chunk, PowerRequest, StudyDesign, make_grid, run_chunk
 from analysis.predict.power.planned import (
     ALL_PAIRS,
@@ -50,13 +50,13 @@ from tests.power_chain import homogeneity_p
 
 
 def directions(setup: Setup[DesignConfig]) -> DirectionStudies:
-    found = drawn(setup)
+    found = studies_of(setup)
     assert isinstance(found, DirectionStudies)
     return found
 
 
 def rated(setup: Setup[DesignConfig]) -> RatingStudies:
-    found = drawn(setup)
+    found = studies_of(setup)
     assert isinstance(found, RatingStudies)
     return found
 

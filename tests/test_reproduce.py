@@ -13,7 +13,7 @@ from scipy.stats import studentized_range
 from statsmodels.stats.anova import AnovaRM
 
 from analysis.logs.reading import read_logs
-from analysis.predict.drawn import DirectionStudies, RatingStudies, drawn
+from analysis.predict.drawn import DirectionStudies, RatingStudies, studies_of
 from analysis.predict.reproduction import reproduce
 from analysis.predict.synthetic_studies import direction_counts, preference_scores
 from analysis.summary.summary import summarize
@@ -213,7 +213,7 @@ def test_a_strangers_folder_is_refused(tmp_path: Path) -> None:
 
 def test_the_odds_draw_the_same_kind_of_people_as_the_session(reproduction: Path) -> None:
     """The people behind the odds are drawn without a session; here they have the session's rates and spread."""
-    studies = drawn(load_setup("direction"))
+    studies = studies_of(load_setup("direction"))
     assert isinstance(studies, DirectionStudies)
     counts = direction_counts(studies, 14, 2000, generator(1, "odds", "direction"))
     rates = studies.law.share
@@ -227,7 +227,7 @@ def test_the_odds_draw_the_same_kind_of_people_as_the_session(reproduction: Path
 
 
 def test_simulated_ratings_keep_the_published_habits() -> None:
-    studies = drawn(load_setup("preference"))
+    studies = studies_of(load_setup("preference"))
     assert isinstance(studies, RatingStudies)
     ratings = preference_scores(studies, 14, 300, generator(1, "test"))
     assert (ratings[..., 0] <= ratings[..., 1:].min(axis=-1)).all()

@@ -17,7 +17,7 @@ import pytest
 
 from analysis.paper.paper import load_paper
 from analysis.paper.recurrence import WHOLE_PATTERN, wilson_interval
-from analysis.predict.drawn import drawn
+from analysis.predict.drawn import studies_of
 from analysis.predict.jobs import cores, on_processes
 from analysis.predict.power.planned import ANOVA, ANY_PAIR
 from analysis.predict.synthetic_studies import pattern_odds
@@ -99,7 +99,7 @@ def test_null_participants_through_real_logs(tmp_path: Path, soak: Soak, experim
 @pytest.mark.parametrize("experiment", ["direction", "preference"])
 def test_the_pattern_recurs_as_the_odds_say(tmp_path: Path, soak: Soak, experiment: str) -> None:
     found = power(tmp_path / "out", experiment, "--participants", 14, "--effect", 1, "--studies", STUDIES)
-    theirs = pattern_odds(drawn(load_setup(experiment)), getattr(load_paper(find("paper")), experiment), 2000, 1)
+    theirs = pattern_odds(studies_of(load_setup(experiment)), getattr(load_paper(find("paper")), experiment), 2000, 1)
     row = next(row for row in theirs.rows if row.claim == WHOLE_PATTERN)
     pattern = found["published_pattern"]
     how = f"{STUDIES:,} studies; `recoil reproduce` says {100 * row.share:.1f} % of 2000"

@@ -36,6 +36,8 @@ def test_the_wheel_holds_the_four_packages_and_the_configs_and_nothing_else(whee
     }
     for name in (
         "experiments/shipped_configs/direction.toml",
+        "experiments/shipped_configs/synthetic/direction-felt.toml",
+        "experiments/shipped_configs/schemas/design.json",
         "analysis/report/templates/report.html.j2",
         "experiments/screens/console/console.qss",
     ):

@@ -16,7 +16,7 @@ from analysis.logs.rules import cell_fault, cell_value
 from experiments.config.setup import sha256
 from experiments.design.config import DesignConfig
 from experiments.design.plan import Plan
-from experiments.rebuild import design_of
+from experiments.rebuild import began_with
 from experiments.record import journal
 from experiments.record.design_table import columns
 from experiments.record.journal import JournalError
@@ -69,7 +69,7 @@ def _design_of(path: str) -> tuple[DesignConfig, Plan]:
         head = journal.head(beside)
         if head is None:
             raise BadLogError(f"{beside.name} has no whole first line, so nothing says what the columns mean")
-        design = design_of(head)
+        design = began_with(head)
     except JournalError as error:
         raise BadLogError(str(error)) from error
     return design, head.plan

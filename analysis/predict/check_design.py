@@ -6,7 +6,7 @@ from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 
-from analysis.predict.drawn import RatingStudies, drawn
+from analysis.predict.drawn import RatingStudies, studies_of
 from analysis.predict.exposure import Exposure, exposure
 from analysis.predict.synthetic_studies import percepts_of_methods
 from analysis.report.section import Section, Table
@@ -107,7 +107,7 @@ def _felt(setup: Setup[DesignConfig], plan: Plan) -> dict[str, dict[str, float]]
         return {}
     synthetic_participant_of(setup, plan)
     try:
-        studies = drawn(setup)
+        studies = studies_of(setup)
     except ConfigError:
         return {}
     if isinstance(studies, RatingStudies) or not isinstance(studies.law, DiffusionLaw):

@@ -15,7 +15,7 @@ from experiments.config.setup import Setup
 from experiments.design.config import DesignConfig
 from experiments.design.language import DIRECTION_FACTOR, INSTRUCTION_FACTOR, METHOD_FACTOR, NumberScale
 from experiments.design.plan import condition
-from experiments.design.planned import PlannedRun, counted
+from experiments.design.planned import PlannedRun, workload
 from experiments.design.planning import plan_of
 from experiments.synthetic.laws import DiffusionLaw, Law, RatesLaw, RatingsLaw, SyntheticAnswers, of_condition
 
@@ -99,9 +99,9 @@ class RatingStudies:
 Drawn = DirectionStudies | RatingStudies
 
 
-def drawn(setup: Setup[DesignConfig]) -> Drawn:
+def studies_of(setup: Setup[DesignConfig]) -> Drawn:
     """The studies of a design. `ConfigError`: they cannot be drawn, and why."""
-    name, law = asked(setup)
+    name, law = drawn_question(setup)
     found = _view(setup.config, name, law)
     if found is None:
         known = '"rates" or "diffusion"' if setup.config.questions[name].correct else '"ratings" by method'
@@ -115,7 +115,7 @@ def drawn(setup: Setup[DesignConfig]) -> Drawn:
     return found
 
 
-def asked(setup: Setup[DesignConfig]) -> tuple[str, Law]:
+def drawn_question(setup: Setup[DesignConfig]) -> tuple[str, Law]:
     """The question that studies are drawn of, and its law. `ConfigError`: the design asks nothing of the kind."""
     design, laws = setup.config, setup.laws
     if not isinstance(laws, SyntheticAnswers):
@@ -159,7 +159,7 @@ def _with_methods(design: DesignConfig, methods: Sequence[str]) -> DesignConfig:
 
 
 def _planned(design: DesignConfig) -> PlannedRun:
-    return counted(design, plan_of(design, "P01", 0))
+    return workload(design, plan_of(design, "P01", 0))
 
 
 def rates_by_method(law: RatesLaw, methods: Sequence[str], direction: Direction) -> dict[str, float]:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable
 from dataclasses import asdict, dataclass
 
 from pydantic import TypeAdapter
@@ -36,18 +36,6 @@ def square_rows(order: Order, count: int) -> list[list[int]]:
 def _zigzag(count: int) -> list[int]:
     """0, count - 1, 1, count - 2, ...: neighbours differ by every amount once."""
     return [place // 2 if place % 2 == 0 else count - 1 - place // 2 for place in range(count)]
-
-
-def next_row(order: Order, count: int, used: Sequence[int]) -> int | None:
-    """The row that was used least so far, the first of them; `None` for a random order.
-
-    >>> next_row("latin-square", 3, [0, 1, 1])
-    2
-    """
-    square = square_rows(order, count)
-    if not square:
-        return None
-    return min(range(len(square)), key=lambda row: (list(used).count(row), row))
 
 
 PLAN_FORMAT = 2

@@ -36,12 +36,12 @@ def planned_run(design: DesignConfig, plan: Plan, gun: GunConfig | None = None) 
 
     Which methods have dampers that hands set, the `gun` knows.
     """
-    found = counted(design, plan, gun)
+    found = workload(design, plan, gun)
     _check_fatigue(design, found)
     return found
 
 
-def counted(design: DesignConfig, plan: Plan, gun: GunConfig | None = None) -> PlannedRun:
+def workload(design: DesignConfig, plan: Plan, gun: GunConfig | None = None) -> PlannedRun:
     """What a plan comes to, whether or not the design allows it."""
     timing, trials = design.timing, plan.trials
     rests_s = [_rest_s(design, before, trial) for before, trial in pairwise(trials)]

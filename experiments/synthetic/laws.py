@@ -25,7 +25,7 @@ from experiments.synthetic.percept import PerceptConfig
 from experiments.synthetic.preference import Appeal
 
 Positive = Annotated[float, Field(gt=0, le=1e9)]
-Mean = Annotated[float, Field(ge=-1e6, le=1e6)]
+
 EVERYWHERE = "all"
 """The cell of a law that does not say by what it differs."""
 
@@ -110,7 +110,7 @@ class RatingsLaw(Model):
 
     law: Literal["ratings"]
     by: tuple[ColumnName, ...] = ()
-    mean: dict[str, Mean]
+    mean: dict[str, Annotated[float, Field(ge=-1e6, le=1e6)]]
     person_sd: Spread = 0.0
     noise_sd: Spread = 0.0
     lowest: Text | None = None
@@ -340,10 +340,10 @@ def cell_of(by: Sequence[str], levels: Condition) -> str:
     return "/".join(shown_level(held[name]) for name in by if name in held) or EVERYWHERE
 
 
-One = TypeVar("One")
+OfCell = TypeVar("OfCell")
 
 
-def of_condition(values: Mapping[str, One], by: Sequence[str], levels: Condition, where: str) -> One:
+def of_condition(values: Mapping[str, OfCell], by: Sequence[str], levels: Condition, where: str) -> OfCell:
     """What a law's table has for the levels of a trial. `ConfigError`: nothing."""
     cell = cell_of(by, levels)
     if cell not in values:

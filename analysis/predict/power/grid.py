@@ -12,7 +12,7 @@ import numpy as np
 
 from analysis.paper.paper import PublishedExperiment, load_paper
 from analysis.paper.recurrence import with_whole_pattern
-from analysis.predict.drawn import DirectionStudies, Drawn, RatingStudies, drawn
+from analysis.predict.drawn import DirectionStudies, Drawn, RatingStudies, studies_of
 from analysis.predict.power.planned import Findings, Tally, analysed_directions, analysed_ratings, tallied
 from analysis.predict.synthetic_studies import (
     Counts,
@@ -214,7 +214,7 @@ def make_grid(request: PowerRequest) -> Grid:
     """The grid of a request. `ConfigError` with a message for people for whatever is wrong with it."""
     check_scalars(request)
     setup = load_setup(request.config)
-    config = drawn(setup)
+    config = studies_of(setup)
     people = request.participants or (NULL_PARTICIPANTS if request.null else DEFAULT_PARTICIPANTS)
     participants = whole_numbers(people, "--participants", 2, _MOST_PEOPLE)
     effects = [0.0] if request.null else factors(request.effects or DEFAULT_EFFECTS)

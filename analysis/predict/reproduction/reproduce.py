@@ -28,7 +28,7 @@ from analysis.paper.paper import (
     load_paper,
 )
 from analysis.paper.recurrence import PatternOdds
-from analysis.predict.drawn import DirectionStudies, Drawn, RatingStudies, drawn, rates_by_method
+from analysis.predict.drawn import DirectionStudies, Drawn, RatingStudies, rates_by_method, studies_of
 from analysis.predict.simulate.shot import shot_panel
 from analysis.predict.synthetic_studies import pattern_odds, rates_of
 from analysis.report.serial import as_csv
@@ -220,7 +220,7 @@ def _odds(study: ReproducedStudy) -> Iterator[PatternOdds]:
 def _drawn(setup: Setup[DesignConfig]) -> Drawn | None:
     """The studies of a design whose people are right at rates or rate by means; `None` of others."""
     try:
-        found = drawn(setup)
+        found = studies_of(setup)
     except ConfigError:
         return None
     return None if isinstance(found.law, DiffusionLaw) else found
@@ -316,7 +316,7 @@ def reconstructed_people(
     """
     codes, people, notes = study.codes(), [], [HONESTY]
     for setup in setups:
-        studies = drawn(setup)
+        studies = studies_of(setup)
         try:
             law, note = _answers(studies, table_name(setup), paper, codes, seed)
         except ValueError as error:
