@@ -15,13 +15,13 @@ from device.limits import MAX_SHOTS_PER_MINUTE, DriveHistory, Load
 from device.methods import drive_of, rendering_of
 from device.parameters import GunParameters
 from device.words import Drive
-from experiments.config.door import ConfigError, StudyConfig, load
+from experiments.config.door import ConfigError, StudyConfig, load, read_toml
 from experiments.config.setup import GunConfig, Setup
 from experiments.design.config import DesignConfig
 from experiments.design.language import TRAIN_INTERVAL
 from experiments.design.planned import planned_run
 from experiments.design.planning import groups, plan_of
-from experiments.design.stimuli import limits, shown_cell
+from experiments.design.stimuli import limits, shown_cell, unchanged_methods
 from experiments.record.design_table import columns
 from experiments.record.tables import MAY_LACK, TABLES
 from experiments.synthetic.laws import SyntheticAnswers, TableLaw, check_laws
@@ -49,6 +49,10 @@ def find(name: str) -> Path:
 def load_setup(name: str) -> Setup[DesignConfig]:
     """A design with its gun and its synthetic people, held against each other. `ConfigError` names what is wrong."""
     path = find(name)
+    if not {"design", "factors"} & set(read_toml(path)):
+        raise ConfigError(
+            f"{path}: no design: it has neither the key design nor a table [factors.*] (is it the config of a run?)"
+        )
     design = load(DesignConfig, path)
     setup = Setup(config=design, gun=load_gun(path.parent / design.gun), source=path)
     with _named(path):
@@ -56,9 +60,14 @@ def load_setup(name: str) -> Setup[DesignConfig]:
         plans = [plan_of(design, "P01", 0, group=group) for group in range(len(groups(design)))]
         for plan in plans:
             planned_run(design, plan)
+        by_gun = () if design.below_break_away else unchanged_methods(design)
+        if set(by_gun) <= set(setup.gun.methods):
+            check_methods(setup.gun, by_gun, path.parent / design.gun)
         limits(design, setup.gun)
     if not design.synthetic:
         return setup
+    if not (path.parent / design.synthetic).is_file():
+        raise ConfigError(f"{path.parent / design.synthetic}: no such file; the config's key `synthetic` names it")
     laws = load(SyntheticAnswers, path.parent / design.synthetic)
     with _named(path.parent / design.synthetic):
         check_laws(design, laws, plans)

@@ -125,12 +125,21 @@ def test_the_files_that_a_run_began_with_load_to_the_same_setup(case: str, tmp_p
     assert all(path.is_relative_to(tmp_path / "back") for path in copied)
 
 
-def test_a_resume_that_was_refused_names_the_command_that_makes_it_possible(recoil: Recoil, tmp_path: Path) -> None:
+@pytest.mark.parametrize(
+    ("file", "old", "new"),
+    [
+        ("direction.toml", "between_sets_s = 20.0", "between_sets_s = 25.0"),
+        ("synthetic/direction.toml", "shift_s = 0.35", "shift_s = 0.45"),
+    ],
+)
+def test_a_resume_that_was_refused_names_the_command_that_makes_it_possible(
+    recoil: Recoil, tmp_path: Path, file: str, old: str, new: str
+) -> None:
     lab = configs(tmp_path / "my lab")
     journal = journal_of(lab / "direction.toml", tmp_path / "results")
     whole = journal.read_bytes().splitlines(keepends=True)
     journal.write_bytes(b"".join(whole[:9]))
-    edited(lab / "direction.toml", ("between_sets_s = 20.0", "between_sets_s = 25.0"))
+    edited(lab / file, (old, new))
 
     def resume(config: str) -> Any:
         options = ("--participant", "P01", "--screen", "synthetic", "--results", tmp_path / "results", "--resume")

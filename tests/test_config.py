@@ -13,7 +13,7 @@ from pydantic import ValidationError
 from experiments.config.door import ConfigError, StudyConfig, leaves, participant_codes
 from experiments.config.setup import Setup
 from experiments.design.config import DesignConfig
-from experiments.design.planned import PlannedRun, counted, planned_run
+from experiments.design.planned import PlannedRun, planned_run
 from experiments.design.planning import plan_of
 from experiments.load import load_setup, load_study, shipped_folder
 from experiments.synthetic.laws import RatesLaw, SyntheticAnswers
@@ -167,8 +167,7 @@ def test_breaks_between_sets_spare_nobody_if_a_session_is_one_set() -> None:
 
 @pytest.mark.parametrize("name", SETUPS)
 def test_a_plan_may_take_exactly_as_long_as_the_limit(name: str) -> None:
-    config = SETUPS[name].config
-    duration_s = counted(config, plan_of(config, "P01", 1)).duration_s
+    duration_s = run_of(SETUPS[name].config).duration_s
     assert run_of(changed(name, fatigue={"max_planned_s": duration_s}).config).duration_s == duration_s
     with pytest.raises(ConfigError, match="planned duration"):
         run_of(changed(name, fatigue={"max_planned_s": duration_s - 0.5}).config)

@@ -10,7 +10,7 @@ from analysis.predict.check_design import DesignCheck, check_design, design_sect
 from analysis.report.section import Section
 from analysis.report.serial import plain
 from analysis.report.terminal import in_text, with_tables
-from experiments.config.door import EligibilityConfig, participant_codes, read_toml
+from experiments.config.door import ConfigError, EligibilityConfig, participant_codes, read_toml
 from experiments.config.setup import Setup
 from experiments.design.config import DesignConfig
 from experiments.load import check_methods, find, load_gun, load_setup, load_study
@@ -61,6 +61,8 @@ def check(name: str, seed: int | None, participants: int) -> AnyCheck:
         gun = load_gun(path)
         check_methods(gun, tuple(gun.methods), path)
         return GunCheck(gun=gun.title, methods=tuple(gun.methods), assumed=tuple(gun.assumed))
+    if not {"direction", "preference", "paper"} & set(table):
+        raise ConfigError(f"{path}: no config that is known: neither a design, a study, a gun nor a paper's numbers")
     paper = load_paper(path)
     return PaperCheck(paper=path.name, experiments={"direction": paper.direction.n, "preference": paper.preference.n})
 

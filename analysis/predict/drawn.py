@@ -104,15 +104,17 @@ def studies_of(setup: Setup[DesignConfig]) -> Drawn:
     name, law = drawn_question(setup)
     found = _view(setup.config, name, law)
     if found is None:
-        known = '"rates" or "diffusion"' if setup.config.questions[name].correct else '"ratings" by method'
-        raise ConfigError(
-            f'{setup.source}: questions.{name}: the law "{law.law}" has no power; studies are drawn from {known}'
-        )
+        rule = _RATES if setup.config.questions[name].correct else _RATINGS
+        raise ConfigError(f'{setup.source}: questions.{name}: the law "{law.law}" has no power; {rule}')
     if isinstance(found, DirectionStudies) and not found.trials[0]:
         raise ConfigError(
             f"{setup.source}: factors.direction has no level forward; the planned analysis is of forward trials"
         )
     return found
+
+
+_RATES = 'studies are drawn from "diffusion", or from "rates" by method and direction'
+_RATINGS = 'studies are drawn from "ratings" with by = ["method"]'
 
 
 def drawn_question(setup: Setup[DesignConfig]) -> tuple[str, Law]:
@@ -130,7 +132,8 @@ def drawn_question(setup: Setup[DesignConfig]) -> tuple[str, Law]:
 
 
 def _view(design: DesignConfig, name: str, law: Any) -> Drawn | None:
-    if _is_direction(design, name) and isinstance(law, RatesLaw | DiffusionLaw):
+    by_cell = isinstance(law, RatesLaw) and set(law.by) <= {METHOD_FACTOR, DIRECTION_FACTOR}
+    if _is_direction(design, name) and (by_cell or isinstance(law, DiffusionLaw)):
         return DirectionStudies(design=design, question=name, law=law)
     if _is_rating(design, name) and isinstance(law, RatingsLaw) and law.by == (METHOD_FACTOR,):
         return RatingStudies(design=design, question=name, law=law)

@@ -10,7 +10,7 @@ from __future__ import annotations
 import json
 import re
 import tomllib
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Annotated, Any, Literal, Self, TypeVar
 
@@ -72,7 +72,7 @@ def checked_table(model: type[SomeModel], table: dict[str, Any], source: Path | 
     try:
         return _validated(model, table)
     except ValidationError as error:
-        raise ConfigError(_findings(error, source, text)) from error
+        raise ConfigError(_findings(error, table, source, text)) from error
 
 
 def _validated(model: type[SomeModel], table: dict[str, Any]) -> SomeModel:
@@ -85,18 +85,60 @@ def _no_json(value: object) -> dict[str, str]:
     return {"date": str(value)}
 
 
-def _findings(error: ValidationError, source: Path | str, text: str) -> str:
-    return "\n".join(_finding(finding, source, text) for finding in error.errors())
+def _findings(error: ValidationError, table: dict[str, Any], source: Path | str, text: str) -> str:
+    found: dict[tuple[str, ...], list[Any]] = {}
+    for finding in error.errors():
+        found.setdefault(_place(finding, table), []).append(finding)
+    return "\n".join(
+        _finding(place, findings, source, text)
+        for place, findings in found.items()
+        if not (
+            _all_of_kind(findings) and any(len(other) > len(place) and other[: len(place)] == place for other in found)
+        )
+    )
 
 
-def _finding(finding: Any, source: Path | str, text: str) -> str:
-    keys = [str(part) for part in finding["loc"]]
-    line = line_of(text, keys)
-    value = finding["input"]
-    shown = f" = {value!r}" if keys and isinstance(value, str | int | float | bool) else ""
+def _all_of_kind(findings: Sequence[Any]) -> bool:
+    """Whether a value was only of another kind than one that may stand there, as where several kinds may."""
+    return all(finding["type"].endswith("_type") for finding in findings)
+
+
+def _place(finding: Any, table: dict[str, Any]) -> tuple[str, ...]:
+    """The keys of a finding as they stand in the file, without the names of the kinds that were tried."""
+    keys: list[str] = []
+    value: Any = table
+    tagged = False
+    for number, part in enumerate(finding["loc"], start=1):
+        if isinstance(value, dict) and value.get(_TAG) == part and not tagged:
+            tagged = True
+        elif (isinstance(value, dict) and part in value) or (isinstance(value, list) and part in range(len(value))):
+            value, tagged = value[part], False
+            keys.append(str(part))
+        elif number == len(finding["loc"]) and finding["type"] == "missing":
+            keys.append(str(part))
+    return tuple(keys)
+
+
+_TAG = "law"
+"""The key by whose value a table is of one kind or another."""
+
+
+def _finding(place: tuple[str, ...], findings: Sequence[Any], source: Path | str, text: str) -> str:
+    line = line_of(text, [*place])
+    if not _all_of_kind(findings):
+        findings = [finding for finding in findings if not finding["type"].endswith("_type")]
+    value = findings[0]["input"]
+    shown = f" = {_shortened(value)}" if place and isinstance(value, str | int | float | bool) else ""
     rules = {"extra_forbidden": _UNKNOWN, "missing": _MISSING}
-    rule = rules.get(finding["type"], finding["msg"].removeprefix("Value error, "))
-    return f"{source}{f':{line}' if line else ''}: {'.'.join(keys)}{shown}{': ' if keys else ''}{rule}"
+    said = dict.fromkeys(rules.get(one["type"], one["msg"].removeprefix("Value error, ")) for one in findings)
+    rule = " or ".join(said) if len(said) > 1 else next(iter(said))
+    return f"{source}{f':{line}' if line else ''}: {'.'.join(place)}{shown}{': ' if place else ''}{rule}"
+
+
+def _shortened(value: object) -> str:
+    """A value as messages show it: all on one line, and no longer than a line."""
+    text = ascii(value) if isinstance(value, str) and not value.isprintable() else repr(value)
+    return text if len(text) <= _LINE else f"{text[:_LINE]}… ({len(text)} characters)"
 
 
 def line_of(text: str, keys: list[str]) -> int | None:
@@ -115,7 +157,7 @@ def line_of(text: str, keys: list[str]) -> int | None:
             if header[1] == "[[":
                 table = (*table, str(sum(place[:-1] == table and place[-1].isdigit() for place in places)))
             places.setdefault(table, number)
-        elif entry := re.match(r"\s*([\w.\-\"]+)\s*=", line):
+        elif entry := re.match(r'\s*((?:"[^"]*"|[\w.\-])+)\s*=', line):
             places.setdefault((*table, *entry[1].replace('"', "").split(".")), number)
     return next((places[tuple(keys[:n])] for n in range(len(keys), 0, -1) if tuple(keys[:n]) in places), None)
 

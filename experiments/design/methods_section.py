@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 
 from experiments.design.config import DesignConfig
-from experiments.design.language import EMPTY, BlockOrder, FactorConfig, QuestionConfig, shown_level
+from experiments.design.language import EMPTY, INSTRUCTION_FACTOR, BlockOrder, FactorConfig, QuestionConfig, shown_level
 from experiments.design.planned import PlannedRun
 from experiments.design.stimuli import by_hand
 
@@ -83,10 +83,18 @@ def _order(design: DesignConfig, planned: PlannedRun) -> Iterator[str]:
     where = "In each session" if planned.sessions > 1 else "In the session"
     times = {1: "once", 2: "twice"}.get(order.repetitions, f"{order.repetitions} times")
     yield f"{where} every condition came {times}, {_HOW[order.trials]}: {each} trials{_sets(design, each)}."
+    if INSTRUCTION_FACTOR in design.factors:
+        yield from _told(design, design.factors[INSTRUCTION_FACTOR])
     if order.set:
         yield f"{_listed([_word(name) for name in order.set]).capitalize()} was constant in a set."
     for name, most in order.longest_run.items():
         yield f"No level of {_word(name)} came more than {most} times in a row."
+
+
+def _told(design: DesignConfig, factor: FactorConfig) -> Iterator[str]:
+    where = "set" if INSTRUCTION_FACTOR in design.order.set else "session"
+    words = [f"{factor.label(level)} “{factor.texts[shown_level(level)]}”" for level in factor.all_levels]
+    yield f"Before each {where} participants were told: {'; '.join(words)}."
 
 
 def _sets(design: DesignConfig, trials: int) -> str:

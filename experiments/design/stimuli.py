@@ -201,6 +201,12 @@ def _changed(parameters: Method, numbers: Mapping[str, tuple[str, float]], metho
     return parameters
 
 
+def unchanged_methods(design: DesignConfig) -> tuple[str, ...]:
+    """The methods that a design takes as the gun has them: all, or none where a factor changes its numbers."""
+    changed = any(name in _GUN_NUMBERS or factor.sets for name, factor in design.factors.items())
+    return () if changed else design.methods
+
+
 def limits(design: DesignConfig, gun: GunConfig) -> list[ConditionLimits]:
     """What every cell asks of the gun. `ConfigError`: one is beyond a limit, never comes home, or never moves.
 

@@ -108,7 +108,7 @@ TRIALS: tuple[Column, ...] = (
         "instruction",
         (),
         "what the participant was told for this set (`speed`, `accuracy`, ...), as the config names it; empty if "
-        "nothing. Synthetic observers `rates` and `table` do not heed it, `felt` does",
+        "nothing. Of synthetic people only those with the law `diffusion` heed it",
     ),
 )
 

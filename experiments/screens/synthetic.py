@@ -30,7 +30,7 @@ def synthetic_participant_of(setup: Setup[DesignConfig], plan: Plan) -> Syntheti
         raise ConfigError(f"{setup.source}: synthetic is missing; it names the file that says how people answer")
     try:
         return SyntheticParticipant(setup.config, setup.laws, plan, setup.gun)
-    except ValueError as error:
+    except ConfigError as error:
         raise ConfigError(f"{setup.source.parent / (setup.config.synthetic or '')}: {error}") from error
 
 

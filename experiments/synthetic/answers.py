@@ -62,8 +62,7 @@ class GivenAnswer:
 class SyntheticParticipant:
     """A person drawn once, by the seed of the plan, who answers every question of a design by its law.
 
-    `ConfigError`: laws that do not cover the plan. `ValueError`: a table without this person, or numbers that make
-    nobody.
+    `ConfigError`: laws that do not cover the plan, a table without this person, or numbers that make nobody.
     """
 
     def __init__(self, design: DesignConfig, laws: SyntheticAnswers, plan: Plan, gun: GunConfig) -> None:
@@ -73,7 +72,7 @@ class SyntheticParticipant:
         self._own = {name: Stream(plan.seed, "person", *self._who, name).normal() for name in design.questions}
         self._leaning = {name: Stream(plan.seed, "bias", *self._who, name).normal() for name in design.questions}
         self._diffusions = {
-            name: self._decisions(law) for name, law in laws.questions.items() if isinstance(law, DiffusionLaw)
+            name: self._decisions(name, law) for name, law in laws.questions.items() if isinstance(law, DiffusionLaw)
         }
         self._given = {name: given for name in design.questions if (given := self._beforehand(name)) is not None}
 
@@ -122,7 +121,10 @@ class SyntheticParticipant:
         """The answers that are settled before the first trial: those of a table, and those of habit; `None` if none."""
         question, law = self._design.questions[name], self._laws.questions[name]
         if isinstance(law, TableLaw):
-            return self._from_table(name, question, law)
+            try:
+                return self._from_table(name, question, law)
+            except ValueError as error:
+                raise ConfigError(f"questions.{name}: {law.file}: {error}") from error
         if isinstance(law, AppealLaw):
             cells = {trial: "/".join(shown_level(level) for _, level in trial.levels) for trial in self._plan.trials}
             strengths = {
@@ -162,16 +164,19 @@ class SyntheticParticipant:
         others = [answer for answer in answers if answer != known]
         return others[draws.below(len(others))]
 
-    def _decisions(self, law: DiffusionLaw) -> dict[Condition, Diffusion]:
+    def _decisions(self, name: str, law: DiffusionLaw) -> dict[Condition, Diffusion]:
         """This person's decision in each cell."""
         model, someone = law.own, person(law.own.people, Stream(self._plan.seed, "person", *self._who))
         cells = {trial.levels: trial for trial in self._plan.trials}
-        return {
-            levels: own_diffusion(
-                model, someone, self._percept(levels, law), trial.direction, trial.instruction or NEUTRAL
-            )
-            for levels, trial in cells.items()
-        }
+        try:
+            return {
+                levels: own_diffusion(
+                    model, someone, self._percept(levels, law), trial.direction, trial.instruction or NEUTRAL
+                )
+                for levels, trial in cells.items()
+            }
+        except ValueError as error:
+            raise ConfigError(f"questions.{name}: the numbers make nobody: {error}") from error
 
     def _percept(self, levels: Condition, law: DiffusionLaw | AppealLaw) -> Percept:
         """What the shot of a cell gives to feel."""

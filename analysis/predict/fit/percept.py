@@ -149,7 +149,7 @@ def _claim_lines(case: Judged) -> Iterator[str]:
 
 
 def config_text(found: FittedPercept) -> str:
-    """`percept.toml`: sections to paste into a config."""
+    """`percept.toml`: sections to paste into a file of synthetic people, with `law = "diffusion"`."""
     return "\n".join(_config_lines(found)) + "\n"
 
 
@@ -157,13 +157,13 @@ def _config_lines(found: FittedPercept) -> Iterator[str]:
     version = found.provenance["recoil"]
     yield f"# Fitted by `recoil fit percept` (Recoil {version}) to {found.source}; in brackets 95 % intervals."
     yield f"# {spread_sentence(found.people)}"
-    yield "[synthetic.percept]"
+    yield "[questions.response.percept]"
     yield f"exponent = {found.assumed.exponent!r}  # assumed"
     yield f"leak_s = {found.assumed.leak_s!r}  # assumed"
     for name, one in found.fitted.items():
         yield f"{name} = {one.value:.6g}  # {_limits(one)}"
     if found.people != People():
-        yield "\n[synthetic.people]  # assumed"
+        yield "\n[questions.response.people]  # assumed"
         yield from (f"{name} = {sd!r}" for name, sd in asdict(found.people).items())
 
 

@@ -284,7 +284,7 @@ def misfit(study: StudyConfig, setups: Sequence[Setup[DesignConfig]], paper: Pap
     for setup in setups:
         studies = _drawn(setup)
         if studies is None:
-            return f"the people of {setup.config.design} are none whose answers the paper's numbers could replace"
+            return f"the people of {setup.config.design} answer by another law than rates or ratings by method"
         if reason := _other_people(study, studies, _published(studies, paper)) or _other_trials(studies, paper):
             return reason
     return None
