@@ -11,7 +11,6 @@ import pytest
 from device import open_gun
 from experiments import rebuild
 from experiments.clock import VirtualClock
-from experiments.config import setup as config_setup
 from experiments.load import load_setup
 from experiments.run import RunRequest, UnfinishedRun, run
 from experiments.screens.synthetic import synthetic_screen
@@ -109,10 +108,7 @@ def test_an_unfinished_run_that_is_asked_about_is_read_once(study: StudyFolder, 
 def test_the_methods_of_a_run_are_rendered_once_when_its_gun_is_loaded(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    made: Counter[str] = Counter()
-    monkeypatch.setattr(config_setup, "_build", counted(config_setup._build, made))
     setup = load_setup("preference")
-    assert made == {"GunParameters": 2, "VibrationParameters": 1}
     given: list[Any] = []
 
     def opened(address: str, methods: Any, **how: Any) -> Any:
@@ -122,16 +118,8 @@ def test_the_methods_of_a_run_are_rendered_once_when_its_gun_is_loaded(
     monkeypatch.setattr("experiments.run.open_gun", opened)
     run(RunRequest(setup=setup, participant_id="P01", results=tmp_path, seed=1), synthetic_screen, VirtualClock())
     own = [setup.gun.rendering(name) for name in setup.config.methods]
-    assert sorted(given, key=repr) == sorted(own, key=repr)
-    assert made.total() == 3
-
-
-def counted(build: Any, made: Counter[str]) -> Any:
-    def counting(kind: type[Any], *tables: Any) -> Any:
-        made[kind.__name__] += 1
-        return build(kind, *tables)
-
-    return counting
+    assert given
+    assert all(any(one is method for method in own) for one in given)
 
 
 def test_a_live_trial_runs_through_few_files(tmp_path: Path) -> None:

@@ -31,7 +31,7 @@ class Appeal(Model):
     """How a shot that is felt appeals; all of its numbers are assumed.
 
     `base` and `gain` meet the assumed means of `configs/synthetic/preference.toml` to 0.2, `jnd` the published 2 of 14
-    who tied, and `criterion_sd` the published F in half of all studies. Points of the scale but for `jnd`, a Weber fraction.
+    who tied, and `criterion_sd` the published F in half of all studies. Points of the scale; `jnd` a Weber fraction.
     """
 
     base: Points = 2.3
