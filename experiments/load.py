@@ -15,7 +15,7 @@ from device.limits import MAX_SHOTS_PER_MINUTE, DriveHistory, Load
 from device.methods import drive_of, rendering_of
 from device.parameters import GunParameters
 from device.words import Drive
-from experiments.config.door import ConfigError, StudyConfig, load, read_toml
+from experiments.config.door import ConfigError, StudyConfig, at_key, load, read_toml
 from experiments.config.setup import GunConfig, Setup
 from experiments.design.config import DesignConfig
 from experiments.design.language import TRAIN_INTERVAL
@@ -60,9 +60,10 @@ def load_setup(name: str) -> Setup[DesignConfig]:
         plans = [plan_of(design, "P01", 0, group=group) for group in range(len(groups(design)))]
         for plan in plans:
             planned_run(design, plan)
-        by_gun = () if design.below_break_away else unchanged_methods(design)
-        if set(by_gun) <= set(setup.gun.methods):
-            check_methods(setup.gun, by_gun, path.parent / design.gun)
+    by_gun = () if design.below_break_away else unchanged_methods(design)
+    if set(by_gun) <= set(setup.gun.methods):
+        check_methods(setup.gun, by_gun, path.parent / design.gun)
+    with _named(path):
         limits(design, setup.gun)
     if not design.synthetic:
         return setup
@@ -117,7 +118,7 @@ def _named(path: Path) -> Iterator[None]:
     try:
         yield
     except ConfigError as error:
-        raise ConfigError(f"{path}: {error}") from error
+        raise ConfigError(at_key(path, str(error))) from error
 
 
 def load_gun(path: Path) -> GunConfig:

@@ -221,8 +221,8 @@ def _new_plan(request: RunRequest, place: Place, registered: Register) -> Plan:
 def _plan_of(before: Contents, request: RunRequest) -> Plan:
     """The plan of the run to go on with. `PlaceError` if the files or the seed are not those it began with."""
     began, now = before.head.setup_sha256, request.setup.sha256()
+    given_back = f"`recoil configs --from {shlex.quote(str(before.path))} --copy DIR`"
     if began != now:
-        given_back = f"`recoil configs --from {shlex.quote(str(before.path))} --copy DIR`"
         raise PlaceError(
             f"{before.path}: the run began with another config or gun file (setup {began[:12]}, now {now[:12]}); "
             f"resume with the files it began with, which {given_back} gives back, or start anew (--fresh)"
@@ -232,7 +232,7 @@ def _plan_of(before: Contents, request: RunRequest) -> Plan:
     if request.simulated and before.head.laws_json not in (None, people):
         raise PlaceError(
             f"{before.path}: the run began with other synthetic people than {request.setup.config.synthetic} has now; "
-            "`recoil configs --from` gives theirs back, or start anew (--fresh)"
+            f"resume with those it began with, whom {given_back} gives back, or start anew (--fresh)"
         )
     if request.seed is not None and request.seed != plan.seed:
         raise PlaceError(f"{before.path}: the run began with seed {plan.seed}, not {request.seed}; leave out --seed")

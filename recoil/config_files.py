@@ -114,6 +114,7 @@ def _csv(path: Path, rows: Sequence[Mapping[str, str]], columns: tuple[str, ...]
 def _write(files: Mapping[Path, bytes], check: Callable[[], None]) -> None:
     """Write all files and check them; if anything goes wrong, take away what was written."""
     written: list[Path] = []
+    made = {one for file in files for one in file.parents if not one.exists()}
     try:
         for file, data in files.items():
             storage.make_folder(file.parent)
@@ -125,6 +126,9 @@ def _write(files: Mapping[Path, bytes], check: Callable[[], None]) -> None:
         for file in written:
             with suppress(OSError):
                 file.unlink()
+        for one in sorted(made, reverse=True):  # the inner ones first
+            with suppress(OSError):
+                one.rmdir()
         raise
 
 

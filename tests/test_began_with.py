@@ -172,6 +172,7 @@ def forged(journal: Path, **changes: Any) -> Path:
     for part, values in changes.items():
         table = head["laws"]["questions"] if part == "laws" else head["setup"][part]
         table |= values
+        head["laws"]["assumed"] = []
     head["setup_sha256"] = sha256(head["setup"])
     journal.write_bytes(canonical_json(head) + b"\n")
     return journal

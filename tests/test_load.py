@@ -1,5 +1,6 @@
 """Broken configs: the shipped ones, each with one edit. Every refusal names file, line, key, value and rule."""
 
+import re
 import shutil
 from pathlib import Path
 from typing import NamedTuple
@@ -352,8 +353,8 @@ def test_one_refusal_names_file_place_key_value_and_rule(folder: Path, broken: B
     for words in broken.said:
         assert words in message
     named = broken.file if "the gun has no method" not in message else broken.config  # both files are at odds there
-    place = f":{line(folder / broken.file, broken.at)}: " if broken.at else ": "
-    assert f"{folder / named}{place}" in message
+    place = f":{line(folder / broken.file, broken.at)}" if broken.at else r"(:\d+)?"
+    assert re.search(f"{re.escape(str(folder / named))}{place}: ", message)
 
 
 def test_a_gun_file_by_itself_is_refused_for_a_method_that_never_moves(folder: Path) -> None:

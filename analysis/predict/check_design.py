@@ -97,7 +97,11 @@ def check_design(setup: Setup[DesignConfig], seed: int, codes: Sequence[str]) ->
         exposure=exposure(_shots(setup, first)),
         felt_forward_rates=_felt(setup, first),
         warnings=tuple(_warnings(design, planned, [*plans.values()], cells)),
-        assumed=(*design.assumed, *(f"{design.gun}: {key}" for key in setup.gun.assumed)),
+        assumed=(
+            *design.assumed,
+            *(f"{design.synthetic}: {key}" for key in getattr(setup.laws, "assumed", ())),
+            *(f"{design.gun}: {key}" for key in setup.gun.assumed),
+        ),
     )
 
 

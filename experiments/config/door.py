@@ -124,7 +124,6 @@ _TAG = "law"
 
 
 def _finding(place: tuple[str, ...], findings: Sequence[Any], source: Path | str, text: str) -> str:
-    line = line_of(text, [*place])
     if not _all_of_kind(findings):
         findings = [finding for finding in findings if not finding["type"].endswith("_type")]
     value = findings[0]["input"]
@@ -132,7 +131,24 @@ def _finding(place: tuple[str, ...], findings: Sequence[Any], source: Path | str
     rules = {"extra_forbidden": _UNKNOWN, "missing": _MISSING}
     said = dict.fromkeys(rules.get(one["type"], one["msg"].removeprefix("Value error, ")) for one in findings)
     rule = " or ".join(said) if len(said) > 1 else next(iter(said))
+    line = line_of(text, [*place] or _keys_in(rule))
     return f"{source}{f':{line}' if line else ''}: {'.'.join(place)}{shown}{': ' if place else ''}{rule}"
+
+
+def at_key(path: Path, message: str) -> str:
+    """A message about a file, with the line of the key that the message begins with, if it does with one."""
+    line = line_of(read_text(path), _keys_in(message))
+    return f"{path}{f':{line}' if line else ''}: {message}"
+
+
+def _keys_in(message: str) -> list[str]:
+    """The dotted key that a message begins with; none of one that begins otherwise.
+
+    >>> _keys_in("order.sets = 7: cannot be shared"), _keys_in("the planned duration")
+    (['order', 'sets'], ['the'])
+    """
+    found = re.match(r"[A-Za-z_][\w\-]*(\.[\w\-]+)*", message)
+    return found[0].split(".") if found else []
 
 
 def _shortened(value: object) -> str:
@@ -153,13 +169,18 @@ def line_of(text: str, keys: list[str]) -> int | None:
     table: tuple[str, ...] = ()
     for number, line in enumerate(text.split("\n"), start=1):
         if header := re.match(r"\s*(\[\[?)([^\[\]]+)\]", line):
-            table = tuple(part.strip(' "') for part in header[2].split("."))
+            table = _key_parts(header[2])
             if header[1] == "[[":
                 table = (*table, str(sum(place[:-1] == table and place[-1].isdigit() for place in places)))
             places.setdefault(table, number)
         elif entry := re.match(r'\s*((?:"[^"]*"|[\w.\-])+)\s*=', line):
-            places.setdefault((*table, *entry[1].replace('"', "").split(".")), number)
+            places.setdefault((*table, *_key_parts(entry[1])), number)
     return next((places[tuple(keys[:n])] for n in range(len(keys), 0, -1) if tuple(keys[:n]) in places), None)
+
+
+def _key_parts(dotted: str) -> tuple[str, ...]:
+    """The parts of a dotted key, of which one in quotes may hold points."""
+    return tuple(part.strip('"') for part in re.findall(r'"[^"]*"|[^.\s"]+', dotted))
 
 
 _BARE = re.compile(r"[A-Za-z0-9_-]+")

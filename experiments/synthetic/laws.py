@@ -9,7 +9,17 @@ from typing import Annotated, Literal, Self, TypeVar
 from pydantic import Field, model_validator
 
 from device.words import DIRECTIONS
-from experiments.config.door import ConfigError, InnerShare, Model, PositiveSeconds, Seconds, Share, Spread, Text
+from experiments.config.door import (
+    ConfigError,
+    InnerShare,
+    Model,
+    PositiveSeconds,
+    Seconds,
+    Share,
+    Spread,
+    Text,
+    leaves,
+)
 from experiments.design.config import DesignConfig
 from experiments.design.language import (
     DIRECTION_FACTOR,
@@ -217,6 +227,13 @@ class SyntheticAnswers(Model):
     times: LogNormalTimes = LogNormalTimes()
     exposure_s: PositiveSeconds = 5.0
     assumed: tuple[Text, ...] = ()
+
+    @model_validator(mode="after")
+    def _assumed_exists(self) -> Self:
+        unknown = sorted(set(self.assumed) - set(leaves(self)))
+        if unknown:
+            raise ValueError(f"assumed names {', '.join(unknown)}, which this file does not have; name existing keys")
+        return self
 
 
 _LAWS_OF: Mapping[str, tuple[str, ...]] = {

@@ -328,7 +328,7 @@ def reconstructed_people(
 
 def _with_law(setup: Setup[DesignConfig], question: str, law: TableLaw) -> SyntheticAnswers:
     laws = setup.laws if isinstance(setup.laws, SyntheticAnswers) else SyntheticAnswers(questions={})
-    return laws.model_copy(update={"questions": laws.questions | {question: law}})
+    return laws.model_copy(update={"questions": laws.questions | {question: law}, "assumed": ()})
 
 
 def table_name(setup: Setup[DesignConfig]) -> str:
