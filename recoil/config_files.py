@@ -22,7 +22,7 @@ from experiments.config.setup import GunConfig
 from experiments.design.config import DesignConfig
 from experiments.load import load_setup, shipped_folder
 from experiments.record import journal, storage
-from experiments.record.journal import JournalError
+from experiments.record.journal import Head, JournalError
 from experiments.study.folders import PlaceError
 from experiments.synthetic.laws import SyntheticAnswers, TableLaw
 
@@ -43,7 +43,7 @@ def copy_began_with(path: Path, folder: Path) -> list[Path]:
     there = [str(file) for file in files if file.exists()]
     if there:
         raise PlaceError(f"{', '.join(there)}: already there; nothing is overwritten, so copy to another folder")
-    _write(files, lambda: _check(path, next(iter(files)), head.setup_sha256))
+    _write(files, lambda: _check(head, next(iter(files))))
     return list(files)
 
 
@@ -70,9 +70,13 @@ def _people(path: Path, config: Any, laws: Any) -> dict[str, bytes]:
         law.file: _csv(path, law.rows, law.columns(name, scored=config["questions"][name].get("correct") is not None))
         for name, law in tables.items()
     }
-    for name in tables:
-        del laws["questions"][name]["rows"]
-    return {config["synthetic"]: _toml(path, laws)} | files
+    told = {**laws, "questions": {name: _without_rows(law) for name, law in laws["questions"].items()}}
+    return {config["synthetic"]: _toml(path, told)} | files
+
+
+def _without_rows(law: Mapping[str, object]) -> dict[str, object]:
+    """A law as its file has it: the lines of its table stand in a file of their own."""
+    return {key: value for key, value in law.items() if key != "rows"}
 
 
 def _place(own: Path, name: str) -> Path:
@@ -132,12 +136,20 @@ def _write(files: Mapping[Path, bytes], check: Callable[[], None]) -> None:
         raise
 
 
-def _check(path: Path, config: Path, sha256: str) -> None:
-    """`ConfigError` unless the copies load to the setup that the journal names."""
+def _check(head: Head, config: Path) -> None:
+    """`ConfigError` unless the copies load to the setup that the journal names, and to its synthetic people."""
+    path, sha256 = head.path, head.setup_sha256
     try:
-        found = load_setup(str(config)).sha256()
+        setup = load_setup(str(config))
     except ConfigError as error:
         raise ConfigError(f"{path}: line 1: what the run began with does not load here:\n{error}") from error
+    found = setup.sha256()
+    people = setup.laws.model_dump(mode="json") if setup.laws is not None else None
+    if found == sha256 and people != head.laws_json:
+        raise ConfigError(
+            f"{path}: line 1: this version of Recoil reads the run's synthetic people otherwise than that which wrote "
+            "them; go on with the version that the head names (provenance)"
+        )
     if found != sha256:
         raise ConfigError(
             f"{path}: line 1: the run began with setup {sha256[:12]}, but this version of Recoil makes {found[:12]} "

@@ -265,7 +265,7 @@ def _participant(line: _Line, file_name: str, mapping: ColumnMap) -> str:
 
 def _records(code: str, lines: Sequence[_Line], mapping: ColumnMap) -> tuple[CsvRecord, ...]:
     """A participant's rows with the columns of Recoil's own table."""
-    make = _trial if mapping.experiment == "direction" else _rating
+    make = _rating if tables.is_rated(mapping.experiment) else _trial
     rows = [make(line, mapping) | _common(code, line, mapping) for line in lines]
     _number(rows, mapping)
     header = tables.names(mapping.experiment)
@@ -350,7 +350,7 @@ def _number(rows: list[_Row], mapping: ColumnMap) -> None:
     counts = Counter[str]()
     for row in rows:
         session = row.setdefault("session", str(methods.setdefault(row["method"], len(methods) + 1)))
-        block = session if mapping.experiment == "direction" else ""
+        block = "" if tables.is_rated(mapping.experiment) else session
         counts[block] += 1
         row.setdefault("trial", str(counts[block]))
         row.setdefault("set", "1")

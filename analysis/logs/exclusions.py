@@ -39,6 +39,7 @@ from analysis.stats.arrays import BoolArray
 from analysis.stats.cells import codes_of, places_among
 from analysis.times.own_trials import timed
 from experiments.config.door import Model, Seconds, Share
+from experiments.record.tables import is_rated
 
 _MEASURES = {"direction": ("correct", "trials unanswered"), "preference": ("rating", "ratings missing")}
 
@@ -92,10 +93,10 @@ def _incomplete(table: pd.DataFrame, experiment: str, methods: Sequence[str]) ->
     rows = np.bincount(person, minlength=len(codes))
     missing = np.bincount(person[table[measure].isna()], minlength=len(codes))
     lacking = {codes[i]: f"{missing[i]} of {rows[i]} {noun}" for i in np.flatnonzero(missing)}
-    counted = np.asarray(table["direction"] == "forward") if experiment == "direction" else slice(None)
+    counted = slice(None) if is_rated(experiment) else np.asarray(table["direction"] == "forward")
     seen = np.zeros((len(codes), len(methods)), dtype=np.bool_)
     seen[person[counted], method[counted]] = True
-    what = "no forward trials with" if experiment == "direction" else "no rating of"
+    what = "no rating of" if is_rated(experiment) else "no forward trials with"
     absent = {
         codes[i]: f"{what} {', '.join(name for name, there in zip(methods, seen[i], strict=True) if not there)}"
         for i in np.flatnonzero(~seen.all(axis=1))
@@ -233,7 +234,7 @@ def _trial_rules(table: pd.DataFrame, rules: TrialRules, experiment: str) -> Ite
         marks = table["flags"].fillna("").astype(str)
         bad = {text for text in marks.unique() if unwanted & set(text.split())}
         yield "drop_flags", marks.isin(bad).to_numpy(dtype=np.bool_)
-    if experiment == "direction":
+    if not is_rated(experiment):
         own = timed(table).by_own_hand
         time = table["response_time_s"].to_numpy(dtype=np.float64)
         if rules.response_time_min_s is not None:
@@ -241,14 +242,13 @@ def _trial_rules(table: pd.DataFrame, rules: TrialRules, experiment: str) -> Ite
         if rules.response_time_max_s is not None:
             yield "response_time_max_s", own & (time > rules.response_time_max_s)
     if rules.drop_unanswered:
-        measure = "correct" if experiment == "direction" else "rating"
-        yield "drop_unanswered", table[measure].isna().to_numpy(dtype=np.bool_)
+        yield "drop_unanswered", table[_MEASURES[experiment][0]].isna().to_numpy(dtype=np.bool_)
 
 
 def _reasons(table: pd.DataFrame, kept: pd.DataFrame, rules: Rules, experiment: str) -> Iterator[tuple[str, str, str]]:
     """Participant, rule and reason, in the order of the file."""
     yield from _too_few(table, kept, rules.participants.min_kept_share)
-    if experiment == "direction":
+    if not is_rated(experiment):
         yield from _too_uniform(kept, rules.participants.max_same_response_share)
         for accuracy in rules.accuracy:
             yield from _too_often_wrong(kept, accuracy)

@@ -148,12 +148,12 @@ def _first_faults(table: _Table, rules: Iterable[_LogRule]) -> dict[int, BadLogE
 def _rules(table: _Table, experiment: str, codes_in_names: Mapping[int, str | None]) -> Iterator[_LogRule]:
     """The rules that bind cells together, in their order."""
     yield _one_participant(table, codes_in_names)
-    if experiment == "direction":
-        yield _right_answers(table)
-        yield from _numbered_sessions(table)
-    else:
+    if tables.is_rated(experiment):
         yield _ratings_on_the_scale(table)
         yield _numbered_trials(table, _sessions(table, np.zeros(sum(table.texts.rows), dtype=np.int64)))
+    else:
+        yield _right_answers(table)
+        yield from _numbered_sessions(table)
 
 
 def experiment_of(header: Sequence[str]) -> str:

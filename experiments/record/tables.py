@@ -142,6 +142,11 @@ def names(experiment: str) -> list[str]:
     return [column.name for column in TABLES[experiment]]
 
 
+def is_rated(experiment: str) -> bool:
+    """Whether a table holds ratings; else it holds answers that are right or wrong."""
+    return "rating" in names(experiment)
+
+
 def guard(text: str) -> str:
     """Text that no spreadsheet takes for a formula: a `'` in front of a leading `=`, `+`, `-`, `@`, tab, CR or `'`.
 

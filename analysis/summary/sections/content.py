@@ -26,6 +26,7 @@ from analysis.summary.results import DesignSummary, DirectionStatistics, Sensiti
 from analysis.summary.sections.designs import figure_of
 from analysis.summary.sections.trade import CONDITIONAL_ACCURACY, QUANTILE_PROBABILITY
 from analysis.times.own_trials import TimeSpread
+from experiments.record.tables import is_rated
 
 FIGURE_5, FIGURE_8 = "figure-5", "figure-8"
 _DIRECTIONS_FIGURE, _TIMES_FIGURE = "figure-directions", "figure-response-times"
@@ -84,7 +85,7 @@ def _crowd_words(largest: int) -> str:
 
 
 def _means_words(found: WithinStatistics, experiment: str) -> str:
-    shown = apa.percent if experiment == "direction" else apa.number
+    shown = apa.number if is_rated(experiment) else apa.percent
     return ", ".join(f"{named(method)} {shown(mean)}" for method, mean in found.means.items())
 
 
