@@ -124,20 +124,20 @@ def written(folder: Path, text: str) -> Path:
 
 
 @pytest.mark.parametrize(
-    ("claim", "message"),
+    ("claim", "line", "message"),
     [
-        ('kind = "grim"\nmean = "5.2x"\nn = 28', "no printed number"),
-        ('kind = "grim"\nmean = 5.2\nn = 28', "mean"),
-        ('kind = "grim"\nmean = "5.2"\nn = 0', "n"),
-        ('kind = "grim"\nmean = "5.2"', "n"),
-        ('kind = "guess"', "kind"),
-        ('kind = "grim"\nmean = "5.2"\nn = 28\nextra = 1', "extra"),
+        ('kind = "grim"\nmean = "5.2x"\nn = 28', 5, "no printed number"),
+        ('kind = "grim"\nmean = 5.2\nn = 28', 5, "mean"),
+        ('kind = "grim"\nmean = "5.2"\nn = 0', 6, "n"),
+        ('kind = "grim"\nmean = "5.2"', 1, "n"),
+        ('kind = "guess"', 1, "kind"),
+        ('kind = "grim"\nmean = "5.2"\nn = 28\nextra = 1', 7, "extra"),
     ],
 )
-def test_a_fault_is_named_with_its_key(claim: str, message: str, tmp_path: Path) -> None:
+def test_a_fault_is_named_with_its_key(claim: str, line: int, message: str, tmp_path: Path) -> None:
     with pytest.raises(ConfigError, match=message) as error:
         load_paper_file(written(tmp_path, f'[[claims]]\nplace = "I"\nquote = "x"\n{claim}'))
-    assert str(error.value).startswith(f"{tmp_path / 'some.toml'}:1: claims.0")
+    assert str(error.value).startswith(f"{tmp_path / 'some.toml'}:{line}: claims.0")
 
 
 def test_a_claim_that_makes_no_sense_is_named_by_its_place(tmp_path: Path) -> None:

@@ -41,7 +41,7 @@ def test_check_prints_design_orders_duration_and_limits_and_runs_nothing(recoil:
     done = recoil("check", "direction", "preference")
     assert done.returncode == 0
     assert "30.0 min planned" in done.stdout
-    assert "9 x 20 s + 2 x 300 s" in done.stdout
+    assert "of which breaks 780 s" in done.stdout
     assert "8.0 min planned" in done.stdout
     assert done.stdout.count("P14") == 2
     assert "24 V, pulse 20 ms, duty 10 % over any second, 300 shots a minute, coil 80 °C" in done.stdout
@@ -242,7 +242,7 @@ def test_a_new_study_can_be_changed_and_run(recoil: Recoil, tmp_path: Path) -> N
 def test_balanced_orders_take_each_row_of_the_square_in_turn(recoil: Recoil, tmp_path: Path) -> None:
     recoil("configs", "--copy", "mine")
     config = tmp_path / "mine" / "preference.toml"
-    config.write_text(config.read_text().replace('trial_order = "random"', 'trial_order = "latin-square"'))
+    config.write_text(config.read_text().replace('trials = "random"', 'trials = "latin-square"'))
     rows = []
     for number in range(1, 7):
         synthetic(recoil, config="mine/preference.toml", participant=f"P{number}")

@@ -77,7 +77,7 @@ def test_what_found_is_shown_in_a_notebook() -> None:
         (lambda setup, _: recoil.plan(setup, participant="a b"), "participant code 'a b'"),
         (lambda setup, _: recoil.plan(setup, seed=-1), "seed = -1: must be a whole number from 0"),
         (lambda setup, _: recoil.plan(setup, seed=1.5), "seed = 1.5: must be a whole number"),
-        (lambda setup, _: recoil.plan(setup, order_row=9), "order_row = 9: the order is 'random' and has 0 rows"),
+        (lambda setup, _: recoil.plan(setup, order_row=9), "order_row = 9: no order of this design is balanced"),
         (lambda setup, folder: recoil.run_synthetic(setup, "P04", folder), "must be a list of codes, such as ['P04']"),
         (lambda setup, folder: recoil.run_synthetic(setup, ["P07"], folder, seed="x"), "seed = 'x': must be a whole"),
         (lambda _, __: recoil.analyze("nowhere"), "nowhere: no such file or folder"),

@@ -33,8 +33,8 @@ def pilot(tmp_path: Path) -> Path:
     new_study(tmp_path / "pilot")
     for name in ("direction", "preference"):
         config = tmp_path / "pilot" / f"{name}.toml"
-        text = config.read_text().replace('session_order = "random"', 'session_order = "latin-square"')
-        config.write_text(text.replace('trial_order = "random"', 'trial_order = "latin-square"'))
+        text = config.read_text().replace('sessions = "random"', 'sessions = "latin-square"')
+        config.write_text(text.replace('trials = "random"', 'trials = "latin-square"'))
     return tmp_path / "pilot"
 
 

@@ -109,18 +109,20 @@ def _place(finding: Any, table: dict[str, Any]) -> tuple[str, ...]:
     value: Any = table
     tagged = False
     for number, part in enumerate(finding["loc"], start=1):
-        if isinstance(value, dict) and value.get(_TAG) == part and not tagged:
+        last = number == len(finding["loc"])
+        if isinstance(value, dict) and not tagged and not last and _is_tag(part, value):
             tagged = True
         elif (isinstance(value, dict) and part in value) or (isinstance(value, list) and part in range(len(value))):
             value, tagged = value[part], False
             keys.append(str(part))
-        elif number == len(finding["loc"]) and finding["type"] == "missing":
+        elif last and finding["type"] == "missing":
             keys.append(str(part))
     return tuple(keys)
 
 
-_TAG = "law"
-"""The key by whose value a table is of one kind or another."""
+def _is_tag(part: object, table: dict[str, Any]) -> bool:
+    """Whether a part of a place only says of which kind a table is, by its `law` or its `kind`."""
+    return part == table.get("law") or (part == table.get("kind") and part not in table)
 
 
 def _finding(place: tuple[str, ...], findings: Sequence[Any], source: Path | str, text: str) -> str:

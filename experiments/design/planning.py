@@ -71,7 +71,13 @@ def plan_of(design: DesignConfig, participant_id: str, seed: int, *, row: int | 
     """
     given = _chosen("group", groups(design), group)
     if row is not None and row not in range(square_size(design)):
-        raise ConfigError(f"order_row = {row!r}: the orders have {square_size(design)} rows, counted from 0")
+        rows = square_size(design)
+        rule = (
+            f"the orders have {rows} rows, counted from 0"
+            if rows
+            else "no order of this design is balanced by a square"
+        )
+        raise ConfigError(f"order_row = {row!r}: {rule}")
     who = (design.design, participant_id)
     sessions = _ordered(design.order.sessions, _sessions(design, given), row, Stream(seed, "session-order", *who))
     trials = [

@@ -103,7 +103,7 @@ class Console:
         self.observer: Any = None
         self._result: Finished | None = None
         self._error: BaseException | None = None
-        self._closes = False
+        self._leaving = ""
         self._opened, self._over = threading.Event(), threading.Event()
         self._thread = threading.Thread(target=self._run, name="run")
         self._loop, self._bridge = QEventLoop(), _Bridge()
@@ -143,7 +143,7 @@ class Console:
             self.window.take(message)
         if isinstance(message, view.Ended) and self.window is None:
             self._loop.quit()
-        elif isinstance(message, view.Ended) and self._closes and self.window is not None:
+        elif isinstance(message, view.Ended) and self._leaving and self.window is not None:
             self.window.close()
 
     def _controls(self, window: ConsoleWindow, live: LiveRun) -> Controls:
@@ -158,8 +158,8 @@ class Console:
         )
 
     def _leave(self, reason: str) -> None:
-        """Stop the run, and close the window when it has ended."""
-        self._closes = True
+        """Stop the run, also one that has not begun yet, and close the window when it has ended."""
+        self._leaving = reason
         if self.live is not None:
             self.live.offer(events.Stop(reason=reason))
         if self.window is not None and self.window.ended is not None:
@@ -221,6 +221,8 @@ class Console:
         """Show where the run stands, and look after the gun from now on."""
         self.live = live
         self._tell(view.Began(live=live))
+        if self._leaving:
+            live.offer(events.Stop(reason=self._leaving))
         if self.participant is not None:
             noise = self.participant.begin(live, self._tell)
             if noise:
