@@ -17,6 +17,7 @@ from experiments.design.language import shown_level
 
 _MARKERS = ("o", "s", "^", "D", "v", "P", "X")
 _ACROSS = 2
+_LEGEND_COLUMNS = 3
 _TICKS = 10
 """So many levels have a tick each."""
 
@@ -150,5 +151,7 @@ def _label(
         axes.xaxis.minorticks_off()
     if not numeric:
         axes.set_xlim(-0.6, len(places) - 0.4)
-    if axes.get_legend_handles_labels()[1]:
-        axes.legend(frameon=False, fontsize=8.0)
+    labels = axes.get_legend_handles_labels()[1]
+    if labels:  # below the axis, where no mark can lie
+        columns = min(len(labels), _LEGEND_COLUMNS)
+        axes.legend(frameon=False, fontsize=8.0, loc="upper center", bbox_to_anchor=(0.5, -0.17), ncols=columns)
