@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import csv
+import statistics
 import subprocess
 import time
 from collections.abc import Callable
@@ -12,12 +13,14 @@ from typing import Any
 import pytest
 
 from experiments.config.door import read_toml, toml_text
+from experiments.design.planning import plan_of
 from experiments.load import load_setup, shipped_folder
 from experiments.record.journal import read_journal
 from experiments.tasks.questions import choices
 from tests.at_display import AtConsole, needs_display, virtual_display
 from tests.at_runs import RUN, words
 from tests.conftest import Soak
+from tests.designs import design
 from tests.warm_start import warm
 
 pytest.importorskip("PyQt6")
@@ -93,3 +96,27 @@ def test_what_they_leave_is_analysed_drawn_and_exported(place: Path, soak: Soak)
     exported = {path.name.split("_task-")[1].split("_")[0] for path in (place / "results" / "bids").rglob("*_beh.tsv")}
     assert exported == set(TEN)
     soak("report, figures and BIDS of the ten", f"{len(exported)} tasks exported, {len(drawn)} own figures", "all", "")
+
+
+@pytest.mark.parametrize(
+    "order",
+    [
+        {"repetitions": 2500},
+        {"session": ["method"], "sets": 50, "repetitions": 2500, "balance": "set"},
+        {"repetitions": 2500, "longest_run": {"direction": 3}},
+    ],
+    ids=["at random", "sessions of balanced sets", "no direction more than three times"],
+)
+def test_ten_thousand_trials_are_planned_in_time(
+    order: dict[str, Any], soak: Soak, request: pytest.FixtureRequest
+) -> None:
+    factors = {"method": {"levels": ["a", "b"]}, "direction": {"levels": ["forward", "backward"]}}
+    config, times = design(factors=factors, order=order), []
+    for seed in range(5):
+        began_s = time.perf_counter()
+        plan = plan_of(config, "P01", seed)
+        times.append(time.perf_counter() - began_s)
+    assert len(plan.trials) == 10_000
+    how = request.node.callspec.id
+    soak(f"10,000 trials planned, {how}", f"{statistics.median(times):.2f} s", "0.5 s", "median of 5")
+    assert statistics.median(times) < 0.5
