@@ -36,7 +36,7 @@ def shipped_folder() -> Path:
 
 def find(name: str) -> Path:
     """The file that a path or the name of a shipped config means."""
-    shipped = shipped_folder() / (name if name.endswith(".toml") else f"{name}.toml")
+    shipped = shipped_folder() / f"{name}.toml"  # what ends so itself is a file, and no other is taken for it
     for path in (Path(name), shipped if shipped.parent == shipped_folder() else Path(name)):
         if path.is_file():
             return path
@@ -67,8 +67,10 @@ def load_setup(name: str) -> Setup[DesignConfig]:
         limits(design, setup.gun)
     if not design.synthetic:
         return setup
-    if not (path.parent / design.synthetic).is_file():
-        raise ConfigError(f"{path.parent / design.synthetic}: no such file; the config's key `synthetic` names it")
+    people = path.parent / design.synthetic
+    if not people.is_file():
+        what = "a folder, not a file" if people.is_dir() else "no such file"
+        raise ConfigError(f"{people}: {what}; the config's key `synthetic` names it")
     laws = load(SyntheticAnswers, path.parent / design.synthetic)
     with _named(path.parent / design.synthetic):
         check_laws(design, laws, plans)

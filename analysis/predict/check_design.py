@@ -81,7 +81,7 @@ def check_design(setup: Setup[DesignConfig], seed: int, codes: Sequence[str]) ->
     plans = dict(zip(codes, _plans(design, seed, codes), strict=True))
     first = next(iter(plans.values()))
     planned = planned_run(design, first, setup.gun)
-    cells = limits(design, setup.gun)
+    cells, shaken = limits(design, setup.gun), exposure(_shots(setup, first))
     return DesignCheck(
         experiment=design.design,
         title=design.title,
@@ -94,9 +94,9 @@ def check_design(setup: Setup[DesignConfig], seed: int, codes: Sequence[str]) ->
         orders={code: _order(design, plan) for code, plan in plans.items()},
         gun=setup.gun.title,
         cells=tuple(_cell(setup, one) for one in cells),
-        exposure=exposure(_shots(setup, first)),
+        exposure=shaken,
         felt_forward_rates=_felt(setup, first),
-        warnings=tuple(_warnings(design, planned, [*plans.values()], cells)),
+        warnings=tuple(_warnings(design, planned, [*plans.values()], cells, shaken)),
         assumed=(
             *design.assumed,
             *(f"{design.synthetic}: {key}" for key in getattr(setup.laws, "assumed", ())),
@@ -127,7 +127,7 @@ def _plans(design: DesignConfig, seed: int, codes: Sequence[str]) -> Iterator[Pl
     """The plans of people who come in this order: groups and rows of the square are filled in turn."""
     rows, kinds = square_size(design), len(groups(design))
     for number, code in enumerate(codes):
-        yield plan_of(design, code, seed, row=number % rows if rows else None, group=number % kinds)
+        yield plan_of(design, code, seed, row=number // kinds % rows if rows else None, group=number % kinds)
 
 
 def _order(design: DesignConfig, plan: Plan) -> tuple[str, ...]:
@@ -182,9 +182,14 @@ def _shots(setup: Setup[DesignConfig], plan: Plan) -> list[tuple[Method, int]]:
 
 
 def _warnings(
-    design: DesignConfig, planned: PlannedRun, plans: Sequence[Plan], cells: Sequence[ConditionLimits]
+    design: DesignConfig, planned: PlannedRun, plans: Sequence[Plan], cells: Sequence[ConditionLimits], shaken: Exposure
 ) -> Iterator[str]:
     yield from warnings(design, planned)
+    if shaken.a8_m_s2 > shaken.action_m_s2:
+        yield (
+            f"the vibration of {shaken.a8_m_s2:.2f} m/s² A(8) exceeds the action value of {shaken.action_m_s2:g} of "
+            "2002/44/EC, if people take as much of it as the design lets them: shoot less often or fewer"
+        )
     slowest_s = max(one.settle_s for one in cells)
     if design.trial.intervals > 1 and not planned.hands_within and design.trial.gap_s < slowest_s:
         yield f"trial.gap_s = {design.trial.gap_s:g} s: it will be longer, as the gun needs {slowest_s:.3g} s"

@@ -30,7 +30,7 @@ from experiments.tasks.questions import chance, correct_columns
 def summarise(design: DesignConfig, table: pd.DataFrame) -> DesignSummary:
     """The statistics of a design from its table: one row a trial, the columns of `design_table.columns`.
 
-    Rankings and pairs are described, not tested.
+    Pairs are described, not tested.
     """
     asked = {name: question for name, question in design.questions.items() if question.kind != "text"}
     return DesignSummary(
@@ -74,7 +74,18 @@ def _question(design: DesignConfig, name: str, question: QuestionConfig, table: 
         left_out=left_out,
         chance=chance(question),
         preferred=_preferred(design, question, scored),
+        scale=_scale(question),
     )
+
+
+def _scale(question: QuestionConfig) -> str | None:
+    """What the numbers of a rating or ranking mean."""
+    if question.kind == "ranking":
+        return f"1 = {question.minimum_text}"
+    if question.kind != "rating" or not (question.minimum_text or question.maximum_text):
+        return None
+    ends = ((question.minimum, question.minimum_text), (question.maximum, question.maximum_text))
+    return ", ".join(f"{end:g} = {text}" for end, text in ends if text)
 
 
 def _varied(design: DesignConfig) -> list[str]:
@@ -189,7 +200,7 @@ def _comparisons(
     design: DesignConfig, question: QuestionConfig, people: pd.DataFrame, group: pd.Series | None
 ) -> Iterator[DesignTest]:
     """What differs between conditions, by as many factors as there are."""
-    if people.empty or design.trial.kind == "pair" or question.kind == "ranking":
+    if people.empty or design.trial.kind == "pair":
         return
     names = [str(name) for name in people.columns.names]
     if why := _untested(question, people):
@@ -198,7 +209,7 @@ def _comparisons(
     scores = people.to_numpy(dtype=np.float64)
     if question.kind == "number" and len(names) == 1:
         yield from _exponent(names[0], people)
-    if len(names) == 1 and group is not None:
+    if len(names) == 1 and group is not None and question.kind != "ranking":
         yield from _mixed(design.between[0], names[0], scores, [str(group[code]) for code in people.index])
     elif len(names) == 1:
         yield from _one_factor(names[0], scores, question)
@@ -210,27 +221,33 @@ def _comparisons(
         yield from map(_effect, two_within(scores.reshape(len(people), *sizes), (names[0], names[1])))
     else:
         effect = " × ".join((*design.between, *names))
-        yield DesignTest(name="anova", effect=effect, reason="there is no ANOVA here of more than two factors")
+        yield DesignTest(name="anova", effect=effect, reason=_MANY)
 
 
 def _untested(question: QuestionConfig, people: pd.DataFrame) -> str:
     """Why there is no test of a question's conditions; empty if there is one."""
+    if question.kind == "ranking" and people.columns.nlevels > 1:
+        return "ranks of several factors are described, not tested"
     if question.correct is None and len(question.named_answers) > 2:
         return "more than two answers and none is right: they are counted"
     return "fewer than two people have all conditions" if len(people) < 2 else ""
 
 
+_MANY = "there is no ANOVA here of more than two factors; take the logs to a program of your choice"
+
+
 def _one_factor(name: str, scores: FloatArray, question: QuestionConfig) -> Iterator[DesignTest]:
-    anova = rm_anova(scores)
-    yield DesignTest(
-        name="anova",
-        effect=name,
-        statistic=float(anova.F),
-        df=(int(anova.df_effect), int(anova.df_error)),
-        p=float(anova.p),
-        reason=str(anova.reason) or None,
-    )
-    if question.kind == "rating":
+    if question.kind != "ranking":
+        anova = rm_anova(scores)
+        yield DesignTest(
+            name="anova",
+            effect=name,
+            statistic=float(anova.F),
+            df=(int(anova.df_effect), int(anova.df_error)),
+            p=float(anova.p),
+            reason=str(anova.reason) or None,
+        )
+    if question.kind in {"rating", "ranking"}:
         ranks = friedman(scores)
         yield DesignTest(name="friedman", effect=name, statistic=ranks.chi2, p=ranks.p, reason=ranks.reason)
 

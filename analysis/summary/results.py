@@ -334,7 +334,7 @@ class QuestionSummary:
     """All that one question gave. `left_out`: who has no score in some condition, and so is in no test.
 
     `chance`: how often who does not know is right; `None` where nothing is right. `preferred`: of pairs, how often each
-    level was chosen of all trials that had it.
+    level was chosen of all trials that had it. `scale`: what the ends of a rating or rank 1 mean.
     """
 
     kind: str
@@ -343,6 +343,7 @@ class QuestionSummary:
     left_out: tuple[str, ...] = ()
     chance: float | None = None
     preferred: tuple[ConditionSummary, ...] | None = field(default=None, metadata=OPTIONAL)
+    scale: str | None = field(default=None, metadata=OPTIONAL)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -10,7 +10,7 @@ from __future__ import annotations
 import json
 import re
 import tomllib
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Annotated, Any, Literal, Self, TypeVar
 
@@ -47,7 +47,7 @@ def read_toml(path: Path) -> dict[str, Any]:
 def read_text(path: Path) -> str:
     """A file's text."""
     try:
-        return path.read_text(encoding="utf-8")
+        return path.read_text(encoding="utf-8-sig")  # some editors begin a file with a mark
     except UnicodeDecodeError as error:
         raise ConfigError(f"{path}: byte {error.start}: not UTF-8; save the file as UTF-8") from error
     except OSError as error:
@@ -130,11 +130,36 @@ def _finding(place: tuple[str, ...], findings: Sequence[Any], source: Path | str
         findings = [finding for finding in findings if not finding["type"].endswith("_type")]
     value = findings[0]["input"]
     shown = f" = {_shortened(value)}" if place and isinstance(value, str | int | float | bool) else ""
-    rules = {"extra_forbidden": _UNKNOWN, "missing": _MISSING}
-    said = dict.fromkeys(rules.get(one["type"], one["msg"].removeprefix("Value error, ")) for one in findings)
+    said = dict.fromkeys(_RULES_BY_TYPE.get(one["type"], _own_words)(one) for one in findings)
     rule = " or ".join(said) if len(said) > 1 else next(iter(said))
     line = line_of(text, [*place] or _keys_in(rule))
     return f"{source}{f':{line}' if line else ''}: {'.'.join(place)}{shown}{': ' if place else ''}{rule}"
+
+
+def _own_words(finding: Any) -> str:
+    return str(finding["msg"]).removeprefix("Value error, ")
+
+
+def _a_kind(finding: Any) -> str:
+    """What a key that says of which kind a table is must say."""
+    key, known = finding["ctx"]["discriminator"].strip("'"), finding["ctx"].get("expected_tags")
+    if known is None:
+        return f"the key {key} is missing: it says of which kind this is"
+    return f"{key} = {finding['ctx']['tag']!r} is none of {known.replace(chr(39), '')}"
+
+
+_RULES_BY_TYPE: Mapping[str, Callable[[Any], str]] = {
+    "extra_forbidden": lambda _: _UNKNOWN,
+    "missing": lambda _: _MISSING,
+    "union_tag_not_found": _a_kind,
+    "union_tag_invalid": _a_kind,
+    "too_short": lambda finding: f"holds too few; give at least {finding['ctx']['min_length']}",
+    "tuple_type": lambda _: "must be a list",
+    "dict_type": lambda _: "must be a table",
+    "model_type": lambda _: "must be a table",
+    "model_attributes_type": lambda _: "must be a table",
+}
+"""The rules that are broken, in words of our own, by what the checker calls them."""
 
 
 def at_key(path: Path, message: str) -> str:

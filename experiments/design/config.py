@@ -151,8 +151,9 @@ def _name_problems(design: DesignConfig) -> Iterator[str]:
     if alike:
         yield f"{', '.join(alike)} differ in case alone; rename one"
     taken = [name for name in (*design.factors, *design.questions) if name in _COMMON_COLUMNS]
-    if taken:
-        yield f"{', '.join(taken)} is the name of a column that every table has; choose another name"
+    for name in taken:
+        where = "factors" if name in design.factors else "questions"
+        yield f"{where}.{name}: {name} is the name of a column that every table has; choose another name"
     columns = [*_columns_of_factors(design), *_columns_of_questions(design)]
     both = sorted({name for name in columns if columns.count(name) > 1})
     if both:
@@ -315,7 +316,9 @@ def _interval_problems(design: DesignConfig, question: QuestionConfig) -> Iterat
     if trial.intervals == 1:
         yield f"correct = {correct!r}: a trial of kind {trial.kind!r} has one interval"
         return
-    if correct == "larger" and not _numeric(design, trial.compare):
+    if correct == "larger" and trial.kind not in {"two-interval", "pair"}:
+        yield f"correct = 'larger' is of two intervals; of kind {trial.kind!r} say interval"
+    elif correct == "larger" and not _numeric(design, trial.compare):
         yield f"correct = 'larger': the levels of {trial.compare} are no numbers, so none is larger"
     elif correct == "larger" and isinstance(trial.standard, str):
         yield f"correct = 'larger': the standard is no number (it is {trial.standard!r}), so none is larger"

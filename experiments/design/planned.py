@@ -9,7 +9,7 @@ from itertools import pairwise
 from experiments.config.door import ConfigError
 from experiments.config.setup import GunConfig
 from experiments.design.config import DesignConfig
-from experiments.design.language import DIRECTION_FACTOR
+from experiments.design.language import DIRECTION_FACTOR, shown_level
 from experiments.design.plan import Condition, Plan, Trial
 from experiments.design.stimuli import by_hand, settings
 
@@ -18,7 +18,7 @@ from experiments.design.stimuli import by_hand, settings
 class PlannedRun:
     """One run as planned: `break_s` of `duration_s` are rests; `hand_changes` is how often hands set something anew.
 
-    `hands_within`: whether they have something to set or to turn between the intervals of a trial.
+    `hands_within`: how often they have something to set or to turn between the intervals of a trial.
     """
 
     sessions: int
@@ -28,7 +28,7 @@ class PlannedRun:
     duration_s: float
     trials_without_break: int
     hand_changes: int
-    hands_within: bool
+    hands_within: int
 
 
 def planned_run(design: DesignConfig, plan: Plan, gun: GunConfig | None = None) -> PlannedRun:
@@ -46,15 +46,16 @@ def workload(design: DesignConfig, plan: Plan, gun: GunConfig | None = None) -> 
     timing, trials = design.timing, plan.trials
     rests_s = [_rest_s(design, before, trial) for before, trial in pairwise(trials)]
     trial_s = timing.hand_over_s + timing.stimulus_s + timing.answer_s
+    within = sum(_hands_within(design, gun, trial) for trial in trials)
     return PlannedRun(
         sessions=len({trial.session for trial in trials}),
         sets=len({(trial.session, trial.set) for trial in trials}),
         trials=len(trials),
         break_s=sum(rests_s),
-        duration_s=timing.opening_s + len(trials) * trial_s + sum(rests_s),
+        duration_s=timing.opening_s + len(trials) * trial_s + within * timing.hand_over_s + sum(rests_s),
         trials_without_break=max(_stretches(rests_s)),
         hand_changes=sum(_by_hand(design, gun, one) != _by_hand(design, gun, other) for one, other in pairwise(trials)),
-        hands_within=any(_hands_within(design, gun, trial) for trial in trials),
+        hands_within=within,
     )
 
 
@@ -83,15 +84,15 @@ def _by_hand(design: DesignConfig, gun: GunConfig | None, trial: Trial) -> objec
     return tuple(trial.level(name) for name in by_hand(design))
 
 
-def _hands_within(design: DesignConfig, gun: GunConfig | None, trial: Trial) -> bool:
-    """Whether the intervals of a trial differ in what hands do."""
+def _hands_within(design: DesignConfig, gun: GunConfig | None, trial: Trial) -> int:
+    """How often hands do something else from one interval of a trial to the next."""
     held = [levels for place in range(len(trial.intervals)) if (levels := trial.levels_at(place)) is not None]
     hands = by_hand(design)
     done = [
         (dict(levels).get(DIRECTION_FACTOR), settings(design, gun, levels) if gun else _of(levels, hands))
         for levels in held
     ]
-    return any(one != done[0] for one in done)
+    return sum(one != other for one, other in pairwise(done))
 
 
 def _of(levels: Condition, names: Sequence[str]) -> Condition:
@@ -110,6 +111,28 @@ def _check_fatigue(design: DesignConfig, found: PlannedRun) -> None:
             f"the planned duration of {found.duration_s:g} s exceeds fatigue.max_planned_s = "
             f"{fatigue.max_planned_s:g} s; plan fewer or shorter trials and breaks"
         )
+
+
+_MOST_SHOWN = 6
+"""So many trials of one session are shown one by one."""
+
+
+def order_shown(design: DesignConfig, plan: Plan) -> tuple[str, ...]:
+    """What is constant in each session in its order, with the group; of one short session the trials."""
+    first = {trial.session: trial for trial in reversed(plan.trials)}
+    if len(first) > 1:
+        found = [_shown(first[number], design.order.session) for number in sorted(first)]
+    elif len(plan.trials) <= _MOST_SHOWN:
+        varied = [name for name in design.varying if len(design.factors[name].all_levels) > 1]
+        found = [_shown(trial, varied) for trial in plan.trials]
+    else:
+        found = []
+    group = _shown(plan.trials[0], design.between)
+    return tuple([f"{group}: {found[0] if found else ''}".rstrip(), *found[1:]] if group else found)
+
+
+def _shown(trial: Trial, names: Sequence[str]) -> str:
+    return " ".join(shown_level(level) for name, level in trial.levels if name in names)
 
 
 def warnings(design: DesignConfig, found: PlannedRun) -> Iterator[str]:

@@ -108,7 +108,8 @@ def _answer(name: str, question: QuestionConfig) -> Column:
         case "number":
             return tables.number_column(name, "", "the number that the participant said; empty means none was given")
         case "ranking":
-            return tables.integer_column(name, "rank among the trials of the block, from 1; empty means none was given")
+            meaning = f"rank among the trials of the block, 1 = {question.minimum_text}; empty means none was given"
+            return tables.integer_column(name, meaning)
         case "text":
             return tables.text_column(name, "the participant's own words")
 

@@ -39,6 +39,8 @@ _HALTED = (
 )
 _HOW = {Rate: "a number, or none", Describe: "the words"}
 _COMMANDS = ("stop", "pause", "undo", "repeat", "flag", "note", "skip", "help")
+_BESIDE = (events.Flag, events.Note, events.Reason)
+"""What is said beside what is asked, which then stands there anew."""
 _TICK_S = 1.0
 
 
@@ -180,6 +182,7 @@ class TerminalScreen:
         verdict = self._live.offer(event, press)
         if verdict.text:
             self._say(f"  {verdict.text}")
+        if verdict.text or isinstance(event, _BESIDE):
             self._show(self.text(self._live.position))
 
     def _meant(self, line: str, position: Position, now_s: float) -> Event | str | None:
@@ -187,7 +190,9 @@ class TerminalScreen:
         if line.startswith("!"):
             return events.EmergencyStop()
         word, _, rest = line.removeprefix("/").partition(" ")
-        free = position.state in (State.DESCRIBING, State.HALTED) or _corrects_words(position)
+        word = word.lower()
+        words = position.state in (State.DESCRIBING, State.HALTED) or _corrects_words(position)
+        free = words or _answers(position, line)
         if word in _COMMANDS and (line.startswith("/") or not free):
             return _command(word, rest.strip())
         return _line(line, position, now_s)
@@ -225,6 +230,12 @@ class TerminalScreen:
 
 def _corrects_words(position: Position) -> bool:
     return isinstance(position.correcting, Describe)
+
+
+def _answers(position: Position, line: str) -> bool:
+    """Whether a line is one of the answers that are asked for, whatever command has the same name."""
+    step = position.correcting or position.step
+    return isinstance(step, Ask) and _chosen(step, line) is not None
 
 
 def _keys(asked: Ask) -> str:

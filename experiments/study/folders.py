@@ -18,7 +18,9 @@ from experiments.config.door import CODE, StudyConfig
 from experiments.config.setup import Setup
 from experiments.design import planning
 from experiments.design.config import DesignConfig
+from experiments.design.planned import order_shown
 from experiments.load import load_setup, load_study
+from experiments.rebuild import began_with
 from experiments.record import journal, replay, storage, tables
 from experiments.record.journal import Contents, Head, JournalError
 from experiments.session.history import answered
@@ -121,12 +123,12 @@ def row_of_next_run(
 ) -> int | None:
     """The row of the balancing square that the next run takes; `None` for a random order.
 
-    The least used row over the runs of participants who are not excluded, the first such row. So rows are used equally
-    often, to within one, whenever everyone who was excluded has been replaced.
+    The least used row over the runs of participants of the same group who are not excluded, the first such row. So in
+    each group rows are used equally often, to within one, whenever everyone who was excluded has been replaced.
     """
     config = setup.config
-    size = planning.square_size(config)
-    return least_used(size, used_rows(results, config.design, registered, head_of)) if size else None
+    size, group = planning.square_size(config), group_of_next_run(setup, results, registered, head_of)
+    return least_used(size, used_rows(results, config.design, registered, head_of, group)) if size else None
 
 
 def group_of_next_run(
@@ -149,10 +151,12 @@ def least_used(count: int, used: Sequence[int]) -> int:
     return min(range(count), key=lambda one: (list(used).count(one), one))
 
 
-def used_rows(results: Path, experiment: str, registered: Register, head_of: HeadOf = journal.head) -> list[int]:
-    """The rows that runs in this folder have taken; who is excluded gives theirs back."""
-    rows = [one.plan.order_row for one in _heads(results, experiment, registered, head_of)]
-    return [row for row in rows if row is not None]
+def used_rows(
+    results: Path, experiment: str, registered: Register, head_of: HeadOf = journal.head, group: int = 0
+) -> list[int]:
+    """The rows that runs of a group in this folder have taken; who is excluded gives theirs back."""
+    plans = [one.plan for one in _heads(results, experiment, registered, head_of)]
+    return [plan.order_row for plan in plans if plan.order_row is not None and plan.group == group]
 
 
 def _heads(results: Path, experiment: str, registered: Register, head_of: HeadOf) -> list[Head]:
@@ -344,7 +348,9 @@ class _Look:
         if row is None and seed is None:
             return None
         group = group_of_next_run(setup, self._study.results, self.registered, self._head)
-        return planning.plan_of(setup.config, participant_id, seed or 0, row=row, group=group).methods
+        return order_shown(
+            setup.config, planning.plan_of(setup.config, participant_id, seed or 0, row=row, group=group)
+        )
 
 
 def progress_of(where: Place, contents: Contents | None, *, elsewhere: bool = False) -> RunProgress:
@@ -366,7 +372,7 @@ def progress_of(where: Place, contents: Contents | None, *, elsewhere: bool = Fa
         answered=len(answered(replay.history(contents))),
         planned=len(plan.trials),
         last_utc=contents.records[-1].utc,
-        methods=plan.methods,
+        methods=order_shown(began_with(contents.head), plan),
     )
 
 

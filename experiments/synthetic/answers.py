@@ -147,7 +147,10 @@ class SyntheticParticipant:
             trials = [trial for trial in self._plan.trials if cell_of(law.by, trial.levels) == cell]
             text = table_cell(law, name, self._plan.participant_id, cell, scored=scored)
             if not scored:
-                found |= dict.fromkeys(trials, _number_in(text, question.scale, f"{self._who[1]}, {cell}, {name}"))
+                where = f"participant {self._who[1]}, {cell}, {name}"
+                if not text and not question.may_be_skipped:
+                    raise ValueError(f"{where} is empty, but the question may not be skipped (may_be_skipped)")
+                found |= dict.fromkeys(trials, _number_in(text, question.scale, where))
                 continue
             correct = _count_in(text, len(trials), f"participant {self._who[1]}, {cell}, correct")
             marks = [True] * correct + [False] * (len(trials) - correct)
@@ -287,7 +290,7 @@ def _number_in(text: str, scale: NumberScale, where: str) -> float | None:
         value = math.nan
     if not scale.minimum <= value <= scale.maximum:
         raise ValueError(
-            f"participant {where} is {text!r}; it must be a number from {scale.minimum:g} to {scale.maximum:g}, or "
+            f"{where} is {text!r}; it must be a number from {scale.minimum:g} to {scale.maximum:g}, or "
             "empty for no answer"
         )
     return value

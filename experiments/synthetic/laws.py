@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Iterator, Mapping, Sequence
+from itertools import product
 from typing import Annotated, Literal, Self, TypeVar
 
 from pydantic import Field, model_validator
@@ -267,10 +268,12 @@ def check_laws(design: DesignConfig, laws: SyntheticAnswers, plans: Iterable[Pla
 
 def _problems(design: DesignConfig, question: QuestionConfig, law: Law) -> Iterator[str]:
     common = [*_common_problems(design, question, law)]
-    if common:
+    if common or (common := [*_surplus_problems(design, law)]):
         yield from common
         return
     match law:
+        case PsychometricLaw():
+            yield from _psychometric_problems(question, law)
         case RatesLaw():
             yield from _bias_problems(question, law.bias)
         case SharesLaw():
@@ -293,6 +296,19 @@ def _common_problems(design: DesignConfig, question: QuestionConfig, law: Law) -
     for factor in (*getattr(law, "by", ()), *filter(None, (getattr(law, "factor", None),))):
         if factor not in design.factors:
             yield f" names {factor!r}, which is no factor; they are {', '.join(design.factors)}"
+            return
+    if isinstance(law, PsychometricLaw | PowerLaw):
+        levels = design.factors[law.factor].all_levels
+        bad = [shown_level(level) for level in levels if not isinstance(level, float) or level <= 0]
+        if bad:
+            yield f".factor = {law.factor!r}: this law needs numbers above 0; its levels are {', '.join(bad)}"
+
+
+def _psychometric_problems(question: QuestionConfig, law: PsychometricLaw) -> Iterator[str]:
+    if question.kind != "yes-no" and law.guess != PsychometricLaw.model_fields["guess"].default:
+        yield f".guess = {law.guess:g} is of yes-no; who does not feel it guesses among the answers here: remove it"
+    if question.kind == "yes-no" and law.guess + law.lapse >= 1.0:
+        yield f": guess {law.guess:g} and lapse {law.lapse:g} leave nothing to feel; make them less than 1 together"
 
 
 def _bias_problems(question: QuestionConfig, bias: Bias | None) -> Iterator[str]:
@@ -308,6 +324,16 @@ def _share_problems(question: QuestionConfig, law: SharesLaw) -> Iterator[str]:
 
 def _listed(question: QuestionConfig) -> str:
     return ", ".join(question.named_answers)
+
+
+def _surplus_problems(design: DesignConfig, law: Law) -> Iterator[str]:
+    """Cells that no trial can be of: most likely misspelt."""
+    by = [[shown_level(level) for level in design.factors[name].all_levels] for name in getattr(law, "by", ())]
+    cells = {"/".join(cell) for cell in product(*by)} if by else {EVERYWHERE}
+    for place in ("share", "mean"):
+        for cell in getattr(law, place, {}):
+            if cell not in cells and not design.trial.catch:
+                yield f".{place} has {cell!r}, which is no cell of {' and '.join(getattr(law, 'by', ())) or 'all'}"
 
 
 def _mean_problems(question: QuestionConfig, law: RatingsLaw) -> Iterator[str]:

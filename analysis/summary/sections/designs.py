@@ -91,7 +91,7 @@ def _tables(name: str, question: QuestionSummary) -> Iterator[Table]:
     if question.preferred:
         yield _conditions(f"{name}: how often each was chosen,", replace(question, cells=question.preferred))
     if question.cells:
-        yield _conditions(name, question)
+        yield _conditions(f"{name} ({question.scale})" if question.scale else name, question)
     if question.tests:
         header = ("Test", "Of", "Statistic", "df", "p", "Effect or interval")
         yield Table(caption=f"{name}: tests", header=header, rows=tuple(map(_test, question.tests)))
