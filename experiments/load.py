@@ -34,9 +34,13 @@ def shipped_folder() -> Path:
     return installed if installed.is_dir() else here.parent / "configs"
 
 
-def find(name: str) -> Path:
-    """The file that a path or the name of a shipped config means."""
-    shipped = shipped_folder() / f"{name}.toml"  # what ends so itself is a file, and no other is taken for it
+def find(name: str | Path) -> Path:
+    """The file that a path or the name of a shipped config means; for a `Path` no shipped one is taken."""
+    if isinstance(name, Path):
+        if name.is_file():
+            return name
+        raise ConfigError(f"{name}: {'a folder, not a config' if name.is_dir() else 'no such file'}")
+    shipped = shipped_folder() / (name if name.endswith(".toml") else f"{name}.toml")
     for path in (Path(name), shipped if shipped.parent == shipped_folder() else Path(name)):
         if path.is_file():
             return path
@@ -46,7 +50,7 @@ def find(name: str) -> Path:
     raise ConfigError(f"{name}: no such file and no shipped config; shipped are {known}")
 
 
-def load_setup(name: str) -> Setup[DesignConfig]:
+def load_setup(name: str | Path) -> Setup[DesignConfig]:
     """A design with its gun and its synthetic people, held against each other. `ConfigError` names what is wrong."""
     path = find(name)
     if not {"design", "factors"} & set(read_toml(path)):

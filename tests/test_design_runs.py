@@ -4,11 +4,13 @@ from __future__ import annotations
 
 import csv
 import io
+from collections import Counter
 
 import pytest
 
 from experiments.clock import VirtualClock
-from experiments.design.planning import groups, practice_of
+from experiments.design.planned import order_shown
+from experiments.design.planning import groups, plan_of, practice_of, square_size
 from experiments.load import load_setup
 from experiments.rebuild import rebuild
 from experiments.record.design_table import columns
@@ -95,6 +97,29 @@ def test_groups_are_filled_in_turn_and_rows_of_the_square_as_well(tmp_path):
     assert [plan.group for plan in found] == [*range(count)] * 2
     orders = [carried_out("realism", tmp_path, f"P0{number}").plan.order_row for number in (1, 2, 3)]
     assert orders == [0, 1, 0]
+
+
+def test_in_each_group_every_row_of_the_square_comes_equally_often(tmp_path):
+    config = SETUPS["grip"].config
+    count, rows = len(groups(config)), square_size(config)
+    assert (count, rows) == (2, 3)
+    plans = [carried_out("grip", tmp_path, f"P{number:02d}").plan for number in range(1, 2 * count * rows + 1)]
+    met = Counter((plan.group, plan.order_row) for plan in plans)
+    assert set(met.values()) == {2}
+    assert len(met) == count * rows
+
+
+def test_the_order_that_is_shown_is_that_of_sessions_and_group():
+    realism, grip = SETUPS["realism"].config, SETUPS["grip"].config
+    assert order_shown(realism, plan_of(realism, "P01", 1, row=1)) == ("on", "off")
+    assert order_shown(grip, plan_of(grip, "P01", 1, row=0, group=1)) == ("two hands",)
+    short = changed("grip", order={"repetitions": 1}).config
+    assert order_shown(short, plan_of(short, "P01", 1, row=0))[0].startswith("one hand: ")
+
+
+def test_a_practice_is_of_the_gun_and_told_no_instruction():
+    practised = practice_of(changed("hurry", practice={"repetitions": 2, "of": ("method",)}).config, "P01", 1)
+    assert {trial.instruction for trial in practised.trials} == {""}
 
 
 def test_a_hand_sets_the_damper_once_a_session_where_the_design_says_so(tmp_path):

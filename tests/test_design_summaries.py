@@ -142,7 +142,9 @@ def test_three_factors_are_described_and_not_tested():
     table = simulated(config, checked_table(SyntheticAnswers, laws, "laws.toml"), 5)
     found = summarise(config, table).questions["q"]
     assert len(found.cells) == 8
-    assert [test.reason for test in found.tests] == ["there is no ANOVA here of more than two factors"]
+    assert [test.reason for test in found.tests] == [
+        "there is no ANOVA here of more than two factors; take the logs to a program of your choice"
+    ]
 
 
 def test_nested_factors_are_described_and_not_tested():

@@ -160,7 +160,7 @@ BROKEN = {
     ),
     "no methods": Broken(
         PREFERENCE, PREFERENCE, '["vibration", "asymmetric-1", "asymmetric-2"]', "[]",
-        ("factors.method.levels", "at least 1 item"), "levels = []",
+        ("factors.method.levels", "holds too few; give at least 1"), "levels = []",
     ),
     "unknown order": Broken(
         DIRECTION, DIRECTION, 'sessions = "random"', 'sessions = "reversed"',
@@ -261,7 +261,7 @@ BROKEN = {
     ),
     "unknown law": Broken(
         DIRECTION, ANSWERING, 'law = "rates"', 'law = "rating"',
-        ("questions.response", "'rating'", "'rates', 'shares'"),
+        ("questions.response", "'rating'", "is none of rates, shares"),
         "[questions.response]",
     ),
     "law of another kind of question": Broken(
@@ -580,3 +580,9 @@ def test_the_line_of_a_key_is_found_in_every_way_that_toml_has_to_write_it() -> 
 def test_a_rare_line_separator_in_a_comment_is_no_line_end() -> None:
     # TOML knows LF and CR LF only; editors count lines the same way
     assert line_of("# one\u2028still one\x85still one\na = 1", ["a"]) == 2
+
+
+def test_a_file_that_is_not_there_is_none_of_the_shipped() -> None:
+    assert load_setup("direction").config.design == "direction"
+    with pytest.raises(ConfigError, match=r"direction\.toml: no such file"):
+        load_setup(Path("direction.toml"))

@@ -123,6 +123,22 @@ def answered_by(design, gun, laws, plan):
             {"response": {"law": "psychometric", "factor": "voltage", "threshold": 9.0, "spread": 0.1}},
             "names 'voltage', which is no factor",
         ),
+        (
+            "voltages",
+            {"response": {"law": "psychometric", "factor": "method", "threshold": 9.0, "spread": 0.1}},
+            "this law needs numbers above 0; its levels are asymmetric-1",
+        ),
+        (
+            "voltages",
+            {"response": {"law": "psychometric", "factor": "voltage_V", "threshold": 9.0, "spread": 0.1, "guess": 0.3}},
+            "guess = 0.3 is of yes-no",
+        ),
+        ("preference", {"rating": {"law": "ratings", "mean": {"all": 11.0}}}, "is off the scale, 0 to 10"),
+        (
+            "direction",
+            {"response": {"law": "worth", "factor": "method", "worth": {"vibration": 1.0}}},
+            "worth has no value for asymmetric-1",
+        ),
         ("grip", {"realism": {"law": "words", "texts": ["x"]}}, "a question of kind 'rating' has ratings"),
         (
             "direction",

@@ -69,7 +69,7 @@ def check(name: str, seed: int | None, participants: int) -> AnyCheck:
 
 def _study(name: str, seed: int | None) -> StudyCheck:
     study, folder = load_study(name)
-    setups = [load_setup(str(folder / experiment)) for experiment in study.experiments]
+    setups = [load_setup(folder / experiment) for experiment in study.experiments]
     return StudyCheck(
         study=study.title,
         participants=study.participants,

@@ -128,7 +128,9 @@ def order_shown(design: DesignConfig, plan: Plan) -> tuple[str, ...]:
     else:
         found = []
     group = _shown(plan.trials[0], design.between)
-    return tuple([f"{group}: {found[0] if found else ''}".rstrip(), *found[1:]] if group else found)
+    if not group:
+        return tuple(found)
+    return (f"{group}: {found[0]}", *found[1:]) if found else (group,)
 
 
 def _shown(trial: Trial, names: Sequence[str]) -> str:

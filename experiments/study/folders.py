@@ -239,7 +239,7 @@ def open_study(folder: Path) -> StudyFolder:
 
 def _loaded(name: str, results: Path) -> StudyFolder:
     config, folder = load_study(name)
-    setups = tuple(load_setup(str(folder / experiment)) for experiment in config.experiments)
+    setups = tuple(load_setup(folder / experiment) for experiment in config.experiments)
     return StudyFolder(config=config, source=folder / "study.toml", setups=setups, results=results)
 
 

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from itertools import product
 from typing import Annotated, Literal, Self, TypeVar
 
 from pydantic import Field, model_validator
@@ -268,7 +267,7 @@ def check_laws(design: DesignConfig, laws: SyntheticAnswers, plans: Iterable[Pla
 
 def _problems(design: DesignConfig, question: QuestionConfig, law: Law) -> Iterator[str]:
     common = [*_common_problems(design, question, law)]
-    if common or (common := [*_surplus_problems(design, law)]):
+    if common:
         yield from common
         return
     match law:
@@ -324,16 +323,6 @@ def _share_problems(question: QuestionConfig, law: SharesLaw) -> Iterator[str]:
 
 def _listed(question: QuestionConfig) -> str:
     return ", ".join(question.named_answers)
-
-
-def _surplus_problems(design: DesignConfig, law: Law) -> Iterator[str]:
-    """Cells that no trial can be of: most likely misspelt."""
-    by = [[shown_level(level) for level in design.factors[name].all_levels] for name in getattr(law, "by", ())]
-    cells = {"/".join(cell) for cell in product(*by)} if by else {EVERYWHERE}
-    for place in ("share", "mean"):
-        for cell in getattr(law, place, {}):
-            if cell not in cells and not design.trial.catch:
-                yield f".{place} has {cell!r}, which is no cell of {' and '.join(getattr(law, 'by', ())) or 'all'}"
 
 
 def _mean_problems(question: QuestionConfig, law: RatingsLaw) -> Iterator[str]:

@@ -114,7 +114,7 @@ def prepared(name: str, seed: int, observer: Observer | None = None) -> Reproduc
     `ConfigError` for configs that cannot be used, and if reconstructed participants are asked for and do not fit.
     """
     config, folder = load_study(name)
-    setups = tuple(load_setup(str(folder / experiment)) for experiment in config.experiments)
+    setups = tuple(load_setup(folder / experiment) for experiment in config.experiments)
     paper = load_paper(folder / config.paper) if config.paper else None
     findings = audit(load_paper_file(folder / config.paper)) if config.paper else ()
     study = ReproducedStudy(config=config, setups=setups, answering=setups, seed=seed, paper=paper, findings=findings)

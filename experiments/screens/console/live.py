@@ -139,7 +139,7 @@ def study_of(request: RunRequest) -> StudyFolder:
     config, folder = load_study(str(own) if own.is_file() else "study")
     setups: tuple[Setup[DesignConfig], ...] = (request.setup,)
     if request.setup.source.resolve() in [(folder / name).resolve() for name in config.experiments]:
-        setups = tuple(load_setup(str(folder / name)) for name in config.experiments)
+        setups = tuple(load_setup(folder / name) for name in config.experiments)
     return StudyFolder(config=config, source=folder / "study.toml", setups=setups, results=request.results)
 
 
