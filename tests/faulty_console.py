@@ -8,6 +8,7 @@ from __future__ import annotations
 import json
 import math
 import os
+import signal
 import subprocess
 import sys
 import threading
@@ -102,6 +103,10 @@ class FaultyGun:
         return getattr(self._gun, name)
 
 
+SIGNAL_HEARD_S = 1.0
+"""Longer than Qt's event loop needs to call what a signal has to do."""
+
+
 def slow_disk(syncs: threading.Event) -> None:
     """From now on a sync takes its time; `syncs` is set meanwhile."""
     sync = storage.sync
@@ -194,6 +199,9 @@ def faulty_guns(case: str) -> list[FaultyGun]:
 
     def open_faulty(*where: Any, **how: Any) -> Any:
         guns.append(FaultyGun(opened(*where, **how), case))
+        if case == "signalled":  # before the window is made and the run begins
+            os.kill(os.getpid(), signal.SIGTERM)
+            time.sleep(SIGNAL_HEARD_S)
         return guns[-1]
 
     runs.open_gun = open_faulty

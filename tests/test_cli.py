@@ -10,7 +10,9 @@ from pathlib import Path
 
 import pytest
 
+from experiments.config.setup import canonical_json
 from experiments.load import shipped_folder
+from experiments.record.journal import link_of
 from tests.conftest import Recoil, refused
 
 pytestmark = pytest.mark.slow
@@ -82,6 +84,24 @@ def test_without_a_seed_one_is_drawn_and_stored(recoil: Recoil, tmp_path: Path) 
 def test_a_code_that_has_no_run_has_none_to_resume(recoil: Recoil, tmp_path: Path) -> None:
     refused(synthetic(recoil, "--resume"), "there is no run of direction by P01 to resume here", "leave out --resume")
     assert not (tmp_path / JOURNAL).exists()
+
+
+def test_nobody_goes_on_for_a_person_whom_a_simulation_would_replace(recoil: Recoil, tmp_path: Path) -> None:
+    synthetic(recoil)
+    journal = tmp_path / JOURNAL
+    lines = journal.read_bytes().splitlines(keepends=True)
+    begun = b"".join(lines[:8]).replace(b'"by":"synthetic"', b'"by":"participant"')
+    journal.write_bytes(_relinked(begun))
+    refused(synthetic(recoil, "--resume"), "a person has answered this run so far", "or another participant")
+
+
+def _relinked(journal: bytes) -> bytes:
+    """A journal with each record linked to the one before it."""
+    found = list[bytes]()
+    for line in journal.splitlines():
+        record = json.loads(line)
+        found.append(canonical_json(record | {"link": link_of(found[-1]) if found else ""}) + b"\n")
+    return b"".join(found)
 
 
 def test_a_participant_who_has_finished_is_refused_and_nothing_changes(recoil: Recoil, tmp_path: Path) -> None:

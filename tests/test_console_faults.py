@@ -132,3 +132,10 @@ def test_a_disk_whose_sync_takes_200_ms_keeps_no_window_waiting(case: Case) -> N
 def test_bad_news_have_their_colour() -> None:
     seen = child("window-alone")
     assert seen["bad"] == seen["wanted"]
+
+
+def test_a_signal_that_comes_before_the_run_has_begun_ends_it_with_nothing_fired(case: Case) -> None:
+    seen, contents, rows = case("signalled")
+    assert (seen["stopped"], seen["shots"]) == ("SIGTERM", 0)
+    assert contents.records[-1].kind == "stopped"
+    assert not any(row["response"] for row in rows)
