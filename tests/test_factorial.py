@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import json
+from pathlib import Path
+
 import numpy as np
 import pandas as pd
 import pytest
@@ -84,3 +87,33 @@ def test_too_few_of_anything_is_refused(shape):
 def test_groups_of_one_are_refused():
     with pytest.raises(ValueError, match="two groups of two"):
         mixed(np.zeros((3, 2)), ["a", "a", "b"], ("g", "m"))
+
+
+R = Path(__file__).parent / "golden" / "r"
+SETS = json.loads((R / "factorial.json").read_text())
+BY_AFEX = json.loads((R / "factorial_expected.json").read_text())["found"]
+
+
+def by_us(rows, kind):
+    table = pd.DataFrame(rows)
+    if kind == "within":
+        shape = [table[name].nunique() for name in ("who", "one", "two")]
+        ordered = table.sort_values(["who", "one", "two"])["score"].to_numpy().reshape(shape)
+        return two_within(ordered, ("one", "two"))
+    scores = table.pivot_table(index="who", columns="two", values="score").to_numpy()
+    return mixed(scores, list(table.groupby("who")["one"].first()), ("one", "two"))
+
+
+@pytest.mark.parametrize("name", SETS)
+def test_the_numbers_are_those_of_afex(name):
+    found = {":".join(effect.source): effect for effect in by_us(SETS[name]["rows"], SETS[name]["kind"])}
+    size = "ges" if SETS[name]["kind"] == "within" else "pes"
+    assert set(found) == {row["effect"] for row in BY_AFEX[name]}
+    for row in BY_AFEX[name]:
+        ours = found[row["effect"]]
+        assert list(ours.df) == row["df"]
+        assert pytest.approx(row["F"], rel=1e-8) == ours.F
+        assert ours.p == pytest.approx(row["p"], rel=1e-7)
+        assert ours.size == pytest.approx(row[size], rel=1e-6)
+        if isinstance(row["epsilon"], float) and ours.epsilon is not None:
+            assert ours.epsilon == pytest.approx(row["epsilon"], rel=1e-6)

@@ -5,13 +5,15 @@ from __future__ import annotations
 import math
 import warnings
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 import pandas as pd
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
+from scipy.linalg import helmert
+from scipy.stats import f as f_distribution
 
-from analysis.stats.arrays import numbers, pingouin
+from analysis.stats.arrays import FloatArray, numbers, pingouin
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -50,7 +52,8 @@ def mixed(scores: ArrayLike, group: Sequence[str], names: tuple[str, str]) -> tu
     """The ANOVA of one factor between people and one within: `names` are theirs, in this order.
 
     `scores`: (n people, k levels), `group`: each one's group. `ValueError`: fewer than two groups or levels, a group of
-    one, or no finite numbers. Source: Winer 1971, chapter 7.
+    one, or no finite numbers. Source: Winer 1971, chapter 7; of groups of unequal size the levels are compared by the
+    means of the groups' means, whatever their sizes (sums of squares of type III, as afex and SPSS have them).
     """
     array = numbers(scores, "scores")
     if array.ndim != 2 or array.shape[1] < 2 or array.shape[0] != len(group):
@@ -62,7 +65,27 @@ def mixed(scores: ArrayLike, group: Sequence[str], names: tuple[str, str]) -> tu
     who, level = (part.ravel() for part in np.indices((n, k)))
     table = pd.DataFrame({"who": who, "level": level, "group": np.repeat(list(group), k), "score": array.ravel()})
     found = _silent("mixed_anova", table, dv="score", within="level", between="group", subject="who")
-    return _effects(found, names, df=("DF1", "DF2"), size="np2")
+    between, within, both = _effects(found, names, df=("DF1", "DF2"), size="np2")
+    return between, _of_unweighted_means(within, array, np.array(group)), both
+
+
+def _of_unweighted_means(effect: FactorialEffect, scores: FloatArray, group: NDArray[np.str_]) -> FactorialEffect:
+    """The effect of the levels when each group counts alike; with groups of one size it is the same."""
+    contrasts = helmert(scores.shape[1]) @ scores.T
+    parts = [contrasts[:, group == one] for one in np.unique(group)]
+    mean = np.mean([part.mean(axis=1) for part in parts], axis=0)
+    explained = (mean**2).sum() / (sum(1.0 / part.shape[1] for part in parts) / len(parts) ** 2)
+    left = sum(((part - part.mean(axis=1, keepdims=True)) ** 2).sum() for part in parts)
+    df, df_error = effect.df
+    F = float(explained / df / (left / df_error)) if left > 0 else math.nan
+    eps = effect.epsilon
+    return replace(
+        effect,
+        F=F,
+        p=float(f_distribution.sf(F, df, df_error)),
+        p_gg=None if eps is None or effect.p_gg is None else float(f_distribution.sf(F, eps * df, eps * df_error)),
+        size=float(explained / (explained + left)),
+    )
 
 
 def _silent(function: str, table: pd.DataFrame, **asked: object) -> pd.DataFrame:
