@@ -57,7 +57,19 @@ def test_every_design_is_read_by_its_journal_and_has_its_statistics(results, fou
     ("name", "question", "tests"),
     [
         ("voltages", "response", [("anova", "voltage_V"), ("anova", "direction"), ("anova", "voltage_V × direction")]),
-        ("detection", "felt", [("anova", "pulse_s"), ("d_prime", "stimulus"), ("criterion", "stimulus")]),
+        (
+            "detection",
+            "felt",
+            [
+                ("anova", "pulse_s"),
+                ("tukey", "0.004 – 0.003"),
+                ("tukey", "0.005 – 0.003"),
+                ("tukey", "0.005 – 0.004"),
+                ("d_prime", "stimulus"),
+                ("criterion", "stimulus"),
+                ("d_prime", "pulse_s 0.003"),
+            ],
+        ),
         ("magnitude", "strength", [("exponent", "pulse_s"), ("anova", "pulse_s")]),
         ("realism", "comfort", [("anova", "damper"), ("anova", "voltage_V"), ("anova", "damper × voltage_V")]),
         ("grip", "realism", [("anova", "grip"), ("anova", "method"), ("anova", "grip × method")]),

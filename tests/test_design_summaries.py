@@ -9,7 +9,7 @@ import pandas as pd
 import pytest
 from scipy import stats
 
-from analysis.stats.anova import rm_anova
+from analysis.stats.anova import rm_anova, rm_tukey_hsd
 from analysis.summary.designs import summarise
 from experiments.config.door import checked_table
 from experiments.synthetic.laws import SyntheticAnswers
@@ -50,7 +50,11 @@ def test_one_factor_within_people_is_its_anova_and_ranks():
     table = simulated(config, laws, 14)
     found = summarise(config, table).questions["rating"]
     scores = table.pivot_table(index="participant_id", columns="method", values="rating").to_numpy()
-    anova, friedman = found.tests
+    anova, friedman, *pairs = found.tests
+    by_hand = rm_tukey_hsd(scores, sorted({"vibration", "asymmetric-1", "asymmetric-2"}))
+    assert [(one.name, one.effect) for one in pairs] == [("tukey", f"{one.a} – {one.b}") for one in by_hand]
+    assert [one.p for one in pairs] == [float(one.p) for one in by_hand]
+    assert pairs[0].df == (3, 26)
     assert anova.statistic == pytest.approx(float(rm_anova(scores).F), rel=1e-12)
     assert friedman.statistic == pytest.approx(stats.friedmanchisquare(*scores.T).statistic, rel=1e-9)
     assert "comment" not in summarise(config, table).questions
@@ -95,8 +99,14 @@ def test_two_intervals_have_the_d_prime_of_their_task():
     config, laws = loaded("stronger")
     table = simulated(config, laws, 10)
     found = summarise(config, table).questions["stronger"]
-    (d_prime,) = [test for test in found.tests if test.name == "d_prime"]
+    d_prime, *by_condition = [test for test in found.tests if test.name == "d_prime"]
     assert d_prime.statistic == pytest.approx(math.sqrt(2) * stats.norm.ppf(table["correct"].mean()), rel=1e-9)
+    right = table.groupby("voltage_V")["correct"].mean()
+    assert [one.effect for one in by_condition] == [f"voltage_V {level:g}" for level in right.index]
+    within = [(one.statistic, share) for one, share in zip(by_condition, right, strict=True) if share < 1]
+    assert within
+    for statistic, share in within:
+        assert statistic == pytest.approx(math.sqrt(2) * stats.norm.ppf(share), rel=1e-9)
 
 
 def test_pairs_are_described_in_the_order_in_which_they_were_felt():

@@ -15,7 +15,7 @@ import numpy as np
 import pandas as pd
 from scipy import stats
 
-from analysis.stats.anova import rm_anova
+from analysis.stats.anova import rm_anova, rm_tukey_hsd
 from analysis.stats.arrays import FloatArray
 from analysis.stats.binomial import binomial_test, yes_no
 from analysis.stats.discrimination import Task, discrimination
@@ -23,7 +23,7 @@ from analysis.stats.factorial import FactorialEffect, mixed, two_within
 from analysis.stats.paired import friedman
 from analysis.summary.results import ConditionSummary, DesignSummary, DesignTest, Origin, QuestionSummary
 from experiments.design.config import DesignConfig
-from experiments.design.language import Level, QuestionConfig
+from experiments.design.language import Level, QuestionConfig, shown_level
 from experiments.tasks.questions import chance, correct_columns
 
 
@@ -213,6 +213,7 @@ def _comparisons(
         yield from _mixed(design.between[0], names[0], scores, [str(group[code]) for code in people.index])
     elif len(names) == 1:
         yield from _one_factor(names[0], scores, question)
+        yield from _pairs(scores, [shown_level(level) for level in people.columns], question)
     elif len(names) == 2 and group is None:
         sizes = tuple(people.columns.get_level_values(name).nunique() for name in names)
         if math.prod(sizes) != scores.shape[1]:
@@ -252,6 +253,26 @@ def _one_factor(name: str, scores: FloatArray, question: QuestionConfig) -> Iter
         yield DesignTest(name="friedman", effect=name, statistic=ranks.chi2, p=ranks.p, reason=ranks.reason)
 
 
+_MOST_COMPARED = 10
+"""Of more conditions the pairs fill pages that nobody reads."""
+
+
+def _pairs(scores: FloatArray, labels: Sequence[str], question: QuestionConfig) -> Iterator[DesignTest]:
+    """Tukey's test of every two conditions, on the error of the ANOVA; of numbers, of their logarithms."""
+    if question.kind == "ranking" or not 2 < len(labels) <= _MOST_COMPARED or rm_anova(scores).reason:
+        return
+    for pair in rm_tukey_hsd(scores, labels):
+        yield DesignTest(
+            name="tukey",
+            effect=f"{pair.a} – {pair.b}",
+            statistic=float(pair.q),
+            df=(len(labels), (len(scores) - 1) * (len(labels) - 1)),
+            p=float(pair.p),
+            ci_low=float(pair.ci_low),
+            ci_high=float(pair.ci_high),
+        )
+
+
 def _mixed(between: str, within: str, scores: FloatArray, group: list[str]) -> Iterator[DesignTest]:
     if len(set(group)) < 2 or min(map(group.count, group)) < 2:
         yield DesignTest(name="anova", effect=f"{between} × {within}", reason="a group has fewer than two people")
@@ -288,18 +309,31 @@ _TASKS: Mapping[str, Task] = {"two-interval": "two-interval", "pair": "two-inter
 
 
 def _sensitivity(design: DesignConfig, question: QuestionConfig, scored: pd.DataFrame) -> Iterator[DesignTest]:
-    """d′ of all people's answers together, by the formula of the task."""
+    """d′ of all people's answers together, by the formula of the task: of all conditions, and of each."""
+    factors = _varied(design)
     if question.correct == "stimulus":
-        yield from _detection(scored)
+        stimulus = scored["stimulus"].astype(int) == 1
+        noise = scored[~stimulus]
+        yield from _detection("stimulus", scored[stimulus], noise)
+        for some in _conditions(scored[stimulus], factors) if factors else ():
+            yield from _detection(_named_condition(some, factors), some, noise)
     elif question.correct in {"interval", "larger"} and len(scored):
-        found = discrimination(int(scored["score"].sum()), len(scored), _TASKS[design.trial.kind])
-        yield DesignTest(name="d_prime", effect=design.trial.kind, statistic=float(found.d_prime))
+        task = _TASKS[design.trial.kind]
+        parts: dict[str, pd.DataFrame] = {design.trial.kind: scored}
+        parts |= {_named_condition(some, factors): some for some in _conditions(scored, factors) if factors}
+        for name, some in parts.items():
+            found = discrimination(int(some["score"].sum()), len(some), task)
+            yield DesignTest(name="d_prime", effect=name, statistic=float(found.d_prime))
 
 
-def _detection(scored: pd.DataFrame) -> Iterator[DesignTest]:
-    stimulus = scored["stimulus"].astype(int) == 1
-    signal, noise = scored[stimulus]["score"], scored[~stimulus]["score"]
+def _named_condition(rows: pd.DataFrame, factors: Sequence[str]) -> str:
+    """The levels of a condition, with their factors."""
+    return ", ".join(f"{name} {shown_level(rows.iloc[0][name])}" for name in factors)
+
+
+def _detection(name: str, signal: pd.DataFrame, noise: pd.DataFrame) -> Iterator[DesignTest]:
     if len(signal) and len(noise):
-        found = yes_no(int(signal.sum()), len(signal), int(len(noise) - noise.sum()), len(noise))
-        yield DesignTest(name="d_prime", effect="stimulus", statistic=float(found.d_prime))
-        yield DesignTest(name="criterion", effect="stimulus", statistic=float(found.criterion))
+        hits, rejected = int(signal["score"].sum()), int(noise["score"].sum())
+        found = yes_no(hits, len(signal), len(noise) - rejected, len(noise))
+        yield DesignTest(name="d_prime", effect=name, statistic=float(found.d_prime))
+        yield DesignTest(name="criterion", effect=name, statistic=float(found.criterion))

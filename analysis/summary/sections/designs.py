@@ -13,6 +13,7 @@ from experiments.design.language import shown_level
 
 _TESTS = {
     "anova": "ANOVA",
+    "tukey": "Tukey",
     "friedman": "Friedman",
     "exponent": "exponent",
     "d_prime": "d′",
