@@ -21,8 +21,8 @@ from experiments.config.setup import Setup
 from experiments.design.config import DesignConfig
 from experiments.design.language import shown_level
 from experiments.design.methods_section import methods_section
-from experiments.design.plan import Plan, Trial
-from experiments.design.planned import PlannedRun, planned_run, warnings
+from experiments.design.plan import Plan
+from experiments.design.planned import PlannedRun, levels_text, planned_run, trial_text, warnings
 from experiments.design.planning import groups, plan_of, square_size
 from experiments.design.stimuli import ConditionLimits, limits, settings, stimulus
 from experiments.load import check_limits
@@ -135,22 +135,11 @@ def _order(design: DesignConfig, plan: Plan) -> tuple[str, ...]:
     sessions = {trial.session: trial for trial in reversed(plan.trials)}
     blocked = [*design.between, *design.order.session]
     if len(sessions) > 1:
-        return tuple(_levels(sessions[number], blocked) for number in sorted(sessions))
+        return tuple(levels_text(sessions[number], blocked) for number in sorted(sessions))
     return (
-        *((_levels(plan.trials[0], blocked),) if blocked else ()),
-        *(_trial(design, one) for one in plan.trials[:6]),
+        *((levels_text(plan.trials[0], blocked),) if blocked else ()),
+        *(trial_text(design, one) for one in plan.trials[:6]),
     )
-
-
-def _levels(trial: Trial, names: Sequence[str]) -> str:
-    return " ".join(shown_level(level) for name, level in trial.levels if name in names)
-
-
-def _trial(design: DesignConfig, trial: Trial) -> str:
-    if trial.catch:
-        return "catch"
-    varied = [name for name in design.varying if len(design.factors[name].all_levels) > 1 and name != trial.compare]
-    return " ".join(filter(None, (_levels(trial, varied), " – ".join(map(shown_level, trial.intervals))))) or "shot"
 
 
 def _cell(setup: Setup[DesignConfig], one: ConditionLimits) -> CellCheck:
@@ -194,7 +183,7 @@ def _warnings(
     if design.trial.intervals > 1 and not planned.hands_within and design.trial.gap_s < slowest_s:
         yield f"trial.gap_s = {design.trial.gap_s:g} s: it will be longer, as the gun needs {slowest_s:.3g} s"
     if len(plans) >= _EXPECTED_EVEN and design.order.session and design.order.sessions == "random":
-        firsts = Counter(_levels(plan.trials[0], design.order.session) for plan in plans)
+        firsts = Counter(levels_text(plan.trials[0], design.order.session) for plan in plans)
         most, least = max(firsts.values()), min(firsts.values()) if len(firsts) > 1 else 0
         if most - least > 1:
             said = ", ".join(f"{name} {count}" for name, count in sorted(firsts.items()))

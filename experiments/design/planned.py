@@ -121,20 +121,28 @@ def order_shown(design: DesignConfig, plan: Plan) -> tuple[str, ...]:
     """What is constant in each session in its order, with the group; of one short session the trials."""
     first = {trial.session: trial for trial in reversed(plan.trials)}
     if len(first) > 1:
-        found = [_shown(first[number], design.order.session) for number in sorted(first)]
+        found = [levels_text(first[number], design.order.session) for number in sorted(first)]
     elif len(plan.trials) <= _MOST_SHOWN:
-        varied = [name for name in design.varying if len(design.factors[name].all_levels) > 1]
-        found = [_shown(trial, varied) for trial in plan.trials]
+        found = [trial_text(design, trial) for trial in plan.trials]
     else:
         found = []
-    group = _shown(plan.trials[0], design.between)
+    group = levels_text(plan.trials[0], design.between)
     if not group:
         return tuple(found)
     return (f"{group}: {found[0]}", *found[1:]) if found else (group,)
 
 
-def _shown(trial: Trial, names: Sequence[str]) -> str:
+def levels_text(trial: Trial, names: Sequence[str]) -> str:
+    """A trial's levels of some factors, as orders are shown."""
     return " ".join(shown_level(level) for name, level in trial.levels if name in names)
+
+
+def trial_text(design: DesignConfig, trial: Trial) -> str:
+    """What a trial is, as orders are shown: what varies, and what is compared."""
+    if trial.catch:
+        return "catch"
+    varied = [name for name in design.varying if len(design.factors[name].all_levels) > 1 and name != trial.compare]
+    return " ".join(filter(None, (levels_text(trial, varied), " – ".join(map(shown_level, trial.intervals))))) or "shot"
 
 
 def warnings(design: DesignConfig, found: PlannedRun) -> Iterator[str]:
