@@ -5,17 +5,22 @@ from __future__ import annotations
 import contextlib
 import os
 import pty
+import re
 import select
 import signal
 import subprocess
 import threading
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Self
+
+from tests.waiting import PATIENCE_S
 
 FIRES, DAMPER, ENDS = "Enter fires:", "Then type d and Enter:", "Enter ends the run:"
 ANSWERS = "fbbffbfb"
 """What the person types, trial after trial, over and over."""
+_ASKED = re.compile(r"[^\n]*\n[^\n]*(?:: |in your own words\. )\Z")
+"""What stands last on the screen when somebody is waited for, with the line above it."""
 
 
 class AtTerminal:
@@ -73,6 +78,25 @@ class AtTerminal:
             self.type("d")
         self.wait_for(FIRES, count)
         self.type("")
+
+    def prompt(self, after: int) -> str:
+        """What is asked for: the last two lines of what was shown after so many letters; empty when the run is over."""
+        with self._news:
+            found = self._news.wait_for(lambda: _ASKED.search(self.seen, after) or self._closed, PATIENCE_S)
+        assert found, f"nothing more was asked for:\n{self.seen}"
+        return "" if found is True else found[0]
+
+    def work(self, reply: Callable[[str, int], str], replies: int | None = None) -> int:
+        """Reply to whatever is asked for, so many times or until the run is over; how often it was replied.
+
+        `reply`: what is typed, by what is asked for and how often it was replied before.
+        """
+        done = after = 0
+        while done != replies and (asked := self.prompt(after)):
+            after = len(self.seen)
+            self.type(reply(asked, done))
+            done += 1
+        return done
 
     def _asked(self, count: int) -> bool:
         return self.seen.count(FIRES) >= count or self.seen.count(DAMPER) > self._dampers

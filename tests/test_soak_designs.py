@@ -1,12 +1,14 @@
-"""The ten designs by real keys at the console, each to its end; then their statistics, report, figures and BIDS."""
+"""The ten designs by real keys at the console and at a terminal, each to its end; then statistics, figures and BIDS."""
 
 from __future__ import annotations
 
 import csv
+import re
 import statistics
 import subprocess
 import time
 from collections.abc import Callable
+from itertools import count
 from pathlib import Path
 from typing import Any
 
@@ -18,7 +20,8 @@ from experiments.load import load_setup, shipped_folder
 from experiments.record.journal import read_journal
 from experiments.tasks.questions import choices
 from tests.at_display import AtConsole, needs_display, virtual_display
-from tests.at_runs import RUN, words
+from tests.at_runs import RUN, answers, words
+from tests.at_terminal import AtTerminal
 from tests.conftest import Soak
 from tests.designs import design
 from tests.warm_start import warm
@@ -46,7 +49,8 @@ def shortened(design: dict[str, Any]) -> dict[str, Any]:
     order, trial = design.get("order", {}), design.get("trial", {})
     told = design["factors"].get("instruction", {"levels": ["none"]})
     short = {"repetitions": 1, "sets": len(told["levels"]), "balance": "session"}
-    more = {"catch": min(trial.get("catch", 0), 3)} if trial.get("catch") else {}
+    more: dict[str, Any] = {"catch": min(trial.get("catch", 0), 3)} if trial.get("catch") else {}
+    more |= {"least_exposure_s": 0.0} if trial.get("kind") == "train" else {}
     return design | {
         "order": {key: value for key, value in order.items() if key != "longest_run"} | short,
         "trial": trial | more,
@@ -73,16 +77,63 @@ def test_each_design_is_run_by_real_keys_to_its_end(name: str, place: Path, soak
         screen.to_the_end()
         code, said = screen.close()
     assert code == 0, said
-    journal = next((place / "results" / "sub-P01").glob(f"*task-{name}_journal.jsonl"))
-    contents = read_journal(journal)
+    trials = all_answered(name, place, "results")
+    took = f"{time.monotonic() - began_s:.0f} s"
+    soak(f"{name} at the console, by real keys", f"{trials} trials, all answered", "all", took)
+
+
+def all_answered(name: str, place: Path, results: str) -> int:
+    """How many trials the table of a finished run has; every one with an answer to every question."""
+    contents = read_journal(journal_of(name, place, results))
     assert contents.finished
-    with next(journal.parent.glob(f"*task-{name}_[tr]*.csv")).open(encoding="utf-8", newline="") as file:
+    with next((place / results / "sub-P01").glob(f"*task-{name}_[tr]*.csv")).open(encoding="utf-8", newline="") as file:
         rows = list(csv.DictReader(file))
     assert len(rows) == len(contents.plan.trials)
     for question in load_setup(str(place / "configs" / f"{name}.toml")).config.questions:
         assert all(row[question] for row in rows), f"{question} has an empty answer"
-    took = f"{time.monotonic() - began_s:.0f} s"
-    soak(f"{name} at the console, by real keys", f"{len(rows)} trials, all answered", "all", took)
+    return len(rows)
+
+
+def journal_of(name: str, place: Path, results: str) -> Path:
+    return place / results / "sub-P01" / f"sub-P01_task-{name}_journal.jsonl"
+
+
+def typed() -> Callable[[str, int], str]:
+    """What a person types: what is asked for, numbers and answers in turn."""
+    turns = count()
+
+    def reply(asked: str, _: int) -> str:
+        line = asked.rsplit("\n", 1)[-1].strip()
+        if "type d and Enter" in line:
+            return "d"
+        if line.startswith("a number") or "     " in line:  # a rating's two ends
+            return str(2 + next(turns) % 4)
+        if keys := re.findall(r"(\w) = ", line):
+            return keys[next(turns) % len(keys)]
+        return "like a toy" if "words" in line else ""
+
+    return reply
+
+
+@pytest.mark.parametrize("name", TEN)
+def test_each_design_is_typed_at_a_terminal_killed_halfway_and_gone_on_with(name: str, place: Path, soak: Soak) -> None:
+    began_s = time.monotonic()
+    config = place / "configs" / f"{name}.toml"
+    run = ["run", config, "--participant", "P01", "--screen", "terminal", "--results", "typed", "--seed", 1]
+    reply, halfway = typed(), 1 + 3 * len(plan_of(load_setup(str(config)).config, "P01", 1).trials) // 2
+    with AtTerminal(warm(*run), place) as screen:
+        assert screen.work(reply, halfway) == halfway
+        screen.kill()
+        acknowledged = screen.seen.count("Saved.")
+    kept = answers(journal_of(name, place, "typed"))
+    assert len(kept) - acknowledged in (0, 1)  # the last one's word may not have come any more
+    with AtTerminal(warm(*run, "--resume"), place) as screen:
+        screen.work(reply)
+        assert screen.end() == 0, screen.seen
+    trials = all_answered(name, place, "typed")
+    assert answers(journal_of(name, place, "typed"))[: len(kept)] == kept
+    took = f"killed after {len(kept)} answers, {time.monotonic() - began_s:.0f} s"
+    soak(f"{name} at a terminal, killed and resumed", f"{trials} trials, all answered", "all", took)
 
 
 def test_what_they_leave_is_analysed_drawn_and_exported(place: Path, soak: Soak) -> None:
