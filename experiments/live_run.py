@@ -148,10 +148,12 @@ class LiveRun:
             if not refusal:
                 self._take(meant, moment)
             before, position = moment.position, self._position
-            kept = refused(meant, before, refusal) if refusal else remark_of(meant, before, position, self.moment.trial)
-            written = None if kept is None else self._submit(kept)
-        if kept is not None and written is not None:  # outside: who shows it may wait for this lock
-            written.add_done_callback(lambda done: self._written(kept, done))
+            kept: list[Remark | None] = [refused(meant, before, refusal)] if refusal else []
+            if not refusal:
+                kept += [remark_of(meant, before, position, self.moment.trial), judging.exchanged(moment, meant)]
+            written = [(remark, self._submit(remark)) for remark in kept if remark is not None]
+        for remark, future in written:  # outside: who shows it may wait for this lock
+            self._watch(remark, future)
         if not refusal:
             self._screen.show(position)
         return EventVerdict(taken=not refusal, text=refusal or text)
@@ -266,8 +268,7 @@ class LiveRun:
         """Have a remark written behind what was written before, and shown when it is on the disk."""
         with self.news:
             written = self._submit(remark)
-        if written is not None:
-            written.add_done_callback(lambda done: self._written(remark, done))
+        self._watch(remark, written)
 
     def _submit(self, remark: Remark) -> Future[None] | None:
         """Have a remark written; `None` if the journal is closed, as the run has just ended."""
@@ -279,6 +280,10 @@ class LiveRun:
         return written
 
     # keeping
+
+    def _watch(self, remark: Remark, written: Future[None] | None) -> None:
+        if written is not None:
+            written.add_done_callback(lambda done: self._written(remark, done))
 
     def _written(self, remark: Remark, done: Future[None]) -> None:
         error = done.exception()

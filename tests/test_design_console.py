@@ -7,7 +7,9 @@ from pathlib import Path
 
 import pytest
 
-from experiments.load import shipped_folder
+from experiments.load import load_setup, shipped_folder
+from experiments.screens.console.participant_link import check_own_keys
+from experiments.study.folders import PlaceError
 from tests.at_display import AtConsole, needs_display, virtual_display
 from tests.at_runs import words
 
@@ -40,6 +42,7 @@ kind = "choice"
 text = "Welcher Schuss war stärker?"
 answers = ["first", "second"]
 correct = "larger"
+keys = { first = "left", second = "right" }
 labels = { first = "der erste", second = "rechts, der zweite" }
 
 [questions.sure]
@@ -81,8 +84,8 @@ def configs(tmp_path: Path) -> Path:
     return folder
 
 
-def table(folder: Path) -> list[dict[str, str]]:
-    path = folder / "results" / "sub-P01" / "sub-P01_task-tiny_trials.csv"
+def table(folder: Path, name: str = "tiny") -> list[dict[str, str]]:
+    path = folder / "results" / "sub-P01" / f"sub-P01_task-{name}_trials.csv"
     with path.open(encoding="utf-8", newline="") as file:
         return list(csv.DictReader(file))
 
@@ -136,7 +139,7 @@ def test_a_design_on_the_participants_own_screen_and_keys(configs: Path, tmp_pat
         screen.participant_shows("Do you agree to take part?")
         asking = screen.to("asking", 1)
         screen.participant_shows("ChoicePage")
-        screen.keys.press("d")
+        screen.keys.press("Left")
         screen.until(lambda look: look.serial != asking.serial)
         screen.at("rating")
         screen.participant_shows("RatingPage")
@@ -154,3 +157,65 @@ def test_a_design_on_the_participants_own_screen_and_keys(configs: Path, tmp_pat
     first, second = table(tmp_path)
     assert (first["stronger"], first["stronger_source"], first["stronger_time_valid"]) == ("first", "participant", "1")
     assert (second["stronger"], second["stronger_source"]) == ("second", "experimenter")
+
+
+def test_keys_of_the_participants_own_that_are_the_consoles_are_refused(configs: Path) -> None:
+    design = configs / "tiny.toml"
+    check_own_keys(load_setup(str(design)))
+    design.write_text(design.read_text().replace('keys = { first = "left", second = "right" }', ""))
+    with pytest.raises(PlaceError, match=r"tiny.toml: questions.stronger: d, r would .* keys = \{ first = \"left"):
+        check_own_keys(load_setup(str(design)))
+
+
+RANKED = """
+design = "places"
+title = "Which is the more comfortable"
+gun = "gun.toml"
+
+[factors.method]
+levels = ["asymmetric-1"]
+
+[factors.voltage_V]
+levels = [12.0, 18.0]
+
+[questions.place]
+kind = "ranking"
+when = "block"
+text = "Which place does this one take?"
+minimum_text = "most comfortable"
+
+[console]
+guard_s = 0.0
+
+[fatigue]
+max_trials_without_break = 10
+max_planned_s = 600.0
+
+[timing]
+hand_over_s = 1.0
+planned_s = 60.0
+"""
+
+
+@pytest.mark.soak
+def test_ranks_on_the_participants_own_screen_do_not_tie(configs: Path, tmp_path: Path) -> None:
+    pytest.importorskip("psychopy")
+    (configs / "places.toml").write_text(RANKED)
+    run = words(configs, "places", "--participant", "P01", "--participant-screen")
+    with virtual_display("1400x900") as display, AtConsole(run, tmp_path, display) as screen:
+        screen.stands(RUN)
+        screen.to("rating", trial=1)
+        for count, keys in enumerate((("Home", "Return"), ("Home", "Return", "End", "Return")), start=1):
+            screen.participant_shows("RatingPage", count)  # of the second one, the first place is taken
+            screen.focus_on("Recoil: participant")
+            for name in keys:
+                screen.keys.press(name)
+            if count == 1:
+                screen.until(lambda look: look.state == "rating" and look.trial == 2)
+        screen.until(lambda look: look.state == "closing" and look.active)
+        screen.to_the_end()
+        code, said = screen.close()
+    assert code == 0, said
+    assert [(row["place"], row["place_by"]) for row in table(tmp_path, "places")] == [
+        ("1", "participant"), ("2", "participant")
+    ]  # fmt: skip

@@ -5,6 +5,7 @@ from __future__ import annotations
 import threading
 from collections.abc import Iterator
 from contextlib import contextmanager
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -57,7 +58,7 @@ from tests.at_controls import (
     sat_at,
 )
 from tests.at_display import records
-from tests.designs import changed
+from tests.designs import changed, design
 from tests.waiting import wait_for
 
 pytestmark = pytest.mark.slow
@@ -331,6 +332,32 @@ def test_the_participants_own_rating_is_in_the_journal_before_the_description_is
     assert [(row["rating"], row["rating_by"], row["comment"]) for row in rows] == [
         ("3.0", "participant", "soft"), ("5.0", "experimenter", "like a toy"), ("5.0", "experimenter", "like a toy"),
     ]  # fmt: skip
+
+
+def ranked(sitting: Sitting, rank: float) -> str:
+    """A rank given on the participant's own screen; why it is not taken."""
+    verdict = sitting.live.offer(events.ParticipantRated(rating=rank, step=sitting.position.number))
+    sitting.settle()
+    return verdict.text
+
+
+def test_ranks_by_the_participants_own_hand_never_tie_nor_do_those_that_are_corrected(tmp_path: Path) -> None:
+    rank = {"kind": "ranking", "when": "block", "text": "Which place?", "minimum_text": "best"}
+    factors = {"method": {"levels": ["vibration", "asymmetric-1", "asymmetric-2"]}}
+    config = design(design="places", factors=factors, questions={"rank": rank})
+    with sat(replace(PREFERENCE, config=config), tmp_path) as sitting:
+        sitting.to(S.RATING)
+        assert ranked(sitting, 2.0) == ""
+        assert "2 was given to another one of this set" in ranked(sitting, 2.0)
+        assert ranked(sitting, 1.0) == ""
+        assert ranked(sitting, 3.0) == ""
+        assert sitting.state is S.CLOSING
+        assert by_hand(sitting, events.Undo())
+        assert by_hand(sitting, events.Correct(value=2.0))  # the third gets the place of the first, and the first its
+        contents, rows = to_the_end(sitting)
+    assert [row["rank"] for row in rows] == ["3", "1", "2"]
+    assert [row["rank_by"] for row in rows] == ["experimenter", "participant", "experimenter"]
+    assert [remark.value for remark in remarks(contents, EntryCorrected)] == [2.0, 3.0]
 
 
 def test_a_pause_before_the_description_keeps_the_rating_and_takes_no_words_until_it_is_over(tmp_path: Path) -> None:

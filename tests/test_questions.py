@@ -100,32 +100,6 @@ def test_catch_trials_are_answered_right_with_no():
         assert questions.is_right(config, felt, trial, None) is None
 
 
-@pytest.mark.parametrize(
-    ("keys", "answer", "problem"),
-    [
-        ({"kind": "choice", "answers": WAYS}, "forward", ""),
-        ({"kind": "choice", "answers": WAYS}, "up", "'up' is none of forward, backward"),
-        ({"kind": "choice", "answers": WAYS}, None, "an answer is needed"),
-        ({"kind": "choice", "answers": WAYS, "may_be_skipped": True}, None, ""),
-        ({"kind": "rating", "minimum": 0.0, "maximum": 10.0, "grain": 0.1}, 10.1, "10.1 is above 10"),
-        ({"kind": "rating", "minimum": 0.0, "maximum": 10.0, "grain": 0.1}, 0.0, ""),
-        ({"kind": "number", "minimum": 0.0}, -1.0, "-1 is below 0"),
-        ({"kind": "number"}, float("nan"), "nan is no number"),
-        ({"kind": "number"}, True, "True is no number"),
-        ({"kind": "ranking", "when": "block", "minimum_text": "best"}, (2, 1, 3), ""),
-        (
-            {"kind": "ranking", "when": "block", "minimum_text": "best"},
-            (2, 2, 3),
-            "each of the numbers 1 to 3 is needed, once",
-        ),
-        ({"kind": "text"}, "", ""),
-        ({"kind": "text"}, "x" * 3000, "words of at most 2000 letters are needed"),
-    ],
-)
-def test_what_is_no_answer_is_said(keys, answer, problem):
-    assert questions.answer_problem(question(**keys), answer, of=3) == problem
-
-
 @given(st.floats(-5, 15), st.sampled_from([0.1, 0.25, 0.5, 1.0]))
 def test_a_rating_is_the_nearest_grain_of_its_scale(value, grain):
     kept = questions.on_scale(value, question(kind="rating", minimum=0.0, maximum=10.0, grain=grain).scale)

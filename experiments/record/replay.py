@@ -10,6 +10,7 @@ from experiments.session import steps
 from experiments.session.history import History, asked_before
 from experiments.session.remarks import REMARK, EntryCorrected, Halted, Remark, TestShot
 from experiments.session.states import EMERGENCY
+from experiments.tasks.questions import AnswerValue
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -59,7 +60,7 @@ def history(contents: Contents) -> History:
     return found
 
 
-def _check_value(contents: Contents, line: Record, step: steps.Step | None, value: steps.Value) -> None:
+def _check_value(contents: Contents, line: Record, step: steps.Step | None, value: AnswerValue) -> None:
     """`JournalError` for an answer that is none to what was asked."""
     if not isinstance(step, steps.Asking) or not steps.is_answer(step, value):
         kind = steps.what(step) if isinstance(step, steps.Asking) else "answer"

@@ -12,15 +12,22 @@ from experiments.design.plan import Plan, Trial
 from experiments.session import remarks, steps
 from experiments.session.history import History, asked_before, entered_value, is_attempt, of_one_set
 from experiments.session.remarks import MAX_FLAG, Remark
-from experiments.session.steps import Ask, Asking, Describe, Outcome, Prepare, Rate, Step, Value, trial_of, what
+from experiments.session.steps import Ask, Asking, Describe, Outcome, Prepare, Rate, Step, trial_of, what
+from experiments.tasks.questions import AnswerValue
 
 FLAG_RULE = f"A flag is a word of at most {MAX_FLAG} letters, digits and hyphens."
 
 
 def ordinal(plan: Plan, trial: Trial) -> str:
     """How a stimulus is named that is rated after all were felt: by its order, not by its method."""
+    number, of = place_in_set(plan, trial)
+    return f"Feedback {number} of {of}"
+
+
+def place_in_set(plan: Plan, trial: Trial) -> tuple[int, int]:
+    """The number of a trial in its set, from 1, and how many the set has."""
     block = [other for other in plan.trials if of_one_set(other, trial)]
-    return f"Feedback {block.index(trial) + 1} of {len(block)}"
+    return block.index(trial) + 1, len(block)
 
 
 def place_text(plan: Plan, trial: Trial) -> str:
@@ -73,7 +80,7 @@ def read_out_text(plan: Plan, step: Prepare) -> str:
     return f"\n  {how}: “{step.instruction}”"
 
 
-def value_text(asked: Asking, said: Value) -> str:
+def value_text(asked: Asking, said: AnswerValue) -> str:
     """What was entered, as text."""
     if said is None:
         return "no answer"
@@ -138,7 +145,7 @@ def saved_text(plan: Plan, told: History, step: Step | None, word: Outcome | Rem
             return ""
 
 
-def _entered_text(plan: Plan, step: Asking, value: Value) -> str:
+def _entered_text(plan: Plan, step: Asking, value: AnswerValue) -> str:
     said = "description" if isinstance(step, Describe) else value_text(step, value)
     return f"{about_text(plan, step)}: {said}"
 

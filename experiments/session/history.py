@@ -9,7 +9,8 @@ from typing import TypeVar
 from experiments.design.plan import Plan, Trial
 from experiments.session import steps
 from experiments.session.remarks import EntryCorrected, Remark
-from experiments.session.steps import Asking, Value
+from experiments.session.steps import Asking
+from experiments.tasks.questions import AnswerValue
 
 Word = TypeVar("Word")
 
@@ -96,13 +97,22 @@ def asked_before(history: History, about: EntryCorrected) -> Asking | None:
     return next((step for step in steps_back if (step.trial, step.question) == wanted), None)
 
 
-def entered_value(history: History, asked: Asking) -> Value:
+def entered_value(history: History, asked: Asking) -> AnswerValue:
     """What an entry says, as it counts: the last that was entered. `None`: no answer."""
     said = [_value(step, word, asked) for step, word in history]
     return next((one[0] for one in reversed(said) if one), None)
 
 
-def _value(step: steps.Step | None, word: steps.Outcome | Remark, asked: Asking) -> tuple[Value] | None:
+def ranks_of_others(history: History, asked: steps.Rate) -> dict[AnswerValue, steps.Rate]:
+    """The ranks that other trials of the set have, with what asked for them; none where ranks need not be distinct."""
+    if not asked.distinct:
+        return {}
+    there = (one for one in entries(history, asked.trial) if isinstance(one, steps.Rate))
+    others = [one for one in there if one.question == asked.question and one.trial != asked.trial]
+    return {value: one for one in others if (value := entered_value(history, one)) is not None}
+
+
+def _value(step: steps.Step | None, word: steps.Outcome | Remark, asked: Asking) -> tuple[AnswerValue] | None:
     if isinstance(word, EntryCorrected):
         return (word.value,) if (word.trial, word.question) == (asked.trial, asked.question) else None
     return (word.value,) if isinstance(word, steps.Answered) and step == asked else None

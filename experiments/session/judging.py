@@ -8,9 +8,10 @@ from dataclasses import dataclass, replace
 from experiments.design.plan import Plan, Trial
 from experiments.session import events, remarks
 from experiments.session.events import ACTS, OWN_HAND_EVENTS, Event, Press
-from experiments.session.history import History, entered_value, entries, of_one_set, repeatable, trial_at
+from experiments.session.history import History, entered_value, entries, ranks_of_others, repeatable, trial_at
 from experiments.session.states import No, Position, State, after, why_after
-from experiments.session.steps import Answered, Ask, Asking, Rate, is_answer, what
+from experiments.session.steps import Ask, Asking, Rate, is_answer, what
+from experiments.tasks.questions import on_scale
 
 REARM_HELD_S = 1.0
 """For so long a key is held to go on after an emergency stop."""
@@ -62,9 +63,16 @@ class Moment:
 
 
 def meant(moment: Moment, event: Event) -> tuple[Event, str]:
-    """The event as it is meant, and a message. A correction that changes nothing does not count as one."""
+    """The event as it is meant, and a message: a rating is kept to the scale's grain, also where it is corrected.
+
+    A correction that changes nothing does not count as one.
+    """
     entry = moment.position.correcting
-    if isinstance(event, events.Correct) and entry is not None and event.value == entered_value(moment.history, entry):
+    if not isinstance(event, events.Correct) or entry is None:
+        return event, ""
+    if isinstance(entry, Rate) and isinstance(event.value, float) and is_answer(entry, event.value):
+        event = replace(event, value=on_scale(event.value, entry))
+    if event.value == entered_value(moment.history, entry):
         return events.Leave(), "That is what stands there: nothing was corrected."
     return event, ""
 
@@ -112,8 +120,8 @@ def _impossible(moment: Moment, event: Event) -> str:  # noqa: C901, PLR0911 - o
             return f"That is no {what(entry)}."
         case events.Rating(rating=None) if isinstance(step := moment.position.step, Rate) and not step.may_be_skipped:
             return "An answer is needed here."
-        case events.Rating(rating=float() as rank) if _is_taken(moment, rank):
-            return f"{rank:g} was given to another one of this set: each has a rank of its own."
+        case events.Rating(rating=rank):
+            return _taken(moment, rank)
         case events.Answer(response=response) if not _is_choice(moment, response):
             return f"“{response}” is not among the answers."
         case events.Undo() if moment.further_back is None:
@@ -134,7 +142,9 @@ def _not_asked(
     """Why what the participant did is no answer to what is asked."""
     if event.step != moment.position.number:
         return "It was the answer to an earlier question."
-    if not isinstance(event, events.ParticipantKey):
+    if isinstance(event, events.ParticipantRated):
+        return _taken(moment, event.rating)
+    if isinstance(event, events.ParticipantDescribed):
         return ""
     if not _is_choice(moment, event.response):
         return f"“{event.response}” is not among the answers."
@@ -146,21 +156,15 @@ def _not_asked(
     return "It went down before the stimulus, or in a pause."
 
 
-def _is_taken(moment: Moment, rank: float) -> bool:
-    """Whether another trial of the set has this rank, where each has one of its own."""
+def _taken(moment: Moment, rank: float | None) -> str:
+    """Why a trial cannot have a rank: another one of the set has it, and each has one of its own."""
     asked = moment.position.step
-    if not isinstance(asked, Rate) or not asked.distinct:
-        return False
-    others = {
-        step.trial: step
-        for step, word in moment.history
-        if isinstance(step, Rate) and isinstance(word, Answered) and step.question == asked.question
-    }
-    return any(
-        entered_value(moment.history, step) == rank
-        for trial, step in others.items()
-        if of_one_set(trial, asked.trial) and trial != asked.trial
-    )
+    if rank is None or not isinstance(asked, Rate):
+        return ""
+    rank = on_scale(rank, asked)
+    if rank not in ranks_of_others(moment.history, asked):
+        return ""
+    return f"{rank:g} was given to another one of this set: each has a rank of its own."
 
 
 def _is_choice(moment: Moment, response: str) -> bool:
@@ -194,6 +198,18 @@ def remark_of(  # noqa: C901, PLR0911 - one case an event
             return remarks.Continued(paused_s=round(then.since_s - (before.paused_s or before.since_s), 3))
         case _:
             return None
+
+
+def exchanged(moment: Moment, event: Event) -> remarks.EntryCorrected | None:
+    """What is corrected along with a rank that another trial of the set has: that one gets the rank that was."""
+    entry = moment.position.correcting
+    if not isinstance(event, events.Correct) or not isinstance(entry, Rate):
+        return None
+    other = ranks_of_others(moment.history, entry).get(event.value)
+    if other is None:
+        return None
+    was = entered_value(moment.history, entry)
+    return remarks.EntryCorrected(trial=other.trial, question=other.question, value=was)
 
 
 def refused(event: Event, position: Position, because: str) -> remarks.Refused | None:

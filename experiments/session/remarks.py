@@ -11,7 +11,7 @@ from typing import Annotated, Literal
 from pydantic import Field, TypeAdapter
 
 from experiments.design.plan import Trial, without_blanks
-from experiments.session.steps import Value
+from experiments.tasks.questions import AnswerValue
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -20,7 +20,7 @@ class EntryCorrected:
 
     trial: Trial
     question: str
-    value: Value
+    value: AnswerValue
     kind: Literal["corrected"] = "corrected"
 
 

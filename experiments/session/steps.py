@@ -14,7 +14,7 @@ from pydantic import Field, TypeAdapter
 
 from device.words import ShotTiming
 from experiments.design.plan import Trial, without_blanks
-from experiments.tasks.questions import Choice
+from experiments.tasks.questions import AnswerValue, Choice
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -66,7 +66,7 @@ class Ask:
         """What can be answered."""
         return tuple(choice.answer for choice in self.choices)
 
-    def label(self, answer: Value) -> str:
+    def label(self, answer: AnswerValue) -> str:
         """What an answer is called."""
         return next((choice.label for choice in self.choices if choice.answer == answer), str(answer))
 
@@ -168,10 +168,6 @@ class Fired:
     kind: Literal["fired"] = "fired"
 
 
-Value = str | float | None
-"""What was said: a named answer or words, a rating, or `None` for no answer. 0 is a rating; words may be empty."""
-
-
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Answered:
     """What the participant said, and whose hand entered it. The time is valid if it came from the participant's own.
@@ -180,7 +176,7 @@ class Answered:
     synthetic participant's is the observer's. Ratings and descriptions have no times.
     """
 
-    value: Value
+    value: AnswerValue
     by: Literal["participant", "experimenter", "synthetic"]
     response_time_s: float | None = None
     response_time_valid: bool | None = None
@@ -295,7 +291,7 @@ def what(asked: Asking) -> What:
     return _WHAT[type(asked)]
 
 
-def is_answer(asked: Asking, value: Value) -> bool:
+def is_answer(asked: Asking, value: AnswerValue) -> bool:
     """Whether a value is an answer to what was asked."""
     match asked:
         case Ask():
@@ -359,7 +355,7 @@ class Presenter:
     def __init__(self, steps_of: StepsOf) -> None:
         self._steps_of = steps_of
         self._presented: Counter[Trial] = Counter()
-        self.said: dict[tuple[Trial, str], Value] = {}
+        self.said: dict[tuple[Trial, str], AnswerValue] = {}
 
     def present(self, trial: Trial) -> Session:
         """Present a trial until it is done; an earlier one that is to be repeated comes in between."""

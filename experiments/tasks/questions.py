@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from string import ascii_lowercase, digits
 from typing import Protocol
@@ -18,10 +18,8 @@ from experiments.design.language import (
 )
 from experiments.design.plan import Trial
 
-AnswerValue = str | float | tuple[int, ...] | None
-"""A named answer or words, a number, the trials of a block in order of rank, or none."""
-
-MAX_TEXT = 2_000
+AnswerValue = str | float | None
+"""What was said: a named answer or words, a number, or `None` for no answer. 0 is a rating; words may be empty."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -109,36 +107,6 @@ def _larger(trial: Trial) -> str | None:
 def chance(question: QuestionConfig) -> float | None:
     """How often who does not know is right; `None` of a question that nothing is right for."""
     return None if question.correct is None else 1.0 / len(question.named_answers)
-
-
-def answer_problem(question: QuestionConfig, answer: AnswerValue, *, of: int = 1) -> str:
-    """Why this is no answer to the question, or nothing if it is one. `of`: how many trials are ranked."""
-    if answer is None:
-        return "" if question.may_be_skipped or question.kind == "text" else "an answer is needed"
-    match question.kind:
-        case "choice" | "yes-no":
-            names = question.named_answers
-            return "" if answer in names else f"{answer!r} is none of {', '.join(names)}"
-        case "text":
-            return (
-                ""
-                if isinstance(answer, str) and len(answer) <= MAX_TEXT
-                else f"words of at most {MAX_TEXT} letters are needed"
-            )
-        case "ranking":
-            ranked = isinstance(answer, tuple) and sorted(answer) == list(range(1, of + 1))
-            return "" if ranked else f"each of the numbers 1 to {of} is needed, once"
-        case "rating" | "number":
-            return next(_number_problems(question, answer), "")
-
-
-def _number_problems(question: QuestionConfig, answer: AnswerValue) -> Iterator[str]:
-    if isinstance(answer, bool) or not isinstance(answer, int | float) or not math.isfinite(answer):
-        yield f"{answer!r} is no number"
-    elif question.minimum is not None and answer < question.minimum:
-        yield f"{answer:g} is below {question.minimum:g}"
-    elif question.maximum is not None and answer > question.maximum:
-        yield f"{answer:g} is above {question.maximum:g}"
 
 
 class Scale(Protocol):

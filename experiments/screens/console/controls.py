@@ -20,8 +20,8 @@ from experiments.session.history import entered_value, trial_at
 from experiments.session.judging import REARM_HELD_S
 from experiments.session.remarks import flag_word
 from experiments.session.states import EMERGENCY, Position, State
-from experiments.session.steps import Ask, Rate, Value
-from experiments.tasks.questions import Choice
+from experiments.session.steps import Ask, Rate
+from experiments.tasks.questions import AnswerValue, Choice
 
 TextField = Literal["line", "number", "words"]
 """What can be typed into."""
@@ -268,7 +268,7 @@ class Controls:
         answer = events.Answer(response=response, at_s=press.at_s, by=self._hand, response_time_s=drawn_s)
         self._give(answer, response, press)
 
-    def _give(self, event: Event, said: Value, press: Press) -> None:
+    def _give(self, event: Event, said: AnswerValue, press: Press) -> None:
         """Offer what was entered, or the same as a correction where one is open."""
         self._offer(events.Correct(value=said) if self.drawn.state is State.CORRECTING else event, press)
 

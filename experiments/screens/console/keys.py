@@ -10,11 +10,12 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Literal
 
+from experiments.design.language import QuestionConfig
 from experiments.session import events
 from experiments.session.events import Event
 from experiments.session.states import No, Position, State, change_of
 from experiments.session.steps import Ask, Describe, Rate
-from experiments.tasks.questions import Choice
+from experiments.tasks.questions import Choice, choices
 
 BOUNCE_S = 0.02
 """A key that goes down again so soon was not let go by a hand: an auto-repeat told as two events, or a bounce."""
@@ -175,6 +176,18 @@ def _letter(key: str, position: Position) -> Name | None:
 _LETTERS: dict[str, Name] = {
     command.key: command.name for command in KEY_COMMANDS if len(command.key) == 1 and command.key != "P"
 }
+
+
+def shared_keys(question: QuestionConfig) -> list[str]:
+    """The participant's own keys that the console takes as well: there nobody could tell whose hand pressed one.
+
+    >>> asked = QuestionConfig(kind="yes-no", text="Was there one?", keys={"yes": "right", "no": "u"})
+    >>> shared_keys(asked), shared_keys(asked.model_copy(update={"keys": {"yes": "right", "no": "left"}}))
+    (['u'], [])
+    """
+    asked = choices(question)
+    heard = {one.key.upper() for one in asked} | {command.key for command in KEY_COMMANDS}
+    return [one.own_key for one in asked if one.own_key.upper() in heard]
 
 
 def field_at(position: Position) -> Literal["number", "words"] | None:

@@ -28,7 +28,7 @@ from experiments.run import Again, Finished, RunRequest, UnfinishedRun
 from experiments.screens.console import people, widgets
 from experiments.screens.console.app import Console, application
 from experiments.screens.console.form import Opening, monitors
-from experiments.screens.console.participant_link import WAIT, ParticipantSide
+from experiments.screens.console.participant_link import WAIT, ParticipantSide, check_own_keys
 from experiments.screens.console.start import choose_run
 from experiments.screens.console.view import THANK_PARTICIPANT
 from experiments.screens.console.widgets import WHY, Option, QuestionBox, TextLines, start_sheet
@@ -147,6 +147,8 @@ def _participant(stack: ExitStack, request: RunRequest) -> ParticipantSide:
     """The participant's screen, once it is open: PsychoPy takes its time, and a window says so meanwhile."""
     options = request.options
     check_monitor(options.monitor)
+    if options.keys:
+        check_own_keys(request.setup)
     look = _look(options.monitor)
 
     def open_link() -> ParticipantLink:

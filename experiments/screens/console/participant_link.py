@@ -12,20 +12,39 @@ from dataclasses import replace
 from experiments.config.setup import Setup
 from experiments.design.config import DesignConfig
 from experiments.live_run import LiveRun
-from experiments.screens.console.keys import choices_at
+from experiments.screens.console.keys import choices_at, shared_keys
 from experiments.screens.console.view import Message, ParticipantSeen, Trouble
 from experiments.screens.participant import messages
 from experiments.screens.participant.link import ParticipantError, ParticipantLink
+from experiments.screens.texts import place_in_set
 from experiments.session import events
 from experiments.session.events import OwnHand
+from experiments.session.history import ranks_of_others
 from experiments.session.states import Position, State
 from experiments.session.steps import Ask, Describe, Inform, Rate, Step
+from experiments.study.folders import PlaceError
 from experiments.tasks.questions import first_choices
 
 WAIT, PAUSED, THANKS = "Please wait.", "Paused. Please wait.", "Thank you."
 
 Wanted = Callable[[], bool]
 """Whether a question is still to be asked."""
+
+
+_OWN = ("left", "right", "up", "down", *"123456789")
+"""Keys that the console leaves to the participant."""
+
+
+def check_own_keys(setup: Setup[DesignConfig]) -> None:
+    """`PlaceError`: a key of the participant's own would be the experimenter's as well."""
+    for name, question in setup.config.questions.items():
+        if shared := shared_keys(question):
+            keys = ", ".join(f'{one} = "{key}"' for one, key in zip(question.named_answers, _OWN, strict=False))
+            raise PlaceError(
+                f"--participant-keys: {setup.source}: questions.{name}: {', '.join(shared)} would be a key of the "
+                "console as well, so nobody could tell who pressed it; give the answers keys of their own, such as "
+                f"keys = {{ {keys} }}"
+            )
 
 
 def _has_a_page(step: Step | None) -> bool:
@@ -160,28 +179,42 @@ class ParticipantSide:
         return bool(verdict)
 
     def _rated(self, step: Rate, position: Position, wanted: Wanted) -> None:
-        given = self._link.ask_rating(
-            messages.AskRating(
-                number=step.trial.trial,
-                of=self.planned,
-                question=step.text,
-                minimum=step.minimum,
-                maximum=step.maximum,
-                minimum_text=step.minimum_text,
-                maximum_text=step.maximum_text,
-                grain=step.grain,
-                draft=position.number,
-            ),
-            wanted=wanted,
-        )
-        self._offer(events.ParticipantRated(rating=given.rating, step=position.number, by=self._hand))
+        number, of = self._place(step)
+        while wanted():
+            given = self._link.ask_rating(
+                messages.AskRating(
+                    number=number,
+                    of=of,
+                    question=step.text,
+                    minimum=step.minimum,
+                    maximum=step.maximum,
+                    minimum_text=step.minimum_text,
+                    maximum_text=step.maximum_text,
+                    grain=step.grain,
+                    taken=self._taken(step),
+                    draft=position.number,
+                ),
+                wanted=wanted,
+            )
+            event = events.ParticipantRated(rating=given.rating, step=position.number, by=self._hand)
+            if self._live is None or self._live.offer(event):
+                return  # else a correction gave that rank to another one meanwhile
+
+    def _taken(self, step: Rate) -> tuple[float, ...]:
+        """The ranks that are no longer free."""
+        history = () if self._live is None else self._live.history
+        return tuple(rank for rank in ranks_of_others(history, step) if isinstance(rank, float))
+
+    def _place(self, step: Rate | Describe) -> tuple[int, int]:
+        """By which number a stimulus is named, and of how many: after a block that in its set."""
+        if self._live is None or not step.later:
+            return step.trial.trial, self.planned
+        return place_in_set(self._live.plan, step.trial)
 
     def _described(self, step: Describe, position: Position, wanted: Wanted) -> None:
+        number, of = self._place(step)
         given = self._link.ask_description(
-            messages.AskDescription(
-                number=step.trial.trial, of=self.planned, question=step.text, draft=position.number
-            ),
-            wanted=wanted,
+            messages.AskDescription(number=number, of=of, question=step.text, draft=position.number), wanted=wanted
         )
         self._offer(events.ParticipantDescribed(text=given.comment, step=position.number, by=self._hand))
 

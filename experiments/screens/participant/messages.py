@@ -40,6 +40,7 @@ class AskRating:
     """Ask for a rating of one of several stimuli, named by its order of presentation.
 
     Asked again with the same `draft`, it begins with the marker where it stood; so does a description with its words.
+    `taken`: ratings that were given to others, where each has one of its own, as ranks are.
     """
 
     number: int
@@ -50,6 +51,7 @@ class AskRating:
     minimum_text: str
     maximum_text: str
     grain: _Positive
+    taken: tuple[_Finite, ...] = ()
     draft: int = 0
     ask: int = 0
     kind: Literal["ask-rating"] = "ask-rating"

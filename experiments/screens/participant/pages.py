@@ -144,6 +144,7 @@ def move(scale: messages.AskRating, rating: float | None, step: Move) -> float:
 
 
 _HINT = "Click on the line or use the arrow keys, then Confirm or Enter"
+_TAKEN = "Another one has this place: each has one of its own"
 _SCALE_Y = -0.06
 _LENGTH = 0.76
 """The scale's, as a part of the page's width."""
@@ -175,7 +176,7 @@ def spot_px(part: float, width_px: int, height_px: int) -> tuple[int, int]:
 class RatingPage(Page):
     """The scale. No marker stands on it until the participant puts one there, and nothing is confirmed before.
 
-    `drafts` holds where it stood when the page was taken off: it stands there again.
+    Nor is what another one has. `drafts` holds where it stood when the page was taken off: it stands there again.
     """
 
     pointer = True
@@ -188,7 +189,8 @@ class RatingPage(Page):
         self._half = _LENGTH * stage.half_width
         self._slider = self._scale()
         self._button = Button(stage, "Confirm")
-        self._drawn = [*heading(stage, asked), *self._ends(), hint(stage, _HINT)]
+        self._drawn = [*heading(stage, asked), *self._ends()]
+        self._hints = {False: hint(stage, _HINT), True: hint(stage, _TAKEN)}
 
     def moves(self) -> float | None:
         """The marker."""
@@ -197,9 +199,9 @@ class RatingPage(Page):
     def draw(self) -> None:
         """The question, the scale with its marker if there is one, the button."""
         self._slider.markerPos = self._rating
-        for stimulus in (*self._drawn, self._slider):
+        for stimulus in (*self._drawn, self._slider, self._hints[self._rating in self._asked.taken]):
             stimulus.draw()
-        self._button.draw(enabled=self._rating is not None)
+        self._button.draw(enabled=self._is_free())
 
     def pressed(self, x: float, y: float) -> None:
         """On the scale: put the marker there. On the button: confirm."""
@@ -241,8 +243,12 @@ class RatingPage(Page):
         if self._rating is not None:
             self._drafts[self._asked.draft] = self._rating
 
+    def _is_free(self) -> bool:
+        """Whether there is a marker, and no other one's place."""
+        return self._rating is not None and self._rating not in self._asked.taken
+
     def _confirm(self) -> None:
-        self._done = self._rating is not None
+        self._done = self._is_free()
 
     def _scale(self) -> Any:
         """PsychoPy's slider draws; the mouse is heard here, as a click between two frames would be lost on it."""
