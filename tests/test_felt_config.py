@@ -2,10 +2,8 @@
 
 from __future__ import annotations
 
-import re
 import shutil
 from pathlib import Path
-from typing import NamedTuple
 
 import pytest
 
@@ -22,6 +20,7 @@ from experiments.synthetic.laws import AppealLaw, DiffusionLaw, SyntheticAnswers
 from experiments.synthetic.model_based import ModelParameters
 from experiments.synthetic.percept import PerceptConfig
 from experiments.synthetic.preference import Appeal
+from tests.refusals import Broken, check_refused, edit
 
 DIRECTION, PREFERENCE, HURRY = "direction.toml", "preference.toml", "examples/hurry.toml"
 DECIDING, LIKING, HURRIED = (f"synthetic/{name}-felt.toml" for name in ("direction", "preference", "hurry"))
@@ -35,12 +34,6 @@ def folder(tmp_path: Path) -> Path:
     for name in ("direction", "preference"):
         edit(tmp_path / "configs" / f"{name}.toml", f'"synthetic/{name}.toml"', f'"synthetic/{name}-felt.toml"')
     return tmp_path / "configs"
-
-
-def edit(path: Path, old: str, new: str) -> None:
-    text = path.read_text(encoding="utf-8")
-    assert old in text, f"no {old!r} in {path.name}"
-    path.write_text(text.replace(old, new, 1), encoding="utf-8")
 
 
 def people(config: Path | str) -> SyntheticAnswers:
@@ -107,17 +100,6 @@ def test_instructions_are_recorded_with_their_texts(folder: Path) -> None:
     assert setup.record()["experiment"]["factors"]["instruction"] == told.model_dump(mode="json")  # type: ignore[index]
     assert told.levels == ("speed", "neutral", "accuracy")
     assert told.texts["neutral"] == "Answer fast and well."
-
-
-class Broken(NamedTuple):
-    """An edit of a file, what the refusal must say, and words on the line that it must name, if there is one."""
-
-    config: str
-    file: str
-    old: str
-    new: str
-    said: tuple[str, ...]
-    at: str | None = None
 
 
 def of_a_law(old: str, new: str, *said: str, at: str = "") -> Broken:
@@ -192,14 +174,7 @@ REFUSED = {
 
 @pytest.mark.parametrize("broken", [pytest.param(broken, id=name) for name, broken in REFUSED.items()])
 def test_one_refusal_names_file_place_key_value_and_rule(folder: Path, broken: Broken) -> None:
-    edit(folder / broken.file, broken.old, broken.new)
-    with pytest.raises(ConfigError) as refused:
-        load_setup(str(folder / broken.config))
-    lines = enumerate((folder / broken.file).read_text().splitlines(), start=1)
-    place = next((f":{n}" for n, line in lines if broken.at and broken.at.strip() in line), r"(:\d+)?")
-    assert re.search(f"{re.escape(broken.file)}{place}: ", str(refused.value))
-    for words in broken.said:
-        assert words in str(refused.value)
+    check_refused(folder, broken)
 
 
 def test_observers_who_do_not_heed_instructions_need_no_boundary(folder: Path) -> None:

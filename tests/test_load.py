@@ -1,9 +1,7 @@
 """Broken configs: the shipped ones, each with one edit. Every refusal names file, line, key, value and rule."""
 
-import re
 import shutil
 from pathlib import Path
-from typing import NamedTuple
 
 import pytest
 
@@ -12,6 +10,7 @@ from device.words import Pulse
 from experiments.config.door import ConfigError, line_of, read_toml
 from experiments.load import check_limits, find, load_gun, load_setup, load_study, shipped_folder
 from experiments.synthetic.laws import SyntheticAnswers, TableLaw
+from tests.refusals import Broken, check_refused, edit, line, refusal
 
 OF_THE_PAPER = ("direction", "preference")
 DESIGNS = ("voltages", "detection", "stronger", "magnitude", "realism", "pairs", "grip", "hurry", *OF_THE_PAPER)
@@ -34,22 +33,6 @@ def folder(tmp_path: Path) -> Path:
         target.parent.mkdir(exist_ok=True)
         shutil.copy(source, target)
     return tmp_path
-
-
-def edit(path: Path, old: str, new: str) -> None:
-    text = path.read_text(encoding="utf-8")
-    assert old in text, f"{path.name} no longer holds {old!r}"
-    path.write_text(text.replace(old, new, 1), encoding="utf-8")
-
-
-def line(path: Path, words: str) -> int:
-    return next(n for n, row in enumerate(path.read_text(encoding="utf-8").splitlines(), start=1) if words in row)
-
-
-def refusal(path: Path) -> str:
-    with pytest.raises(ConfigError) as refused:
-        check_limits(load_setup(str(path)))
-    return str(refused.value)
 
 
 # what is shipped
@@ -93,20 +76,6 @@ def test_a_name_that_means_no_file_is_refused_with_what_is_shipped(name: str) ->
 
 
 # one edit each
-
-
-class Broken(NamedTuple):
-    """An edit of a file that makes `config` unusable, and what the refusal must say.
-
-    `named` is the file that must be named, `at` words on the line that must be named, if there is one.
-    """
-
-    config: str
-    file: str
-    old: str
-    new: str
-    said: tuple[str, ...]
-    at: str | None = None
 
 
 BROKEN = {
@@ -310,6 +279,7 @@ BROKEN_GUNS = {
     "method that the gun has not": Broken(
         PREFERENCE, GUN, "[methods.asymmetric-2]", "[methods.asymmetric-3]",
         ("factors.method: the gun has no method 'asymmetric-2'", "vibration, asymmetric-1, asymmetric-3"),
+        named=PREFERENCE,  # both files are at odds there
     ),
     "30 V": Broken(
         DIRECTION, GUN, "voltage_V = 16.0", "voltage_V = 30.0",
@@ -348,13 +318,7 @@ def broken_cases() -> list:
 
 @pytest.mark.parametrize("broken", broken_cases())
 def test_one_refusal_names_file_place_key_value_and_rule(folder: Path, broken: Broken) -> None:
-    edit(folder / broken.file, broken.old, broken.new)
-    message = refusal(folder / broken.config)
-    for words in broken.said:
-        assert words in message
-    named = broken.file if "the gun has no method" not in message else broken.config  # both files are at odds there
-    place = f":{line(folder / broken.file, broken.at)}" if broken.at else r"(:\d+)?"
-    assert re.search(f"{re.escape(str(folder / named))}{place}: ", message)
+    check_refused(folder, broken)
 
 
 def test_a_gun_file_by_itself_is_refused_for_a_method_that_never_moves(folder: Path) -> None:
