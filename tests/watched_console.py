@@ -141,8 +141,8 @@ class Eye:
 
     def _run(self, window: Any) -> dict[str, Any]:
         """Where the run of a console's window is, as far as it is drawn."""
+        from experiments.screens.console.buttons import CommandButton
         from experiments.screens.console.keys import field_at
-        from experiments.screens.console.panels import CommandButton
 
         if window.live is None:
             return {"ended": window.ended is not None}

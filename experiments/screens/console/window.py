@@ -12,9 +12,10 @@ from PyQt6.QtGui import QCloseEvent, QResizeEvent, QShowEvent
 from experiments.clock import Clock
 from experiments.live_run import LiveRun
 from experiments.screens.console import view, widgets, windows
+from experiments.screens.console.buttons import Buttons
 from experiments.screens.console.controls import Controls, TextField
 from experiments.screens.console.keys import Name, Typing
-from experiments.screens.console.panels import FITS, Bars, Buttons, Notice, SidePanel, TextFields, TextPage
+from experiments.screens.console.panels import FITS, Bars, Notice, SidePanel, TextFields, TextPage
 from experiments.screens.console.progress import RunTiming, marks
 from experiments.screens.console.windows import Keyboard, remember, scaled_sheet
 from experiments.screens.participant.messages import Theme
