@@ -22,7 +22,14 @@ if TYPE_CHECKING:
         studentized_range_sf,
         tukey_hsd,
     )
-    from analysis.stats.binomial import BinomialTest, Detection, binomial_test, yes_no
+    from analysis.stats.binomial import (
+        BinomialTest,
+        Detection,
+        binomial_test,
+        binomial_test_log_p,
+        binomial_test_p,
+        yes_no,
+    )
 
 __all__ = [
     "Anova",
@@ -31,6 +38,8 @@ __all__ = [
     "Detection",
     "RepeatedMeasuresAnova",
     "binomial_test",
+    "binomial_test_log_p",
+    "binomial_test_p",
     "one_way_anova",
     "rm_anova",
     "rm_tukey_hsd",

@@ -238,7 +238,7 @@ def test_the_binomial_test_and_its_interval_are_those_of_binom_test() -> None:
     table = np.array(R["binom_test"], dtype=float)
     for confidence in np.unique(table[:, 3]):
         k, n, p0, _, p, low, high = table[table[:, 3] == confidence].T
-        ours = binomial_test(k, n, p0, confidence)
+        ours = binomial_test(k, n, p0, confidence=confidence)
         assert ours.p == _near(p, 1e-12, 0.0)
         assert ours.ci_low == _near(low, 1e-13, 0.0)
         assert ours.ci_high == _near(high, 1e-13, 0.0)

@@ -11,7 +11,8 @@ from hypothesis import strategies as st
 from mpmath import mp, mpf
 from scipy import special, stats
 
-from analysis import binomial_test
+from analysis import binomial_test, binomial_test_log_p, binomial_test_p
+from analysis.stats.binomial import Tail
 from tests.golden_binomial import GOLDEN, digits_of
 
 
@@ -63,6 +64,57 @@ def test_p_and_its_logarithm_agree_with_sums_of_mpmath() -> None:
             assert p < 1e-299, what
         else:
             assert digits_of(p, case["p"]) >= (11 if far else 13), what
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("alternative", ["greater", "less"])
+def test_one_sided_logarithms_agree_with_sums_of_mpmath(alternative: Tail) -> None:
+    cases = GOLDEN["tests"]
+    columns = ([case[name] for case in cases] for name in ("k", "n", "p0"))
+    for case, log_p in zip(cases, np.asarray(binomial_test_log_p(*columns, alternative)), strict=True):
+        exact, far = case[f"log_{alternative}"], case["n"] > 10**6
+        if abs(mpf(exact)) > 1e-300:
+            assert digits_of(log_p, exact) >= (11 if far else 14), f"{case['k']} of {case['n']} at {case['p0']:.3g}"
+        else:
+            assert -1e-299 < log_p <= 0.0
+
+
+@pytest.mark.slow
+@settings(max_examples=40)
+@given(st.integers(1, 60), st.data(), st.sampled_from([Fraction(1, 2), Fraction(1, 3), Fraction(1, 10)]))
+def test_one_sided_p_is_the_exact_sum_of_all_outcomes_beyond(n: int, data: st.DataObject, p0: Fraction) -> None:
+    k = data.draw(st.integers(0, n))
+    pmf = [math.comb(n, i) * Fraction(float(p0)) ** i * (1 - Fraction(float(p0))) ** (n - i) for i in range(n + 1)]
+    for alternative, exact in (("greater", sum(pmf[k:])), ("less", sum(pmf[: k + 1]))):
+        assert binomial_test_p(k, n, float(p0), alternative) == pytest.approx(float(exact), rel=1e-14)
+
+
+@pytest.mark.parametrize("k", [0, 1, 5, 19, 20])
+@pytest.mark.parametrize(("alternative", "confidence"), [("greater", 0.95), ("less", 0.95), ("less", 0.8)])
+def test_one_sided_tests_and_intervals_are_those_of_scipy(k: int, alternative: Tail, confidence: float) -> None:
+    theirs = stats.binomtest(k, 20, 0.3, alternative)
+    found = binomial_test(k, 20, 0.3, alternative, confidence=confidence)
+    exact, wilson = (theirs.proportion_ci(confidence, method) for method in ("exact", "wilson"))
+    assert found.p == pytest.approx(theirs.pvalue, rel=1e-12)
+    assert (found.ci_low, found.ci_high) == pytest.approx((exact.low, exact.high), rel=1e-9, abs=1e-12)
+    assert (found.wilson_low, found.wilson_high) == pytest.approx((wilson.low, wilson.high), rel=1e-12, abs=1e-15)
+
+
+def test_p_alone_is_that_of_the_test() -> None:
+    k, n, p0 = np.arange(21)[:, None], [20, 30], 0.4
+    found = binomial_test(k, n, p0)
+    assert np.array_equal(binomial_test_p(k, n, p0), found.p)
+    assert np.array_equal(binomial_test_log_p(k, n, p0), found.log_p)
+
+
+def test_many_counts_of_many_trials_are_worked_out_as_one_by_one() -> None:
+    rng = np.random.default_rng(3)
+    n, p0 = rng.integers(1, 2000, size=5000), rng.choice([0.2, 0.5], size=5000)
+    k = rng.binomial(n, p0)
+    together = np.asarray(binomial_test_p(k, n, p0))
+    for i in range(0, 5000, 250):
+        assert together[i] == binomial_test_p(k[i], n[i], p0[i])
+    assert binomial_test_p([], 10).shape == (0,)
 
 
 @pytest.mark.parametrize("case", GOLDEN["intervals"], ids=lambda case: f"{case['k']} of {case['n']}")
@@ -135,6 +187,8 @@ def test_broadcasting_is_the_same_as_looping() -> None:
 @pytest.mark.parametrize(
     ("k", "n", "p0", "reason"),
     [
+        (2, [1.5], 0.5, r"trials must be whole numbers, not 1\.5"),
+        ([1, 2], [3, 4, 5], 0.5, r"do not fit together: successes \(2,\), trials \(3,\), p0 \(\)"),
         (11, 10, 0.5, r"0\.\.trials, not 11"),
         (-1, 10, 0.5, r"0\.\.trials, not -1"),
         (1.5, 10, 0.5, "whole"),
@@ -147,3 +201,8 @@ def test_broadcasting_is_the_same_as_looping() -> None:
 def test_impossible_counts_are_refused(k: float, n: float, p0: float, reason: str) -> None:
     with pytest.raises(ValueError, match=reason):
         binomial_test(k, n, p0)
+
+
+def test_an_alternative_that_is_none_is_refused() -> None:
+    with pytest.raises(ValueError, match="alternative must be one of two-sided, greater, less, not 'larger'"):
+        binomial_test(7, 10, alternative="larger")  # type: ignore[arg-type]

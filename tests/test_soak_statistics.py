@@ -12,13 +12,24 @@ import warnings
 from collections.abc import Callable
 from fractions import Fraction
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pandas as pd
 import pytest
 from mpmath import mpf
+from scipy import stats as scipy_stats
 
-from analysis import binomial_test, one_way_anova, rm_anova, rm_tukey_hsd, rm_tukey_hsd_paired
+from analysis import (
+    binomial_test,
+    binomial_test_log_p,
+    binomial_test_p,
+    one_way_anova,
+    rm_anova,
+    rm_tukey_hsd,
+    rm_tukey_hsd_paired,
+)
+from analysis.stats.binomial import Tail
 from tests import nist
 from tests.conftest import Soak
 from tests.exact import digits, exact_one_way_F, exact_rm_F, exact_squared_q, p_digits
@@ -83,6 +94,65 @@ def test_binomial_against_sums_of_mpmath(soak: Soak, most: int, p_bound: float, 
     soak(f"binomial, n up to {most:.0e}: fewest digits of log p", f"{log_p:.1f}", log_bound, f"{len(tests)} cases")
     assert p >= p_bound
     assert log_p >= log_bound
+
+
+@pytest.mark.parametrize("alternative", ["greater", "less"])
+def test_one_sided_binomial_against_sums_of_mpmath(soak: Soak, alternative: Tail) -> None:
+    """A log p below 1e-300, next to p = 1, is no normal double."""
+    cases = [case for case in GOLDEN["tests"] if abs(mpf(case[f"log_{alternative}"])) > 1e-300]
+    worst = min(
+        digits_of(binomial_test_log_p(case["k"], case["n"], case["p0"], alternative), case[f"log_{alternative}"])
+        for case in cases
+    )
+    soak(
+        f"binomial, {alternative}: fewest digits of log p", f"{worst:.1f}", 14, f"mpmath, {len(cases)} cases to n = 1e9"
+    )
+    assert worst >= 14
+
+
+@pytest.mark.parametrize("p0", [0.5, 0.3])
+def test_two_thousand_binomials_of_a_million_beside_scipy(soak: Soak, p0: float) -> None:
+    counts = np.random.default_rng(1).choice(np.arange(10**6 * p0 - 3000, 10**6 * p0 + 3000), 2000, replace=False)
+    few = [int(count) for count in counts[::10]]
+    pairs = [
+        (_cpu_seconds(lambda: binomial_test_p(counts, 10**6, p0)) / 2000, _cpu_seconds(lambda: _scipys(few, p0)) / 200)
+        for _ in range(5)
+    ]
+    found, theirs = np.asarray(binomial_test_p(few, 10**6, p0)), _scipys(few, p0)
+    apart = float(np.max(np.abs(found / theirs - 1.0)))
+    ours, scipys = (st.median(column) for column in zip(*pairs, strict=True))
+    how = f"{1e6 * ours:.1f} us a count; scipy.stats.binomtest p alone {1e6 * scipys:.0f} us, at most {apart:.0e} apart"
+    soak(f"2,000 binomial p of n = 1e6 at {p0}", f"{scipys / ours:,.0f} times scipy", "1", how)
+    assert scipys >= ours
+
+
+def test_one_binomial_and_a_hundred_thousand_beside_scipy(soak: Soak) -> None:
+    counts = np.random.default_rng(1).binomial(140, 0.5, 100_000)
+    works = (
+        lambda: binomial_test_p(counts, 140),
+        lambda: binomial_test_p(78, 140),
+        lambda: binomial_test(78, 140),
+        lambda: scipy_stats.binomtest(78, 140).pvalue,
+        lambda: _with_both_intervals(scipy_stats.binomtest(78, 140)),
+    )
+    rounds = [[_cpu_seconds(work) for work in works] for _ in range(41)]
+    many, one, whole, theirs, their_whole = (st.median(column) for column in zip(*rounds, strict=True))
+    each = many / len(counts)
+    how = f"{1e6 * each:.2f} us a count, n = 140; scipy.stats.binomtest p alone {1e6 * theirs:.0f} us"
+    soak("100,000 binomial p", f"{theirs / each:,.0f} times scipy", "1,000", how)
+    soak("one binomial p", f"{theirs / one:.1f} times scipy", "stated", f"{1e3 * one:.2f} ms")
+    how = f"{1e3 * whole:.2f} ms; scipy: p, exact and Wilson's interval {1e3 * their_whole:.2f} ms"
+    soak("one binomial test with both intervals", f"{their_whole / whole:.1f} times scipy", "1", how)
+    assert theirs / each >= 1000
+    assert their_whole >= whole
+
+
+def _with_both_intervals(test: Any) -> None:
+    test.pvalue, test.proportion_ci(method="exact"), test.proportion_ci(method="wilson")
+
+
+def _scipys(counts: list[int], p0: float) -> np.ndarray:
+    return np.array([scipy_stats.binomtest(count, 10**6, p0).pvalue for count in counts])
 
 
 def test_intervals_against_mpmath(soak: Soak) -> None:
@@ -153,6 +223,13 @@ start = time.perf_counter()
 rm_anova(tables), rm_tukey_hsd(tables)
 print(time.perf_counter() - start)
 """
+
+
+def _cpu_seconds(work: Callable[[], object]) -> float:
+    """Of this process alone, so that neighbours count less."""
+    start = time.process_time()
+    work()
+    return time.process_time() - start
 
 
 def _seconds(work: Callable[[], object]) -> float:

@@ -13,7 +13,7 @@ from scipy import special
 
 from analysis.paper.paper import PublishedDirection, PublishedExperiment, PublishedTukeyTest
 from analysis.stats.anova import PairStatistics, check_scores, pairs_of, pooled_pairs, rm_anova, studentized_range_isf
-from analysis.stats.binomial import binomial_test
+from analysis.stats.binomial import binomial_test_p
 
 WHOLE_PATTERN = "whole pattern"
 SIGNIFICANT = 0.05
@@ -72,7 +72,7 @@ def chance_recurs(correct: ArrayLike, trials: tuple[int, int], published: Publis
     claims = {}
     for claim in published.binomial:
         method, direction = published.methods.index(claim.method), ("forward", "backward").index(claim.direction)
-        rejected = np.asarray(binomial_test(counts[..., method, direction], trials[direction]).p) < SIGNIFICANT
+        rejected = np.asarray(binomial_test_p(counts[..., method, direction], trials[direction])) < SIGNIFICANT
         expected = float(claim.p) < SIGNIFICANT
         outcome = "p < .05" if expected else "p not below .05"
         claims[f"binomial, {claim.method} {claim.direction}, {outcome}"] = np.asarray(rejected == expected)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import warnings
 from collections.abc import Callable, Sequence
 from numbers import Real
-from typing import Any
+from typing import Any, TypeVar
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -65,6 +65,58 @@ def share(value: float, name: str) -> float:
     if not 0.0 < value < 1.0:
         raise ValueError(f"{name} must lie between 0 and 1, not {value}")
     return value
+
+
+def together(**named: FloatArray) -> tuple[FloatArray, ...]:
+    """The arrays broadcast against each other, else `ValueError` naming their shapes."""
+    try:
+        return tuple(np.broadcast_arrays(*named.values()))
+    except ValueError:
+        shapes = ", ".join(f"{name} {array.shape}" for name, array in named.items())
+        raise ValueError(f"the shapes do not fit together: {shapes}") from None
+
+
+Number = TypeVar("Number", np.float64, np.longdouble)
+_CASES = 2048
+"""Cases worked out together: what their nodes take stays in a processor's cache."""
+
+
+def by_case(function: Callable[..., NDArray[Number]], *arguments: FloatArray) -> NDArray[Number]:
+    """`function` of arguments of one shape, called for each different case once; results (..., cases) to (..., shape).
+
+    >>> by_case(lambda k, n: k / n, np.array([1.0, 1.0, 3.0]), np.array([4.0, 4.0, 4.0])).tolist()
+    [0.25, 0.25, 0.75]
+    """
+    first, where = _distinct(*(argument.ravel() for argument in arguments))
+    cases = [argument.ravel()[first] for argument in arguments]
+    chunks = range(0, max(len(first), 1), _CASES)
+    found = np.concatenate([function(*(case[i : i + _CASES] for case in cases)) for i in chunks], axis=-1)
+    return found[..., where].reshape(found.shape[:-1] + arguments[0].shape)
+
+
+def _distinct(*columns: FloatArray) -> tuple[IndexArray, IndexArray]:
+    """The row where each different combination of the columns (n,) stands, and for each row which of them it is."""
+    key = np.zeros(columns[0].shape, dtype=np.intp)
+    first = key[:1]
+    for column in columns:
+        if column.size and column.min() != column.max():
+            codes = _codes(column)
+            key = _codes(key * (codes.max() + 1) + codes)
+            first = np.empty(key.max() + 1, dtype=np.intp)
+            first[key] = np.arange(key.size)
+    return first, key
+
+
+def _codes(values: FloatArray | IndexArray) -> IndexArray:
+    """A number from 0 for each value, the same for equal ones; counts in a table, since sorting takes longer."""
+    most = values.max()
+    if values.min() < 0 or most >= 4 * values.size or (values.dtype.kind == "f" and (values != np.floor(values)).any()):
+        return np.unique(values, return_inverse=True)[1]
+    places = values.astype(np.intp)
+    seen = np.zeros(int(most) + 1, dtype=np.bool_)
+    seen[places] = True
+    codes: IndexArray = (np.cumsum(seen) - 1)[places]
+    return codes
 
 
 def by_row(**columns: ArrayLike) -> list[dict[str, float]]:

@@ -1,177 +1,35 @@
-"""The exact binomial test of a proportion, its tails in long doubles, its intervals; sensitivity d′ and criterion c.
-
-A probability of 1e-300 is the exponential of -690: 13 digits of it take 16 digits of the exponent, which doubles do not
-have and the 64 bits of an x86 long double do. Where long doubles are doubles, three digits fewer hold.
-"""
+"""The exact binomial test of a proportion and its intervals, of many counts at once; sensitivity d′, criterion c."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
-from math import factorial
+from typing import Literal, get_args
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 from scipy import special
 
-from analysis.stats.arrays import FloatArray, Values, float_or_array, numbers, share
+from analysis.stats.arrays import FloatArray, Values, by_case, float_or_array, numbers, share, together
+from analysis.stats.binomial_tail import LongArray, log_between, log_pmf, tail_over_pmf
 
-LongArray = NDArray[np.longdouble]
-
-_PI = np.longdouble("3.14159265358979323846264338327950288")
-_SMALL = 16
-_STIRLING = [(1, 12), (-1, 360), (1, 1260), (-1, 1680), (1, 1188), (-691, 360360), (1, 156), (-3617, 122400)]
-"""Coefficients of 1/x, 1/x^3, ... in log x! - [log(2 pi x) / 2 + x log x - x]; enough from x = 16 on."""
-
-_NEGLIGIBLE = 1e-21
-_FIRST_TERMS, _MOST_TERMS = 32, 4096
-
-
-def _small_stirling_errors() -> LongArray:
-    x = np.arange(1, _SMALL, dtype=np.longdouble)
-    factorials = np.array([np.longdouble(factorial(i)) for i in range(1, _SMALL)])
-    errors = np.log(factorials) - (np.log(2 * _PI * x) / 2 + x * np.log(x) - x)
-    return np.concatenate([[np.longdouble(0)], errors])
-
-
-_SMALL_ERRORS = _small_stirling_errors()
-
-
-def log_pmf(k: LongArray, n: LongArray, chance: LongArray) -> LongArray:
-    """Log of P(X = k) for X from n trials with 0 < chance < 1 and 0 <= k <= n, by the saddle point.
-
-    log P = log[n / (2 pi k (n - k))] / 2 + e(n) - e(k) - e(n - k) - D(k, n chance) - D(n - k, n (1 - chance)), with
-    Stirling's error e and the deviance D(x, m) = x log(x / m) + m - x. No large terms cancel, unlike in log gammas.
-    Source: Loader 2000, Fast and accurate computation of binomial probabilities.
-    """
-    size = np.maximum(n, 2)
-    x = np.clip(k, 1, size - 1)
-    y = size - x
-    deviance = _deviance(x, size * chance) + _deviance(y, size * (1 - chance))
-    stirling = _stirling_error(size) - _stirling_error(x) - _stirling_error(y)
-    inside = np.log(size / (2 * _PI * x * y)) / 2 + stirling - deviance
-    return np.select([k == 0, k == n], [n * np.log1p(-chance), n * np.log(chance)], default=inside)
-
-
-def log_tail(border: LongArray, step: int, n: LongArray, chance: LongArray) -> LongArray:
-    """Log of P(X >= border) for step 1, of P(X <= border) for step -1; `border` must lie on that side of the mode."""
-    return log_pmf(border, n, chance) + np.log(_relative_sum(border, step, np.full_like(n, np.inf), n, chance))
-
-
-def log_between(low: LongArray, high: LongArray, n: LongArray, chance: LongArray) -> LongArray:
-    """Log of P(low < X < high), -inf if nothing lies between; for up to some 1e5 values in between."""
-    count = high - low - 1
-    start = np.clip(low + 1, 0, n)
-    total = log_pmf(start, n, chance) + np.log(_relative_sum(start, 1, np.maximum(count, 1), n, chance))
-    return np.where(count < 1, -np.inf, total)
-
-
-def _stirling_error(x: LongArray) -> LongArray:
-    large = np.maximum(x, _SMALL)
-    series = np.zeros_like(large)
-    for numerator, denominator in reversed(_STIRLING):
-        series = series / (large * large) + np.longdouble(numerator) / denominator
-    table: LongArray = _SMALL_ERRORS[np.minimum(x, _SMALL - 1).astype(np.intp)]
-    return np.where(x < _SMALL, table, series / large)
-
-
-def _deviance(x: LongArray, m: LongArray) -> LongArray:
-    """D(x, m) for x >= 1; near m as (x - m) v + 2 x (v^3 / 3 + v^5 / 5 + ...) with v = (x - m) / (x + m)."""
-    v = (x - m) / (x + m)
-    near = np.abs(v) < 0.1
-    square = np.where(near, v * v, 0)
-    series = np.zeros_like(v)
-    for power in range(25, 1, -2):
-        series = square * series + np.longdouble(1) / power
-    close = (x - m) * v + 2 * x * v * square * series
-    return np.where(near, close, x * np.log(x / m) + m - x)
-
-
-def _relative_sum(start: LongArray, step: int, count: LongArray, n: LongArray, chance: LongArray) -> LongArray:
-    """Sum of P(start + j step) / P(start) over j from 0 to count - 1, until no term adds a digit; one axis."""
-    total, term, place, left = np.ones_like(start), np.ones_like(start), start.copy(), count - 1
-    odds = chance / (1 - chance)
-    active, terms = np.flatnonzero(left > 0), _FIRST_TERMS
-    while active.size:
-        ratios = _ratios(place[active], step, terms, n[active], odds[active])
-        ratios[np.arange(terms) >= left[active, None]] = 0
-        new = np.cumprod(ratios, axis=1) * term[active, None]
-        total[active] += new.sum(axis=1)
-        term[active] = new[:, -1]
-        place[active] += step * terms
-        left[active] -= terms
-        active = active[term[active] > _NEGLIGIBLE * total[active]]
-        terms = min(2 * terms, _MOST_TERMS)
-    return total
-
-
-def _ratios(place: LongArray, step: int, terms: int, n: LongArray, odds: LongArray) -> LongArray:
-    """P(i + step) / P(i) for the next `terms` values i from `place` on; 0 beyond the ends."""
-    i = np.clip(place[:, None] + step * np.arange(terms), 0, n[:, None])
-    rest = n[:, None] - i
-    ratios: LongArray = rest / (i + 1) * odds[:, None] if step > 0 else i / ((rest + 1) * odds[:, None])
-    return ratios
-
-
-_CLOSE = 1e-9
-"""A step of Newton's so small leaves an error of its square."""
-
-
-def clopper_pearson(k: FloatArray, n: FloatArray, tail: float) -> tuple[FloatArray, FloatArray]:
-    """Limits with P(X >= k | low) = P(X <= k | high) = tail, for k of n, one axis; 0 for k = 0, 1 for k = n.
-
-    Found by Newton's method, because scipy's beta quantiles can be wrong in the first digit (1000 of 1e9, scipy 1.17).
-    Source: Clopper & Pearson 1934, Biometrika 26, 404.
-    """
-    successes, trials = k.astype(np.longdouble), n.astype(np.longdouble)
-    low, high = np.zeros_like(k), np.ones_like(k)
-    some, not_all = k > 0.0, k < n
-    low[some] = _limit(successes[some], trials[some], tail, 1)
-    high[not_all] = _limit(successes[not_all], trials[not_all], tail, -1)
-    return low, high
-
-
-def _limit(k: LongArray, n: LongArray, tail: float, step: int) -> FloatArray:
-    """The p at which P(X >= k) (step 1) or P(X <= k) (step -1) is `tail`.
-
-    The logarithm of either is concave in t = log(p / (1 - p)), so Newton's steps converge from where it is a half. Its
-    slope in t is k (1 - p) P(k) / P(X >= k), or -(n - k) p P(k) / P(X <= k).
-    """
-    odds = (k + 0.5) / (n - k + 0.5)
-    change = np.ones_like(odds)
-    while (np.abs(change) > _CLOSE).any():
-        p = odds / (1 + odds)
-        log_now = log_tail(k, step, n, p)
-        falling = np.exp(log_pmf(k, n, p) - log_now)
-        slope = k * (1 - p) * falling if step > 0 else -(n - k) * p * falling
-        change = (np.log(np.longdouble(tail)) - log_now) / slope
-        odds = odds * np.exp(change)
-    limit: LongArray = odds / (1 + odds)
-    return limit.astype(np.float64)
-
-
-def wilson(k: FloatArray, n: FloatArray, tail: float) -> tuple[FloatArray, FloatArray]:
-    """The p with |k / n - p| = z sqrt(p (1 - p) / n), z the normal quantile of `tail`.
-
-    These are the roots of (n + z^2) p^2 - (2 k + z^2) p + k^2 / n = 0; the lower is taken from the product of the two,
-    where nothing cancels. Source: Wilson 1927, J. Am. Stat. Assoc. 22, 209.
-    """
-    z = -float(special.ndtri(tail))
-    upper = k + z * z / 2.0 + z * np.sqrt(k * (n - k) / n + z * z / 4.0)
-    return k * (k / n) / upper, np.where(k == n, 1.0, upper / (n + z * z))
-
+Tail = Literal["two-sided", "greater", "less"]
 
 TIE = 1e-7
 """Outcomes within this relative distance of the observed one's probability count as equally likely (R's rule)."""
 
 _MOST_TRIALS = 1e10
-"""The sums take time with the square root of the trials: beyond this, seconds."""
+"""What the sums near p = 1 bear: they take time with the square root of the trials."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class BinomialTest:
-    """Two-sided exact test of a proportion; `log_p` is the natural logarithm, good where `p` underflows to 0.
+    """Exact test of a proportion; `log_p` is the natural logarithm, good where `p` underflows to 0.
 
-    `ci_low, ci_high` are Clopper and Pearson's limits, `wilson_low, wilson_high` Wilson's.
+    `ci_low, ci_high` are Clopper and Pearson's limits, `wilson_low, wilson_high` Wilson's. Of a one-sided test the
+    interval is one-sided too: for "greater" it ends at 1, for "less" it begins at 0.
+
+    >>> binomial_test(9, 10).estimate
+    0.9
     """
 
     p: Values
@@ -184,35 +42,82 @@ class BinomialTest:
 
 
 def binomial_test(
-    successes: ArrayLike, trials: ArrayLike, p0: ArrayLike = 0.5, confidence: float = 0.95
+    successes: ArrayLike,
+    trials: ArrayLike,
+    p0: ArrayLike = 0.5,
+    alternative: Tail = "two-sided",
+    *,
+    confidence: float = 0.95,
 ) -> BinomialTest:
-    """Is the chance of success `p0`? p = sum of P(i) over all outcomes i with P(i) <= P(successes) (1 + 1e-7).
+    """Is the chance of success `p0`, or is it greater, or less? With the intervals; `binomial_test_p` gives p alone.
 
-    The tolerance makes ties of rounding count as ties, as R's `binom.test` and scipy do. It concerns the other side of
-    the mode alone: on its own side the observed count is the border. It shows where neighbours differ by less than it:
-    0 of 1e9 at p0 = 1e-9 has p = 1, with strict comparison 0.632.
+    Two-sided p = sum of P(i) over all outcomes i with P(i) <= P(successes) (1 + 1e-7); "greater": P(X >= successes);
+    "less": P(X <= successes). The tolerance makes ties of rounding count as ties, as R's `binom.test` and scipy do. It
+    concerns the other side of the mode alone: on its own side the observed count is the border. It shows where
+    neighbours differ by less than it: 0 of 1e9 at p0 = 1e-9 has p = 1, with strict comparison 0.632.
+
     `successes, trials, p0` broadcast; equal cases are worked out once. `ValueError`: counts that are not whole,
-    successes outside 0..trials, trials outside 1..1e10, p0 outside 0..1.
-    Source: Sterne 1954, Biometrika 41, 275.
+    successes outside 0..trials, trials outside 1..1e10, p0 outside 0..1, an alternative that is none.
+    Sources: Sterne 1954, Biometrika 41, 275; the intervals: see `clopper_pearson` and `wilson`.
 
-    >>> round(binomial_test(78, 140).p, 3)
-    0.205
+    >>> found = binomial_test(78, 140)
+    >>> round(found.p, 3), round(found.ci_low, 3), round(found.ci_high, 3)
+    (0.205, 0.471, 0.641)
+    >>> round(binomial_test(78, 140, alternative="greater").p, 3)
+    0.102
     """
     k, n, chance = _checked(successes, trials, p0)
-    tail = (1.0 - share(confidence, "confidence")) / 2.0
-    cases, where = np.unique(np.stack([k.ravel(), n.ravel(), chance.ravel()]), axis=1, return_inverse=True)
-    log_p = _log_p(*cases.astype(np.longdouble))
-    columns = [np.exp(log_p), log_p, cases[0] / cases[1]]
-    columns += [*clopper_pearson(cases[0], cases[1], tail), *wilson(cases[0], cases[1], tail)]
+    side = _known(alternative)
+    tail = (1.0 - share(confidence, "confidence")) / (2.0 if side == "two-sided" else 1.0)
+    log_p = _log_p_of((k, n, chance), side)
+
+    def intervals(k: FloatArray, n: FloatArray) -> FloatArray:
+        limits = np.stack([*clopper_pearson(k, n, tail), *wilson(k, n, tail)])
+        limits[1::2] = 1.0 if side == "greater" else limits[1::2]
+        limits[::2] = 0.0 if side == "less" else limits[::2]
+        return limits
+
     with np.errstate(under="ignore"):
-        found = [float_or_array(column.astype(np.float64)[where.ravel()].reshape(k.shape)) for column in columns]
+        columns = [np.exp(log_p), log_p, k / n, *by_case(intervals, k, n)]
+        found = [float_or_array(column) for column in columns]
     return BinomialTest(**dict(zip(BinomialTest.__slots__, found, strict=True)))
 
 
+def binomial_test_p(
+    successes: ArrayLike, trials: ArrayLike, p0: ArrayLike = 0.5, alternative: Tail = "two-sided"
+) -> Values:
+    """The p of `binomial_test` alone: many at once without their intervals. `ValueError`: as there.
+
+    >>> binomial_test_p([9, 10], 10).round(4).tolist()
+    [0.0215, 0.002]
+    """
+    with np.errstate(under="ignore"):
+        return float_or_array(np.exp(_log_p_of(_checked(successes, trials, p0), _known(alternative))))
+
+
+def binomial_test_log_p(
+    successes: ArrayLike, trials: ArrayLike, p0: ArrayLike = 0.5, alternative: Tail = "two-sided"
+) -> Values:
+    """Natural logarithm of the p of `binomial_test`, also where that is no double any more. `ValueError`: as there.
+
+    >>> round(binomial_test_log_p(0, 10_000), 3)
+    -6930.779
+    """
+    return float_or_array(_log_p_of(_checked(successes, trials, p0), _known(alternative)))
+
+
+def _log_p_of(cases: tuple[FloatArray, FloatArray, FloatArray], side: Tail) -> LongArray:
+    found: LongArray = by_case(lambda k, n, chance: _log_p(k, n, chance, side), *cases)
+    return found
+
+
 def _checked(successes: ArrayLike, trials: ArrayLike, p0: ArrayLike) -> tuple[FloatArray, FloatArray, FloatArray]:
-    k, n, chance = np.broadcast_arrays(numbers(successes, "successes"), numbers(trials, "trials"), numbers(p0, "p0"))
-    if (k != np.floor(k)).any() or (n != np.floor(n)).any():
-        raise ValueError("successes and trials must be whole numbers")
+    k, n, chance = together(
+        successes=numbers(successes, "successes"), trials=numbers(trials, "trials"), p0=numbers(p0, "p0")
+    )
+    for name, counts in (("successes", k), ("trials", n)):
+        if (counts != np.floor(counts)).any():
+            raise ValueError(f"{name} must be whole numbers, not {counts[counts != np.floor(counts)][0]:g}")
     if ((n < 1.0) | (n > _MOST_TRIALS)).any():
         wrong = n[(n < 1.0) | (n > _MOST_TRIALS)][0]
         raise ValueError(f"trials must be at least 1 and at most {_MOST_TRIALS:g}, not {wrong:g}")
@@ -223,47 +128,137 @@ def _checked(successes: ArrayLike, trials: ArrayLike, p0: ArrayLike) -> tuple[Fl
     return k, n, chance
 
 
-def _log_p(k: LongArray, n: LongArray, chance: LongArray) -> LongArray:
+def _known(alternative: str) -> Tail:
+    for side in get_args(Tail):
+        if alternative == side:
+            known: Tail = side
+            return known
+    raise ValueError(f"alternative must be one of {', '.join(get_args(Tail))}, not {alternative!r}")
+
+
+def _log_p(k: FloatArray, n: FloatArray, chance: FloatArray, side: Tail) -> LongArray:
     """Log of p; where p0 is 0 or 1, only one outcome is possible."""
-    possible = (chance > 0) & (chance < 1)
-    log_p = np.where(k == n * chance, 0, -np.inf).astype(np.longdouble)
-    log_p[possible] = _log_two_sided(k[possible], n[possible], chance[possible])
+    counted = {"two-sided": np.equal, "greater": np.less_equal, "less": np.greater_equal}[side]
+    log_p = np.where(counted(k, n * chance), 0, -np.inf).astype(np.longdouble)
+    possible = (chance > 0.0) & (chance < 1.0)
+    successes, trials, p = (case[possible].astype(np.longdouble) for case in (k, n, chance))
+    match side:
+        case "two-sided":
+            log_p[possible] = _log_two_sided(successes, trials, p, 1 - p)
+        case "greater":
+            log_p[possible] = _log_upper(successes, trials, p, 1 - p)
+        case "less":
+            log_p[possible] = _log_upper(trials - successes, trials, 1 - p, p)
     return log_p
 
 
-def _log_two_sided(k: LongArray, n: LongArray, chance: LongArray) -> LongArray:
-    """Log of both tails; where they are more than a half, of 1 less what lies between, which keeps the digits there."""
-    low, high = _least_likely(k, n, chance)
-    tails = np.full((2, len(k)), -np.inf, dtype=np.longdouble)
-    for tail, border, step, there in zip(tails, (low, high), (-1, 1), (low >= 0, high <= n), strict=True):
-        tail[there] = log_tail(border[there], step, n[there], chance[there])
-    log_p: LongArray = np.logaddexp(tails[0], tails[1])
-    likely = log_p > -np.log(2)
-    between = log_between(low[likely], high[likely], n[likely], chance[likely])
-    log_p[likely] = 0 + np.log1p(-np.exp(between))
+def _log_upper(k: LongArray, n: LongArray, p: LongArray, q: LongArray) -> LongArray:
+    """Log of P(X >= k): the tail, or 1 less the other one if k is not beyond the mode."""
+    beyond = k > np.floor((n + 1) * p)
+    border = np.clip(np.where(beyond, k, n - k + 1), 1, n)
+    chances = np.where(beyond, p, q), np.where(beyond, q, p)
+    tail = log_pmf(border, n, *chances) + np.log(tail_over_pmf(border, n, *chances))
+    with np.errstate(divide="ignore"):
+        return np.select([k == 0, beyond], [0, tail], default=np.log1p(-np.exp(tail)))
+
+
+_LIKELY = np.log(0.9)
+"""Above this log p, 1 less what lies between the tails keeps the digits."""
+
+
+def _log_two_sided(k: LongArray, n: LongArray, p: LongArray, q: LongArray) -> LongArray:
+    """Log of both tails; next to p = 1, of 1 less what lies between. Counts above the mode are turned to failures."""
+    mode = np.minimum(np.floor((n + 1) * p), n)
+    above = k > mode
+    k, mode = np.where(above, n - k, k), np.where(above, n - mode, mode)
+    p, q = np.where(above, q, p), np.where(above, p, q)
+    log_low = log_pmf(k, n, p, q)
+    high, log_high = _other_border(
+        log_low + np.log1p(np.longdouble(TIE)), np.clip(2 * mode - k, mode, n), (mode, n, p, q)
+    )
+    borders = np.clip(np.concatenate([n - k, high]), 1, np.tile(n, 2))
+    over_pmf = tail_over_pmf(borders, np.tile(n, 2), np.concatenate([q, p]), np.concatenate([p, q]))
+    lower, upper = np.concatenate([log_low, log_high]).reshape(2, -1) + np.log(over_pmf).reshape(2, -1)
+    log_p: LongArray = np.where(high > n, lower, np.logaddexp(lower, upper))
+    likely = log_p > _LIKELY
+    if likely.any():
+        between = log_between(*(case[likely] for case in (k, high, n, p, q)))
+        log_p[likely] = 0 + np.log1p(-np.exp(between))
     return log_p
 
 
-def _least_likely(k: LongArray, n: LongArray, chance: LongArray) -> tuple[LongArray, LongArray]:
-    """The outcomes counted: all up to `low` (-1: none) and all from `high` (n + 1: none).
+_LEAST_FALL = np.finfo(np.float64).tiny
 
-    The probabilities rise up to the mode and fall after it, so the other side's border is found by halving.
+
+def _other_border(
+    limit: LongArray, start: LongArray, case: tuple[LongArray, LongArray, LongArray, LongArray]
+) -> tuple[LongArray, LongArray]:
+    """The outcome nearest to the mode, from there upwards, with log P <= `limit`, and its log P; n + 1 if none has.
+
+    `case`: mode, n, p, q. Log P is concave and its slope from one outcome to the next has a closed form, so Newton's
+    steps, cut to whole ones, never leave the counted outcomes once they are there, and end at the border.
     """
-    mode = np.minimum(np.floor((n + 1) * chance), n)
-    limit = log_pmf(k, n, chance) + np.log1p(np.longdouble(TIE))
-    other = _border(np.where(k <= mode, n + 1, -1), mode, limit, n, chance)
-    return np.where(k <= mode, k, other), np.where(k >= mode, k, other)
+    mode, n, p, q = case
+    at, before = start, None
+    while before is None or (at != before).any():
+        log_now = log_pmf(at, n, p, q)
+        over, counted = log_now - limit, log_now <= limit
+        outer = np.where(counted, at, at + 1)
+        with np.errstate(divide="ignore", over="ignore"):
+            fall = np.maximum(np.log(outer * q) - np.log((n - outer + 1) * p), _LEAST_FALL)
+            steps = np.where(counted, -np.floor(-over / fall), np.maximum(np.ceil(over / fall), 1))
+        at, before = np.clip(at + steps, mode, n), at
+    return np.where(counted, at, n + 1), log_now
 
 
-def _border(outer: LongArray, mode: LongArray, limit: LongArray, n: LongArray, chance: LongArray) -> LongArray:
-    """Between `outer` (counted) and the mode: the counted outcome nearest to the mode."""
-    counted, other = outer, mode + np.sign(mode - outer)
-    while (np.abs(other - counted) > 1).any():
-        middle = np.trunc((counted + other) / 2)
-        rare = log_pmf(np.clip(middle, 0, n), n, chance) <= limit
-        apart = np.abs(other - counted) > 1
-        counted, other = np.where(rare & apart, middle, counted), np.where(apart & ~rare, middle, other)
-    return counted
+_CLOSE = 1e-5
+"""With log P so near to its aim, the third power of which is left after a step."""
+
+
+def clopper_pearson(k: FloatArray, n: FloatArray, tail: float) -> tuple[FloatArray, FloatArray]:
+    """Limits with P(X >= k | low) = P(X <= k | high) = tail, for k of n, one axis; 0 for k = 0, 1 for k = n.
+
+    Found by Halley's method, because scipy's beta quantiles can be wrong in the first digit (1000 of 1e9, scipy 1.17).
+    Source: Clopper & Pearson 1934, Biometrika 26, 404.
+    """
+    low, high = np.zeros_like(k), np.ones_like(k)
+    some, not_all = k > 0.0, k < n
+    odds = _odds_of_tail(np.concatenate([k[some], (n - k)[not_all]]), np.concatenate([n[some], n[not_all]]), tail)
+    of_successes, of_failures = np.split(odds, [int(some.sum())])
+    low[some], high[not_all] = of_successes / (1.0 + of_successes), 1.0 / (1.0 + of_failures)
+    return low, high
+
+
+def _odds_of_tail(k: FloatArray, n: FloatArray, tail: float) -> FloatArray:
+    """The odds p / q at which P(X >= k) is `tail`, k >= 1.
+
+    In t = log odds, F = log P(X >= k) is concave, F' = k q P(k) / P(X >= k) and F'' = F' (k - n p - p - F'). Steps
+    begin at Wilson's limit of half a success less.
+    """
+    start = wilson(k - 0.5, n, tail)[0]
+    odds = (start / (1.0 - start)).astype(np.longdouble)
+    successes, trials = k.astype(np.longdouble), n.astype(np.longdouble)
+    missing = np.ones_like(odds)
+    while (np.abs(missing) > _CLOSE).any():
+        q = 1 / (1 + odds)
+        p = odds * q
+        sum_over_first = tail_over_pmf(successes, trials, p, q)
+        missing = np.log(np.longdouble(tail)) - log_pmf(successes, trials, p, q) - np.log(sum_over_first)
+        slope = successes * q / sum_over_first
+        newton = missing / slope
+        odds = odds * np.exp(newton / np.clip(1 + newton * (successes - trials * p - p - slope) / 2, 0.5, 2))
+    return odds.astype(np.float64)
+
+
+def wilson(k: FloatArray, n: FloatArray, tail: float) -> tuple[FloatArray, FloatArray]:
+    """The p with |k / n - p| = z sqrt(p (1 - p) / n), z the normal quantile of `tail`.
+
+    These are the roots of (n + z^2) p^2 - (2 k + z^2) p + k^2 / n = 0; the lower is taken from the product of the two,
+    where nothing cancels. Source: Wilson 1927, J. Am. Stat. Assoc. 22, 209.
+    """
+    z = -float(special.ndtri(tail))
+    upper = k + z * z / 2.0 + z * np.sqrt(k * (n - k) / n + z * z / 4.0)
+    return k * (k / n) / upper, np.where(k == n, 1.0, upper / (n + z * z))
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

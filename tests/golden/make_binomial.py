@@ -84,6 +84,26 @@ def log_p(k: int, n: int, p0: float) -> mpf:
     return largest + mp.log(sum(mp.exp(tail - largest) for tail in tails))
 
 
+def log_greater(k: int, n: int, p0: float) -> mpf:
+    """Log of P(X >= k)."""
+    p = mpf(p0)
+    if p0 in {0.0, 1.0}:
+        return mpf(0) if k <= n * p0 else -mp.inf
+    if k > (n + 1) * p:
+        return log_tail(k, 1, n, p)
+    return mp.log1p(-mp.exp(log_tail(k - 1, -1, n, p))) if k else mpf(0)
+
+
+def log_less(k: int, n: int, p0: float) -> mpf:
+    """Log of P(X <= k)."""
+    p = mpf(p0)
+    if p0 in {0.0, 1.0}:
+        return mpf(0) if k >= n * p0 else -mp.inf
+    if k < (n + 1) * p - 1:
+        return log_tail(k, -1, n, p)
+    return mp.log1p(-mp.exp(log_tail(k + 1, 1, n, p))) if k < n else mpf(0)
+
+
 def clopper_pearson(k: int, n: int) -> tuple[mpf, mpf]:
     """The limits at 95 %: where the tail, which grows away from k / n towards it, is 0.025; by halving the logit."""
     low = mpf(0) if k == 0 else _root(lambda p: log_tail(k, 1, n, p), mpf(-60), _logit(k, n))
@@ -120,7 +140,8 @@ def main(path: Path) -> None:
     tests = []
     for k, n, p0 in CASES:
         log = log_p(k, n, p0)
-        tests.append({"k": k, "n": n, "p0": p0, "p": _text(mp.exp(log)), "log_p": _text(log)})
+        sides = {"log_greater": _text(log_greater(k, n, p0)), "log_less": _text(log_less(k, n, p0))}
+        tests.append({"k": k, "n": n, "p0": p0, "p": _text(mp.exp(log)), "log_p": _text(log), **sides})
     limits = []
     for k, n in INTERVALS:
         names = ("ci_low", "ci_high", "wilson_low", "wilson_high")

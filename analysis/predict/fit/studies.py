@@ -18,7 +18,7 @@ from analysis.predict.fit.percept_model import FITTED, PAPER_TRIALS, PerceptPeak
 from analysis.predict.synthetic_studies import Counts, Felt, felt_counts, piece_sizes
 from analysis.stats.anova import rm_anova
 from analysis.stats.arrays import FloatArray
-from analysis.stats.binomial import binomial_test
+from analysis.stats.binomial import binomial_test_p
 from device.methods import Method
 from device.words import DIRECTIONS
 from experiments.config.door import ConfigError
@@ -306,7 +306,7 @@ def _quantities(correct: Counts, published: PublishedDirection) -> list[_Quantit
     for claim in published.binomial:
         method, way = published.methods.index(claim.method), DIRECTIONS.index(claim.direction)
         trials, pooled = published.n * _trials(published)[way], correct[..., method, way].sum(axis=-1)
-        of_count = np.asarray(binomial_test(np.arange(trials + 1), trials).p)
+        of_count = np.asarray(binomial_test_p(np.arange(trials + 1), trials))
         name, fitted = f"{claim.method}, {claim.direction} shots", claim.direction == "forward"
         found.append((f"{name}: binomial p", _printed(claim.p), of_count[pooled], fitted))
         for count in (k for k in range(trials + 1) if not fitted and rounds_to(float(of_count[k]), claim.p)):

@@ -18,7 +18,7 @@ from scipy import special
 from analysis.paper.recurrence import SIGNIFICANT, Recurrence, ShareOfStudies, share_of
 from analysis.stats.anova import check_scores, pairs_of, pooled_pairs, rm_anova, studentized_range_isf
 from analysis.stats.arrays import FloatArray
-from analysis.stats.binomial import binomial_test, yes_no
+from analysis.stats.binomial import binomial_test_p, yes_no
 from device.words import DIRECTIONS
 
 ANOVA = "ANOVA"
@@ -126,7 +126,7 @@ def _binomials(
 @lru_cache(maxsize=64)
 def _rejected(trials: int) -> Recurrence:
     """Of each count out of so many trials: does the exact test reject one half at 5 %?"""
-    p = np.asarray(binomial_test(np.arange(trials + 1), trials).p)
+    p = np.asarray(binomial_test_p(np.arange(trials + 1), trials))
     return p < SIGNIFICANT
 
 
