@@ -12,7 +12,7 @@ from scipy import special
 
 from analysis.stats.anova import Label, pairs_of
 from analysis.stats.arrays import FloatArray, by_row, numbers, share
-from analysis.stats.paired import holm
+from analysis.stats.corrections import holm
 
 METHOD = (
     "Clustering: the intraclass correlation is the analysis-of-variance estimate for binary answers (Ridout, Demétrio "

@@ -13,6 +13,7 @@ from scipy import special, stats
 
 from analysis.stats.anova import Label, check_scores, own_pairs, pairs_of
 from analysis.stats.arrays import FloatArray, by_row, numbers, pingouin, share
+from analysis.stats.corrections import holm
 
 SCALE = math.sqrt(2.0) / 2.0
 """Scale r of the Cauchy prior on the standardised difference: "medium" in JASP and R's BayesFactor."""
@@ -97,22 +98,6 @@ def paired_t_tests(
         )
         for (a, b), d, test in zip(pairs_of(k), pairs.difference.tolist(), tests, strict=True)
     )
-
-
-def holm(p: ArrayLike) -> FloatArray:
-    """P-values adjusted for their number m: the running maximum of (m - i) p_(i), i = 0.. in rising order, at most 1.
-
-    Source: Holm 1979, Scand. J. Stat. 6, 65.
-
-    >>> holm([0.01, 0.04, 0.03]).tolist()
-    [0.03, 0.06, 0.06]
-    """
-    array = numbers(p, "p").ravel()
-    order = np.argsort(array, kind="stable")
-    steps = np.maximum.accumulate((array.size - np.arange(array.size)) * array[order])
-    adjusted = np.empty_like(array)
-    adjusted[order] = np.minimum(steps, 1.0)
-    return adjusted
 
 
 EXACT_UP_TO = 50

@@ -1,0 +1,95 @@
+"""Power of an analysis of variance from an assumed effect size, by the noncentral F distribution.
+
+`recoil power` simulates instead: it knows floors, ceilings and people who differ. This is the textbook's number, for
+means that are normal, and what reviewers compare with. Arguments broadcast, so that the smallest study is the first
+whose power is enough.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import ArrayLike
+from scipy import special
+
+from analysis.stats.arrays import FloatArray, Values, float_or_array, numbers
+
+
+def cohens_f(eta_squared: ArrayLike) -> Values:
+    """Cohen's f = sqrt(eta^2 / (1 - eta^2)), of the eta squared of the population. `ValueError` outside 0 <= eta^2 < 1.
+
+    Between people f is the SD of the groups' means over the SD within groups. A partial eta squared within people has
+    the differences between people taken out already: use its f with `correlation` 0 in `rm_anova_power`.
+    Source: Cohen 1988, Statistical Power Analysis for the Behavioral Sciences, 8.2.
+
+    >>> round(cohens_f(0.14), 4)
+    0.4035
+    """
+    array = _at_least(eta_squared, "eta_squared", 0.0, below=1.0)
+    return float_or_array(np.sqrt(array / (1.0 - array)))
+
+
+def one_way_anova_power(f: ArrayLike, sizes: ArrayLike, alpha: ArrayLike = 0.05) -> Values:
+    """Power of `one_way_anova` with groups of `sizes`: P(F' > F_alpha), noncentrality f^2 N, on k - 1 and N - k df.
+
+    `sizes`: (..., k groups), each at least 1; `f` and `alpha` broadcast with (...). f weighs the groups by their sizes.
+    `ValueError`: f below 0, fewer than two groups, no group of two, or `alpha` outside 0 to 1.
+    Source: Cohen 1988, chapter 8.
+
+    >>> round(one_way_anova_power(0.25, [45, 45, 45]), 3)  # Cohen's medium effect
+    0.732
+    """
+    groups = numbers(sizes, "sizes")
+    if groups.ndim < 1 or groups.shape[-1] < 2 or (groups < 1.0).any() or (groups.max(axis=-1) < 2.0).any():
+        raise ValueError("sizes must be of at least two groups, each at least 1 and one of them at least 2")
+    total, k = groups.sum(axis=-1), groups.shape[-1]
+    return _power(_at_least(f, "f", 0.0) ** 2 * total, np.asarray(k - 1.0), total - k, alpha)
+
+
+def rm_anova_power(
+    f: ArrayLike,
+    participants: ArrayLike,
+    conditions: ArrayLike,
+    *,
+    correlation: ArrayLike = 0.5,
+    epsilon: ArrayLike = 1.0,
+    alpha: ArrayLike = 0.05,
+) -> Values:
+    """Power of `rm_anova`: noncentrality f^2 n k e / (1 - rho), on (k - 1) e and (n - 1)(k - 1) e degrees of freedom.
+
+    `f`: SD of the conditions' means over the SD between people in one condition; `correlation` rho: of the scores of
+    two conditions; `epsilon` e: departure from sphericity, 1 / (k - 1) to 1, under which power is an approximation
+    (`box_epsilon` of an assumed covariance). All broadcast.
+    `ValueError`: f below 0, fewer than two people or conditions, rho outside -1 / (k - 1) to 1, e or alpha out of range.
+    Sources: Muller & Barton 1989, J. Am. Stat. Assoc. 84, 549; Faul, Erdfelder, Lang & Buchner 2007, Behav. Res.
+    Methods 39, 175, whose G*Power has this as "ANOVA: repeated measures, within factors".
+
+    >>> n = np.arange(2, 100)
+    >>> int(n[(rm_anova_power(0.25, n, 3) >= 0.8).argmax()])  # as G*Power
+    28
+    """
+    n, k = _at_least(participants, "participants", 2.0), _at_least(conditions, "conditions", 2.0)
+    rho, e = numbers(correlation, "correlation"), numbers(epsilon, "epsilon")
+    if ((rho <= -1.0 / (k - 1.0)) | (rho >= 1.0)).any():
+        raise ValueError("correlation must lie between -1 / (conditions - 1) and 1")
+    if ((e < (1.0 - 1e-12) / (k - 1.0)) | (e > 1.0)).any():
+        raise ValueError("epsilon must lie in 1 / (conditions - 1) to 1")
+    noncentrality = _at_least(f, "f", 0.0) ** 2 * n * k * e / (1.0 - rho)
+    return _power(noncentrality, (k - 1.0) * e, (n - 1.0) * (k - 1.0) * e, alpha)
+
+
+def _at_least(values: ArrayLike, name: str, low: float, below: float = np.inf) -> FloatArray:
+    array = numbers(values, name)
+    if ((array < low) | (array >= below)).any():
+        rule = f"lie in {low:g} to {below:g}, which it does not reach" if np.isfinite(below) else f"be at least {low:g}"
+        raise ValueError(f"{name} must {rule}, not {values!r}")
+    return array
+
+
+def _power(noncentrality: FloatArray, df_effect: FloatArray, df_error: FloatArray, alpha: ArrayLike) -> Values:
+    """P(F' > F_alpha); without an effect the level itself."""
+    level = numbers(alpha, "alpha")
+    if ((level <= 0.0) | (level >= 1.0)).any():
+        raise ValueError(f"alpha must lie between 0 and 1, not {alpha!r}")
+    critical = special.fdtri(df_effect, df_error, 1.0 - level)
+    power = 1.0 - special.ncfdtr(df_effect, df_error, noncentrality, critical)
+    return float_or_array(np.where(noncentrality > 0.0, power, level))

@@ -1,0 +1,105 @@
+"""The fixed effects of a model of single trials: predictors as columns, and what was estimated of each."""
+
+from __future__ import annotations
+
+from collections.abc import Hashable, Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+import pandas as pd
+from numpy.typing import ArrayLike, NDArray
+from scipy import special
+
+from analysis.stats.arrays import FloatArray, by_row, numbers, share
+
+INTERCEPT = "intercept"
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Coefficient:
+    """One coefficient with its standard error, z = estimate / se, p of the normal distribution, and interval."""
+
+    name: str
+    estimate: float
+    se: float
+    z: float
+    p: float
+    ci_low: float
+    ci_high: float
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Columns:
+    """The intercept and the predictors, each centred and over its SD: `matrix` (rows, columns).
+
+    `back` (columns, columns) brings the coefficients of these columns to those of the predictors as they were given.
+    """
+
+    names: tuple[str, ...]
+    matrix: FloatArray
+    back: FloatArray
+
+
+def indicators(levels: Sequence[str], reference: str | None = None) -> dict[str, FloatArray]:
+    """A factor as predictors: for each level but the `reference` (the first that occurs unless given) 1 where it is.
+
+    `ValueError`: a reference that does not occur, or one level only.
+
+    >>> {name: column.tolist() for name, column in indicators(["a", "b", "c", "b"]).items()}
+    {'b': [0.0, 1.0, 0.0, 1.0], 'c': [0.0, 0.0, 1.0, 0.0]}
+    """
+    names = list(dict.fromkeys(map(str, levels)))
+    first = names[0] if reference is None else reference
+    if first not in names or len(names) < 2:
+        raise ValueError(f"two levels are needed, and the reference {first!r} among them; there are {', '.join(names)}")
+    given = np.array(list(map(str, levels)))
+    return {name: (given == name).astype(np.float64) for name in names if name != first}
+
+
+def people_codes(people: Sequence[Hashable], rows: int) -> NDArray[np.intp]:
+    """A number for each person, row by row. `ValueError`: another number of rows, or a row of nobody.
+
+    >>> people_codes(["P2", "P1", "P2"], 3).tolist()
+    [0, 1, 0]
+    """
+    if len(people) != rows:
+        raise ValueError(f"people must say whose each row is: there are {len(people)} for {rows} rows")
+    codes: NDArray[np.intp] = pd.factorize(np.fromiter(people, dtype=object, count=rows))[0]
+    if (codes < 0).any():
+        raise ValueError(f"people must say whose each row is, but row {int(np.argmax(codes < 0))} is of nobody")
+    return codes
+
+
+def columns_of(predictors: Mapping[str, ArrayLike], rows: int) -> Columns:
+    """The columns of a model. `ValueError`: another number of rows, a constant predictor, predictors that overlap."""
+    given = [numbers(values, f"predictor {name!r}") for name, values in predictors.items()]
+    for name, array in zip(predictors, given, strict=True):
+        if array.shape != (rows,):
+            raise ValueError(f"predictor {name!r} must have one number for each of the {rows} rows, not {array.shape}")
+        if array.min() == array.max():
+            raise ValueError(f"predictor {name!r} is {array[0]:g} in every row: it tells nothing from the intercept")
+    wide = np.column_stack([np.ones(rows), *given])
+    means, spreads = wide.mean(axis=0), wide.std(axis=0)
+    means[0], spreads[0] = 0.0, 1.0
+    matrix = (wide - means) / spreads
+    if int(np.linalg.matrix_rank(matrix)) < matrix.shape[1]:
+        raise ValueError(f"the predictors {', '.join(predictors)} overlap: one of them follows from the others")
+    back = np.diag(1.0 / spreads)
+    back[0, 1:] = -means[1:] / spreads[1:]
+    return Columns(names=(INTERCEPT, *predictors), matrix=matrix, back=back)
+
+
+def coefficients(
+    names: Sequence[str], estimates: FloatArray, se: FloatArray, confidence: float
+) -> tuple[Coefficient, ...]:
+    """Wald tests and intervals of estimates (p,) with their standard errors (p,)."""
+    z, half = estimates / se, -float(special.ndtri((1.0 - share(confidence, "confidence")) / 2.0)) * se
+    rows = by_row(
+        estimate=estimates,
+        se=se,
+        z=z,
+        p=2.0 * special.ndtr(-np.abs(z)),
+        ci_low=estimates - half,
+        ci_high=estimates + half,
+    )
+    return tuple(Coefficient(name=name, **row) for name, row in zip(names, rows, strict=True))
