@@ -59,7 +59,8 @@ def rm_anova_power(
     `f`: SD of the conditions' means over the SD between people in one condition; `correlation` rho: of the scores of
     two conditions; `epsilon` e: departure from sphericity, 1 / (k - 1) to 1, under which power is an approximation
     (`box_epsilon` of an assumed covariance). All broadcast.
-    `ValueError`: f below 0, fewer than two people or conditions, rho outside -1 / (k - 1) to 1, e or alpha out of range.
+    `ValueError`: f below 0, fewer than two people or conditions, rho outside -1 / (k - 1) to 1, e or alpha out of
+    range.
     Sources: Muller & Barton 1989, J. Am. Stat. Assoc. 84, 549; Faul, Erdfelder, Lang & Buchner 2007, Behav. Res.
     Methods 39, 175, whose G*Power has this as "ANOVA: repeated measures, within factors".
 

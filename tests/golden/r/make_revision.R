@@ -145,10 +145,11 @@ simulated_power <- function(n, means, rho, ratio, tables = 20000) {
   error <- apply(cells^2, 1, sum) - n * k * all^2 - effect - people
   F <- effect / error * (n - 1)
   critical <- qf(0.95, (k - 1) * epsilon, (n - 1) * (k - 1) * epsilon)
-  # what the formula wants: the SD of the means over that of a score, and a correlation that gives the error variance
+  # what the formula wants: in the SD of a score, the SD of the means and a correlation that gives the error variance
+  variance <- mean(sds^2)
   error_variance <- sum(diag(inner)) / (k - 1)
-  c(n = n, k = k, f = sqrt(mean((means - mean(means))^2)), correlation = 1 - error_variance, epsilon = epsilon,
-    power = mean(F > critical), tables = tables)
+  c(n = n, k = k, f = sqrt(mean((means - mean(means))^2) / variance), correlation = 1 - error_variance / variance,
+    epsilon = epsilon, power = mean(F > critical), tables = tables)
 }
 
 adjusted <- function() {
