@@ -31,7 +31,7 @@ from experiments.record.replay import RunPosition
 from experiments.runner import carry_out, gun_name
 from experiments.session.design_session import design_session
 from experiments.session.steps import Answered, Describe, Session
-from experiments.study import folders, register
+from experiments.study import balance, folders, register
 from experiments.study.folders import Place, PlaceError
 from experiments.study.register import Register
 
@@ -209,9 +209,9 @@ def _refuse_finished(where: Place, contents: Contents | None) -> None:
 
 def _new_plan(request: RunRequest, place: Place, registered: Register) -> Plan:
     setup, seed = request.setup, resolve_seed(request)
-    group = folders.group_of_next_run(setup, place.results, registered)
+    group = balance.group_of_next_run(setup, place.results, registered)
     if not request.practice:
-        row = folders.row_of_next_run(setup, place.results, registered)
+        row = balance.row_of_next_run(setup, place.results, registered)
         return plan_of(setup.config, place.participant_id, seed, row=row, group=group)
     plan = practice_of(setup.config, place.participant_id, seed, group=group)
     if plan is None:

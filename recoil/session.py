@@ -21,7 +21,9 @@ from experiments.run import Again, Finished, ParticipantOptions, RunRequest, Scr
 from experiments.screens.synthetic import synthetic_screen
 from experiments.screens.terminal import TerminalScreen
 from experiments.session.steps import Answered
+from experiments.study.balance import unread
 from experiments.study.folders import Place, PlaceError, check_code, place, set_aside_file
+from experiments.study.register import read_register
 
 
 def run_session(request: RunRequest) -> Place:
@@ -33,12 +35,20 @@ def run_session(request: RunRequest) -> Place:
         raise PlaceError("--resume: a practice is begun anew each time; leave --resume or --practice out")
     if request.again == "resume":
         _check_resumable(request)
+    _say_unread(request)
     try:
         return _SCREENS[request.screen](request).place
     except RunStopped as stop:
         with suppress(OSError):  # where the terminal is gone, nobody reads it
             sys.stderr.write(f"recoil: stopped: {stop}. Go on with --resume.\n")
         raise KeyboardInterrupt from stop
+
+
+def _say_unread(request: RunRequest) -> None:
+    """Whose journals cannot be read: they are no reason to send this participant home."""
+    for message in unread(request.setup, request.results, read_register(request.results)):
+        with suppress(OSError):
+            sys.stderr.write(f"recoil: {message}\n")
 
 
 def _check_resumable(request: RunRequest) -> None:

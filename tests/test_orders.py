@@ -6,7 +6,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from experiments.design.plan import square_rows
-from experiments.study.folders import least_used
+from experiments.study.balance import least_used
 
 COUNTS = range(2, 9)
 SQUARES = ("latin-square", "williams")

@@ -6,15 +6,14 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from experiments.design.plan import Plan
+from experiments.study.balance import journals, used_rows
 from experiments.study.folders import (
     Place,
     PlaceError,
-    journals,
     known_codes,
     place,
     set_aside,
     set_aside_file,
-    used_rows,
 )
 from experiments.study.register import read_register
 from tests.journals import write_head

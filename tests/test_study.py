@@ -18,7 +18,8 @@ from experiments.config.setup import Setup
 from experiments.design.config import DesignConfig
 from experiments.design.plan import Plan
 from experiments.load import load_setup, load_study, shipped_folder
-from experiments.study.folders import place, row_of_next_run, used_rows
+from experiments.study.balance import row_of_next_run, used_rows
+from experiments.study.folders import place
 from experiments.study.register import append, entry, read_register
 from experiments.study.study import (
     Facts,

@@ -27,6 +27,8 @@ from experiments.record import storage
 
 Kind = Literal["run", "step", "outcome", "shot", "remark", "resumed", "stopped", "finished"]
 _KINDS = get_args(Kind)
+ENDING = "_journal.jsonl"
+"""How the name of every journal ends."""
 _PATIENCE_S = 0.5
 """How long a journal is tried that somebody may only be looking at."""
 
@@ -260,14 +262,20 @@ def link_of(line: bytes) -> str:
 
 
 def parsed_line(line: bytes) -> dict[str, object]:
-    """The JSON object on a line; else `JournalError`."""
+    """The JSON object on a line; else `JournalError`. NaN and halves of characters are no JSON that can be written."""
     try:
-        value = json.loads(line)
+        value = json.loads(line.decode(), parse_constant=_no_number)
+        if b"\\u" in line:
+            json.dumps(value, ensure_ascii=False).encode()
     except (ValueError, RecursionError) as error:
         raise JournalError(f"not a JSON record ({error}); it was changed or damaged") from error
     if not isinstance(value, dict):
         raise JournalError("not a JSON object; it was changed or damaged")
     return value
+
+
+def _no_number(name: str) -> object:
+    raise ValueError(f"{name} is no number of JSON")
 
 
 def check_chain(value: dict[str, object], number: int, before: str) -> None:
@@ -285,8 +293,15 @@ def read_journal(path: Path) -> Contents:
     """
     contents = begun(path)
     if contents is None:
-        raise JournalError(f"{path}: line 1: no whole record, so nothing was acknowledged")
+        raise JournalError(f"{path}: {_nothing(path)}")
     return contents
+
+
+def _nothing(path: Path) -> str:
+    """What there is to say of a file without a whole line."""
+    if path.name.endswith(ENDING):
+        return "line 1: no whole record, so nothing was acknowledged"
+    return f"is empty, or no text; it is no journal (rule: a file sub-CODE_task-EXPERIMENT{ENDING} that a run wrote)"
 
 
 def begun(path: Path) -> Contents | None:
@@ -331,6 +346,8 @@ def head_of(path: Path, data: bytes) -> Head | None:
     line, end, _ = data.partition(b"\n")
     if not end:
         return None
+    if not path.name.endswith(ENDING) and not line.startswith(b"{"):
+        raise JournalError(f"{path}: is no journal (rule: a file sub-CODE_task-EXPERIMENT{ENDING} that a run wrote)")
     value = _values(path, 0, line, "")
     if value["kind"] != "run" or not {"plan", "setup"} <= value.keys():
         raise JournalError(f"{path}: line 1: not the head of a journal (kind `run` with `plan` and `setup`)")

@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Collection
 from dataclasses import dataclass, replace
 
+from experiments.design.plan import Trial
 from experiments.record.journal import Contents, JournalError, Record, read_as
 from experiments.session import steps
 from experiments.session.history import History, asked_before
@@ -41,11 +42,14 @@ def history(contents: Contents) -> History:
     """All that a journal tells, in order: the steps that were done, each with its outcome, and remarks between them."""
     found: list[tuple[steps.Step | None, steps.Outcome | Remark]] = []
     step: steps.Step | None = None
+    planned = frozenset(contents.plan.trials)
     for line in contents.records:
         if line.kind == "step":
             step = read_as(steps.STEP, line.body, _place(contents, line))
+            _check_trial(contents, line, steps.trial_of(step), planned)
         elif line.kind == "remark":
             remark = _remark(contents, line)
+            _check_trial(contents, line, getattr(remark, "trial", None), planned)
             if isinstance(remark, EntryCorrected):
                 _check_value(contents, line, asked_before(found, remark), remark.value)
             found.append((None, remark))
@@ -58,6 +62,13 @@ def history(contents: Contents) -> History:
             found.append((step, outcome))
             step = None
     return found
+
+
+def _check_trial(contents: Contents, line: Record, trial: Trial | None, planned: Collection[Trial]) -> None:
+    """`JournalError` for a step or remark about a trial that nobody planned."""
+    if trial is not None and trial not in planned:
+        where = f"session {trial.session}, set {trial.set}, trial {trial.trial}"
+        raise JournalError(f"{_place(contents, line)}: {where} is none of the plan in line 1; the record was changed")
 
 
 def _check_value(contents: Contents, line: Record, step: steps.Step | None, value: AnswerValue) -> None:

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import os
 import re
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator
 from contextlib import suppress
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -25,6 +25,7 @@ from experiments.record import journal, replay, storage, tables
 from experiments.record.journal import Contents, Head, JournalError
 from experiments.session.history import answered
 from experiments.study import register
+from experiments.study.balance import group_of_next_run, row_of_next_run
 from experiments.study.register import Register
 from experiments.study.study import Member, NextParticipant, Participant, RunProgress, by_code, who_is_next
 
@@ -107,67 +108,6 @@ def known_codes(results: Path, registered: Register) -> list[str]:
     """The participants who have a folder, or stand in the register as far as it can be trusted."""
     folders = {path.name.removeprefix("sub-") for path in results.glob("sub-*") if path.is_dir()}
     return sorted(folders | set(registered.members))
-
-
-def journals(results: Path, experiment: str) -> Iterator[Path]:
-    """The journals of an experiment in a results folder."""
-    yield from sorted(results.glob(f"sub-*/sub-*_task-{experiment}_journal.jsonl"))
-
-
-HeadOf = Callable[[Path], Head | None]
-"""Gives the head of a journal; `None` where nothing in it was acknowledged."""
-
-
-def row_of_next_run(
-    setup: Setup[DesignConfig], results: Path, registered: Register, head_of: HeadOf = journal.head
-) -> int | None:
-    """The row of the balancing square that the next run takes; `None` for a random order.
-
-    The least used row over the runs of participants of the same group who are not excluded, the first such row. So in
-    each group rows are used equally often, to within one, whenever everyone who was excluded has been replaced.
-    """
-    config = setup.config
-    size, group = planning.square_size(config), group_of_next_run(setup, results, registered, head_of)
-    return least_used(size, used_rows(results, config.design, registered, head_of, group)) if size else None
-
-
-def group_of_next_run(
-    setup: Setup[DesignConfig], results: Path, registered: Register, head_of: HeadOf = journal.head
-) -> int:
-    """Which combination of the levels that vary between people the next run gets: the least used, the first such."""
-    config = setup.config
-    count = len(planning.groups(config))
-    if count == 1:
-        return 0
-    return least_used(count, [one.plan.group for one in _heads(results, config.experiment, registered, head_of)])
-
-
-def least_used(count: int, used: Sequence[int]) -> int:
-    """The number below `count` that was used least, the first of them.
-
-    >>> least_used(3, [0, 1, 1])
-    2
-    """
-    return min(range(count), key=lambda one: (list(used).count(one), one))
-
-
-def used_rows(
-    results: Path, experiment: str, registered: Register, head_of: HeadOf = journal.head, group: int = 0
-) -> list[int]:
-    """The rows that runs of a group in this folder have taken; who is excluded gives theirs back."""
-    plans = [one.plan for one in _heads(results, experiment, registered, head_of)]
-    return [plan.order_row for plan in plans if plan.order_row is not None and plan.group == group]
-
-
-def _heads(results: Path, experiment: str, registered: Register, head_of: HeadOf) -> list[Head]:
-    """The heads of the runs of people who are not excluded."""
-    left_out = registered.excluded()
-    heads = (head_of(path) for path in journals(results, experiment) if _code(path) not in left_out)
-    return [one for one in heads if one is not None]
-
-
-def _code(journal_path: Path) -> str:
-    return journal_path.parent.name.removeprefix("sub-")
 
 
 def set_aside(run: Place) -> list[Path]:
@@ -286,7 +226,10 @@ class _Look:
         results = self._study.results
         check_code(code)
         check_case(results, code, self._codes)
-        runs = [Place(results=results, participant_id=code, experiment=name) for name in self._study.experiments]
+        runs = [
+            Place(results=results, participant_id=code, experiment=one.config.experiment, suffix=one.config.table)
+            for one in self._study.setups
+        ]
         member = self._members.get(code, Member(participant_id=code))
         return Participant(
             participant_id=code,
@@ -308,7 +251,13 @@ class _Look:
             return RunProgress(experiment=where.experiment, state="not begun")
         elsewhere = _is_held(where)
         data = self._data(where.journal)
-        return progress_of(where, journal.contents_of(where.journal, data), elsewhere=elsewhere)
+        found = progress_of(where, journal.contents_of(where.journal, data), elsewhere=elsewhere)
+        if found.state == "done" and not elsewhere and not where.table.exists():
+            self.problems.append(
+                f"{where.table}: is missing, though the run is finished; `recoil rebuild {where.journal}` makes it "
+                "again; until then analyses make it from the journal"
+            )
+        return found
 
     def _data(self, path: Path) -> bytes:
         """The bytes of a journal, whose head is kept."""
@@ -337,7 +286,7 @@ class _Look:
             ahead = None
             try:
                 ahead = self._next_methods(setups[run.experiment], next_one.participant_id)
-            except JournalError as error:
+            except JournalError as error:  # the register's, which says who is excluded
                 self.problems.append(str(error))
             found[run.experiment] = run.methods or ahead
         return found
