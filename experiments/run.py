@@ -302,7 +302,8 @@ def _to_the_end(session: Session, desk: Desk, position: RunPosition, place: Plac
         raise
     desk.live.end("")
     contents = read_journal(place.journal)
-    desk.live.journal.append("finished", table_sha256=hashlib.sha256(table(contents)).hexdigest())
+    hashes = {"table_sha256": hashlib.sha256(table(contents)).hexdigest(), "journal_sha256": contents.sha256}
+    desk.live.journal.append("finished", **hashes)
     return _write_table(place, contents)
 
 

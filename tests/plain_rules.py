@@ -5,9 +5,11 @@ from __future__ import annotations
 import re
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
+from datetime import datetime
+from itertools import pairwise
 
+from analysis.logs.cell_rules import as_moment, cell_fault, cell_value, experiment_of
 from analysis.logs.files import BadLogError
-from analysis.logs.rules import cell_fault, cell_value, experiment_of
 from experiments.record import tables
 
 Cell = str | int | float | None
@@ -35,9 +37,12 @@ def check_table(records: Sequence[tuple[int, list[str]]], code_in_name: str | No
     if experiment == "direction":
         _check_answers(table)
         _check_sessions(table)
+        _check_sets(table)
+        _check_times(table)
     else:
-        _check_ratings(table)
         _check_run("trial", [(row["trial"], number) for row, number in _numbered(table)], "the run")
+    _check_order(table)
+    _check_onsets(table)
     return table
 
 
@@ -83,13 +88,6 @@ def _check_answers(table: Table) -> None:
             raise BadLogError(f"{shown} (rule: 1 if they are the same, else 0)", line, "correct")
 
 
-def _check_ratings(table: Table) -> None:
-    for row, line in _numbered(table):
-        rating = row["rating"]
-        if isinstance(rating, float) and not 0.0 <= rating <= 10.0:
-            raise BadLogError(f"rating {rating:g} is out of range (rule: 0 to 10)", line, "rating")
-
-
 def _check_sessions(table: Table) -> None:
     first_line: dict[Cell, int] = {}
     methods: dict[Cell, Cell] = {}
@@ -117,6 +115,59 @@ def _check_run(column: str, numbered: list[tuple[Cell, int]], where: str) -> Non
     if missing is not None:
         rule = f"(rule: 1, 2, 3, ... without a gap; found {_shown(', '.join(map(str, sorted(map(_as_int, seen)))))})"
         raise BadLogError(f"{column} {missing} is missing in {where} {rule}", numbered[-1][1], column)
+
+
+def _in_sessions(table: Table) -> list[tuple[Row, int]]:
+    return sorted(_numbered(table), key=lambda one: (_as_int(one[0].get("session")), _as_int(one[0]["trial"])))
+
+
+def _check_sets(table: Table) -> None:
+    before: dict[Cell, int] = {}
+    wrong = []
+    for row, line in _in_sessions(table):
+        step = _as_int(row["set"]) - before.get(row["session"], 0)
+        if step not in (0, 1) or (row["session"] not in before and step != 1):
+            wrong.append((line, row))
+        before[row["session"]] = _as_int(row["set"])
+    for line, row in sorted(wrong, key=lambda one: one[0])[:1]:
+        where = f"set {row['set']} at trial {row['trial']} of session {row['session']}"
+        raise BadLogError(f"{where} (rule: sets 1, 2, 3, ... one after the other)", line, "set")
+
+
+def _check_times(table: Table) -> None:
+    times = [row["response_time_s"] for row in table.rows if row["response_time_s"] is not None]
+    if len(times) >= 10 and len(set(times)) == 1:
+        rule = "(rule: times that were measured differ; leave the cells empty where none was measured)"
+        raise BadLogError(
+            f"all {len(times)} response times are {times[0]:g} s {rule}", table.lines[0], "response_time_s"
+        )
+
+
+def _check_order(table: Table) -> None:
+    places = {id(row): place for place, row in enumerate(table.rows)}
+    rows = _in_sessions(table)
+    behind = [(line, row) for (row, line), (later, _) in pairwise(rows) if places[id(row)] > places[id(later)]]
+    for line, row in sorted(behind, key=lambda one: one[0])[:1]:
+        where = f"trial {row['trial']}" + (f" of session {row['session']}" if "session" in row else "")
+        raise BadLogError(f"{where} stands behind a later one (rule: rows in the order of the run)", line, "trial")
+
+
+def _check_onsets(table: Table) -> None:
+    onsets = [(str(row["onset_utc"]), line, row) for row, line in _numbered(table) if row["onset_utc"] is not None]
+    for text, line, _ in onsets:
+        if as_moment(text) is None:
+            rule = "(rule: date and time by ISO 8601, as 2026-11-21T09:00:00Z)"
+            raise BadLogError(f"{_shown(text)} is no date and time {rule}", line, "onset_utc")
+    for (before, _, _), (text, line, row) in pairwise(onsets):
+        if _moment(text) < _moment(before) and "clock-set-back" not in str(row["flags"]).split():
+            rule = "(rule: later, unless the flag clock-set-back says that the clock was set back)"
+            raise BadLogError(f"{_shown(text)} is earlier than the onset before it {rule}", line, "onset_utc")
+
+
+def _moment(text: str) -> datetime:
+    found = as_moment(text)
+    assert found is not None
+    return found
 
 
 def _as_int(number: Cell) -> int:

@@ -281,10 +281,10 @@ def test_broken_logs_are_listed_and_the_rest_is_exported(recoil: Recoil, tmp_pat
     assert done.returncode == 1
     assert "sub-P02_task-direction_trials.csv, line 1" in done.stderr
     assert "'P01'" in done.stderr
-    assert "onset of 3 trials of participant 'P02', preference: onset_utc = 'soon'" in done.stderr
+    assert "sub-P02_task-preference_ratings.csv, line 2, column onset_utc: 'soon' is no date and time" in done.stderr
     counts = json.loads(done.stdout)
     assert len(counts["left_out"]) == 4
-    assert (counts["participants"], counts["runs"]) == (3, {"direction": 2, "preference": 2})
+    assert (counts["participants"], counts["runs"]) == (2, {"direction": 2, "preference": 1})
     assert beyond_people(validated(logs / "bids", tmp_path / "home")) == []
 
 

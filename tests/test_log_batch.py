@@ -250,7 +250,7 @@ def test_files_are_found_in_the_order_of_their_paths_and_links_once(tmp_path: Pa
     write_rows(trials_path(tmp_path / "a-b", "P09"), trial_rows("P09"))
     linked = tmp_path / "a" / "zz_trials.csv"
     linked.symlink_to(trials_path(tmp_path / "a", "P02"))
-    found, problems = find_logs([tmp_path])
+    found = find_logs([tmp_path])
     expected = sorted([*tmp_path.rglob("*_trials.csv"), *tmp_path.rglob("*_ratings.csv")])
-    assert problems == []
-    assert [Path(log) for log in found] == [path for path in expected if path != linked]
+    assert found.problems == ()
+    assert [Path(log) for log in found.logs] == [path for path in expected if path != linked]

@@ -260,7 +260,7 @@ def test_another_plan_is_refused_at_the_first_step_that_does_not_follow(
     assert other.trials[0] != whole.plan.trials[0]
     head = json.loads(with_plan(whole.lines[0], other.record(), plan_sha256=other.sha256()))
     journal.write_bytes(forged([head, *whole.records[1:20]]))
-    with pytest.raises(JournalError, match="of the plan in line 1|from the plan in line 1"):
+    with pytest.raises(JournalError, match=r"of the plan in line 1|from the plan in line 1"):
         run(request(name, tmp_path, "resume", seed=None), synthetic_screen, VirtualClock())
 
 

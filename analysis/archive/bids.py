@@ -13,11 +13,11 @@ import json
 import re
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from datetime import UTC, datetime
 from typing import TypedDict
 
 import pandas as pd
 
+from analysis.logs.cell_rules import as_moment
 from analysis.logs.reading import Logs
 from analysis.logs.texts import Cell
 from experiments.record import tables
@@ -62,7 +62,8 @@ _MORE: dict[str, ColumnDescription] = {
         "Format": "number",
         "Units": "s",
         "Description": "first pulse of the last presentation, counted from the earliest such pulse of this run; "
-        "n/a if none. The log has date and time; they are left out here",
+        "n/a if none, or once the computer's clock was set back (flag clock-set-back). The log has date and time; "
+        "they are left out here",
     },
 }
 """What the data dictionary does not say, or says of what stands in the log and not here."""
@@ -243,7 +244,6 @@ def runs_of(logs: Logs) -> Runs:
             problems.append(f"participant {run.participant_id!r}, {run.experiment}: {rule}")
             continue
         runs.append(run)
-        problems += _unreadable_onsets(run)
     return Runs(runs=tuple(runs), problems=tuple(problems))
 
 
@@ -264,13 +264,6 @@ def _runs(experiment: str, table: pd.DataFrame, of: tuple[Column, ...], task: st
         cells = rows.itertuples(index=False, name=None)
         named = tuple(dict(zip(names, row, strict=True)) for row in cells)
         yield Run(participant_id=str(code), experiment=experiment, rows=named, columns=of, task=task)
-
-
-def _unreadable_onsets(run: Run) -> Iterator[str]:
-    bad = [str(row["onset_utc"]) for row in run.rows if row["onset_utc"] and _moment(row["onset_utc"]) is None]
-    if bad:
-        where = f"onset of {len(bad)} trials of participant {run.participant_id!r}, {run.experiment}"
-        yield f"{where}: onset_utc = {bad[0][:80]!r} is no ISO 8601 time"
 
 
 def data_set(
@@ -345,19 +338,13 @@ def _beh(run: Run, free_text: bool) -> bytes:
 
 
 def _onsets(run: Run) -> list[float | None]:
-    """Seconds since the earliest pulse in the rows; `None` where there was no pulse."""
-    moments = [_moment(row["onset_utc"]) for row in run.rows]
-    start = min(filter(None, moments), default=None)
-    return [(moment - start).total_seconds() if moment and start else None for moment in moments]
-
-
-def _moment(cell: Cell) -> datetime | None:
-    """When that was; nothing if there is none, or if it is no time."""
-    try:
-        moment = datetime.fromisoformat(str(cell or ""))
-    except ValueError:
-        return None
-    return moment if moment.tzinfo else moment.replace(tzinfo=UTC)
+    """Seconds since the first pulse in the rows; `None` without a pulse, and once the clock was set back."""
+    moments = [as_moment(str(row["onset_utc"] or "")) for row in run.rows]
+    back = (n for n, row in enumerate(run.rows) if tables.CLOCK_SET_BACK in str(row["flags"] or "").split())
+    known = moments[: next(back, None)]
+    start = min(filter(None, known), default=None)
+    since = [(moment - start).total_seconds() if moment and start else None for moment in known]
+    return [*since, *(None for _ in moments[len(known) :])]
 
 
 def _cell(column: Column, value: Cell) -> str:

@@ -14,7 +14,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from analysis.archive import bids
-from analysis.logs.reading import Logs, Track, read_logs
+from analysis.logs.reading import Logs, Track, read_logs, refuse_nothing
 from experiments.load import load_study
 from experiments.record import storage
 from experiments.record.provenance import recoil_version
@@ -32,6 +32,7 @@ class Exported:
     """Where the data set lies, what is in it, and what was left out with the reason.
 
     Runs and rows are counted by experiment; `synthetic` participants are those of whose answers a simulation gave any.
+    `remarks`: what there is to say of logs that are in it; `begun`: the runs that are not, as they are not finished.
     """
 
     out: str
@@ -42,6 +43,8 @@ class Exported:
     rows: Mapping[str, int]
     files: int
     left_out: tuple[str, ...]
+    remarks: tuple[str, ...] = ()
+    begun: tuple[str, ...] = ()
 
 
 def export(folder: Path, out: Path, *, free_text: bool = False, track: Track = iter) -> Exported:
@@ -55,8 +58,7 @@ def export(folder: Path, out: Path, *, free_text: bool = False, track: Track = i
     target = out.resolve()
     earlier = _earlier(target)
     logs = read_logs([folder], track)
-    if not logs.files:
-        raise PlaceError("\n".join([f"no usable log in {folder}", *map(str, logs.problems)]))
+    refuse_nothing([folder], logs)
     results = _results(folder, logs)
     runs = bids.runs_of(logs)
     files = bids.data_set(runs, _members(results), _name(results), recoil_version(), free_text=free_text)
@@ -71,6 +73,8 @@ def export(folder: Path, out: Path, *, free_text: bool = False, track: Track = i
         rows={task: sum(len(run.rows) for run in done) for task, done in by_task.items()},
         files=len(files),
         left_out=(*map(str, logs.problems), *runs.problems),
+        remarks=tuple(map(str, logs.remarks)),
+        begun=tuple(map(str, logs.begun)),
     )
 
 

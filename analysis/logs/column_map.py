@@ -8,9 +8,11 @@ So the same rules check them. `configs/examples/columns.toml` shows every key. W
 - `[participant]`: the `column` with the code, or `file_name`, a pattern whose one group is the code;
 - `[columns]`: for `method`, `direction`, `response`, `rating`, ... the name of the column that holds it. Without
   `session` a session is all trials with one method, without `trial` they are numbered in the order of rows;
-  `instruction` is what the participant was told, as speed or accuracy;
+  `instruction` is what the participant was told, as speed or accuracy; `correct`, where the other program said so, is
+  held against direction and response;
 - `[values.NAME]`: what a cell of NAME's column means ("f" = "forward");
-- `[response_time]`: the `unit`, s or ms; `[rating]`: `scale_min` and `scale_max`, mapped to 0 and 10;
+- `[response_time]`: the `unit`, s or ms; `[rating]`: `scale_min` and `scale_max`, mapped to 0 and 10, and the `grain`
+  between ratings, if there is one;
 - `[[skip]]`: rows to leave out, where a `column` is one of `values`, or `empty`.
 """
 
@@ -29,7 +31,9 @@ from pydantic import AfterValidator, Field, model_validator
 from analysis.logs.files import BadLogError
 from analysis.logs.texts import CsvRecord
 from experiments.config.door import Model
+from experiments.design.language import NumberScale
 from experiments.record import tables
+from experiments.tasks.questions import on_scale
 
 ShortText = Annotated[str, Field(min_length=1, max_length=500)]
 MEASURES = {"direction": ("method", "direction", "response"), "preference": ("method", "rating")}
@@ -76,7 +80,9 @@ class Columns(Model):
     response: ShortText | None = None
     response_time: ShortText | None = None
     instruction: ShortText | None = None
+    correct: ShortText | None = None
     rating: ShortText | None = None
+    onset_utc: ShortText | None = None
     study: ShortText | None = None
     session: ShortText | None = None
     set: ShortText | None = None
@@ -93,10 +99,11 @@ class ResponseTimeMapping(Model):
 
 
 class ScaleMapping(Model):
-    """The ends of the rating scale, which become 0 and 10."""
+    """The ends of the rating scale, which become 0 and 10, and the distance of two ratings if it has one."""
 
     scale_min: float
     scale_max: float
+    grain: Annotated[float, Field(gt=0)] | None = None
 
     @model_validator(mode="after")
     def _is_a_scale(self) -> Self:
@@ -131,6 +138,7 @@ class ValuesMapping(Model):
     direction: dict[str, Literal["forward", "backward"]] = Field(default_factory=dict)
     response: dict[str, Literal["forward", "backward"]] = Field(default_factory=dict)
     instruction: dict[str, str] = Field(default_factory=dict)
+    correct: dict[str, bool] = Field(default_factory=dict)
 
 
 class ColumnMap(Model):
@@ -154,7 +162,7 @@ class ColumnMap(Model):
         if lacking:
             raise ValueError(f"columns.{lacking[0]} is missing (rule: a {self.experiment} log has it)")
         if self.columns.response_time is not None and self.response_time is None:
-            raise ValueError('response_time.unit is missing (rule: "s" or "ms" if tables.response_time is given)')
+            raise ValueError('response_time.unit is missing (rule: "s" or "ms" if columns.response_time is given)')
         return self
 
     @model_validator(mode="after")
@@ -172,6 +180,8 @@ class MappedLog:
     """One participant's log in a file, or why it cannot be mapped; the study if the map knows it."""
 
     study: str | None
+    participant: str
+    experiment: str
     records: tuple[CsvRecord, ...] | BadLogError
 
 
@@ -192,7 +202,12 @@ def read_mapped(content: bytes, file_name: str, mapping: ColumnMap) -> list[Mapp
     if not people:
         raise BadLogError("has no row left to read (rule: at least one that `skip` does not leave out)")
     return [
-        MappedLog(study=study, records=_records_or_fault(code, group, mapping))
+        MappedLog(
+            study=study,
+            participant=code,
+            experiment=mapping.experiment,
+            records=_records_or_fault(code, group, mapping),
+        )
         for (study, code), group in people.items()
     ]
 
@@ -267,6 +282,8 @@ def _records(code: str, lines: Sequence[_Line], mapping: ColumnMap) -> tuple[Csv
     """A participant's rows with the columns of Recoil's own table."""
     make = _rating if tables.is_rated(mapping.experiment) else _trial
     rows = [make(line, mapping) | _common(code, line, mapping) for line in lines]
+    if tables.is_rated(mapping.experiment) and mapping.columns.trial is None:
+        _check_rated_once(rows, lines, mapping)
     _number(rows, mapping)
     header = tables.names(mapping.experiment)
     return tuple(
@@ -274,9 +291,18 @@ def _records(code: str, lines: Sequence[_Line], mapping: ColumnMap) -> tuple[Csv
     )
 
 
+def _check_rated_once(rows: Sequence[_Row], lines: Sequence[_Line], mapping: ColumnMap) -> None:
+    first: dict[str, int] = {}
+    for row, line in zip(rows, lines, strict=True):
+        if (before := first.setdefault(row["method"], line.number)) != line.number:
+            rule = "(rule: once; a column `trial` in the map tells repeated ratings apart)"
+            message = f"{row['method']!r} is rated here and on line {before} {rule}"
+            raise BadLogError(message, line.number, mapping.columns.rating)
+
+
 def _common(code: str, line: _Line, mapping: ColumnMap) -> _Row:
     named = mapping.columns.model_dump(exclude_none=True)
-    row = {name: line.cells[named[name]] for name in named if name in ("session", "set", "trial")}
+    row = {name: line.cells[named[name]] for name in named if name in ("session", "set", "trial", "onset_utc")}
     row |= {name: tables.guard(line.cells[named[name]]) for name in named if name in ("flags", "note", "comment")}
     method = line.cells[mapping.columns.method]
     return row | {
@@ -291,15 +317,35 @@ def _trial(line: _Line, mapping: ColumnMap) -> _Row:
     direction = _translated(line, "direction", mapping)
     response = _translated(line, "response", mapping)
     time, own = _seconds(line, mapping), str(int(mapping.response_source != "experimenter"))
+    correct = str(int(response == direction)) if response else tables.MISSING
+    _check_correct(line, correct, f"the direction is {direction}, the response {response or 'empty'}", mapping)
     return {
         "direction": direction,
         "response": response,
-        "correct": str(int(response == direction)) if response else tables.MISSING,
+        "correct": correct,
         "response_time_s": time,
         "response_source": mapping.response_source if response else tables.MISSING,
         "response_time_valid": own if time else tables.MISSING,
         "instruction": _instruction(line, mapping),
     }
+
+
+_TRUTHS = {"1": True, "1.0": True, "true": True, "0": False, "0.0": False, "false": False}
+
+
+def _check_correct(line: _Line, correct: str, because: str, mapping: ColumnMap) -> None:
+    """`BadLogError` if the other program said otherwise of an answer; of no answer it may say what it likes."""
+    name = mapping.columns.correct
+    cell = line.cells[name] if name else tables.MISSING
+    if not (cell and correct):
+        return
+    said = mapping.values.correct.get(cell, _TRUTHS.get(cell.lower()))
+    if said is None:
+        rule = "(rule: 1 or 0, true or false; values.correct says what others mean)"
+        raise BadLogError(f"{cell!r} is not allowed {rule}", line.number, name)
+    if said != (correct == "1"):
+        rule = "(rule: right if they are the same; does the map turn one of them round?)"
+        raise BadLogError(f"correct is {cell}, but {because} {rule}", line.number, name)
 
 
 def _instruction(line: _Line, mapping: ColumnMap) -> str:
@@ -315,6 +361,9 @@ def _rating(line: _Line, mapping: ColumnMap) -> _Row:
         if not scale.scale_min <= value <= scale.scale_max:
             rule = f"(rule: {scale.scale_min:g} to {scale.scale_max:g}, as the map says)"
             raise BadLogError(f"rating {cell} is out of range {rule}", line.number, mapping.columns.rating)
+        if scale.grain and on_scale(value, NumberScale(scale.scale_min, scale.scale_max, scale.grain)) != value:
+            rule = f"(rule: by {scale.grain:g} from {scale.scale_min:g}, as the map says)"
+            raise BadLogError(f"rating {cell} is off the grain {rule}", line.number, mapping.columns.rating)
         cell = repr(10.0 * (value - scale.scale_min) / (scale.scale_max - scale.scale_min))
     return {"rating": cell, "rating_by": mapping.response_source if cell else tables.MISSING}
 

@@ -3,16 +3,17 @@
 from __future__ import annotations
 
 import csv
-import re
 from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from datetime import datetime
 from pathlib import Path
 
 import pandas as pd
 
-from analysis.logs.files import BadLogError, code_in_name, read_content
-from analysis.logs.rules import cell_fault, cell_value
+from analysis.logs.cell_rules import FEWEST_ALIKE, all_alike, as_moment, cell_fault, cell_value, no_date, too_early
+from analysis.logs.files import BadLogError, code_in_name, experiment_in_name, read_content
+from analysis.logs.journals import compared, journal_of
 from experiments.config.setup import sha256
 from experiments.design.config import DesignConfig
 from experiments.design.plan import Plan
@@ -20,11 +21,8 @@ from experiments.rebuild import began_with
 from experiments.record import journal
 from experiments.record.design_table import columns
 from experiments.record.journal import JournalError
-from experiments.record.tables import TABLES, Column
+from experiments.record.tables import CLOCK_SET_BACK, TABLES, Column
 from experiments.tasks.questions import correct_columns, is_right
-
-_TASK = re.compile(r"_task-([a-z]+)_[^/\\]*$")
-_JOURNAL = re.compile(r"_[a-z]+\.csv$")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -37,32 +35,41 @@ class DesignLogs:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class DesignLog:
-    """One log that keeps every rule; `key` is the same for logs that can be analysed together."""
+    """One log that keeps every rule; `key` is the same for logs that can be analysed together.
+
+    `journal` is what there is to say of the journal beside it.
+    """
 
     code: str
     design: DesignConfig
     key: str
+    journal: str
     rows: tuple[Mapping[str, object], ...]
 
 
 def is_of_design(path: str) -> bool:
     """Whether a file's name is that of a design's log: of any experiment but the two that have tables of their own."""
-    found = _TASK.search(path)
-    return found is not None and found[1] not in TABLES
+    return experiment_in_name(path) not in ("", *TABLES)
 
 
-def read_design_log(path: str) -> DesignLog:
-    """A log and its design. `BadLogError`: it breaks a rule, or nothing says what its columns mean."""
-    content = read_content(path)
+def read_design_log(path: str, made: bytes | None = None) -> DesignLog:
+    """A log and its design; the table that its journal `made`, if it has none.
+
+    `BadLogError`: it breaks a rule, or nothing says what its columns mean.
+    """
+    content = read_content(path) if made is None else made
     design, plan = _design_of(path)
     rows = tuple(_rows(content, design))
     code = _code(path, rows)
     _check_plan(design, plan, rows)
-    return DesignLog(code=code, design=design, key=_key(design), rows=rows)
+    _check_times(design, rows)
+    _check_onsets(rows)
+    said = compared(path, content) or ""
+    return DesignLog(code=code, design=design, key=_key(design), rows=rows, journal=said)
 
 
 def _design_of(path: str) -> tuple[DesignConfig, Plan]:
-    beside = Path(_JOURNAL.sub("_journal.jsonl", path))
+    beside = Path(journal_of(path))
     if not beside.is_file():
         raise BadLogError(f"there is no {beside.name} beside it, which says what the columns mean; keep both together")
     try:
@@ -143,6 +150,25 @@ def _check_plan(design: DesignConfig, plan: Plan, rows: Sequence[Mapping[str, ob
             right = is_right(design, design.questions[question], trial, said if isinstance(said, str) else None)
             if row[column] != (None if right is None else int(right)):
                 raise BadLogError(f"{row[column]!r} does not follow from {question} {said!r}", line, column)
+
+
+def _check_times(design: DesignConfig, rows: Sequence[Mapping[str, object]]) -> None:
+    for name in (f"{name}_time_s" for name, question in design.questions.items() if question.named_answers):
+        times = [row[name] for row in rows if row[name] is not None]
+        if len(times) >= FEWEST_ALIKE and len(set(times)) == 1:
+            raise BadLogError(all_alike(len(times), float(str(times[0]))), 2, name)
+
+
+def _check_onsets(rows: Sequence[Mapping[str, object]]) -> None:
+    before: datetime | None = None
+    for line, row in enumerate(rows, start=2):
+        text = str(row["onset_utc"] or "")
+        onset = as_moment(text) if text else before
+        if onset is None and text:
+            raise BadLogError(no_date(text), line, "onset_utc")
+        if before and onset and onset < before and CLOCK_SET_BACK not in str(row["flags"] or "").split():
+            raise BadLogError(too_early(text), line, "onset_utc")
+        before = onset
 
 
 def logs_by_design(logs: Sequence[tuple[DesignLog, str]], *, several: bool) -> tuple[list[DesignLogs], set[str]]:

@@ -2,12 +2,9 @@
 
 from __future__ import annotations
 
-import hashlib
-import io
-import json
 import os
 import re
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path, PurePath
 
@@ -15,12 +12,10 @@ from device.words import RecoilError
 from experiments.record import tables
 
 ENDINGS = tuple(f"_{suffix}.csv" for suffix in tables.FILE_SUFFIX.values())
-_BEHIND_STEM = re.compile(rf"(_({'|'.join(tables.FILE_SUFFIX.values())}))?\.[^.]*$")
 _CODE = re.compile(r"sub-([^_]+)_")
+_TASK = re.compile(r"_task-([a-z]+)_[^/\\]*$")
 _READ_ONLY = os.O_RDONLY | getattr(os, "O_BINARY", 0)
 _PIECE_BYTES = 1 << 16
-_TAIL_BYTES = (1 << 12, 1 << 16)
-"""As much of a journal as mostly, and as surely, holds its last record."""
 
 
 class BadLogError(RecoilError):
@@ -30,43 +25,91 @@ class BadLogError(RecoilError):
         super().__init__(message)
         self.message, self.line, self.column = message, line, column
 
+    def of(self, file: Path, participant: str, experiment: str) -> Problem:
+        """The same as it leaves the room: in which file, whose log it was, of which experiment."""
+        return Problem(
+            file=file,
+            line=self.line,
+            column=self.column,
+            message=self.message,
+            participant=participant,
+            experiment=experiment,
+        )
+
 
 _NO_FILE = "a link that leads to no file; fetch what it stands for (`git annex get`, `datalad get`), or delete it"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Problem:
-    """A file that was left out, the place, and why."""
+    """A file, or somebody's part of it, that was left out or needs a word: the place, and why.
+
+    `participant` and `experiment` as far as they are known; a person is named where the file's name does not.
+    """
 
     file: Path
     line: int | None
     column: str | None
     message: str
+    participant: str = ""
+    experiment: str = ""
 
     def __str__(self) -> str:
+        named = not self.participant or code_in_name(str(self.file)) == self.participant
+        who = "" if named else f"participant {self.participant} of "
         line = "" if self.line is None else f", line {self.line}"
         column = "" if self.column is None else f", column {self.column}"
-        return f"{self.file}{line}{column}: {self.message}"
+        return f"{who}{self.file}{line}{column}: {self.message}"
 
 
-def find_logs(paths: Sequence[Path], endings: tuple[str, ...] = ENDINGS) -> tuple[dict[str, str], list[Problem]]:
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Found:
+    """Logs and journals by their paths, each with the folder that stands for its study; and what cannot be read."""
+
+    logs: Mapping[str, str]
+    journals: Mapping[str, str]
+    problems: tuple[Problem, ...]
+
+
+def find_logs(paths: Sequence[Path], endings: tuple[str, ...] = ENDINGS) -> Found:
     """The files in `paths`, each once, with the folder that stands for its study; files in folders by their endings.
 
-    Practice is left out.
+    Logs of practices are left out; journals are all there.
     """
     found: dict[str, tuple[str, str]] = {}
     problems: list[Problem] = []
     for path in paths:
-        logs = _in_folder(path, endings, problems) if path.is_dir() else {os.path.realpath(path): str(path)}
-        if not logs or not path.exists():
+        logs = _in_folder(path, (*endings, _JOURNALS), problems) if path.is_dir() else {_real(path): str(path)}
+        if not any(map(_is_counted, logs.values())) or not path.exists():
             kinds = " or ".join(f"*{ending}" for ending in endings)
-            reason = f"no {kinds} in this folder" if path.is_dir() else "no such file or folder"
+            there = "is a practice, or no log" if path.exists() else "no such file or folder"
+            reason = f"no {kinds} in this folder" if path.is_dir() else there
             problems.append(Problem(file=path, line=None, column=None, message=reason))
             continue
-        top = os.path.realpath(path if path.is_dir() else path.parent)
+        top = _real(path if path.is_dir() else path.parent)
         for real, log in logs.items():
             found.setdefault(real, (log, _study(real, top)))
-    return {log: study for log, study in found.values() if "practice" not in _name(log).lower()}, problems
+    journals = {log: study for log, study in found.values() if _is_journal(log)}
+    logs_found = {log: study for log, study in found.values() if log not in journals and _is_counted(log)}
+    return Found(logs=logs_found, journals=journals, problems=tuple(problems))
+
+
+_JOURNALS = ".jsonl"
+_JOURNAL = re.compile(r"_journal(\.aside-[0-9]+)?\.jsonl$")
+
+
+def _is_journal(path: str) -> bool:
+    return _JOURNAL.search(path) is not None
+
+
+def _is_counted(path: str) -> bool:
+    """Whether a file may hold data: a practice holds none, nor does a register."""
+    name = _name(path).lower()
+    return "practice" not in name and (_is_journal(name) or not name.endswith(_JOURNALS))
+
+
+def _real(path: Path) -> str:
+    return os.path.realpath(path)
 
 
 def names_below(files: Iterable[Path]) -> dict[Path, Path]:
@@ -123,14 +166,22 @@ def code_in_name(path: str) -> str | None:
     return match[1] if match else None
 
 
+def experiment_in_name(path: str) -> str:
+    """The experiment in a file's name, empty if there is none.
+
+    >>> experiment_in_name("results/sub-P01/sub-P01_task-direction_trials.csv")
+    'direction'
+    """
+    found = _TASK.search(path)
+    return found[1] if found else ""
+
+
 def read_content(path: str) -> bytes:
-    """A file's bytes; `BadLogError` if it cannot be read or is not the one that its finished run left."""
+    """A file's bytes; `BadLogError` if it cannot be read."""
     try:
-        content = _bytes(path)
+        return _bytes(path)
     except OSError as error:
         raise BadLogError(f"cannot be read: {error.strerror or error}") from error
-    _check_unedited(path, content)
-    return content
 
 
 def _bytes(path: str) -> bytes:
@@ -143,36 +194,6 @@ def _bytes(path: str) -> bytes:
     finally:
         os.close(descriptor)
     return content
-
-
-def _check_unedited(path: str, content: bytes) -> None:
-    """If the journal beside the file says that the run was finished, the file is still the one it finished with."""
-    journal = f"{_BEHIND_STEM.sub('', path)}_journal.jsonl"
-    finished = _last_record(journal)
-    expected = finished.get("table_sha256") if finished.get("kind") == "finished" else None
-    if expected is not None and expected != hashlib.sha256(content).hexdigest():
-        raise BadLogError(f"edited since the run; `recoil rebuild {journal}` gives the original")
-
-
-def _last_record(journal: str) -> dict[str, object]:
-    """The last record of a journal, or nothing if there is no journal or its last line is torn."""
-    if not os.access(journal, os.F_OK):
-        return {}
-    try:
-        with open(journal, "rb", buffering=0) as stream:  # noqa: PTH123 - of many thousands
-            record = json.loads(next(filter(None, _last_lines(stream)), b"{}"))
-    except (OSError, ValueError):
-        return {}
-    return record if isinstance(record, dict) else {}
-
-
-def _last_lines(stream: io.FileIO) -> Iterator[bytes]:
-    """The last line, if it lies within as much of the end as mostly holds it; else the last of as much as surely."""
-    size = stream.seek(0, io.SEEK_END)
-    for tail in _TAIL_BYTES:
-        stream.seek(max(0, size - tail))
-        lines = stream.read(tail).splitlines()
-        yield lines[-1] if len(lines) > 1 or (lines and size <= tail) else b""
 
 
 def study_names(folders: Iterable[str]) -> dict[str, str]:

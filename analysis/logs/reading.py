@@ -1,4 +1,8 @@
-"""Log files into two tables. A file that breaks a rule is left out whole, and the reason stands in `problems`."""
+"""Log files into tables. Whoever's log breaks a rule is left out whole, and the reason stands in `problems`.
+
+A finished run without a table is read from its journal. What was used, though there is something to say of it, stands
+in `remarks`, and who has only begun in `begun`.
+"""
 
 from __future__ import annotations
 
@@ -13,11 +17,23 @@ import pandas as pd
 
 from analysis.logs.column_map import ColumnMap, MappedLog, is_recoils, read_mapped
 from analysis.logs.design_logs import DesignLog, DesignLogs, is_of_design, logs_by_design, read_design_log
-from analysis.logs.files import ENDINGS, BadLogError, Problem, code_in_name, find_logs, read_content, study_names
+from analysis.logs.files import (
+    ENDINGS,
+    BadLogError,
+    Problem,
+    code_in_name,
+    experiment_in_name,
+    find_logs,
+    read_content,
+    study_names,
+)
+from analysis.logs.journals import BegunRun, RunFile, compared, gone, made_again, run_file, without_table
 from analysis.logs.rules import Log, check_logs
 from analysis.logs.texts import Block, TextTable, joined, table_of_records, text_tables
 from experiments.record import tables
 from experiments.study import register
+from experiments.study.folders import PlaceError
+from experiments.study.study import Member
 
 __all__ = ["Logs", "Problem", "Track", "read_logs"]
 
@@ -34,6 +50,14 @@ Track = Callable[[Sequence[Path]], Iterable[Path]]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
+class Joined:
+    """A participant of a register, and its folder."""
+
+    participant: str
+    study: str
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
 class Logs:
     """The rows of all good files, with the columns of `experiments.record.tables` and the study; empty cells are NA.
 
@@ -45,6 +69,12 @@ class Logs:
     problems: tuple[Problem, ...]
     files: tuple[Path, ...]
     designs: tuple[DesignLogs, ...] = ()
+    remarks: tuple[Problem, ...] = ()
+    begun: tuple[BegunRun, ...] = ()
+    runs: tuple[RunFile, ...] = ()
+    """Every run whose journal was found, practices and those set aside too."""
+    joined: tuple[Joined, ...] = ()
+    """Who stands in the registers of the folders that were read."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -64,8 +94,10 @@ class _Batch:
 
     blocks: list[Block] = field(default_factory=list)
     logs: dict[int, Log | BadLogError] = field(default_factory=dict)
-    studies: dict[int, str | None] = field(default_factory=dict)
-    """The studies that a column map knows."""
+    mapped: dict[int, MappedLog] = field(default_factory=dict)
+    """Logs of other programs."""
+    journals: dict[int, str | None] = field(default_factory=dict)
+    """Of logs of our own what there is to say of their journals, `None` where there is none."""
 
 
 @dataclass(slots=True, kw_only=True)
@@ -81,42 +113,56 @@ class _Reading:
     """The first log of each study, experiment and code, upper and lower case alike."""
     files: dict[int, Path] = field(default_factory=dict)
     """The files of good logs, numbered."""
-    excluded: dict[str, Mapping[str, str]] = field(default_factory=dict)
-    """Who is excluded in each results folder, and why."""
+    members: dict[str, Mapping[str, Member]] = field(default_factory=dict)
+    """Who stands in the register of each results folder."""
+    remarks: list[Problem] = field(default_factory=list)
+    proven: list[tuple[str, str, bool]] = field(default_factory=list)
+    """Folder and code of each good log of our own, and whether it has a journal."""
 
     def add(self, waiting: Sequence[_Waiting], batch: _Batch) -> None:
         """Take over the logs of some files."""
         self.blocks += batch.blocks
         files = {one.number: one for one in waiting}
         for number, log in sorted(batch.logs.items()):
-            one = files[number // _LOGS_A_FILE]
+            one, mapped = files[number // _LOGS_A_FILE], batch.mapped.get(number)
+            code = mapped.participant if mapped else code_in_name(one.path) or ""
             try:
                 if isinstance(log, BadLogError):
                     raise log
-                self.admit(number, one, log, batch.studies.get(number) or one.study)
+                self.admit(number, one, log, (mapped and mapped.study) or one.study)
             except BadLogError as bad:
-                problem = Problem(file=one.file, line=bad.line, column=bad.column, message=bad.message)
-                self.problems.append(problem)
+                experiment = mapped.experiment if mapped else experiment_in_name(one.path)
+                self.problems.append(bad.of(one.file, code, experiment))
+            else:
+                if number in batch.journals:
+                    self.note(one, log, batch.journals[number])
+
+    def note(self, one: _Waiting, log: Log, said: str | None) -> None:
+        """What there is to say of the journal of a log that was admitted."""
+        self.proven.append((one.study, log.code, said is not None))
+        if said:
+            self.remarks.append(BadLogError(said).of(one.file, log.code, log.experiment))
 
     def admit(self, number: int, one: _Waiting, log: Log, study: str) -> None:
         """Take a participant's log of an experiment. `BadLogError`: they are excluded, or have one already."""
         results = one.path.rpartition(os.sep)[0].rpartition(os.sep)[0] or str(one.file.parent.parent)
-        if results not in self.excluded:
-            self.excluded[results] = self._exclusions(results)
-        reason = self.excluded[results].get(log.code)
+        reason = self.known(results).get(log.code, Member(participant_id=log.code)).excluded
         if reason is not None:
-            raise BadLogError(f"participant {log.code} is excluded: {reason} (`recoil study` readmits them)")
+            how = f"`recoil study DIR --readmit {log.code} --reason TEXT`"
+            raise BadLogError(f"participant {log.code} is excluded: {reason} ({how} readmits them)")
         self._check_new(study, log, number)
         self.studies[number], self.codes[number] = study, log.code
         self.files[number // _LOGS_A_FILE] = one.file
 
-    def _exclusions(self, results: str) -> dict[str, str]:
-        """Who is excluded in a results folder, as far as its register can be read; what cannot is a problem."""
-        found = register.read_register(Path(results))
-        if found.problem:
-            said = f"{found.problem.removeprefix(f'{found.path}: ')}; whom it excludes there is not known"
-            self.problems.append(Problem(file=found.path, line=None, column=None, message=said))
-        return {code: member.excluded for code, member in found.members.items() if member.excluded is not None}
+    def known(self, results: str) -> Mapping[str, Member]:
+        """Who stands in the register of a results folder, as far as it can be read; what cannot is a problem."""
+        if results not in self.members:
+            found = register.read_register(Path(results))
+            if found.problem:
+                said = f"{found.problem.removeprefix(f'{found.path}: ')}; whom it excludes there is not known"
+                self.problems.append(Problem(file=found.path, line=None, column=None, message=said))
+            self.members[results] = found.members
+        return self.members[results]
 
     def _check_new(self, study: str, log: Log, number: int) -> None:
         first = self.firsts.setdefault((study, log.experiment, log.code.casefold()), number)
@@ -136,36 +182,67 @@ def read_logs(paths: Iterable[str | Path], track: Track = iter, mapping: ColumnM
     by one: for a progress bar. With a `mapping`, files without the header of Recoil's own tables are read by it.
     """
     endings = mapping.files_end_with if mapping else ()
-    found, problems = find_logs([Path(path) for path in paths], (*ENDINGS, *endings))
-    designed = {path: study for path, study in found.items() if is_of_design(path)}
-    found = {path: study for path, study in found.items() if path not in designed}
-    reading = _Reading(problems=problems)
-    for waiting, batch in _checked_batches(_batches(found, track), mapping):
+    files = find_logs([Path(path) for path in paths], (*ENDINGS, *endings))
+    reading = _Reading(problems=list(files.problems))
+    runs = [run for path, study in files.journals.items() if (run := run_file(path, study))]
+    made, begun = _without_tables(reading, without_table(runs, files.logs))
+    every = {**files.logs, **{run.path: run.study for run in runs if run.path in made}}
+    found = {path: study for path, study in every.items() if not is_of_design(path)}
+    for waiting, batch in _checked_batches(_batches(found, track, made), mapping):
         reading.add(waiting, batch)
-    designs = _designed(reading, designed, track, len(found))
+    designs = _designed(reading, {path: every[path] for path in every if path not in found}, track, len(found), made)
+    reading.remarks += gone(reading.proven)
     names = study_names(folder for folder in set(reading.studies.values()) if Path(folder).is_absolute())
     studies = {number: names.get(study, study) for number, study in reading.studies.items()}
+    by_design = _by_design(reading, designs, studies)
     return Logs(
         trials=joined("direction", reading.blocks, studies),
         ratings=joined("preference", reading.blocks, studies),
-        designs=_by_design(reading, designs, studies),
+        designs=by_design,
         problems=tuple(reading.problems),
         files=tuple(reading.files.values()),
+        remarks=tuple(reading.remarks),
+        begun=tuple(begun),
+        runs=tuple(runs),
+        joined=tuple(
+            Joined(participant=code, study=where) for where in reading.members for code in reading.members[where]
+        ),
     )
 
 
-def _designed(reading: _Reading, found: Mapping[str, str], track: Track, first: int) -> dict[int, DesignLog]:
+def _without_tables(reading: _Reading, runs: Sequence[RunFile]) -> tuple[dict[str, bytes], list[BegunRun]]:
+    """The tables of finished runs that lack one, by the paths of their journals; and the runs that are not finished."""
+    made, begun = dict[str, bytes](), list[BegunRun]()
+    for run in runs:
+        try:
+            found = made_again(run)
+        except BadLogError as bad:
+            reading.problems.append(bad.of(Path(run.path), run.participant, run.experiment))
+        else:
+            if isinstance(found, BegunRun):
+                begun.append(found)
+                reading.known(str(Path(run.path).parent.parent))
+            else:
+                made[run.path] = found
+    return made, begun
+
+
+def _designed(
+    reading: _Reading, found: Mapping[str, str], track: Track, first: int, made: Mapping[str, bytes]
+) -> dict[int, DesignLog]:
     """The good logs of designs, numbered behind the others."""
     logs: dict[int, DesignLog] = {}
     files = zip(found.items(), track([Path(path) for path in found]), strict=True) if found else ()
     for number, ((path, study), file) in enumerate(files, start=first):
         waiting = _Waiting(number=number, file=file, path=path, study=study, content=b"")
         try:
-            log = read_design_log(path)
-            reading.admit(number * _LOGS_A_FILE, waiting, Log(code=log.code, experiment=log.design.design), study)
+            log = read_design_log(path, made.get(path))
+            of_design = Log(code=log.code, experiment=log.design.design)
+            reading.admit(number * _LOGS_A_FILE, waiting, of_design, study)
+            reading.note(waiting, of_design, log.journal)
             logs[number * _LOGS_A_FILE] = log
         except BadLogError as bad:
-            reading.problems.append(Problem(file=file, line=bad.line, column=bad.column, message=bad.message))
+            reading.problems.append(bad.of(file, code_in_name(path) or "", experiment_in_name(path)))
     return logs
 
 
@@ -180,17 +257,17 @@ def _by_design(reading: _Reading, logs: Mapping[int, DesignLog], studies: Mappin
                 f"was made with another design {log.design.design!r} than most logs of that name (its factors, order, "
                 "trial or questions differ); analyse it apart"
             )
-            reading.problems.append(Problem(file=file, line=None, column=None, message=message))
+            reading.problems.append(BadLogError(message).of(file, log.code, log.design.design))
     return tuple(found)
 
 
-def _batches(found: Mapping[str, str], track: Track) -> Iterator[list[_Waiting]]:
-    """The files' contents, read in turn."""
+def _batches(found: Mapping[str, str], track: Track, made: Mapping[str, bytes]) -> Iterator[list[_Waiting]]:
+    """The files' contents, read in turn, but for tables that were `made` of journals."""
     waiting: list[_Waiting] = []
     size = 0
     files = zip(found.items(), track([Path(path) for path in found]), strict=True)
     for number, ((path, study), file) in enumerate(files):
-        content = _content(path)
+        content = made[path] if path in made else _content(path)
         waiting.append(_Waiting(number=number, file=file, path=path, study=study, content=content))
         size += len(content) if isinstance(content, bytes) else 0
         if size >= _BATCH_BYTES:
@@ -233,6 +310,7 @@ def _checked(waiting: Sequence[_Waiting], mapping: ColumnMap | None) -> _Batch:
             if mapping is not None and not is_recoils(one.content):
                 tables.append(_mapped(batch, number, read_mapped(one.content, one.file.name, mapping), mapping))
             else:
+                batch.journals[number] = compared(one.path, one.content)
                 contents[number], names[number] = one.content, code_in_name(one.path)
         except BadLogError as bad:
             batch.logs[number] = bad
@@ -240,7 +318,7 @@ def _checked(waiting: Sequence[_Waiting], mapping: ColumnMap | None) -> _Batch:
     batch.logs |= faults
     for texts in (*own, *tables):
         try:
-            block, logs = check_logs(texts, names)
+            block, logs = check_logs(texts, names, own=texts not in tables)
         except BadLogError as bad:
             batch.logs |= dict.fromkeys(texts.logs, bad)
         else:
@@ -253,9 +331,16 @@ def _mapped(batch: _Batch, first: int, logs: Sequence[MappedLog], mapping: Colum
     """The logs of a file that Recoil did not write, numbered from `first`, as far as they could be mapped."""
     records = {}
     for number, log in enumerate(logs, start=first):
-        batch.studies[number] = log.study
+        batch.mapped[number] = log
         if isinstance(log.records, BadLogError):
             batch.logs[number] = log.records
         else:
             records[number] = log.records
     return table_of_records(tables.names(mapping.experiment), records)
+
+
+def refuse_nothing(paths: Sequence[Path], logs: Logs) -> None:
+    """`PlaceError` where there is no usable log at all, with every reason and what to do."""
+    if not logs.files:
+        reasons = [*map(str, logs.problems), *map(str, logs.begun)]
+        raise PlaceError("\n".join(["no usable log in " + ", ".join(map(str, paths)), *reasons]))

@@ -6,7 +6,6 @@ rules of the cells come first, then whose log it is, then what binds the cells o
 
 from __future__ import annotations
 
-import math
 import re
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
@@ -16,6 +15,17 @@ import numpy as np
 import pyarrow as pa
 from numpy.typing import NDArray
 
+from analysis.logs.cell_rules import (
+    FEWEST_ALIKE,
+    all_alike,
+    cell_fault,
+    cell_value,
+    experiment_of,
+    moments,
+    no_date,
+    shown,
+    too_early,
+)
 from analysis.logs.files import BadLogError
 from analysis.logs.texts import (
     Block,
@@ -32,15 +42,11 @@ from analysis.logs.texts import (
 )
 from analysis.stats.arrays import BoolArray
 from experiments.record import tables
-from experiments.record.tables import Column
+from experiments.record.tables import CLOCK_SET_BACK, Column
 
 Integers = NDArray[np.int64]
 
-_MEASURES = {"direction": ("response", "correct"), "preference": ("rating",)}
-"""Columns without which a table has nothing to analyse, though a cell of them may be empty."""
 _CODE = re.compile(r"[A-Za-z0-9]{1,32}")
-_INTEGER = re.compile(r"[+-]?[0-9]{1,15}")
-_NUMBER = re.compile(r"[+-]?([0-9]+\.?[0-9]*|\.[0-9]+)([eE][+-]?[0-9]{1,4})?")
 _NO_ROWS: Integers = np.empty(0, dtype=np.int64)
 
 
@@ -104,11 +110,12 @@ _LogRule = tuple[Integers, Callable[[int], BadLogError]]
 
 
 def check_logs(
-    texts: TextTable, codes_in_names: Mapping[int, str | None]
+    texts: TextTable, codes_in_names: Mapping[int, str | None], *, own: bool = True
 ) -> tuple[Block, dict[int, Log | BadLogError]]:
     """The rows of those logs of a table that keep every rule, and each log by its number, or what is wrong with it.
 
-    `codes_in_names` are the participants' codes in the names of the logs' files, as far as there are some.
+    `codes_in_names` are the participants' codes in the names of the logs' files, as far as there are some. Logs of
+    other programs, which are not `own`, may count sets through the run, and mix sessions.
     `BadLogError`: what is wrong with all logs of the table, as their header is.
     """
     experiment = experiment_of(texts.header)
@@ -119,7 +126,8 @@ def check_logs(
     cells = {name: values for name, (values, _) in parsed.items()}
     table = _Table(texts=texts, cells=cells, first=np.cumsum(rows) - rows)
     wrong = np.concatenate([list(texts.ragged), *(odd for _, odd in parsed.values())]).astype(np.int64)
-    rules: list[_LogRule] = [(wrong, partial(_say_cell, table, experiment)), *_rules(table, experiment, codes_in_names)]
+    others = _rules(table, experiment, codes_in_names, own=own)
+    rules: list[_LogRule] = [(wrong, partial(_say_cell, table, experiment)), *others]
     faults = _first_faults(table, rules)
     good = np.array([place not in faults for place in range(len(rows))], dtype=np.bool_)
     kept = None if good.all() else np.flatnonzero(np.repeat(good, rows))
@@ -145,59 +153,22 @@ def _first_faults(table: _Table, rules: Iterable[_LogRule]) -> dict[int, BadLogE
     return found
 
 
-def _rules(table: _Table, experiment: str, codes_in_names: Mapping[int, str | None]) -> Iterator[_LogRule]:
+def _rules(
+    table: _Table, experiment: str, codes_in_names: Mapping[int, str | None], *, own: bool
+) -> Iterator[_LogRule]:
     """The rules that bind cells together, in their order."""
     yield _one_participant(table, codes_in_names)
     if tables.is_rated(experiment):
-        yield _ratings_on_the_scale(table)
-        yield _numbered_trials(table, _sessions(table, np.zeros(sum(table.texts.rows), dtype=np.int64)))
+        found = _sessions(table, np.zeros(sum(table.texts.rows), dtype=np.int64))
+        yield _numbered_trials(table, found)
     else:
+        found = _sessions(table, table.whole("session"))
         yield _right_answers(table)
-        yield from _numbered_sessions(table)
-
-
-def experiment_of(header: Sequence[str]) -> str:
-    """Which table the header is of: the one that shares most columns with it. `BadLogError`: none, or not all of it."""
-    shared = {name: len(set(header) & set(tables.names(name))) for name in tables.TABLES}
-    experiment = max(shared, key=lambda name: shared[name])
-    if shared[experiment] < 4:
-        raise BadLogError(
-            f"the header {_shown(','.join(header))} is neither a trials nor a ratings table of Recoil "
-            "(a log of another experiment or program, or not comma-separated)",
-            1,
-        )
-    for name in header:
-        if header.count(name) > 1:
-            raise BadLogError(f"column {name!r} stands {header.count(name)} times in the header (rule: once)", 1, name)
-    required = [column.name for column in tables.TABLES[experiment] if column.required]
-    for name in (*required, *_MEASURES[experiment]):
-        if name not in header:
-            raise BadLogError(f"column {name!r} is missing (rule: a {experiment} table has it)", 1, name)
-    return experiment
-
-
-def cell_fault(column: Column, text: str) -> str:
-    """Why a column may not hold a text; empty if it may."""
-    if text == tables.MISSING:
-        return "the cell is empty (rule: a value is required)" if column.required else ""
-    if column.type == "integer" and not _INTEGER.fullmatch(text):
-        return f"{_shown(text)} is not a whole number of at most 15 digits"
-    if column.type == "number" and not (_NUMBER.fullmatch(text) and math.isfinite(float(text))):
-        return f"{_shown(text)} is not a finite number with a decimal point"
-    if column.levels and text not in column.levels:
-        return f"{_shown(text)} is not allowed (rule: one of {', '.join(column.levels)})"
-    return ""
-
-
-def cell_value(column: Column, text: str) -> Cell:
-    """The value of a text that a column may hold; `None` for an empty one."""
-    if text == tables.MISSING:
-        return None
-    if column.type == "number":
-        return float(text)
-    if column.type in ("integer", "flag"):
-        return int(text)
-    return tables.unguard(text) if column.type == "text" else text
+        yield from _numbered_sessions(table, found)
+        yield _numbered_sets(table, found, own=own)
+        yield _measured_times(table)
+    yield _in_order(table, found, own=own)
+    yield from _onsets(table)
 
 
 def _parsed(column: Column, texts: Texts) -> tuple[Cells, Integers]:
@@ -222,6 +193,8 @@ def _few_values(column: Column, codes: NDArray[np.int32], texts: list[str]) -> t
 
 def _numbers(column: Column, texts: Texts) -> tuple[Cells, Integers]:
     numbers, odd = decimals(texts)
+    if column.most is not None and (beyond := numbers > column.most).any():
+        odd = np.append(odd, np.flatnonzero(beyond))
     if not odd.size:
         return numbers, odd
     cells = texts.take(pa.array(odd)).to_pylist()
@@ -257,9 +230,9 @@ def _say_participant(table: _Table, names: Mapping[int, str | None], row: int) -
     place, rows = table.log(row)
     code, own = (str(table.value("participant_id", one)) for one in (row, rows.start))
     if code != own:
-        message = f"{_shown(code)} after {own!r} (rule: one participant a file)"
+        message = f"{shown(code)} after {own!r} (rule: one participant a file)"
     elif not _CODE.fullmatch(code):
-        message = f"{_shown(code)} is not a code (rule: 1 to 32 letters or digits)"
+        message = f"{shown(code)} is not a code (rule: 1 to 32 letters or digits)"
     else:
         rule = f"sub-{names[table.texts.logs[place]]} (rule: one participant a file, the one in its name)"
         message = f"participant {code!r}, but the file is named {rule}"
@@ -285,15 +258,6 @@ def _say_answer(table: _Table, row: int) -> BadLogError:
         shown = f"correct is {correct}, but the direction was {direction} and the response {response}"
         message = f"{shown} (rule: 1 if they are the same, else 0)"
     return table.fault(message, row, "correct")
-
-
-def _ratings_on_the_scale(table: _Table) -> _LogRule:
-    rating = np.asarray(table.cells["rating"], dtype=np.float64)
-
-    def said(row: int) -> BadLogError:
-        return table.fault(f"rating {rating[row]:g} is out of range (rule: 0 to 10)", row, "rating")
-
-    return np.flatnonzero((rating < 0.0) | (rating > 10.0)), said
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -325,9 +289,8 @@ def _miscounted(numbers: Integers, begins: Integers) -> Integers:
     return np.unique(run[numbers != np.arange(1, len(numbers) + 1) - begins[run]])
 
 
-def _numbered_sessions(table: _Table) -> Iterator[_LogRule]:
-    """One method a session; sessions 1, 2, 3, ... in a log, and trials 1, 2, 3, ... in a session, in any order."""
-    found = _sessions(table, table.whole("session"))
+def _numbered_sessions(table: _Table, found: _Sessions) -> Iterator[_LogRule]:
+    """One method a session; sessions 1, 2, 3, ... in a log, and trials 1, 2, 3, ... in a session."""
     method = table.coded("method").codes
     first = np.repeat(found.first, np.diff(np.append(found.begins, len(found.order))))
     yield found.order[method[found.order] != method[first]], partial(_say_method, table, found)
@@ -374,10 +337,62 @@ def _miscount(table: _Table, column: str, numbers: Iterable[int], rows: Sequence
             return table.fault(f"{column} {number} stands twice in {where} (rule: 1, 2, 3, ... once each)", row, column)
         seen.add(number)
     missing = next(number for number in range(1, len(rows) + 1) if number not in seen)
-    rule = f"(rule: 1, 2, 3, ... without a gap; found {_shown(', '.join(map(str, sorted(seen))))})"
+    rule = f"(rule: 1, 2, 3, ... without a gap; found {shown(', '.join(map(str, sorted(seen))))})"
     return table.fault(f"{column} {missing} is missing in {where} {rule}", rows[-1], column)
 
 
-def _shown(text: str) -> str:
-    """`text` in quotes, cut to what fits into a message."""
-    return repr(text if len(text) <= 80 else text[:77] + "...")
+def _numbered_sets(table: _Table, found: _Sessions, *, own: bool) -> _LogRule:
+    """The sets of a session are 1, 2, 3, ... one after the other; of other programs they only never go back."""
+    numbers = table.whole("set")[found.order]
+    step = np.diff(numbers, prepend=0)
+    step[found.begins] = numbers[found.begins] if own else 0
+    wrong = (step < 0) | (step > 1) if own else step < 0
+
+    def said(row: int) -> BadLogError:
+        where = f"set {table.value('set', row)} at trial {table.value('trial', row)} of session {found.session[row]}"
+        return table.fault(f"{where} (rule: sets 1, 2, 3, ... one after the other)", row, "set")
+
+    return found.order[wrong], said
+
+
+def _measured_times(table: _Table) -> _LogRule:
+    """Measured times differ."""
+    time_s = np.asarray(table.cells["response_time_s"], dtype=np.float64)
+    counts = np.add.reduceat((~np.isnan(time_s)).astype(np.int64), table.first)
+    alike = np.fmin.reduceat(time_s, table.first) == np.fmax.reduceat(time_s, table.first)
+
+    def said(row: int) -> BadLogError:
+        place = int(table.logs(np.array(row)))
+        time = float(np.nanmax(time_s[row : row + table.texts.rows[place]]))
+        return table.fault(all_alike(int(counts[place]), time), row, "response_time_s")
+
+    return table.first[alike & (counts >= FEWEST_ALIKE)], said
+
+
+def _in_order(table: _Table, found: _Sessions, *, own: bool) -> _LogRule:
+    """Rows stand in the order of presentation; of other programs within each session."""
+    back = np.diff(found.order, append=np.iinfo(np.int64).max) < 0
+    back[found.begins[1:] - 1] &= own
+
+    def said(row: int) -> BadLogError:
+        where = f"trial {table.value('trial', row)}"
+        where += f" of session {found.session[row]}" if found.session[row] else ""
+        return table.fault(f"{where} stands behind a later one (rule: rows in the order of the run)", row, "trial")
+
+    return found.order[back], said
+
+
+def _onsets(table: _Table) -> Iterator[_LogRule]:
+    """Onsets are dates and times, and do not go back but where the log says that the clock was set back."""
+    found, none = moments(table.texts.column("onset_utc"))
+    rows = np.flatnonzero(found >= 0)
+    log = table.logs(rows)
+    earlier = rows[1:][(np.diff(found[rows]) < 0) & (np.diff(log) == 0)]
+    flags = table.texts.column("flags")
+    unsaid = [row for row in earlier.tolist() if CLOCK_SET_BACK not in (flags[row].as_py() or "").split()]
+
+    def say(rule: Callable[[str], str], row: int) -> BadLogError:
+        return table.fault(rule(table.texts.column("onset_utc")[row].as_py()), row, "onset_utc")
+
+    yield none, partial(say, no_date)
+    yield np.array(unsaid, dtype=np.int64), partial(say, too_early)

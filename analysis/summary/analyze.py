@@ -10,7 +10,7 @@ from pathlib import Path
 from analysis.logs.column_map import ColumnMap
 from analysis.logs.exclusions import ExclusionEffect, Rules, apply_rules, by_study
 from analysis.logs.files import Problem
-from analysis.logs.reading import Logs, Track, read_logs
+from analysis.logs.reading import Logs, Track, read_logs, refuse_nothing
 from analysis.paper.audit.page import predictions
 from analysis.paper.audit.run import audit, load_paper_file
 from analysis.paper.paper import Prediction, load_paper
@@ -25,7 +25,6 @@ from experiments.config.door import ConfigError, load
 from experiments.config.setup import sha256
 from experiments.record import storage
 from experiments.record.provenance import provenance
-from experiments.study.folders import PlaceError
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -50,9 +49,7 @@ def analyze(request: Request, track: Track = iter) -> tuple[StudyStatistics, tup
     rules = load(Rules, request.rules) if request.rules else None
     book = remarks_coding.load_codebook(request.codebook) if request.codebook else None
     logs = read_logs(request.paths, track, mapping)
-    if not logs.files:
-        reasons = "\n".join(str(problem) for problem in logs.problems)
-        raise PlaceError("\n".join(filter(None, ["no usable log in " + ", ".join(map(str, request.paths)), reasons])))
+    refuse_nothing(request.paths, logs)
     effect = apply_rules(logs, rules) if rules is not None else None
     used = effect.logs if effect is not None else logs
     statistics = replace(summarize(used), studies=_by_study(used))

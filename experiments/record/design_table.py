@@ -83,8 +83,8 @@ def _questions(design: DesignConfig) -> Iterator[Column]:
         if name in scored:
             yield tables.flag_column(scored[name], "1 if the answer was right, 0 if not; empty without one")
         if question.named_answers:
-            yield tables.number_column(
-                f"{name}_time_s", "s", "time from the onset of the last stimulus to the answer; empty if there is none"
+            yield tables.seconds_column(
+                f"{name}_time_s", "time from the onset of the last stimulus to the answer; empty if there is none"
             )
             yield tables.level_column(f"{name}_source", HANDS, "whose hand gave the answer")
             yield tables.flag_column(
@@ -104,21 +104,23 @@ def _answer(name: str, question: QuestionConfig) -> Column:
         case "rating":
             low, high = question.minimum_text or "lower end", question.maximum_text or "upper end"
             ends = f"{question.minimum:g} ({low}) to {question.maximum:g} ({high})"
-            return tables.number_column(name, "", f"{ends}; empty means none was given")
+            return tables.bounded_column(name, f"{ends}; empty means none was given", *question.scale)
         case "number":
-            return tables.number_column(name, "", "the number that the participant said; empty means none was given")
+            said = "the number that the participant said; empty means none was given"
+            return tables.bounded_column(name, said, *question.scale)
         case "ranking":
             meaning = f"rank among the trials of the block, 1 = {question.minimum_text}; empty means none was given"
-            return tables.integer_column(name, meaning)
+            return tables.integer_column(name, meaning, most=tables.MOST_OFTEN)
         case "text":
             return tables.text_column(name, "the participant's own words")
 
 
 def _presentation(design: DesignConfig) -> Iterator[Column]:
     if design.trial.kind == "train":
-        yield tables.integer_column("shots", "shots presented until the participant said next")
-        yield tables.number_column(
-            "exposure_s", "s", "from the first pulse until the participant said next, at the last presentation"
+        shots = "shots presented until the participant said next"
+        yield tables.integer_column("shots", shots, least=0, most=tables.MOST_OFTEN)
+        yield tables.seconds_column(
+            "exposure_s", "from the first pulse until the participant said next, at the last presentation"
         )
         yield tables.EARLIER_EXPOSURE
     if design.below_break_away:
@@ -128,7 +130,7 @@ def _presentation(design: DesignConfig) -> Iterator[Column]:
 
 def design_rows(plan: Plan, history: History, design: DesignConfig) -> list[Row]:
     """One row a planned trial, in order; what was not reached is empty."""
-    return [
+    rows: list[Row] = [
         {
             "participant_id": plan.participant_id,
             "experiment": plan.experiment,
@@ -144,6 +146,19 @@ def design_rows(plan: Plan, history: History, design: DesignConfig) -> list[Row]
         }
         for trial, events in by_trial(plan.trials, history).items()
     ]
+    for row in went_back(rows):
+        row["flags"] = " ".join(filter(None, (str(row["flags"]), tables.CLOCK_SET_BACK)))
+    return rows
+
+
+def went_back(rows: Iterable[Row]) -> Iterator[Row]:
+    """The rows whose stimulus has an earlier date and time than the last one before: the clock was set back."""
+    before = ""
+    for row in rows:
+        onset = str(row.get("onset_utc") or "")  # of one length, all UTC: earlier sorts first
+        if onset and onset < before:
+            yield row
+        before = onset or before
 
 
 def _compared(trial: Trial) -> Row:

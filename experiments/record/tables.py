@@ -26,7 +26,10 @@ _FORMULA_STARTS = ("=", "+", "-", "@", "\t", "\r", "'")
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Column:
-    """One column of a log table. `levels` are all values a `level` column may hold; empty where the config decides."""
+    """One column of a log table. `levels` are all values a `level` column may hold; empty where the config decides.
+
+    `least` and `most` bound a number, which is a multiple of `grain` above the least, if there is a grain.
+    """
 
     name: str
     type: ColumnType
@@ -34,6 +37,9 @@ class Column:
     levels: tuple[str, ...] = ()
     unit: str = ""
     required: bool = False
+    least: float | None = None
+    most: float | None = None
+    grain: float = 0.0
 
 
 def level_column(name: str, levels: tuple[str, ...], description: str, *, required: bool = False) -> Column:
@@ -41,14 +47,32 @@ def level_column(name: str, levels: tuple[str, ...], description: str, *, requir
     return Column(name=name, type="level", levels=levels, description=description, required=required)
 
 
-def integer_column(name: str, description: str, *, required: bool = False) -> Column:
-    """A column of whole numbers."""
-    return Column(name=name, type="integer", description=description, required=required)
+LONGEST_S = 86_400.0
+"""A day: nobody feels, or thinks, for longer (assumed)."""
+MOST_OFTEN = 100_000
+"""No stimulus is repeated, and no train goes on, for more presentations or shots than this (assumed)."""
+
+
+def integer_column(
+    name: str, description: str, *, required: bool = False, least: float = 1, most: float | None = None
+) -> Column:
+    """A column of whole numbers, from 1 unless said otherwise."""
+    return Column(name=name, type="integer", description=description, required=required, least=least, most=most)
 
 
 def number_column(name: str, unit: str, description: str) -> Column:
     """A column of numbers in a unit."""
     return Column(name=name, type="number", unit=unit, description=description)
+
+
+def bounded_column(name: str, description: str, least: float, most: float, grain: float = 0.0) -> Column:
+    """A column of numbers on a scale."""
+    return Column(name=name, type="number", description=description, least=least, most=most, grain=grain)
+
+
+def seconds_column(name: str, description: str) -> Column:
+    """A column of durations: none is negative."""
+    return Column(name=name, type="number", unit="s", description=description, least=0.0, most=LONGEST_S)
 
 
 def text_column(name: str, description: str, *, required: bool = False) -> Column:
@@ -64,13 +88,13 @@ def flag_column(name: str, description: str) -> Column:
 PARTICIPANT = text_column("participant_id", "participant's code, letters and digits", required=True)
 _METHOD = level_column("method", (), "rendering method, as the config names it", required=True)
 ATTEMPTS = integer_column(
-    "attempts", "how often the stimulus was presented; more than 1 after a fault, pause or repeat"
+    "attempts", "how often the stimulus was presented; more than 1 after a fault, pause or repeat", most=MOST_OFTEN
 )
 FLAGS = text_column(
     "flags",
     "marks set on the trial, separated by a blank: `device-error`, `interrupted` (the run broke off), `paused`, "
-    "`repeated`, `corrected`, `anticipation` (the participant's key within 0.1 s of the onset), and the experimenter's "
-    "own",
+    "`repeated`, `corrected`, `anticipation` (the participant's key within 0.1 s of the onset), `clock-set-back` (the "
+    "computer's date and time went back since the trial before), and the experimenter's own",
 )
 NOTE = text_column("note", "the experimenter's note")
 ONSET = text_column(
@@ -81,9 +105,10 @@ GUN = text_column("gun", "who rendered it: model and serial number of the gun, `
 
 PRESENTATION = (ATTEMPTS, FLAGS, NOTE, ONSET, GUN)
 """How a trial was presented: the last columns of every table."""
-EARLIER_EXPOSURE = number_column(
+CLOCK_SET_BACK = "clock-set-back"
+"""The flag of a trial whose stimulus has an earlier date and time than the one before it."""
+EARLIER_EXPOSURE = seconds_column(
     "earlier_exposure_s",
-    "s",
     "how long the same trial was felt before, at presentations that a pause ended or that were repeated; empty if it "
     "was not",
 )
@@ -98,7 +123,7 @@ TRIALS: tuple[Column, ...] = (
     level_column("direction", ("forward", "backward"), "which way the gun pointed and shot", required=True),
     level_column("response", ("forward", "backward"), "which way the participant said; empty if never answered"),
     flag_column("correct", "1 if the response is the direction, 0 if not; empty without a response"),
-    number_column("response_time_s", "s", "time from the onset of the pulse to the answer; empty if there is none"),
+    seconds_column("response_time_s", "time from the onset of the pulse to the answer; empty if there is none"),
     level_column("response_source", ("participant", "experimenter", "synthetic"), "whose hand gave the answer"),
     flag_column(
         "response_time_valid", "1 if the time is the participant's own; 0 if corrected or by the experimenter's hand"
@@ -117,13 +142,16 @@ RATINGS: tuple[Column, ...] = (
     level_column("experiment", ("preference",), "which experiment", required=True),
     integer_column("trial", "order of presentation, from 1", required=True),
     _METHOD,
-    number_column(
-        "rating", "", "0 (dislike very much) to 10 (like very much); 0 is a rating, empty means none was given"
+    bounded_column(
+        "rating",
+        "0 (dislike very much) to 10 (like very much); 0 is a rating, empty means none was given",
+        least=0.0,
+        most=10.0,
     ),
     level_column("rating_by", ("participant", "experimenter", "synthetic"), "whose hand entered the rating"),
     text_column("comment", "the participant's own words"),
-    integer_column("shots", "shots presented until the participant said next"),
-    number_column("exposure_s", "s", "from the first pulse until the participant said next, at the last presentation"),
+    integer_column("shots", "shots presented until the participant said next", least=0, most=MOST_OFTEN),
+    seconds_column("exposure_s", "from the first pulse until the participant said next, at the last presentation"),
     EARLIER_EXPOSURE,
     *PRESENTATION,
 )

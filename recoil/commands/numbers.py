@@ -79,9 +79,11 @@ def bids(
     done = feature(folder, out or folder / "bids", free_text=free_text, track=tracked)
     for problem in done.left_out:
         say(f"recoil: left out: {problem}")
+    for remark in (*done.remarks, *done.begun):
+        say(f"recoil: {remark}")
     counts = f"participants: {done.participants}, runs: {sum(done.runs.values())}, files: {done.files}"
     show(done, f"BIDS data set: {done.out} ({counts})", as_json)
-    raise end(exceptions=bool(done.left_out))
+    raise end(exceptions=bool(done.left_out or done.remarks or done.begun))
 
 
 def audit(

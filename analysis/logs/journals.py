@@ -1,0 +1,150 @@
+"""The journals beside logs: whether a table is what its journal says, and the runs that have no table to read."""
+
+from __future__ import annotations
+
+import hashlib
+import re
+from collections.abc import Iterable
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Literal
+
+from analysis.logs.files import BadLogError, Problem
+from experiments.rebuild import table
+from experiments.record import journal, replay
+from experiments.record.journal import Contents, JournalError
+from experiments.record.tables import FILE_SUFFIX
+from experiments.session.history import answered
+
+RunKind = Literal["run", "practice", "set aside"]
+_NAME = re.compile(r"sub-([A-Za-z0-9]{1,32})_task-([a-z]+)(_practice)?_journal(\.aside-[0-9]+)?\.jsonl$")
+_TABLE = re.compile(rf"(_({'|'.join({*FILE_SUFFIX.values()})}))?\.[^.]*$")
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class RunFile:
+    """A run by the name of its journal: whose, of which experiment, in which folder."""
+
+    path: str
+    participant: str
+    experiment: str
+    kind: RunKind
+    study: str
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class BegunRun:
+    """A run that has no table and is not finished: how far it has come."""
+
+    file: RunFile
+    answered: int
+    planned: int
+
+    def __str__(self) -> str:
+        run = self.file
+        done = f"{self.answered} of {self.planned} trials" if self.planned else "nothing was acknowledged"
+        return (
+            f"{run.path}: participant {run.participant} has begun {run.experiment} and not finished it ({done}); go on "
+            f"with `recoil run ... --participant {run.participant} --resume`, or make a table of what is there with "
+            f"`recoil rebuild {run.path}`"
+        )
+
+
+def run_file(path: str, study: str) -> RunFile | None:
+    """The run whose journal has this name; `None` if it is that of no journal."""
+    found = _NAME.search(path)
+    if found is None:
+        return None
+    kind: RunKind = "practice" if found[3] else "set aside" if found[4] else "run"
+    return RunFile(path=path, participant=found[1], experiment=found[2], kind=kind, study=study)
+
+
+def journal_of(path: str) -> str:
+    """The journal that belongs beside a table; a journal itself."""
+    return path if path.endswith(journal.ENDING) else f"{_TABLE.sub('', path)}{journal.ENDING}"
+
+
+def without_table(runs: Iterable[RunFile], tables: Iterable[str]) -> list[RunFile]:
+    """The runs, neither practices nor set aside, whose table is not among these."""
+    there = {journal_of(path) for path in tables}
+    return [run for run in runs if run.kind == "run" and run.path not in there]
+
+
+def made_again(run: RunFile) -> bytes | BegunRun:
+    """The table of a finished run, made from its journal; how far one has come that is not. `BadLogError`: neither."""
+    try:
+        contents = journal.begun(Path(run.path))
+        if contents is None:
+            return BegunRun(file=run, answered=0, planned=0)
+        _refuse_other(run, contents)
+        if not contents.finished:
+            done = len(answered(replay.history(contents)))
+            return BegunRun(file=run, answered=done, planned=len(contents.plan.trials))
+        return table(contents)
+    except JournalError as error:
+        raise BadLogError(f"its table is missing, and the journal is no help: {_without(run.path, error)}") from error
+
+
+def _refuse_other(run: RunFile, contents: Contents) -> None:
+    plan = contents.plan
+    if (plan.participant_id, plan.experiment) != (run.participant, run.experiment):
+        raise JournalError(f"is of participant {plan.participant_id}, experiment {plan.experiment}; was it renamed?")
+
+
+def compared(path: str, content: bytes) -> str | None:
+    """What there is to say of the journal of a table; empty if all is well, `None` if there is no journal.
+
+    `BadLogError`: the table is not what the journal says.
+    """
+    where = journal_of(path)
+    if where == path:
+        return f"its table is missing, so it was made again from this journal; `recoil rebuild {path}` writes it"
+    try:
+        data = Path(where).read_bytes()
+    except FileNotFoundError:
+        return None
+    except OSError as error:
+        return f"its journal cannot be read ({error.strerror}), so nothing proves the table"
+    of_table, of_itself = journal.ending_of(data)
+    if of_table and of_table != hashlib.sha256(content).hexdigest():
+        raise BadLogError(f"edited since the run; `recoil rebuild {where}` gives the original")
+    return "" if of_itself else _compared_whole(where, content, data, finished=bool(of_table))
+
+
+def _compared_whole(where: str, content: bytes, data: bytes, *, finished: bool) -> str:
+    """The same of a journal that is not finished, or that was changed: every record is read."""
+    try:
+        contents = journal.contents_of(Path(where), data)
+        made = None if contents is None else table(contents)
+    except JournalError as error:
+        known = "the table is still the one of the finished run" if finished else "so nothing proves the table"
+        return f"its journal cannot be trusted, {known}: {_without(where, error)}"
+    if made != content:
+        raise BadLogError(
+            f"is not what its journal says: edited, or the run went on since; `recoil rebuild {where}` makes it anew"
+        )
+    return "its journal was changed and says the same as before" if finished else ""
+
+
+def _without(path: str, error: JournalError) -> str:
+    return str(error).removeprefix(f"{path}: ").splitlines()[0]
+
+
+def gone(logs: Iterable[tuple[str, str, bool]]) -> list[Problem]:
+    """Of each study's folder where some logs have a journal, those that have none. `logs`: folder, code, has one."""
+    by_study: dict[str, dict[bool, list[str]]] = {}
+    for study, code, proven in logs:
+        by_study.setdefault(study, {True: [], False: []})[proven].append(code)
+    return [
+        Problem(file=Path(study), line=None, column=None, message=_gone(there[False], sum(map(len, there.values()))))
+        for study, there in by_study.items()
+        if there[True] and there[False]
+    ]
+
+
+def _gone(codes: list[str], count: int) -> str:
+    shown = ", ".join(codes[:20]) + (f" and {len(codes) - 20} more" if len(codes) > 20 else "")
+    return (
+        f"{len(codes)} of {count} logs have no journal beside them, as the others have, so nothing proves them: "
+        f"{shown}; put the journals back"
+    )
