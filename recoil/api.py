@@ -90,14 +90,15 @@ def read_logs(*paths: str | Path) -> Logs:
     logs = reading(paths)
     if not logs.files:
         nothing = (f"{', '.join(map(str, paths))}: no logs of Recoil",)
-        raise ConfigError("\n".join(map(str, logs.problems or nothing)))
+        raise ConfigError("\n".join(map(str, (*logs.problems, *logs.begun) or nothing)))
     return logs
 
 
 def analyze(*paths: str | Path) -> StudyStatistics:
     """The statistics of all logs in files and folders; `to_frame()`, `to_dict()`, and a table in a notebook.
 
-    What was left out stands in `warnings`. `RecoilError` if there is nothing that can be used.
+    Who was left out stands in `excluded`, and what there is to say in `warnings`. `RecoilError` if there is nothing
+    that can be used.
 
     >>> from tempfile import TemporaryDirectory
     >>> with TemporaryDirectory() as folder:
@@ -108,12 +109,13 @@ def analyze(*paths: str | Path) -> StudyStatistics:
     """
     from dataclasses import replace
 
+    from analysis.summary.analyze import with_everybody
     from analysis.summary.summary import summarize
 
     logs = read_logs(*paths)
-    found = summarize(logs)
-    left_out = (f"left out: {problem}" for problem in logs.problems)
-    return replace(found, warnings=(*left_out, *found.warnings))
+    found = with_everybody(summarize(logs), logs)
+    left_out = (f"left out: {one}" for one in (*logs.problems, *logs.begun))
+    return replace(found, warnings=(*left_out, *map(str, logs.remarks), *found.warnings))
 
 
 def audit(paper: str | Path = "paper") -> Audited:

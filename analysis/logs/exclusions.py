@@ -24,8 +24,10 @@ where they have the columns; then participants.
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
+from pathlib import Path
 from typing import Annotated, Self
 
 import numpy as np
@@ -33,6 +35,7 @@ import pandas as pd
 from pydantic import Field, model_validator
 
 from analysis.logs.column_map import ShortText
+from analysis.logs.files import Problem, below, names_below
 from analysis.logs.reading import Logs
 from analysis.logs.texts import STUDY
 from analysis.stats.arrays import BoolArray
@@ -46,18 +49,17 @@ _MEASURES = {"direction": ("correct", "trials unanswered"), "preference": ("rati
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class LeftOut:
-    """A participant who is left out of an experiment, and why."""
+    """A participant who is left out of an experiment, why, by which rule, and what would take them in.
+
+    `file`: of whom no more is known than the log that cannot be read. What is not known is empty.
+    """
 
     experiment: str
     participant: str
     reason: str
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class LeftOutByRule(LeftOut):
-    """A participant whom a rule leaves out."""
-
-    rule: str
+    rule: str = ""
+    remedy: str = ""
+    file: str = ""
 
 
 def complete_rows(table: pd.DataFrame, experiment: str, methods: Sequence[str]) -> tuple[pd.DataFrame, list[LeftOut]]:
@@ -68,7 +70,8 @@ def complete_rows(table: pd.DataFrame, experiment: str, methods: Sequence[str]) 
     """
     reasons = _incomplete(table, experiment, methods)
     left_out = [
-        LeftOut(experiment=experiment, participant=code, reason=reason) for code, reason in sorted(reasons.items())
+        LeftOut(experiment=experiment, participant=code, reason=reason, rule=rule, remedy=remedy)
+        for code, (reason, rule, remedy) in sorted(reasons.items())
     ]
     return (rows_without(table, reasons) if reasons else table), left_out
 
@@ -85,23 +88,83 @@ def tidied(table: pd.DataFrame) -> pd.DataFrame:
     return table.assign(**{name: table[name].cat.remove_unused_categories() for name in categories})
 
 
-def _incomplete(table: pd.DataFrame, experiment: str, methods: Sequence[str]) -> dict[str, str]:
-    """Why participants are left out, by code."""
+_DROP = "`drop_unanswered = true` under [trials] in a file for --rules leaves out the trials, not the person"
+_RULES_OF = {
+    "direction": ("every trial is answered", _DROP),
+    "preference": (
+        "every method is rated",
+        "a test of all methods needs every rating; `drop_unanswered = true` under [trials] in a file for --rules keeps "
+        "whoever rated the method another time",
+    ),
+}
+_ABSENT = (
+    "everybody has every method",
+    "analyse those who have other methods apart: name their folders or files in a call of its own",
+)
+
+
+def _incomplete(table: pd.DataFrame, experiment: str, methods: Sequence[str]) -> dict[str, tuple[str, str, str]]:
+    """Why participants are left out, by which rule, and what to do, by code."""
     measure, noun = _MEASURES[experiment]
     codes = table["participant_id"].cat.categories.tolist()
     person, method = codes_of(table["participant_id"]), places_among(table["method"], methods)
     rows = np.bincount(person, minlength=len(codes))
     missing = np.bincount(person[table[measure].isna()], minlength=len(codes))
-    lacking = {codes[i]: f"{missing[i]} of {rows[i]} {noun}" for i in np.flatnonzero(missing)}
+    lacking = {codes[i]: (f"{missing[i]} of {rows[i]} {noun}", *_RULES_OF[experiment]) for i in np.flatnonzero(missing)}
     counted = slice(None) if is_rated(experiment) else np.asarray(table["direction"] == "forward")
     seen = np.zeros((len(codes), len(methods)), dtype=np.bool_)
     seen[person[counted], method[counted]] = True
     what = "no rating of" if is_rated(experiment) else "no forward trials with"
     absent = {
-        codes[i]: f"{what} {', '.join(name for name, there in zip(methods, seen[i], strict=True) if not there)}"
+        codes[i]: (
+            f"{what} {', '.join(name for name, there in zip(methods, seen[i], strict=True) if not there)}",
+            *_ABSENT,
+        )
         for i in np.flatnonzero(~seen.all(axis=1))
     }
     return absent | lacking
+
+
+FINISHED = "a run is finished"
+"""The rule that leaves out who has begun."""
+
+
+def left_out_by_files(logs: Logs) -> tuple[LeftOut, ...]:
+    """Whose logs could not be read, and whose runs are not finished. No path says on which machine."""
+    problems = logs.problems
+    names = names_below([*logs.files, *(one.file for one in problems), *(Path(run.file.path) for run in logs.begun)])
+    bad = (_by_problem(logs, one, names[one.file]) for one in problems)
+    begun = (
+        LeftOut(
+            experiment=run.file.experiment,
+            participant=logs.person(run.file.study, run.file.participant),
+            reason=f"the run has begun and is not finished: {run.far}",
+            rule=FINISHED,
+            remedy=run.remedy.replace(run.file.path, names[Path(run.file.path)].as_posix()),
+            file=names[Path(run.file.path)].as_posix(),
+        )
+        for run in logs.begun
+    )
+    return (*bad, *begun)
+
+
+_RULE = re.compile(r"\(rule: (.*)\)")
+_COMMAND = re.compile(r"`(recoil [^`]*)`")
+
+
+def _by_problem(logs: Logs, one: Problem, name: Path) -> LeftOut:
+    """A problem in the words of an exclusion: its rule and the command it names, if it does."""
+    said = below(one, name.parent)
+    rule, command = _RULE.search(said), _COMMAND.search(said)
+    correct = "correct it (DATA_DICTIONARY.md says what it may hold) and analyse again"
+    return LeftOut(
+        experiment=one.experiment,
+        participant=logs.person(one.study, one.participant) if one.participant else "",
+        reason=said,
+        rule=rule[1] if rule else "a log can be read and trusted",
+        remedy=f"`{command[1]}`" if command else correct,
+        file=name.as_posix(),
+    )
 
 
 def by_study(logs: Logs) -> dict[str, Logs]:
@@ -181,7 +244,7 @@ class ExclusionEffect:
     """
 
     logs: Logs
-    excluded: tuple[LeftOutByRule, ...]
+    excluded: tuple[LeftOut, ...]
     dropped: Mapping[str, Mapping[str, Mapping[str, int]]]
     trials: Mapping[str, KeptTrials]
     warnings: tuple[str, ...]
@@ -189,7 +252,7 @@ class ExclusionEffect:
 
 def apply_rules(logs: Logs, rules: Rules) -> ExclusionEffect:
     """Leave out what the rules say. A trial that several rules drop counts for the first of them."""
-    excluded: list[LeftOutByRule] = []
+    excluded: list[LeftOut] = []
     dropped: dict[str, dict[str, dict[str, int]]] = {}
     trials: dict[str, KeptTrials] = {}
     tables = {"direction": logs.trials, "preference": logs.ratings}
@@ -199,7 +262,13 @@ def apply_rules(logs: Logs, rules: Rules) -> ExclusionEffect:
             found = [*_reasons(table, kept, rules, experiment)]
             reasons = {code: (rule, reason) for code, rule, reason in reversed(found)}  # the first rule is told
             excluded += [
-                LeftOutByRule(experiment=experiment, participant=code, reason=reason, rule=rule)
+                LeftOut(
+                    experiment=experiment,
+                    participant=code,
+                    reason=reason,
+                    rule=rule,
+                    remedy=f"change or remove `{rule}` in the file given with --rules",
+                )
                 for code, (rule, reason) in sorted(reasons.items())
             ]
             tables[experiment] = rows_without(kept, reasons) if reasons else kept

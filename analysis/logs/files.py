@@ -25,7 +25,7 @@ class BadLogError(RecoilError):
         super().__init__(message)
         self.message, self.line, self.column = message, line, column
 
-    def of(self, file: Path, participant: str, experiment: str) -> Problem:
+    def of(self, file: Path, participant: str, experiment: str, study: str) -> Problem:
         """The same as it leaves the room: in which file, whose log it was, of which experiment."""
         return Problem(
             file=file,
@@ -34,6 +34,7 @@ class BadLogError(RecoilError):
             message=self.message,
             participant=participant,
             experiment=experiment,
+            study=study,
         )
 
 
@@ -44,7 +45,8 @@ _NO_FILE = "a link that leads to no file; fetch what it stands for (`git annex g
 class Problem:
     """A file, or somebody's part of it, that was left out or needs a word: the place, and why.
 
-    `participant` and `experiment` as far as they are known; a person is named where the file's name does not.
+    `participant`, `experiment` and `study` (its folder or name) as far as they are known; a person is named where the
+    file's name does not.
     """
 
     file: Path
@@ -53,6 +55,7 @@ class Problem:
     message: str
     participant: str = ""
     experiment: str = ""
+    study: str = ""
 
     def __str__(self) -> str:
         named = not self.participant or code_in_name(str(self.file)) == self.participant
@@ -118,6 +121,14 @@ def names_below(files: Iterable[Path]) -> dict[Path, Path]:
     folders = {file.absolute().parent for file in every}
     root = Path(os.path.commonpath(folders)) if folders else Path()
     return {file: file.absolute().relative_to(root) for file in every}
+
+
+def below(problem: Problem, shown: Path) -> str:
+    """A problem with its file's folder as it is shown: its remedy names the journal there as well."""
+    text, instead = str(problem), "" if shown == Path() else f"{shown.as_posix()}/"
+    for folder in (problem.file.parent.absolute(), problem.file.parent):
+        text = text.replace(f"{folder}{os.sep}", instead) if folder != Path() else text
+    return text
 
 
 def _name(path: str) -> str:

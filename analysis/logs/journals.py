@@ -40,14 +40,21 @@ class BegunRun:
     answered: int
     planned: int
 
+    @property
+    def far(self) -> str:
+        """How far it has come, in words."""
+        return f"{self.answered} of {self.planned} trials" if self.planned else "nothing was acknowledged"
+
+    @property
+    def remedy(self) -> str:
+        """How to go on, or to have a table of what is there."""
+        go_on = f"`recoil run ... --participant {self.file.participant} --resume`"
+        return f"go on with {go_on}, or make a table of what is there with `recoil rebuild {self.file.path}`"
+
     def __str__(self) -> str:
         run = self.file
-        done = f"{self.answered} of {self.planned} trials" if self.planned else "nothing was acknowledged"
-        return (
-            f"{run.path}: participant {run.participant} has begun {run.experiment} and not finished it ({done}); go on "
-            f"with `recoil run ... --participant {run.participant} --resume`, or make a table of what is there with "
-            f"`recoil rebuild {run.path}`"
-        )
+        what = f"participant {run.participant} has begun {run.experiment} and not finished it ({self.far})"
+        return f"{run.path}: {what}; {self.remedy}"
 
 
 def run_file(path: str, study: str) -> RunFile | None:
@@ -123,7 +130,9 @@ def _compared_whole(where: str, content: bytes, data: bytes, *, finished: bool) 
         raise BadLogError(
             f"is not what its journal says: edited, or the run went on since; `recoil rebuild {where}` makes it anew"
         )
-    return "its journal was changed and says the same as before" if finished else ""
+    if finished:
+        return "its journal was changed and says the same as before"
+    return "its run is not finished; the table holds what was answered so far, and `recoil run ... --resume` goes on"
 
 
 def _without(path: str, error: JournalError) -> str:

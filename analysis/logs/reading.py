@@ -50,14 +50,6 @@ Track = Callable[[Sequence[Path]], Iterable[Path]]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Joined:
-    """A participant of a register, and its folder."""
-
-    participant: str
-    study: str
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
 class Logs:
     """The rows of all good files, with the columns of `experiments.record.tables` and the study; empty cells are NA.
 
@@ -73,8 +65,15 @@ class Logs:
     begun: tuple[BegunRun, ...] = ()
     runs: tuple[RunFile, ...] = ()
     """Every run whose journal was found, practices and those set aside too."""
-    joined: tuple[Joined, ...] = ()
-    """Who stands in the registers of the folders that were read."""
+    joined: tuple[tuple[str, str], ...] = ()
+    """Folder and code of everyone in the registers of the folders that were read."""
+    names: Mapping[str, str] = field(default_factory=dict)
+    """Short names of the studies' folders."""
+
+    def person(self, study: str, code: str) -> str:
+        """What a participant is called in the tables."""
+        several = len(set(self.names.values())) > 1
+        return f"{self.names.get(study, Path(study).name)}/{code}" if several else code
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -126,13 +125,14 @@ class _Reading:
         for number, log in sorted(batch.logs.items()):
             one, mapped = files[number // _LOGS_A_FILE], batch.mapped.get(number)
             code = mapped.participant if mapped else code_in_name(one.path) or ""
+            study = (mapped and mapped.study) or one.study
             try:
                 if isinstance(log, BadLogError):
                     raise log
-                self.admit(number, one, log, (mapped and mapped.study) or one.study)
+                self.admit(number, one, log, study)
             except BadLogError as bad:
                 experiment = mapped.experiment if mapped else experiment_in_name(one.path)
-                self.problems.append(bad.of(one.file, code, experiment))
+                self.problems.append(bad.of(one.file, code, experiment, study))
             else:
                 if number in batch.journals:
                     self.note(one, log, batch.journals[number])
@@ -141,7 +141,7 @@ class _Reading:
         """What there is to say of the journal of a log that was admitted."""
         self.proven.append((one.study, log.code, said is not None))
         if said:
-            self.remarks.append(BadLogError(said).of(one.file, log.code, log.experiment))
+            self.remarks.append(BadLogError(said).of(one.file, log.code, log.experiment, one.study))
 
     def admit(self, number: int, one: _Waiting, log: Log, study: str) -> None:
         """Take a participant's log of an experiment. `BadLogError`: they are excluded, or have one already."""
@@ -204,9 +204,8 @@ def read_logs(paths: Iterable[str | Path], track: Track = iter, mapping: ColumnM
         remarks=tuple(reading.remarks),
         begun=tuple(begun),
         runs=tuple(runs),
-        joined=tuple(
-            Joined(participant=code, study=where) for where in reading.members for code in reading.members[where]
-        ),
+        joined=tuple((os.path.realpath(where), code) for where, codes in reading.members.items() for code in codes),
+        names={study: names.get(study, study) for study in reading.studies.values()},
     )
 
 
@@ -217,7 +216,7 @@ def _without_tables(reading: _Reading, runs: Sequence[RunFile]) -> tuple[dict[st
         try:
             found = made_again(run)
         except BadLogError as bad:
-            reading.problems.append(bad.of(Path(run.path), run.participant, run.experiment))
+            reading.problems.append(bad.of(Path(run.path), run.participant, run.experiment, run.study))
         else:
             if isinstance(found, BegunRun):
                 begun.append(found)
@@ -242,7 +241,7 @@ def _designed(
             reading.note(waiting, of_design, log.journal)
             logs[number * _LOGS_A_FILE] = log
         except BadLogError as bad:
-            reading.problems.append(bad.of(file, code_in_name(path) or "", experiment_in_name(path)))
+            reading.problems.append(bad.of(file, code_in_name(path) or "", experiment_in_name(path), study))
     return logs
 
 
@@ -257,7 +256,8 @@ def _by_design(reading: _Reading, logs: Mapping[int, DesignLog], studies: Mappin
                 f"was made with another design {log.design.design!r} than most logs of that name (its factors, order, "
                 "trial or questions differ); analyse it apart"
             )
-            reading.problems.append(BadLogError(message).of(file, log.code, log.design.design))
+            study = reading.studies[number]
+            reading.problems.append(BadLogError(message).of(file, log.code, log.design.design, study))
     return tuple(found)
 
 

@@ -3,19 +3,19 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
 from analysis.logs.column_map import ColumnMap
-from analysis.logs.exclusions import ExclusionEffect, Rules, apply_rules, by_study
-from analysis.logs.files import Problem
+from analysis.logs.exclusions import ExclusionEffect, Rules, apply_rules, by_study, left_out_by_files
 from analysis.logs.reading import Logs, Track, read_logs, refuse_nothing
 from analysis.paper.audit.page import predictions
 from analysis.paper.audit.run import audit, load_paper_file
 from analysis.paper.paper import Prediction, load_paper
 from analysis.summary import remarks_coding
 from analysis.summary.comparison import compare
+from analysis.summary.participation import exclusion_lines, participation
 from analysis.summary.results import RulesApplied, StudyStatistics
 from analysis.summary.sections.content import ReportData
 from analysis.summary.sections.sections import write_report
@@ -39,8 +39,10 @@ class Request:
     codebook: Path | None = None
 
 
-def analyze(request: Request, track: Track = iter) -> tuple[StudyStatistics, tuple[Problem, ...]]:
-    """Write statistics, tables and report of all usable logs; returns the statistics and what was left out.
+def analyze(request: Request, track: Track = iter) -> tuple[StudyStatistics, tuple[str, ...]]:
+    """Write statistics, tables and report of all usable logs; returns the statistics and what there is to say.
+
+    That is whose logs were left out, and what was used though something is to be said of it.
 
     `PlaceError` if there is no usable log at all, with every reason.
     """
@@ -58,11 +60,13 @@ def analyze(request: Request, track: Track = iter) -> tuple[StudyStatistics, tup
     coded = None if book is None else _coded(used, statistics, book)
     if coded is not None:
         statistics = replace(statistics, remarks=coded)
+    statistics = with_everybody(statistics, used)
     storage.make_folder(request.out)
     report = ReportData(
         title="Statistics of " + ", ".join(path.name or str(path) for path in request.paths),
         statistics=statistics,
         problems=logs.problems,
+        remarks=logs.remarks,
         comparison=None if published is None else compare(statistics, published, _predicted(request.paper)),
         files=logs.files,
         provenance=provenance() | _read_by(request.columns, mapping),
@@ -72,7 +76,22 @@ def analyze(request: Request, track: Track = iter) -> tuple[StudyStatistics, tup
     write_report(request.out, report)
     for name, content in result_tables(used, statistics.analysed).items():
         storage.write_whole(request.out / name, content)
-    return statistics, logs.problems
+    return statistics, tuple(_said(logs, statistics))
+
+
+def _said(logs: Logs, statistics: StudyStatistics) -> Iterator[str]:
+    yield from (f"left out: {problem}" for problem in logs.problems)
+    yield from (f"left out: {run}" for run in logs.begun)
+    yield from exclusion_lines(statistics.excluded)
+    yield from map(str, logs.remarks)
+
+
+def with_everybody(statistics: StudyStatistics, logs: Logs) -> StudyStatistics:
+    """The statistics with whose logs could not be read among the excluded, and who is in which analysis."""
+    excluded = (*statistics.excluded, *left_out_by_files(logs))
+    analysed = {name: found.participants.codes for name, found in statistics.analysed.items()}
+    analysed |= {one.design.design: tuple(map(str, one.table["participant_id"].unique())) for one in logs.designs}
+    return replace(statistics, excluded=excluded, participation=participation(logs, analysed, excluded))
 
 
 def _predicted(paper: Path | None) -> dict[str, Prediction]:

@@ -19,6 +19,7 @@ from analysis.stats.cells import ByParticipant
 from analysis.stats.diagnostics import EffectSize, Normality, Sphericity
 from analysis.stats.logit_model import Clustering, LogitModel
 from analysis.stats.paired import PairedT, SignedRanks
+from analysis.summary.participation import Participation
 from analysis.summary.remarks_coding import CodedRemarks
 from analysis.times.own_trials import ResponseTimes
 from analysis.times.speed_accuracy import NoSpeedAccuracy, SpeedAccuracy
@@ -383,6 +384,7 @@ class StudyStatistics(NotebookResult):
     preference: WithinStatistics | None = field(default=None, metadata=OPTIONAL)
     designs: Mapping[str, DesignSummary] = field(default_factory=dict, metadata=SPREAD)
     excluded: tuple[LeftOut, ...] = ()
+    participation: Participation | None = field(default=None, metadata=OPTIONAL)
     warnings: tuple[str, ...] = ()
     versions: Mapping[str, str] | None = field(default=None, metadata=OPTIONAL)
     studies: Mapping[str, StudyStatistics] | None = field(default=None, metadata=OPTIONAL)

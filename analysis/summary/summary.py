@@ -51,6 +51,7 @@ from analysis.summary.designs import origin_of, summarise
 from analysis.times.own_trials import INSTRUCTION, response_times, timed
 from analysis.times.speed_accuracy import speed_accuracy
 from device.words import DIRECTIONS
+from experiments.record.design_table import ANTICIPATION_S
 
 SCALES = {"direction": (0.0, 1.0), "preference": (0.0, 10.0)}
 """The least and the most that a score can be."""
@@ -75,10 +76,55 @@ def summarize(logs: Logs, *, trade: bool = True) -> results.StudyStatistics:
     direction, left_out = _direction(logs.trials, trade=trade) if len(logs.trials) else (None, [])
     preference, also_out = _preference(logs.ratings) if len(logs.ratings) else (None, [])
     designs = {one.design.design: summarise(one.design, one.table) for one in logs.designs}
+    lacking = (out for name, one in designs.items() for out in _lacking(name, one))
     found = results.StudyStatistics(
-        direction=direction, preference=preference, designs=designs, excluded=(*left_out, *also_out)
+        direction=direction, preference=preference, designs=designs, excluded=(*left_out, *also_out, *lacking)
     )
-    return replace(found, warnings=tuple(_warnings(found)), versions=statistics_versions())
+    said = (*_hasty(logs.trials), *_repeated(logs.ratings), *_warnings(found))
+    return replace(found, warnings=said, versions=statistics_versions())
+
+
+def _hasty(table: pd.DataFrame) -> Iterator[str]:
+    """Answers by the participant's own hand that came sooner than anybody reacts."""
+    if not len(table):
+        return
+    hasty = timed(table).by_own_hand & (table["response_time_s"].to_numpy(dtype=np.float64) < ANTICIPATION_S)
+    people = table["participant_id"][hasty].astype(str).value_counts(sort=False)
+    if hasty.any():
+        shown = ", ".join(f"{who} {count}" for who, count in sorted(people.items())[:_NAMED])
+        more = f" and {len(people) - _NAMED} others" if len(people) > _NAMED else ""
+        yield (
+            f"direction: {np.count_nonzero(hasty)} anticipations, answers within {ANTICIPATION_S:g} s of the onset "
+            f"({shown}{more}); they count, and `response_time_min_s = {ANTICIPATION_S:g}` under [trials] in a file for "
+            "--rules drops them"
+        )
+
+
+def _repeated(table: pd.DataFrame) -> Iterator[str]:
+    """Methods that somebody rated more than once: their mean counts."""
+    keys = table[["participant_id", "method"]].astype(str)
+    doubled = keys[keys.duplicated()].drop_duplicates().itertuples(index=False)
+    shown = [f"{who} {method}" for who, method in doubled]
+    if shown:
+        more = f" and {len(shown) - _NAMED} others" if len(shown) > _NAMED else ""
+        yield f"preference: rated more than once, so that the mean counts: {', '.join(shown[:_NAMED])}{more}"
+
+
+_NAMED = 20
+"""So many people are named in a sentence."""
+
+
+def _lacking(name: str, design: results.DesignSummary) -> Iterator[LeftOut]:
+    """Who is in no test of some question of a design."""
+    for question, found in design.questions.items():
+        for who in found.left_out:
+            yield LeftOut(
+                experiment=name,
+                participant=who,
+                reason=f"{question}: no answer in some condition, so in no test of it",
+                rule="a test takes who answered in every condition",
+                remedy="none here; means, counts and the other questions count them",
+            )
 
 
 def statistics_versions() -> dict[str, str]:

@@ -56,11 +56,11 @@ def analyze(
     from analysis.summary import analyze as feature
 
     asked = feature.Request(paths=paths, out=out, paper=paper, columns=columns, rules=rules, codebook=codebook)
-    statistics, problems = feature.analyze(asked, tracked)
-    for problem in problems:
-        say(f"recoil: left out: {problem}")
+    statistics, said = feature.analyze(asked, tracked)
+    for line in said:
+        say(f"recoil: {line}")
     show(statistics, f"Report: {out / 'report.html'}", as_json)
-    raise end(exceptions=bool(problems or statistics.excluded))
+    raise end(exceptions=bool(said))
 
 
 def bids(

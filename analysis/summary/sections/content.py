@@ -174,13 +174,14 @@ EXPERIMENTS = {"direction": "direction recognition", "preference": "preference"}
 class ReportData:
     """What a report tells. `comparison` is None without a paper.
 
-    `files` are the logs used; `provenance` is label -> text; `notes` are the assumptions behind the numbers; `extra`
-    are finished sections that follow the statistics.
+    `files` are the logs used, `remarks` what there is to say of some; `provenance` is label -> text; `notes` are the
+    assumptions behind the numbers; `extra` are finished sections that follow the statistics.
     """
 
     title: str
     statistics: StudyStatistics
     problems: tuple[Problem, ...] = ()
+    remarks: tuple[Problem, ...] = ()
     comparison: tuple[ComparisonRow, ...] | None = None
     odds: tuple[PatternOdds, ...] = ()
     panels: tuple[ShotPanel, ...] = ()

@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-import os
 from collections import Counter
 from pathlib import Path
 
-from analysis.logs.files import Problem, names_below
+from analysis.logs.exclusions import FINISHED
+from analysis.logs.files import below, names_below
 from analysis.paper.paper import AUDITED, ComparisonRow
 from analysis.paper.recurrence import PatternOdds
 from analysis.report import apa
@@ -18,6 +18,7 @@ from analysis.summary.results import DirectionStatistics, Origin
 from analysis.summary.sections.content import EXPERIMENTS, ReportData, results_picture, shot_picture, write_figures
 from analysis.summary.sections.designs import design_section
 from analysis.summary.sections.experiments import direction_section, preference_section
+from analysis.summary.sections.people import people_section
 from analysis.summary.sections.supplement import supplement_sections
 from analysis.summary.sections.trade import trade_section
 
@@ -39,6 +40,7 @@ def sections(report: ReportData) -> tuple[Section, ...]:
     direction, preference = (statistics.analysed.get(name) for name in EXPERIMENTS)
     found = [
         _analysed(report),
+        people_section(report.statistics.participation),
         Section(title="Results at a glance", pictures=(results_picture(statistics),)) if statistics.analysed else None,
         _verdicts(report.comparison) if report.comparison else None,
         *(
@@ -59,7 +61,7 @@ def sections(report: ReportData) -> tuple[Section, ...]:
 
 
 def _analysed(report: ReportData) -> Section:
-    gone = Counter(entry.experiment for entry in report.statistics.excluded)
+    gone = Counter(entry.experiment for entry in report.statistics.excluded if not entry.file)
     rows = tuple(
         (name.capitalize(), f"{found.n:,}", f"{gone[key]:,}")
         for key, name in EXPERIMENTS.items()
@@ -177,26 +179,26 @@ def _odds(odds: tuple[PatternOdds, ...]) -> Section:
 
 def _left_out(report: ReportData) -> Section | None:
     excluded = tuple(
-        f"Participant {entry.participant} in {EXPERIMENTS.get(entry.experiment, entry.experiment)}: {entry.reason}."
+        f"Participant {entry.participant} in {EXPERIMENTS.get(entry.experiment, entry.experiment)}: {entry.reason}. "
+        f"Rule: {entry.rule}; remedy: {entry.remedy}."
         for entry in report.statistics.excluded
+        if not entry.file or entry.rule == FINISHED
     )
     names = _short_names(report)
-    problems = tuple(_without_folder(problem, names[problem.file].parent) for problem in report.problems)
+    problems = tuple(below(problem, names[problem.file].parent) for problem in report.problems)
+    remarks = tuple(f"Used, but: {below(remark, names[remark.file].parent)}." for remark in report.remarks)
     warnings = tuple(f"Warning: {warning}." for warning in report.statistics.warnings)
-    items = (*shortened(excluded, "exclusions"), *shortened(problems, "problems"), *shortened(warnings, "warnings"))
+    items = (
+        *shortened(excluded, "exclusions"),
+        *shortened(problems, "problems"),
+        *shortened(remarks, "remarks"),
+        *shortened(warnings, "warnings"),
+    )
     return Section(title="Exclusions and problems", items=items) if items else None
 
 
-def _without_folder(problem: Problem, shown: Path) -> str:
-    """A problem with its file's folder as it is shown: its remedy names the journal there as well."""
-    text, instead = str(problem), "" if shown == Path() else f"{shown.as_posix()}/"
-    for folder in (problem.file.parent.absolute(), problem.file.parent):
-        text = text.replace(f"{folder}{os.sep}", instead) if folder != Path() else text
-    return text
-
-
 def _short_names(report: ReportData) -> dict[Path, Path]:
-    return names_below([*report.files, *(problem.file for problem in report.problems)])
+    return names_below([*report.files, *(one.file for one in (*report.problems, *report.remarks))])
 
 
 def _provenance(report: ReportData) -> Section | None:

@@ -1,0 +1,105 @@
+"""Who is in which analysis: everybody that the logs, journals and registers know, in every experiment."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
+from itertools import groupby
+
+from analysis.logs.exclusions import LeftOut
+from analysis.logs.reading import Logs
+from experiments.study.study import by_code
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class PeopleOfExperiment:
+    """How many people are in the analysis of an experiment, and how many are not, by the reason.
+
+    `begun`: not finished; `not_done`: known from elsewhere. `practices` and `set_aside` count runs, which are not data.
+    """
+
+    analysed: int
+    left_out: int
+    begun: int
+    not_done: int
+    practices: int = 0
+    set_aside: int = 0
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class PersonInExperiment:
+    """Who is not in the analysis of an experiment, and why."""
+
+    participant: str
+    experiment: str
+    state: str
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Participation:
+    """Who is in which analysis: counts of every experiment, and everybody who is not in all of them."""
+
+    experiments: Mapping[str, PeopleOfExperiment] = field(default_factory=dict)
+    absent: tuple[PersonInExperiment, ...] = ()
+
+
+def participation(logs: Logs, analysed: Mapping[str, Iterable[str]], excluded: Sequence[LeftOut]) -> Participation:
+    """Look at everybody. `analysed`: by experiment, who is in its tests; `excluded`: who is not, and why."""
+    within = {name: set(people) for name, people in analysed.items()}
+    why = {(one.participant, one.experiment): one for one in reversed(excluded) if one.participant and one.experiment}
+    begun = {(logs.person(run.file.study, run.file.participant), run.file.experiment): run for run in logs.begun}
+    runs = [(logs.person(run.study, run.participant), run) for run in logs.runs]
+    joined = {logs.person(study, code) for study, code in logs.joined}
+    people = set().union(joined, *within.values(), (who for who, _ in why), (who for who, _ in begun))
+    people |= {who for who, _ in runs}
+    names = list(dict.fromkeys([*within, *(name for _, name in why), *(run.experiment for _, run in runs)]))
+
+    def state(who: str, experiment: str) -> str:
+        if who in within.get(experiment, ()):
+            return ""
+        if (who, experiment) in begun:
+            return f"begun: {begun[who, experiment].far}"
+        if (who, experiment) in why:
+            return f"left out: {why[who, experiment].reason}"
+        return "not done"
+
+    order = sorted(people, key=by_code)
+    absent = tuple(
+        PersonInExperiment(participant=who, experiment=name, state=said)
+        for who in order
+        for name in names
+        if (said := state(who, name))
+    )
+    kinds = Counter((run.experiment, run.kind) for _, run in runs)
+    counts = Counter((one.experiment, one.state.partition(":")[0]) for one in absent)
+    return Participation(
+        experiments={
+            name: PeopleOfExperiment(
+                analysed=len(within.get(name, ())),
+                left_out=counts[name, "left out"],
+                begun=counts[name, "begun"],
+                not_done=counts[name, "not done"],
+                practices=kinds[name, "practice"],
+                set_aside=kinds[name, "set aside"],
+            )
+            for name in names
+        },
+        absent=absent,
+    )
+
+
+def exclusion_lines(excluded: Iterable[LeftOut]) -> Iterator[str]:
+    """Who is left out by what their answers are, for a terminal: a line a rule, with everybody and what to do.
+
+    What could not be read is told by itself.
+    """
+    told = sorted((one for one in excluded if not one.file), key=_rule)
+    for (experiment, rule, remedy), some in groupby(told, key=_rule):
+        people = [f"{one.participant} ({one.reason})" for one in some]
+        count = f"{len(people)} participant{'' if len(people) == 1 else 's'}"
+        yield f"left out of {experiment}: {count} (rule: {rule}): {', '.join(people)}; {remedy}"
+
+
+def _rule(one: LeftOut) -> tuple[str, str, str]:
+    return one.experiment, one.rule, one.remedy
