@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 import json
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
 from experiments.config.setup import canonical_json, sha256
 from experiments.design.plan import Plan
+from experiments.record.journal import link_of
 
 
 def raw(path: Path) -> list[dict[str, Any]]:
@@ -22,3 +24,12 @@ def write_head(path: Path, plan: Plan) -> None:
     hashes = {f"{name}_sha256": sha256(part) for name, part in parts.items()}
     times = {"utc": "2026-01-01T00:00:00Z", "monotonic_s": 0.0, "clock": "real"}
     path.write_bytes(canonical_json({"n": 0, "kind": "run", "link": "", **times, **parts, **hashes}) + b"\n")
+
+
+def forged(entries: Sequence[dict[str, Any]]) -> bytes:
+    """Records as lines whose numbers and links are right, whatever they say."""
+    lines: list[bytes] = []
+    for n, entry in enumerate(entries):
+        before = link_of(lines[-1]) if lines else ""
+        lines.append(canonical_json(entry | {"n": n, "link": before}) + b"\n")
+    return b"".join(lines)

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from analysis.logs.exclusions import ExclusionEffect, KeptTrials, LeftOutByRule, Rules, apply_rules
+from analysis.logs.exclusions import ExclusionEffect, KeptTrials, Rules, apply_rules
 from analysis.logs.reading import Logs, read_logs
 from analysis.summary.summary import summarize
 from experiments.config.door import ConfigError, load
@@ -64,9 +64,9 @@ def test_statistics_are_over_the_trials_and_people_that_are_kept(effect: Exclusi
 
 def test_who_says_always_the_same_is_left_out_with_rule_and_reason(effect: ExclusionEffect) -> None:
     reason = "1 of the answers are the same (rule: at most 0.95)"
-    assert effect.excluded == (
-        LeftOutByRule(experiment="direction", participant="P03", reason=reason, rule="max_same_response_share"),
-    )
+    (found,) = effect.excluded
+    assert (found.experiment, found.participant, found.reason) == ("direction", "P03", reason)
+    assert (found.rule, found.remedy.split("`")[1]) == ("max_same_response_share", "max_same_response_share")
 
 
 def test_participants_need_a_share_of_their_trials_and_of_correct_answers(tmp_path: Path) -> None:

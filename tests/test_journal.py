@@ -13,7 +13,7 @@ import pytest
 from experiments.clock import VirtualClock
 from experiments.config.setup import sha256
 from experiments.record import storage
-from experiments.record.journal import Journal, JournalError, head, read_journal
+from experiments.record.journal import ENDING, Journal, JournalError, head, read_journal
 
 PARTS = {"plan": {"trials": [1, 2]}, "setup": {"title": "é – 20 °C"}}
 HEAD = PARTS | {f"{name}_sha256": sha256(part) for name, part in PARTS.items()}
@@ -161,7 +161,7 @@ with Journal.reopen(contents, VirtualClock()) as journal:
 
 @pytest.mark.slow
 def test_a_journal_cut_at_any_byte_is_read_to_its_last_whole_record(path: Path) -> None:
-    data, cut = path.read_bytes(), path.with_name("cut")
+    data, cut = path.read_bytes(), path.with_name(f"cut{ENDING}")
     ends = [n + 1 for n, byte in enumerate(data) if byte == 0x0A]
     for length in range(len(data) + 1):
         cut.write_bytes(data[:length])

@@ -110,11 +110,12 @@ def test_participants_who_miss_an_answer_or_a_method_are_left_out_and_listed(tmp
     write_rows(ratings_path(tmp_path, "P04"), ratings)
     found = summarize(read_logs([tmp_path])).to_dict()
     assert (found["direction"]["n"], found["preference"]["n"]) == (3, 4)
-    assert found["excluded"] == [
-        {"experiment": "direction", "participant": "P02", "reason": "1 of 60 trials unanswered"},
-        {"experiment": "direction", "participant": "P03", "reason": "no forward trials with asymmetric-2"},
-        {"experiment": "preference", "participant": "P04", "reason": "1 of 3 ratings missing"},
+    assert [tuple(one.values())[:4] for one in found["excluded"]] == [
+        ("direction", "P02", "1 of 60 trials unanswered", "every trial is answered"),
+        ("direction", "P03", "no forward trials with asymmetric-2", "everybody has every method"),
+        ("preference", "P04", "1 of 3 ratings missing", "every method is rated"),
     ]
+    assert all("drop_unanswered" in one["remedy"] for one in found["excluded"][::2])
 
 
 @pytest.mark.parametrize("participants", [0, 1])

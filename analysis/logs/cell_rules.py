@@ -30,7 +30,7 @@ def experiment_of(header: Sequence[str]) -> str:
     experiment = max(shared, key=lambda name: shared[name])
     if shared[experiment] < 4:
         raise BadLogError(
-            f"the header {shown(','.join(header))} is neither a trials nor a ratings table of Recoil "
+            f"the header {quoted(','.join(header))} is neither a trials nor a ratings table of Recoil "
             "(a log of another experiment or program, or not comma-separated)",
             1,
         )
@@ -49,13 +49,13 @@ def cell_fault(column: Column, text: str) -> str:
     if text == tables.MISSING:
         return "the cell is empty (rule: a value is required)" if column.required else ""
     if column.type == "integer" and not _INTEGER.fullmatch(text):
-        return f"{shown(text)} is not a whole number of at most 15 digits"
+        return f"{quoted(text)} is not a whole number of at most 15 digits"
     if column.type == "number" and not (_NUMBER.fullmatch(text) and math.isfinite(float(text))):
-        return f"{shown(text)} is not a finite number with a decimal point"
+        return f"{quoted(text)} is not a finite number with a decimal point"
     if column.type in ("integer", "number"):
         return _number_fault(column, text)
     if column.levels and text not in column.levels:
-        return f"{shown(text)} is not allowed (rule: one of {', '.join(column.levels)})"
+        return f"{quoted(text)} is not allowed (rule: one of {', '.join(column.levels)})"
     return ""
 
 
@@ -83,7 +83,7 @@ def cell_value(column: Column, text: str) -> Cell:
     return tables.unguard(text) if column.type == "text" else text
 
 
-def shown(text: str) -> str:
+def quoted(text: str) -> str:
     """A text in quotes, cut to what fits into a message."""
     return repr(_cut(text))
 
@@ -104,16 +104,16 @@ def all_alike(count: int, time_s: float) -> str:
 
 def no_date(text: str) -> str:
     """What is said of an onset that is none."""
-    return f"{shown(text)} is no date and time (rule: date and time by ISO 8601, as 2026-11-21T09:00:00Z)"
+    return f"{quoted(text)} is no date and time (rule: date and time by ISO 8601, as 2026-11-21T09:00:00Z)"
 
 
 def too_early(text: str) -> str:
     """What is said of an onset that goes back."""
     rule = f"(rule: later, unless the flag {CLOCK_SET_BACK} says that the clock was set back)"
-    return f"{shown(text)} is earlier than the onset before it {rule}"
+    return f"{quoted(text)} is earlier than the onset before it {rule}"
 
 
-def moments(cells: Texts) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+def onset_moments(cells: Texts) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
     """Dates and times (ISO 8601, UTC unless they say otherwise) in µs since 1970, -1 for none; and odd rows."""
     try:
         found = cells.cast(pa.timestamp("us", "UTC")).cast(pa.int64())

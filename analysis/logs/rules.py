@@ -21,9 +21,9 @@ from analysis.logs.cell_rules import (
     cell_fault,
     cell_value,
     experiment_of,
-    moments,
     no_date,
-    shown,
+    onset_moments,
+    quoted,
     too_early,
 )
 from analysis.logs.files import BadLogError
@@ -230,9 +230,9 @@ def _say_participant(table: _Table, names: Mapping[int, str | None], row: int) -
     place, rows = table.log(row)
     code, own = (str(table.value("participant_id", one)) for one in (row, rows.start))
     if code != own:
-        message = f"{shown(code)} after {own!r} (rule: one participant a file)"
+        message = f"{quoted(code)} after {own!r} (rule: one participant a file)"
     elif not _CODE.fullmatch(code):
-        message = f"{shown(code)} is not a code (rule: 1 to 32 letters or digits)"
+        message = f"{quoted(code)} is not a code (rule: 1 to 32 letters or digits)"
     else:
         rule = f"sub-{names[table.texts.logs[place]]} (rule: one participant a file, the one in its name)"
         message = f"participant {code!r}, but the file is named {rule}"
@@ -337,7 +337,7 @@ def _miscount(table: _Table, column: str, numbers: Iterable[int], rows: Sequence
             return table.fault(f"{column} {number} stands twice in {where} (rule: 1, 2, 3, ... once each)", row, column)
         seen.add(number)
     missing = next(number for number in range(1, len(rows) + 1) if number not in seen)
-    rule = f"(rule: 1, 2, 3, ... without a gap; found {shown(', '.join(map(str, sorted(seen))))})"
+    rule = f"(rule: 1, 2, 3, ... without a gap; found {quoted(', '.join(map(str, sorted(seen))))})"
     return table.fault(f"{column} {missing} is missing in {where} {rule}", rows[-1], column)
 
 
@@ -384,7 +384,7 @@ def _in_order(table: _Table, found: _Sessions, *, own: bool) -> _LogRule:
 
 def _onsets(table: _Table) -> Iterator[_LogRule]:
     """Onsets are dates and times, and do not go back but where the log says that the clock was set back."""
-    found, none = moments(table.texts.column("onset_utc"))
+    found, none = onset_moments(table.texts.column("onset_utc"))
     rows = np.flatnonzero(found >= 0)
     log = table.logs(rows)
     earlier = rows[1:][(np.diff(found[rows]) < 0) & (np.diff(log) == 0)]

@@ -47,7 +47,7 @@ def level_column(name: str, levels: tuple[str, ...], description: str, *, requir
     return Column(name=name, type="level", levels=levels, description=description, required=required)
 
 
-LONGEST_S = 86_400.0
+LONGEST_TIME_S = 86_400.0
 """A day: nobody feels, or thinks, for longer (assumed)."""
 MOST_OFTEN = 100_000
 """No stimulus is repeated, and no train goes on, for more presentations or shots than this (assumed)."""
@@ -72,7 +72,7 @@ def bounded_column(name: str, description: str, least: float, most: float, grain
 
 def seconds_column(name: str, description: str) -> Column:
     """A column of durations: none is negative."""
-    return Column(name=name, type="number", unit="s", description=description, least=0.0, most=LONGEST_S)
+    return Column(name=name, type="number", unit="s", description=description, least=0.0, most=LONGEST_TIME_S)
 
 
 def text_column(name: str, description: str, *, required: bool = False) -> Column:
