@@ -90,7 +90,7 @@ class Train:
         return steps.Interrupted(presented=True, cause="pause", shots=self.shots, exposure_s=self._exposure_s())
 
     def _exposure_s(self) -> float:
-        return self._live.clock.now() - self._onset_s
+        return round(self._live.clock.now() - self._onset_s, 6)
 
 
 def disarm(gun: Gun) -> None:

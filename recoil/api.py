@@ -94,11 +94,11 @@ def read_logs(*paths: str | Path) -> Logs:
     return logs
 
 
-def analyze(*paths: str | Path) -> StudyStatistics:
+def analyze(*paths: str | Path, fits: bool = False) -> StudyStatistics:
     """The statistics of all logs in files and folders; `to_frame()`, `to_dict()`, and a table in a notebook.
 
-    Who was left out stands in `excluded`, and what there is to say in `warnings`. `RecoilError` if there is nothing
-    that can be used.
+    `fits`: with the diffusion model fitted. Who was left out stands in `excluded`, and what there is to say in
+    `warnings`. `RecoilError` if there is nothing that can be used.
 
     >>> from tempfile import TemporaryDirectory
     >>> with TemporaryDirectory() as folder:
@@ -113,7 +113,7 @@ def analyze(*paths: str | Path) -> StudyStatistics:
     from analysis.summary.summary import summarize
 
     logs = read_logs(*paths)
-    found = with_everybody(summarize(logs), logs)
+    found = with_everybody(summarize(logs, fits=fits), logs)
     left_out = (f"left out: {one}" for one in (*logs.problems, *logs.begun))
     return replace(found, warnings=(*left_out, *map(str, logs.remarks), *found.warnings))
 

@@ -1,5 +1,6 @@
 from __future__ import annotations
 
+import html
 import json
 import re
 from dataclasses import replace
@@ -68,15 +69,15 @@ def pictures_alone(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(style, "save", saved_as("png"))
 
 
-def _text(html: str) -> str:
+def _text(page: str) -> str:
     """What a reader sees, in one line."""
-    body = re.sub(r"<style>.*?</style>", "", html, flags=re.DOTALL)
+    body = re.sub(r"<style>.*?</style>", "", page, flags=re.DOTALL)
     return " ".join(re.sub(r"<[^>]+>", " ", body).split())
 
 
 def test_everything_that_the_contract_names_is_written(full: Path) -> None:
     names = sorted(str(path.relative_to(full)) for path in full.rglob("*") if path.is_file())
-    stems = ("5", "8", "conditional-accuracy", "directions", "quantile-probability", "response-times")
+    stems = ("conditional-accuracy", "directions", "quantile-probability", "response-times", "results", "shot")
     figures = [f"figures/figure-{stem}.{kind}" for stem in stems for kind in ("pdf", "png", "svg")]
     assert names == [*figures, "report.html", "report.md", "statistics.json"]
 
@@ -84,19 +85,21 @@ def test_everything_that_the_contract_names_is_written(full: Path) -> None:
 @pytest.mark.parametrize(
     "words",
     [
-        "28 log files were read",
+        "Participants, answers and trials of 28 log files",
         "Vibration",
         "percentage points, 95 % CI [",
         "partial η² = .",
-        "Response times: 840 valid ones.",
-        "Means (SD) of the correct rate on forward shots over 14 synthetic participants: Vibration",
-        "The CI is within-subject (Cousineau–Morey)",
+        "There are 840 valid response times.",
+        "Means (SD) of the correct rate on forward shots, 14 synthetic participants: Vibration",
+        "SYNTHETIC DATA: simulated participants answered.",
+        "Planned comparisons (Tukey&#39;s HSD): Asymmetric Force I was above Vibration, p",
+        "The 95 % CI is within-subject (Cousineau–Morey)",
         "pooled error term of the repeated-measures ANOVA",
         "ignores that trials come in people",
         "One replication is luck",
         "33.0 % [24.6, 42.7]",
         "Assumed: no spread.",
-        "Participant P15 in direction recognition: 3 of 60 trials unanswered.",
+        "Direction recognition: 1 participant left out: P15 (3 of 60 trials unanswered).",
         "line 7, column response: &#39;left&#39; is not allowed",
         "The coil is shorted after the pulse.",
         "28.45",
@@ -114,21 +117,23 @@ def test_F_is_written_in_the_style_of_the_apa(full: Path) -> None:
 
 
 def test_the_html_stands_alone(full: Path) -> None:
-    html = (full / "report.html").read_text(encoding="utf-8")
-    assert "<script" not in html
-    addresses = re.findall(r'(?:src|href)="([^"]*)"', html)
-    assert all(address.startswith(("data:image/png;base64,", "#")) for address in addresses)
-    assert "url(" not in html
-    assert "@import" not in html
-    assert len(re.findall(r'<img [^>]*alt="[^"]{40,}"', html)) == 6
+    page = (full / "report.html").read_text(encoding="utf-8")
+    assert "<script" not in page
+    addresses = re.findall(r'(?:src|href)="([^"]*)"', page)
+    beside = [address for address in addresses if not address.startswith(("data:image/png;base64,", "#"))]
+    assert beside == ["statistics.json"]
+    assert (full / "statistics.json").is_file()
+    assert "url(" not in page
+    assert "@import" not in page
+    assert len(re.findall(r'<img [^>]*alt="[^"]{40,}"', page)) == 6
     for words in ("prefers-color-scheme: dark", "@media print", 'name="viewport"', 'class="scroll'):
-        assert words in html
+        assert words in page
 
 
 def test_what_was_typed_is_never_markup(full: Path) -> None:
-    html = (full / "report.html").read_text(encoding="utf-8")
-    assert "<title>Recoil &amp; co: a &lt;study&gt;</title>" in html
-    assert "sub-&lt;b&gt;_trials.csv" in html
+    page = (full / "report.html").read_text(encoding="utf-8")
+    assert "<title>Recoil &amp; co: a &lt;study&gt;</title>" in page
+    assert "sub-&lt;b&gt;_trials.csv" in page
 
 
 def test_the_markdown_links_its_figures_and_keeps_its_tables_whole(full: Path) -> None:
@@ -162,7 +167,12 @@ def test_the_same_report_is_the_same_bytes_without_dates_and_versions(
 
 
 def _titles(out: Path) -> list[str]:
-    return re.findall(r"<h2>(.*?)</h2>", (out / "report.html").read_text(encoding="utf-8"))
+    """Of all sections, those of the appendix last."""
+    text = html.unescape((out / "report.html").read_text(encoding="utf-8"))
+    return re.findall(r"<h[23]>(.*?)</h[23]>", text)
+
+
+_ENDS = ("Provenance and assumptions",)
 
 
 @pytest.mark.usefixtures("pictures_alone")
@@ -171,10 +181,9 @@ def test_sections_without_data_are_left_out(tmp_path: Path) -> None:
     logs = read_logs(sorted((tmp_path / "study").rglob("*_ratings.csv")))
     write_report(tmp_path / "out", ReportData(title="Ratings", statistics=summarize(logs)))
     titles = _titles(tmp_path / "out")
-    assert titles[:3] == ["What was analysed", "Results at a glance", "Preference"]
-    assert titles[-1] == "Provenance and assumptions"
-    assert not [title for title in titles if re.search("[Dd]irection|shot|[Pp]ublished", title)]
-    assert {path.stem for path in (tmp_path / "out" / "figures").iterdir()} == {"figure-8"}
+    further = ("Data quality", "Preference: further statistics", "Every participant's values")
+    assert titles == ["Who was analysed", "Results", "Preference", "For your paper", *further, *_ENDS]
+    assert {path.stem for path in (tmp_path / "out" / "figures").iterdir()} == {"figure-results"}
 
 
 def test_a_report_of_nothing_says_so(tmp_path: Path) -> None:
@@ -189,8 +198,9 @@ def test_one_participant_gets_means_and_no_tests(tmp_path: Path) -> None:
     statistics = summarize(read_logs([write_study(tmp_path / "study", participants=1)]))
     write_report(tmp_path / "out", ReportData(title="One", statistics=statistics))
     text = (tmp_path / "out" / "report.md").read_text(encoding="utf-8")
-    assert "There are too few participants or methods for a test." in text
-    assert "(–)" in text
+    assert "There were too few participants or methods for a test." in text
+    assert "> **ONE PARTICIPANT in direction recognition and preference: " in text
+    assert "(SD)" not in text.split("## Results")[1].split("## Direction")[0]
 
 
 @pytest.mark.usefixtures("pictures_alone")
@@ -203,8 +213,8 @@ def test_files_are_named_below_their_common_folder_not_by_the_machine(tmp_path: 
     write_report(tmp_path / "out", data)
     text = (tmp_path / "out" / "report.md").read_text(encoding="utf-8")
     assert str(tmp_path) not in text
-    assert "| log file | sub-P01/sub-P01_task-direction_trials.csv |" in text
-    assert "- sub-P03_task-direction_trials.csv: is empty" in text
+    assert "\n- sub-P01/sub-P01_task-direction_trials.csv\n" in text
+    assert "\n- Left out: sub-P03_task-direction_trials.csv: is empty" in text
 
 
 def test_no_p_is_zero_and_none_has_a_leading_zero_in_the_sentences(full: Path) -> None:
@@ -214,12 +224,12 @@ def test_no_p_is_zero_and_none_has_a_leading_zero_in_the_sentences(full: Path) -
 
 
 def test_figures_and_tables_are_numbered_from_one(full: Path) -> None:
-    for name, mark in (("report.md", r"\*\*{} (\d+)\.\*\*"), ("report.html", r"<b>{} (\d+)\.</b>")):
+    """Those of the appendix apart: A1, A2, ..."""
+    for name, mark in (("report.md", r"\*\*{} {}(\d+)\.\*\*"), ("report.html", r"<b>{} {}(\d+)\.</b>")):
         text = (full / name).read_text(encoding="utf-8")
-        for kind, least in (("Figure", 4), ("Table", 9)):
-            numbers = [int(number) for number in re.findall(mark.format(kind), text)]
-            assert numbers == list(range(1, len(numbers) + 1))
-            assert len(numbers) >= least
+        for kind, letter, count in (("Figure", "", 5), ("Figure", "A", 1), ("Table", "", 12), ("Table", "A", 8)):
+            numbers = [int(number) for number in re.findall(mark.format(kind, letter), text)]
+            assert numbers == list(range(1, count + 1)), (name, kind, letter)
 
 
 @pytest.mark.usefixtures("pictures_alone")
@@ -269,8 +279,9 @@ def test_a_report_of_two_thousand_stays_short(
     for words in (
         "the first 50 of 2,000; everybody is in direction_wide.csv",
         "the first 50 of 2,000; everybody is in preference_wide.csv",
-        "| log files | and 1,950 more |",
-        "- and 1,950 more problems",
+        "\n- and 1,950 more log files\n",
+        "\n- and 1,988 more, listed in the appendix\n",
+        "\n- and 1,950 more left out\n",
         "2,000 synthetic participants",
     ):
         assert words in text

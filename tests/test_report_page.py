@@ -37,8 +37,10 @@ def browse(page: Path, folder: Path, *words: str) -> str:
     return done.stdout
 
 
-def test_the_page_names_nothing_outside_itself(page: Path) -> None:
-    assert not re.search(r"""(src|href)=["'](?!data:|#)""", page.read_text(encoding="utf-8"))
+def test_the_page_names_nothing_but_itself_and_the_files_beside_it(page: Path) -> None:
+    named = re.findall(r"""(?:src|href)=["'](?!data:|#)([^"']*)""", page.read_text(encoding="utf-8"))
+    assert named == ["statistics.json", "reconstructed_direction.csv", "reconstructed_preference.csv"]
+    assert all((page.parent / name).is_file() for name in named)
     assert "<script" not in page.read_text(encoding="utf-8")
 
 

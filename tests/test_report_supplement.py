@@ -5,13 +5,16 @@ from pathlib import Path
 import pytest
 
 from analysis.report.section import Section
+from analysis.summary.sections.content import ReportData
+from analysis.summary.sections.quality import quality_section
 from analysis.summary.sections.supplement import TITLES, supplement_sections
 from tests.made_scores import CEILING, ONE_AT_CEILING, RIGHT, ratings_of, study_of
 
 
 @pytest.fixture(scope="module")
 def direction(tmp_path_factory: pytest.TempPathFactory) -> Section:
-    (section,) = supplement_sections(study_of(tmp_path_factory.mktemp("study"), RIGHT))
+    statistics = study_of(tmp_path_factory.mktemp("study"), RIGHT)
+    (section,) = supplement_sections(ReportData(title="T", statistics=statistics))
     return section
 
 
@@ -40,23 +43,32 @@ def test_the_pairs_stand_side_by_side_with_every_test(direction: Section) -> Non
     assert all(len(row) == len(table.header) for table in direction.tables for row in table.rows)
 
 
-def test_assumptions_are_a_list_with_warnings_in_the_words_of_the_report(direction: Section) -> None:
-    told = "\n".join(direction.items)
-    assert "Warning: sphericity does not hold" in told
+def test_the_planned_test_is_marked_among_the_pairs(direction: Section) -> None:
+    assert [name for name in direction.tables[0].header if "Planned" in name] == ["Planned: Tukey, pooled error"]
+    assert any("Whoever registered another test reports that" in text for text in direction.paragraphs)
+
+
+def test_assumptions_are_said_and_those_that_do_not_hold_stand_with_the_data(tmp_path: Path) -> None:
+    report = ReportData(title="T", statistics=study_of(tmp_path, RIGHT))
+    (further,), (quality,) = supplement_sections(report), quality_section(report)
+    assert "Assumed: Participants are independent of each other" in further.paragraphs[-1]
+    told = "\n".join(quality.items)
+    assert told.count("sphericity does not hold") == 1
+    assert "Direction recognition: many participants score at an end of the scale" in told
     assert "Asymmetric Force II (ceiling 10 of 14)" in told
     assert "asymmetric-2" not in told
 
 
 def test_ratings_have_no_model_of_answers(tmp_path: Path) -> None:
-    (section,) = supplement_sections(ratings_of(tmp_path, RIGHT))
+    (section,) = supplement_sections(ReportData(title="T", statistics=ratings_of(tmp_path, RIGHT)))
     assert section.title == TITLES["preference"]
-    assert len(section.tables) == 2
+    assert len(section.tables) == 1
     assert "odds" not in " ".join(section.paragraphs)
 
 
 @pytest.mark.slow
 def test_separation_is_told_instead_of_a_table(tmp_path: Path) -> None:
-    (section,) = supplement_sections(study_of(tmp_path, ONE_AT_CEILING))
+    (section,) = supplement_sections(ReportData(title="T", statistics=study_of(tmp_path, ONE_AT_CEILING)))
     assert any(
         "Asymmetric Force II (every answer right); no contrast is given" in words for words in section.paragraphs
     )
@@ -65,7 +77,7 @@ def test_separation_is_told_instead_of_a_table(tmp_path: Path) -> None:
 
 @pytest.mark.slow
 def test_reasons_stand_where_there_are_no_numbers(tmp_path: Path) -> None:
-    (section,) = supplement_sections(study_of(tmp_path, CEILING))
+    (section,) = supplement_sections(ReportData(title="T", statistics=study_of(tmp_path, CEILING)))
     told = "\n".join(section.paragraphs)
     assert "Sphericity: There is no error variance" in told
     assert "Friedman test: Every participant scores all conditions alike" in told

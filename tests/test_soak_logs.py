@@ -40,7 +40,7 @@ for _ in range(4):
     timed("loop", lambda: [pd.read_csv(file).shape for file in files])
     logs = timed("read", lambda: read_logs([folder]))
     timed("summarize", lambda: summarize(logs, trade=False))
-    timed("trade", lambda: summarize(logs))
+    timed("trade", lambda: summarize(logs, fits=True))
 assert len(logs.trials) == 60 * len(files) and not logs.problems
 print(json.dumps({name: found[1:] for name, found in times.items()}))
 """
@@ -51,7 +51,7 @@ import resource, sys
 from pathlib import Path
 from analysis.logs.reading import read_logs
 from analysis.summary.summary import summarize
-summarize(read_logs([Path(sys.argv[1])]))
+summarize(read_logs([Path(sys.argv[1])]), fits=True)
 print(resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024)
 """
 

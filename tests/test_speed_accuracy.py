@@ -25,7 +25,9 @@ from analysis.summary.figures.trade import (
     has_points,
 )
 from analysis.summary.results import StudyStatistics
-from analysis.summary.sections.trade import CONDITIONAL_ACCURACY, QUANTILE_PROBABILITY, trade_section
+from analysis.summary.sections.content import ReportData
+from analysis.summary.sections.pictures import CONDITIONAL_ACCURACY, QUANTILE_PROBABILITY, write_figures
+from analysis.summary.sections.trade import trade_details, trade_sections
 from analysis.summary.summary import summarize
 from analysis.times import trade
 from analysis.times.first_passage import moments
@@ -86,7 +88,7 @@ def study(
 
 
 def found_in(folder: Path) -> Any:
-    return summarize(read_logs([folder])).to_dict()["direction"]["speed_accuracy"]
+    return summarize(read_logs([folder]), fits=True).to_dict()["direction"]["speed_accuracy"]
 
 
 def rows_of(folder: Path) -> list[dict[str, str]]:
@@ -117,7 +119,7 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 @pytest.fixture(scope="module")
 def statistics(folder: Path) -> StudyStatistics:
-    return summarize(read_logs([folder]))
+    return summarize(read_logs([folder]), fits=True)
 
 
 @pytest.fixture(scope="module")
@@ -125,8 +127,14 @@ def found(statistics: StudyStatistics) -> Any:
     return statistics.to_dict()["direction"]["speed_accuracy"]
 
 
-def page_of(section: Section, out: Path) -> str:
-    write_page(out, "Trade", (section,))
+def sections_of(statistics: StudyStatistics) -> list[Section]:
+    """What was measured, then the appendix with scores and models."""
+    report = ReportData(title="Trade", statistics=statistics)
+    return [*trade_sections(report), *trade_details(report)]
+
+
+def page_of(sections: list[Section], out: Path) -> str:
+    write_page(out, "Trade", tuple(sections))
     return (out / "report.md").read_text(encoding="utf-8")
 
 
@@ -238,8 +246,8 @@ def test_times_from_the_experimenters_hand_are_refused_with_the_reason(tmp_path:
     assert "the experimenter's hand" in found["reason"]
     assert found["refused"]["experimenter"]["trials"] == 120
     assert "reaction to it" in found["refused"]["experimenter"]["why"]
-    section = trade_section(statistics.direction)
-    text = page_of(section, tmp_path)
+    (section,) = sections_of(statistics)
+    text = page_of([section], tmp_path)
     assert "all times came from the experimenter's hand" in text
     assert "Refused of 120 answered trials: 120 because the time came from the experimenter's hand" in text
     assert not section.pictures
@@ -317,8 +325,7 @@ def test_people_who_were_told_different_things_count_each_for_their_own(tmp_path
         write_rows(trials_path(tmp_path, f"P{i}"), diffused(f"P{i}", 60, (told,)))
     found = found_in(tmp_path)
     assert {one["accuracy"]["people"] for one in found["instruction_effects"]} == {0}
-    section = trade_section(summarize(read_logs([tmp_path])).direction)
-    assert section is not None
+    section, _ = sections_of(summarize(read_logs([tmp_path])))
     assert any("No participant was told two things" in text for text in section.paragraphs)
     assert not [table for table in section.tables if "Effect of the instruction" in table.caption]
     estimates = found["diffusion"]["each"]["estimates"]
@@ -367,25 +374,23 @@ def test_whatever_the_log_there_is_a_section_and_no_nan(kind: str, people: int, 
         for row in rows if kind == "one trial" else ():
             row |= {"direction": "forward", "correct": str(int(row["response"] == "forward"))}
         write_rows(trials_path(tmp_path / "study", f"P{i}"), changed(rows, kind))
-    statistics = summarize(read_logs([tmp_path / "study"]))
+    statistics = summarize(read_logs([tmp_path / "study"]), fits=True)
     found = statistics.direction
     assert found.n == people
     json.dumps(statistics.to_dict(), allow_nan=False)
     assert not [warning for warning in statistics.warnings if "speed_accuracy" in warning]
-    section = trade_section(found)
-    assert section is not None
-    cells = [*section.paragraphs, *(cell for table in section.tables for row in table.rows for cell in row)]
+    sections = sections_of(statistics)
+    told = [text for section in sections for text in section.paragraphs]
+    cells = [*told, *(cell for one in sections for table in one.tables for row in table.rows for cell in row)]
     assert not [cell for cell in cells if re.search(r"\b(nan|None|inf)\b", cell)]
-    assert {picture.stem for picture in section.pictures} == {
-        stem
-        for stem, there in ((CONDITIONAL_ACCURACY, has_curve(found)), (QUANTILE_PROBABILITY, has_points(found)))
-        if there
-    }
+    drawn = ((CONDITIONAL_ACCURACY, has_curve(found)), (QUANTILE_PROBABILITY, has_points(found)))
+    shown = {picture.stem for section in sections for picture in section.pictures}
+    assert shown - {"figure-response-times"} == {stem for stem, there in drawn if there}
     fits = statistics.to_dict()["direction"]["speed_accuracy"].get("diffusion") or {"together": None}
     clear = fits["together"] is not None and fits["together"]["reason"] is None
-    one_fit = any("With one participant" in text for text in section.paragraphs)
+    one_fit = any("With one participant" in text for text in told)
     assert one_fit == (people == 1 and clear)
-    assert bool(section.pictures) == (kind not in ("no times", "one trial", "one time"))
+    assert bool(shown - {"figure-response-times"}) == (kind not in ("no times", "one trial", "one time"))
 
 
 @pytest.mark.parametrize("kind", ["all correct", "told by method"])
@@ -467,7 +472,7 @@ def test_a_high_bar_of_correct_answers_keeps_the_lucky_guessers() -> None:
 def test_a_crowd_is_fitted_by_a_sample_of_people_whose_codes_are_evenly_spaced(tmp_path: Path) -> None:
     people = 3 * MOST_PEOPLE // 2
     logs = read_logs([write_many(tmp_path, people)])
-    shown = summarize(logs).to_dict()["direction"]["speed_accuracy"]
+    shown = summarize(logs, fits=True).to_dict()["direction"]["speed_accuracy"]
     sample = shown["diffusion"]
     assert shown["people"] == people
     assert (sample["people"], sample["fitted"], sample["trials"]) == (people, MOST_PEOPLE, 60 * MOST_PEOPLE)
@@ -482,12 +487,13 @@ def test_a_crowd_is_fitted_by_a_sample_of_people_whose_codes_are_evenly_spaced(t
 
 
 def test_the_section_shows_figures_tables_and_caveats(statistics: StudyStatistics, tmp_path: Path) -> None:
-    section = trade_section(statistics.direction)
-    assert [picture.stem for picture in section.pictures] == [CONDITIONAL_ACCURACY, QUANTILE_PROBABILITY]
-    (tmp_path / "figures").mkdir()
-    figure_conditional_accuracy(statistics.direction, tmp_path / "figures" / CONDITIONAL_ACCURACY)
-    figure_quantile_probability(statistics.direction, tmp_path / "figures" / QUANTILE_PROBABILITY)
-    text = page_of(section, tmp_path)
+    measured, made_of_it = sections_of(statistics)
+    stems = ["figure-response-times", CONDITIONAL_ACCURACY, QUANTILE_PROBABILITY]
+    assert [picture.stem for picture in measured.pictures] == stems
+    assert made_of_it.appendix
+    assert made_of_it.folded
+    write_figures(tmp_path / "figures", ReportData(title="Trade", statistics=statistics))
+    text = page_of([measured, made_of_it], tmp_path)
     for words in (
         "## Speed and accuracy",
         "1,080 of 1,080 answered trials have a time of the answerer's own hand (6 participants).",
@@ -503,3 +509,24 @@ def test_the_section_shows_figures_tables_and_caveats(statistics: StudyStatistic
         assert f"figures/figure-{stem}.png" in text
         for kind in ("png", "svg"):
             assert (tmp_path / "figures" / f"figure-{stem}.{kind}").stat().st_size > 5_000
+
+
+def test_the_diffusion_is_fitted_only_where_that_was_asked_for(folder: Path) -> None:
+    statistics = summarize(read_logs([folder]))
+    fits = statistics.to_dict()["direction"]["speed_accuracy"]["diffusion"]
+    assert (fits["fitted"], fits["each"], fits["together"]) == (0, None, None)
+    assert "recoil analyze --fits" in fits["reason"]
+    _, made_of_it = sections_of(statistics)
+    assert not [table for table in made_of_it.tables if "Diffusion model" in table.caption]
+
+
+def test_the_interval_of_a_mean_rate_stays_within_0_and_1(tmp_path: Path) -> None:
+    """By Student's t alone one miss of three people reaches 113 %."""
+    for i in range(3):
+        rows = changed(trial_rows(f"P{i}", i), "all correct")
+        if i == 0:
+            rows[0] |= {"response": "forward" if rows[0]["direction"] == "backward" else "backward", "correct": "0"}
+        write_rows(trials_path(tmp_path, f"P{i}"), rows)
+    cell = found_in(tmp_path)["methods"][rows[0]["method"]]["neutral"]["accuracy"]
+    assert cell["mean"] < 1.0 == cell["ci_high"]
+    assert 0.0 < cell["ci_low"] < cell["mean"]

@@ -129,7 +129,7 @@ def test_fewer_than_two_complete_participants_give_no_test_but_a_reason(particip
     assert found["direction"]["n"] == participants
     assert found["direction"]["anova"] is None
     assert found["direction"]["tukey"] is None
-    assert f"there are {participants} complete participants" in " ".join(found["warnings"])
+    assert f"complete participants: {participants}, methods: 3" in " ".join(found["warnings"])
 
 
 def test_what_is_not_finite_is_null_and_named(tmp_path: Path) -> None:

@@ -16,6 +16,7 @@ from analysis.logs.reading import Logs, read_logs
 from analysis.report.serial import undefined
 from analysis.stats.paired import SCALE, jzs_paired
 from analysis.summary.results import Supplement
+from analysis.summary.sections.content import ReportData
 from analysis.summary.sections.supplement import supplement_sections
 from analysis.summary.summary import summarize, within_supplement
 from tests.log_files import METHODS, write_study
@@ -150,14 +151,14 @@ def test_degenerate_answers_never_crash_and_never_give_a_silent_number(name: str
     for entry in (direction["friedman"], direction["sphericity"], direction["diagnostics"]["normality"]):
         assert entry["p"] is not None or entry["reason"]
     assert direction["model"]["contrasts"] or direction["model"]["reason"]
-    assert list(supplement_sections(statistics))
+    assert list(supplement_sections(ReportData(title="T", statistics=statistics)))
 
 
 @pytest.mark.parametrize("name", DEGENERATE)
 def test_degenerate_ratings_never_crash_either(name: str, tmp_path: Path) -> None:
     statistics = ratings_of(tmp_path, DEGENERATE[name])
     assert np.isfinite(_numbers(statistics.to_dict())).all()
-    assert list(supplement_sections(statistics))
+    assert list(supplement_sections(ReportData(title="T", statistics=statistics)))
 
 
 def test_all_at_ceiling_gives_reasons_everywhere(tmp_path: Path) -> None:
@@ -197,7 +198,7 @@ def test_one_person_or_one_method_has_no_supplement(right: Any, tmp_path: Path) 
     assert [direction[field.name] for field in fields(Supplement)] == [None] * len(fields(Supplement))
     assert found.assumptions == ()
     assert found.model.fit.reason
-    assert not list(supplement_sections(statistics))
+    assert not list(supplement_sections(ReportData(title="T", statistics=statistics)))
 
 
 def test_the_paired_tukey_is_the_one_of_the_core(found: dict[str, Any]) -> None:

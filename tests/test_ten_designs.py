@@ -130,7 +130,7 @@ def answered_by(design, gun, laws, plan):
         (
             "voltages",
             {"response": {"law": "psychometric", "factor": "method", "threshold": 9.0, "spread": 0.1}},
-            "this law needs numbers above 0; its levels are asymmetric-1",
+            "this law needs numbers from 0; its levels are asymmetric-1",
         ),
         (
             "voltages",

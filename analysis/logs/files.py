@@ -77,11 +77,12 @@ class Found:
 def find_logs(paths: Sequence[Path], endings: tuple[str, ...] = ENDINGS) -> Found:
     """The files in `paths`, each once, with the folder that stands for its study; files in folders by their endings.
 
-    Logs of practices are left out; journals are all there.
+    Logs of practices are left out; journals are all there. All comes in the order of real paths, whatever the order of
+    `paths`.
     """
     found: dict[str, tuple[str, str]] = {}
     problems: list[Problem] = []
-    for path in paths:
+    for path in sorted(set(paths), key=lambda path: (_real(path), str(path))):
         logs = _in_folder(path, (*endings, _JOURNALS), problems) if path.is_dir() else {_real(path): str(path)}
         if not any(map(_is_counted, logs.values())) or not path.exists():
             kinds = " or ".join(f"*{ending}" for ending in endings)
@@ -92,8 +93,9 @@ def find_logs(paths: Sequence[Path], endings: tuple[str, ...] = ENDINGS) -> Foun
         top = _real(path if path.is_dir() else path.parent)
         for real, log in logs.items():
             found.setdefault(real, (log, _study(real, top)))
-    journals = {log: study for log, study in found.values() if _is_journal(log)}
-    logs_found = {log: study for log, study in found.values() if log not in journals and _is_counted(log)}
+    in_order = [log for _, log in sorted(found.items(), key=lambda one: one[0].split(os.sep))]  # noqa: PTH206 - many
+    journals = {log: study for log, study in in_order if _is_journal(log)}
+    logs_found = {log: study for log, study in in_order if log not in journals and _is_counted(log)}
     return Found(logs=logs_found, journals=journals, problems=tuple(problems))
 
 

@@ -199,7 +199,7 @@ def read_logs(paths: Iterable[str | Path], track: Track = iter, mapping: ColumnM
         trials=joined("direction", reading.blocks, studies),
         ratings=joined("preference", reading.blocks, studies),
         designs=by_design,
-        problems=tuple(reading.problems),
+        problems=tuple(sorted(reading.problems, key=_by_place)),
         files=tuple(reading.files.values()),
         remarks=tuple(reading.remarks),
         begun=tuple(begun),
@@ -207,6 +207,10 @@ def read_logs(paths: Iterable[str | Path], track: Track = iter, mapping: ColumnM
         joined=tuple((os.path.realpath(where), code) for where, codes in reading.members.items() for code in codes),
         names={study: names.get(study, study) for study in reading.studies.values()},
     )
+
+
+def _by_place(problem: Problem) -> tuple[str, int, str, str]:
+    return str(problem.file), problem.line or 0, problem.column or "", problem.message
 
 
 def _without_tables(reading: _Reading, runs: Sequence[RunFile]) -> tuple[dict[str, bytes], list[BegunRun]]:

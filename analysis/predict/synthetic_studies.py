@@ -224,14 +224,14 @@ def rates_words(law: RatesLaw, methods: Sequence[str]) -> Iterator[str]:
     )
 
 
-def ratings_words(law: RatingsLaw, *, with_effect: bool = False) -> Iterator[str]:
-    """People who rate, also where the distances of the methods are multiplied by an effect."""
-    yield f"Mean ratings: {', '.join(f'{name} {value:g}' for name, value in law.mean.items())}."
+def ratings_words(law: RatingsLaw, methods: Sequence[str], *, with_effect: bool = False) -> Iterator[str]:
+    """People who rate these methods, also where the distances of the methods are multiplied by an effect."""
+    yield f"Mean ratings: {', '.join(f'{name} {law.mean[name]:g}' for name in law.mean if name in methods)}."
     yield f"SD between people {law.person_sd:g}, within people {law.noise_sd:g}; kept to the scale and its grain."
-    if law.lowest:
+    if law.lowest in methods:
         less = " at effect 1, by a smaller share below it" if with_effect else ""
         yield f"{law.lowest} is rated below all others, by everybody{less}."
-    if law.same:
+    if law.same and set(law.same) <= set(methods):
         yield f"A share of {law.same_share:g} rates {' and '.join(law.same)} alike."
 
 
@@ -268,7 +268,7 @@ def pattern_odds(drawn: Drawn, published: PublishedExperiment, replications: int
     draws = generator(seed, "odds", name)
     if isinstance(drawn, RatingStudies):
         answers: Counts | FloatArray = preference_scores(drawn, n, replications, draws)
-        trials, law, size = (0, 0), ratings_words(drawn.law), "one rating a method"
+        trials, law, size = (0, 0), ratings_words(drawn.law, methods), "one rating a method"
         known = "neither means nor SDs are published, so these are assumed"
     else:
         answers, trials = direction_counts(drawn, n, replications, draws), drawn.trials

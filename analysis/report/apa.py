@@ -57,19 +57,25 @@ def p_cell(p: float | None) -> str:
     return "> .999" if p > 0.9995 else f"{p:.3f}".removeprefix("0")
 
 
-def p_value(p: float | None) -> str:
-    """A p-value in a sentence.
+def p_value(p: float | None, *, exact: bool = False) -> str:
+    """A p-value in a sentence; `exact`: below .001 in full, with two digits.
 
-    >>> p_value(0.0004), p_value(0.0423), p_value(None)
-    ('p < .001', 'p = .042', 'p undefined')
+    >>> p_value(0.0004), p_value(0.0423), p_value(None), p_value(2.84e-7, exact=True)
+    ('p < .001', 'p = .042', 'p undefined', 'p = 2.8 × 10⁻⁷')
     """
     cell = p_cell(p)
     if cell == NO_NUMBER:
         return "p undefined"
+    if exact and p is not None and 0.0 < p < 0.001:
+        digits, _, power = f"{p:.1e}".partition("e")
+        return f"p = {digits} × 10{str(int(power)).translate(_RAISED)}"
     return f"p {cell}" if cell[0] in "<>" else f"p = {cell}"
 
 
-def f_test(F: float | None, df: Sequence[float], p: float | None) -> str:
+_RAISED = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
+
+
+def f_test(F: float | None, df: Sequence[float], p: float | None, *, exact: bool = False) -> str:
     """An F test in a sentence; whole degrees of freedom without decimals, corrected ones with two.
 
     >>> f_test(28.4512, (2, 26), 2.7e-7)
@@ -77,7 +83,7 @@ def f_test(F: float | None, df: Sequence[float], p: float | None) -> str:
     """
     shown = number(F)
     of = ", ".join(str(one) if isinstance(one, int) else number(one) for one in df)
-    return f"F({of}) = {'undefined or infinite' if shown == NO_NUMBER else shown}, {p_value(p)}"
+    return f"F({of}) = {'undefined or infinite' if shown == NO_NUMBER else shown}, {p_value(p, exact=exact)}"
 
 
 def interval(low: float | None, high: float | None, digits: int = 2) -> str:

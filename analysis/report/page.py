@@ -4,11 +4,12 @@ from __future__ import annotations
 
 import base64
 import re
+from dataclasses import dataclass
 from pathlib import Path
 
 from jinja2 import Environment, PackageLoader, StrictUndefined, select_autoescape
 
-from analysis.report.section import Section
+from analysis.report.section import PNG_DPI, PageHead, Section
 
 _VERDICTS = (
     *("agrees", "differs", "differs as predicted", "not published", "not obtained"),
@@ -21,11 +22,13 @@ _MARKDOWN_MARKS = re.compile(r"[\\`*|~]|<(?=[a-zA-Z/!?])|(?<![a-zA-Z0-9])_|_(?![
 _TIGHT = re.compile(r" (?=[=<>] [\d.−])|(?<= [=<>]) (?=[\d.−])|(?<=\d) (?=%)|(?<=% CI) (?=\[)|(?<=,) (?=[\d.]+[)\]])")
 """Spaces that no line may break at: around `=` and `<` before a number, before a percent sign, in brackets."""
 
+_BARE = PageHead()
 
-def write_page(out: Path, title: str, parts: tuple[Section, ...]) -> None:
+
+def write_page(out: Path, title: str, parts: tuple[Section, ...], head: PageHead = _BARE) -> None:
     """Write `report.html` and `report.md` of finished sections; their pictures stand in `out / "figures"` already."""
     for name in ("report.html", "report.md"):
-        text = _render(f"{name}.j2", title, parts, out / "figures")
+        text = _render(f"{name}.j2", title, parts, head, out / "figures")
         (out / name).write_text(text, encoding="utf-8", newline="\n")
 
 
@@ -47,7 +50,7 @@ def unbroken(text: str) -> str:
     return _TIGHT.sub("\N{NO-BREAK SPACE}", text)
 
 
-def _render(template: str, title: str, parts: tuple[Section, ...], figures: Path) -> str:
+def _render(template: str, title: str, parts: tuple[Section, ...], head: PageHead, figures: Path) -> str:
     environment = Environment(
         loader=PackageLoader("analysis.report"),
         autoescape=select_autoescape(enabled_extensions=("html.j2",)),
@@ -57,11 +60,29 @@ def _render(template: str, title: str, parts: tuple[Section, ...], figures: Path
         keep_trailing_newline=True,
     )
     environment.filters |= {"markdown": markdown, "unbroken": unbroken}
-    embedded = {
-        part.stem: _data_address(figures / f"{part.stem}.png") for section in parts for part in section.pictures
-    }
-    return environment.get_template(template).render(title=title, sections=parts, embedded=embedded, verdicts=_VERDICTS)
+    stems = [picture.stem for section in parts for picture in section.pictures]
+    embedded = {stem: _embedded(figures / f"{stem}.png") for stem in stems}
+    body = [section for section in parts if not section.appendix]
+    appendix = [section for section in parts if section.appendix]
+    return environment.get_template(template).render(
+        title=title, head=head, body=body, appendix=appendix, embedded=embedded, verdicts=_VERDICTS
+    )
 
 
-def _data_address(png: Path) -> str:
-    return "data:image/png;base64," + base64.b64encode(png.read_bytes()).decode("ascii")
+_SCREEN_DPI = 117.0
+"""Pixels of the page for an inch of a figure: the widest figures fill the page, and all have letters of one size."""
+
+
+@dataclass(frozen=True, slots=True)
+class _Embedded:
+    """A picture inside the page: its data, and how wide it is shown."""
+
+    address: str
+    width_px: int
+
+
+def _embedded(png: Path) -> _Embedded:
+    content = png.read_bytes()
+    width = int.from_bytes(content[16:20])  # of the header, which comes first in every PNG
+    address = "data:image/png;base64," + base64.b64encode(content).decode("ascii")
+    return _Embedded(address, round(width * _SCREEN_DPI / PNG_DPI))

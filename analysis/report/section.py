@@ -4,11 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from typing import Literal
 
 LISTED = 100
 """A list longer than this is cut: a page of ten thousand rows is read by nobody, and opens slowly."""
 SHOWN = 50
 """So many of it are left."""
+PNG_DPI = 200
+"""Points of an inch of a picture."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -31,13 +34,36 @@ class Picture:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Section:
-    """A heading with paragraphs, then pictures, tables and a list, each of which may be empty."""
+    """A heading with paragraphs, words to copy, pictures, tables and a list, each of which may be empty.
+
+    What is of the `appendix` stands behind all else, its figures and tables with numbers of their own; what is
+    `folded` opens with a click where a page can do so.
+    """
 
     title: str
     paragraphs: tuple[str, ...] = ()
+    quotes: tuple[str, ...] = ()
     pictures: tuple[Picture, ...] = ()
     tables: tuple[Table, ...] = ()
     items: tuple[str, ...] = ()
+    appendix: bool = False
+    folded: bool = False
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class PageNotice:
+    """A line on top of a page: a `warning` in colour, that nobody may overlook, or a quiet `note`."""
+
+    text: str
+    kind: Literal["warning", "note"]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class PageHead:
+    """What stands under a page's title: notices, and the names of the files beside it."""
+
+    notices: tuple[PageNotice, ...] = ()
+    files: tuple[str, ...] = ()
 
 
 def origin_table(facts: Mapping[str, object]) -> Table:

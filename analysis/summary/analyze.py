@@ -29,7 +29,10 @@ from experiments.record.provenance import provenance
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Request:
-    """What is asked for: the logs, where to write, and the files that say how to read and what to leave out."""
+    """What is asked for: the logs, where to write, and the files that say how to read and what to leave out.
+
+    `fits`: with the diffusion model fitted to response times.
+    """
 
     paths: Sequence[Path]
     out: Path
@@ -37,6 +40,7 @@ class Request:
     columns: Path | None = None
     rules: Path | None = None
     codebook: Path | None = None
+    fits: bool = False
 
 
 def analyze(request: Request, track: Track = iter) -> tuple[StudyStatistics, tuple[str, ...]]:
@@ -54,7 +58,7 @@ def analyze(request: Request, track: Track = iter) -> tuple[StudyStatistics, tup
     refuse_nothing(request.paths, logs)
     effect = apply_rules(logs, rules) if rules is not None else None
     used = effect.logs if effect is not None else logs
-    statistics = replace(summarize(used), studies=_by_study(used))
+    statistics = replace(summarize(used, fits=request.fits), studies=_by_study(used, fits=request.fits))
     if effect is not None and rules is not None and request.rules is not None:
         statistics = _with_rules(statistics, effect, rules, request.rules)
     coded = None if book is None else _coded(used, statistics, book)
@@ -62,19 +66,21 @@ def analyze(request: Request, track: Track = iter) -> tuple[StudyStatistics, tup
         statistics = replace(statistics, remarks=coded)
     statistics = with_everybody(statistics, used)
     storage.make_folder(request.out)
+    tables = result_tables(used, statistics.analysed)
     report = ReportData(
-        title="Statistics of " + ", ".join(path.name or str(path) for path in request.paths),
+        title=report_title(request.paths),
         statistics=statistics,
         problems=logs.problems,
         remarks=logs.remarks,
         comparison=None if published is None else compare(statistics, published, _predicted(request.paper)),
         files=logs.files,
+        beside=tuple(tables),
         provenance=provenance() | _read_by(request.columns, mapping),
-        notes=tuple(_notes(effect)),
+        dropped=tuple(_notes(effect)),
         extra=() if coded is None else (remarks_coding.coding_section(coded),),
     )
     write_report(request.out, report)
-    for name, content in result_tables(used, statistics.analysed).items():
+    for name, content in tables.items():
         storage.write_whole(request.out / name, content)
     return statistics, tuple(_said(logs, statistics))
 
@@ -92,6 +98,21 @@ def with_everybody(statistics: StudyStatistics, logs: Logs) -> StudyStatistics:
     analysed = {name: found.participants.codes for name, found in statistics.analysed.items()}
     analysed |= {one.design.design: tuple(map(str, one.table["participant_id"].unique())) for one in logs.designs}
     return replace(statistics, excluded=excluded, participation=participation(logs, analysed, excluded))
+
+
+_TITLED = 3
+"""So many paths stand in the title of a report."""
+
+
+def report_title(paths: Sequence[Path]) -> str:
+    """What was read, whatever the order it was named in.
+
+    >>> report_title([Path("oslo"), Path("kyoto")]), report_title([Path(f"P{i}.csv") for i in range(20)])
+    ('Statistics of kyoto, oslo', 'Statistics of P0.csv, P1.csv, P10.csv and 17 more')
+    """
+    names = sorted({path.name or path.absolute().name or str(path) for path in paths})
+    more = f" and {len(names) - _TITLED} more" if len(names) > _TITLED else ""
+    return f"Statistics of {', '.join(names[:_TITLED])}{more}"
 
 
 def _predicted(paper: Path | None) -> dict[str, Prediction]:
@@ -115,9 +136,10 @@ def _coded(logs: Logs, statistics: StudyStatistics, book: remarks_coding.Codeboo
         raise ConfigError(f"the codebook: {error}") from error
 
 
-def _by_study(logs: Logs) -> dict[str, StudyStatistics] | None:
+def _by_study(logs: Logs, *, fits: bool) -> dict[str, StudyStatistics] | None:
     """Each study's own statistics, if there are several; what computed them stands above."""
-    return {name: replace(summarize(alone), versions=None) for name, alone in by_study(logs).items()} or None
+    each = by_study(logs).items()
+    return {name: replace(summarize(alone, fits=fits), versions=None) for name, alone in each} or None
 
 
 def _with_rules(statistics: StudyStatistics, effect: ExclusionEffect, rules: Rules, path: Path) -> StudyStatistics:

@@ -139,18 +139,19 @@ def _preference(
     published: publication.PublishedPreference, found: WithinStatistics | None
 ) -> Iterator[publication.ComparisonRow]:
     name, lowest, same = "preference", published.lowest, published.same_score
-    ratings = None if found is None else found.participants.values()
+    methods = () if found is None else found.methods
+    ratings = () if found is None else found.participants.values()
     yield _number(
         name,
         publication.rated_lowest(lowest),
         str(lowest.participants),
-        None if ratings is None else sum(_is_lowest(row, lowest.method) for row in ratings),
+        sum(_is_lowest(row, lowest.method) for row in ratings) if lowest.method in methods else None,
     )
     yield _number(
         name,
         publication.one_score(same),
         str(same.participants),
-        None if ratings is None else sum(_is_same(row, same.methods) for row in ratings),
+        sum(_is_same(row, same.methods) for row in ratings) if set(same.methods) <= set(methods) else None,
     )
     means, sds = (found.means, found.sds) if found is not None else ({}, {})
     for kind, values in (("mean", means), ("SD", sds)):
@@ -161,8 +162,8 @@ def _preference(
 
 def _is_lowest(row: Mapping[str, float], method: str) -> bool:
     """Strictly below every other method."""
-    return method in row and all(row[method] < score for other, score in row.items() if other != method)
+    return all(row[method] < score for other, score in row.items() if other != method)
 
 
 def _is_same(row: Mapping[str, float], methods: list[str]) -> bool:
-    return all(method in row for method in methods) and row[methods[0]] == row[methods[1]]
+    return row[methods[0]] == row[methods[1]]

@@ -8,7 +8,7 @@ named. Which test there is follows from how many factors vary within and between
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Hashable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -18,12 +18,16 @@ from scipy import stats
 from analysis.stats.anova import rm_anova, rm_tukey_hsd
 from analysis.stats.arrays import FloatArray
 from analysis.stats.binomial import binomial_test, yes_no
+from analysis.stats.diagnostics import effect_size, unit_scaled
 from analysis.stats.discrimination import Task, discrimination
 from analysis.stats.factorial import FactorialEffect, mixed, two_within
 from analysis.stats.paired import friedman
 from analysis.summary.results import ConditionSummary, DesignSummary, DesignTest, Origin, QuestionSummary
 from experiments.design.config import DesignConfig
 from experiments.design.language import Level, QuestionConfig, shown_level
+from experiments.design.methods_section import methods_section
+from experiments.design.planned import workload
+from experiments.design.planning import plan_of
 from experiments.tasks.questions import chance, correct_columns
 
 
@@ -41,6 +45,7 @@ def summarise(design: DesignConfig, table: pd.DataFrame) -> DesignSummary:
         origin=_hands(design, table),
         words={name: int(table[name].notna().sum()) for name in design.questions if name not in asked},
         assumed=design.assumed,
+        protocol=methods_section(design, workload(design, plan_of(design, "P01", 0))),
     )
 
 
@@ -54,9 +59,14 @@ def _hands(design: DesignConfig, table: pd.DataFrame) -> Origin:
 def origin_of(rows: pd.DataFrame, source: str) -> Origin:
     """Whose hands stand in the column `source`, and the guns."""
     answers, guns = (
-        {str(name): count for name, count in rows[column].value_counts().items()} for column in (source, "gun")
+        {str(name): int(count) for name, count in sorted(rows[column].value_counts().items(), key=_most_first)}
+        for column in (source, "gun")
     )
     return Origin(answers=answers, guns=guns)
+
+
+def _most_first(counted: tuple[Hashable, int]) -> tuple[int, str]:
+    return -counted[1], str(counted[0])
 
 
 def _question(design: DesignConfig, name: str, question: QuestionConfig, table: pd.DataFrame) -> QuestionSummary:
@@ -246,6 +256,7 @@ def _one_factor(name: str, scores: FloatArray, question: QuestionConfig) -> Iter
             statistic=float(anova.F),
             df=(int(anova.df_effect), int(anova.df_error)),
             p=float(anova.p),
+            size=effect_size(rm_anova(unit_scaled(scores))).generalized_eta_squared,
             reason=str(anova.reason) or None,
         )
     if question.kind in {"rating", "ranking"}:

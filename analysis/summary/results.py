@@ -351,7 +351,8 @@ class QuestionSummary:
 class DesignSummary:
     """The statistics of a design: as they stand in `statistics.json` under its name.
 
-    `words`: how many texts were said to each question that asks for them; `assumed`: what the design says it assumes.
+    `words`: how many texts were said to each question that asks for them; `assumed`: what the design says it assumes;
+    `protocol`: the design as a Methods section.
     """
 
     title: str
@@ -361,6 +362,7 @@ class DesignSummary:
     origin: Origin
     words: Mapping[str, int] = field(default_factory=dict)
     assumed: tuple[str, ...] = ()
+    protocol: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -61,19 +61,21 @@ TUKEY_ERROR_TERM = (
     "on its (n − 1)(k − 1) degrees of freedom; it assumes sphericity."
 )
 BINOMIAL_NOTE = (
-    "Trials are pooled over participants, as in the paper. The test takes them as independent and ignores that trials "
-    "come in people; if people differ, its p-values are not exact."
+    "Trials are pooled over participants. The test takes them as independent and ignores that trials come in people; "
+    "if people differ, its p-values are not exact."
 )
+UNDEFINED = "written as null"
+"""What the warning about an undefined number says."""
 
 
-def summarize(logs: Logs, *, trade: bool = True) -> results.StudyStatistics:
+def summarize(logs: Logs, *, trade: bool = True, fits: bool = False) -> results.StudyStatistics:
     """The statistics of `logs`: rates 0 to 1, SD with n - 1.
 
-    `trade`: with the measures of speed and accuracy. An experiment without a log is left out. Participants who miss an
-    answer or a method are left out of that experiment and listed in `excluded`. Numbers that are NaN or infinite
-    are named in `warnings`.
+    `trade`: with the measures of speed and accuracy; `fits`: with diffusion fits among them. An experiment without a
+    log is left out. Participants who miss an answer or a method are left out of that experiment and listed in
+    `excluded`. Numbers that are NaN or infinite are named in `warnings`.
     """
-    direction, left_out = _direction(logs.trials, trade=trade) if len(logs.trials) else (None, [])
+    direction, left_out = _direction(logs.trials, trade=trade, fits=fits) if len(logs.trials) else (None, [])
     preference, also_out = _preference(logs.ratings) if len(logs.ratings) else (None, [])
     designs = {one.design.design: summarise(one.design, one.table) for one in logs.designs}
     lacking = (out for name, one in designs.items() for out in _lacking(name, one))
@@ -152,7 +154,7 @@ def _warnings(found: results.StudyStatistics) -> Iterator[str]:
     for experiment in SCALES:
         one = found.of(experiment)
         if one is not None and one.anova is None:
-            there = f"there are {one.n} complete participants and {len(one.methods)} methods"
+            there = f"complete participants: {one.n}, methods: {len(one.methods)}"
             yield f"{experiment}: no ANOVA and no Tukey test, which need 2 of each; {there}"
         elif one is not None:
             yield from (f"{experiment}: {entry.warning}" for entry in one.assumptions if entry.serious)
@@ -160,7 +162,7 @@ def _warnings(found: results.StudyStatistics) -> Iterator[str]:
         why = "undefined (no variance to divide by, or one value only)"
         if math.isinf(value):
             why = "infinite (an effect without any error variance)"
-        yield f"{place} is {why}; written as null"
+        yield f"{place} is {why}; {UNDEFINED}"
 
 
 def _complete(table: pd.DataFrame, experiment: str) -> tuple[pd.DataFrame, list[str], list[LeftOut]]:
@@ -172,7 +174,7 @@ def _complete(table: pd.DataFrame, experiment: str) -> tuple[pd.DataFrame, list[
     return complete, methods, left_out
 
 
-def _direction(table: pd.DataFrame, *, trade: bool) -> tuple[results.DirectionStatistics, list[LeftOut]]:
+def _direction(table: pd.DataFrame, *, trade: bool, fits: bool) -> tuple[results.DirectionStatistics, list[LeftOut]]:
     complete, methods, left_out = _complete(table, "direction")
     cells = trial_cells(complete, methods)
     within = _within(cells.rates("forward"), "direction", origin_of(complete, "response_source"))
@@ -186,7 +188,7 @@ def _direction(table: pd.DataFrame, *, trade: bool) -> tuple[results.DirectionSt
         sensitivity={method: _sensitivity(cells, method) for method in methods},
         response_time=_median_times(complete, methods),
         response_times=response_times(complete, methods),
-        speed_accuracy=speed_accuracy(complete, methods) if trade else None,
+        speed_accuracy=speed_accuracy(complete, methods, fits=fits) if trade else None,
     )
     return replace(found, assumptions=assumptions(found)), left_out
 
@@ -215,7 +217,7 @@ def _within(scores: pd.DataFrame, experiment: str, origin: results.Origin) -> re
         means=shown.means,
         sds=shown.sds,
         participants=shown.participants,
-        within_ci=_within_ci(scores) if tested else None,
+        within_ci=_within_ci(scores, SCALES[experiment]) if tested else None,
         anova=_anova(scores.to_numpy()) if tested else None,
         tukey=_tukey(scores) if tested else None,
         tukey_error_term=TUKEY_ERROR_TERM,
@@ -237,10 +239,15 @@ def _by_method(row: pd.Series) -> dict[str, float]:
     return {str(method): float(value) for method, value in row.items()}
 
 
-def _within_ci(scores: pd.DataFrame) -> dict[str, results.ConfidenceInterval]:
-    """Cousineau-Morey intervals of the means."""
+def _within_ci(scores: pd.DataFrame, scale: tuple[float, float]) -> dict[str, results.ConfidenceInterval]:
+    """Cousineau-Morey intervals of the means, cut at the ends of the scale.
+
+    A mean lies on its scale, so what is cut off never held it: the interval covers it as often as before. What is left
+    is as long as other programs have it, on the scale of the differences; an interval on the logit would be neither,
+    and has no standard error to start from where everybody is at the ceiling.
+    """
     found = cousineau_morey(scores.to_numpy())
-    rows = zip(scores.columns, found.ci_low, found.ci_high, strict=True)
+    rows = zip(scores.columns, np.clip(found.ci_low, *scale), np.clip(found.ci_high, *scale), strict=True)
     return {
         str(method): results.ConfidenceInterval(ci_low=float(low), ci_high=float(high)) for method, low, high in rows
     }

@@ -162,6 +162,17 @@ def over_people(values: FloatArray) -> Mean:
     return Mean(mean=defined(one.value), sd=defined(one.sd), ci_low=low, ci_high=high, people=one.people)
 
 
+def rate_over_people(rates: FloatArray) -> Mean:
+    """The mean of rates over the people who have one; its interval is cut at 0 and 1, beyond which no mean lies.
+
+    >>> rate_over_people(np.array([1.0, 0.9, 1.0])).ci_high
+    1.0
+    """
+    found = over_people(rates)
+    low, high = (None if end is None else min(max(end, 0.0), 1.0) for end in (found.ci_low, found.ci_high))
+    return replace(found, ci_low=low, ci_high=high)
+
+
 def defined(value: float) -> float | None:
     """`None` for what is undefined: the counts beside it say why."""
     return float(value) if math.isfinite(value) else None

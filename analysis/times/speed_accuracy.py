@@ -21,6 +21,7 @@ from analysis.times.people import (
     instruction_effects,
     over_people,
     person_cells,
+    rate_over_people,
     sampled_fit,
 )
 from analysis.times.trade import (
@@ -40,8 +41,8 @@ FEWEST_CORRECT = 5
 chance who guessed luckily would be left, and the mean drift of no drift at all would be 0.2 (assumed)."""
 
 CAVEATS = {
-    "means": "Each person's own value first, then the mean over people, with Student's t for the 95 % interval, which "
-    "is not cut at the ends of a scale.",
+    "means": "Each person's own value first, then the mean over people, with Student's t for the 95 % interval, that "
+    "of a rate cut at 0 and 1.",
     "conditional_accuracy": "A person's bin holds few trials; only the mean over people means much.",
     "quantile_probability": "Quantiles of errors rest on the people who made at least 5 of them.",
     "inverse_efficiency_s": "Mean time of the correct answers over the correct rate. Not to be trusted above about 10 "
@@ -186,10 +187,12 @@ class SpeedAccuracy(_UsedTrials):
     caveats: Mapping[str, str]
 
 
-def speed_accuracy(trials: pd.DataFrame, methods: Sequence[str]) -> SpeedAccuracy | NoSpeedAccuracy:
+def speed_accuracy(
+    trials: pd.DataFrame, methods: Sequence[str], *, fits: bool = False
+) -> SpeedAccuracy | NoSpeedAccuracy:
     """Measures of speed and accuracy over times of the answerer's own hand alone, if there are some.
 
-    `trials` is a coded table.
+    `trials` is a coded table; `fits`: with the diffusion model fitted.
     """
     own = own_trials(trials, methods)
     n, people = int(own.time_s.size), int(np.unique(own.person).size)
@@ -215,7 +218,7 @@ def speed_accuracy(trials: pd.DataFrame, methods: Sequence[str]) -> SpeedAccurac
         quantiles=QUANTILES,
         methods=_methods(own, cells),
         instruction_effects=tuple(instruction_effects(cells, own.methods, own.instructions)),
-        diffusion=_diffusion(sampled_fit(own)),
+        diffusion=_diffusion(sampled_fit(own)) if fits else _not_fitted(n, people),
         caveats=CAVEATS,
     )
 
@@ -231,7 +234,7 @@ def _methods(own: OwnTrials, cells: PersonCells) -> dict[str, dict[str, CellTrad
             if some.time_s.size:
                 found.setdefault(method, {})[instruction] = CellTrade(
                     n=int(some.time_s.size),
-                    accuracy=over_people(cells.rate[:, i, k]),
+                    accuracy=rate_over_people(cells.rate[:, i, k]),
                     mean_s=over_people(cells.mean_s[:, i, k]),
                     median_s=over_people(cells.median_s[:, i, k]),
                     inverse_efficiency_s=over_people(efficiency[:, i, k]),
@@ -277,6 +280,13 @@ def _ez(some: OwnTrials) -> EZMeans:
             non_decision_below_0=int(found.impossible.sum()),
         ),
     )
+
+
+NOT_ASKED = "it was not asked for (`recoil analyze --fits`)"
+
+
+def _not_fitted(trials: int, people: int) -> DiffusionFits:
+    return DiffusionFits(people=people, fitted=0, trials=trials, reason=NOT_ASKED, each=None, together=None)
 
 
 def _diffusion(found: SampledFit) -> DiffusionFits:

@@ -202,9 +202,9 @@ def exposure_row(events: TrialHistory) -> Row:
     felt = [word.exposure_s for word in events.words if isinstance(word, Presented | Interrupted) and word.exposure_s]
     shown = events.last(Presented)
     if shown is None:
-        return {"earlier_exposure_s": sum(felt)} if felt else {}
+        return {"earlier_exposure_s": round(sum(felt), 6)} if felt else {}
     row: Row = {"shots": shown.shots, "exposure_s": shown.exposure_s}
-    return row | ({"earlier_exposure_s": sum(felt[:-1])} if felt[:-1] else {})
+    return row | ({"earlier_exposure_s": round(sum(felt[:-1]), 6)} if felt[:-1] else {})
 
 
 def _shown(design: DesignConfig, events: TrialHistory) -> Row:

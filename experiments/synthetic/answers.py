@@ -235,9 +235,9 @@ class SyntheticParticipant:
         level, threshold = _number(trial, law.factor), law.threshold * math.exp(law.log_threshold_sd * self._own[name])
         if question.correct == "larger":
             others = [one for one in trial.intervals if isinstance(one, float) and one != level] or [level]
-            return law.lapse / 2 + (1 - law.lapse) * _NORMAL.cdf(abs(math.log(level / others[0])) / law.spread)
+            return law.lapse / 2 + (1 - law.lapse) * _NORMAL.cdf(abs(_log_ratio(level, others[0])) / law.spread)
         guess = law.guess if question.named_answers == (YES, NO) else 1.0 / len(question.named_answers)
-        return guess + max(0.0, 1.0 - guess - law.lapse) * _NORMAL.cdf(math.log(level / threshold) / law.spread)
+        return guess + max(0.0, 1.0 - guess - law.lapse) * _NORMAL.cdf(_log_ratio(level, threshold) / law.spread)
 
     def _worth(self, law: WorthLaw, level: Level | None, name: str) -> float:
         shown = EMPTY if level is None else shown_level(level)
@@ -245,6 +245,17 @@ class SyntheticParticipant:
             raise ConfigError(f"questions.{name}.worth has no value for {shown}; give one for each level")
         own = Stream(self._plan.seed, "worth", *self._who, name, shown).normal()
         return law.worth[shown] * math.exp(law.log_worth_sd * own)
+
+
+def _log_ratio(a: float, b: float) -> float:
+    """The logarithm of a / b for numbers from 0; 0 if they are equal.
+
+    >>> _log_ratio(0.0, 2.0), _log_ratio(0.0, 0.0)
+    (-inf, 0.0)
+    """
+    if a == b:
+        return 0.0
+    return math.log(a / b) if a and b else math.copysign(math.inf, a - b)
 
 
 def draw_ratings(law: RatingsLaw, scale: NumberScale, cells: Sequence[str], stream: Stream) -> dict[str, float]:

@@ -98,8 +98,9 @@ class SharesLaw(Model):
 class PsychometricLaw(Model):
     """A right answer, or yes, with g + (1 - g - lapse) F(ln(x / threshold) / spread), F the standard normal.
 
-    x is the level of `factor`. g is chance for a scored choice, `guess` for yes-no. For a question about the larger of
-    two the threshold is the other interval's level: the larger is chosen with lapse / 2 + (1 - lapse) F(...).
+    x is the level of `factor`; 0 is not felt. g is chance for a scored choice, `guess` for yes-no. For a question about
+    the larger of two the threshold is the other interval's level: the larger is chosen with
+    lapse / 2 + (1 - lapse) F(...).
     """
 
     law: Literal["psychometric"]
@@ -297,10 +298,11 @@ def _common_problems(design: DesignConfig, question: QuestionConfig, law: Law) -
             yield f" names {factor!r}, which is no factor; they are {', '.join(design.factors)}"
             return
     if isinstance(law, PsychometricLaw | PowerLaw):
+        least, rule = (0.0, "from 0") if isinstance(law, PsychometricLaw) else (5e-324, "above 0")
         levels = design.factors[law.factor].all_levels
-        bad = [shown_level(level) for level in levels if not isinstance(level, float) or level <= 0]
+        bad = [shown_level(level) for level in levels if not isinstance(level, float) or level < least]
         if bad:
-            yield f".factor = {law.factor!r}: this law needs numbers above 0; its levels are {', '.join(bad)}"
+            yield f".factor = {law.factor!r}: this law needs numbers {rule}; its levels are {', '.join(bad)}"
 
 
 def _psychometric_problems(question: QuestionConfig, law: PsychometricLaw) -> Iterator[str]:
@@ -338,7 +340,7 @@ def _habit_problems(design: DesignConfig, law: RatingsLaw) -> Iterator[str]:
         return
     known = [shown_level(level) for name in law.by for level in design.factors[name].all_levels]
     for level in law.habitual:
-        if level not in known:
+        if level not in known and level not in law.mean:  # a design may do without a method that others have
             yield f" names {level!r}, which is no level of {law.by[0]}; they are {', '.join(known)}"
 
 

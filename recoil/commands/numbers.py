@@ -50,12 +50,15 @@ def analyze(
     ] = None,
     paper: Annotated[Path | None, typer.Option(help="Published numbers to compare with.")] = None,
     codebook: Annotated[Path | None, typer.Option(metavar="CODES.toml", help="Codes of free descriptions.")] = None,
+    fits: Annotated[bool, typer.Option("--fits", help="With the diffusion model fitted to response times.")] = False,
     as_json: AsJsonOption = False,
 ) -> None:
     """Statistics, tables, figures and report of any number of logs."""
     from analysis.summary import analyze as feature
 
-    asked = feature.Request(paths=paths, out=out, paper=paper, columns=columns, rules=rules, codebook=codebook)
+    asked = feature.Request(
+        paths=paths, out=out, paper=paper, columns=columns, rules=rules, codebook=codebook, fits=fits
+    )
     statistics, said = feature.analyze(asked, tracked)
     for line in said:
         say(f"recoil: {line}")

@@ -362,7 +362,7 @@ def _felt(law: DiffusionLaw, instructions: Sequence[str], *, null: bool) -> Iter
 
 
 def _ratings(law: RatingsLaw) -> Iterator[str]:
-    yield from ratings_words(law, with_effect=True)
+    yield from ratings_words(law, tuple(law.mean), with_effect=True)
     yield "The effect is a factor on the distances of the methods' means from their common mean; 1 is the config."
 
 

@@ -35,7 +35,8 @@ from analysis.report.serial import as_csv
 from analysis.summary.comparison import compare
 from analysis.summary.results import StudyStatistics
 from analysis.summary.sections.content import ReportData
-from analysis.summary.sections.sections import obtained_text, write_report
+from analysis.summary.sections.published import obtained_text
+from analysis.summary.sections.sections import write_report
 from analysis.summary.summary import summarize
 from device.parameters import GunParameters
 from experiments.clock import VirtualClock
@@ -137,7 +138,7 @@ def reproduce(study: ReproducedStudy, out: Path, tell: Tell) -> Reproduced:
         _take_part(study, setup, code, out / "logs")
         tell(f"{code} {setup.config.experiment}")
     logs = read_logs([out / "logs"])
-    statistics = summarize(logs)
+    statistics = summarize(logs, fits=True)
     tell("statistics")
     odds = tuple(_odds(study))
     tell("odds of the published pattern")
@@ -212,9 +213,14 @@ def _odds(study: ReproducedStudy) -> Iterator[PatternOdds]:
         return
     for setup in study.setups:
         studies = _drawn(setup)
-        if studies is not None:
-            published = _published(studies, study.paper)
+        published = None if studies is None else _published(studies, study.paper)
+        if studies is not None and published is not None and not _lacking(studies, published):
             yield pattern_odds(studies, published, study.config.replications, study.seed)
+
+
+def _lacking(studies: Drawn, published: PublishedExperiment) -> list[str]:
+    """The methods of the paper that a study does without, so that its claims cannot recur."""
+    return [method for method in published.methods if method not in studies.methods]
 
 
 def _drawn(setup: Setup[DesignConfig]) -> Drawn | None:
@@ -247,7 +253,9 @@ def _report(
         panels=tuple(_panels(study.setups[0])),
         files=logs.files,
         provenance=provenance() | {"seed": str(study.seed), "participants": people, "gun": "simulated"},
+        beside=tuple(table_name(setup) for setup in study.answering) if study.reconstructed else (),
         notes=tuple(_notes(study)),
+        reconstructed=study.reconstructed,
     )
 
 
@@ -262,13 +270,25 @@ def _panels(setup: Setup[DesignConfig]) -> Iterator[Any]:
 def _notes(study: ReproducedStudy) -> Iterator[str]:
     """What the numbers rest on beyond the paper."""
     yield from study.notes
+    yield from _without_odds(study)
     gun = study.setups[0].gun
     coil = gun.coil
-    yield f"The coil after the pulse is {coil.drive_off}, its back-EMF is {coil.emf}; the paper leaves both open."
+    open_there, beyond = ("; the paper leaves both open", ", not in the paper") if study.paper else ("", "")
+    yield f"The coil after the pulse is {coil.drive_off}, its back-EMF is {coil.emf}{open_there}."
     for setup in study.setups:
-        keys = ", ".join(setup.config.assumed)
-        yield f"Assumed or fitted for {setup.config.experiment}, not in the paper: {keys}."
-    yield f"Assumed for the gun, not in the paper: {', '.join(gun.assumed)}."
+        if setup.config.assumed:
+            yield f"Assumed or fitted for {setup.config.experiment}{beyond}: {', '.join(setup.config.assumed)}."
+    if gun.assumed:
+        yield f"Assumed for the gun{beyond}: {', '.join(gun.assumed)}."
+
+
+def _without_odds(study: ReproducedStudy) -> Iterator[str]:
+    for setup in study.setups if study.paper else ():
+        studies = _drawn(setup)
+        lacking = [] if studies is None or study.paper is None else _lacking(studies, _published(studies, study.paper))
+        if lacking:
+            name, methods = setup.config.design, ", ".join(lacking)
+            yield f"No odds of the published pattern of {name}: the study has no {methods}, which its claims are about."
 
 
 HONESTY = (

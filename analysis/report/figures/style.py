@@ -18,6 +18,8 @@ from matplotlib.figure import Figure
 from matplotlib.image import imsave
 from matplotlib.layout_engine import ConstrainedLayoutEngine
 
+from analysis.report.section import PNG_DPI
+
 BLUE, ORANGE, GREEN, VERMILION = "#0072B2", "#E69F00", "#009E73", "#D55E00"
 PURPLE, SKY, YELLOW, BLACK = "#CC79A7", "#56B4E9", "#F0E442", "#000000"
 INK = "#333333"
@@ -27,7 +29,6 @@ METHOD_LINES: tuple[str | tuple[int, tuple[float, ...]], ...] = ("-", "--", "-."
 """The methods' lines without colour."""
 DIRECTION_MARKERS = {"forward": "o", "backward": "^"}
 
-PNG_DPI = 200
 
 _STYLE = {
     "font.family": "DejaVu Sans",

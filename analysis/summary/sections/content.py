@@ -1,4 +1,4 @@
-"""What a report is made of, and its pictures with their captions."""
+"""What a report is made of."""
 
 from __future__ import annotations
 
@@ -9,163 +9,9 @@ from pathlib import Path
 from analysis.logs.files import Problem
 from analysis.paper.paper import ComparisonRow
 from analysis.paper.recurrence import PatternOdds
-from analysis.report import apa
-from analysis.report.figures.shot import ShotPanel, figure_5
-from analysis.report.figures.style import named
-from analysis.report.section import Picture, Section
-from analysis.summary.figures.designs import figure_design
-from analysis.summary.figures.results import figure_8, figure_directions
-from analysis.summary.figures.trade import (
-    figure_conditional_accuracy,
-    figure_quantile_probability,
-    figure_response_times,
-    has_curve,
-    has_points,
-)
-from analysis.summary.results import DesignSummary, DirectionStatistics, Sensitivity, StudyStatistics, WithinStatistics
-from analysis.summary.sections.designs import figure_of
-from analysis.summary.sections.trade import CONDITIONAL_ACCURACY, QUANTILE_PROBABILITY
-from analysis.times.own_trials import TimeSpread
-from experiments.record.tables import is_rated
-
-FIGURE_5, FIGURE_8 = "figure-5", "figure-8"
-_DIRECTIONS_FIGURE, _TIMES_FIGURE = "figure-directions", "figure-response-times"
-
-_PANELS = " (a), sensitivity d′ (b) and criterion c (c)"
-_LINES = ", the absence of bias, and the d′ of somebody who is always right (log-linear correction)"
-_MARKS = "* p < .05, ** p < .01, *** p < .001, n.s. not significant"
-
-
-def write_figures(folder: Path, report: ReportData) -> None:
-    """Every figure that has data, under the stem that its picture names."""
-    statistics, direction = report.statistics, report.statistics.direction
-    if statistics.analysed:
-        figure_8(statistics, folder / FIGURE_8)
-    if direction is not None and direction.n:
-        figure_directions(direction, folder / _DIRECTIONS_FIGURE)
-        if direction.response_times.n:
-            figure_response_times(direction, folder / _TIMES_FIGURE)
-        if has_curve(direction):
-            figure_conditional_accuracy(direction, folder / CONDITIONAL_ACCURACY)
-        if has_points(direction):
-            figure_quantile_probability(direction, folder / QUANTILE_PROBABILITY)
-    for name, one in drawn_designs(statistics).items():
-        figure_design(one, folder / figure_of(name))
-    if report.panels:
-        figure_5(report.panels, folder / FIGURE_5)
-
-
-def drawn_designs(statistics: StudyStatistics) -> dict[str, DesignSummary]:
-    """The designs that have something to draw."""
-    found = statistics.designs.items()
-    return {name: one for name, one in found if any(question.cells for question in one.questions.values())}
-
-
-def results_picture(statistics: StudyStatistics) -> Picture:
-    """Figure 8 of the paper, of the experiments that have people."""
-    shown = statistics.analysed
-    counts = "; ".join(f"{EXPERIMENTS[name]}, {found.people}" for name, found in shown.items())
-    largest = max(found.n for found in shown.values())
-    tested = any(found.tukey for found in shown.values())
-    brackets = f" Brackets: Tukey's HSD with the repeated-measures error term ({_MARKS})." if tested else ""
-    caption = (
-        f"As the paper's Figure 8: {counts}. Bars and whiskers: mean and SD between participants; an SD may reach "
-        f"beyond the scale. {_crowd_words(largest)}{brackets}"
-    )
-    means = ". ".join(f"{EXPERIMENTS[name].capitalize()}: {_means_words(one, name)}" for name, one in shown.items())
-    tests = " ".join(_tests_words(one, name) for name, one in shown.items())
-    alt = f"Bar chart with one bar a rendering method and everybody's values. {means}. {tests}".strip()
-    return Picture(stem=FIGURE_8, caption=caption, alt=alt)
-
-
-def _crowd_words(largest: int) -> str:
-    if largest > 200:
-        return "Beyond 200 participants their distribution is shaded instead of drawn person by person."
-    return "Points: participants, each at the same place in every bar; thin lines join the values of one."
-
-
-def _means_words(found: WithinStatistics, experiment: str) -> str:
-    shown = apa.number if is_rated(experiment) else apa.percent
-    return ", ".join(f"{named(method)} {shown(mean)}" for method, mean in found.means.items())
-
-
-def _tests_words(found: WithinStatistics, experiment: str) -> str:
-    pairs = "; ".join(f"{named(c.a)} against {named(c.b)} {apa.p_value(c.p)}" for c in found.tukey or ())
-    return f"Tukey's tests, {EXPERIMENTS[experiment]}: {pairs}." if pairs else ""
-
-
-def directions_picture(found: DirectionStatistics) -> Picture:
-    """Correct rates by direction beside d′ and criterion."""
-    sensitive = any(found.sensitivity.values())
-    caption = (
-        f"Correct rate on forward and backward shots{_PANELS if sensitive else ''} of {found.people}. Large marks and "
-        f"whiskers: mean and SD. {_direction_crowd(found.n)} Dashed lines: guessing{_LINES if sensitive else ''}."
-    )
-    rates = "; ".join(_rates_words(found, method) for method in found.methods)
-    alt = f"Dot plot of the mean correct rates with everybody's values and a line at chance, 50 %. {rates}."
-    return Picture(stem=_DIRECTIONS_FIGURE, caption=caption, alt=alt)
-
-
-def _direction_crowd(n: int) -> str:
-    if n > 200:
-        return "Shaded: histograms over participants; in (a) forward to the left, backward to the right."
-    return "Small marks: participants; thin lines join the values of one."
-
-
-def _rates_words(found: DirectionStatistics, method: str) -> str:
-    forward, backward = found.means[method], found.backward.means.get(method)
-    rates = f"{named(method)} {apa.percent(forward)} forward, {apa.percent(backward)} backward"
-    return rates + _sensitivity_words(found.sensitivity[method])
-
-
-def _sensitivity_words(one: Sensitivity | None) -> str:
-    if one is None:
-        return ""
-    return f", d′ {apa.number(one.d_prime.mean)}, criterion {apa.number(one.criterion.mean)}"
-
-
-def response_times_picture(found: DirectionStatistics) -> Picture | None:
-    """Response times, if there is a valid one."""
-    times = found.response_times
-    if not times.n:
-        return None
-    medians = " Points: medians of the participants." if len(times.participants) <= 200 else ""
-    caption = (
-        f"Response times from the onset of the pulse, {times.n:,} valid times of {found.people}. "
-        f"(a) Share of the trials answered by then. (b) By direction, n forward / backward; boxes: quartiles, "
-        f"whiskers: 5 and 95 %.{medians}"
-    )
-    spreads = "; ".join(_spread_words(method, spread) for method, spread in times.methods.items() if spread)
-    alt = f"Cumulative distributions and box plots of the response times. {spreads}."
-    return Picture(stem=_TIMES_FIGURE, caption=caption, alt=alt)
-
-
-def _spread_words(method: str, spread: TimeSpread) -> str:
-    low, median, high = (apa.number(spread.percentiles[at]) for at in (25, 50, 75))
-    return f"{named(method)} median {median} s, quartiles {low} and {high} s"
-
-
-def shot_picture(panels: tuple[ShotPanel, ...]) -> Picture:
-    """Figure 5 of the paper."""
-    caption = (
-        "As the paper's Figure 5: force on the hand F (positive in the direction of recoil), displacement x, velocity "
-        "dx/dt and drive u of one simulated shot. Dashed lines and circles: ends of the stages. Arrow: estimated force "
-        "of the collision with the rear stop, apart from F."
-    )
-    landings = "; ".join(
-        f"column {chr(ord('a') + i)}, {panel.title}: {_landing_words(panel)}" for i, panel in enumerate(panels)
-    )
-    alt = f"Line charts of F, x, dx/dt and u over time, one column a friction. {landings}."
-    return Picture(stem=FIGURE_5, caption=caption, alt=alt)
-
-
-def _landing_words(panel: ShotPanel) -> str:
-    peaks = f"F up to {apa.number(float(panel.force_N.max()), 1)} N, x up to "
-    peaks += f"{apa.number(float(panel.displacement_m.max()) * 1e3, 1)} mm"
-    if not panel.collision_force_N >= 0.0:
-        return f"{peaks}, no landing"
-    return f"{peaks}, collision with {apa.number(panel.collision_force_N, 1 if panel.collision_force_N >= 1 else 2)} N"
-
+from analysis.report.figures.shot import ShotPanel
+from analysis.report.section import Section
+from analysis.summary.results import StudyStatistics
 
 EXPERIMENTS = {"direction": "direction recognition", "preference": "preference"}
 
@@ -174,8 +20,10 @@ EXPERIMENTS = {"direction": "direction recognition", "preference": "preference"}
 class ReportData:
     """What a report tells. `comparison` is None without a paper.
 
-    `files` are the logs used, `remarks` what there is to say of some; `provenance` is label -> text; `notes` are the
-    assumptions behind the numbers; `extra` are finished sections that follow the statistics.
+    `files` are the logs used, `remarks` what there is to say of some, `beside` the names of the tables beside the page;
+    `provenance` is label -> text; `notes` are the assumptions behind the numbers, `dropped` what rules left out of
+    trials; `extra` are finished sections that follow the results; the participants may be `reconstructed` from the
+    published numbers.
     """
 
     title: str
@@ -186,6 +34,9 @@ class ReportData:
     odds: tuple[PatternOdds, ...] = ()
     panels: tuple[ShotPanel, ...] = ()
     files: tuple[Path, ...] = ()
+    beside: tuple[str, ...] = ()
     provenance: Mapping[str, str] = field(default_factory=dict)
     notes: tuple[str, ...] = ()
+    dropped: tuple[str, ...] = ()
     extra: tuple[Section, ...] = ()
+    reconstructed: bool = False

@@ -1,4 +1,4 @@
-"""The section of a design: a picture, then for each question what each condition gave, and what differs."""
+"""A design in a report: what was found, in sentences; a picture; what each condition gave, and what differs."""
 
 from __future__ import annotations
 
@@ -9,6 +9,8 @@ from analysis.report import apa
 from analysis.report.figures.style import named
 from analysis.report.section import Picture, Section, Table
 from analysis.summary.results import ConditionSummary, DesignSummary, DesignTest, QuestionSummary
+from analysis.summary.sections.content import ReportData
+from analysis.summary.sections.pictures import figure_of
 from experiments.design.language import shown_level
 
 _TESTS = {
@@ -20,27 +22,110 @@ _TESTS = {
     "criterion": "criterion",
     "preferred": "preferred",
 }
+_ESTIMATES = frozenset(["d_prime", "criterion", "preferred"])
+_TOLD = 6
+"""So many conditions or pairs are told in a sentence; more are in the table."""
 
 
-def figure_of(name: str) -> str:
-    """The stem of a design's figure."""
-    return f"figure-{name}"
+def sections_of_designs(report: ReportData) -> Iterator[Section]:
+    """Each design's section."""
+    for name, found in report.statistics.designs.items():
+        yield _design_section(name, found)
 
 
-def design_section(name: str, found: DesignSummary) -> Section:
-    """What a design gave."""
-    people = f"{found.n} participant{'' if found.n == 1 else 's'}"
+def _design_section(name: str, found: DesignSummary) -> Section:
     return Section(
         title=found.title or name.capitalize(),
-        paragraphs=(
-            f"Design `{name}`: {people}. {_factors(found)}",
-            *_assumed(found),
-            *_words(found),
-            *_left_out(found),
-        ),
+        paragraphs=(_factors(found), *_assumed(found), *_words(found)),
         pictures=(_picture(name, found),) if any(question.cells for question in found.questions.values()) else (),
         tables=tuple(table for asked, question in found.questions.items() for table in _tables(asked, question)),
     )
+
+
+_PLANNED = (
+    "planned are those that the analysis fixes for a design before it sees any data; whoever registered another test "
+    "reports that"
+)
+
+
+def _standing(question: QuestionSummary, test: DesignTest) -> str:
+    """Whether a test was planned; a dash for an estimate."""
+    if test.name in _ESTIMATES:
+        return apa.NO_NUMBER
+    planned = {"friedman"} if question.kind == "ranking" else {"anova", "tukey"}
+    return "planned" if test.name in planned else "further"
+
+
+def result_sentences(name: str, found: DesignSummary, *, exact: bool = False) -> Iterator[str]:
+    """What a design gave, a paragraph a question; `exact`: with p-values in full."""
+    people = f"{found.n:,} {'synthetic ' if found.origin.synthetic else ''}participant{'' if found.n == 1 else 's'}"
+    for asked, question in found.questions.items():
+        if question.cells:
+            told = " ".join([_cells_words(question), *_tests_words(question, exact=exact)])
+            yield f"{found.title or name.capitalize()}, {asked} ({people}): {told}"
+
+
+def _cells_words(question: QuestionSummary) -> str:
+    cells = question.preferred or question.cells
+    shown = [f"{_condition(question, cell)} {_mean_and_spread(question, cell)}" for cell in cells]
+    if len(shown) > _TOLD:
+        ends = sorted(cells, key=lambda cell: (cell.mean is None, cell.mean or 0.0))
+        ends = [cell for cell in ends if cell.mean is not None] or ends
+        low, high = (
+            f"{_mean_and_spread(question, cell)} ({_condition(question, cell)})" for cell in (ends[0], ends[-1])
+        )
+        return f"{_mean_word(question)} of {len(cells)} conditions went from {low} to {high}."
+    return f"{_mean_word(question)}: {'; '.join(shown)}."
+
+
+def _mean_word(question: QuestionSummary) -> str:
+    if any(cell.right is not None for cell in question.cells):
+        return "right answers"
+    if question.preferred:
+        return "chosen, in the mean over people"
+    answers = tuple(next(iter(question.cells)).answers or ())
+    words = {"number": "geometric means", "ranking": "mean ranks"}
+    share = f"share of {answers[0]}" if answers else "share"
+    return share if question.kind in ("choice", "yes-no") else words.get(question.kind, "means (SD)")
+
+
+def _mean_and_spread(question: QuestionSummary, cell: ConditionSummary) -> str:
+    if cell.right is not None:
+        return f"{_mean(question, cell)} ({cell.right:,} of {cell.trials:,})"
+    return f"{_mean(question, cell)} ({apa.number(cell.sd)})" if question.kind == "rating" else _mean(question, cell)
+
+
+def _tests_words(question: QuestionSummary, *, exact: bool) -> Iterator[str]:
+    planned = [test for test in question.tests if _standing(question, test) == "planned"]
+    yield from (f"No test of {named(test.effect)}: {test.reason}." for test in planned if test.reason)
+    anovas = [_anova_words(test, exact=exact) for test in planned if test.name == "anova" and not test.reason]
+    if anovas:
+        yield f"ANOVA: {'; '.join(anovas)}."
+    yield from (_ranks_words(test, exact=exact) for test in planned if test.name == "friedman" and not test.reason)
+    pairs = [test for test in planned if test.name == "tukey"]
+    if len(pairs) > _TOLD:
+        below = sum(test.p is not None and test.p < 0.05 for test in pairs)
+        yield f"Planned comparisons (Tukey's HSD): {below} of {len(pairs)} pairs differed at p < .05."
+    elif pairs:
+        told = "; ".join(
+            f"{named(test.effect)}, q = {apa.number(test.statistic)}, {apa.p_value(test.p, exact=exact)}"
+            for test in pairs
+        )
+        yield f"Planned comparisons (Tukey's HSD): {told}."
+    d_prime = next((test for test in question.tests if test.name == "d_prime"), None)
+    if d_prime is not None:
+        yield f"All answers together gave d′ = {apa.number(d_prime.statistic)}."
+
+
+def _anova_words(test: DesignTest, *, exact: bool) -> str:
+    size = "" if test.size is None else f", generalised η² = {apa.below_one(test.size)}"
+    effect = "significant effect" if test.p is not None and test.p < 0.05 else "no significant effect"
+    return f"{effect} of {named(test.effect)}, {apa.f_test(test.statistic, test.df or (), test.p, exact=exact)}{size}"
+
+
+def _ranks_words(test: DesignTest, *, exact: bool) -> str:
+    told = f"χ² = {apa.number(test.statistic)}, {apa.p_value(test.p, exact=exact)}"
+    return f"Friedman's test of {named(test.effect)}: {told}."
 
 
 def _factors(found: DesignSummary) -> str:
@@ -58,7 +143,8 @@ def _words(found: DesignSummary) -> Iterator[str]:
         yield f"{name}: {said} answer{'' if said == 1 else 's'} in words; they stand in the logs."
 
 
-def _left_out(found: DesignSummary) -> tuple[str, ...]:
+def lacking_conditions(found: DesignSummary) -> tuple[str, ...]:
+    """Who is in no test of a question, and why."""
     return tuple(
         f"In no test of {asked}, as a condition is missing: {', '.join(question.left_out)}."
         for asked, question in found.questions.items()
@@ -72,14 +158,19 @@ def _picture(name: str, found: DesignSummary) -> Picture:
     parts += ["the SD between participants"] if len(scored) < len(found.questions) else []
     spread = f"Whiskers: {' of right answers, else '.join(parts)}."
     means = "; ".join(
-        f"{asked}: {', '.join(f'{_condition(cell)} {_mean(question, cell)}' for cell in question.cells)}"
+        f"{asked}: {', '.join(f'{_condition(question, cell)} {_mean(question, cell)}' for cell in question.cells)}"
         for asked, question in found.questions.items()
     )
     return Picture(stem=figure_of(name), caption=f"{found.title}. {spread}", alt=f"Means by condition. {means}")
 
 
-def _condition(cell: ConditionSummary) -> str:
-    return named(", ".join(shown_level(level) for level in cell.levels.values())) or "all"
+def _condition(question: QuestionSummary, cell: ConditionSummary) -> str:
+    """The levels of a condition; a number with the name of its factor."""
+    levels = (
+        shown_level(level) if isinstance(level, str) else f"{name} {shown_level(level)}"
+        for name, level in cell.levels.items()
+    )
+    return named(", ".join(levels)) or ("catch trials" if len(question.cells) > 1 else "all trials")
 
 
 def _mean(question: QuestionSummary, cell: ConditionSummary) -> str:
@@ -94,8 +185,10 @@ def _tables(name: str, question: QuestionSummary) -> Iterator[Table]:
     if question.cells:
         yield _conditions(f"{name} ({question.scale})" if question.scale else name, question)
     if question.tests:
-        header = ("Test", "Of", "Statistic", "df", "p", "Effect or interval")
-        yield Table(caption=f"{name}: tests", header=header, rows=tuple(map(_test, question.tests)))
+        header = ("Test", "Of", "Statistic", "df", "p", "Effect or interval", "Standing")
+        rows = tuple((*_test(test), _standing(question, test)) for test in question.tests)
+        note = f"; {_PLANNED}" if any(row[-1] == "planned" for row in rows) else ""
+        yield Table(caption=f"{name}: tests{note}", header=header, rows=rows)
 
 
 def _conditions(name: str, question: QuestionSummary) -> Table:

@@ -1,78 +1,174 @@
-"""The results of the two experiments as sections of a report, with their tables."""
+"""The results of the two experiments as sections of a report: what was found, in sentences and in tables."""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
 from itertools import islice
 
 from analysis.report import apa
 from analysis.report.figures.style import display_name
 from analysis.report.section import LISTED, SHOWN, Section, Table
+from analysis.stats.paired import PairedT
 from analysis.summary.results import ConfidenceInterval, DirectionStatistics, Pair, WithinStatistics
-from analysis.summary.sections.content import directions_picture, response_times_picture
-from analysis.times.own_trials import ResponseTimes
-
-_WITHIN = (
-    ". The CI is within-subject (Cousineau–Morey): it tells of differences between methods, not between people, and is "
-    "not cut at the ends of the scale"
-)
+from analysis.summary.sections.content import ReportData
+from analysis.summary.sections.pictures import directions_picture
 
 
-def tukey_tables(found: WithinStatistics, measure: str, scale: float, digits: int) -> tuple[Table, ...]:
-    """The pairs with their simultaneous intervals; no table where nothing was tested."""
-    if found.anova is None or not found.tukey:
+@dataclass(frozen=True, slots=True, kw_only=True)
+class PrintedMeasure:
+    """How the scores of an experiment are printed: `scale` times the stored value; `unit` of values, of differences."""
+
+    words: str
+    scale: float
+    digits: int
+    unit: str
+    unit_of_differences: str
+
+    def value(self, value: float) -> str:
+        """A single value."""
+        return f"{apa.number(self.scale * value, self.digits)}{self.unit}"
+
+    def mean(self, mean: float | None, sd: float | None) -> str:
+        """A mean with its SD, for a sentence."""
+        return mean_sd(mean, sd, self.scale, self.digits, self.unit)
+
+    def difference(self, value: float) -> str:
+        """The size of a difference."""
+        return f"{apa.number(self.scale * abs(value), self.digits)}{self.unit_of_differences}"
+
+    def interval(self, low: float, high: float) -> str:
+        """The ends of an interval, without a unit."""
+        return apa.interval(self.scale * low, self.scale * high, self.digits)
+
+
+PRINTED_MEASURES = {
+    "direction": PrintedMeasure(
+        words="the correct rate on forward shots",
+        scale=100.0,
+        digits=1,
+        unit=" %",
+        unit_of_differences=" percentage points",
+    ),
+    "preference": PrintedMeasure(words="the rating", scale=1.0, digits=2, unit="", unit_of_differences=""),
+}
+_WITHIN = "The 95 % CI is within-subject (Cousineau–Morey): it tells of differences between methods, not between people"
+_CUT = "; cut at the end of the scale, beyond which no mean lies"
+
+
+def effect_sentence(found: WithinStatistics, experiment: str, *, full: bool = False) -> str:
+    """What the ANOVA found, and the means; `full`: with the exact p and all effect sizes."""
+    printed = PRINTED_MEASURES[experiment]
+    means = _means_words(found, printed)
+    anova = found.anova
+    if anova is None:
+        return f"{means} There were too few participants or methods for a test."
+    if math.isnan(anova.p):
+        return f"{means} The {anova.name} is undefined: all scores are equal."
+    effect = "had a significant effect" if anova.p < 0.05 else "had no significant effect"
+    test = f"{apa.f_test(anova.F, anova.df, anova.p, exact=full)}{_sizes(found, full=full)}"
+    return f"The rendering method {effect} on {printed.words}, {test}. {means}"
+
+
+def _means_words(found: WithinStatistics, printed: PrintedMeasure) -> str:
+    """The means with their SDs; of one participant the values."""
+    if found.n == 1:
+        values = ", ".join(f"{display_name(m)} {printed.value(found.means[m])}" for m in found.methods)
+        return f"{printed.words[:1].upper()}{printed.words[1:]} of {found.people}: {values}."
+    means = ", ".join(f"{display_name(m)} {printed.mean(found.means[m], found.sds[m])}" for m in found.methods)
+    return f"Means (SD) of {printed.words}, {found.people}: {means}."
+
+
+def _sizes(found: WithinStatistics, *, full: bool) -> str:
+    """The effect sizes behind a comma, as far as there are any."""
+    size = found.supplement.effect_size.size if found.supplement else None
+    if size is None or size.partial_eta_squared is None:
+        return ""
+    partial = f", partial η² = {apa.below_one(size.partial_eta_squared)}"
+    if not full:
+        return partial
+    ends = "" if size.ci_90 is None else f", 90 % CI [{', '.join(map(apa.below_one, size.ci_90))}]"
+    return f"{partial}{ends}, generalised η² = {apa.below_one(size.generalized_eta_squared)}"
+
+
+def pairs_sentence(found: WithinStatistics, experiment: str, *, full: bool = False) -> str:
+    """The planned comparisons; empty where nothing was tested. `full`: with intervals, the exact p and d_z."""
+    if not found.tukey or found.supplement is None:
+        return ""
+    tests = zip(found.tukey, found.supplement.paired_t, strict=True)
+    pairs = "; ".join(_pair_words(pair, _tested(pair, t, experiment, full=full)) for pair, t in tests)
+    note = ", 95 % CIs simultaneous" if full else ""
+    return f"Planned comparisons (Tukey's HSD{note}): {pairs}."
+
+
+def _pair_words(pair: Pair, tested: str) -> str:
+    """The larger mean first."""
+    a, b = display_name(pair.a), display_name(pair.b)
+    if not pair.p < 0.05:
+        return f"{a} and {b} did not differ significantly, {tested}"
+    return f"{b} was above {a}, {tested}" if pair.difference < 0.0 else f"{a} was above {b}, {tested}"
+
+
+def _tested(pair: Pair, t: PairedT, experiment: str, *, full: bool) -> str:
+    """The p of a pair; `full`: after the size of the difference with its interval, before d_z."""
+    if not full:
+        return apa.p_value(pair.p)
+    printed = PRINTED_MEASURES[experiment]
+    low, high = (pair.ci_low, pair.ci_high) if pair.difference >= 0.0 else (-pair.ci_high, -pair.ci_low)
+    size = "" if t.d_z is None else f", d_z = {apa.number(abs(t.d_z))}"
+    amount = f"by {printed.difference(pair.difference)}, 95 % CI {printed.interval(low, high)}"
+    return f"{amount}, {apa.p_value(pair.p, exact=True)}{size}"
+
+
+def tukey_tables(found: WithinStatistics, experiment: str) -> tuple[Table, ...]:
+    """The planned pairs with their simultaneous intervals; no table where nothing was tested."""
+    if found.anova is None or not found.tukey or found.supplement is None:
         return ()
+    printed = PRINTED_MEASURES[experiment]
+    unit = printed.unit_of_differences.strip()
     rows = (
         (
             f"{display_name(c.a)} − {display_name(c.b)}",
-            apa.number(scale * c.difference, digits),
-            _interval_cell(c, scale, digits),
+            apa.number(printed.scale * c.difference, printed.digits),
+            printed.interval(c.ci_low, c.ci_high),
             apa.number(c.q),
             apa.p_cell(c.p),
+            apa.number(t.d_z),
         )
-        for c in found.tukey
+        for c, t in zip(found.tukey, found.supplement.paired_t, strict=True)
     )
-    df = found.anova.df[1]
     table = Table(
-        caption=f"Tukey's HSD of the {measure}, repeated-measures error term, {df} degrees of freedom",
-        header=("Pair", "Difference", "95 % CI, simultaneous", "q", "p"),
+        caption=f"Planned comparisons of {printed.words}{f' ({unit})' if unit else ''}: Tukey's HSD, repeated-measures "
+        f"error term, {found.anova.df[1]} degrees of freedom; d_z: mean difference over the SD of the differences",
+        header=("Pair", "Difference", "95 % CI, simultaneous", "q", "p", "d_z"),
         rows=tuple(rows),
     )
     return (table,)
 
 
-def means_table(found: WithinStatistics, scale: float, digits: int, unit: str) -> Table:
-    """Mean, SD and within-subject interval; the interval is left out where there is none."""
-    intervals = found.within_ci
-    rows = (
-        (
-            display_name(m),
-            f"{found.n:,}",
-            apa.number(scale * found.means[m], digits),
-            apa.number(scale * found.sds[m], digits),
-            *((_interval_cell(intervals[m], scale, digits),) if intervals else ()),
-        )
-        for m in found.methods
-    )
-    measure = "Correct rate on forward shots" if unit else "Rating"
-    return Table(
-        caption=f"{measure}, mean and SD over participants{_WITHIN if intervals else ''}",
-        header=("Method", "n", f"Mean{unit}", f"SD{unit}", *((f"95 % CI{unit}",) if intervals else ())),
-        rows=tuple(rows),
-    )
+def within_caption(found: WithinStatistics) -> str:
+    """What the within-subject intervals of a table are; empty where there are none."""
+    if found.within_ci is None or found.supplement is None:
+        return ""
+    low, high = found.supplement.diagnostics.scale
+    cut = any(ends.ci_low <= low or ends.ci_high >= high for ends in found.within_ci.values())
+    return f". {_WITHIN}{_CUT if cut else ''}"
 
 
-def _interval_cell(ends: Pair | ConfidenceInterval, scale: float, digits: int) -> str:
-    return apa.interval(scale * ends.ci_low, scale * ends.ci_high, digits)
+def _interval_cells(found: WithinStatistics, experiment: str, method: str) -> tuple[str, ...]:
+    """The cell of a method's interval; none where no method has one."""
+    ends: ConfidenceInterval | None = (found.within_ci or {}).get(method)
+    return () if ends is None else (PRINTED_MEASURES[experiment].interval(ends.ci_low, ends.ci_high),)
 
 
 def direction_means(found: DirectionStatistics) -> Table:
     """Rates of both directions, d′, criterion and response time."""
+    interval = ("95 % CI, forward [%]",) if found.within_ci else ()
     return Table(
-        caption="Both directions: mean (SD) over participants of rates, sensitivity and criterion; pooled median of "
-        "the valid response times",
-        header=("Method", "Forward", "Backward", "d′", "Criterion", "Response time [s]"),
+        caption="Correct rates, sensitivity d′ and criterion: mean (SD) over participants; pooled median of the valid "
+        f"response times, and their number{within_caption(found)}",
+        header=("Method", "Forward", *interval, "Backward", "d′", "Criterion", "Response time [s]"),
         rows=tuple(_direction_row(found, method) for method in found.methods),
     )
 
@@ -84,9 +180,10 @@ def _direction_row(found: DirectionStatistics, method: str) -> tuple[str, ...]:
     return (
         display_name(method),
         mean_sd(found.means[method], found.sds[method], 100.0, 1, " %"),
+        *_interval_cells(found, "direction", method),
         mean_sd(backward.means.get(method), backward.sds.get(method), 100.0, 1, " %"),
         *((mean_sd(one.mean, one.sd, 1.0, 2, "") for one in measures) if measures else (apa.NO_NUMBER, apa.NO_NUMBER)),
-        f"{apa.number(time.median)} (n = {time.n:,})" if time.n else apa.NO_NUMBER,
+        f"{apa.number(time.median)} ({time.n:,})" if time.n else apa.NO_NUMBER,
     )
 
 
@@ -108,18 +205,96 @@ def binomial_table(found: DirectionStatistics) -> Table:
             apa.percent(test.estimate),
             apa.interval(100.0 * test.ci_low, 100.0 * test.ci_high, 1),
             apa.p_cell(test.p),
+            apa.p_cell(test.clustering.p_adjusted),
         )
         for method, tests in found.binomial.items()
         for direction, test in tests.items()
     )
     return Table(
-        caption="Exact binomial tests against 50 %, trials pooled over participants (their clustering is ignored)",
-        header=("Method", "Direction", "Correct", "Rate", "95 % CI [%]", "p"),
+        caption="Exact binomial tests against 50 %, trials pooled over participants; the last column takes into "
+        "account that trials come in people",
+        header=("Method", "Direction", "Correct", "Rate", "95 % CI [%]", "p", "p, clustered"),
         rows=tuple(rows),
     )
 
 
-def direction_people(found: DirectionStatistics) -> Table:
+def preference_means(found: WithinStatistics) -> Table:
+    """Mean, SD and within-subject interval of the ratings; the interval is left out where there is none."""
+    printed = PRINTED_MEASURES["preference"]
+    rows = (
+        (
+            display_name(m),
+            apa.number(found.means[m], printed.digits),
+            apa.number(found.sds[m], printed.digits),
+            *_interval_cells(found, "preference", m),
+        )
+        for m in found.methods
+    )
+    return Table(
+        caption=f"Ratings of {found.people}{within_caption(found)}",
+        header=("Method", "Mean", "SD", *(("95 % CI",) if found.within_ci else ())),
+        rows=tuple(rows),
+    )
+
+
+_DIRECTION_NOTE = (
+    "The measure is the share of right answers on forward shots. Forward trials alone mix sensitivity with the "
+    "readiness to say forward, so d′ and criterion over both directions stand beside it (log-linear correction; a "
+    "criterion below 0 leans towards forward)."
+)
+
+
+def direction_section(report: ReportData) -> Iterator[Section]:
+    """Experiment 1: correct rates, sensitivity, planned comparisons, tests against guessing."""
+    found = report.statistics.direction
+    if found is None or not found.n:
+        return
+    yield Section(
+        title="Direction recognition",
+        paragraphs=(_DIRECTION_NOTE, f"{_binomial_sentence(found)} {found.binomial_note}"),
+        pictures=(directions_picture(found),),
+        tables=(direction_means(found), *tukey_tables(found, "direction"), binomial_table(found)),
+    )
+
+
+def preference_section(report: ReportData) -> Iterator[Section]:
+    """Experiment 2: ratings and planned comparisons."""
+    found = report.statistics.preference
+    if found is None or not found.n:
+        return
+    yield Section(
+        title="Preference",
+        paragraphs=("Ratings went from 0 (dislike very much) to 10 (like very much).",),
+        tables=(preference_means(found), *tukey_tables(found, "preference")),
+    )
+
+
+def _binomial_sentence(found: DirectionStatistics) -> str:
+    """Which rates differed from guessing."""
+    tests = [
+        (test.p < 0.05, f"{display_name(method)} {direction}, {apa.p_value(test.p)}")
+        for method, directions in found.binomial.items()
+        for direction, test in directions.items()
+    ]
+    parts = []
+    for differs, words in ((False, "no significant difference from 50 %"), (True, "a significant one from 50 %")):
+        shown = "; ".join(text for significant, text in tests if significant is differs)
+        parts += [f"{words} ({shown})"] if shown else []
+    return f"Exact binomial tests of the correct rates: {', and '.join(parts)}."
+
+
+def everybodys_values(report: ReportData) -> Iterator[Section]:
+    """The appendix' tables of each participant's values."""
+    direction, preference = report.statistics.direction, report.statistics.preference
+    tables = (
+        *((_direction_people(direction),) if direction and direction.n else ()),
+        *((_preference_people(preference),) if preference and preference.n else ()),
+    )
+    if tables:
+        yield Section(title="Every participant's values", tables=tables, appendix=True, folded=True)
+
+
+def _direction_people(found: DirectionStatistics) -> Table:
     """Forward and backward rate of each participant in one cell a method."""
     backward = found.backward.participants
     rows = tuple(
@@ -132,7 +307,7 @@ def _both(forward: float | None, backward: float | None) -> str:
     return f"{apa.percent(forward, 0)} / {apa.percent(backward, 0)}"
 
 
-def preference_people(found: WithinStatistics) -> Table:
+def _preference_people(found: WithinStatistics) -> Table:
     """The rating of each participant."""
     rows = tuple((code, *(apa.number(row[m], 1) for m in found.methods)) for code, row in _few(found))
     return _people_table(found, rows, "Rating of each participant", "preference_wide.csv")
@@ -147,120 +322,3 @@ def _people_table(found: WithinStatistics, rows: tuple[tuple[str, ...], ...], ca
     rest = f": the first {len(rows)} of {found.n:,}; everybody is in {file}" if len(rows) < found.n else ""
     header = ("Participant", *(display_name(method) for method in found.methods))
     return Table(caption=caption + rest, header=header, rows=rows)
-
-
-_DIRECTION_NOTE = (
-    "The measure is the paper's: correct answers on forward shots over forward shots. Forward trials alone mix "
-    "sensitivity with the readiness to say forward, so d′ and criterion over both directions stand beside it "
-    "(log-linear correction; a criterion below 0 leans towards forward)."
-)
-
-
-def direction_section(found: DirectionStatistics) -> Section:
-    """Experiment 1: correct rates, sensitivity, response times, tests."""
-    tests = tukey_tables(found, "correct rate, forward (percentage points)", 100.0, 1)
-    times = response_times_picture(found)
-    return Section(
-        title="Direction recognition",
-        paragraphs=(
-            _effect_sentence(found, "the correct rate on forward shots", 100.0, 1, " %"),
-            *_post_hoc_sentences(found, 100.0, 1, " percentage points"),
-            _DIRECTION_NOTE,
-            _binomial_sentence(found),
-            _times_sentence(found.response_times),
-        ),
-        pictures=(directions_picture(found), *((times,) if times else ())),
-        tables=(
-            means_table(found, 100.0, 1, " [%]"),
-            direction_means(found),
-            *tests,
-            binomial_table(found),
-            direction_people(found),
-        ),
-    )
-
-
-def preference_section(found: WithinStatistics) -> Section:
-    """Experiment 2: ratings and tests."""
-    tests = tukey_tables(found, "rating", 1.0, 2)
-    return Section(
-        title="Preference",
-        paragraphs=(
-            "Ratings go from 0 (dislike very much) to 10 (like very much).",
-            _effect_sentence(found, "the rating", 1.0, 2, ""),
-            *_post_hoc_sentences(found, 1.0, 2, ""),
-        ),
-        tables=(means_table(found, 1.0, 2, ""), *tests, preference_people(found)),
-    )
-
-
-def _effect_sentence(found: WithinStatistics, measure: str, scale: float, digits: int, unit: str) -> str:
-    means = ", ".join(
-        f"{display_name(m)} {mean_sd(found.means[m], found.sds[m], scale, digits, unit)}" for m in found.methods
-    )
-    means = f"Means (SD) of {measure} over {found.people}: {means}."
-    anova = found.anova
-    if anova is None:
-        return f"{means} There are too few participants or methods for a test."
-    if math.isnan(anova.p):
-        return f"{means} The {anova.name} is undefined: all scores are equal."
-    effect = "had a significant effect" if anova.p < 0.05 else "had no significant effect"
-    test = f"{apa.f_test(anova.F, anova.df, anova.p)}{_size(found)} ({anova.name})"
-    return f"{means} The rendering method {effect} on {measure}, {test}."
-
-
-def _size(found: WithinStatistics) -> str:
-    """The partial eta squared, if there is one."""
-    partial = found.supplement.effect_size.size.partial_eta_squared if found.supplement else None
-    return "" if partial is None else f", partial η² = {apa.below_one(partial)}"
-
-
-def _post_hoc_sentences(found: WithinStatistics, scale: float, digits: int, unit: str) -> tuple[str, ...]:
-    if not found.tukey:
-        return ()
-    pairs = "; ".join(_pair_words(comparison, scale, digits, unit) for comparison in found.tukey)
-    return (f"Post-hoc comparisons (95 % CIs are simultaneous): {pairs}. {found.tukey_error_term}",)
-
-
-def _pair_words(comparison: Pair, scale: float, digits: int, unit: str) -> str:
-    """The larger mean first."""
-    a, b = display_name(comparison.a), display_name(comparison.b)
-    low, high, p = comparison.ci_low, comparison.ci_high, comparison.p
-    if comparison.difference < 0.0:
-        a, b, low, high = b, a, -high, -low
-    amount = f"{apa.number(scale * abs(comparison.difference), digits)}{unit}"
-    tested = f"95 % CI {apa.interval(scale * low, scale * high, digits)}, {apa.p_value(p)}"
-    if not p < 0.05:
-        return f"{a} and {b} do not differ significantly (by {amount}, {tested})"
-    return f"{a} is above {b} by {amount}, {tested}"
-
-
-def _binomial_sentence(found: DirectionStatistics) -> str:
-    """Which rates differ from guessing; the reservation about pooling with it."""
-    tests = [
-        (
-            test.p < 0.05,
-            f"{display_name(method)} {direction} {test.successes} of {test.trials}, {apa.p_value(test.p)}",
-        )
-        for method, directions in found.binomial.items()
-        for direction, test in directions.items()
-    ]
-    parts = []
-    for differs, words in (
-        (False, "no significant difference from 50 %"),
-        (True, "a significant difference from 50 %"),
-    ):
-        named = "; ".join(text for significant, text in tests if significant is differs)
-        parts += [f"{words} ({named})"] if named else []
-    return f"Exact binomial tests of the correct rate: {', and '.join(parts)}. {found.binomial_note}"
-
-
-def _times_sentence(times: ResponseTimes) -> str:
-    """How many response times there are, and which are none."""
-    left_out = (
-        f"{times.left_out:,} answered trials have none: it was entered or corrected by the experimenter, whose hand "
-        "tells nothing of the participant's time."
-    )
-    if not times.n:
-        return f"There is no valid response time, and so no figure of them. {left_out}"
-    return f"Response times: {times.n:,} valid ones.{' ' + left_out if times.left_out else ''}"

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterator
 
 from analysis.report import apa
 from analysis.report.figures.style import display_name, named
@@ -11,17 +11,16 @@ from analysis.stats.diagnostics import Sphericity
 from analysis.stats.logit_model import Contrast
 from analysis.summary.results import (
     Assumption,
-    Diagnostics,
     DirectionStatistics,
     FriedmanTest,
     NamedModel,
     NotedEffectSize,
     NotedNormality,
     Pair,
-    StudyStatistics,
     Supplement,
     WithinStatistics,
 )
+from analysis.summary.sections.content import ReportData
 
 TITLES = {
     "direction": "Direction recognition: further statistics",
@@ -30,30 +29,29 @@ TITLES = {
 _LARGE = 1000.0
 
 
-def supplement_sections(statistics: StudyStatistics) -> Iterator[Section]:
-    """A section for each experiment that was tested."""
-    for name, title in TITLES.items():
-        found = statistics.of(name)
-        if found is not None and found.supplement is not None and found.anova is not None:
-            yield _section(title, found, found.supplement, found.anova.F)
+def supplement_sections(report: ReportData) -> Iterator[Section]:
+    """A section for each experiment that was tested; the first says how to read them."""
+    found = {name: one for name in TITLES if (one := report.statistics.of(name)) is not None and one.supplement}
+    for place, (name, one) in enumerate(found.items()):
+        if one.supplement is not None and one.anova is not None:
+            yield _section(TITLES[name], one, one.supplement, one.anova.F, noted=not place)
 
 
-def _section(title: str, found: WithinStatistics, beside: Supplement, F: float) -> Section:
+def _section(title: str, found: WithinStatistics, beside: Supplement, F: float, *, noted: bool) -> Section:
     answers = found if isinstance(found, DirectionStatistics) else None
     tables = [_pairs(found, beside), *((_model_table(answers), _clustering_table(answers)) if answers else ())]
-    tables.append(_ends(found, beside.diagnostics))
     return Section(
         title=title,
         paragraphs=(
             _corrected(F, beside.sphericity),
-            _sizes(beside.effect_size),
-            _friedman(beside.friedman),
-            _pairs_words(beside),
+            _sizes(beside.effect_size, noted=noted),
+            _friedman(beside.friedman, noted=noted),
+            *((_pairs_words(found.tukey_error_term, beside),) if noted else ()),
             *((_model_words(answers.model), named(answers.clustering_note)) if answers else ()),
-            _residuals(beside.diagnostics.normality),
+            _residuals(beside.diagnostics.normality, noted=noted),
+            *(_assumed(found.assumptions) if noted else ("How to read them, and what they assume: as above.",)),
         ),
         tables=tuple(table for table in tables if table.rows),
-        items=tuple(_assumption(entry) for entry in found.assumptions),
     )
 
 
@@ -77,37 +75,43 @@ def _mauchly(sphericity: Sphericity) -> str:
     return f"Mauchly's W = {W}, χ²({sphericity.df}) = {chi2}, {apa.p_value(sphericity.p)}"
 
 
-def _sizes(effect: NotedEffectSize) -> str:
+def _sizes(effect: NotedEffectSize, *, noted: bool) -> str:
     size = effect.size
     partial = f"Partial η² = {apa.below_one(size.partial_eta_squared)}"
     for level, ends in ((90, size.ci_90), (95, size.ci_95)):
         if ends is not None:
             partial += f", {level} % CI {apa.interval(*ends)}"
     told = f"{partial}; generalised η² = {apa.below_one(size.generalized_eta_squared)}."
-    return f"{told} {size.reason or effect.note}"
+    return f"{told} {size.reason or (effect.note if noted else '')}".rstrip()
 
 
-def _friedman(test: FriedmanTest) -> str:
+def _friedman(test: FriedmanTest, *, noted: bool) -> str:
     if test.reason:
         return f"Friedman test: {test.reason}"
     told = f"χ²({test.df}) = {apa.number(test.chi2)}, {apa.p_value(test.p)}"
-    return f"Friedman test: {told}, Kendall's W = {apa.below_one(test.kendall_w)}. {test.post_hoc.name}"
+    note = f" {test.post_hoc.name}" if noted else ""
+    return f"Friedman test: {told}, Kendall's W = {apa.below_one(test.kendall_w)}.{note}"
 
 
-def _residuals(noted: NotedNormality) -> str:
-    test = noted.test
+def _residuals(found: NotedNormality, *, noted: bool) -> str:
+    test = found.test
     if test.reason:
         return f"Residuals: {test.reason}"
     shape = f"skewness {apa.number(test.skewness)}, excess kurtosis {apa.number(test.excess_kurtosis)}"
-    return f"Residuals: W = {apa.below_one(test.W)}, {apa.p_value(test.p)}, {shape}. {noted.note}"
+    return f"Residuals: W = {apa.below_one(test.W)}, {apa.p_value(test.p)}, {shape}.{f' {found.note}' if noted else ''}"
 
 
-def _pairs_words(found: Supplement) -> str:
+_PLANNED = (
+    "The pairs in several ways. Planned, that is fixed by the analysis before it sees any data, is the first alone; "
+    "the others are checks on it. Whoever registered another test reports that."
+)
+
+
+def _pairs_words(error_term: str, found: Supplement) -> str:
     factors = found.bayes_factors
     return (
-        "The pairs in several ways. Tukey with the pooled error is the test of the main text. Tukey with a pair's own "
-        f"error: {found.tukey_paired_note} t: paired t-tests with Holm's correction, a check on both. "
-        f"{factors.note} Here r = {apa.number(factors.r, 3)}."
+        f"{_PLANNED} Planned: {error_term} Tukey with a pair's own error: {found.tukey_paired_note} t: paired t-tests "
+        f"with Holm's correction. {factors.note} Here r = {apa.number(factors.r, 3)}."
     )
 
 
@@ -115,8 +119,11 @@ def _pairs(found: WithinStatistics, beside: Supplement) -> Table:
     ranks, factors = beside.friedman.post_hoc.pairs, beside.bayes_factors.pairs
     pairs = zip(found.tukey or (), beside.tukey_paired, beside.paired_t, ranks, factors, strict=True)
     return Table(
-        caption="p-values of the pairs by four tests, effect size and Bayes factor",
-        header=("Pair", "Tukey, pooled error", "Tukey, own error", "t, Holm", "Signed ranks, Holm", "d_z", "BF10"),
+        caption="p-values of the pairs by the planned test and by three others, and the Bayes factor",
+        header=(
+            *("Pair", "Planned: Tukey, pooled error", "Tukey, own error", "t, Holm", "Signed ranks, Holm"),
+            "BF10",
+        ),
         rows=tuple(
             (
                 _pair(pooled),
@@ -124,7 +131,6 @@ def _pairs(found: WithinStatistics, beside: Supplement) -> Table:
                 apa.p_cell(own.p),
                 apa.p_cell(t.p_holm),
                 apa.p_cell(rank.p_holm),
-                apa.number(t.d_z),
                 bayes_cell(factor.bf10),
             )
             for pooled, own, t, rank, factor in pairs
@@ -177,16 +183,14 @@ def _model_table(found: DirectionStatistics) -> Table:
 
 def _clustering_table(found: DirectionStatistics) -> Table:
     return Table(
-        caption="Binomial tests against 50 % and what the clustering of the answers in people leaves of them",
-        header=("Method", "Direction", "Intraclass correlation", "Design effect", "p pooled", "p adjusted"),
+        caption="How the answers cluster in people",
+        header=("Method", "Direction", "Intraclass correlation", "Design effect"),
         rows=tuple(
             (
                 display_name(method),
                 direction,
                 apa.number(test.clustering.icc),
                 apa.number(test.clustering.design_effect),
-                apa.p_cell(test.p),
-                apa.p_cell(test.clustering.p_adjusted),
             )
             for method, tests in found.binomial.items()
             for direction, test in tests.items()
@@ -194,29 +198,6 @@ def _clustering_table(found: DirectionStatistics) -> Table:
     )
 
 
-def _ends(found: WithinStatistics, diagnostics: Diagnostics) -> Table:
-    return Table(
-        caption=f"Scores at the ends of the scale, and outliers. {diagnostics.outliers.rule}",
-        header=("Method", "At the floor", "At the ceiling", "Outliers"),
-        rows=tuple(
-            (
-                display_name(method),
-                str(diagnostics.floor[method]),
-                str(diagnostics.ceiling[method]),
-                _some(o.participant for o in diagnostics.outliers.found if o.method == method),
-            )
-            for method in found.methods
-        ),
-    )
-
-
-def _some(codes: Iterable[str], shown: int = 10) -> str:
-    """The first few codes, and how many more there are."""
-    people = list(codes)
-    more = f" and {len(people) - shown:,} more" if len(people) > shown else ""
-    return ", ".join(people[:shown]) + more if people else "none"
-
-
-def _assumption(entry: Assumption) -> str:
-    warning = f" Warning: {named(entry.warning)}." if entry.warning else ""
-    return f"Assumed: {entry.assumption}{warning}"
+def _assumed(assumptions: tuple[Assumption, ...]) -> tuple[str, ...]:
+    """What was taken for granted; where it does not hold, the quality of the data says so."""
+    return (f"Assumed: {' '.join(entry.assumption for entry in assumptions)}",) if assumptions else ()

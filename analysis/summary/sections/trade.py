@@ -9,6 +9,8 @@ from analysis.report.figures.style import display_name, named
 from analysis.report.section import Picture, Section, Table
 from analysis.summary.figures.trade import has_curve, has_points
 from analysis.summary.results import DirectionStatistics
+from analysis.summary.sections.content import ReportData
+from analysis.summary.sections.pictures import CONDITIONAL_ACCURACY, QUANTILE_PROBABILITY, response_times_picture
 from analysis.times.people import Mean
 from analysis.times.speed_accuracy import CellTrade, EZLeftOut, NoSpeedAccuracy, Parameter, SpeedAccuracy
 
@@ -25,10 +27,14 @@ def cells_of(trade: SpeedAccuracy) -> Iterator[tuple[str, CellTrade]]:
 
 
 def trade_tables(trade: SpeedAccuracy) -> Iterator[Table]:
-    """Every table; one without rows has nothing to say."""
+    """What was measured; a table without rows has nothing to say."""
     yield _accuracy(trade)
-    yield _scores(trade)
     yield _effects(trade)
+
+
+def model_tables(trade: SpeedAccuracy) -> Iterator[Table]:
+    """What scores and models make of it."""
+    yield _scores(trade)
     yield _ez(trade)
     if not trade.diffusion.reason:
         yield _diffusion(trade)
@@ -171,30 +177,43 @@ def _parameter(name: str) -> str:
 
 
 TITLE = "Speed and accuracy"
-CONDITIONAL_ACCURACY, QUANTILE_PROBABILITY = "figure-conditional-accuracy", "figure-quantile-probability"
+DETAILS = "Speed and accuracy: scores and models"
 
 
-def trade_section(found: DirectionStatistics) -> Section | None:
-    """The section, or the sentence why there is nothing to show."""
-    trade = found.speed_accuracy
-    if trade is None:
-        return None
+def trade_sections(report: ReportData) -> Iterator[Section]:
+    """Accuracy and times, or the sentence why there is nothing to show."""
+    found = report.statistics.direction
+    trade = None if found is None else found.speed_accuracy
     if isinstance(trade, NoSpeedAccuracy):
-        return Section(title=TITLE, paragraphs=(trade.reason or "", *_refused(trade)))
-    caveats = trade.caveats
-    return Section(
-        title=TITLE,
-        paragraphs=(
-            _used(found, trade),
-            f"{caveats['means']} Inverse efficiency score (IES): {_lower(caveats['inverse_efficiency_s'])} Balanced "
-            f"integration score (BIS): {caveats['balanced_integration']}",
-            *_unpaired(trade),
-            caveats["ez"],
-            *_fitted(trade),
-        ),
-        pictures=trade_pictures(found, trade),
-        tables=tuple(table for table in trade_tables(trade) if table.rows),
-    )
+        yield Section(title=TITLE, paragraphs=(trade.reason or "", *_refused(trade)))
+    elif found is not None and trade is not None:
+        times = response_times_picture(found)
+        yield Section(
+            title=TITLE,
+            paragraphs=(_used(found, trade), trade.caveats["means"], *_unpaired(trade)),
+            pictures=(*((times,) if times else ()), *trade_pictures(found, trade)),
+            tables=tuple(table for table in trade_tables(trade) if table.rows),
+        )
+
+
+def trade_details(report: ReportData) -> Iterator[Section]:
+    """The appendix' scores and models of the same trials."""
+    found = report.statistics.direction
+    trade = None if found is None else found.speed_accuracy
+    if isinstance(trade, SpeedAccuracy):
+        caveats = trade.caveats
+        yield Section(
+            title=DETAILS,
+            paragraphs=(
+                f"Inverse efficiency score (IES): {_lower(caveats['inverse_efficiency_s'])} Balanced integration score "
+                f"(BIS): {caveats['balanced_integration']}",
+                caveats["ez"],
+                *_fitted(trade),
+            ),
+            tables=tuple(table for table in model_tables(trade) if table.rows),
+            appendix=True,
+            folded=True,
+        )
 
 
 def _lower(text: str) -> str:
@@ -205,7 +224,7 @@ def _used(found: DirectionStatistics, trade: SpeedAccuracy) -> str:
     """How many trials count, and whose they are."""
     used = f"{trade.n:,} of {trade.answered:,} answered trials have a time of the answerer's own hand"
     synthetic = found.origin.synthetic
-    model = " All times are synthetic: they show the observer's model, and nothing of people." if synthetic else ""
+    model = " All times are synthetic: they show the model that made them, and nothing of people." if synthetic else ""
     return " ".join([f"{used} ({_count(trade.people)}).{model}", *_refused(trade)])
 
 

@@ -1,0 +1,169 @@
+"""The pictures of a report with their captions, and their files."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from analysis.report import apa
+from analysis.report.figures.shot import ShotPanel, figure_5
+from analysis.report.figures.style import named
+from analysis.report.section import Picture
+from analysis.summary.figures.designs import figure_design
+from analysis.summary.figures.results import figure_8, figure_directions
+from analysis.summary.figures.trade import (
+    figure_conditional_accuracy,
+    figure_quantile_probability,
+    figure_response_times,
+    has_curve,
+    has_points,
+)
+from analysis.summary.results import DesignSummary, DirectionStatistics, Sensitivity, StudyStatistics, WithinStatistics
+from analysis.summary.sections.content import EXPERIMENTS, ReportData
+from analysis.times.own_trials import TimeSpread
+from experiments.record.tables import is_rated
+
+_SHOT_FIGURE, _RESULTS_FIGURE = "figure-shot", "figure-results"
+_DIRECTIONS_FIGURE, _TIMES_FIGURE = "figure-directions", "figure-response-times"
+CONDITIONAL_ACCURACY, QUANTILE_PROBABILITY = "figure-conditional-accuracy", "figure-quantile-probability"
+
+_PANELS = " (a), sensitivity d′ (b) and criterion c (c)"
+_LINES = ", the absence of bias, and the d′ of somebody who is always right (log-linear correction)"
+_MARKS = "* p < .05, ** p < .01, *** p < .001, n.s. not significant"
+
+
+def write_figures(folder: Path, report: ReportData) -> None:
+    """Every figure that has data, under the stem that its picture names."""
+    statistics, direction = report.statistics, report.statistics.direction
+    if statistics.analysed:
+        figure_8(statistics, folder / _RESULTS_FIGURE)
+    if direction is not None and direction.n:
+        figure_directions(direction, folder / _DIRECTIONS_FIGURE)
+        if direction.response_times.n:
+            figure_response_times(direction, folder / _TIMES_FIGURE)
+        if has_curve(direction):
+            figure_conditional_accuracy(direction, folder / CONDITIONAL_ACCURACY)
+        if has_points(direction):
+            figure_quantile_probability(direction, folder / QUANTILE_PROBABILITY)
+    for name, one in drawn_designs(statistics).items():
+        figure_design(one, folder / figure_of(name))
+    if report.panels:
+        figure_5(report.panels, folder / _SHOT_FIGURE)
+
+
+def figure_of(name: str) -> str:
+    """The stem of a design's figure."""
+    return f"figure-{name}"
+
+
+def drawn_designs(statistics: StudyStatistics) -> dict[str, DesignSummary]:
+    """The designs that have something to draw."""
+    found = statistics.designs.items()
+    return {name: one for name, one in found if any(question.cells for question in one.questions.values())}
+
+
+def results_picture(statistics: StudyStatistics, *, compared: bool) -> Picture:
+    """Means, SDs and everybody, of the experiments that have people; `compared`: with the paper's Figure 8."""
+    shown = statistics.analysed
+    counts = "; ".join(f"{EXPERIMENTS[name]}, {found.people}" for name, found in shown.items())
+    largest = max(found.n for found in shown.values())
+    tested = any(found.tukey for found in shown.values())
+    brackets = f" Brackets: Tukey's HSD with the repeated-measures error term ({_MARKS})." if tested else ""
+    opening = f"As in the paper's Figure 8: {counts}" if compared else f"{counts[:1].upper()}{counts[1:]}"
+    caption = (
+        f"{opening}. Bars{' and whiskers: mean and SD between' if largest > 1 else ': the values of the'} participants"
+        f"{'; an SD may reach beyond the scale' if largest > 1 else ''}. {_crowd_words(largest)}{brackets}"
+    )
+    means = ". ".join(f"{EXPERIMENTS[name].capitalize()}: {_means_words(one, name)}" for name, one in shown.items())
+    tests = " ".join(_tests_words(one, name) for name, one in shown.items())
+    alt = f"Bar chart with one bar a rendering method and everybody's values. {means}. {tests}".strip()
+    return Picture(stem=_RESULTS_FIGURE, caption=caption, alt=alt)
+
+
+def _crowd_words(largest: int) -> str:
+    if largest > 200:
+        return "Beyond 200 participants their distribution is shaded instead of drawn person by person."
+    return "Points: participants, each at the same place in every bar; thin lines join the values of one."
+
+
+def _means_words(found: WithinStatistics, experiment: str) -> str:
+    shown = apa.number if is_rated(experiment) else apa.percent
+    return ", ".join(f"{named(method)} {shown(mean)}" for method, mean in found.means.items())
+
+
+def _tests_words(found: WithinStatistics, experiment: str) -> str:
+    pairs = "; ".join(f"{named(c.a)} against {named(c.b)} {apa.p_value(c.p)}" for c in found.tukey or ())
+    return f"Tukey's tests, {EXPERIMENTS[experiment]}: {pairs}." if pairs else ""
+
+
+def directions_picture(found: DirectionStatistics) -> Picture:
+    """Correct rates by direction beside d′ and criterion."""
+    sensitive = any(found.sensitivity.values())
+    caption = (
+        f"Correct rate on forward and backward shots{_PANELS if sensitive else ''} of {found.people}. Large marks and "
+        f"whiskers: mean and SD. {_direction_crowd(found.n)} Dashed lines: guessing{_LINES if sensitive else ''}."
+    )
+    rates = "; ".join(_rates_words(found, method) for method in found.methods)
+    alt = f"Dot plot of the mean correct rates with everybody's values and a line at chance, 50 %. {rates}."
+    return Picture(stem=_DIRECTIONS_FIGURE, caption=caption, alt=alt)
+
+
+def _direction_crowd(n: int) -> str:
+    if n > 200:
+        return "Shaded: histograms over participants; in (a) forward to the left, backward to the right."
+    return "Small marks: participants; thin lines join the values of one."
+
+
+def _rates_words(found: DirectionStatistics, method: str) -> str:
+    forward, backward = found.means[method], found.backward.means.get(method)
+    rates = f"{named(method)} {apa.percent(forward)} forward, {apa.percent(backward)} backward"
+    return rates + _sensitivity_words(found.sensitivity[method])
+
+
+def _sensitivity_words(one: Sensitivity | None) -> str:
+    if one is None:
+        return ""
+    return f", d′ {apa.number(one.d_prime.mean)}, criterion {apa.number(one.criterion.mean)}"
+
+
+def response_times_picture(found: DirectionStatistics) -> Picture | None:
+    """Response times, if there is a valid one."""
+    times = found.response_times
+    if not times.n:
+        return None
+    medians = " Points: medians of the participants." if len(times.participants) <= 200 else ""
+    caption = (
+        f"Response times from the onset of the pulse, {times.n:,} valid times of {found.people}. "
+        f"(a) Share of the trials answered by then. (b) By direction, n forward / backward; boxes: quartiles, "
+        f"whiskers: 5 and 95 %.{medians}"
+    )
+    spreads = "; ".join(_spread_words(method, spread) for method, spread in times.methods.items() if spread)
+    alt = f"Cumulative distributions and box plots of the response times. {spreads}."
+    return Picture(stem=_TIMES_FIGURE, caption=caption, alt=alt)
+
+
+def _spread_words(method: str, spread: TimeSpread) -> str:
+    low, median, high = (apa.number(spread.percentiles[at]) for at in (25, 50, 75))
+    return f"{named(method)} median {median} s, quartiles {low} and {high} s"
+
+
+def shot_picture(panels: tuple[ShotPanel, ...], *, compared: bool) -> Picture:
+    """One shot's course; `compared`: with the paper's Figure 5."""
+    as_there = ", as in the paper's Figure 5" if compared else ""
+    caption = (
+        "Force on the hand F (positive in the direction of recoil), displacement x, velocity dx/dt and drive u of one "
+        f"simulated shot{as_there}. Dashed lines and circles: ends of the stages. Arrow: estimated force of the "
+        "collision with the rear stop, apart from F."
+    )
+    landings = "; ".join(
+        f"column {chr(ord('a') + i)}, {panel.title}: {_landing_words(panel)}" for i, panel in enumerate(panels)
+    )
+    alt = f"Line charts of F, x, dx/dt and u over time, one column a friction. {landings}."
+    return Picture(stem=_SHOT_FIGURE, caption=caption, alt=alt)
+
+
+def _landing_words(panel: ShotPanel) -> str:
+    peaks = f"F up to {apa.number(float(panel.force_N.max()), 1)} N, x up to "
+    peaks += f"{apa.number(float(panel.displacement_m.max()) * 1e3, 1)} mm"
+    if not panel.collision_force_N >= 0.0:
+        return f"{peaks}, no landing"
+    return f"{peaks}, collision with {apa.number(panel.collision_force_N, 1 if panel.collision_force_N >= 1 else 2)} N"

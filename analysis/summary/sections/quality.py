@@ -1,0 +1,90 @@
+"""How good the data are: times, ends of the scale, outliers, dropped trials, and assumptions that do not hold."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator
+
+from analysis.report.figures.style import display_name, named
+from analysis.report.section import Section, Table, shortened
+from analysis.stats.diagnostics import OUTLIER_RULE
+from analysis.summary.results import WithinStatistics
+from analysis.summary.sections.content import EXPERIMENTS, ReportData
+from analysis.summary.sections.designs import lacking_conditions
+from analysis.summary.summary import UNDEFINED
+from analysis.times.own_trials import ResponseTimes
+
+
+def quality_section(report: ReportData) -> Iterator[Section]:
+    """What a reader has to know of the data before believing the tests."""
+    statistics = report.statistics
+    times = () if statistics.direction is None else (_times_sentence(statistics.direction.response_times),)
+    tables = tuple(table for table in (_ends(report),) if table.rows)
+    items = shortened([*_warnings(report), *report.dropped, *_of_designs(report)], "warnings")
+    if statistics.analysed or items:
+        yield Section(title="Data quality", paragraphs=times, tables=tables, items=items)
+
+
+def _of_designs(report: ReportData) -> Iterator[str]:
+    """Who lacks a condition of a design."""
+    for one in report.statistics.designs.values():
+        yield from (f"{one.title}: {text}" for text in lacking_conditions(one))
+
+
+def _warnings(report: ReportData) -> Iterator[str]:
+    """Those of the statistics, and assumptions that do not hold without changing which number to read."""
+    for warning in report.statistics.warnings:
+        if UNDEFINED not in warning:
+            yield f"Warning: {named(warning)}."
+    for name, found in report.statistics.analysed.items():
+        for entry in found.assumptions:
+            if entry.warning and not entry.serious:
+                yield f"{EXPERIMENTS[name].capitalize()}: {named(entry.warning)}."
+
+
+def undefined_numbers(report: ReportData) -> Iterator[Section]:
+    """The appendix' list of the numbers that data like these do not define."""
+    found = [warning for warning in report.statistics.warnings if UNDEFINED in warning]
+    if found:
+        listed = shortened([f"{warning}." for warning in found], "numbers")
+        yield Section(title="Numbers that are undefined here", items=listed, appendix=True, folded=True)
+
+
+def _times_sentence(times: ResponseTimes) -> str:
+    """How many response times there are, and which are none."""
+    left_out = (
+        f"{times.left_out:,} answered trials have none: it was entered or corrected by the experimenter, whose hand "
+        "tells nothing of the participant's time."
+    )
+    if not times.n:
+        return f"There is no valid response time, and so no figure of them. {left_out}"
+    return f"There are {times.n:,} valid response times.{' ' + left_out if times.left_out else ''}"
+
+
+def _ends(report: ReportData) -> Table:
+    rows = tuple(row for name, one in report.statistics.analysed.items() for row in _ends_rows(EXPERIMENTS[name], one))
+    return Table(
+        caption=f"Participants whose score lies at an end of the scale, and outliers. {OUTLIER_RULE}",
+        header=("Experiment", "Method", "At the floor", "At the ceiling", "Outliers"),
+        rows=rows,
+    )
+
+
+def _ends_rows(name: str, found: WithinStatistics) -> Iterator[tuple[str, ...]]:
+    if found.supplement is None:
+        return
+    diagnostics = found.supplement.diagnostics
+    for method in found.methods:
+        yield (
+            name.capitalize(),
+            display_name(method),
+            str(diagnostics.floor[method]),
+            str(diagnostics.ceiling[method]),
+            _some(o.participant for o in diagnostics.outliers.found if o.method == method),
+        )
+
+
+def _some(codes: Iterable[str], shown: int = 10) -> str:
+    """The first few codes, and how many more there are."""
+    people = list(codes)
+    more = f" and {len(people) - shown:,} more" if len(people) > shown else ""
+    return ", ".join(people[:shown]) + more if people else "none"
