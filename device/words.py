@@ -7,6 +7,9 @@ and no config can lift the limit.
 from __future__ import annotations
 
 import math
+import re
+from collections import Counter
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 from numbers import Integral, Real
 from typing import Literal, Protocol, TypeGuard, get_args
@@ -22,8 +25,50 @@ MAX_EFFECT = 123
 """Waveforms in the library of the vibration driver (DRV2605)."""
 
 
+QUOTED = 200
+"""Characters of a value that a message quotes."""
+_LONG_QUOTE = re.compile(rf"""(?<!\w)(['"])([^'"\n]{{{QUOTED}}})[^'"\n]+\1(?!\w)""")
+_LONG_WORD = re.compile(rf"([^\s/\\]{{{QUOTED}}})[^\s/\\]{{100,}}")
+_PARTICULARS = re.compile(r"""'[^'\n]*'|"[^"\n]*"|\S*[/\\]\S*|\S+\.[a-z]\w*|\d[\d.,]*""")
+_LIKE = 5
+
+
+def cut_values(message: str) -> str:
+    """A message with long values, in quotes or in one word, cut; names of files, at most 255 characters, stay whole.
+
+    >>> len(cut_values(f"{'9' * 5000} is no trial"))
+    231
+    """
+    short = _LONG_QUOTE.sub(lambda found: f"{found[1]}{found[2]}… ({len(found[0]) - 2} characters){found[1]}", message)
+    return _LONG_WORD.sub(lambda found: f"{found[1]}… ({len(found[0])} characters)", short)
+
+
+def few_of_each(messages: Iterable[str]) -> Iterator[str]:
+    """The first five messages of each kind, and how many more there are: files, numbers and quotes make no kind.
+
+    >>> list(few_of_each(f"P{n}: no answer" for n in range(200)))[-2:]
+    ['P4: no answer', '... and 195 more like it']
+    """
+    seen: Counter[str] = Counter()
+    for message in messages:
+        kind = _PARTICULARS.sub("", message)
+        seen[kind] += 1
+        if seen[kind] <= _LIKE:
+            yield message
+    for kind, count in seen.items():
+        if count > _LIKE:
+            said = kind.rpartition(": ")[2] if len(seen) > 1 else ""
+            yield f"... and {count - _LIKE} more like it{f' ({said.strip()})' if said else ''}"
+
+
 class RecoilError(Exception):
-    """Anything that goes wrong and has a message for people: the root of all errors of this product."""
+    """Anything that goes wrong and has a message for people: the root of all errors of this product.
+
+    A value that the message quotes is cut at 200 characters.
+    """
+
+    def __init__(self, *args: object) -> None:
+        super().__init__(*(cut_values(one) if isinstance(one, str) else one for one in args))
 
 
 class DeviceError(RecoilError):

@@ -11,7 +11,7 @@ import typer
 
 import recoil
 from analysis.report.terminal import INTERRUPTED, UNUSABLE, say
-from device.words import RecoilError
+from device.words import RecoilError, few_of_each
 from recoil.commands import guns, numbers, predictions, sessions
 
 app = typer.Typer(
@@ -32,6 +32,7 @@ COMMANDS = (
     sessions.rebuild,
     numbers.analyze,
     numbers.audit,
+    numbers.grim,
     predictions.power,
     predictions.design,
     guns.simulate,
@@ -79,7 +80,7 @@ def main() -> None:
         say(f"recoil: {error.filename or 'system'}: {error.strerror or error}")
         sys.exit(UNUSABLE)
     except RecoilError as error:
-        say("\n".join(f"recoil: {line}" for line in str(error).splitlines()))
+        say("\n".join(f"recoil: {line}" for line in few_of_each(str(error).splitlines())))
         sys.exit(UNUSABLE)
 
 

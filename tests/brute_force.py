@@ -17,9 +17,10 @@ from typing import TypeVar
 import mpmath
 import numpy as np
 
+from analysis.paper.audit.binomial import binomial_p
 from analysis.paper.audit.freedom import degrees_of_freedom
 from analysis.paper.audit.means import debit, grim, grimmer, percent_of_count
-from analysis.paper.audit.p_values import binomial_p, p_against_statistic
+from analysis.paper.audit.p_values import p_against_statistic
 from analysis.paper.audit.printed import CheckResult
 from analysis.paper.audit.tukey_pattern import ClaimedComparison, tukey_pattern
 from analysis.paper.audit.variance_ratios import between_f, repeated_f
@@ -57,7 +58,7 @@ class Printed:
 
 def expected(texts: Hashable, plain: Printed, readings: Iterable[Printed] = ()) -> str:
     if texts in plain.mixed:
-        return "attainable" if texts in plain.by_mode[0] and texts in plain.by_mode[1] else "only under a reading"
+        return "attainable" if texts in plain.by_mode[0] or texts in plain.by_mode[1] else "only under a reading"
     rescued = any(texts in reading.mixed for reading in readings)
     return "only under a reading" if rescued else "not attainable"
 

@@ -9,10 +9,10 @@ from pathlib import Path
 
 import pytest
 
+from analysis.paper.audit.binomial import binomial_p
 from analysis.paper.audit.claims import AuditFinding
 from analysis.paper.audit.freedom import degrees_of_freedom
-from analysis.paper.audit.means import debit, grim, grimmer
-from analysis.paper.audit.p_values import binomial_p
+from analysis.paper.audit.means import debit, grim, grimmer, percent_of_count
 from analysis.paper.audit.page import (
     ELSEWHERE,
     counts,
@@ -139,6 +139,34 @@ def test_a_sound_paper_ends_with_0_and_an_example_of_another_field_is_told(recoi
     done = recoil("audit", CONFIGS / "examples" / "audit.toml")
     assert done.returncode == 1
     assert "7.19 is not attainable" in done.stdout
+
+
+def test_a_tie_is_told_with_its_last_digit_and_the_convention() -> None:
+    text = " ".join(sentences(of(percent_of_count("13%", 1, 8))))
+    assert text.startswith("1 of 8, 13% is attainable: 1 of 8 is 12.5 %, printed half up.")
+    assert sentences(of(percent_of_count("14%", 1, 8)))[0].startswith("1 of 8 people are 12.5 %, not 14%")
+
+
+@pytest.mark.parametrize(
+    ("options", "code", "said"),
+    [
+        (["--mean", "3.48", "--sd", "1.12", "--n", "23", "--scale", "1-5"], 0, "mean: attainable"),
+        (["--mean", "5.19", "--sd", "1.1", "--n", "28"], 1, "SD = 1.1 is not judged, since no data have that mean"),
+        (["--mean", "0.35", "--sd", "0.18", "--n", "20", "--scale", "0-1"], 1, "it would have to be SD 0.489"),
+        (["--mean", "3,47", "--n", "23"], 2, "--mean: '3,47' is no printed number (a comma? write '3.47')"),
+        (["--mean", "3.47", "--n", "23", "--scale", "five"], 2, "--scale: 'five' is no scale"),
+    ],
+)
+def test_one_line_judges_one_mean(recoil: Recoil, options: list[str], code: int, said: str) -> None:
+    done = recoil("grim", *options)
+    assert (done.returncode, said in done.stdout + done.stderr) == (code, True), done
+
+
+def test_the_line_for_programs_has_both_findings(recoil: Recoil) -> None:
+    done = recoil("grim", "--mean", "3.48", "--sd", "1.12", "--n", "23", "--scale", "1-5", "--json")
+    found = json.loads(done.stdout)
+    assert [found[key]["verdict"] for key in ("mean", "sd")] == ["attainable", "attainable"]
+    assert sum(map(Fraction, found["sd"]["data"][0])) == 80
 
 
 @pytest.mark.parametrize(

@@ -10,6 +10,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from analysis.paper.audit.binomial import binomial_p
 from analysis.paper.audit.freedom import Term, total
 from analysis.paper.audit.lattices import (
     BudgetError,
@@ -21,8 +22,8 @@ from analysis.paper.audit.lattices import (
     search_rows,
     within_rows,
 )
-from analysis.paper.audit.means import grimmer
-from analysis.paper.audit.p_values import binomial_p, p_against_statistic, p_bounds
+from analysis.paper.audit.means import grim, grimmer
+from analysis.paper.audit.p_values import p_against_statistic, p_bounds
 from analysis.paper.audit.printed import (
     NONE_EXISTS,
     UNKNOWN,
@@ -84,7 +85,9 @@ def test_verdicts_follow_from_attempts() -> None:
         return lambda r: DataExistence(True) if r in {*roundings, Rounding.ANY} else NONE_EXISTS
 
     both = under(Rounding.HALF_UP, Rounding.HALF_EVEN)
-    assert judge_readings(both).verdict == "attainable"  # type: ignore[arg-type]
+    assert (judge_readings(both).verdict, judge_readings(both).rounding) == ("attainable", "")  # type: ignore[arg-type]
+    alone = judge_readings(under(Rounding.HALF_EVEN))  # type: ignore[arg-type]
+    assert (alone.verdict, alone.rounding) == ("attainable", "rounding half to even")
     assert judge_readings(under(Rounding.TRUNCATION)).readings == ("truncation",)  # type: ignore[arg-type]
     assert judge_readings(under()).readings == ("roundings mixed",)  # type: ignore[arg-type]
     assert judge_readings(lambda _: NONE_EXISTS).verdict == "not attainable"
@@ -157,6 +160,13 @@ def test_totals_take_the_rounding_of_their_parts() -> None:
         (lambda: grimmer("1.0", "1.0", 1), "n - 1"),
         (lambda: grimmer("1.0", "1.0", 5, low="1", high="2.5"), "whole number of steps"),
         (lambda: binomial_p("0.1", 5, chance="1"), "chance"),
+        (lambda: binomial_p("0.1", 5, chance="1/0"), "chance"),
+        (lambda: binomial_p("0.1", 5, chance="1e-999999999"), "chance"),
+        (lambda: binomial_p("0.1", 1_000_001), "at most 1,000,000"),
+        (lambda: grim("3.47", 10**9), "at most 1,000,000"),
+        (lambda: grim("3,47", 23), r"a comma\? write '3.47'"),
+        (lambda: grim("1,234.5", 23), "no mark between thousands"),
+        (lambda: grim("9" * 5_000, 23), "at most 40 characters, not 5000"),
         (lambda: binomial_p("0.1", 5, counts=[6]), "counts"),
         (lambda: p_against_statistic("t", "< 2", ["3"], ".1"), "not the bound"),
         (lambda: p_against_statistic("t", "2", [], ".1"), "degrees of freedom"),

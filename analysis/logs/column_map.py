@@ -20,7 +20,6 @@ from __future__ import annotations
 
 import csv
 import io
-import re
 from collections import Counter
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
@@ -29,6 +28,7 @@ from typing import Annotated, Literal, Self
 from pydantic import AfterValidator, Field, model_validator
 
 from analysis.logs.files import BadLogError
+from analysis.logs.patterns import Pattern, group_in, groups_in
 from analysis.logs.texts import CsvRecord
 from experiments.config.door import Model
 from experiments.design.language import NumberScale
@@ -41,10 +41,7 @@ MEASURES = {"direction": ("method", "direction", "response"), "preference": ("me
 
 
 def _with_one_group(pattern: str) -> str:
-    try:
-        groups = re.compile(pattern).groups
-    except re.error as error:
-        raise ValueError(f"must be a regular expression ({error})") from error
+    groups = groups_in(pattern)
     if groups != 1:
         raise ValueError(f"has {groups} groups; it must have one, which is the code")
     return pattern
@@ -63,7 +60,7 @@ class ParticipantMapping(Model):
     """Where the participant's code stands."""
 
     column: ShortText | None = None
-    file_name: Annotated[ShortText, AfterValidator(_with_one_group)] | None = None
+    file_name: Annotated[Pattern, Field(min_length=1), AfterValidator(_with_one_group)] | None = None
 
     @model_validator(mode="after")
     def _one_of_both(self) -> Self:
@@ -270,11 +267,11 @@ def _participant(line: _Line, file_name: str, mapping: ColumnMap) -> str:
     if mapping.participant.column is not None:
         code = line.cells[mapping.participant.column]
     else:
-        match = re.search(mapping.participant.file_name or "", file_name)
-        if match is None or match[1] is None:
+        found = group_in(file_name, mapping.participant.file_name or "()")
+        if not found:
             rule = f"(rule: participant.file_name = {mapping.participant.file_name!r} finds it)"
             raise BadLogError(f"the name has no participant's code {rule}")
-        code = match[1]
+        code = found
     return mapping.values.participant.get(code, code)
 
 

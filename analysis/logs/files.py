@@ -23,7 +23,7 @@ class BadLogError(RecoilError):
 
     def __init__(self, message: str, line: int | None = None, column: str | None = None) -> None:
         super().__init__(message)
-        self.message, self.line, self.column = message, line, column
+        self.message, self.line, self.column = str(self), line, column
 
     def of(self, file: Path, participant: str, experiment: str, study: str) -> Problem:
         """The same as it leaves the room: in which file, whose log it was, of which experiment."""

@@ -26,7 +26,9 @@ def _is_share(text: str) -> str:
 
 PrintedP = Annotated[Printed, AfterValidator(_is_share)]
 """A printed p-value or its bound."""
-AtLeastOne = Annotated[int, Field(ge=1)]
+MOST_COUNTED = 1_000_000
+"""Of people, trials or values: up to so many every count is checked within a second."""
+AtLeastOne = Annotated[int, Field(ge=1, le=MOST_COUNTED)]
 
 
 class PaperHead(Model):

@@ -1,4 +1,4 @@
-"""Free descriptions coded with a codebook: how many participants said what, counted from the codes.
+r"""Free descriptions coded with a codebook: how many participants said what, counted from the codes.
 
 ```
 hand_coded = "coded.csv"            # optional: participant_id,code; codes that somebody gave by hand
@@ -8,12 +8,14 @@ code = "toy"
 label = "It feels like a toy for children."
 method = "vibration"                # optional: only in descriptions of this method
 words = ["toy", "children"]         # any of these words, whole and in any case
-pattern = "toy|child(ren)?"         # or a regular expression, in any case
+pattern = "toy|child(ren)?"         # or a regular expression (RE2's), in any case
 participants = ["P03", "P07"]       # or coded by hand, here
 ```
 
 A participant counts once a code, however often they said it; percentages are of all analysed participants. Words and
-patterns know nothing of negation or irony: read what they found before you publish it.
+patterns know nothing of negation or irony: read what they found before you publish it. RE2 matches in time that grows
+with the text alone; it has no look-around and no back-references, and its \w and \b know ASCII only (\p{L} is any
+letter).
 """
 
 from __future__ import annotations
@@ -25,20 +27,12 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated, Self
 
-from pydantic import AfterValidator, Field, model_validator
+from pydantic import Field, model_validator
 
+from analysis.logs.patterns import Pattern, holding
 from analysis.report import apa
 from analysis.report.section import Section, Table
 from experiments.config.door import ConfigError, Model, load
-
-
-def _compiles(text: str) -> str:
-    try:
-        re.compile(text)
-    except re.error as error:
-        raise ValueError(f"is no regular expression ({error})") from error
-    return text
-
 
 _NonEmpty = Annotated[str, Field(min_length=1)]
 
@@ -50,13 +44,15 @@ class RemarkCode(Model):
     label: _NonEmpty
     method: _NonEmpty | None = None
     words: tuple[_NonEmpty, ...] = ()
-    pattern: Annotated[str, AfterValidator(_compiles)] | None = None
+    pattern: Pattern | None = None
     participants: tuple[_NonEmpty, ...] = ()
 
     def found_in(self, text: str) -> bool:
         """Is one of the words, or the pattern, in the text?"""
         whole = (rf"\b{re.escape(word)}\b" for word in self.words)
-        return any(re.search(pattern, text, re.IGNORECASE) for pattern in (*whole, *filter(None, [self.pattern])))
+        if any(re.search(word, text, re.IGNORECASE) for word in whole):
+            return True
+        return self.pattern is not None and holding(text, self.pattern)
 
 
 class Codebook(Model):

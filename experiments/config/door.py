@@ -10,7 +10,9 @@ from __future__ import annotations
 import json
 import re
 import tomllib
+from collections import Counter
 from collections.abc import Callable, Iterator, Mapping, Sequence
+from functools import lru_cache
 from pathlib import Path
 from typing import Annotated, Any, Literal, Self, TypeVar
 
@@ -20,6 +22,14 @@ from device.words import RecoilError
 
 SomeModel = TypeVar("SomeModel", bound=BaseModel)
 
+_LONGEST, _DEEPEST = 1_000_000, 32
+"""Characters of a file, and how deep its tables, lists and keys may go."""
+_LIKE, _MOST_FINDINGS = 5, 2_000
+"""Findings of a kind that are said, and findings that are looked at."""
+_TOO_DEEP = f"tables and lists lie too deep in each other (rule: at most {_DEEPEST})"
+_PART = r"""(?:[\w-]++|"[^"\n]*+"|'[^'\n]*+')"""
+_LONG_KEY = re.compile(rf"""(?<![\w"'-]){_PART}(?:[ \t]*+\.[ \t]*+{_PART}){{{_DEEPEST}}}""")
+_DECIMAL_COMMA = re.compile(r"=\s*(-?\d+),(\d+)\b")
 _MISSING = "is missing; it is required"
 _UNKNOWN = "unknown key; remove it or correct its spelling"
 
@@ -56,10 +66,45 @@ def read_text(path: Path) -> str:
 
 def tables(text: str, source: Path | str) -> dict[str, Any]:
     """The tables of a TOML text, unchecked; `source` is what messages call it."""
+    _check_size(text, source)
     try:
-        return tomllib.loads(text)
-    except (ValueError, RecursionError) as error:  # also numbers and nestings beyond all reason
-        raise ConfigError(f"{source}: not TOML: {error}") from error
+        found = tomllib.loads(text)
+    except ValueError as error:  # also numbers beyond all reason
+        raise ConfigError(f"{source}: not TOML: {error}{_comma(text, str(error))}") from error
+    except RecursionError as error:
+        raise ConfigError(f"{source}: {_TOO_DEEP}") from error
+    if _is_deep(found):
+        raise ConfigError(f"{source}: {_TOO_DEEP}")
+    return found
+
+
+def _check_size(text: str, source: Path | str) -> None:
+    """`ConfigError` for what would be read for minutes: too much, or a key of ever more parts."""
+    if len(text) > _LONGEST:
+        raise ConfigError(f"{source}: is {len(text)} characters long (rule: at most {_LONGEST})")
+    if found := _LONG_KEY.search(text):
+        line = text.count("\n", 0, found.start()) + 1
+        raise ConfigError(f"{source}:{line}: a key has too many parts (rule: at most {_DEEPEST})")
+
+
+def _is_deep(value: object) -> bool:
+    """Whether tables and lists lie in each other deeper than any file needs."""
+    level: list[object] = [value]
+    for _ in range(_DEEPEST):
+        level = [
+            inner
+            for one in level
+            if isinstance(one, dict | list)
+            for inner in (one.values() if isinstance(one, dict) else one)
+        ]
+    return bool(level)
+
+
+def _comma(text: str, said: str) -> str:
+    """What to do where a decimal comma may be what is no TOML."""
+    line = re.search(r"at line (\d+)", said)
+    found = _DECIMAL_COMMA.search(text.splitlines()[int(line[1]) - 1]) if line else None
+    return f"; a decimal comma? write {found[1]}.{found[2]}" if found else ""
 
 
 def checked(model: type[SomeModel], table: dict[str, Any], path: Path) -> SomeModel:
@@ -87,15 +132,32 @@ def _no_json(value: object) -> dict[str, str]:
 
 def _findings(error: ValidationError, table: dict[str, Any], source: Path | str, text: str) -> str:
     found: dict[tuple[str, ...], list[Any]] = {}
-    for finding in error.errors():
+    for finding in error.errors(include_url=False)[:_MOST_FINDINGS]:
         found.setdefault(_place(finding, table), []).append(finding)
-    return "\n".join(
-        _finding(place, findings, source, text)
-        for place, findings in found.items()
-        if not (
-            _all_of_kind(findings) and any(len(other) > len(place) and other[: len(place)] == place for other in found)
-        )
-    )
+    inner = {place[:length] for place in found for length in range(len(place))}
+    said = [(place, findings) for place, findings in found.items() if not (_all_of_kind(findings) and place in inner)]
+    lines = [_finding(place, findings, source, text) for place, findings in _few(said)]
+    return "\n".join([*lines, *_more(len(said) - len(lines), error.error_count() - _MOST_FINDINGS)])
+
+
+Found = tuple[tuple[str, ...], Sequence[Any]]
+
+
+def _few(findings: Sequence[Found]) -> Iterator[Found]:
+    """The first five findings of each kind: of the same key of some table, and the same rule."""
+    seen = Counter[tuple[object, ...]]()
+    for place, found in findings:
+        kind = (tuple(part for part in place if not part.isdigit()), found[0]["type"])
+        seen[kind] += 1
+        if seen[kind] <= _LIKE:
+            yield place, found
+
+
+def _more(like: int, unread: int) -> Iterator[str]:
+    if like > 0:
+        yield f"... and {like} more like {'it' if like == 1 else 'them'}"
+    if unread > 0:
+        yield f"... and {unread} more"
 
 
 def _all_of_kind(findings: Sequence[Any]) -> bool:
@@ -133,7 +195,8 @@ def _finding(place: tuple[str, ...], findings: Sequence[Any], source: Path | str
     said = dict.fromkeys(_RULES_BY_TYPE.get(one["type"], _own_words)(one) for one in findings)
     rule = " or ".join(said) if len(said) > 1 else next(iter(said))
     line = line_of(text, [*place] or _keys_in(rule))
-    return f"{source}{f':{line}' if line else ''}: {'.'.join(place)}{shown}{': ' if place else ''}{rule}"
+    key = ".".join(part if len(part) <= _LINE else _shortened(part) for part in place)
+    return f"{source}{f':{line}' if line else ''}: {key}{shown}{': ' if place else ''}{rule}"
 
 
 def _own_words(finding: Any) -> str:
@@ -192,17 +255,26 @@ def line_of(text: str, keys: list[str]) -> int | None:
     >>> line_of("[[b]]\nc = 1\n[[b]]\nc = 2", ["b", "1", "c"])
     4
     """
+    places = _places(text)
+    return next((places[tuple(keys[:n])] for n in range(len(keys), 0, -1) if tuple(keys[:n]) in places), None)
+
+
+@lru_cache(maxsize=4)
+def _places(text: str) -> Mapping[tuple[str, ...], int]:
+    """The lines of the tables and keys of a TOML text."""
     places: dict[tuple[str, ...], int] = {}
     table: tuple[str, ...] = ()
+    elements = Counter[tuple[str, ...]]()
     for number, line in enumerate(text.split("\n"), start=1):
         if header := re.match(r"\s*(\[\[?)([^\[\]]+)\]", line):
             table = _key_parts(header[2])
             if header[1] == "[[":
-                table = (*table, str(sum(place[:-1] == table and place[-1].isdigit() for place in places)))
+                elements[table] += 1
+                table = (*table, str(elements[table] - 1))
             places.setdefault(table, number)
         elif entry := re.match(r'\s*((?:"[^"]*"|[\w.\-])+)\s*=', line):
             places.setdefault((*table, *_key_parts(entry[1])), number)
-    return next((places[tuple(keys[:n])] for n in range(len(keys), 0, -1) if tuple(keys[:n]) in places), None)
+    return places
 
 
 def _key_parts(dotted: str) -> tuple[str, ...]:

@@ -9,6 +9,7 @@ from typing import Annotated
 import typer
 
 from analysis.report.terminal import AsJsonOption, FixedSeedOption, end, progress, say, show, tracked
+from device.words import few_of_each
 
 
 class ObserverName(StrEnum):
@@ -60,7 +61,7 @@ def analyze(
         paths=paths, out=out, paper=paper, columns=columns, rules=rules, codebook=codebook, fits=fits
     )
     statistics, said = feature.analyze(asked, tracked)
-    for line in said:
+    for line in few_of_each(said):
         say(f"recoil: {line}")
     show(statistics, f"Report: {out / 'report.html'}", as_json)
     raise end(exceptions=bool(said))
@@ -80,8 +81,8 @@ def bids(
     from analysis.archive.bids_export import export as feature
 
     done = feature(folder, out or folder / "bids", free_text=free_text, track=tracked)
-    for problem in done.left_out:
-        say(f"recoil: left out: {problem}")
+    for line in few_of_each(f"left out: {problem}" for problem in done.left_out):
+        say(f"recoil: {line}")
     for remark in (*done.remarks, *done.begun):
         say(f"recoil: {remark}")
     counts = f"participants: {done.participants}, runs: {sum(done.runs.values())}, files: {done.files}"
@@ -102,3 +103,21 @@ def audit(
     feature.write(audited, out)
     show(audited.record, f"{audited.as_text()}\n\nReport: {out / 'report.html'}", as_json)
     raise end(exceptions=audited.exceptions)
+
+
+def grim(
+    mean: Annotated[str, typer.Option(help="As printed, such as 3.47; with % for a percentage.")],
+    n: Annotated[int, typer.Option(help="How many scores.")],
+    sd: Annotated[str | None, typer.Option(help="The standard deviation as printed.")] = None,
+    scale: Annotated[str | None, typer.Option(metavar="A-B", help="Its ends, such as 1-5; 0-1 for yes and no.")] = None,
+    grain: Annotated[str, typer.Option(help="The steps in which scores come.")] = "1",
+    items: Annotated[int, typer.Option(help="A score is the mean of so many answers.")] = 1,
+    *,
+    as_json: AsJsonOption = False,
+) -> None:
+    """Can n scores have this mean (GRIM), and with it this SD (GRIMMER, DEBIT)? Exit code 1 if not."""
+    from analysis.paper.audit import one_number as feature
+
+    found = feature.mean_and_sd(mean, n, sd, scale, grain=grain, items=items)
+    show(found, found.as_text(), as_json)
+    raise end(exceptions=found.exceptions)

@@ -13,9 +13,10 @@ from typing import Annotated, Literal
 from pydantic import Field
 
 from analysis.paper import paper as publication
+from analysis.paper.audit.binomial import binomial_p
 from analysis.paper.audit.freedom import Bound, ComparisonDesign, Term, degrees_of_freedom, total
 from analysis.paper.audit.means import debit, grim, grimmer, percent_of_count, scale_of
-from analysis.paper.audit.p_values import Sides, Statistic, binomial_p, p_against_statistic
+from analysis.paper.audit.p_values import Sides, Statistic, p_against_statistic
 from analysis.paper.audit.printed import CheckResult, JudgedReadings, PrintedText, Rounding, read_printed
 from analysis.paper.audit.tukey_pattern import ClaimedComparison, tukey_pattern
 from analysis.paper.audit.variance_ratios import between_f, repeated_f

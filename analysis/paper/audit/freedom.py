@@ -21,6 +21,7 @@ from analysis.paper.audit.printed import (
     PrintedText,
     Rounding,
     decimal,
+    family,
     judge_readings,
     listed,
     read_printed,
@@ -61,10 +62,7 @@ def degrees_of_freedom(df: Sequence[str], design: ComparisonDesign, counts: Sequ
     expected = expected_df(design, counts)
     if len(printed) != len(expected):
         raise ValueError(f"a {design} design has {len(expected)} degrees of freedom, not {len(printed)}")
-    others: list[tuple[str, Attempt]] = [
-        (name, partial(_same, printed, other)) for name, other in _readings(design, counts)
-    ]
-    others += _corrections(printed, design, counts)
+    others = [*_readings(printed, design, counts), *_corrections(printed, design, counts)]
     judged = judge_readings(partial(_same, printed, expected), others)
     return CheckResult(
         check="df",
@@ -95,36 +93,64 @@ def _same(printed: Sequence[PrintedNumber], values: Freedom, rounding: Rounding)
     return DataExistence(True, (values,)) if fits else NONE_EXISTS
 
 
-def _readings(design: ComparisonDesign, counts: Sequence[int]) -> Iterator[tuple[str, Freedom]]:
+Reading = tuple[str, Attempt]
+
+
+def _readings(printed: Sequence[PrintedNumber], design: ComparisonDesign, counts: Sequence[int]) -> list[Reading]:
     """Other whole degrees of freedom that the same data could have been given."""
     if design == "repeated":
-        yield from _repeated_readings(*counts)
-    elif design == "between":
-        yield from _between_readings(counts)
-    elif design != "contingency":
-        full = int(expected_df(design, counts)[0])
-        yield from ((f"{full - df} participants fewer", (Fraction(df),)) for df in range(1, full))
+        return _repeated_readings(printed, *counts)
+    if design == "between":
+        return _between_readings(printed, counts)
+    if design == "contingency":
+        return []
+    full = int(expected_df(design, counts)[0])
+
+    def fitting(rounding: Rounding) -> range:
+        df = printed[0].interval(rounding).integers(1, full - 1)
+        return range(full - df.stop + 1, full - df.start + 1)
+
+    def name(missing: str) -> str:
+        return f"{missing} participants" if missing == "fewer" else f"{missing} participants fewer"
+
+    return family(fitting, name, lambda missing: partial(_same, printed, (Fraction(full - missing),)))
 
 
-def _repeated_readings(n: int, k: int) -> Iterator[tuple[str, Freedom]]:
-    yield "error term of a between-subjects design", (Fraction(k - 1), Fraction(k * (n - 1)))
-    if n > k:
-        yield "multivariate test", (Fraction(k - 1), Fraction(n - k + 1))
-    for m in range(2, n):
-        yield f"{m} participants instead of {n}", expected_df("repeated", [m, k])
+def _repeated_readings(printed: Sequence[PrintedNumber], n: int, k: int) -> list[Reading]:
+    def fitting(rounding: Rounding) -> range:
+        return printed[1].interval(rounding).mapped(lambda df: df / (k - 1) + 1).integers(2, n - 1)
+
+    def same(error: int) -> Attempt:
+        return partial(_same, printed, (Fraction(k - 1), Fraction(error)))
+
+    fewer = family(fitting, lambda m: f"{m} participants instead of {n}", lambda m: same((m - 1) * (k - 1)))
+    return [
+        ("error term of a between-subjects design", same(k * (n - 1))),
+        *([("multivariate test", same(n - k + 1))] if n > k else []),
+        *fewer,
+    ]
 
 
-def _between_readings(sizes: Sequence[int]) -> Iterator[tuple[str, Freedom]]:
+def _between_readings(printed: Sequence[PrintedNumber], sizes: Sequence[int]) -> list[Reading]:
     k, everyone = len(sizes), sum(sizes)
-    if len(set(sizes)) == 1 and sizes[0] > 1:
-        yield "error term of a repeated-measures design", expected_df("repeated", [sizes[0], k])
-    for total in range(k + 1, everyone):
-        yield f"{total} participants instead of {everyone}", (Fraction(k - 1), Fraction(total - k))
+
+    def fitting(rounding: Rounding) -> range:
+        return printed[1].interval(rounding).mapped(lambda df: df + k).integers(k + 1, everyone - 1)
+
+    def same(error: int) -> Attempt:
+        return partial(_same, printed, (Fraction(k - 1), Fraction(error)))
+
+    equal = len(set(sizes)) == 1 and sizes[0] > 1
+    repeated = ("error term of a repeated-measures design", same((sizes[0] - 1) * (k - 1)))
+    return [
+        *([repeated] if equal else []),
+        *family(fitting, lambda total: f"{total} participants instead of {everyone}", lambda total: same(total - k)),
+    ]
 
 
 def _corrections(
     printed: Sequence[PrintedNumber], design: ComparisonDesign, counts: Sequence[int]
-) -> Iterator[tuple[str, Attempt]]:
+) -> Iterator[Reading]:
     if design == "repeated":
         yield "Greenhouse-Geisser or Huynh-Feldt correction", partial(_corrected, printed, counts[0], counts[1])
     if design == "two samples":

@@ -185,6 +185,8 @@ def column_choices(ranges: Sequence[range], most: int = 2_000) -> Iterator[tuple
     return None if prod(map(len, ranges)) > most else product(*ranges)
 
 
+SEARCH_STEPS = 20_000
+"""Of one search for numbers with their sums."""
 _EXACT_WORK = 400_000
 _TRIES = 60
 
@@ -312,9 +314,22 @@ class BudgetError(RuntimeError):
 
 
 @dataclass(slots=True)
+class SearchBudget:
+    """Steps that are left to a search, or to several together."""
+
+    left: int
+
+    def spend(self) -> None:
+        """Take a step. `BudgetError` where none is left."""
+        self.left -= 1
+        if self.left < 0:
+            raise BudgetError
+
+
+@dataclass(slots=True)
 class _Search:
     low: int
-    budget: int
+    budget: SearchBudget
     failed: set[tuple[int, int, int, int]] = field(default_factory=set)
 
     def run(self, n: int, total: int, squares: int, high: int) -> tuple[int, ...] | None:
@@ -326,16 +341,30 @@ class _Search:
         place = (n, total, squares, high)
         if place in self.failed:
             return None
-        self.budget -= 1
-        if self.budget < 0:
-            raise BudgetError
+        self.budget.spend()
         for value in range(min(high, _greatest_value(n, total, squares)), -(-total // n) - 1, -1):
-            for times in range(n, 0, -1):
+            self.budget.spend()
+            for times in _times(n, total, squares, value, self.low):
                 rest = self.run(n - times, total - times * value, squares - times * value**2, value - 1)
                 if rest is not None:
                     return (value,) * times + rest
         self.failed.add(place)
         return None
+
+
+def _times(n: int, total: int, squares: int, value: int, low: int) -> range:
+    """How often `value` can be the greatest of n whole numbers from `low` on, the most first; necessary bounds.
+
+    At most: sum (y - value)^2 is all that t values at it leave to the others, t <= (n S - T^2) / (n v^2 - 2 T v + S).
+    At least: the others are at most v - 1, and with l their least (y - l)(v - 1 - y) >= 0 for each of them.
+    """
+    apart = n * value**2 - 2 * total * value + squares
+    most = n if apart <= 0 else min(n, (n * squares - total**2) // apart)
+    if value == low:
+        return range(n, n - 1, -1) if most == n else range(0)
+    below = value - 1
+    least = max(1, total - n * below, -((-squares + (low + below) * total - n * low * below) // (value - low)))
+    return range(most, least - 1, -1)
 
 
 def _greatest_value(n: int, total: int, squares: int) -> int:
@@ -369,7 +398,13 @@ def greatest_squares(n: int, total: int, low: int, high: int) -> int:
 
 
 def numbers_with_sums(
-    n: int, total: int, squares: int, low: int | None = None, high: int | None = None, *, budget: int = 20_000
+    n: int,
+    total: int,
+    squares: int,
+    low: int | None = None,
+    high: int | None = None,
+    *,
+    budget: int | SearchBudget = SEARCH_STEPS,
 ) -> tuple[int, ...] | None:
     """Falling whole numbers with sum `total` and sum of squares `squares`; None if there are none: that is proved.
 
@@ -381,4 +416,6 @@ def numbers_with_sums(
     reach = isqrt(squares) if squares > 0 else 0
     low = -reach if low is None else max(low, -reach)
     high = reach if high is None else min(high, reach)
-    return _Search(low, budget).run(n, total, squares, high)
+    return _Search(low, budget if isinstance(budget, SearchBudget) else SearchBudget(budget)).run(
+        n, total, squares, high
+    )

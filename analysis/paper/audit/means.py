@@ -2,16 +2,25 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from bisect import bisect_left, bisect_right
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from fractions import Fraction
 from functools import partial
-from itertools import islice
-from math import ceil, floor
+from itertools import chain, islice, zip_longest
+from math import ceil, floor, log10
 
-from analysis.paper.audit.lattices import BudgetError, greatest_squares, least_squares, numbers_with_sums
+from analysis.paper.audit.lattices import (
+    SEARCH_STEPS,
+    BudgetError,
+    SearchBudget,
+    greatest_squares,
+    least_squares,
+    numbers_with_sums,
+)
 from analysis.paper.audit.printed import (
     NONE_EXISTS,
+    ORDINARY,
     UNKNOWN,
     Attempt,
     CheckResult,
@@ -21,10 +30,13 @@ from analysis.paper.audit.printed import (
     Rounding,
     Witness,
     decimal,
+    family,
     judge_readings,
     listed,
+    middle,
     read_printed,
 )
+from analysis.paper.paper import MOST_COUNTED
 
 _GRIM = "Brown & Heathers 2017, Social Psychological and Personality Science 8, 363"
 
@@ -100,20 +112,20 @@ def grim(
 
 
 def check_count(n: int, name: str = "n") -> None:
-    """`ValueError` if `n` is below 1."""
-    if n < 1:
-        raise ValueError(f"{name} must be at least 1, not {n}")
+    """`ValueError` if `n` is below 1, or above what can be checked."""
+    if not 1 <= n <= MOST_COUNTED:
+        raise ValueError(f"{name} must be at {'least 1' if n < 1 else f'most {MOST_COUNTED:,}'}, not {n}")
 
 
 def _mean_data(printed: PrintedNumber, n: int, scale: AnswerScale, rounding: Rounding) -> DataExistence:
     sums = scale.sums(printed.interval(rounding), n)
-    return DataExistence(True, even_spread(sums[len(sums) // 2], n, scale)) if sums else NONE_EXISTS
+    return DataExistence(True, even_spread(middle(sums), n, scale)) if sums else NONE_EXISTS
 
 
 def even_spread(total: int, n: int, scale: AnswerScale) -> Witness:
     """So many scores with the sum `total`, as equal as can be."""
     base, more = divmod(total, n)
-    return (tuple(scale.value(base + (i < more)) for i in range(n)),)
+    return ((scale.value(base + 1),) * more + (scale.value(base),) * (n - more),)
 
 
 def nearest(
@@ -145,9 +157,13 @@ def percent_of_count(percent: str, count: int, n: int) -> CheckResult:
     if not 0 <= count <= n:
         raise ValueError(f"count must lie in 0..{n}, not {count}")
     printed = read_printed(percent if "%" in percent else f"{percent}%")
-    others = [(f"out of {m} instead of {n}", _share_attempt(printed, count, m)) for m in _bases(printed, count, n)]
+    others = family(
+        partial(_bases, printed, count, n),
+        lambda base: f"out of {base} instead of {n}",
+        lambda base: _share_attempt(printed, count, base),
+    )
     judged = judge_readings(_share_attempt(printed, count, n), others)
-    fitting = list(AnswerScale(Fraction(1), low=0, high=1).sums(printed.interval(Rounding.ANY), n))
+    fitting = AnswerScale(Fraction(1), low=0, high=1).sums(printed.interval(Rounding.ANY), n)
     below, above = nearest(printed.value, Fraction(1, n), Fraction(0), (0, n))
     return CheckResult(
         check="percent of count",
@@ -168,10 +184,16 @@ def _share_attempt(printed: PrintedNumber, count: int, n: int) -> Attempt:
     return lambda rounding: DataExistence(True, ((share,),)) if printed.interval(rounding).holds(share) else NONE_EXISTS
 
 
-def _bases(printed: PrintedNumber, count: int, n: int) -> list[int]:
-    """Smaller numbers of people of which `count` would print so."""
-    widest = printed.interval(Rounding.ANY)
-    return [m for m in range(max(count, 1), n) if widest.holds(Fraction(count, m))]
+def _bases(printed: PrintedNumber, count: int, n: int, rounding: Rounding) -> range:
+    """Smaller numbers of people of which `count` would print so: a share falls as they grow."""
+    fewer, share = range(max(count, 1), n)[::-1], printed.interval(rounding)
+    fitting = _held(fewer, lambda m: share.side(Fraction(count, m)))
+    return range(fitting[-1], fitting[0] + 1) if fitting else range(0)
+
+
+def _held(numbers: range, side: Callable[[int], int]) -> range:
+    """Of numbers along which a value never falls, those at which it lies inside (`Interval.side`)."""
+    return numbers[bisect_left(numbers, 0, key=side) : bisect_right(numbers, 0, key=side)]
 
 
 DIVISORS: tuple[tuple[str, Callable[[int], int]], ...] = (
@@ -180,7 +202,8 @@ DIVISORS: tuple[tuple[str, Callable[[int], int]], ...] = (
     ("the printed SD is a standard error", lambda n: n * (n - 1)),
 )
 """What the sum of squared deviations of n is divided by to give the square of the printed number."""
-_MOST_SUMS = 20_000
+_MOST_SUMS, _MOST_STEPS, _MOST_FAILED = 20_000, 300_000, 10
+"""Of one search for data: pairs of sums, steps in all, and searches without an answer."""
 
 
 def grimmer(
@@ -199,12 +222,14 @@ def grimmer(
     check_count(n - 1, "n - 1")
     plain, *others = ((name, _spread_attempt(means, spread, n, scale, by(n))) for name, by in DIVISORS)
     judged = judge_readings(plain[1], others)
-    below, above = _nearest_spreads(means, spread, n, scale)
+    no_mean = _no_mean(means, n, scale)
+    below, above = (None, None) if no_mean else _nearest_spreads(means, spread, n, scale)
+    steps = f"{n} scores in steps of {decimal(scale.grain)} with one mean have sums of squares 2 steps apart"
     return CheckResult(
         check="grimmer",
         printed=f"M = {means.text}, SD = {spread.text}",
         judged=judged,
-        reason=f"{n} scores in steps of {decimal(scale.grain)} with one mean have sums of squares 2 steps apart",
+        reason=no_mean or steps,
         source="Anaya 2016, PeerJ Preprints 4, e2400v1; Allard 2018",
         step=2 * scale.grain**2 / (n - 1),
         below=below,
@@ -213,63 +238,92 @@ def grimmer(
     )
 
 
+def _no_mean(means: PrintedNumber, n: int, scale: AnswerScale) -> str:
+    """Why the mean alone cannot be, before any SD is judged; empty if it can."""
+    if judge_readings(partial(_mean_data, means, n, scale)).verdict == "attainable":
+        return ""
+    sides = nearest(means.value, scale.grain / n, scale.origin, scale.ends(n))
+    digits = max(0, -floor(log10(means.unit))) + 1
+    shown = " and ".join(decimal(value, digits) for value in sides if value is not None)
+    return (
+        f"no {n} scores in steps of {decimal(scale.grain)} have this mean, whatever their SD; the nearest are {shown}"
+    )
+
+
 def _spread_attempt(means: PrintedNumber, spread: PrintedNumber, n: int, scale: AnswerScale, divisor: int) -> Attempt:
     def attempt(rounding: Rounding) -> DataExistence:
         variances = spread.interval(rounding).squared()
         if variances is None:
             return NONE_EXISTS
-        pairs = _pairs(scale.sums(means.interval(rounding), n), variances, n, scale, divisor)
-        return _first_witness(islice(pairs, _MOST_SUMS), n, scale)
+        sums = scale.sums(means.interval(rounding), n)
+        pairs = _pairs(sums, variances, n, scale, divisor)
+        return _first_witness(islice(pairs, _MOST_SUMS), n, scale, complete=sums.stop - sums.start <= _MOST_SUMS)
 
     return attempt
 
 
 def _pairs(sums: range, variances: Interval, n: int, scale: AnswerScale, divisor: int) -> Iterator[tuple[int, int]]:
     """Sums and sums of squares, in grains, that print so; the middle sums first, where data are most likely."""
-    for total in sorted(sums, key=lambda value: abs(2 * value - sums[0] - sums[-1])):
+    for total in islice(_middle_out(sums), _MOST_SUMS):
         squares = variances.mapped(partial(_sum_of_squares, total, n, divisor, scale.grain))
         bounded = scale.low is not None and scale.high is not None
         most = greatest_squares(n, total, scale.low or 0, scale.high or 0) if bounded else None
-        for value in squares.integers(least_squares(n, total), most):
-            if (value - total) % 2 == 0:
-                yield total, value
+        whole = squares.integers(least_squares(n, total), most)
+        yield from ((total, value) for value in range(whole.start + (whole.start - total) % 2, whole.stop, 2))
+
+
+def _middle_out(values: range) -> Iterator[int]:
+    """The values of a range, those in its middle first."""
+    if not values:
+        return iter(())
+    centre = middle(values)
+    both = zip_longest(range(centre, values.start - 1, -1), range(centre + 1, values.stop))
+    return (value for value in chain.from_iterable(both) if value is not None)
 
 
 def _sum_of_squares(total: int, n: int, divisor: int, grain: Fraction, variance: Fraction) -> Fraction:
     return variance * divisor / grain**2 + Fraction(total**2, n)
 
 
-def _first_witness(pairs: Iterator[tuple[int, int]], n: int, scale: AnswerScale) -> DataExistence:
-    unsure, tried = False, 0
+def _first_witness(pairs: Iterator[tuple[int, int]], n: int, scale: AnswerScale, *, complete: bool) -> DataExistence:
+    tried = unsure = steps = 0
     for tried, (total, squares) in enumerate(pairs, 1):  # noqa: B007 the count outlives the loop
+        budget = SearchBudget(SEARCH_STEPS)
         try:
-            found = numbers_with_sums(n, total, squares, scale.low, scale.high)
+            found = numbers_with_sums(n, total, squares, scale.low, scale.high, budget=budget)
         except BudgetError:
-            unsure = True
-            continue
+            found, unsure = None, unsure + 1
         if found is not None:
-            return DataExistence(True, (tuple(scale.value(value) for value in found),))
-    return UNKNOWN if unsure or tried == _MOST_SUMS else NONE_EXISTS
+            return DataExistence(True, (_values(found, scale),))
+        steps += SEARCH_STEPS - budget.left
+        if unsure == _MOST_FAILED or steps > _MOST_STEPS:
+            return UNKNOWN
+    return NONE_EXISTS if complete and not unsure and tried < _MOST_SUMS else UNKNOWN
+
+
+def _values(multiples: Sequence[int], scale: AnswerScale) -> tuple[Fraction, ...]:
+    known = {multiple: scale.value(multiple) for multiple in set(multiples)}
+    return tuple(known[multiple] for multiple in multiples)
 
 
 def _nearest_spreads(
     means: PrintedNumber, spread: PrintedNumber, n: int, scale: AnswerScale
 ) -> tuple[Fraction | None, Fraction | None]:
     """The nearest attainable squares of the SD on both sides of the printed one, for sums that print the mean."""
-    sums = scale.sums(means.interval(Rounding.ANY), n)
-    if not sums or len(sums) > 100:
+    sums = next(filter(None, (scale.sums(means.interval(rounding), n) for rounding in ORDINARY)), range(0))
+    if sums.stop - sums.start > 100:
         return None, None
-    target, unit = spread.value**2, scale.grain**2 / (n - 1)
+    target, unit, budget = spread.value**2, scale.grain**2 / (n - 1), SearchBudget(_MOST_STEPS)
     sides: tuple[list[Fraction], list[Fraction]] = ([], [])
     for total in sums:
         place = int(_sum_of_squares(total, n, n - 1, scale.grain, target))
         for side, step in enumerate((-1, 1)):
-            squares = _next_squares(place + side, step, n, total, scale)
+            squares = _next_squares(place + side, step, n, total, scale=scale, budget=budget)
             sides[side].extend([] if squares is None else [(squares - Fraction(total**2, n)) * unit])
     return max(sides[0], default=None), min(sides[1], default=None)
 
 
-def _next_squares(start: int, step: int, n: int, total: int, scale: AnswerScale) -> int | None:
+def _next_squares(start: int, step: int, n: int, total: int, *, scale: AnswerScale, budget: SearchBudget) -> int | None:
     """From `start` on, the first sum of squares that n whole numbers with this sum have."""
     least = least_squares(n, total)
     start = max(start, least) if step > 0 else start
@@ -277,7 +331,7 @@ def _next_squares(start: int, step: int, n: int, total: int, scale: AnswerScale)
         if squares < least:
             return None
         try:
-            if numbers_with_sums(n, total, squares, scale.low, scale.high) is not None:
+            if numbers_with_sums(n, total, squares, scale.low, scale.high, budget=budget) is not None:
                 return squares
         except BudgetError:
             return None
@@ -298,17 +352,20 @@ def debit(mean: str, sd: str, n: int) -> CheckResult:
     check_count(n - 1, "n - 1")
     plain, *others = ((name, partial(_binary_data, means, spread, n, by(n))) for name, by in DIVISORS)
     judged = judge_readings(plain[1], others)
-    ones = AnswerScale(Fraction(1), low=0, high=1).sums(means.interval(Rounding.ANY), n)
-    squares = sorted(_binary_variance(k, n, n - 1) for k in ones)
+    scale = AnswerScale(Fraction(1), low=0, high=1)
+    ones = scale.sums(means.interval(Rounding.ANY), n)
+    no_mean = _no_mean(means, n, scale)
+    below, above = (None, None) if no_mean else _nearest_variances(ones, spread.value**2, n)
+    fixed = f"the mean fixes the SD of answers of 0 and 1, here with {listed(ones) or 'no whole number of'} ones"
     return CheckResult(
         check="debit",
         printed=f"M = {means.text}, SD = {spread.text}",
         judged=judged,
-        reason=f"the mean fixes the SD of answers of 0 and 1, here with {listed(ones) or 'no whole number of'} ones",
+        reason=no_mean or fixed,
         source="Heathers & Brown 2019, https://osf.io/5vb3u/",
         step=Fraction(1, n),
-        below=max((value for value in squares if value <= spread.value**2), default=None),
-        above=min((value for value in squares if value >= spread.value**2), default=None),
+        below=below,
+        above=above,
         contradicts=() if judged.verdict == "attainable" else (f"M = {means.text}", f"n = {n}"),
     )
 
@@ -317,10 +374,33 @@ def _binary_variance(ones: int, n: int, divisor: int) -> Fraction:
     return Fraction(ones * (n - ones), n * divisor)
 
 
+def _slopes(ones: range, n: int) -> tuple[range, range]:
+    """Counts of ones along which the variance never falls: those up to a half, and from the others the most first."""
+    half = max(ones.start, min(ones.stop, n // 2 + 1))
+    return range(ones.start, half), range(half, ones.stop)[::-1]
+
+
+def _nearest_variances(ones: range, target: Fraction, n: int) -> tuple[Fraction | None, Fraction | None]:
+    """The nearest variances on both sides of the target."""
+
+    def variance(k: int) -> Fraction:
+        return _binary_variance(k, n, n - 1)
+
+    below, above = list[Fraction](), list[Fraction]()
+    for slope in _slopes(ones, n):
+        below += map(variance, slope[: bisect_right(slope, target, key=variance)][-1:])
+        above += map(variance, slope[bisect_left(slope, target, key=variance) :][:1])
+    return max(below, default=None), min(above, default=None)
+
+
 def _binary_data(
     means: PrintedNumber, spread: PrintedNumber, n: int, divisor: int, rounding: Rounding
 ) -> DataExistence:
     variances = spread.interval(rounding).squared()
+    if variances is None:
+        return NONE_EXISTS
     ones = AnswerScale(Fraction(1), low=0, high=1).sums(means.interval(rounding), n)
-    k = next((k for k in ones if variances and variances.holds(_binary_variance(k, n, divisor))), None)
-    return NONE_EXISTS if k is None else DataExistence(True, ((Fraction(1),) * k + (Fraction(0),) * (n - k),))
+    for slope in _slopes(ones, n):
+        for k in _held(slope, lambda k: variances.side(_binary_variance(k, n, divisor)))[:1]:
+            return DataExistence(True, ((Fraction(1),) * k + (Fraction(0),) * (n - k),))
+    return NONE_EXISTS

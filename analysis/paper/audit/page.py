@@ -47,7 +47,7 @@ def _summary(findings: Sequence[AuditFinding]) -> Section:
 
 
 _MEANING = {
-    "attainable": "data of the stated kind give it, as printed",
+    "attainable": "data of the stated kind give it as printed, a tie rounded half up or half to even",
     "only under a reading": "no such data give it as printed; under a reading that the paper does not state, some do",
     "not attainable": "proved: no such data give it under any reading that was tried",
     "not published": "needed to repeat the work, and not printed",
@@ -172,7 +172,8 @@ def nearest_text(result: CheckResult) -> str:
 
 def _attainable(finding: AuditFinding) -> tuple[str, str]:
     result = finding.result
-    return f"{_subject(result)} is attainable: {result.reason}.", _why_attainable(result)
+    rounding = result.judged.rounding.replace("rounding", ", printed", 1)
+    return f"{_subject(result)} is attainable: {result.reason}{rounding}.", _why_attainable(result)
 
 
 def _subject(result: CheckResult) -> str:
@@ -284,11 +285,12 @@ def _tried(result: CheckResult) -> str:
 
 
 def _number(result: CheckResult, value: Fraction) -> str:
-    """In the unit and to the digits of the printed number."""
+    """In the unit and to the digits of the printed number; a tie, which prints in two ways, to its own last digit."""
     printed = _printed(result)
     percent = "%" in printed.text
-    digits = _digits(printed)
-    return f"{float(value) * (100 if percent else 1):.{digits}f}{' %' if percent else ''}"
+    shown, digits = value * (100 if percent else 1), _digits(printed)
+    tie = (shown * 10**digits % 1) == Fraction(1, 2)
+    return f"{float(shown):.{digits + tie}f}{' %' if percent else ''}"
 
 
 def _one_digit_more(result: CheckResult, value: Fraction) -> str:

@@ -11,10 +11,10 @@ from dataclasses import dataclass
 from fractions import Fraction
 from typing import Any
 
+from analysis.paper.audit.binomial import binomial_p
 from analysis.paper.audit.claims import STARS
 from analysis.paper.audit.lattices import Rows, effect
 from analysis.paper.audit.means import AnswerScale, scale_of
-from analysis.paper.audit.p_values import binomial_p
 from analysis.paper.audit.printed import CheckResult, Interval, Rounding, read_printed
 from analysis.paper.audit.reconstruct import (
     ColumnOrder,

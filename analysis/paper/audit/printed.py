@@ -1,7 +1,8 @@
 """Printed numbers, the exact intervals of the true values that print so, and the verdicts on them.
 
-A tie can fall either way in binary arithmetic, so half-down stands beside half-up and half-even; truncation is a
-habit of its own. `ANY` is the union of the four: what lies outside it prints so under none.
+Half-up and half-even printing are both ordinary: a number that prints so under either is plain attainable. Half-down (a
+tie can fall either way in binary arithmetic) and truncation are readings of their own. `ANY` is the union of the four:
+what lies outside it prints so under none.
 
 "not attainable" is said only where no attempt under any reading could succeed, "attainable" only with a witness.
 """
@@ -13,16 +14,20 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
 from enum import StrEnum
 from fractions import Fraction
+from itertools import groupby
 from math import ceil, floor
 from typing import Annotated, Literal
 
-from pydantic import AfterValidator
+from pydantic import AfterValidator, BeforeValidator
 
 from analysis.report.serial import beside, written
 
 Relation = Literal["=", "<", "<=", ">", ">="]
 _RELATIONS: dict[str, Relation] = {"": "=", "=": "=", "<": "<", ">": ">", "<=": "<=", ">=": ">=", "≤": "<=", "≥": ">="}
 _TEXT = re.compile(r"^(<=|>=|[<>=≤≥]?)\s*([-+−]?)\s*([0-9]*)(?:\.([0-9]*))?\s*(%?)$")
+_COMMA = re.compile(r"[0-9]*,[0-9]+")
+_LONGEST = 40
+"""Characters of a printed number; longer ones are no number of a paper."""
 
 
 class Rounding(StrEnum):
@@ -46,9 +51,13 @@ class Interval:
 
     def holds(self, value: Fraction) -> bool:
         """Is `value` inside?"""
-        above = self.low is None or value > self.low or (self.low_closed and value == self.low)
-        below = self.high is None or value < self.high or (self.high_closed and value == self.high)
-        return above and below
+        return self.side(value) == 0
+
+    def side(self, value: Fraction) -> int:
+        """-1 where `value` lies below, 0 inside, 1 above."""
+        if self.low is not None and (value < self.low or (value == self.low and not self.low_closed)):
+            return -1
+        return int(self.high is not None and (value > self.high or (value == self.high and not self.high_closed)))
 
     def mapped(self, change: Callable[[Fraction], Fraction]) -> Interval:
         """The image under a strictly increasing `change`."""
@@ -126,9 +135,9 @@ def read_printed(text: str | int) -> PrintedNumber:
     >>> read_printed("64.3%").value
     Fraction(643, 1000)
     """
-    found = _TEXT.match(str(text).strip())
+    found = _TEXT.match(str(text).strip()) if len(str(text)) <= _LONGEST else None
     if found is None or not (found[3] or found[4]):
-        raise ValueError(f"{text!r} is no printed number (rule: digits, as in '28.45', '< .001' or '64.3%')")
+        raise ValueError(f"{_cut(str(text))!r} is no printed number ({_rule(str(text))})")
     relation, sign, whole, decimals, percent = found.groups()
     decimals = decimals or ""
     unit = Fraction(1, 10 ** len(decimals)) / (100 if percent else 1)
@@ -136,12 +145,31 @@ def read_printed(text: str | int) -> PrintedNumber:
     return PrintedNumber(str(text).strip(), _RELATIONS[relation], -value if sign in {"-", "−"} else value, unit)
 
 
+def _rule(text: str) -> str:
+    if len(text) > _LONGEST:
+        return f"rule: at most {_LONGEST} characters, not {len(text)}"
+    if _COMMA.search(text):
+        point = text.replace(",", ".") if text.count(",") == 1 and "." not in text else None
+        return f"a comma? write {point!r}" if point else "rule: a decimal point, and no mark between thousands"
+    return "rule: digits, as in '28.45', '< .001' or '64.3%'"
+
+
+def _cut(text: str) -> str:
+    return text if len(text) <= _LONGEST else f"{text[:_LONGEST]}…"
+
+
+def _quoted(value: object) -> object:
+    if isinstance(value, int | float) and not isinstance(value, bool):
+        raise ValueError(f'stands without quotes, so its printed digits are lost; write it as printed: "{value}"')
+    return value
+
+
 def _is_printed(text: str) -> str:
     read_printed(text)
     return text
 
 
-PrintedText = Annotated[str, AfterValidator(_is_printed)]
+PrintedText = Annotated[str, BeforeValidator(_quoted), AfterValidator(_is_printed)]
 """A number or a bound as printed: "28.45", ".205", "< .001", "64.3%"."""
 
 
@@ -188,8 +216,18 @@ Witness = tuple[tuple[Fraction, ...], ...]
 """Data that give the printed numbers: rows of values in the unit of the data."""
 
 
+_LONG_ROW = 100
+
+
 def _as_texts(rows: Witness) -> list[list[str]]:
-    return [[str(value) for value in row] for row in rows]
+    return [_row_texts(row) for row in rows]
+
+
+def _row_texts(row: Sequence[Fraction]) -> list[str]:
+    """The values of a row; of a long one each with how often it stands there, such as "3 x 500000"."""
+    if len(row) <= _LONG_ROW:
+        return [str(value) for value in row]
+    return [f"{value} x {sum(1 for _ in run)}" for value, run in groupby(row)]
 
 
 ORDINARY = (Rounding.HALF_UP, Rounding.HALF_EVEN)
@@ -199,12 +237,16 @@ ROUNDINGS = tuple(rounding.value for rounding in Rounding)
 
 @dataclass(frozen=True, slots=True)
 class JudgedReadings:
-    """A verdict with the readings that rescue, data for the first of them, and all readings tried beside the plain."""
+    """A verdict with the readings that rescue, data for the first of them, and all readings tried beside the plain.
+
+    `rounding`: of a number that is attainable under one of the two ordinary conventions alone, which one.
+    """
 
     verdict: AuditVerdict
     readings: tuple[str, ...] = ()
     witness: Witness = field(default=(), metadata=written(_as_texts, name="data"))
     tried: tuple[str, ...] = ()
+    rounding: str = ""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -247,48 +289,82 @@ Attempt = Callable[[Rounding], DataExistence]
 
 
 def judge_readings(plain: Attempt, others: Sequence[tuple[str, Attempt]] = ()) -> JudgedReadings:
-    """Attainable if `plain` succeeds under both ordinary roundings; else the readings that rescue are named.
+    """Attainable if `plain` succeeds under one of the ordinary roundings; else the readings that rescue are named.
 
     A rounding alone is named if only some of them rescue; of `others`, (name, attempt), all that rescue are named.
     Where `plain` could not be settled the verdict is "undecided", whatever the readings give.
     """
-    first = _under_roundings(plain, "") or JudgedReadings("undecided")
+    first = _under_roundings(plain) or JudgedReadings("undecided")
     if first.verdict != "not attainable":
         return replace(first, tried=ROUNDINGS)
     names = (*ROUNDINGS, *(name for name, _ in others))
-    found = [_under_roundings(attempt, name) or JudgedReadings("undecided") for name, attempt in others]
-    rescued = [decision for decision in found if decision.readings]
+    found = [(name, _under_roundings(attempt)) for name, attempt in others]
+    rescued = [(_named(name, one), one) for name, one in found if one is not None and _names(one)]
     if rescued:
-        readings = tuple(reading for decision in rescued for reading in decision.readings)
-        return JudgedReadings("only under a reading", readings, rescued[0].witness, names)
-    unsure = any(decision.verdict == "undecided" for decision in found)
+        readings = tuple(reading for names, _ in rescued for reading in names)
+        return JudgedReadings("only under a reading", readings, rescued[0][1].witness, names)
+    unsure = any(one is None or one.verdict == "undecided" for _, one in found)
     return JudgedReadings("undecided" if unsure else "not attainable", (), (), names)
 
 
-def _under_roundings(attempt: Attempt, name: str) -> JudgedReadings | None:
+def _under_roundings(attempt: Attempt) -> JudgedReadings | None:
     """The decision on one reading; None if nothing was found or proved."""
     widest = attempt(Rounding.ANY)
     if widest.exists is not True:
         return JudgedReadings("not attainable") if widest.exists is False else None
     ordinary = {rounding: attempt(rounding) for rounding in ORDINARY}
-    if all(found.exists for found in ordinary.values()):
-        witness = ordinary[Rounding.HALF_UP].witness
-        return (
-            JudgedReadings("only under a reading", (name,), witness)
-            if name
-            else JudgedReadings("attainable", (), witness)
-        )
+    printing = [rounding for rounding, found in ordinary.items() if found.exists]
+    if printing:
+        alone = printing[0] if len(printing) == 1 else ""
+        return JudgedReadings("attainable", (), ordinary[printing[0]].witness, rounding=str(alone))
     tried = ordinary | {rounding: attempt(rounding) for rounding in OTHER}
     names = [rounding for rounding, found in tried.items() if found.exists]
     if not names and not any(found.exists is None for found in tried.values()):
         names = [Rounding.ANY]
     unsure = any(found.exists is None for found in ordinary.values())
-    rescued = tuple(f"{name}, {rounding.value}" if name else rounding.value for rounding in names)
     witness = tried[names[0]].witness if names and names[0] in tried else widest.witness
-    return JudgedReadings("undecided" if unsure else "only under a reading", rescued, witness)
+    return JudgedReadings("undecided" if unsure else "only under a reading", tuple(map(str, names)), witness)
 
 
-def listed(values: Sequence[object], most: int = 12) -> str:
-    """Values for a report, the first `most` of them."""
-    text = ", ".join(map(str, values[:most]))
-    return text + (f" and {len(values) - most} more" if len(values) > most else "")
+def _names(one: JudgedReadings) -> bool:
+    """Whether a reading gives the number, under some rounding."""
+    return one.verdict == "attainable" or bool(one.readings)
+
+
+def _named(name: str, one: JudgedReadings) -> tuple[str, ...]:
+    """A reading by its name, with the roundings that it needs."""
+    needed = one.readings or ((one.rounding,) if one.rounding else ())
+    return tuple(f"{name}, {rounding}" for rounding in needed) or (name,)
+
+
+def family(
+    fitting: Callable[[Rounding], range], name: Callable[[str], str], attempt: Callable[[int], Attempt]
+) -> list[tuple[str, Attempt]]:
+    """Readings that differ in a whole number: those that could fit, all in one where they are many.
+
+    `fitting` gives the numbers that fit under a rounding; `name` names a reading by its number, or by "fewer" where
+    none fits.
+    """
+    values = fitting(Rounding.ANY)
+    if not values:
+        return [(name("fewer"), lambda _: NONE_EXISTS)]
+    if values.stop - values.start <= LISTED_AT_MOST:
+        return [(name(str(value)), attempt(value)) for value in values]
+    values = fitting(Rounding.HALF_UP) or values
+    return [(name(f"{values[0]} to {values[-1]}"), attempt(middle(values)))]
+
+
+def middle(values: range) -> int:
+    """The number in the middle of a range of any length."""
+    return (values.start + values.stop - 1) // 2
+
+
+LISTED_AT_MOST = 12
+"""Values of which a report names all."""
+
+
+def listed(values: Sequence[object], *, count: int | None = None) -> str:
+    """Values for a report, the first of them; `count` says how many there are where `values` has only the first."""
+    shown = values[:LISTED_AT_MOST]
+    more = (len(values) if count is None else count) - len(shown)
+    return ", ".join(map(str, shown)) + (f" and {more} more" if more > 0 else "")

@@ -1,0 +1,109 @@
+"""Nothing runs away at the door: files, keys, nestings, patterns and messages have bounds, and say so."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from analysis.logs.column_map import ColumnMap
+from analysis.logs.patterns import group_in, holding
+from analysis.paper.audit.run import PaperFile, load_paper_file
+from analysis.summary.remarks_coding import Codebook
+from device.words import RecoilError, few_of_each
+from experiments.config.door import ConfigError, checked_table, tables
+
+BOMB, CAMEL = "(a+)+$", "a" * 5_000 + "!"
+
+
+@pytest.mark.parametrize(
+    ("text", "said"),
+    [
+        ("a" + ".a" * 50_000 + " = 1", "some.toml:1: a key has too many parts"),
+        ('x = 1\n["a"' + '."a"' * 50_000 + "]", "some.toml:2: a key has too many parts"),
+        ("x = " + "[" * 5_000, "too deep in each other"),
+        ("x = " + "[" * 100 + "]" * 100, "too deep in each other"),
+        ("x = " + "{a = " * 50 + "1" + "}" * 50, "too deep in each other"),
+        ("#" * 1_000_001, "rule: at most 1000000"),
+        ("a = 1\nmean = 3,47", "a decimal comma? write 3.47"),
+        ("a = " + "9" * 5_000, "not TOML"),
+    ],
+)
+def test_toml_beyond_reason_is_refused(text: str, said: str) -> None:
+    with pytest.raises(ConfigError) as refused:
+        tables(text, "some.toml")
+    assert said in str(refused.value)
+
+
+def test_keys_and_text_with_points_are_taken() -> None:
+    found = tables('[a.b."c.d"]\ne.f = "www.' + ". ".join(["some text"] * 50) + '"', "some.toml")
+    assert list(found["a"]["b"]["c.d"]["e"]) == ["f"]
+
+
+@pytest.mark.parametrize(
+    ("pattern", "said"),
+    [
+        ("a{99999999999}", "multiply to at most 100"),
+        ("((a{5}){5}){5}", "multiply to at most 100"),
+        ("(" * 600, "rule: at most 500"),
+        ("(" * 21 + ")" * 21, "21 groups"),
+        ("stab(", "no regular expression"),
+        ("(?=a)", "no regular expression"),
+        (r"(a)\\1", "no regular expression"),
+    ],
+)
+def test_patterns_beyond_reason_are_refused(pattern: str, said: str) -> None:
+    book = {"codes": [{"code": "a", "label": "A", "pattern": pattern.replace("\\\\", "\\")}]}
+    with pytest.raises(ConfigError, match=said):
+        checked_table(Codebook, book, "codes.toml")
+
+
+def test_a_map_refuses_such_patterns_too() -> None:
+    table = {
+        "experiment": "preference",
+        "participant": {"file_name": "(a{99999999999})"},
+        "columns": {"method": "m", "rating": "r"},
+    }
+    with pytest.raises(ConfigError, match="multiply to at most 100"):
+        checked_table(ColumnMap, table, "map.toml")
+
+
+def test_a_pattern_that_would_go_back_for_ever_does_not() -> None:
+    """Python's `re` takes 2^5000 steps for these."""
+    assert not holding(CAMEL, BOMB)
+    assert group_in(CAMEL, "(?:a+)+(b)") is None
+    assert holding("Die Äpfel", "äpfel|birnen")
+
+
+def test_a_value_in_a_message_is_cut_at_200_characters() -> None:
+    said = str(RecoilError(f"a.csv: {'9' * 5_000!r} is no trial, nor is {'7' * 5_000}; it's a long way"))
+    assert "(5000 characters)" in said
+    assert len(said) < 520
+    assert said.endswith("it's a long way")
+    name = "x" * 255
+    assert name in str(RecoilError(f"/somewhere/{name}: cannot be read"))
+
+
+def test_of_like_findings_five_are_said_and_the_rest_counted(tmp_path: Path) -> None:
+    path = tmp_path / "paper.toml"
+    path.write_text('[[claims]]\nplace = "I"\nquote = "x"\nkind = "grim"\nmean = 5.2\nn = 28\n' * 200, encoding="utf-8")
+    with pytest.raises(ConfigError) as refused:
+        load_paper_file(path)
+    lines = str(refused.value).splitlines()
+    assert len(lines) == 6
+    assert lines[4].startswith(f"{path}:29: claims.4.mean = 5.2")
+    assert lines[5] == "... and 195 more like them"
+
+
+def test_a_hundred_thousand_findings_are_soon_said() -> None:
+    with pytest.raises(ConfigError) as refused:
+        checked_table(PaperFile, {"claims": [1] * 100_000}, "paper.toml")
+    assert str(refused.value).splitlines()[5:] == ["... and 1995 more like them", "... and 98000 more"]
+
+
+def test_like_problems_of_files_are_counted_by_what_is_wrong() -> None:
+    said = [f"logs/sub-P{n}/a.csv, line {n}, column set: '{n}' is not allowed" for n in range(200)]
+    assert list(few_of_each([*said, "b.csv: is empty"]))[5:7] == [
+        "b.csv: is empty",
+        "... and 195 more like it (is not allowed)",
+    ]
