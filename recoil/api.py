@@ -94,9 +94,10 @@ def read_logs(*paths: str | Path) -> Logs:
     return logs
 
 
-def analyze(*paths: str | Path, fits: bool = False) -> StudyStatistics:
+def analyze(*paths: str | Path, requests: str | Path | None = None, fits: bool = False) -> StudyStatistics:
     """The statistics of all logs in files and folders; `to_frame()`, `to_dict()`, and a table in a notebook.
 
+    `requests`: a file of further tests and models (`examples/requests.toml`), whose answers are `requested`.
     `fits`: with the diffusion model fitted. Who was left out stands in `excluded`, and what there is to say in
     `warnings`. `RecoilError` if there is nothing that can be used.
 
@@ -110,10 +111,16 @@ def analyze(*paths: str | Path, fits: bool = False) -> StudyStatistics:
     from dataclasses import replace
 
     from analysis.summary.analyze import with_everybody
+    from analysis.summary.measured import answers_to
+    from analysis.summary.requests import Requests
     from analysis.summary.summary import summarize
+    from experiments.config.door import load
 
+    asked = load(Requests, Path(requests)) if requests is not None else None
     logs = read_logs(*paths)
     found = with_everybody(summarize(logs, fits=fits), logs)
+    if asked is not None and requests is not None:
+        found = replace(found, requested=answers_to(asked, Path(requests), logs))
     left_out = (f"left out: {one}" for one in (*logs.problems, *logs.begun))
     return replace(found, warnings=(*left_out, *map(str, logs.remarks), *found.warnings))
 

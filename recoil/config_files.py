@@ -263,6 +263,7 @@ def schemas() -> dict[str, bytes]:
     from analysis.logs.exclusions import Rules  # noqa: PLC0415
     from analysis.paper.paper import Paper  # noqa: PLC0415
     from analysis.summary.remarks_coding import Codebook  # noqa: PLC0415
+    from analysis.summary.requests import Requests  # noqa: PLC0415
 
     kinds: dict[str, type[BaseModel]] = {
         "design": DesignConfig,
@@ -273,6 +274,7 @@ def schemas() -> dict[str, bytes]:
         "columns": ColumnMap,
         "rules": Rules,
         "codebook": Codebook,
+        "requests": Requests,
     }
     return {f"{name}.json": _schema(name, kind) for name, kind in kinds.items()}
 

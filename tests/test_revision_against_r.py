@@ -178,7 +178,8 @@ def test_the_linear_mixed_model_is_lmer_by_reml(data: Entry, found: Entry) -> No
 
 def test_the_power_of_groups_is_that_of_power_anova_test() -> None:
     for k, n, f, alpha, power in R["one_way_power"]:
-        assert one_way_anova_power(f, [n] * int(k), alpha) == pytest.approx(power, rel=1e-8)
+        found = one_way_anova_power(f, [n] * int(k), alpha)
+        assert found == pytest.approx(power, rel=0.0, abs=1e-9)  # where R's noncentral distribution ends
 
 
 def test_the_power_of_two_conditions_is_that_of_the_paired_t_test() -> None:

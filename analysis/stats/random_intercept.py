@@ -185,24 +185,33 @@ def _fitted(
 
 
 def _climbed(cells: _Cells, start: FloatArray, rule: tuple[FloatArray, FloatArray]) -> tuple[FloatArray, _Peak | None]:
-    """Where Newton's method ends, and the peak there; None if it is none. Steps are cut, and halved if they fall."""
+    """Where Newton's method ends, and the peak there; None if it is none."""
     theta, here = start, _likelihood(cells, start, rule)
     for _ in range(_STEPS):
         values, vectors = np.linalg.eigh(-here.hessian)
         steepness = np.maximum(np.abs(values), 1e-8 * np.abs(values).max())
         step = vectors @ ((vectors.T @ here.gradient) / steepness)
         step *= min(1.0, _LONGEST / float(np.abs(step).max() or 1.0))
-        there = _likelihood(cells, theta + step, rule)
-        while there.value < here.value - 1e-10 * abs(here.value) and np.abs(step).max() > _CLOSE:
-            step = step / 2.0
-            there = _likelihood(cells, theta + step, rule)
-        theta, here = theta + step, there
+        step, here = _upwards(cells, theta, here, step, rule)
+        theta = theta + step
         if abs(theta[-1]) > LARGEST_SD:
             return theta, None
         if np.abs(step).max() < _CLOSE:
             values = np.linalg.eigvalsh(-here.hessian)
             return theta, here if values[0] > _FLAT * values[-1] else None
     return theta, None
+
+
+def _upwards(
+    cells: _Cells, theta: FloatArray, here: _Peak, step: FloatArray, rule: tuple[FloatArray, FloatArray]
+) -> tuple[FloatArray, _Peak]:
+    """The step, halved until it gains some of what its slope promises: s and -s are the same model, and no gain."""
+    while True:
+        there = _likelihood(cells, theta + step, rule)
+        promised = 1e-4 * float(here.gradient @ step) - 1e-12 * abs(here.value)
+        if there.value >= here.value + promised or np.abs(step).max() < _CLOSE:
+            return step, there
+        step = step / 2.0
 
 
 def _likelihood(cells: _Cells, theta: FloatArray, rule: tuple[FloatArray, FloatArray]) -> _Peak:

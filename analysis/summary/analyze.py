@@ -15,7 +15,9 @@ from analysis.paper.audit.run import audit, load_paper_file
 from analysis.paper.paper import Prediction, load_paper
 from analysis.summary import remarks_coding
 from analysis.summary.comparison import compare
+from analysis.summary.measured import answers_to
 from analysis.summary.participation import exclusion_lines, participation
+from analysis.summary.requests import Requests
 from analysis.summary.results import RulesApplied, StudyStatistics
 from analysis.summary.sections.content import ReportData
 from analysis.summary.sections.sections import write_report
@@ -41,6 +43,7 @@ class Request:
     rules: Path | None = None
     codebook: Path | None = None
     fits: bool = False
+    requests: Path | None = None
 
 
 def analyze(request: Request, track: Track = iter) -> tuple[StudyStatistics, tuple[str, ...]]:
@@ -53,6 +56,7 @@ def analyze(request: Request, track: Track = iter) -> tuple[StudyStatistics, tup
     published = load_paper(request.paper) if request.paper else None
     mapping = load(ColumnMap, request.columns) if request.columns else None
     rules = load(Rules, request.rules) if request.rules else None
+    asked = load(Requests, request.requests) if request.requests else None
     book = remarks_coding.load_codebook(request.codebook) if request.codebook else None
     logs = read_logs(request.paths, track, mapping)
     refuse_nothing(request.paths, logs)
@@ -64,6 +68,8 @@ def analyze(request: Request, track: Track = iter) -> tuple[StudyStatistics, tup
     coded = None if book is None else _coded(used, statistics, book)
     if coded is not None:
         statistics = replace(statistics, remarks=coded)
+    if asked is not None and request.requests is not None:
+        statistics = replace(statistics, requested=answers_to(asked, request.requests, used))
     statistics = with_everybody(statistics, used)
     storage.make_folder(request.out)
     tables = result_tables(used, statistics.analysed)

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Hashable, Iterable, Iterator, Mapping, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 import pandas as pd
@@ -69,19 +69,39 @@ def _most_first(counted: tuple[Hashable, int]) -> tuple[int, str]:
     return -counted[1], str(counted[0])
 
 
-def _question(design: DesignConfig, name: str, question: QuestionConfig, table: pd.DataFrame) -> QuestionSummary:
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class QuestionScores:
+    """Answered trials with their `score`, those with a stimulus (`real`), and each person's mean in every condition.
+
+    `people`: a row for each person who has all conditions; `left_out`: who has not.
+    """
+
+    scored: pd.DataFrame
+    real: pd.DataFrame
+    people: pd.DataFrame
+    left_out: tuple[str, ...]
+
+
+def question_scores(design: DesignConfig, name: str, table: pd.DataFrame) -> QuestionScores:
+    """The scores of a question, trial by trial and person by person."""
     column = correct_columns(design.questions).get(name, name)
-    scored = table.assign(score=_scores(question, table[column])).dropna(subset=["score"])
-    factors = _varied(design)
-    cells = _ordered(design, (_cell(design, name, question, some) for some in _conditions(scored, factors)))
+    scored = table.assign(score=_scores(design.questions[name], table[column])).dropna(subset=["score"])
     real = scored if "stimulus" not in scored else scored[scored["stimulus"].astype(int) == 1]
-    people, left_out = _complete(real, factors)
-    tests = (*_comparisons(design, question, people, _groups(design, real)), *_sensitivity(design, question, scored))
+    people, left_out = _complete(real, _varied(design))
+    return QuestionScores(scored=scored, real=real, people=people, left_out=left_out)
+
+
+def _question(design: DesignConfig, name: str, question: QuestionConfig, table: pd.DataFrame) -> QuestionSummary:
+    found, factors = question_scores(design, name, table), _varied(design)
+    scored, people = found.scored, found.people
+    cells = _ordered(design, (_cell(design, name, question, some) for some in _conditions(scored, factors)))
+    comparisons = _comparisons(design, question, people, _groups(design, found.real))
+    tests = (*comparisons, *_sensitivity(design, question, scored))
     return QuestionSummary(
         kind=question.kind,
         cells=cells,
         tests=tests,
-        left_out=left_out,
+        left_out=found.left_out,
         chance=chance(question),
         preferred=_preferred(design, question, scored),
         scale=_scale(question),

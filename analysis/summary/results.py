@@ -21,6 +21,7 @@ from analysis.stats.logit_model import Clustering, LogitModel
 from analysis.stats.paired import PairedT, SignedRanks
 from analysis.summary.participation import Participation
 from analysis.summary.remarks_coding import CodedRemarks
+from analysis.summary.requests import Requested
 from analysis.times.own_trials import ResponseTimes
 from analysis.times.speed_accuracy import NoSpeedAccuracy, SpeedAccuracy
 from experiments.design.language import Level
@@ -392,6 +393,7 @@ class StudyStatistics(NotebookResult):
     studies: Mapping[str, StudyStatistics] | None = field(default=None, metadata=OPTIONAL)
     rules: RulesApplied | None = field(default=None, metadata=OPTIONAL)
     remarks: CodedRemarks | None = field(default=None, metadata=OPTIONAL)
+    requested: tuple[Requested, ...] | None = field(default=None, metadata=OPTIONAL)
 
     def of(self, experiment: str) -> WithinStatistics | None:
         """The statistics of an experiment by its name."""

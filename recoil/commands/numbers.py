@@ -51,6 +51,9 @@ def analyze(
     ] = None,
     paper: Annotated[Path | None, typer.Option(help="Published numbers to compare with.")] = None,
     codebook: Annotated[Path | None, typer.Option(metavar="CODES.toml", help="Codes of free descriptions.")] = None,
+    requests: Annotated[
+        Path | None, typer.Option(metavar="REQUESTS.toml", help="Further tests and models, such as planned contrasts.")
+    ] = None,
     fits: Annotated[bool, typer.Option("--fits", help="With the diffusion model fitted to response times.")] = False,
     as_json: AsJsonOption = False,
 ) -> None:
@@ -58,7 +61,7 @@ def analyze(
     from analysis.summary import analyze as feature
 
     asked = feature.Request(
-        paths=paths, out=out, paper=paper, columns=columns, rules=rules, codebook=codebook, fits=fits
+        paths=paths, out=out, paper=paper, columns=columns, rules=rules, codebook=codebook, requests=requests, fits=fits
     )
     statistics, said = feature.analyze(asked, tracked)
     for line in few_of_each(said):

@@ -17,6 +17,7 @@ from analysis.summary.sections.participants import all_left_out, notices, partic
 from analysis.summary.sections.pictures import write_figures
 from analysis.summary.sections.published import odds_section, published_sections, shot_section
 from analysis.summary.sections.quality import quality_section, undefined_numbers
+from analysis.summary.sections.requested import requested_sections
 from analysis.summary.sections.supplement import supplement_sections
 from analysis.summary.sections.trade import trade_details, trade_sections
 
@@ -58,6 +59,7 @@ READERS_ORDER: tuple[Callable[[ReportData], Iterator[Section]], ...] = (
     manuscript_section,
     quality_section,
     supplement_sections,
+    requested_sections,
     trade_sections,
     # what follows is the appendix
     all_left_out,

@@ -1,0 +1,271 @@
+"""What a revision of a paper asks for beyond the report's own statistics: a file of requests, and what answers them.
+
+    [[requests]]
+    kind = "contrasts"                         # planned contrasts of the conditions, each on its own error
+    of = "direction"                           # an experiment or a design whose logs are analysed
+    weights."force against vibration" = { vibration = -1.0, asymmetric-1 = 0.5, asymmetric-2 = 0.5 }
+
+`configs/examples/requests.toml` has every kind. Scores are those of the report: a participant's mean in a condition, in
+direction the share of right answers to forward shots. A condition of several factors is called by its levels, joined by
+`/`; a condition without a weight has weight 0.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from importlib.metadata import version
+from typing import Annotated, Literal
+
+import numpy as np
+import pandas as pd
+from pydantic import Field
+
+from analysis.logs.column_map import ShortText
+from analysis.stats.anova_bayes import FIXED_SCALE, RANDOM_SCALE, AnovaBayesFactor, rm_anova_bayes_factor
+from analysis.stats.arrays import FloatArray
+from analysis.stats.contrasts import PlannedContrast, planned_contrasts
+from analysis.stats.corrections import Correction
+from analysis.stats.equivalence import Equivalence, tost_one_sample, tost_paired
+from analysis.stats.fixed_effects import indicators
+from analysis.stats.mixed_model import LinearMixedModel, linear_mixed_model
+from analysis.stats.random_intercept import NODES, RandomInterceptLogit, random_intercept_logit
+from experiments.config.door import Model
+from experiments.design.language import Level
+
+RequestKind = Literal["contrasts", "equivalence", "bayes-factor", "mixed-model", "logistic"]
+Result = tuple[PlannedContrast, ...] | Equivalence | AnovaBayesFactor | LinearMixedModel | RandomInterceptLogit
+
+
+class _OfData(Model):
+    """Whose data: an experiment or a design, and of several questions which one."""
+
+    of: ShortText
+    question: ShortText | None = None
+
+
+class ContrastsRequest(_OfData):
+    """Weights of the conditions by the name of each contrast."""
+
+    kind: Literal["contrasts"]
+    weights: dict[ShortText, dict[ShortText, float]] = Field(min_length=1)
+    correction: Correction = "holm"
+
+
+class EquivalenceRequest(_OfData):
+    """Is the mean of condition `a`, less that of `b` if it is given, between `low` and `high`?"""
+
+    kind: Literal["equivalence"]
+    a: ShortText
+    b: ShortText | None = None
+    low: float
+    high: float
+    alpha: Annotated[float, Field(gt=0.0, lt=0.5)] = 0.05
+
+
+class BayesFactorRequest(_OfData):
+    """The Bayes factor of the conditions; `scale` is that of the prior on their effects."""
+
+    kind: Literal["bayes-factor"]
+    scale: Annotated[float, Field(gt=0.0, le=10.0)] = FIXED_SCALE
+
+
+class MixedModelRequest(_OfData):
+    """A linear mixed model of single trials. `terms` are factors, or several joined by `:`; all unless given."""
+
+    kind: Literal["mixed-model"]
+    terms: tuple[ShortText, ...] = ()
+
+
+class LogisticRequest(_OfData):
+    """A logistic mixed model of single answers; `terms` as in a linear one."""
+
+    kind: Literal["logistic"]
+    terms: tuple[ShortText, ...] = ()
+
+
+AnyRequest = ContrastsRequest | EquivalenceRequest | BayesFactorRequest | MixedModelRequest | LogisticRequest
+
+
+class Requests(Model):
+    """All requests of a file."""
+
+    requests: tuple[Annotated[AnyRequest, Field(discriminator="kind")], ...] = Field(min_length=1, max_length=100)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Requested:
+    """The answer to one request: from how many people, what was done in words, and the result."""
+
+    kind: RequestKind
+    of: str
+    question: str | None
+    people: int
+    note: str
+    result: Result
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Measured:
+    """What requests are answered from.
+
+    `scores`: participants by conditions, no cell empty; `trials`: a row a trial, with `participant_id`, `score` and the
+    `factors`, whose levels come in the order of the design. `unit`: what a score is; `grouped`: some factor varies
+    between people.
+    """
+
+    scores: pd.DataFrame
+    trials: pd.DataFrame
+    factors: Mapping[str, tuple[Level, ...]]
+    unit: str
+    grouped: bool = False
+
+
+_CORRECTED = {
+    "none": "not corrected for their number",
+    "holm": "p corrected by Holm (1979)",
+    "benjamini-hochberg": "p corrected by Benjamini and Hochberg (1995)",
+}
+
+
+def answered(request: AnyRequest, measured: Measured) -> Requested:
+    """The answer to a request. `ValueError` if the data have not what it names, with what they have."""
+    match request:
+        case ContrastsRequest():
+            note, result = _contrasts(request, measured)
+        case EquivalenceRequest():
+            note, result = _equivalence(request, measured)
+        case BayesFactorRequest():
+            note, result = _bayes_factor(request, measured)
+        case MixedModelRequest():
+            note, result = _mixed_model(request, measured)
+        case LogisticRequest():
+            note, result = _logistic(request, measured)
+    together = measured.grouped and isinstance(request, ContrastsRequest | EquivalenceRequest)
+    of_trials = isinstance(result, LinearMixedModel | RandomInterceptLogit)
+    return Requested(
+        kind=request.kind,
+        of=request.of,
+        question=request.question,
+        people=measured.trials["participant_id"].nunique() if of_trials else len(measured.scores),
+        note=f"{note} Scores are {measured.unit}{', people of all groups together' if together else ''}.",
+        result=result,
+    )
+
+
+def _contrasts(request: ContrastsRequest, measured: Measured) -> tuple[str, Result]:
+    for weights in request.weights.values():
+        for name in weights:
+            _column(measured, name)
+    names = [str(name) for name in measured.scores.columns]
+    wide = {name: [weights.get(one, 0.0) for one in names] for name, weights in request.weights.items()}
+    note = (
+        "Contrasts of the participants' scores, each on its own error (t on n − 1 degrees of freedom), which needs no "
+        f"sphericity; {_CORRECTED[request.correction]}; intervals of each contrast by itself."
+    )
+    return note, planned_contrasts(_table(measured), wide, request.correction)
+
+
+def _equivalence(request: EquivalenceRequest, measured: Measured) -> tuple[str, Result]:
+    _table(measured)
+    first, bounds = _column(measured, request.a), (request.low, request.high, request.alpha)
+    what = request.a if request.b is None else f"{request.a} − {request.b}"
+    shown = " and ".join(f"{bound:g}".replace("-", "−") for bound in bounds[:2])
+    note = (
+        f"Equivalence of {what} by two one-sided t-tests (Schuirmann 1987) against {shown}: equivalent at "
+        f"{request.alpha:g} where p is below it, which is where the interval lies within the bounds."
+    )
+    if request.b is None:
+        return note, tost_one_sample(first, *bounds)
+    return note, tost_paired(first, _column(measured, request.b), *bounds)
+
+
+def _bayes_factor(request: BayesFactorRequest, measured: Measured) -> tuple[str, Result]:
+    within = len(measured.factors)
+    if measured.grouped or within > 1:
+        raise ValueError("a Bayes factor is of one factor within people, and there are more")
+    note = (
+        "Bayes factor of the repeated-measures ANOVA: conditions and participants against participants alone (Rouder "
+        f"et al. 2012), of the participants' scores; effects Cauchy, r = {request.scale:g} for the conditions and "
+        f"{RANDOM_SCALE:g} for the participants."
+    )
+    return note, rm_anova_bayes_factor(_table(measured), request.scale)
+
+
+def _mixed_model(request: MixedModelRequest, measured: Measured) -> tuple[str, Result]:
+    note = (
+        "Linear mixed model of single trials with a random intercept a person, fitted by REML (statsmodels "
+        f"{version('statsmodels')}); Wald tests on the normal distribution.{_references(request.terms, measured)}"
+    )
+    trials = measured.trials
+    return note, linear_mixed_model(
+        trials["score"], list(trials["participant_id"]), _predictors(request.terms, measured)
+    )
+
+
+def _logistic(request: LogisticRequest, measured: Measured) -> tuple[str, Result]:
+    trials = measured.trials
+    if not trials["score"].isin((0.0, 1.0)).all():
+        raise ValueError("a logistic model is of answers that are right or wrong, or one of two; take mixed-model")
+    note = (
+        "Logistic regression of single answers with a random intercept a person, by maximum likelihood (adaptive "
+        f"Gauss-Hermite quadrature, {NODES} nodes); odds are one person's; Wald tests."
+        f"{_references(request.terms, measured)}"
+    )
+    predictors = _predictors(request.terms, measured)
+    return note, random_intercept_logit(trials["score"], list(trials["participant_id"]), predictors)
+
+
+def _table(measured: Measured) -> FloatArray:
+    n, k = measured.scores.shape
+    if n < 2 or k < 2:
+        raise ValueError(f"two people with all of two conditions are needed; there are {n} and {k}")
+    return measured.scores.to_numpy(dtype=np.float64)
+
+
+def _column(measured: Measured, name: str) -> FloatArray:
+    names = [str(one) for one in measured.scores.columns]
+    if name not in names:
+        raise ValueError(f"there is no condition {name!r}; there are {', '.join(names)}")
+    return measured.scores[name].to_numpy(dtype=np.float64)
+
+
+def _terms(terms: tuple[str, ...], measured: Measured) -> tuple[str, ...]:
+    return terms or tuple(measured.factors)
+
+
+def _predictors(terms: tuple[str, ...], measured: Measured) -> dict[str, FloatArray]:
+    """The columns of all terms by name; those of several factors are products."""
+    found: dict[str, FloatArray] = {}
+    for term in _terms(terms, measured):
+        columns: dict[str, FloatArray] = {}
+        for name in term.split(":"):
+            own = _factor_columns(name, measured)
+            columns = {f"{a}:{b}": x * y for a, x in columns.items() for b, y in own.items()} if columns else own
+        found |= columns
+    return found
+
+
+def _factor_columns(name: str, measured: Measured) -> dict[str, FloatArray]:
+    """A factor of numbers as it is, one of words as indicators against its first level."""
+    if name not in measured.factors:
+        raise ValueError(f"terms: there is no factor {name!r} that varies; there are {', '.join(measured.factors)}")
+    column, levels = measured.trials[name], measured.factors[name]
+    if not isinstance(levels[0], str):
+        return {name: column.to_numpy(dtype=np.float64)}
+    given = [str(level) for level in column]
+    there = [level for level in map(str, levels) if level in given]
+    found = indicators(given, there[0])
+    return {level: found[level] for level in there[1:]}
+
+
+def _references(terms: tuple[str, ...], measured: Measured) -> str:
+    """What words are compared with."""
+    return "".join(f" {name}: against {first}." for name, first in _first_levels(terms, measured))
+
+
+def _first_levels(terms: tuple[str, ...], measured: Measured) -> Iterator[tuple[str, str]]:
+    for name in dict.fromkeys(name for term in _terms(terms, measured) for name in term.split(":")):
+        levels = measured.factors.get(name, ())
+        if levels and isinstance(levels[0], str):
+            yield name, levels[0]

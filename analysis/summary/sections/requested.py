@@ -1,0 +1,150 @@
+"""The sections of what was requested: for each request what was done, and its table."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Sequence
+from dataclasses import replace
+
+from analysis.report import apa
+from analysis.report.figures.style import named
+from analysis.report.section import Section, Table
+from analysis.stats.anova_bayes import AnovaBayesFactor
+from analysis.stats.contrasts import PlannedContrast
+from analysis.stats.equivalence import Equivalence
+from analysis.stats.fixed_effects import Coefficient
+from analysis.stats.mixed_model import LinearMixedModel
+from analysis.stats.random_intercept import RandomInterceptLogit
+from analysis.summary.requests import Requested, RequestKind
+from analysis.summary.sections.content import ReportData
+from analysis.summary.sections.supplement import bayes_cell
+
+_DIGITS = 3
+
+
+def requested_sections(report: ReportData) -> Iterator[Section]:
+    """A section a request, in their order."""
+    for one in report.statistics.requested or ():
+        table = _table(one)
+        yield Section(
+            title=f"Requested: {_NAMES[one.kind]}, {_data(one)}",
+            paragraphs=(named(f"{one.people} participants. {one.note} {_told(one)}".strip()),),
+            tables=(table,) if table else (),
+        )
+
+
+_NAMES: dict[RequestKind, str] = {
+    "contrasts": "planned contrasts",
+    "equivalence": "equivalence",
+    "bayes-factor": "Bayes factor",
+    "mixed-model": "linear mixed model",
+    "logistic": "logistic mixed model",
+}
+
+
+def _data(one: Requested) -> str:
+    return one.of if one.question is None else f"{one.of}, {one.question}"
+
+
+def _told(one: Requested) -> str:
+    """What is not in a table: a Bayes factor, how people differ, or why there is no result."""
+    result = one.result
+    if isinstance(result, tuple):
+        return ""
+    if result.reason is not None:
+        return result.reason
+    match result:
+        case AnovaBayesFactor():
+            factor = bayes_cell(result.bf10)
+            return f"BF10 {factor}." if factor[0] in "<>" else f"BF10 = {factor}."
+        case LinearMixedModel():
+            spread = f"SD between people {_number(result.person_sd)}, of single trials {_number(result.residual_sd)}"
+            return f"{spread}; {result.trials} trials."
+        case RandomInterceptLogit():
+            return f"SD of people's log odds {_number(result.person_sd)}; {result.trials} trials."
+    return ""
+
+
+def _table(one: Requested) -> Table | None:
+    match one.result:
+        case tuple():
+            return _contrasts(f"Planned contrasts of {_data(one)}", one.result)
+        case Equivalence(reason=None):
+            return _equivalence(f"Two one-sided tests of {_data(one)}; p is the larger", one.result)
+        case LinearMixedModel(reason=None):
+            return _coefficients(f"Fixed effects on {_data(one)}", one.result.coefficients)
+        case RandomInterceptLogit(reason=None, coefficients=found):
+            return _with_odds(_coefficients(f"Fixed effects on the log odds of {_data(one)}", found), found)
+    return None
+
+
+def _contrasts(caption: str, found: Sequence[PlannedContrast]) -> Table:
+    return Table(
+        caption=caption,
+        header=("Contrast", "Estimate", "95 % CI", "t", "df", "p", "p corrected", "d_z"),
+        rows=tuple(
+            (
+                one.name if one.reason is None else f"{one.name}. {one.reason}",
+                _number(one.estimate),
+                _interval(one),
+                apa.number(one.t),
+                str(one.df),
+                apa.p_cell(one.p),
+                apa.p_cell(one.p_adjusted),
+                apa.number(one.d_z),
+            )
+            for one in found
+        ),
+    )
+
+
+def _equivalence(caption: str, found: Equivalence) -> Table:
+    level = apa.number(100.0 * (1.0 - 2.0 * found.alpha), 0)
+    return Table(
+        caption=caption,
+        header=("Difference", "Bounds", f"{level} % CI", "t, low", "t, high", "df", "p"),
+        rows=(
+            (
+                _number(found.difference),
+                apa.interval(found.low, found.high, _DIGITS),
+                _interval(found),
+                apa.number(found.t_low),
+                apa.number(found.t_high),
+                f"{found.df:g}",
+                apa.p_cell(found.p),
+            ),
+        ),
+    )
+
+
+def _coefficients(caption: str, found: Sequence[Coefficient]) -> Table:
+    return Table(
+        caption=caption,
+        header=("Coefficient", "Estimate", "95 % CI", "SE", "z", "p"),
+        rows=tuple(
+            (
+                named(one.name),
+                _number(one.estimate),
+                _interval(one),
+                _number(one.se),
+                apa.number(one.z),
+                apa.p_cell(one.p),
+            )
+            for one in found
+        ),
+    )
+
+
+def _with_odds(table: Table, found: Sequence[Coefficient]) -> Table:
+    """With the odds, which a coefficient multiplies; the intercept's are those of the references themselves."""
+    odds = tuple(apa.number(math.exp(min(one.estimate, 700.0))) for one in found)
+    rows = tuple((*row, cell) for row, cell in zip(table.rows, odds, strict=True))
+    return replace(table, header=(*table.header, "Odds ratio"), rows=rows)
+
+
+def _number(value: float | None) -> str:
+    return apa.number(value, _DIGITS)
+
+
+def _interval(one: PlannedContrast | Equivalence | Coefficient) -> str:
+    return apa.interval(one.ci_low, one.ci_high, _DIGITS)
