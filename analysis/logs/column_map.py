@@ -69,7 +69,7 @@ class ParticipantMapping(Model):
         return self
 
 
-class Columns(Model):
+class ColumnNames(Model):
     """The names of the columns."""
 
     method: ShortText
@@ -147,7 +147,7 @@ class ColumnMap(Model):
     response_source: Literal["participant", "experimenter", "synthetic"] = "participant"
     text: TextFormat = TextFormat()
     participant: ParticipantMapping
-    columns: Columns
+    columns: ColumnNames
     values: ValuesMapping = ValuesMapping()
     response_time: ResponseTimeMapping | None = None
     rating: ScaleMapping | None = None

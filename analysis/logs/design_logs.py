@@ -13,7 +13,7 @@ import pandas as pd
 
 from analysis.logs.cell_rules import FEWEST_ALIKE, all_alike, as_moment, cell_fault, cell_value, no_date, too_early
 from analysis.logs.files import BadLogError, code_in_name, experiment_in_name, read_content
-from analysis.logs.journals import compared, journal_of
+from analysis.logs.journals import compared_with, journal_of
 from experiments.config.setup import sha256
 from experiments.design.config import DesignConfig
 from experiments.design.plan import Plan
@@ -58,28 +58,29 @@ def read_design_log(path: str, made: bytes | None = None) -> DesignLog:
     `BadLogError`: it breaks a rule, or nothing says what its columns mean.
     """
     content = read_content(path) if made is None else made
-    design, plan = _design_of(path)
+    data, design, plan = _design_of(path)
     rows = tuple(_rows(content, design))
     code = _code(path, rows)
     _check_plan(design, plan, rows)
     _check_times(design, rows)
     _check_onsets(rows)
-    said = compared(path, content) or ""
+    said = compared_with(data, path, content)
     return DesignLog(code=code, design=design, key=_key(design), rows=rows, journal=said)
 
 
-def _design_of(path: str) -> tuple[DesignConfig, Plan]:
+def _design_of(path: str) -> tuple[bytes, DesignConfig, Plan]:
+    """The bytes of the journal beside a log, and the design and plan in its first line."""
     beside = Path(journal_of(path))
     if not beside.is_file():
         raise BadLogError(f"there is no {beside.name} beside it, which says what the columns mean; keep both together")
     try:
-        head = journal.head(beside)
+        data = journal.journal_bytes(beside)
+        head = journal.head_of(beside, data)
         if head is None:
             raise BadLogError(f"{beside.name} has no whole first line, so nothing says what the columns mean")
-        design = began_with(head)
+        return data, began_with(head), head.plan
     except JournalError as error:
         raise BadLogError(str(error)) from error
-    return design, head.plan
 
 
 def _key(design: DesignConfig) -> str:

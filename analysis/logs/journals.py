@@ -103,15 +103,19 @@ def compared(path: str, content: bytes) -> str | None:
 
     `BadLogError`: the table is not what the journal says.
     """
-    where = journal_of(path)
-    if where == path:
-        return f"its table is missing, so it was made again from this journal; `recoil rebuild {path}` writes it"
     try:
-        data = Path(where).read_bytes()
+        return compared_with(Path(journal_of(path)).read_bytes(), path, content)
     except FileNotFoundError:
         return None
     except OSError as error:
         return f"its journal cannot be read ({error.strerror}), so nothing proves the table"
+
+
+def compared_with(data: bytes, path: str, content: bytes) -> str:
+    """As `compared`, where the bytes of the journal are at hand."""
+    where = journal_of(path)
+    if where == path:
+        return f"its table is missing, so it was made again from this journal; `recoil rebuild {path}` writes it"
     of_table, of_itself = journal.ending_of(data)
     if of_table and of_table != hashlib.sha256(content).hexdigest():
         raise BadLogError(f"edited since the run; `recoil rebuild {where}` gives the original")
@@ -122,7 +126,9 @@ def _compared_whole(where: str, content: bytes, data: bytes, *, finished: bool) 
     """The same of a journal that is not finished, or that was changed: every record is read."""
     try:
         contents = journal.contents_of(Path(where), data)
-        made = None if contents is None else table(contents)
+        if contents is None:
+            return "its journal holds no whole record, so nothing proves the table"
+        made = table(contents)
     except JournalError as error:
         known = "the table is still the one of the finished run" if finished else "so nothing proves the table"
         return f"its journal cannot be trusted, {known}: {_without(where, error)}"

@@ -97,8 +97,14 @@ def exclusion_lines(excluded: Iterable[LeftOut]) -> Iterator[str]:
     told = sorted((one for one in excluded if not one.file), key=_rule)
     for (experiment, rule, remedy), some in groupby(told, key=_rule):
         people = [f"{one.participant} ({one.reason})" for one in some]
-        count = f"{len(people)} participant{'' if len(people) == 1 else 's'}"
+        count = f"{len(people):,} participant{'' if len(people) == 1 else 's'}"
+        if len(people) > _NAMED:
+            people[_NAMED:] = [f"and {len(people) - _NAMED:,} more, all named in statistics.json"]
         yield f"left out of {experiment}: {count} (rule: {rule}): {', '.join(people)}; {remedy}"
+
+
+_NAMED = 100
+"""So many people are named on a line of a terminal."""
 
 
 def _rule(one: LeftOut) -> tuple[str, str, str]:

@@ -1,0 +1,142 @@
+"""Whoever is left out is named, with the rule and the remedy: on the terminal, in the report and in the statistics."""
+
+from __future__ import annotations
+
+import json
+from datetime import UTC, datetime, timedelta
+from pathlib import Path
+
+import pytest
+
+from analysis.logs.reading import read_logs
+from analysis.summary.analyze import with_everybody
+from analysis.summary.participation import PersonInExperiment
+from analysis.summary.summary import summarize
+from experiments.clock import VirtualClock
+from experiments.load import load_setup
+from experiments.run import RunRequest, run
+from experiments.screens.synthetic import synthetic_screen
+from experiments.study import register
+from tests.conftest import Recoil, refused
+from tests.lies import journal, lines, table
+from tests.log_files import trial_rows, trials_path, write_rows, write_study
+
+
+class LaterClock(VirtualClock):
+    """A virtual clock whose date and time go back by ten days when it is told so."""
+
+    def __init__(self, back: timedelta = timedelta()) -> None:
+        super().__init__()
+        self._start = datetime(2026, 3, 11, 9, tzinfo=UTC) - back
+
+
+def ran(folder: Path, code: str = "P01", config: str = "preference", **how: object) -> None:
+    asked = RunRequest(setup=load_setup(config), participant_id=code, results=folder, seed=1, **how)  # type: ignore[arg-type]
+    run(asked, synthetic_screen, LaterClock())
+
+
+def broken_off(folder: Path, code: str, records: int) -> Path:
+    """A run that has begun: the head and so many records more of a finished one, and no table."""
+    ran(folder, code)
+    path = journal(folder, "preference", code)
+    lines(path, lambda found: found.__delitem__(slice(records, None)))
+    table(folder, "preference", code).unlink()
+    return path
+
+
+def test_unanswered_trials_are_told_with_everybody_and_the_remedy(recoil: Recoil, tmp_path: Path) -> None:
+    results = write_study(tmp_path / "results", participants=4)
+    for code, missing in (("P02", 1), ("P04", 2)):
+        rows = trial_rows(code, 7)
+        for row in rows[:missing]:
+            row.update(response="", correct="")
+        write_rows(trials_path(results, code), rows)
+    done = recoil("analyze", results, "--out", tmp_path / "out")
+    assert done.returncode == 1
+    (line,) = (line for line in done.stderr.splitlines() if line.startswith("recoil: left out"))
+    assert "left out of direction: 2 participants (rule: every trial is answered): P02 (1 of 60 trials" in line
+    assert "P04 (2 of 60 trials unanswered); `drop_unanswered = true` under [trials]" in line
+    found = json.loads((tmp_path / "out" / "statistics.json").read_text(encoding="utf-8"))
+    assert [one["participant"] for one in found["excluded"]] == ["P02", "P04"]
+    assert all(one["rule"] and "drop_unanswered" in one["remedy"] for one in found["excluded"])
+    report = (tmp_path / "out" / "report.md").read_text(encoding="utf-8").replace("\\", "")
+    assert "P02" in report
+    assert "drop_unanswered" in report
+
+
+def test_everybody_is_counted_in_every_experiment(tmp_path: Path) -> None:
+    results = write_study(tmp_path, participants=2)
+    trials_path(results, "P02").write_bytes(b"participant_id\r\n")
+    broken_off(results, "P03", 9)
+    ran(results, "P04", "direction", practice=True)
+    register.append(results, register.entry("joined", "P05", facts={}), VirtualClock())
+    logs = read_logs([results])
+    found = with_everybody(summarize(logs), logs).participation
+    assert found is not None
+    direction, preference = found.experiments["direction"], found.experiments["preference"]
+    assert (direction.analysed, direction.left_out, direction.not_done, direction.practices) == (1, 1, 3, 1)
+    assert (preference.analysed, preference.begun, preference.not_done, preference.set_aside) == (2, 1, 2, 0)
+    assert PersonInExperiment(participant="P05", experiment="preference", state="not done") in found.absent
+    assert any(one.participant == "P03" and one.state.startswith("begun: ") for one in found.absent)
+    assert sum(one.participant == "P01" for one in found.absent) == 0
+
+
+def test_a_finished_run_without_its_table_is_analysed_exported_and_named(recoil: Recoil, tmp_path: Path) -> None:
+    results = tmp_path / "results"
+    for code in ("P01", "P02"):
+        ran(results, code)
+    whole = summarize(read_logs([results])).to_dict()
+    table(results, "preference").unlink()
+    assert summarize(read_logs([results])).to_dict() == whole
+    said = "its table is missing, so it was made again from this journal; `recoil rebuild"
+    for words in (("analyze", results, "--out", tmp_path / "out"), ("export", "bids", results)):
+        done = recoil(*words)
+        assert (done.returncode, said in done.stderr) == (1, True)
+    assert (results / "bids" / "sub-P01" / "beh" / "sub-P01_task-preference_beh.tsv").exists()
+    study = recoil("study", results)
+    assert study.returncode == 1
+    assert "is missing, though the run is finished; `recoil rebuild" in study.stderr
+
+
+@pytest.mark.parametrize("command", ["analyze", "export"])
+def test_of_unfinished_runs_alone_it_is_said_how_to_go_on(recoil: Recoil, tmp_path: Path, command: str) -> None:
+    path = broken_off(tmp_path / "results", "P01", 9)
+    words = ["bids", tmp_path / "results"] if command == "export" else [tmp_path / "results", "--out", "out"]
+    refused(recoil(command, *words), "P01 has begun preference", "--participant P01 --resume", f"recoil rebuild {path}")
+
+
+def test_somebody_elses_unreadable_journal_stops_no_run_of_a_balanced_order(recoil: Recoil, tmp_path: Path) -> None:
+    assert recoil("configs", "--copy", tmp_path / "configs").returncode == 0
+    config = tmp_path / "configs" / "preference.toml"
+    config.write_text(config.read_text().replace('trials = "random"', 'trials = "williams"'))
+    words = ["run", config, "--screen", "synthetic", "--results", "results", "--seed", 1, "--participant"]
+    assert recoil(*words, "P01").returncode == 0
+    broken = journal(tmp_path / "results", "preference")
+    lines(broken, lambda found: found.__setitem__(0, found[0].replace(b'"order_row":0', b'"order_row":NaN')))
+    done = recoil(*words, "P02")
+    assert done.returncode == 0, done
+    assert "NaN is no number of JSON" in done.stderr
+    assert "its order does not count in the balance" in done.stderr
+    assert table(tmp_path / "results", "preference", "P02").exists()
+
+
+def test_a_clock_that_ran_backwards_is_flagged_and_bids_counts_no_onset_after_it(
+    recoil: Recoil, tmp_path: Path
+) -> None:
+    path = broken_off(tmp_path / "results", "P01", 100)
+    head = json.loads(path.read_bytes().splitlines()[0])
+    assert head["utc"].startswith("2026-03-11")
+    asked = RunRequest(
+        setup=load_setup("preference"), participant_id="P01", results=tmp_path / "results", again="resume"
+    )
+    run(asked, synthetic_screen, LaterClock(timedelta(days=10)))
+    logs = read_logs([tmp_path / "results"])
+    flags = logs.ratings["flags"].fillna("").tolist()
+    (at,) = (place for place, text in enumerate(flags) if "clock-set-back" in text.split())
+    assert (at > 0, logs.problems) == (True, ())
+    assert recoil("export", "bids", "results").returncode == 0
+    rows = (tmp_path / "results/bids/sub-P01/beh/sub-P01_task-preference_beh.tsv").read_text().splitlines()
+    column = rows[0].split("\t").index("onset")
+    onsets = [row.split("\t")[column] for row in rows[1:]]
+    assert onsets[at:] == ["n/a"] * (3 - at)
+    assert all(0.0 <= float(onset) < 3600.0 for onset in onsets[:at])
