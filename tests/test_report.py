@@ -72,7 +72,7 @@ def pictures_alone(monkeypatch: pytest.MonkeyPatch) -> None:
 def _text(page: str) -> str:
     """What a reader sees, in one line."""
     body = re.sub(r"<style>.*?</style>", "", page, flags=re.DOTALL)
-    return " ".join(re.sub(r"<[^>]+>", " ", body).split())
+    return html.unescape(" ".join(re.sub(r"<[^>]+>", " ", body).split()))
 
 
 def test_everything_that_the_contract_names_is_written(full: Path) -> None:
@@ -92,7 +92,7 @@ def test_everything_that_the_contract_names_is_written(full: Path) -> None:
         "There are 840 valid response times.",
         "Means (SD) of the correct rate on forward shots, 14 synthetic participants: Vibration",
         "SYNTHETIC DATA: simulated participants answered.",
-        "Planned comparisons (Tukey&#39;s HSD): Asymmetric Force I was above Vibration, p",
+        "Planned comparisons (Tukey's HSD): Asymmetric Force I was above Vibration, p",
         "The 95 % CI is within-subject (Cousineau–Morey)",
         "pooled error term of the repeated-measures ANOVA",
         "ignores that trials come in people",
@@ -100,7 +100,7 @@ def test_everything_that_the_contract_names_is_written(full: Path) -> None:
         "33.0 % [24.6, 42.7]",
         "Assumed: no spread.",
         "Direction recognition: 1 participant left out: P15 (3 of 60 trials unanswered).",
-        "line 7, column response: &#39;left&#39; is not allowed",
+        "line 7, column response: 'left' is not allowed",
         "The coil is shorted after the pulse.",
         "28.45",
         "not published",

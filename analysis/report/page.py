@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import base64
+import html
 import re
 from dataclasses import dataclass
 from pathlib import Path
@@ -50,6 +51,18 @@ def unbroken(text: str) -> str:
     return _TIGHT.sub("\N{NO-BREAK SPACE}", text)
 
 
+_CODE = re.compile(r"`([^`]+)`")
+
+
+def with_code(text: str) -> str:
+    """Text as HTML, escaped; what stands between two backticks is code.
+
+    >>> print(with_code("say `recoil study <DIR>`"))
+    say <code>recoil study &lt;DIR&gt;</code>
+    """
+    return _CODE.sub(r"<code>\1</code>", html.escape(text))
+
+
 def _render(template: str, title: str, parts: tuple[Section, ...], head: PageHead, figures: Path) -> str:
     environment = Environment(
         loader=PackageLoader("analysis.report"),
@@ -59,7 +72,7 @@ def _render(template: str, title: str, parts: tuple[Section, ...], head: PageHea
         lstrip_blocks=True,
         keep_trailing_newline=True,
     )
-    environment.filters |= {"markdown": markdown, "unbroken": unbroken}
+    environment.filters |= {"markdown": markdown, "unbroken": unbroken, "with_code": with_code}
     stems = [picture.stem for section in parts for picture in section.pictures]
     embedded = {stem: _embedded(figures / f"{stem}.png") for stem in stems}
     body = [section for section in parts if not section.appendix]
