@@ -1,6 +1,13 @@
-"""Log tables into the statistics, figures and report of a paper. The tests of the core are named here.
+"""Log tables into the statistics, figures and report of a paper. The statistics that a notebook wants are named here.
 
-They are looked up when they are used: importing this loads nothing, a test loads numpy and scipy.
+    from analysis import rm_anova, rm_tukey_hsd, wide
+
+    ratings = wide(trials, participant="participant_id", condition="method", score="rating")
+    rm_anova(ratings).F, rm_tukey_hsd(ratings).to_frame()
+
+Scores are arrays or lists of participants by conditions, DataFrames of such rows and columns, or mappings from a
+condition to its scores; names stay. Results are frozen, with `to_frame()`, `to_dict()` and a table in a notebook.
+Names are looked up when they are used: importing this loads nothing, a test loads numpy and scipy.
 """
 
 from __future__ import annotations
@@ -17,9 +24,6 @@ if TYPE_CHECKING:
         rm_anova,
         rm_tukey_hsd,
         rm_tukey_hsd_paired,
-        studentized_range_isf,
-        studentized_range_logsf,
-        studentized_range_sf,
         tukey_hsd,
     )
     from analysis.stats.anova_bayes import one_way_bayes_factor, rm_anova_bayes_factor
@@ -34,25 +38,36 @@ if TYPE_CHECKING:
     )
     from analysis.stats.contrasts import planned_contrasts
     from analysis.stats.corrections import benjamini_hochberg, holm
+    from analysis.stats.diagnostics import cousineau_morey, effect_size, normality, outliers, sphericity
+    from analysis.stats.discrimination import discrimination
     from analysis.stats.equivalence import tost_one_sample, tost_paired, tost_two_samples
+    from analysis.stats.factorial import mixed, two_within
     from analysis.stats.fixed_effects import indicators
+    from analysis.stats.frames import groups_of, wide
+    from analysis.stats.logit_model import clustering, logit_model
     from analysis.stats.mixed_model import linear_mixed_model
+    from analysis.stats.paired import friedman, jzs_paired, paired_t_tests, signed_rank_tests
     from analysis.stats.random_intercept import random_intercept_logit
+    from analysis.stats.studentized_range import studentized_range_isf, studentized_range_logsf, studentized_range_sf
 
 _NAMES = {
-    "anova": (
-        "Anova Comparison RepeatedMeasuresAnova one_way_anova rm_anova rm_tukey_hsd rm_tukey_hsd_paired "
-        "studentized_range_isf studentized_range_logsf studentized_range_sf tukey_hsd"
-    ),
+    "anova": "Anova Comparison RepeatedMeasuresAnova one_way_anova rm_anova rm_tukey_hsd rm_tukey_hsd_paired tukey_hsd",
     "anova_bayes": "one_way_bayes_factor rm_anova_bayes_factor",
     "anova_power": "cohens_f one_way_anova_power rm_anova_power",
     "binomial": "BinomialTest Detection binomial_test binomial_test_log_p binomial_test_p yes_no",
     "contrasts": "planned_contrasts",
     "corrections": "benjamini_hochberg holm",
+    "diagnostics": "cousineau_morey effect_size normality outliers sphericity",
+    "discrimination": "discrimination",
     "equivalence": "tost_one_sample tost_paired tost_two_samples",
+    "factorial": "mixed two_within",
     "fixed_effects": "indicators",
+    "frames": "groups_of wide",
+    "logit_model": "clustering logit_model",
     "mixed_model": "linear_mixed_model",
+    "paired": "friedman jzs_paired paired_t_tests signed_rank_tests",
     "random_intercept": "random_intercept_logit",
+    "studentized_range": "studentized_range_isf studentized_range_logsf studentized_range_sf",
 }
 _HOMES = {name: module for module, names in _NAMES.items() for name in names.split()}
 
@@ -66,13 +81,25 @@ __all__ = [
     "binomial_test",
     "binomial_test_log_p",
     "binomial_test_p",
+    "clustering",
     "cohens_f",
+    "cousineau_morey",
+    "discrimination",
+    "effect_size",
+    "friedman",
+    "groups_of",
     "holm",
     "indicators",
+    "jzs_paired",
     "linear_mixed_model",
+    "logit_model",
+    "mixed",
+    "normality",
     "one_way_anova",
     "one_way_anova_power",
     "one_way_bayes_factor",
+    "outliers",
+    "paired_t_tests",
     "planned_contrasts",
     "random_intercept_logit",
     "rm_anova",
@@ -80,6 +107,8 @@ __all__ = [
     "rm_anova_power",
     "rm_tukey_hsd",
     "rm_tukey_hsd_paired",
+    "signed_rank_tests",
+    "sphericity",
     "studentized_range_isf",
     "studentized_range_logsf",
     "studentized_range_sf",
@@ -87,6 +116,8 @@ __all__ = [
     "tost_paired",
     "tost_two_samples",
     "tukey_hsd",
+    "two_within",
+    "wide",
     "yes_no",
 ]
 
@@ -95,3 +126,7 @@ def __getattr__(name: str) -> object:
     if name not in _HOMES:
         raise AttributeError(f"module 'analysis' has no attribute {name!r}; it has {', '.join(__all__)}")
     return getattr(import_module(f"analysis.stats.{_HOMES[name]}"), name)
+
+
+def __dir__() -> list[str]:
+    return __all__

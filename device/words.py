@@ -65,6 +65,12 @@ class RecoilError(Exception):
     """Anything that goes wrong and has a message for people: the root of all errors of this product.
 
     A value that the message quotes is cut at 200 characters.
+
+    >>> try:
+    ...     raise LimitError("voltage_V is 30; it must be a number between 0 and 24")
+    ... except RecoilError as error:
+    ...     print(error)
+    voltage_V is 30; it must be a number between 0 and 24
     """
 
     def __init__(self, *args: object) -> None:

@@ -5,7 +5,7 @@ import math
 import numpy as np
 import pytest
 
-from analysis.stats.anova import rm_anova
+from analysis.stats.anova import one_way_anova, rm_anova
 from analysis.stats.diagnostics import NO_ERROR_VARIANCE, TOO_LARGE, effect_size, partial_eta_squared_interval
 from tests.made_scores import RIGHT
 
@@ -62,3 +62,31 @@ def test_two_conditions_give_the_eta_squared_of_t() -> None:
     difference = (RIGHT[:, 1] - RIGHT[:, 0]).astype(np.float64)
     t = difference.mean() / difference.std(ddof=1) * math.sqrt(14)
     assert effect_size(rm_anova(RIGHT[:, :2])).partial_eta_squared == pytest.approx(t**2 / (t**2 + 13))
+
+
+@pytest.mark.parametrize("scale", [5e-324, 1e-300, 1e-160, 1e160, 1e300])
+def test_effect_sizes_and_their_intervals_are_those_of_the_data_at_every_scale(scale: float) -> None:
+    found, ours = effect_size(rm_anova(RIGHT * scale)), effect_size(rm_anova(RIGHT))
+    assert found.reason is None
+    assert found.partial_eta_squared == pytest.approx(ours.partial_eta_squared, rel=1e-13)
+    assert found.generalized_eta_squared == pytest.approx(ours.generalized_eta_squared, rel=1e-13)
+    assert found.ci_90 == pytest.approx(ours.ci_90, rel=1e-9)
+
+
+def test_effect_sizes_keep_their_digits_far_from_zero() -> None:
+    scores = 1e14 + 0.5 * RIGHT
+    assert effect_size(rm_anova(scores)) == effect_size(rm_anova(0.5 * RIGHT))
+
+
+def test_the_anovas_of_many_data_sets_have_an_effect_size_each() -> None:
+    many = np.stack([RIGHT, RIGHT**2, np.ones_like(RIGHT)])
+    found = rm_anova(many)
+    assert found.partial_eta_squared[:2] == pytest.approx([0.737484737484737, rm_anova(RIGHT**2).partial_eta_squared])
+    assert np.isnan(found.partial_eta_squared[2])
+    with pytest.raises(ValueError, match=r"anova must be that of one data set, not of an array \(3,\)"):
+        effect_size(found)
+
+
+def test_eta_squared_between_groups_is_r2_of_the_group_means() -> None:
+    # R 4.2.2: summary(lm(y ~ g))$r.squared of y = 1 2 3 2 3 4 6 7 8 is 0.875
+    assert one_way_anova([[1, 2, 3], [2, 3, 4], [6, 7, 8]]).partial_eta_squared == pytest.approx(0.875)

@@ -109,7 +109,7 @@ def test_two_people_have_contrasts_but_no_overall_test_of_three() -> None:
     [
         ([[11, 2]], [[10, 10]], "every cell"),
         ([[1, 2]], [[10, 0]], "every cell"),
-        ([[1], [2]], [[3], [3]], "2 labelled"),
+        ([[1], [2]], [[3], [3]], "at least 2 conditions"),
     ],
 )
 def test_impossible_counts_are_refused(successes: Any, trials: Any, match: str) -> None:

@@ -107,6 +107,20 @@ def test_isf_with_different_parameters_at_once_gives_what_it_gives_one_by_one() 
     assert together == pytest.approx([studentized_range_isf(*each) for each in zip(p, k, df, strict=True)], rel=1e-14)
 
 
+@pytest.mark.parametrize("k", [2, 3, 10, 20])
+@pytest.mark.parametrize(("df", "p"), [(1, 1e-300), (1, 1e-160), (1.5, 1e-300), (2, 1e-300)])
+def test_a_q_whose_square_is_no_double_is_found(k: int, df: float, p: float) -> None:
+    """P(Q > q) falls like q^-df: isf was inf from 1e154 on."""
+    q = studentized_range_isf(p, k, df)
+    assert 1e100 < q < 1e308
+    assert studentized_range_sf(q, k, df) == pytest.approx(p, rel=1e-12)
+
+
+def test_of_two_means_the_smallest_level_of_a_cauchy_is_its_closed_form() -> None:
+    # df = 1: q = sqrt(2) cot(pi p / 2)
+    assert studentized_range_isf(1e-300, 2, 1) == pytest.approx(math.sqrt(2) * 2 / math.pi * 1e300, rel=1e-12)
+
+
 def test_a_q_beyond_the_largest_double_is_infinite() -> None:
     assert studentized_range_isf(1e-300, 3, 0.5) == np.inf
 

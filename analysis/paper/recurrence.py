@@ -12,8 +12,9 @@ from numpy.typing import ArrayLike, NDArray
 from scipy import special
 
 from analysis.paper.paper import PublishedDirection, PublishedExperiment, PublishedTukeyTest
-from analysis.stats.anova import PairStatistics, check_scores, pairs_of, pooled_pairs, rm_anova, studentized_range_isf
+from analysis.stats.anova import PairStatistics, check_scores, pairs_of, pooled_pairs, rm_anova
 from analysis.stats.binomial import binomial_test_p
+from analysis.stats.studentized_range import studentized_range_isf
 
 WHOLE_PATTERN = "whole pattern"
 SIGNIFICANT = 0.05

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import warnings
 from collections.abc import Callable, Sequence
+from decimal import Decimal
 from numbers import Real
 from typing import Any, TypeVar
 
@@ -18,7 +19,7 @@ Values = float | FloatArray
 
 
 def numbers(values: ArrayLike, name: str) -> FloatArray:
-    """`values` as float64, itself if it is that already. Truth values count as 0 and 1.
+    """`values` as float64, itself if it is that already; `Fraction` and `Decimal` too. Truth values count as 0 and 1.
 
     `ValueError` naming the place if a value is missing, infinite or not a number, or if rows differ in length. Numbers
     in text are not read: who wrote "7" may have meant a label.
@@ -30,9 +31,16 @@ def numbers(values: ArrayLike, name: str) -> FloatArray:
         array = np.asarray(values)
     except ValueError as error:
         raise ValueError(f"{name} must be numbers in a full rectangle: {_ragged(values)}") from error
-    if array.dtype.kind not in "biuf":
-        raise ValueError(f"{name} must be numbers in a full rectangle, not {array.dtype}{_first_stranger(array)}")
-    array = array.astype(np.float64, copy=False)
+    if array.dtype.kind in "US":  # numpy makes text of the numbers beside a text
+        array = np.asarray(values, dtype=object)
+    if array.dtype.kind not in "biuf" and (array.dtype.kind != "O" or _first_stranger(array)):
+        raise ValueError(
+            f"{name} must be numbers in a full rectangle, {_first_stranger(array) or f'not {array.dtype}'}"
+        )
+    try:
+        array = array.astype(np.float64, copy=False)
+    except OverflowError:
+        raise ValueError(f"{name} must be finite, but one is beyond the largest double") from None
     if not np.isfinite(array).all():
         place = tuple(int(i) for i in np.argwhere(~np.isfinite(array))[0])
         raise ValueError(f"{name} must be finite, but the value at index {place} is {array[place]}")
@@ -48,10 +56,15 @@ def _ragged(values: object) -> str:
 
 def _first_stranger(array: NDArray[np.generic]) -> str:
     for place, value in np.ndenumerate(array):
-        if not isinstance(value, Real | np.bool_):
+        if not isinstance(value, Real | Decimal | np.bool_) or _signals(value):
             found = value.item() if isinstance(value, np.generic) else value
-            return f"; the value at index {place} is {found!r}"
+            return f"but the value at index {place} is {found!r}" if place else f"not {found!r}"
     return ""
+
+
+def _signals(value: object) -> bool:
+    """Whether a number is `Decimal("sNaN")`, which no float can be."""
+    return isinstance(value, Decimal) and value.is_snan()
 
 
 def float_or_array(values: ArrayLike) -> Values:

@@ -11,6 +11,7 @@ from scipy import special
 
 from analysis.stats.arrays import FloatArray, Values, by_case, float_or_array, numbers, share, together
 from analysis.stats.binomial_tail import LongArray, log_between, log_pmf, tail_over_pmf
+from analysis.stats.frames import Result
 
 Tail = Literal["two-sided", "greater", "less"]
 
@@ -22,7 +23,7 @@ _MOST_TRIALS = 1e10
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class BinomialTest:
+class BinomialTest(Result):
     """Exact test of a proportion; `log_p` is the natural logarithm, good where `p` underflows to 0.
 
     `ci_low, ci_high` are Clopper and Pearson's limits, `wilson_low, wilson_high` Wilson's. Of a one-sided test the
@@ -262,8 +263,12 @@ def wilson(k: FloatArray, n: FloatArray, tail: float) -> tuple[FloatArray, Float
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Detection:
-    """d' and criterion with the corrected rates they come from. A criterion below 0 leans towards "yes"."""
+class Detection(Result):
+    """d' and criterion with the corrected rates they come from. A criterion below 0 leans towards "yes".
+
+    >>> yes_no([18, 12], 20, [6, 6], 20).to_frame().columns.tolist()
+    ['d_prime', 'criterion', 'hit_rate', 'false_alarm_rate']
+    """
 
     d_prime: Values
     criterion: Values
@@ -282,6 +287,12 @@ def yes_no(hits: ArrayLike, signal_trials: ArrayLike, false_alarms: ArrayLike, n
     >>> round(yes_no(10, 10, 0, 10).d_prime, 3)
     3.381
     """
+    hits, signal_trials, false_alarms, noise_trials = together(
+        hits=numbers(hits, "hits"),
+        signal_trials=numbers(signal_trials, "signal_trials"),
+        false_alarms=numbers(false_alarms, "false_alarms"),
+        noise_trials=numbers(noise_trials, "noise_trials"),
+    )
     hit_rate, z_hit = _rate_and_z(hits, signal_trials, "hits")
     false_alarm_rate, z_false_alarm = _rate_and_z(false_alarms, noise_trials, "false_alarms")
     return Detection(
@@ -292,9 +303,8 @@ def yes_no(hits: ArrayLike, signal_trials: ArrayLike, false_alarms: ArrayLike, n
     )
 
 
-def _rate_and_z(count: ArrayLike, trials: ArrayLike, name: str) -> tuple[FloatArray, FloatArray]:
+def _rate_and_z(counts: FloatArray, totals: FloatArray, name: str) -> tuple[FloatArray, FloatArray]:
     """The corrected rate and its normal quantile, taken from the nearer end so that 0 and all mirror exactly."""
-    counts, totals = np.broadcast_arrays(numbers(count, name), numbers(trials, f"trials of {name}"))
     if (totals < 1.0).any():
         raise ValueError(f"{name}: there must be at least 1 trial")
     if ((counts < 0.0) | (counts > totals)).any():

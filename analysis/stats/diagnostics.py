@@ -8,12 +8,12 @@ from dataclasses import dataclass
 
 import numpy as np
 import pandas as pd
-from numpy.typing import ArrayLike
 from scipy import special, stats
 from scipy.optimize import brentq
 
-from analysis.stats.anova import RepeatedMeasuresAnova, check_scores, rm_anova
-from analysis.stats.arrays import FloatArray, numbers, pingouin, share
+from analysis.stats.anova import RepeatedMeasuresAnova, check_scores, one_table, rm_anova
+from analysis.stats.arrays import FloatArray, pingouin, share
+from analysis.stats.frames import Result, Results, ScoreTable, named_scores
 from analysis.stats.sums_of_squares import repeated_sums
 
 
@@ -23,7 +23,7 @@ def unit_scaled(scores: FloatArray) -> FloatArray:
     return scaled
 
 
-def residuals(scores: ArrayLike) -> FloatArray:
+def residuals(scores: ScoreTable) -> FloatArray:
     """e_ij = x_ij - m_i - m_j + m in a power of two of the data's unit, so that the largest score lies in 0.5..1.
 
     `scores`: (n participants, k conditions), the result too. All zeros where `rm_anova` finds no error variance, so
@@ -32,7 +32,7 @@ def residuals(scores: ArrayLike) -> FloatArray:
     >>> residuals([[1.0, 2.0], [2.0, 5.0]]).tolist()
     [[0.0625, -0.0625], [-0.0625, 0.0625]]
     """
-    array = check_scores(scores)
+    array = one_table(check_scores(scores))
     sums = repeated_sums(array)
     if not sums.error.any():
         return np.zeros_like(array)
@@ -59,7 +59,7 @@ OUTLIER_RULE = (
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Normality:
+class Normality(Result):
     """Shapiro-Wilk's W and p of `n` residuals, skewness and excess kurtosis; None where undefined, for `reason`."""
 
     W: float | None = None
@@ -71,7 +71,7 @@ class Normality:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Outlier:
+class Outlier(Result):
     """A score beyond the fences of its condition: `row` of the participant, `column` of the condition."""
 
     row: int
@@ -81,17 +81,21 @@ class Outlier:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Ends:
+class Ends(Result):
     """How many participants score the least and the most that the scale allows, for each condition."""
 
     floor: tuple[int, ...]
     ceiling: tuple[int, ...]
 
 
-def normality(scores: ArrayLike) -> Normality:
+def normality(scores: ScoreTable) -> Normality:
     """Are the residuals of the repeated-measures ANOVA normal? `scores`: (n participants, k conditions).
 
     `ValueError` as in `rm_anova`. Source: Shapiro & Wilk 1965, Biometrika 52, 591; p by Royston 1995, algorithm AS R94.
+
+    >>> found = normality([[1, 2, 4], [2, 2, 6], [3, 5, 5], [4, 5, 9]])
+    >>> found.n, round(found.W, 3)
+    (12, 0.963)
     """
     rest = residuals(scores).ravel()
     if not rest.any():
@@ -104,19 +108,22 @@ def normality(scores: ArrayLike) -> Normality:
     return Normality(W=float(W), p=float(p), n=rest.size, skewness=skewness, excess_kurtosis=kurtosis)
 
 
-def outliers(scores: ArrayLike, reach: float = 1.5) -> tuple[Outlier, ...]:
+def outliers(scores: ScoreTable, reach: float = 1.5) -> Results[Outlier]:
     """The scores beyond `reach` interquartile ranges from the quartiles of their condition, conditions in order.
 
     `scores`: (n participants, k conditions). Quartiles interpolate linearly. A score within 1e-9 interquartile ranges
     of a fence is inside: tenths are no doubles. Source: Tukey 1977, Exploratory Data Analysis, 2D.
+
+    >>> outliers([[1, 4], [2, 5], [2, 5], [3, 6], [30, 5]])[0].score
+    30.0
     """
-    array = numbers(scores, "scores")
+    array = one_table(named_scores(scores, "scores")[0])
     lower, upper = np.quantile(array, [0.25, 0.75], axis=0)
     spread = upper - lower
     slack = 1e-9 * np.maximum(spread, np.abs(array).max(axis=0))
     low, high = lower - reach * spread, upper + reach * spread
     out = (array < low - slack) | (array > high + slack)
-    return tuple(
+    return Results(
         Outlier(
             row=int(i),
             column=int(j),
@@ -127,9 +134,9 @@ def outliers(scores: ArrayLike, reach: float = 1.5) -> tuple[Outlier, ...]:
     )
 
 
-def ends(scores: ArrayLike, scale: Sequence[float]) -> Ends:
+def ends(scores: ScoreTable, scale: Sequence[float]) -> Ends:
     """Counts of scores at the two ends of the `scale` (lowest, highest). `scores`: (n participants, k conditions)."""
-    array, (lowest, highest) = numbers(scores, "scores"), scale
+    array, (lowest, highest) = one_table(named_scores(scores, "scores")[0]), scale
     return Ends(
         floor=tuple(int(count) for count in (array <= lowest).sum(axis=0)),
         ceiling=tuple(int(count) for count in (array >= highest).sum(axis=0)),
@@ -146,7 +153,7 @@ SINGULAR = "A contrast of the conditions has no variance at all (W = 0), so Mauc
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Corrected:
+class Corrected(Result):
     """The F test with both degrees of freedom multiplied by `epsilon`."""
 
     epsilon: float
@@ -155,7 +162,7 @@ class Corrected:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Sphericity:
+class Sphericity(Result):
     """Mauchly's test and the two corrections; what is undefined is None, and `reason` says why."""
 
     W: float | None = None
@@ -167,7 +174,7 @@ class Sphericity:
     reason: str | None = None
 
 
-def sphericity(scores: ArrayLike) -> Sphericity:
+def sphericity(scores: ScoreTable) -> Sphericity:
     """Mauchly's test and the F test of `rm_anova` corrected by the Greenhouse-Geisser and Huynh-Feldt epsilon.
 
     With M = C'SC, the covariance matrix of k - 1 orthonormal contrasts, d = k - 1:
@@ -183,7 +190,7 @@ def sphericity(scores: ArrayLike) -> Sphericity:
     >>> round(found.W, 2), round(found.greenhouse_geisser.epsilon, 2), round(found.huynh_feldt.epsilon, 2)
     (0.21, 0.56, 0.62)
     """
-    array = check_scores(scores)
+    array = one_table(check_scores(scores))
     n, k = array.shape
     rest = residuals(array)
     if not rest.any():
@@ -241,7 +248,7 @@ EFFECT_SIZE_NOTE = (
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class EffectSize:
+class EffectSize(Result):
     """Eta squared, partial (its intervals too) and generalised; None where undefined, and `reason` says why."""
 
     partial_eta_squared: float | None
@@ -255,18 +262,29 @@ def effect_size(anova: RepeatedMeasuresAnova) -> EffectSize:
     """Effect sizes of one repeated-measures ANOVA.
 
     Partial: SS_effect / (SS_effect + SS_error). Generalised: SS_effect / (SS_effect + SS_participants + SS_error).
+    `ValueError`: analyses of many data sets. They are safe against the data's scale and offset, as F is.
     Sources: Olejnik & Algina 2003, Psychol. Methods 8, 434; Bakeman 2005, Behav. Res. Methods 37, 379.
+
+    >>> found = effect_size(rm_anova([[1, 2, 4], [2, 2, 6], [3, 5, 5], [4, 5, 9]]))
+    >>> round(found.partial_eta_squared, 3), tuple(round(end, 3) for end in found.ci_90)
+    (0.812, (0.283, 0.871))
     """
-    effect, error, people = (float(ss) for ss in (anova.ss_effect, anova.ss_error, anova.ss_participants))
-    partial, generalized = _ratio(effect, error), _ratio(effect, people + error)
-    F = float(anova.F)
+    if np.ndim(anova.F):
+        raise ValueError(f"anova must be that of one data set, not of an array {np.shape(anova.F)} of them")
+    F, partial, generalized = (
+        float(one) for one in (anova.F, anova.partial_eta_squared, anova.generalized_eta_squared)
+    )
     reason = TOO_LARGE if math.isfinite(F) and F > LARGEST_F else None if math.isfinite(F) else NO_ERROR_VARIANCE
     ci_90, ci_95 = (
         None if reason else partial_eta_squared_interval(F, anova.df_effect, anova.df_error, level)
         for level in (0.90, 0.95)
     )
     return EffectSize(
-        partial_eta_squared=partial, ci_90=ci_90, ci_95=ci_95, generalized_eta_squared=generalized, reason=reason
+        partial_eta_squared=None if math.isnan(partial) else partial,
+        ci_90=ci_90,
+        ci_95=ci_95,
+        generalized_eta_squared=None if math.isnan(generalized) else generalized,
+        reason=reason,
     )
 
 
@@ -301,35 +319,36 @@ def _above(excess: Callable[[float], float], start: float) -> float:
     return high
 
 
-def _ratio(effect: float, rest: float) -> float | None:
-    return effect / (effect + rest) if effect + rest > 0.0 else None
-
-
 @dataclass(frozen=True, slots=True, kw_only=True)
-class WithinSubject:
-    """Means of the conditions and their intervals, arrays (conditions,)."""
+class WithinSubject(Result):
+    """Means of the conditions and their intervals, arrays (conditions,).
+
+    `half_widths` keep their digits also where the means are so large that their ends cannot show them.
+    """
 
     means: FloatArray
+    half_widths: FloatArray
     ci_low: FloatArray
     ci_high: FloatArray
 
 
-def cousineau_morey(scores: ArrayLike, confidence: float = 0.95) -> WithinSubject:
+def cousineau_morey(scores: ScoreTable, confidence: float = 0.95) -> WithinSubject:
     """Means with within-subject intervals, of `scores` (participants, conditions).
 
-    y'_ij = y_ij - mean_i + mean; the interval of condition j is mean_j +- t(n - 1) s'_j / sqrt(n) sqrt(k / (k - 1)).
+    y'_ij = y_ij - mean_i + mean; the interval of condition j is mean_j +- t(n - 1) s'_j / sqrt(n) sqrt(k / (k - 1)),
+    with y'_ij - mean_j the `residuals` of the ANOVA, whatever the offset and the scale.
     `ValueError` for fewer than 2 participants or conditions.
     Sources: Cousineau 2005, Tutorials in Quantitative Methods for Psychology 1, 42; Morey 2008, same journal 4, 61.
 
     >>> cousineau_morey([[1, 2, 3], [5, 6, 7]]).ci_low.tolist()
     [3.0, 4.0, 5.0]
     """
-    array = numbers(scores, "scores")
-    if array.ndim != 2 or min(array.shape) < 2:
-        raise ValueError(f"scores must be at least 2 participants by 2 conditions, not {array.shape}")
+    array = one_table(check_scores(scores))
     n, k = array.shape
-    within = array - array.mean(axis=1, keepdims=True) + array.mean()
     t = special.stdtrit(n - 1, 0.5 + share(confidence, "confidence") / 2.0)
-    half = t * within.std(axis=0, ddof=1) / math.sqrt(n) * math.sqrt(k / (k - 1))
-    means: FloatArray = np.asarray(array.mean(axis=0))
-    return WithinSubject(means=means, ci_low=means - half, ci_high=means + half)
+    spread = np.sqrt(np.square(residuals(array)).sum(axis=0) / (n - 1))
+    exponent = np.frexp(np.abs(array).max())[1]
+    half = np.ldexp(t * spread / math.sqrt(n) * math.sqrt(k / (k - 1)), exponent)
+    means = np.ldexp(unit_scaled(array).mean(axis=0), exponent)
+    with np.errstate(over="ignore"):
+        return WithinSubject(means=means, half_widths=half, ci_low=means - half, ci_high=means + half)

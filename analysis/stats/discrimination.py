@@ -24,6 +24,7 @@ from scipy import special
 from scipy.optimize import elementwise
 
 from analysis.stats.arrays import FloatArray, Values, float_or_array, numbers
+from analysis.stats.frames import Result
 
 Task = Literal["two-interval", "abx", "oddity"]
 CHANCE: Mapping[Task, float] = {"two-interval": 1 / 2, "abx": 1 / 2, "oddity": 1 / 3}
@@ -57,20 +58,27 @@ _RIGHT: Mapping[Task, Callable[[FloatArray], FloatArray]] = {
 }
 
 
+def _right(task: str) -> Callable[[FloatArray], FloatArray]:
+    for name, right in _RIGHT.items():
+        if name == task:
+            return right
+    raise ValueError(f"task must be one of {', '.join(_RIGHT)}, not {task!r}")
+
+
 def share_right(d_prime: ArrayLike, task: Task) -> Values:
     """The share of right answers at a d′ of at least 0. `ValueError`: below 0 or no number.
 
     >>> round(float(share_right(1.0, "two-interval")), 4), round(float(share_right(0.0, "oddity")), 4)
     (0.7602, 0.3333)
     """
-    d = numbers(d_prime, "d_prime")
+    right, d = _right(task), numbers(d_prime, "d_prime")
     if np.any(d < 0):
         raise ValueError("d_prime must be at least 0")
-    return float_or_array(_RIGHT[task](np.asarray(d, dtype=float)))
+    return float_or_array(right(d))
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Discrimination:
+class Discrimination(Result):
     """d′ with its standard error (delta method, binomial); 0 at or below chance, with a standard error of NaN.
 
     `corrected`: all or none were right, so half an answer was added on either side (log-linear) before d′ was taken.
@@ -89,13 +97,13 @@ def discrimination(right: int, trials: int, task: Task) -> Discrimination:
     """
     if not 0 <= right <= trials or trials < 1:
         raise ValueError(f"right must lie in 0..trials and trials be at least 1, not {right} of {trials}")
-    corrected = right in (0, trials)
+    share_of, corrected = _right(task), right in (0, trials)
     share = (right + 0.5) / (trials + 1) if corrected else right / trials
     if share <= CHANCE[task]:
         return Discrimination(d_prime=0.0, se=float("nan"), corrected=corrected)
-    found = elementwise.find_root(lambda d: _RIGHT[task](np.asarray(d)) - share, (0.0, MOST_D))
+    found = elementwise.find_root(lambda d: share_of(np.asarray(d)) - share, (0.0, MOST_D))
     d = float(found.x)
     low, high = max(d - 1e-4, 0.0), d + 1e-4
-    slope = float(np.diff(_RIGHT[task](np.array([low, high])))[0]) / (high - low)
+    slope = float(np.diff(share_of(np.array([low, high])))[0]) / (high - low)
     se = float(np.sqrt(share * (1.0 - share) / trials) / slope) if slope > 0 else float("nan")
     return Discrimination(d_prime=d, se=se, corrected=corrected)

@@ -14,10 +14,11 @@ from scipy.linalg import helmert
 from scipy.stats import f as f_distribution
 
 from analysis.stats.arrays import FloatArray, numbers, pingouin
+from analysis.stats.frames import Result, Results, ScoreTable, named_scores
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class FactorialEffect:
+class FactorialEffect(Result):
     """One effect. `source` names its factors; `p_gg` is corrected by `epsilon` (Greenhouse and Geisser), if it can be.
 
     `size` is generalised eta squared where both factors are within people, partial eta squared in a mixed design.
@@ -32,11 +33,15 @@ class FactorialEffect:
     size: float
 
 
-def two_within(scores: ArrayLike, names: tuple[str, str]) -> tuple[FactorialEffect, ...]:
+def two_within(scores: ArrayLike, names: tuple[str, str]) -> Results[FactorialEffect]:
     """The ANOVA of two factors within people: each effect against its own interaction with people.
 
     `scores`: (n people, a levels, b levels). `ValueError`: fewer than two people or levels, or no finite numbers.
     Sources: Winer 1971, chapter 7; Olejnik & Algina 2003, Psychological Methods 8, 434.
+
+    >>> scores = [[[1, 2], [3, 6]], [[2, 2], [4, 9]], [[1, 3], [5, 7]], [[3, 4], [4, 8]]]
+    >>> [(effect.source, round(effect.F, 2)) for effect in two_within(scores, ("method", "load"))][:2]
+    [(('method',), 58.8), (('load',), 243.0)]
     """
     array = numbers(scores, "scores")
     if array.ndim != 3 or min(array.shape) < 2:
@@ -48,14 +53,18 @@ def two_within(scores: ArrayLike, names: tuple[str, str]) -> tuple[FactorialEffe
     return _effects(found, names, df=("ddof1", "ddof2"), size="ng2")
 
 
-def mixed(scores: ArrayLike, group: Sequence[str], names: tuple[str, str]) -> tuple[FactorialEffect, ...]:
+def mixed(scores: ScoreTable, group: Sequence[str], names: tuple[str, str]) -> Results[FactorialEffect]:
     """The ANOVA of one factor between people and one within: `names` are theirs, in this order.
 
     `scores`: (n people, k levels), `group`: each one's group. `ValueError`: fewer than two groups or levels, a group of
     one, or no finite numbers. Source: Winer 1971, chapter 7; of groups of unequal size the levels are compared by the
     means of the groups' means, whatever their sizes (sums of squares of type III, as afex and SPSS have them).
+
+    >>> scores = [[1, 2], [2, 4], [3, 4], [2, 7], [4, 8], [3, 9]]
+    >>> [round(effect.F, 2) for effect in mixed(scores, ["old"] * 3 + ["young"] * 3, ("age", "load"))]
+    [13.14, 90.25, 30.25]
     """
-    array = numbers(scores, "scores")
+    array = named_scores(scores, "scores")[0]
     if array.ndim != 2 or array.shape[1] < 2 or array.shape[0] != len(group):
         raise ValueError(f"scores must be (people, levels) with a group for each person, not {array.shape}")
     sizes = {one: list(group).count(one) for one in group}
@@ -66,7 +75,7 @@ def mixed(scores: ArrayLike, group: Sequence[str], names: tuple[str, str]) -> tu
     table = pd.DataFrame({"who": who, "level": level, "group": np.repeat(list(group), k), "score": array.ravel()})
     found = _silent("mixed_anova", table, dv="score", within="level", between="group", subject="who")
     between, within, both = _effects(found, names, df=("DF1", "DF2"), size="np2")
-    return between, _of_unweighted_means(within, array, np.array(group)), both
+    return Results((between, _of_unweighted_means(within, array, np.array(group)), both))
 
 
 def _of_unweighted_means(effect: FactorialEffect, scores: FloatArray, group: NDArray[np.str_]) -> FactorialEffect:
@@ -98,10 +107,10 @@ def _silent(function: str, table: pd.DataFrame, **asked: object) -> pd.DataFrame
 
 def _effects(
     found: pd.DataFrame, names: tuple[str, str], *, df: tuple[str, str], size: str
-) -> tuple[FactorialEffect, ...]:
+) -> Results[FactorialEffect]:
     """The three effects of a table of pingouin, whose columns of freedom and size have these names."""
     sources = ((names[0],), (names[1],), names)
-    return tuple(
+    return Results(
         FactorialEffect(
             source=source,
             F=float(row["F"]),

@@ -4,15 +4,16 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import ArrayLike
 from scipy import special
 
-from analysis.stats.anova import Label, pairs_of
+from analysis.stats.anova import condition_names, pairs_of
 from analysis.stats.arrays import FloatArray, by_row, numbers, share
 from analysis.stats.corrections import holm
+from analysis.stats.frames import Label, Result, Results, ScoreTable, named_scores
 
 METHOD = (
     "Clustering: the intraclass correlation is the analysis-of-variance estimate for binary answers (Ridout, Demétrio "
@@ -26,7 +27,7 @@ ALL_ANSWERS_EQUAL = "All answers are equal: the intraclass correlation is 0/0."
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Clustering:
+class Clustering(Result):
     """Intraclass correlation (it may be negative), design effect and the p-value it leaves; None for `reason`."""
 
     icc: float | None = None
@@ -46,6 +47,10 @@ def clustering(successes: ArrayLike, trials: ArrayLike, p0: float = 0.5) -> Clus
 
     `successes, trials`: (n,), participants without a trial do not count. `ValueError`: successes outside 0..trials.
     Sources: Ridout, Demetrio & Firth 1999, Biometrics 55, 137; Rao & Scott 1992, Biometrics 48, 577.
+
+    >>> found = clustering([9, 4, 8, 2], [10, 10, 10, 10])
+    >>> round(found.icc, 3), round(found.design_effect, 2), round(found.p_adjusted, 3)
+    (0.335, 4.02, 0.668)
     """
     y, m = numbers(successes, "successes"), numbers(trials, "trials")
     if y.shape != m.shape or ((y < 0.0) | (y > m)).any():
@@ -93,7 +98,7 @@ FEW = 5
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Odds:
+class Odds(Result):
     """One condition: pooled `rate` with interval, and its log odds with standard error."""
 
     label: Label
@@ -105,7 +110,7 @@ class Odds:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Contrast:
+class Contrast(Result):
     """Log odds of `a` less those of `b`; the interval, for this pair alone, is of the odds ratio."""
 
     a: Label
@@ -122,7 +127,7 @@ class Contrast:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class EqualOdds:
+class EqualOdds(Result):
     """Are the odds of all conditions equal? Hotelling's F of the k - 1 contrasts."""
 
     F: float
@@ -131,18 +136,22 @@ class EqualOdds:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class LogitModel:
+class LogitModel(Result):
     """The fitted model; empty where there is none, and `reason` says why. `few`: conditions near floor or ceiling."""
 
     conditions: tuple[Odds, ...] = ()
-    contrasts: tuple[Contrast, ...] = ()
+    contrasts: Results[Contrast] = field(default_factory=Results)
     test: EqualOdds | None = None
     few: tuple[Label, ...] = ()
     reason: str | None = None
 
+    def rows(self) -> list[dict[str, object]]:
+        """The conditions, a row each."""
+        return [row for condition in self.conditions for row in condition.rows()]
+
 
 def logit_model(
-    successes: ArrayLike, trials: ArrayLike, labels: Sequence[Label], confidence: float = 0.95
+    successes: ScoreTable, trials: ScoreTable, labels: Sequence[Label] | None = None, confidence: float = 0.95
 ) -> LogitModel:
     """GEE of binary answers on one factor within people, by its closed form; linear in the number of people.
 
@@ -151,13 +160,19 @@ def logit_model(
     (I - H_ii)^-1. Equals statsmodels' `GEE(..., Independence()).fit(cov_type="bias_reduced")` on the single trials,
     which takes 6 s for 10 000 people.
 
-    `successes, trials`: (n people, k conditions), every cell with a trial, k >= 2 labels; else `ValueError`.
+    `successes, trials`: (n people, k conditions), every cell with a trial, k >= 2; else `ValueError`. The conditions
+    have the labels, or else the names of the columns of `successes`, or numbers.
     No fit (`reason`): a condition all right or all wrong (separation), one person, no spread between people.
     Sources: Liang & Zeger 1986, Biometrika 73, 13; Mancl & DeRouen 2001, Biometrics 57, 126.
+
+    >>> found = logit_model({"A": [3, 5, 4], "B": [8, 6, 9]}, {"A": [10, 10, 10], "B": [10, 10, 10]})
+    >>> [(one.label, round(one.rate, 3)) for one in found.conditions], round(found.contrasts[0].odds_ratio, 2)
+    ([('A', 0.4), ('B', 0.767)], 4.93)
     """
-    y, n = numbers(successes, "successes"), numbers(trials, "trials")
-    if y.ndim != 2 or y.shape != n.shape or y.shape[1] != len(labels) or len(labels) < 2:
-        raise ValueError("successes and trials must be people by conditions, at least 2 labelled conditions")
+    (y, own), (n, _) = named_scores(successes, "successes"), named_scores(trials, "trials")
+    if y.ndim != 2 or y.shape != n.shape or y.shape[1] < 2:
+        raise ValueError(f"successes and trials must be people by at least 2 conditions, not {y.shape} and {n.shape}")
+    labels = condition_names(own if labels is None else labels, y.shape[1])
     if (n < 1.0).any() or ((y < 0.0) | (y > n)).any():
         raise ValueError("every cell needs a trial, and successes must lie in 0..trials")
     right, total = y.sum(axis=0), n.sum(axis=0)
@@ -202,7 +217,7 @@ def _conditions(
 
 def _contrasts(
     log_odds: FloatArray, covariance: FloatArray, df_and_confidence: tuple[int, float], labels: Sequence[Label]
-) -> tuple[Contrast, ...] | None:
+) -> Results[Contrast] | None:
     """All pairs, or None if a pair has no variance to test against."""
     a, b = np.array(pairs_of(len(labels)), dtype=np.intp).T
     difference = log_odds[a] - log_odds[b]
@@ -217,7 +232,7 @@ def _contrasts(
         ratio, low, high = (np.exp(difference + sign * critical * se) for sign in (0.0, -1.0, 1.0))
     tests = by_row(log_odds_difference=difference, se=se, t=t, p=p, p_holm=adjusted)
     odds = by_row(odds_ratio=ratio, ci_low=low, ci_high=high)
-    return tuple(
+    return Results(
         Contrast(a=labels[i], b=labels[j], df=df, **test, **of_odds)
         for i, j, test, of_odds in zip(a, b, tests, odds, strict=True)
     )

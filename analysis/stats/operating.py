@@ -13,8 +13,9 @@ from dataclasses import dataclass
 import numpy as np
 from scipy import special
 
-from analysis.stats.anova import PairStatistics, own_pairs, pairs_of, pooled_pairs, studentized_range_isf
+from analysis.stats.anova import PairStatistics, own_pairs, pairs_of, pooled_pairs
 from analysis.stats.arrays import FloatArray
+from analysis.stats.studentized_range import studentized_range_isf
 
 ALPHA = 0.05
 STUDY_SIZE = 14

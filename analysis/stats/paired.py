@@ -11,9 +11,10 @@ import numpy as np
 from numpy.typing import ArrayLike
 from scipy import special, stats
 
-from analysis.stats.anova import Label, check_scores, own_pairs, pairs_of
+from analysis.stats.anova import check_scores, one_table, own_pairs, pairs_of, scores_and_names
 from analysis.stats.arrays import FloatArray, by_row, numbers, pingouin, share
 from analysis.stats.corrections import holm
+from analysis.stats.frames import Label, Result, Results, ScoreTable
 
 SCALE = math.sqrt(2.0) / 2.0
 """Scale r of the Cauchy prior on the standardised difference: "medium" in JASP and R's BayesFactor."""
@@ -50,7 +51,7 @@ CONSTANT = "The difference is the same in every participant: without variance th
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class PairedT:
+class PairedT(Result):
     """One pair: `difference` = mean of `a` - mean of `b`, its own standard error, t on n - 1 degrees of freedom.
 
     `p_holm` is adjusted for all pairs; the interval is for this pair alone. `d_z` = t / sqrt(n), the mean difference
@@ -71,17 +72,20 @@ class PairedT:
 
 
 def paired_t_tests(
-    scores: ArrayLike, labels: Sequence[Label] | None = None, confidence: float = 0.95
-) -> tuple[PairedT, ...]:
+    scores: ScoreTable, labels: Sequence[Label] | None = None, confidence: float = 0.95
+) -> Results[PairedT]:
     """Paired t-tests of all pairs: t = mean d / (sd(d) / sqrt(n)), Holm's correction over the pairs that have a p.
 
-    `scores`: (n participants, k conditions); `ValueError` as in `rm_anova`.
-    Sources: Student 1908, Biometrika 6, 1; Holm 1979, Scand. J. Stat. 6, 65.
+    `scores`: (n participants, k conditions), or a DataFrame, whose columns name the pairs; `ValueError` as in
+    `rm_anova`. Sources: Student 1908, Biometrika 6, 1; Holm 1979, Scand. J. Stat. 6, 65.
+
+    >>> found = paired_t_tests({"A": [1.0, 2.0, 3.0, 4.0], "B": [2.0, 4.0, 4.0, 7.0]})
+    >>> found[0].a, found[0].b, round(found[0].t, 3), round(found[0].p, 4)
+    ('B', 'A', 3.656, 0.0354)
     """
-    array = check_scores(scores)
-    n, k = array.shape
+    array, names = scores_and_names(scores, labels)
+    n, k = one_table(array).shape
     pairs = own_pairs(array)
-    names = range(k) if labels is None else labels
     t = np.sign(pairs.difference) * pairs.q / math.sqrt(2.0)
     p = 2.0 * special.stdtr(n - 1, -np.abs(t))
     there = np.isfinite(t)
@@ -92,7 +96,7 @@ def paired_t_tests(
     low, high = pairs.difference - half, pairs.difference + half
     rows = by_row(t=t, p=p, p_holm=adjusted, ci_low=low, ci_high=high, d_z=t / math.sqrt(n))
     tests = [row if tested else {} for row, tested in zip(rows, there, strict=True)]
-    return tuple(
+    return Results(
         PairedT(
             a=names[a], b=names[b], difference=d, df=n - 1, reason=None if test else CONSTANT if d else EQUAL, **test
         )
@@ -107,7 +111,7 @@ NOTHING_TO_RANK = "The two conditions are equal in every participant: there is n
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Friedman:
+class Friedman(Result):
     """Friedman's test with the correction for ties; `kendall_w` is the agreement of the participants, 0 to 1."""
 
     chi2: float | None = None
@@ -119,7 +123,7 @@ class Friedman:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class SignedRanks:
+class SignedRanks(Result):
     """One pair: `W` is the smaller sum of ranks over the `n` participants with a difference, `r` the rank-biserial.
 
     `r` = (sum of ranks in favour of `a` - in favour of `b`) / sum of ranks. `exact`: p from all 2^n signs, not from
@@ -137,13 +141,17 @@ class SignedRanks:
     reason: str | None = None
 
 
-def friedman(scores: ArrayLike) -> Friedman:
+def friedman(scores: ScoreTable) -> Friedman:
     """Friedman's test: chi2 of the rank sums over participants, corrected for ties, on k - 1 degrees of freedom.
 
     `scores`: (n participants, k conditions); `ValueError` as in `rm_anova`. Kendall's W = chi2 / (n (k - 1)).
     Source: Friedman 1937, J. Am. Stat. Assoc. 32, 675; Conover 1999, Practical Nonparametric Statistics, 5.8.
+
+    >>> found = friedman([[1, 2, 3], [2, 3, 5], [1, 3, 2], [4, 6, 7]])
+    >>> found.chi2, found.df, round(found.p, 4), found.mean_ranks
+    (6.5, 2, 0.0388, (1.0, 2.25, 2.75))
     """
-    array = check_scores(scores)
+    array = one_table(check_scores(scores))
     n, k = array.shape
     ranks = stats.rankdata(array, axis=1)
     mean_ranks = tuple(float(rank) for rank in ranks.mean(axis=0))
@@ -156,18 +164,22 @@ def friedman(scores: ArrayLike) -> Friedman:
     return Friedman(chi2=float(chi2), df=k - 1, p=float(p), kendall_w=agreement, mean_ranks=mean_ranks)
 
 
-def signed_rank_tests(scores: ArrayLike, labels: Sequence[Label] | None = None) -> tuple[SignedRanks, ...]:
+def signed_rank_tests(scores: ScoreTable, labels: Sequence[Label] | None = None) -> Results[SignedRanks]:
     """Wilcoxon's signed-rank test of all pairs, Holm's correction over the pairs that have a p.
 
     Differences of 0 are left out, ties get mean ranks. Up to 50 differences p is exact, ties included.
     `scores`: (n participants, k conditions); `ValueError` as in `rm_anova`.
     Source: Wilcoxon 1945, Biometrics Bulletin 1, 80; Holm 1979.
+
+    >>> found = signed_rank_tests({"A": [1, 2, 3, 4, 9], "B": [2, 4, 6, 8, 7]})
+    >>> found[0].W, found[0].p, found[0].exact
+    (2.5, 0.25, True)
     """
-    array = check_scores(scores)
-    names = range(array.shape[1]) if labels is None else labels
+    array, names = scores_and_names(scores, labels)
+    one_table(array)
     tests = [_signed_ranks(array[:, a], array[:, b], names[a], names[b]) for a, b in pairs_of(array.shape[1])]
     adjusted = iter(holm([test.p for test in tests if test.p is not None]).tolist())
-    return tuple(test if test.p is None else replace(test, p_holm=next(adjusted)) for test in tests)
+    return Results(test if test.p is None else replace(test, p_holm=next(adjusted)) for test in tests)
 
 
 def exact_signed_rank_p(ranks: ArrayLike, statistic: float) -> float:

@@ -31,7 +31,6 @@ from analysis.stats.diagnostics import (
     normality,
     outliers,
     sphericity,
-    unit_scaled,
 )
 from analysis.stats.logit_model import METHOD as CLUSTERING_NOTE
 from analysis.stats.logit_model import MODEL_NAME, MODEL_NOTE, LogitModel, clustering, logit_model
@@ -350,7 +349,7 @@ def within_supplement(scores: pd.DataFrame, scale: tuple[float, float]) -> resul
     pairs = paired_t_tests(array, methods)
     return results.Supplement(
         sphericity=sphericity(array),
-        effect_size=results.NotedEffectSize(size=effect_size(rm_anova(unit_scaled(array))), note=EFFECT_SIZE_NOTE),
+        effect_size=results.NotedEffectSize(size=effect_size(rm_anova(array)), note=EFFECT_SIZE_NOTE),
         friedman=_friedman(array, methods),
         paired_t=pairs,
         tukey_paired=tuple(_finite(pair) for pair in rm_tukey_hsd_paired(array, methods)),

@@ -54,19 +54,18 @@ class LogDensity:
 
 
 def log_density(time_s: ArrayLike, upper: ArrayLike, drift: ArrayLike, boundary: ArrayLike, start: ArrayLike) -> Values:
-    """Log p(t, answer) of the decision time (without t0) and the answer; -inf at t <= 0. All arguments broadcast.
+    """Log p(t, answer) of the decision time (without t0) and the answer; -inf at t <= 0 and t = inf, NaN at NaN.
 
-    `ValueError`: a boundary not above 0 or a start not strictly between 0 and 1.
+    All arguments broadcast. `ValueError`: a boundary not above 0 or a start not strictly between 0 and 1.
 
     >>> round(float(log_density(0.5, True, 1.0, 1.0, 0.5)), 6)
     -1.072671
     """
     t, up, v, a, w = _together(time_s, upper, drift, boundary, start)
     v, near, far = np.where(up, -v, v), np.where(up, 1.0 - w, w), np.where(up, w, 1.0 - w)
-    some = t > 0.0
-    tau = np.where(some, t, 1.0) / a**2
-    value = unit_log_density(tau, near, far) - 2.0 * np.log(a) - v * a * near - v * v * t / 2.0
-    return float_or_array(np.where(some, value, -math.inf))
+    inside = np.where((t > 0.0) & (t < math.inf), t, 1.0)
+    value = unit_log_density(inside / a**2, near, far) - 2.0 * np.log(a) - v * a * near - v * v * inside / 2.0
+    return float_or_array(np.select([inside == t, np.isnan(t)], [value, math.nan], default=-math.inf))
 
 
 def _together(
@@ -242,6 +241,8 @@ def distribution(
 ) -> Values:
     """P(T <= t, answer), rising from 0 to the answer's probability; divide by that for the time given the answer.
 
+    NaN at t = NaN.
+
     The decision time is without t0; all arguments broadcast. `ValueError`: as `log_density`.
 
     >>> round(distribution(100.0, True, 1.0, 2.0, 0.5), 6)
@@ -249,13 +250,12 @@ def distribution(
     """
     t, up, v, a, w = _together(time_s, upper, drift, boundary, start)
     c, near = np.where(up, -v, v) * a, np.where(up, 1.0 - w, w)
-    some = t > 0.0
-    tau = np.where(some, t, 1.0) / a**2
+    tau = np.where(t > 0.0, t, 1.0) / a**2
     value = np.empty(tau.shape)
     short = tau <= MEET_AT
     value[short] = _images(tau[short], c[short], near[short])
     value[~short] = _waves(tau[~short], c[~short], near[~short])
-    return float_or_array(np.where(some, value, 0.0))
+    return float_or_array(np.select([t > 0.0, np.isnan(t)], [value, math.nan], default=0.0))
 
 
 def _images(tau: FloatArray, c: FloatArray, near: FloatArray) -> FloatArray:

@@ -21,7 +21,7 @@ from analysis.paper.audit.printed import (
     judge_readings,
     read_printed,
 )
-from analysis.stats.anova import studentized_range_sf
+from analysis.stats.studentized_range import studentized_range_sf
 
 Statistic = Literal["t", "F", "chi2", "r", "z", "Q", "q"]
 Sides = Literal["two-sided", "one-sided"]

@@ -26,7 +26,7 @@ from analysis.paper.audit.reconstruct import (
 )
 from analysis.paper.audit.variance_ratios import repeated_f
 from analysis.paper.paper import PublishedDirection, PublishedExperiment, PublishedPreference, PublishedTukeyTest
-from analysis.stats.anova import studentized_range_isf
+from analysis.stats.studentized_range import studentized_range_isf
 
 MEAN_SLACK = Fraction(3, 10)
 """How far an assumed mean rating may be off in a data set, in units of the scale; assumed."""

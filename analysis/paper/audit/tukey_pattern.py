@@ -31,7 +31,7 @@ from analysis.paper.audit.printed import (
     judge_readings,
     read_printed,
 )
-from analysis.stats.anova import studentized_range_isf
+from analysis.stats.studentized_range import studentized_range_isf
 from experiments.config.door import Model
 
 OWN_ERROR = "each pair's own error term"

@@ -16,9 +16,10 @@ from numpy.typing import ArrayLike, NDArray
 from scipy import special
 
 from analysis.paper.recurrence import SIGNIFICANT, Recurrence, ShareOfStudies, share_of
-from analysis.stats.anova import check_scores, pairs_of, pooled_pairs, rm_anova, studentized_range_isf
+from analysis.stats.anova import check_scores, pairs_of, pooled_pairs, rm_anova
 from analysis.stats.arrays import FloatArray
 from analysis.stats.binomial import binomial_test_p, yes_no
+from analysis.stats.studentized_range import studentized_range_isf
 from device.words import DIRECTIONS
 
 ANOVA = "ANOVA"
