@@ -111,7 +111,7 @@ def analyze(*paths: str | Path, requests: str | Path | None = None, fits: bool =
     from dataclasses import replace
 
     from analysis.summary.analyze import with_everybody
-    from analysis.summary.measured import answers_to
+    from analysis.summary.request_data import answers_to
     from analysis.summary.requests import Requests
     from analysis.summary.summary import summarize
     from experiments.config.door import load

@@ -29,7 +29,7 @@ class Coefficient:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class Columns:
+class PredictorColumns:
     """The intercept and the predictors, each centred and over its SD: `matrix` (rows, columns).
 
     `back` (columns, columns) brings the coefficients of these columns to those of the predictors as they were given.
@@ -70,7 +70,7 @@ def people_codes(people: Sequence[Hashable], rows: int) -> NDArray[np.intp]:
     return codes
 
 
-def columns_of(predictors: Mapping[str, ArrayLike], rows: int) -> Columns:
+def columns_of(predictors: Mapping[str, ArrayLike], rows: int) -> PredictorColumns:
     """The columns of a model. `ValueError`: another number of rows, a constant predictor, predictors that overlap."""
     given = [numbers(values, f"predictor {name!r}") for name, values in predictors.items()]
     for name, array in zip(predictors, given, strict=True):
@@ -86,7 +86,7 @@ def columns_of(predictors: Mapping[str, ArrayLike], rows: int) -> Columns:
         raise ValueError(f"the predictors {', '.join(predictors)} overlap: one of them follows from the others")
     back = np.diag(1.0 / spreads)
     back[0, 1:] = -means[1:] / spreads[1:]
-    return Columns(names=(INTERCEPT, *predictors), matrix=matrix, back=back)
+    return PredictorColumns(names=(INTERCEPT, *predictors), matrix=matrix, back=back)
 
 
 def coefficients(

@@ -19,7 +19,7 @@ from scipy import special
 from scipy.optimize import linprog
 
 from analysis.stats.arrays import FloatArray, numbers
-from analysis.stats.fixed_effects import Coefficient, Columns, coefficients, columns_of, people_codes
+from analysis.stats.fixed_effects import Coefficient, PredictorColumns, coefficients, columns_of, people_codes
 from analysis.stats.logit_model import ONE_PERSON, ONE_TRIAL
 
 NODES = 25
@@ -123,7 +123,7 @@ def _cells(matrix: FloatArray, right: FloatArray, person: NDArray[np.intp]) -> _
     )
 
 
-def _unfit(cells: _Cells, columns: Columns) -> str | None:
+def _unfit(cells: _Cells, columns: PredictorColumns) -> str | None:
     if cells.first.size < 2:
         return ONE_PERSON
     if cells.first.size == cells.trials.sum():
@@ -164,7 +164,7 @@ def _separating(cells: _Cells) -> NDArray[np.bool_]:
 
 
 def _fitted(
-    empty: RandomInterceptLogit, cells: _Cells, columns: Columns, confidence_and_nodes: tuple[float, int]
+    empty: RandomInterceptLogit, cells: _Cells, columns: PredictorColumns, confidence_and_nodes: tuple[float, int]
 ) -> RandomInterceptLogit:
     confidence, nodes = confidence_and_nodes
     start = np.zeros(cells.matrix.shape[1] + 1)

@@ -15,8 +15,8 @@ from analysis.paper.audit.run import audit, load_paper_file
 from analysis.paper.paper import Prediction, load_paper
 from analysis.summary import remarks_coding
 from analysis.summary.comparison import compare
-from analysis.summary.measured import answers_to
 from analysis.summary.participation import exclusion_lines, participation
+from analysis.summary.request_data import answers_to
 from analysis.summary.requests import Requests
 from analysis.summary.results import RulesApplied, StudyStatistics
 from analysis.summary.sections.content import ReportData

@@ -106,7 +106,7 @@ class Requested:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class Measured:
+class RequestData:
     """What requests are answered from.
 
     `scores`: participants by conditions, no cell empty; `trials`: a row a trial, with `participant_id`, `score` and the
@@ -128,47 +128,47 @@ _CORRECTED = {
 }
 
 
-def answered(request: AnyRequest, measured: Measured) -> Requested:
+def answer_to(request: AnyRequest, data: RequestData) -> Requested:
     """The answer to a request. `ValueError` if the data have not what it names, with what they have."""
     match request:
         case ContrastsRequest():
-            note, result = _contrasts(request, measured)
+            note, result = _contrasts(request, data)
         case EquivalenceRequest():
-            note, result = _equivalence(request, measured)
+            note, result = _equivalence(request, data)
         case BayesFactorRequest():
-            note, result = _bayes_factor(request, measured)
+            note, result = _bayes_factor(request, data)
         case MixedModelRequest():
-            note, result = _mixed_model(request, measured)
+            note, result = _mixed_model(request, data)
         case LogisticRequest():
-            note, result = _logistic(request, measured)
-    together = measured.grouped and isinstance(request, ContrastsRequest | EquivalenceRequest)
+            note, result = _logistic(request, data)
+    together = data.grouped and isinstance(request, ContrastsRequest | EquivalenceRequest)
     of_trials = isinstance(result, LinearMixedModel | RandomInterceptLogit)
     return Requested(
         kind=request.kind,
         of=request.of,
         question=request.question,
-        people=measured.trials["participant_id"].nunique() if of_trials else len(measured.scores),
-        note=f"{note} Scores are {measured.unit}{', people of all groups together' if together else ''}.",
+        people=data.trials["participant_id"].nunique() if of_trials else len(data.scores),
+        note=f"{note} Scores are {data.unit}{', people of all groups together' if together else ''}.",
         result=result,
     )
 
 
-def _contrasts(request: ContrastsRequest, measured: Measured) -> tuple[str, Result]:
+def _contrasts(request: ContrastsRequest, data: RequestData) -> tuple[str, Result]:
     for weights in request.weights.values():
         for name in weights:
-            _column(measured, name)
-    names = [str(name) for name in measured.scores.columns]
+            _column(data, name)
+    names = [str(name) for name in data.scores.columns]
     wide = {name: [weights.get(one, 0.0) for one in names] for name, weights in request.weights.items()}
     note = (
         "Contrasts of the participants' scores, each on its own error (t on n − 1 degrees of freedom), which needs no "
         f"sphericity; {_CORRECTED[request.correction]}; intervals of each contrast by itself."
     )
-    return note, planned_contrasts(_table(measured), wide, request.correction)
+    return note, planned_contrasts(_table(data), wide, request.correction)
 
 
-def _equivalence(request: EquivalenceRequest, measured: Measured) -> tuple[str, Result]:
-    _table(measured)
-    first, bounds = _column(measured, request.a), (request.low, request.high, request.alpha)
+def _equivalence(request: EquivalenceRequest, data: RequestData) -> tuple[str, Result]:
+    _table(data)
+    first, bounds = _column(data, request.a), (request.low, request.high, request.alpha)
     what = request.a if request.b is None else f"{request.a} − {request.b}"
     shown = " and ".join(f"{bound:g}".replace("-", "−") for bound in bounds[:2])
     note = (
@@ -177,80 +177,78 @@ def _equivalence(request: EquivalenceRequest, measured: Measured) -> tuple[str, 
     )
     if request.b is None:
         return note, tost_one_sample(first, *bounds)
-    return note, tost_paired(first, _column(measured, request.b), *bounds)
+    return note, tost_paired(first, _column(data, request.b), *bounds)
 
 
-def _bayes_factor(request: BayesFactorRequest, measured: Measured) -> tuple[str, Result]:
-    within = len(measured.factors)
-    if measured.grouped or within > 1:
+def _bayes_factor(request: BayesFactorRequest, data: RequestData) -> tuple[str, Result]:
+    within = len(data.factors)
+    if data.grouped or within > 1:
         raise ValueError("a Bayes factor is of one factor within people, and there are more")
     note = (
         "Bayes factor of the repeated-measures ANOVA: conditions and participants against participants alone (Rouder "
         f"et al. 2012), of the participants' scores; effects Cauchy, r = {request.scale:g} for the conditions and "
         f"{RANDOM_SCALE:g} for the participants."
     )
-    return note, rm_anova_bayes_factor(_table(measured), request.scale)
+    return note, rm_anova_bayes_factor(_table(data), request.scale)
 
 
-def _mixed_model(request: MixedModelRequest, measured: Measured) -> tuple[str, Result]:
+def _mixed_model(request: MixedModelRequest, data: RequestData) -> tuple[str, Result]:
     note = (
         "Linear mixed model of single trials with a random intercept a person, fitted by REML (statsmodels "
-        f"{version('statsmodels')}); Wald tests on the normal distribution.{_references(request.terms, measured)}"
+        f"{version('statsmodels')}); Wald tests on the normal distribution.{_references(request.terms, data)}"
     )
-    trials = measured.trials
-    return note, linear_mixed_model(
-        trials["score"], list(trials["participant_id"]), _predictors(request.terms, measured)
-    )
+    trials = data.trials
+    return note, linear_mixed_model(trials["score"], list(trials["participant_id"]), _predictors(request.terms, data))
 
 
-def _logistic(request: LogisticRequest, measured: Measured) -> tuple[str, Result]:
-    trials = measured.trials
+def _logistic(request: LogisticRequest, data: RequestData) -> tuple[str, Result]:
+    trials = data.trials
     if not trials["score"].isin((0.0, 1.0)).all():
         raise ValueError("a logistic model is of answers that are right or wrong, or one of two; take mixed-model")
     note = (
         "Logistic regression of single answers with a random intercept a person, by maximum likelihood (adaptive "
         f"Gauss-Hermite quadrature, {NODES} nodes); odds are one person's; Wald tests."
-        f"{_references(request.terms, measured)}"
+        f"{_references(request.terms, data)}"
     )
-    predictors = _predictors(request.terms, measured)
+    predictors = _predictors(request.terms, data)
     return note, random_intercept_logit(trials["score"], list(trials["participant_id"]), predictors)
 
 
-def _table(measured: Measured) -> FloatArray:
-    n, k = measured.scores.shape
+def _table(data: RequestData) -> FloatArray:
+    n, k = data.scores.shape
     if n < 2 or k < 2:
         raise ValueError(f"two people with all of two conditions are needed; there are {n} and {k}")
-    return measured.scores.to_numpy(dtype=np.float64)
+    return data.scores.to_numpy(dtype=np.float64)
 
 
-def _column(measured: Measured, name: str) -> FloatArray:
-    names = [str(one) for one in measured.scores.columns]
+def _column(data: RequestData, name: str) -> FloatArray:
+    names = [str(one) for one in data.scores.columns]
     if name not in names:
         raise ValueError(f"there is no condition {name!r}; there are {', '.join(names)}")
-    return measured.scores[name].to_numpy(dtype=np.float64)
+    return data.scores[name].to_numpy(dtype=np.float64)
 
 
-def _terms(terms: tuple[str, ...], measured: Measured) -> tuple[str, ...]:
-    return terms or tuple(measured.factors)
+def _terms(terms: tuple[str, ...], data: RequestData) -> tuple[str, ...]:
+    return terms or tuple(data.factors)
 
 
-def _predictors(terms: tuple[str, ...], measured: Measured) -> dict[str, FloatArray]:
+def _predictors(terms: tuple[str, ...], data: RequestData) -> dict[str, FloatArray]:
     """The columns of all terms by name; those of several factors are products."""
     found: dict[str, FloatArray] = {}
-    for term in _terms(terms, measured):
+    for term in _terms(terms, data):
         columns: dict[str, FloatArray] = {}
         for name in term.split(":"):
-            own = _factor_columns(name, measured)
+            own = _factor_columns(name, data)
             columns = {f"{a}:{b}": x * y for a, x in columns.items() for b, y in own.items()} if columns else own
         found |= columns
     return found
 
 
-def _factor_columns(name: str, measured: Measured) -> dict[str, FloatArray]:
+def _factor_columns(name: str, data: RequestData) -> dict[str, FloatArray]:
     """A factor of numbers as it is, one of words as indicators against its first level."""
-    if name not in measured.factors:
-        raise ValueError(f"terms: there is no factor {name!r} that varies; there are {', '.join(measured.factors)}")
-    column, levels = measured.trials[name], measured.factors[name]
+    if name not in data.factors:
+        raise ValueError(f"terms: there is no factor {name!r} that varies; there are {', '.join(data.factors)}")
+    column, levels = data.trials[name], data.factors[name]
     if not isinstance(levels[0], str):
         return {name: column.to_numpy(dtype=np.float64)}
     given = [str(level) for level in column]
@@ -259,13 +257,13 @@ def _factor_columns(name: str, measured: Measured) -> dict[str, FloatArray]:
     return {level: found[level] for level in there[1:]}
 
 
-def _references(terms: tuple[str, ...], measured: Measured) -> str:
+def _references(terms: tuple[str, ...], data: RequestData) -> str:
     """What words are compared with."""
-    return "".join(f" {name}: against {first}." for name, first in _first_levels(terms, measured))
+    return "".join(f" {name}: against {first}." for name, first in _first_levels(terms, data))
 
 
-def _first_levels(terms: tuple[str, ...], measured: Measured) -> Iterator[tuple[str, str]]:
-    for name in dict.fromkeys(name for term in _terms(terms, measured) for name in term.split(":")):
-        levels = measured.factors.get(name, ())
+def _first_levels(terms: tuple[str, ...], data: RequestData) -> Iterator[tuple[str, str]]:
+    for name in dict.fromkeys(name for term in _terms(terms, data) for name in term.split(":")):
+        levels = data.factors.get(name, ())
         if levels and isinstance(levels[0], str):
             yield name, levels[0]

@@ -1,4 +1,4 @@
-"""The scores and trials that requests are answered from, as the statistics of the report take them."""
+"""The scores and trials that requests are answer_to from, as the statistics of the report take them."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from analysis.logs.exclusions import complete_rows
 from analysis.logs.reading import Logs
 from analysis.stats.cells import coded
 from analysis.summary.designs import question_scores
-from analysis.summary.requests import AnyRequest, Measured, Requested, Requests, answered
+from analysis.summary.requests import AnyRequest, RequestData, Requested, Requests, answer_to
 from analysis.summary.summary import methods_in
 from experiments.config.door import ConfigError, line_of, read_text
 from experiments.design.config import DesignConfig
@@ -23,7 +23,7 @@ def answers_to(asked: Requests, path: Path, logs: Logs) -> tuple[Requested, ...]
     found, faults = [], []
     for place, request in enumerate(asked.requests):
         try:
-            found.append(answered(request, measured(logs, request)))
+            found.append(answer_to(request, request_data(logs, request)))
         except ValueError as error:
             line = line_of(read_text(path), ["requests", str(place)])
             faults.append(f"{path}{f':{line}' if line else ''}: requests.{place}: {error}")
@@ -32,7 +32,7 @@ def answers_to(asked: Requests, path: Path, logs: Logs) -> tuple[Requested, ...]
     return tuple(found)
 
 
-def measured(logs: Logs, request: AnyRequest) -> Measured:
+def request_data(logs: Logs, request: AnyRequest) -> RequestData:
     """What a request is about. `ValueError`: no such logs, or no such question."""
     tables = {"direction": (logs.trials, "correct"), "preference": (logs.ratings, "rating")}
     there = {name: table for name, table in tables.items() if len(table[0])}
@@ -46,7 +46,7 @@ def measured(logs: Logs, request: AnyRequest) -> Measured:
     raise ValueError(f"of = {request.of!r}: there are no logs of it; there are some of {', '.join((*there, *designs))}")
 
 
-def _of_experiment(name: str, table: pd.DataFrame, measure: str) -> Measured:
+def _of_experiment(name: str, table: pd.DataFrame, measure: str) -> RequestData:
     """Everybody who is complete; in direction the forward shots, as the report's ANOVA has them."""
     methods = methods_in(table)
     rows = complete_rows(coded(table), name, methods)[0]
@@ -61,10 +61,10 @@ def _of_experiment(name: str, table: pd.DataFrame, measure: str) -> Measured:
     )
     scores = trials.pivot_table(index="participant_id", columns="method", values="score").reindex(columns=methods)
     unit = "shares of right answers to forward shots" if name == "direction" else "ratings"
-    return Measured(scores=scores, trials=trials, factors={"method": tuple(methods)}, unit=unit)
+    return RequestData(scores=scores, trials=trials, factors={"method": tuple(methods)}, unit=unit)
 
 
-def _of_design(design: DesignConfig, asked: str | None, table: pd.DataFrame) -> Measured:
+def _of_design(design: DesignConfig, asked: str | None, table: pd.DataFrame) -> RequestData:
     names = [name for name, question in design.questions.items() if question.kind != "text"]
     if asked is None and len(names) > 1:
         raise ValueError(f"question: say which one; {design.design} has {', '.join(names)}")
@@ -77,7 +77,7 @@ def _of_design(design: DesignConfig, asked: str | None, table: pd.DataFrame) -> 
     levels = {one: factor.all_levels for one, factor in design.factors.items() if len(factor.all_levels) > 1}
     scores = found.people.set_axis([*_conditions(found.people)], axis=1)
     unit = _unit(design.questions[name])
-    return Measured(scores=scores, trials=found.real, factors=levels, unit=unit, grouped=bool(design.between))
+    return RequestData(scores=scores, trials=found.real, factors=levels, unit=unit, grouped=bool(design.between))
 
 
 def _unit(question: QuestionConfig) -> str:

@@ -1,0 +1,204 @@
+"""A file of requests: each is answered from the scores of the report, in report and statistics.json, or refused."""
+
+from __future__ import annotations
+
+import json
+import math
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pandas as pd
+import pytest
+
+from analysis.logs.design_logs import DesignLogs
+from analysis.logs.reading import Logs, read_logs
+from analysis.stats.anova import rm_anova
+from analysis.stats.anova_bayes import rm_anova_bayes_factor
+from analysis.stats.contrasts import planned_contrasts
+from analysis.stats.equivalence import tost_paired
+from analysis.summary.request_data import answers_to, request_data
+from analysis.summary.requests import BayesFactorRequest, Requested, Requests
+from analysis.summary.results import StudyStatistics
+from analysis.summary.sections.content import ReportData
+from analysis.summary.sections.requested import requested_sections
+from analysis.summary.summary import summarize
+from experiments.config.door import ConfigError, load
+from tests.conftest import Recoil
+from tests.log_files import write_study
+from tests.tables_of_designs import loaded, simulated
+
+EXAMPLE = Path(__file__).parent.parent / "configs" / "examples" / "requests.toml"
+PEOPLE = 9
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    study = tmp_path_factory.mktemp("study")
+    write_study(study, participants=PEOPLE)
+    return study
+
+
+@pytest.fixture(scope="module")
+def logs(folder: Path) -> Logs:
+    return read_logs([folder])
+
+
+@pytest.fixture(scope="module")
+def answers(logs: Logs) -> dict[str, Requested]:
+    """The example's requests, each kind once."""
+    return {one.kind: one for one in answers_to(load(Requests, EXAMPLE), EXAMPLE, logs)}
+
+
+def of_designs(*names: str) -> Logs:
+    """The logs of designs as their synthetic participants fill them."""
+    empty = pd.DataFrame()
+    designs = []
+    for name in names:
+        config, laws = loaded(name)
+        designs.append(DesignLogs(design=config, table=simulated(config, laws, 8)))
+    return Logs(trials=empty, ratings=empty, files=(), problems=(), designs=tuple(designs))
+
+
+def asked(tmp_path: Path, text: str, logs: Logs) -> tuple[Requested, ...]:
+    path = tmp_path / "requests.toml"
+    path.write_text(text, encoding="utf-8")
+    return answers_to(load(Requests, path), path, logs)
+
+
+def test_the_example_asks_for_every_kind(answers: dict[str, Requested]) -> None:
+    assert set(answers) == {"contrasts", "equivalence", "bayes-factor", "logistic", "mixed-model"}
+
+
+def test_contrasts_and_bayes_factor_are_of_the_scores_of_the_anova(logs: Logs, answers: dict[str, Requested]) -> None:
+    direction = summarize(logs).direction
+    assert direction is not None
+    assert direction.anova is not None
+    scores, names = direction.participants.array, direction.methods
+    assert float(rm_anova(scores).F) == direction.anova.F
+    weights = {"vibration": -1.0, "asymmetric-1": 0.5, "asymmetric-2": 0.5}
+    expected = planned_contrasts(scores, {"x": [weights[name] for name in names]})[0]
+    first: Any = answers["contrasts"].result
+    assert (first[0].name, first[0].estimate, first[0].t) == ("force against vibration", expected.estimate, expected.t)
+    bayes: Any = answers["bayes-factor"].result
+    assert bayes.bf10 == rm_anova_bayes_factor(scores).bf10
+
+
+def test_equivalence_is_of_the_two_conditions_in_their_order(logs: Logs, answers: dict[str, Requested]) -> None:
+    preference = summarize(logs).preference
+    assert preference is not None
+    column = dict(zip(preference.methods, preference.participants.array.T, strict=True))
+    expected = tost_paired(column["asymmetric-2"], column["asymmetric-1"], -1.0, 1.0)
+    assert answers["equivalence"].result == expected
+
+
+def test_models_are_of_single_trials(answers: dict[str, Requested]) -> None:
+    logistic: Any = answers["logistic"].result
+    linear: Any = answers["mixed-model"].result
+    assert (logistic.people, linear.people) == (PEOPLE, PEOPLE)
+    assert linear.trials == 3 * PEOPLE
+    assert [one.name for one in linear.coefficients] == ["intercept", "asymmetric-1", "asymmetric-2"]
+
+
+def test_every_answer_has_its_section_with_its_numbers(answers: dict[str, Requested]) -> None:
+    statistics = StudyStatistics(requested=tuple(answers.values()))
+    found = {one.title: one for one in requested_sections(ReportData(title="x", statistics=statistics))}
+    assert list(found) == [
+        "Requested: planned contrasts, direction",
+        "Requested: equivalence, preference",
+        "Requested: Bayes factor, direction",
+        "Requested: logistic mixed model, direction",
+        "Requested: linear mixed model, preference",
+    ]
+    contrasts: Any = answers["contrasts"].result
+    row = found["Requested: planned contrasts, direction"].tables[0].rows[0]
+    assert row[3] == f"{contrasts[0].t:.2f}".replace("-", "−")
+    logistic: Any = answers["logistic"].result
+    row = found["Requested: logistic mixed model, direction"].tables[0].rows[1]
+    assert row[-1] == f"{math.exp(logistic.coefficients[1].estimate):.2f}"
+    assert "BF10" in found["Requested: Bayes factor, direction"].paragraphs[0]
+
+
+def test_a_report_without_requests_has_none(logs: Logs) -> None:
+    assert summarize(logs).requested is None
+    assert [*requested_sections(ReportData(title="x", statistics=summarize(logs)))] == []
+
+
+def test_a_design_is_asked_by_question_cells_and_terms(tmp_path: Path) -> None:
+    text = """
+[[requests]]
+kind = "contrasts"
+of = "realism"
+question = "comfort"
+weights."damper at 20 V" = { "off/20" = -1.0, "on/20" = 1.0 }
+[[requests]]
+kind = "mixed-model"
+of = "realism"
+question = "realism"
+terms = ["damper", "voltage_V", "damper:voltage_V"]
+[[requests]]
+kind = "logistic"
+of = "voltages"
+[[requests]]
+kind = "contrasts"
+of = "grip"
+weights.x = { vibration = -1.0, asymmetric-1 = 1.0 }
+"""
+    logs = of_designs("realism", "voltages", "grip")
+    contrast, mixed, logistic, grip = asked(tmp_path, text, logs)
+    rows = logs.designs[0].table
+    rows = rows[rows["voltage_V"] == 20.0].pivot_table(index="participant_id", columns="damper", values="comfort")
+    result: Any = contrast.result
+    assert result[0].estimate == pytest.approx((rows["on"] - rows["off"]).mean())
+    model: Any = mixed.result
+    assert [one.name for one in model.coefficients] == ["intercept", "on", "voltage_V", "on:voltage_V"]
+    model = logistic.result
+    assert [one.name for one in model.coefficients] == ["intercept", "voltage_V", "backward"]
+    assert grip.note.endswith("Scores are ratings, people of all groups together.")
+
+
+def test_numbers_are_asked_as_their_logarithms() -> None:
+    found = request_data(of_designs("magnitude"), BayesFactorRequest(kind="bayes-factor", of="magnitude"))
+    assert found.unit == "natural logarithms of the numbers"
+    assert np.exp(found.trials["score"]).round(6).tolist() == found.trials["strength"].round(6).tolist()
+
+
+@pytest.mark.parametrize(
+    ("text", "said"),
+    [
+        ('kind = "bayes-factor"\nof = "nothing"', "there are no logs of it; there are some of realism, magnitude"),
+        ('kind = "bayes-factor"\nof = "realism"', "question: say which one; realism has realism, comfort"),
+        ('kind = "bayes-factor"\nof = "realism"\nquestion = "pain"', "realism has realism, comfort"),
+        ('kind = "bayes-factor"\nof = "realism"\nquestion = "comfort"', "of one factor within people"),
+        ('kind = "logistic"\nof = "realism"\nquestion = "comfort"', "right or wrong, or one of two; take mixed-model"),
+        ('kind = "mixed-model"\nof = "magnitude"\nterms = ["hand"]', "there is no factor 'hand' that varies"),
+        ('kind = "contrasts"\nof = "magnitude"\nweights.x = { "1" = 1, "2" = -1 }', "there is no condition '1'"),
+        ('kind = "contrasts"\nof = "magnitude"\nweights.x = { "0.004" = 1, "0.006" = -0.9 }', "must add up to 0"),
+        ('kind = "equivalence"\nof = "magnitude"\na = "0.004"\nlow = 2.0\nhigh = 1.0', "low must be below high"),
+    ],
+)
+def test_what_the_data_have_not_is_said_with_the_line_and_what_they_have(tmp_path: Path, text: str, said: str) -> None:
+    with pytest.raises(ConfigError, match=rf"requests.toml:2: requests.0: .*{said}"):
+        asked(tmp_path, f"# one request\n[[requests]]\n{text}\n", of_designs("realism", "magnitude"))
+
+
+def test_an_experiment_has_one_measure(tmp_path: Path, logs: Logs) -> None:
+    with pytest.raises(ConfigError, match="direction has one measure; leave the key out"):
+        asked(tmp_path, '[[requests]]\nkind = "logistic"\nof = "direction"\nquestion = "response"\n', logs)
+
+
+@pytest.mark.slow
+def test_the_command_answers_in_report_and_statistics_and_writes_nothing_of_what_it_refuses(
+    recoil: Recoil, folder: Path, tmp_path: Path
+) -> None:
+    done = recoil("analyze", folder, "--out", tmp_path / "out", "--requests", EXAMPLE)
+    assert done.returncode == 0, done.stderr
+    found = json.loads((tmp_path / "out" / "statistics.json").read_text(encoding="utf-8"))["requested"]
+    assert [one["kind"] for one in found] == [one.kind for one in load(Requests, EXAMPLE).requests]
+    assert set(found[0]) == {"kind", "of", "question", "people", "note", "result"}
+    assert "Requested: planned contrasts, direction" in (tmp_path / "out" / "report.md").read_text(encoding="utf-8")
+    (tmp_path / "bad.toml").write_text('[[requests]]\nkind = "anova"\nof = "direction"\n', encoding="utf-8")
+    bad = recoil("analyze", folder, "--out", tmp_path / "none", "--requests", tmp_path / "bad.toml")
+    assert bad.returncode == 2
+    assert "kind = 'anova' is none of contrasts, equivalence" in bad.stderr
+    assert not (tmp_path / "none").exists()
