@@ -146,6 +146,7 @@ def asked(**keys):
         ({"practice": {"of": ["method"]}}, "a practice needs repetitions"),
         ({"factors": ONE | {"grip": {"levels": ["one"], "between": True}}}, "between = true with one level"),
         ({"factors": ONE | {"grip": {"levels": ["=1", "two"]}}}, "a spreadsheet takes for a formula"),
+        ({"design": "excluded"}, "design = 'excluded': the statistics have another part of that name; choose another"),
         ({"factors": ONE | {"Method": {"levels": ["x", "y"]}}}, "method, Method differ in case alone"),
         (
             {

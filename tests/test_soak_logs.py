@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import hashlib
 import json
 import statistics as st
 import subprocess
@@ -13,7 +14,10 @@ from typing import Any
 import pandas as pd
 import pytest
 
+from experiments.clock import VirtualClock
 from experiments.load import load_setup
+from experiments.run import RunRequest, run
+from experiments.screens.synthetic import synthetic_screen
 from tests.conftest import RECOIL, Soak
 from tests.log_files import trials_path, write_many
 
@@ -41,7 +45,7 @@ for _ in range(4):
     logs = timed("read", lambda: read_logs([folder]))
     timed("summarize", lambda: summarize(logs, trade=False))
     timed("trade", lambda: summarize(logs, fits=True))
-assert len(logs.trials) == 60 * len(files) and not logs.problems
+assert len(logs.trials) == 60 * len(files) and not logs.problems and not logs.remarks
 print(json.dumps({name: found[1:] for name, found in times.items()}))
 """
 """The first round of each only warms up."""
@@ -83,6 +87,37 @@ def test_reading_checking_and_analysing_against_a_loop_that_merely_reads(logs: P
     soak("speed and accuracy, 40 people fitted, of the loop's time", f"{fits:.0%}", "25 %", by_turns)
     assert ratio >= 5
     assert max(statistics, fits) < 0.25
+
+
+SEALED = 2_000
+
+
+@pytest.fixture(scope="module")
+def sealed(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Logs with the journal of one real run beside each, finished with the hash of the log."""
+    folder = write_many(tmp_path_factory.mktemp("sealed"), SEALED)
+    asked = RunRequest(
+        setup=load_setup("direction"), participant_id="P1", results=tmp_path_factory.mktemp("one"), seed=1
+    )
+    data = run(asked, synthetic_screen, VirtualClock()).place.journal.read_bytes()
+    end = data.rfind(b"\n", 0, -1) + 1
+    last = json.loads(data[end:])
+    for path in folder.rglob("*_trials.csv"):
+        last["table_sha256"] = hashlib.sha256(path.read_bytes()).hexdigest()
+        name = path.name.replace("_trials.csv", "_journal.jsonl")
+        path.with_name(name).write_bytes(data[:end] + json.dumps(last, separators=(",", ":")).encode() + b"\n")
+    return folder
+
+
+def test_holding_every_log_against_its_journal_against_the_same_loop(sealed: Path, soak: Soak) -> None:
+    found = _child(BOTH_WAYS, sealed)
+    rounds = list(zip(*found.values(), strict=True))
+    ratio = st.median(a / (b + c) for a, b, c, _ in rounds)
+    read = st.median(b / a for a, b, _, _ in rounds)
+    how = f"{SEALED} logs, a journal of 130 kB beside each, hashed whole; in one process, by turns"
+    soak("read, checked against journals and analysed, times faster than the loop", f"{ratio:.1f}", "2", how)
+    soak("the reading and checking of these, of the loop's time", f"{read:.0%}", "stated", how)
+    assert ratio >= 2
 
 
 def test_memory(logs: Path, soak: Soak) -> None:

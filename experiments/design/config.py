@@ -145,7 +145,13 @@ _COMMON_COLUMNS = frozenset(
 )
 
 
+_TAKEN = ("excluded", "participation", "remarks", "rules", "studies", "versions", "warnings")
+"""What `statistics.json` has beside the designs by their names."""
+
+
 def _name_problems(design: DesignConfig) -> Iterator[str]:
+    if design.design in _TAKEN:
+        yield f"design = {design.design!r}: the statistics have another part of that name; choose another"
     named = list(dict.fromkeys((*design.factors, *design.questions)))
     alike = [name for name in named if sum(one.casefold() == name.casefold() for one in named) > 1]
     if alike:
