@@ -41,7 +41,7 @@ if TYPE_CHECKING:
     from analysis.stats.diagnostics import cousineau_morey, effect_size, normality, outliers, sphericity
     from analysis.stats.discrimination import discrimination
     from analysis.stats.equivalence import tost_one_sample, tost_paired, tost_two_samples
-    from analysis.stats.factorial import mixed, two_within
+    from analysis.stats.factorial import factorial_anova
     from analysis.stats.fixed_effects import indicators
     from analysis.stats.frames import groups_of, wide
     from analysis.stats.logit_model import clustering, logit_model
@@ -60,7 +60,7 @@ _NAMES = {
     "diagnostics": "cousineau_morey effect_size normality outliers sphericity",
     "discrimination": "discrimination",
     "equivalence": "tost_one_sample tost_paired tost_two_samples",
-    "factorial": "mixed two_within",
+    "factorial": "factorial_anova",
     "fixed_effects": "indicators",
     "frames": "groups_of wide",
     "logit_model": "clustering logit_model",
@@ -86,6 +86,7 @@ __all__ = [
     "cousineau_morey",
     "discrimination",
     "effect_size",
+    "factorial_anova",
     "friedman",
     "groups_of",
     "holm",
@@ -93,7 +94,6 @@ __all__ = [
     "jzs_paired",
     "linear_mixed_model",
     "logit_model",
-    "mixed",
     "normality",
     "one_way_anova",
     "one_way_anova_power",
@@ -116,7 +116,6 @@ __all__ = [
     "tost_paired",
     "tost_two_samples",
     "tukey_hsd",
-    "two_within",
     "wide",
     "yes_no",
 ]

@@ -2,7 +2,11 @@
 
 from __future__ import annotations
 
+import csv
+import io
 import json
+import math
+import statistics
 import subprocess
 import sys
 from pathlib import Path
@@ -13,6 +17,7 @@ from analysis.archive.bids import data_set, runs_of
 from analysis.logs.reading import read_logs
 from analysis.summary.analyze import Request, analyze
 from analysis.summary.summary import summarize
+from analysis.summary.tables_out import result_tables
 from experiments.clock import VirtualClock
 from experiments.load import load_setup, shipped_folder
 from experiments.run import RunRequest, run
@@ -51,6 +56,41 @@ def test_every_design_is_read_by_its_journal_and_has_its_statistics(results, fou
     assert len(logs.files) == len(NAMES) * PEOPLE
     assert sorted(found) == sorted(NAMES)
     assert {one.n for one in found.values()} == {PEOPLE}
+
+
+def long_table(results, name):
+    logs = read_logs([results])
+    data = result_tables(logs, {})[f"{name}_long.csv"]
+    assert b"\r\n" in data
+    return list(csv.DictReader(io.StringIO(data.decode(), newline="")))
+
+
+def test_the_long_table_of_a_design_has_each_persons_scores_of_each_condition(results, found):
+    rows = long_table(results, "realism")
+    assert [*rows[0]] == [
+        "study", "participant_id", "damper", "voltage_V", "trials", "realism_answers", "realism_mean",
+        "comfort_answers", "comfort_mean",
+    ]  # fmt: skip
+    assert len(rows) == PEOPLE * 6
+    for cell in found["realism"].questions["realism"].cells:
+        some = [row for row in rows if (row["damper"], float(row["voltage_V"])) == tuple(cell.levels.values())]
+        assert statistics.fmean(float(row["realism_mean"]) for row in some) == pytest.approx(cell.mean)
+        assert sum(int(row["trials"]) for row in some) == cell.trials
+
+
+def test_the_long_table_counts_right_answers_by_group_and_catch_trials_without_a_level(results, found):
+    rows = long_table(results, "detection")
+    caught = [row for row in rows if row["pulse_s"] == ""]
+    assert len(caught) == PEOPLE
+    for cell in found["detection"].questions["felt"].cells:
+        level = str(cell.levels.get("pulse_s", ""))
+        assert sum(int(row["felt_right"]) for row in rows if row["pulse_s"] == level) == cell.right
+    assert {row["grip"] for row in long_table(results, "grip")} == {"one hand", "two hands"}
+    strengths = [float(row["strength_log_mean"]) for row in long_table(results, "magnitude")]
+    assert all(math.isfinite(one) for one in strengths)
+    chosen = long_table(results, "pairs")
+    assert sum(int(row["rather_first"]) + int(row["rather_second"]) for row in chosen) == PEOPLE * 20
+    assert [*chosen[0]][2:4] == ["method_1", "method_2"]
 
 
 @pytest.mark.parametrize(
@@ -167,7 +207,11 @@ def test_designs_are_exported_as_tasks_of_a_bids_data_set(results, tmp_path):
     felt = files["sub-P01/beh/sub-P01_task-detection_beh.tsv"].decode().splitlines()
     correct = felt[0].split("\t").index("correct")
     assert {line.split("\t")[correct] for line in felt[1:]} == {"0", "1"}
-    assert b"\ttrue\n" in files["participants.tsv"]
+    people = files["participants.tsv"].decode().splitlines()
+    assert [line.split("\t")[-2:] for line in people] == [
+        ["synthetic", "group"], ["true", "one hand"], ["true", "two hands"], ["true", "one hand"], ["true", "two hands"]
+    ]  # fmt: skip
+    assert "group" in json.loads(files["participants.json"])
 
 
 def test_bids_takes_an_exported_design(results, tmp_path):

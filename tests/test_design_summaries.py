@@ -139,22 +139,52 @@ def test_a_group_of_one_is_not_tested():
     assert test.reason == "a group has fewer than two people"
 
 
-def test_three_factors_are_described_and_not_tested():
-    config = design(
-        factors={
-            "method": {"levels": ["a", "b"]},
-            "posture": {"levels": ["x", "y"]},
-            "voltage_V": {"levels": [1.0, 2.0]},
-        },
-        questions={"q": {"kind": "rating", "text": "?", "minimum": 1.0, "maximum": 7.0, "grain": 1.0}},
-    )
+RATED = {"q": {"kind": "rating", "text": "?", "minimum": 1.0, "maximum": 7.0, "grain": 1.0}}
+
+
+def effects_of(count=6, **factors):
+    """What is tested of a rating by these factors, each of two levels."""
+    config = design(factors={"method": {"levels": ["a"]}, **factors}, questions=RATED)
     laws = {"questions": {"q": {"law": "ratings", "mean": {"all": 4.0}, "noise_sd": 1.0}}}
-    table = simulated(config, checked_table(SyntheticAnswers, laws, "laws.toml"), 5)
-    found = summarise(config, table).questions["q"]
-    assert len(found.cells) == 8
-    assert [test.reason for test in found.tests] == [
-        "there is no ANOVA here of more than two factors; take the logs to a program of your choice"
-    ]
+    table = simulated(config, checked_table(SyntheticAnswers, laws, "laws.toml"), count)
+    return summarise(config, table).questions["q"].tests
+
+
+def test_three_factors_within_people_give_seven_effects():
+    levels = {"levels": [1.0, 2.0]}
+    found = effects_of(posture=levels, voltage_V=levels, pulse_s=levels)
+    assert [test.effect for test in found] == [
+        "posture", "voltage_V", "pulse_s", "posture × voltage_V", "posture × pulse_s", "voltage_V × pulse_s",
+        "posture × voltage_V × pulse_s",
+    ]  # fmt: skip
+    assert {test.df for test in found} == {(1, 5)}
+
+
+def test_a_factor_that_varies_between_people_alone_is_tested():
+    (found,) = effects_of(6, grip={"levels": ["one", "two"], "between": True})
+    assert (found.effect, found.df) == ("grip", (1, 4))
+
+
+def test_groups_and_two_factors_within_people_give_seven_effects():
+    levels = {"levels": [1.0, 2.0]}
+    found = effects_of(8, grip={"levels": ["one", "two"], "between": True}, posture=levels, voltage_V=levels)
+    assert len(found) == 7
+    assert {test.df for test in found} == {(1, 6)}
+
+
+@pytest.mark.parametrize(
+    ("factors", "said"),
+    [
+        ({name: {"levels": ["x", "y"]} for name in "abcde"}, "more than 4 factors within people are not tested here"),
+        (
+            {name: {"levels": ["x", "y"], "between": True} for name in "ab"},
+            "several factors between people are not tested here; test_long.csv has everyone's scores",
+        ),
+    ],
+)
+def test_of_too_many_factors_it_is_said_what_is_not_tested_and_what_to_do(factors, said):
+    (found,) = effects_of(**factors)
+    assert said in found.reason
 
 
 def test_nested_factors_are_described_and_not_tested():
@@ -163,9 +193,9 @@ def test_nested_factors_are_described_and_not_tested():
             "method": {"levels": ["a", "b"]},
             "voltage_V": {"within": "method", "levels": {"a": [1.0, 2.0], "b": [2.0, 3.0]}},
         },
-        questions={"q": {"kind": "rating", "text": "?", "minimum": 1.0, "maximum": 7.0, "grain": 1.0}},
+        questions=RATED,
     )
     laws = {"questions": {"q": {"law": "ratings", "mean": {"all": 4.0}, "noise_sd": 1.0}}}
     table = simulated(config, checked_table(SyntheticAnswers, laws, "laws.toml"), 5)
-    found = summarise(config, table).questions["q"]
-    assert [test.reason for test in found.tests] == ["the factors are nested, not crossed"]
+    (test,) = summarise(config, table).questions["q"].tests
+    assert "factors that are nested, not crossed, are not tested here" in test.reason

@@ -106,6 +106,12 @@ PARTICIPANT_COLUMNS: dict[str, ColumnDescription] = {
         "Format": "boolean",
         "Levels": {"true": "a simulation answered", "false": "a person answered every time"},
     },
+    "group": {
+        "LongName": "Group",
+        "Description": "the levels of what varied between participants, as the tables of their runs have them; n/a if "
+        "they did nothing of the kind; without such a task this column is left out",
+        "Format": "string",
+    },
 }
 """The columns of `participants.tsv`."""
 
@@ -193,6 +199,13 @@ class Run:
     rows: tuple[Mapping[str, Cell], ...]
     columns: tuple[Column, ...]
     task: str
+    between: tuple[str, ...] = ()
+    """The columns that vary between participants alone."""
+
+    @property
+    def group(self) -> str:
+        """The participant's levels of what varies between participants; empty if nothing does."""
+        return ", ".join(str(self.rows[0][name]) for name in self.between)
 
     @property
     def hands(self) -> set[str]:
@@ -252,18 +265,19 @@ def _all_runs(logs: Logs) -> Iterator[Run]:
         yield from _runs(experiment, table, tables.TABLES[experiment], TASKS[experiment])
     for one in logs.designs:
         asked = " ".join(question.text for question in one.design.questions.values())
-        yield from _runs(
-            one.design.design, one.table, columns(one.design), f"{one.design.title.rstrip('.?!')}. {asked}"
-        )
+        task = f"{one.design.title.rstrip('.?!')}. {asked}"
+        yield from _runs(one.design.design, one.table, columns(one.design), task, one.design.between)
 
 
-def _runs(experiment: str, table: pd.DataFrame, of: tuple[Column, ...], task: str) -> Iterator[Run]:
+def _runs(
+    experiment: str, table: pd.DataFrame, of: tuple[Column, ...], task: str, between: tuple[str, ...] = ()
+) -> Iterator[Run]:
     names = [column.name for column in of]
     plain = table[names].astype(object).where(table[names].notna(), None)
     for code, rows in plain.groupby("participant_id", sort=False):
         cells = rows.itertuples(index=False, name=None)
         named = tuple(dict(zip(names, row, strict=True)) for row in cells)
-        yield Run(participant_id=str(code), experiment=experiment, rows=named, columns=of, task=task)
+        yield Run(participant_id=str(code), experiment=experiment, rows=named, columns=of, task=task, between=between)
 
 
 def data_set(
@@ -271,12 +285,14 @@ def data_set(
 ) -> dict[str, bytes]:
     """Every file of the data set by its path in it. `members` is what the register says, `version` is Recoil's."""
     people = [_participant(code, done, members.get(code)) for code, done in runs.by_code.items()]
+    grouped = any(person["group"] != NOT_AVAILABLE for person in people)
+    shown = [name for name in PARTICIPANT_COLUMNS if name != "group" or grouped]
     synthetic = sum(person["synthetic"] == "true" for person in people)
     return {
         DESCRIPTION: json_bytes(_description(name, version)),
         "README": readme(len(people), synthetic, free_text=free_text).encode(),
-        "participants.tsv": _tsv(list(people[0]), (person.values() for person in people)),
-        "participants.json": json_bytes(PARTICIPANT_COLUMNS),
+        "participants.tsv": _tsv(shown, ([person[name] for name in shown] for person in people)),
+        "participants.json": json_bytes({name: PARTICIPANT_COLUMNS[name] for name in shown}),
         **{f"task-{task}_beh.json": json_bytes(_sidecar(run, free_text)) for task, run in runs.tasks.items()},
         **{_path(run): _beh(run, free_text) for run in runs.runs},
     }
@@ -304,6 +320,7 @@ def _participant(code: str, done: Sequence[Run], member: Member | None) -> dict[
         "sex": _SEX.get(facts.sex or "", NOT_AVAILABLE) if facts else NOT_AVAILABLE,
         "handedness": _HANDEDNESS.get(facts.handedness or "", NOT_AVAILABLE) if facts else NOT_AVAILABLE,
         "synthetic": synthetic,
+        "group": "; ".join(dict.fromkeys(run.group for run in done if run.group)) or NOT_AVAILABLE,
     }
 
 

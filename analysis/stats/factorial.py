@@ -1,27 +1,27 @@
-"""Analyses of variance of two factors: both within people, or one within and one between. Computed by pingouin."""
+"""Analyses of variance of crossed factors: any number within people, and one between them if there are groups."""
 
 from __future__ import annotations
 
 import math
-import warnings
-from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from functools import reduce
+from itertools import chain, combinations
 
 import numpy as np
-import pandas as pd
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import NDArray
 from scipy.linalg import helmert
 from scipy.stats import f as f_distribution
 
-from analysis.stats.arrays import FloatArray, numbers, pingouin
+from analysis.stats.arrays import FloatArray
 from analysis.stats.frames import Result, Results, ScoreTable, named_scores
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class FactorialEffect(Result):
-    """One effect. `source` names its factors; `p_gg` is corrected by `epsilon` (Greenhouse and Geisser), if it can be.
+    """One effect. `source` names its factors; `p_gg` is corrected by `epsilon` (Greenhouse and Geisser) within people.
 
-    `size` is generalised eta squared where both factors are within people, partial eta squared in a mixed design.
+    `size` is generalised eta squared, of factors that are all manipulated.
     """
 
     source: tuple[str, ...]
@@ -33,96 +33,106 @@ class FactorialEffect(Result):
     size: float
 
 
-def two_within(scores: ArrayLike, names: tuple[str, str]) -> Results[FactorialEffect]:
-    """The ANOVA of two factors within people: each effect against its own interaction with people.
+@dataclass(frozen=True, slots=True, kw_only=True)
+class _Stratum:
+    """What some factors within people come to: each person's contrasts (n, df), and the squares left within groups."""
 
-    `scores`: (n people, a levels, b levels). `ValueError`: fewer than two people or levels, or no finite numbers.
+    factors: tuple[int, ...]
+    parts: list[FloatArray]
+    left: float
+
+    @property
+    def df(self) -> int:
+        return int(self.parts[0].shape[1])
+
+    @property
+    def df_error(self) -> int:
+        return self.df * sum(len(part) - 1 for part in self.parts)
+
+    @property
+    def epsilon(self) -> float:
+        """Greenhouse and Geisser's: tr(S)^2 / (df tr(S^2)), S the covariance of the contrasts within groups."""
+        rest = np.concatenate([part - part.mean(axis=0) for part in self.parts])
+        covariance = rest.T @ rest
+        squares = self.df * float((covariance**2).sum())
+        return float(np.trace(covariance)) ** 2 / squares if squares > 0 else math.nan
+
+    def within(self) -> float:
+        """The squares that the levels explain when each group counts alike, whatever its size (type III)."""
+        mean = np.mean([part.mean(axis=0) for part in self.parts], axis=0)
+        return float((mean**2).sum() / (sum(1.0 / len(part) for part in self.parts) / len(self.parts) ** 2))
+
+    def between(self) -> float:
+        """The squares by which the groups differ."""
+        grand = np.concatenate(self.parts).mean(axis=0)
+        return float(sum(len(part) * ((part.mean(axis=0) - grand) ** 2).sum() for part in self.parts))
+
+
+def factorial_anova(
+    scores: ScoreTable, names: Sequence[str], group: Sequence[str] | None = None
+) -> Results[FactorialEffect]:
+    """The ANOVA of crossed factors, each effect against its own interaction with people.
+
+    `scores`: (n people, levels of the first factor within people, of the second, ...). `group`: each one's group, if a
+    factor varies between people. `names`: of the factors, the one between people first. `ValueError`: fewer than two
+    people, levels or groups, a group of one, or no finite numbers. Groups of unequal size are compared as sums of
+    squares of type III do, the levels by the means of the groups' means, as afex and SPSS have them. Of one factor within
+    people `scores` may be a table with a column a level.
     Sources: Winer 1971, chapter 7; Olejnik & Algina 2003, Psychological Methods 8, 434.
 
-    >>> scores = [[[1, 2], [3, 6]], [[2, 2], [4, 9]], [[1, 3], [5, 7]], [[3, 4], [4, 8]]]
-    >>> [(effect.source, round(effect.F, 2)) for effect in two_within(scores, ("method", "load"))][:2]
-    [(('method',), 58.8), (('load',), 243.0)]
-    """
-    array = numbers(scores, "scores")
-    if array.ndim != 3 or min(array.shape) < 2:
-        raise ValueError(f"scores must be (people, levels, levels), each at least 2, not {array.shape}")
-    n, a, b = array.shape
-    who, one, other = (part.ravel() for part in np.indices((n, a, b)))
-    table = pd.DataFrame({"who": who, "one": one, "other": other, "score": array.ravel()})
-    found = _silent("rm_anova", table, dv="score", within=["one", "other"], subject="who")
-    return _effects(found, names, df=("ddof1", "ddof2"), size="ng2")
-
-
-def mixed(scores: ScoreTable, group: Sequence[str], names: tuple[str, str]) -> Results[FactorialEffect]:
-    """The ANOVA of one factor between people and one within: `names` are theirs, in this order.
-
-    `scores`: (n people, k levels), `group`: each one's group. `ValueError`: fewer than two groups or levels, a group of
-    one, or no finite numbers. Source: Winer 1971, chapter 7; of groups of unequal size the levels are compared by the
-    means of the groups' means, whatever their sizes (sums of squares of type III, as afex and SPSS have them).
-
-    >>> scores = [[1, 2], [2, 4], [3, 4], [2, 7], [4, 8], [3, 9]]
-    >>> [round(effect.F, 2) for effect in mixed(scores, ["old"] * 3 + ["young"] * 3, ("age", "load"))]
-    [13.14, 90.25, 30.25]
+    >>> [effect.source for effect in factorial_anova([[[1, 2], [2, 4]], [[1, 3], [2, 2]]], ["damper", "voltage"])]
+    [('damper',), ('voltage',), ('damper', 'voltage')]
     """
     array = named_scores(scores, "scores")[0]
-    if array.ndim != 2 or array.shape[1] < 2 or array.shape[0] != len(group):
-        raise ValueError(f"scores must be (people, levels) with a group for each person, not {array.shape}")
-    sizes = {one: list(group).count(one) for one in group}
-    if len(sizes) < 2 or min(sizes.values()) < 2:
-        raise ValueError(f"at least two groups of two are needed, not {sizes}")
-    n, k = array.shape
-    who, level = (part.ravel() for part in np.indices((n, k)))
-    table = pd.DataFrame({"who": who, "level": level, "group": np.repeat(list(group), k), "score": array.ravel()})
-    found = _silent("mixed_anova", table, dv="score", within="level", between="group", subject="who")
-    between, within, both = _effects(found, names, df=("DF1", "DF2"), size="np2")
-    return Results((between, _of_unweighted_means(within, array, np.array(group)), both))
-
-
-def _of_unweighted_means(effect: FactorialEffect, scores: FloatArray, group: NDArray[np.str_]) -> FactorialEffect:
-    """The effect of the levels when each group counts alike; with groups of one size it is the same."""
-    contrasts = helmert(scores.shape[1]) @ scores.T
-    parts = [contrasts[:, group == one] for one in np.unique(group)]
-    mean = np.mean([part.mean(axis=1) for part in parts], axis=0)
-    explained = (mean**2).sum() / (sum(1.0 / part.shape[1] for part in parts) / len(parts) ** 2)
-    left = sum(((part - part.mean(axis=1, keepdims=True)) ** 2).sum() for part in parts)
-    df, df_error = effect.df
-    F = float(explained / df / (left / df_error)) if left > 0 else math.nan
-    eps = effect.epsilon
-    return replace(
-        effect,
-        F=F,
-        p=float(f_distribution.sf(F, df, df_error)),
-        p_gg=None if eps is None or effect.p_gg is None else float(f_distribution.sf(F, eps * df, eps * df_error)),
-        size=float(explained / (explained + left)),
-    )
-
-
-def _silent(function: str, table: pd.DataFrame, **asked: object) -> pd.DataFrame:
-    """What a function of pingouin finds; what it warns of is for its authors."""
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore")
-        found: pd.DataFrame = pingouin(function)(table, **asked)
-    return found
-
-
-def _effects(
-    found: pd.DataFrame, names: tuple[str, str], *, df: tuple[str, str], size: str
-) -> Results[FactorialEffect]:
-    """The three effects of a table of pingouin, whose columns of freedom and size have these names."""
-    sources = ((names[0],), (names[1],), names)
-    return Results(
-        FactorialEffect(
-            source=source,
-            F=float(row["F"]),
-            df=(int(row[df[0]]), int(row[df[1]])),
-            p=float(row["p_unc"]),
-            epsilon=_known(row["eps"]),
-            p_gg=_known(row.get("p_GG_corr", math.nan)),
-            size=float(row[size]),
+    within = list(names) if group is None else list(names)[1:]
+    if array.ndim != 1 + len(within) or min(array.shape) < 2 or len(group or array) != len(array):
+        raise ValueError(
+            f"scores must be (people, levels, ...) of {len(within)} factors, each at least 2, not {array.shape}"
         )
-        for source, (_, row) in zip(sources, found.iterrows(), strict=True)
+    groups = np.array([""] * len(array) if group is None else group)
+    sizes = {str(one): int((groups == one).sum()) for one in np.unique(groups)}
+    if group is not None and (len(sizes) < 2 or min(sizes.values()) < 2):
+        raise ValueError(f"at least two groups of two are needed, not {sizes}")
+    strata = [_stratum(array, groups, some) for some in _subsets(len(within))]
+    all_left = sum(stratum.left for stratum in strata)
+    found = []
+    for stratum in strata:
+        named = tuple(within[place] for place in stratum.factors)
+        if named:
+            found.append(_effect(named, stratum, stratum.within(), stratum.df, all_left))
+        if group is not None:
+            df = stratum.df * (len(sizes) - 1)
+            found.append(_effect((names[0], *named), stratum, stratum.between(), df, all_left))
+    return Results(found)
+
+
+def _subsets(count: int) -> Iterator[tuple[int, ...]]:
+    """The factors of each effect, none first: main effects, then interactions of two, and so on."""
+    return chain.from_iterable(combinations(range(count), size) for size in range(count + 1))
+
+
+def _stratum(scores: FloatArray, groups: NDArray[np.str_], factors: tuple[int, ...]) -> _Stratum:
+    """Orthonormal contrasts of these factors, of the mean over all others."""
+    parts = [
+        helmert(levels) if place in factors else np.full((1, levels), levels**-0.5)
+        for place, levels in enumerate(scores.shape[1:])
+    ]
+    contrasts = reduce(np.kron, parts, np.ones((1, 1)))
+    values = scores.reshape(len(scores), -1) @ contrasts.T
+    own = [values[groups == one] for one in np.unique(groups)]
+    return _Stratum(factors=factors, parts=own, left=float(sum(((one - one.mean(axis=0)) ** 2).sum() for one in own)))
+
+
+def _effect(source: tuple[str, ...], stratum: _Stratum, explained: float, df: int, all_left: float) -> FactorialEffect:
+    df_error, left = stratum.df_error, stratum.left
+    F = explained / df / (left / df_error) if left > 0 else math.nan
+    epsilon = stratum.epsilon if stratum.factors else None
+    return FactorialEffect(
+        source=source,
+        F=F,
+        df=(df, df_error),
+        p=float(f_distribution.sf(F, df, df_error)),
+        epsilon=epsilon,
+        p_gg=None if epsilon is None else float(f_distribution.sf(F, epsilon * df, epsilon * df_error)),
+        size=explained / (explained + all_left) if explained + all_left > 0 else math.nan,
     )
-
-
-def _known(value: float) -> float | None:
-    return None if math.isnan(value) else float(value)

@@ -20,7 +20,7 @@ from analysis.stats.arrays import FloatArray
 from analysis.stats.binomial import binomial_test, yes_no
 from analysis.stats.diagnostics import effect_size, unit_scaled
 from analysis.stats.discrimination import Task, discrimination
-from analysis.stats.factorial import FactorialEffect, mixed, two_within
+from analysis.stats.factorial import factorial_anova
 from analysis.stats.paired import friedman
 from analysis.summary.results import ConditionSummary, DesignSummary, DesignTest, Origin, QuestionSummary
 from experiments.design.config import DesignConfig
@@ -85,14 +85,14 @@ class QuestionScores:
 def question_scores(design: DesignConfig, name: str, table: pd.DataFrame) -> QuestionScores:
     """The scores of a question, trial by trial and person by person."""
     column = correct_columns(design.questions).get(name, name)
-    scored = table.assign(score=_scores(design.questions[name], table[column])).dropna(subset=["score"])
+    scored = table.assign(score=answer_scores(design.questions[name], table[column])).dropna(subset=["score"])
     real = scored if "stimulus" not in scored else scored[scored["stimulus"].astype(int) == 1]
-    people, left_out = _complete(real, _varied(design))
+    people, left_out = _complete(real, varied(design))
     return QuestionScores(scored=scored, real=real, people=people, left_out=left_out)
 
 
 def _question(design: DesignConfig, name: str, question: QuestionConfig, table: pd.DataFrame) -> QuestionSummary:
-    found, factors = question_scores(design, name, table), _varied(design)
+    found, factors = question_scores(design, name, table), varied(design)
     scored, people = found.scored, found.people
     cells = _ordered(design, (_cell(design, name, question, some) for some in _conditions(scored, factors)))
     comparisons = _comparisons(design, question, people, _groups(design, found.real))
@@ -118,7 +118,7 @@ def _scale(question: QuestionConfig) -> str | None:
     return ", ".join(f"{end:g} = {text}" for end, text in ends if text)
 
 
-def _varied(design: DesignConfig) -> list[str]:
+def varied(design: DesignConfig) -> list[str]:
     """The columns by which conditions differ: factors with several levels; of pairs both intervals."""
     names = [name for name, factor in design.factors.items() if len(factor.all_levels) > 1]
     if design.trial.kind != "pair":
@@ -133,7 +133,7 @@ def _ordered(design: DesignConfig, cells: Iterable[ConditionSummary]) -> tuple[C
 
     def place(cell: ConditionSummary) -> list[int]:
         named = {f"{compared}_1": compared, f"{compared}_2": compared}
-        levels = {name: design.factors[named.get(name, name)].all_levels for name in _varied(design)}
+        levels = {name: design.factors[named.get(name, name)].all_levels for name in varied(design)}
         return [some.index(cell.levels[name]) if name in cell.levels else len(some) for name, some in levels.items()]
 
     return tuple(sorted(cells, key=place))
@@ -169,7 +169,7 @@ def _ordered_levels(levels: Sequence[Level], name: str, rows: pd.DataFrame) -> t
     return tuple(found)
 
 
-def _scores(question: QuestionConfig, column: pd.Series) -> FloatArray:
+def answer_scores(question: QuestionConfig, column: pd.Series) -> FloatArray:
     """The answers as numbers; NaN for none. An unscored choice: 1 for the first answer."""
     if question.kind in {"rating", "ranking"} or question.correct is not None:
         return pd.to_numeric(column, errors="coerce").to_numpy(dtype=np.float64)
@@ -193,7 +193,7 @@ def _conditions(scored: pd.DataFrame, factors: Sequence[str]) -> Iterator[pd.Dat
 def _cell(design: DesignConfig, name: str, question: QuestionConfig, rows: pd.DataFrame) -> ConditionSummary:
     means = rows.groupby("participant_id")["score"].mean().to_numpy(dtype=np.float64)
     first = rows.iloc[0]
-    levels = {factor: first[factor] for factor in _varied(design) if not pd.isna(first[factor])}
+    levels = {factor: first[factor] for factor in varied(design) if not pd.isna(first[factor])}
     mean = float(means.mean()) if means.size else None
     described = ConditionSummary(
         levels=levels,
@@ -214,7 +214,9 @@ def _cell(design: DesignConfig, name: str, question: QuestionConfig, rows: pd.Da
 def _complete(rows: pd.DataFrame, factors: Sequence[str]) -> tuple[pd.DataFrame, tuple[str, ...]]:
     """Every person's mean score by condition, one row a person; and who lacks one."""
     within = [name for name in factors if rows.groupby("participant_id")[name].nunique().max() > 1]
-    wide = rows.pivot_table(index="participant_id", columns=within, values="score") if within else pd.DataFrame()
+    if not within:
+        return rows.groupby("participant_id")[["score"]].mean(), ()
+    wide = rows.pivot_table(index="participant_id", columns=within, values="score")
     lacking = wide.index[wide.isna().any(axis=1)]
     return wide.drop(index=lacking), tuple(map(str, lacking))
 
@@ -232,39 +234,61 @@ def _comparisons(
     """What differs between conditions, by as many factors as there are."""
     if people.empty or design.trial.kind == "pair":
         return
-    names = [str(name) for name in people.columns.names]
-    if why := _untested(question, people):
-        yield DesignTest(name="anova", effect=" × ".join(names), reason=why)
+    names = [str(name) for name in people.columns.names if name is not None]
+    if not (names or design.between):
         return
-    scores = people.to_numpy(dtype=np.float64)
+    if why := _untested(design, question, people):
+        yield DesignTest(name="anova", effect=" × ".join((*design.between, *names)), reason=why)
+        return
     if question.kind == "number" and len(names) == 1:
         yield from _exponent(names[0], people)
-    if len(names) == 1 and group is not None and question.kind != "ranking":
-        yield from _mixed(design.between[0], names[0], scores, [str(group[code]) for code in people.index])
-    elif len(names) == 1:
+    if len(names) == 1 and (group is None or question.kind == "ranking"):
+        scores = people.to_numpy(dtype=np.float64)
         yield from _one_factor(names[0], scores, question)
         yield from _pairs(scores, [shown_level(level) for level in people.columns], question)
-    elif len(names) == 2 and group is None:
-        sizes = tuple(people.columns.get_level_values(name).nunique() for name in names)
-        if math.prod(sizes) != scores.shape[1]:
-            yield DesignTest(name="anova", effect=" × ".join(names), reason="the factors are nested, not crossed")
-            return
-        yield from map(_effect, two_within(scores.reshape(len(people), *sizes), (names[0], names[1])))
     else:
-        effect = " × ".join((*design.between, *names))
-        yield DesignTest(name="anova", effect=effect, reason=_MANY)
+        yield from _factorial(names, people, group)
 
 
-def _untested(question: QuestionConfig, people: pd.DataFrame) -> str:
+_MOST_FACTORS = 4
+"""Of more factors within people there are more interactions than anybody reads."""
+
+
+def _untested(design: DesignConfig, question: QuestionConfig, people: pd.DataFrame) -> str:
     """Why there is no test of a question's conditions; empty if there is one."""
+    instead = f"not tested here; {design.design}_long.csv has everyone's scores for other programs, such as R's afex"
     if question.kind == "ranking" and people.columns.nlevels > 1:
         return "ranks of several factors are described, not tested"
     if question.correct is None and len(question.named_answers) > 2:
         return "more than two answers and none is right: they are counted"
+    if len(design.between) > 1:
+        return f"several factors between people are {instead}"
+    if len(_sizes(people)) > _MOST_FACTORS:
+        return f"more than {_MOST_FACTORS} factors within people are {instead}"
+    if math.prod(_sizes(people)) != people.shape[1]:
+        return f"factors that are nested, not crossed, are {instead}"
     return "fewer than two people have all conditions" if len(people) < 2 else ""
 
 
-_MANY = "there is no ANOVA here of more than two factors; take the logs to a program of your choice"
+def _sizes(people: pd.DataFrame) -> tuple[int, ...]:
+    """How many levels each factor within people has."""
+    return tuple(people.columns.get_level_values(name).nunique() for name in people.columns.names if name is not None)
+
+
+def _factorial(names: Sequence[str], people: pd.DataFrame, group: pd.Series | None) -> Iterator[DesignTest]:
+    """Every effect of the factors within people, of the one between them, and their interactions."""
+    named = [*([] if group is None else [str(group.name)]), *names]
+    groups = None if group is None else [str(group[code]) for code in people.index]
+    if groups is not None and (len(set(groups)) < 2 or min(map(groups.count, groups)) < 2):
+        yield DesignTest(name="anova", effect=" × ".join(named), reason="a group has fewer than two people")
+        return
+    scores = people.to_numpy(dtype=np.float64).reshape(len(people), *_sizes(people))
+    for one in factorial_anova(scores, named, groups):
+        effect = " × ".join(one.source)
+        if math.isnan(one.F):
+            yield DesignTest(name="anova", effect=effect, reason="people do not differ in it, so there is no error")
+        else:
+            yield DesignTest(name="anova", effect=effect, statistic=one.F, df=one.df, p=one.p, size=one.size)
 
 
 def _one_factor(name: str, scores: FloatArray, question: QuestionConfig) -> Iterator[DesignTest]:
@@ -304,19 +328,6 @@ def _pairs(scores: FloatArray, labels: Sequence[str], question: QuestionConfig) 
         )
 
 
-def _mixed(between: str, within: str, scores: FloatArray, group: list[str]) -> Iterator[DesignTest]:
-    if len(set(group)) < 2 or min(map(group.count, group)) < 2:
-        yield DesignTest(name="anova", effect=f"{between} × {within}", reason="a group has fewer than two people")
-        return
-    yield from map(_effect, mixed(scores, group, (between, within)))
-
-
-def _effect(effect: FactorialEffect) -> DesignTest:
-    return DesignTest(
-        name="anova", effect=" × ".join(effect.source), statistic=effect.F, df=effect.df, p=effect.p, size=effect.size
-    )
-
-
 def _exponent(name: str, people: pd.DataFrame) -> Iterator[DesignTest]:
     """The mean exponent of the power law: each person's slope of log number over log level, tested against 0."""
     levels = people.columns.to_numpy(dtype=np.float64)
@@ -341,7 +352,7 @@ _TASKS: Mapping[str, Task] = {"two-interval": "two-interval", "pair": "two-inter
 
 def _sensitivity(design: DesignConfig, question: QuestionConfig, scored: pd.DataFrame) -> Iterator[DesignTest]:
     """d′ of all people's answers together, by the formula of the task: of all conditions, and of each."""
-    factors = _varied(design)
+    factors = varied(design)
     if question.correct == "stimulus":
         stimulus = scored["stimulus"].astype(int) == 1
         noise = scored[~stimulus]

@@ -1,6 +1,7 @@
-"""One table of results an experiment, long and wide, for R, JASP and SPSS: the analysed participants, nothing rounded.
+"""Tables of results for R, JASP and SPSS: the participants' own scores, nothing rounded.
 
-Long: a row a participant and method. Wide: a row a participant, a column a method and measure, as in
+Of the paper's two experiments long and wide, of other designs long, with everyone in them. Long: a row a participant
+and condition. Wide: a row a participant, a column a method and measure, as in
 `vibration_rate_forward`; names start with a letter, hold letters, digits and underscores only, and have at most 64
 characters. RFC 4180, UTF-8; an empty cell is missing.
 """
@@ -13,10 +14,15 @@ from collections.abc import Iterable, Mapping, Sequence
 import numpy as np
 import pandas as pd
 
+from analysis.logs.design_logs import DesignLogs
 from analysis.logs.reading import Logs
 from analysis.logs.texts import STUDY
+from analysis.summary.designs import answer_scores, varied
 from analysis.summary.results import WithinStatistics
 from analysis.times.own_trials import timed
+from experiments.design.language import QuestionConfig
+from experiments.record.tables import guard
+from experiments.tasks.questions import correct_columns
 
 MAX_NAME = 64
 _KEYS = [STUDY, "participant_id", "method"]
@@ -34,7 +40,43 @@ def result_tables(logs: Logs, analysed: Mapping[str, WithinStatistics]) -> dict[
             long = measure(pd.concat([keys, table.drop(columns=_KEYS)], axis=1)[mine])
             files[f"{experiment}_long.csv"] = _csv(long)
             files[f"{experiment}_wide.csv"] = _csv(_wide(long, whose.methods))
-    return files
+    return files | {f"{one.design.design}_long.csv": _csv(_of_design(one)) for one in logs.designs}
+
+
+def _of_design(logs: DesignLogs) -> pd.DataFrame:
+    """What each participant answered to each question in each condition; catch trials, which have no level, as well."""
+    keys = [STUDY, "participant_id", *varied(logs.design)]
+    scored = correct_columns(logs.design.questions)
+    measured: dict[str, tuple[pd.Series, str]] = {}
+    for name, question in logs.design.questions.items():
+        measured |= _measures(logs.table, name, question, scored.get(name))
+    rows = logs.table[keys].assign(**{name: values for name, (values, _) in measured.items()})
+    by = rows.groupby(keys, dropna=False)
+    found = by.agg(**{name: (name, how) for name, (_, how) in measured.items()})
+    found.insert(0, "trials", by.size())
+    table = found.reset_index()
+    return table.set_axis(short_names(table.columns), axis=1)
+
+
+def _measures(
+    table: pd.DataFrame, name: str, question: QuestionConfig, correct: str | None
+) -> dict[str, tuple[pd.Series, str]]:
+    """The measures of a question by name: a value a trial, and how those of a condition become one."""
+    if question.kind == "text":
+        return {}
+    found: dict[str, tuple[pd.Series, str]] = {f"{name}_answers": (table[name].notna(), "sum")}
+    if correct is not None:
+        right = pd.to_numeric(table[correct])
+        found |= {f"{name}_right": (right, "sum"), f"{name}_rate": (right, "mean")}
+    elif question.named_answers:
+        found |= {f"{name}_{one}": (table[name] == one, "sum") for one in question.named_answers}
+    else:
+        score = pd.Series(answer_scores(question, table[name]), index=table.index)
+        found[f"{name}_log_mean" if question.kind == "number" else f"{name}_mean"] = (score, "mean")
+    if question.named_answers:
+        times_s = pd.to_numeric(table[f"{name}_time_s"]).where(pd.to_numeric(table[f"{name}_time_valid"]) == 1)
+        found[f"{name}_time_median_s"] = (times_s, "median")
+    return found
 
 
 def _direction(trials: pd.DataFrame) -> pd.DataFrame:
@@ -96,6 +138,8 @@ def _csv(table: pd.DataFrame) -> bytes:
     for name in shown.columns:
         if shown[name].dtype.kind == "f":
             shown[name] = [_number(value) for value in shown[name].to_numpy(dtype=np.float64).tolist()]
+        elif shown[name].dtype.kind == "O":
+            shown[name] = [guard(value) if isinstance(value, str) else value for value in shown[name]]
     return shown.to_csv(index=False, lineterminator="\r\n").encode("utf-8")
 
 

@@ -1,4 +1,4 @@
-# afex's ANOVAs of two factors for the data sets in factorial.json: `Rscript make_factorial.R` in this folder writes
+# afex's ANOVAs of several factors for the data sets in factorial.json: `Rscript make_factorial.R` in this folder writes
 # factorial_expected.json. Needs R with afex and jsonlite (the versions used stand in it). The tests need none of it.
 
 suppressPackageStartupMessages({
@@ -9,7 +9,7 @@ suppressPackageStartupMessages({
 rows_of <- function(fit) {
   table <- as.data.frame(fit$anova_table)
   plain <- as.data.frame(anova(fit, correction = "none", es = c("ges", "pes")))
-  corrected <- summary(fit)$pval.adjustments
+  corrected <- if (is.null(attr(fit, "within")) || length(attr(fit, "within")) == 0) NULL else summary(fit)$pval.adjustments
   unname(lapply(rownames(plain), function(effect) {
     here <- !is.null(corrected) && effect %in% rownames(corrected)
     list(
@@ -24,10 +24,12 @@ rows_of <- function(fit) {
 one <- function(set) {
   long <- as.data.frame(set$rows)
   long$who <- factor(long$who)
-  long$one <- factor(long$one)
-  long$two <- factor(long$two)
-  within <- if (set$kind == "within") c("one", "two") else "two"
-  between <- if (set$kind == "within") NULL else "one"
+  for (name in intersect(c("one", "two", "three"), names(long))) long[[name]] <- factor(long[[name]])
+  within <- switch(set$kind,
+    "within" = c("one", "two"), "mixed" = "two", "three within" = c("one", "two", "three"),
+    "two within, one between" = c("two", "three"), "between" = NULL
+  )
+  between <- if ("one" %in% within) NULL else "one"
   rows_of(aov_ez("who", "score", long, within = within, between = between))
 }
 
