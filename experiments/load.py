@@ -15,7 +15,7 @@ from device.limits import MAX_SHOTS_PER_MINUTE, DriveHistory, Load
 from device.methods import drive_of, rendering_of
 from device.parameters import GunParameters
 from device.words import Drive
-from experiments.config.door import ConfigError, StudyConfig, at_key, load, read_toml
+from experiments.config.door import ConfigError, StudyConfig, at_key, load, read_toml, why_unread
 from experiments.config.setup import GunConfig, Setup
 from experiments.design.config import DesignConfig
 from experiments.design.language import TRAIN_INTERVAL
@@ -115,7 +115,7 @@ def _table_rows(path: Path, law: TableLaw, columns: tuple[str, ...]) -> tuple[di
         with table.open(encoding="utf-8-sig", newline="") as file:
             return tuple(_answer_rows(table, csv.reader(file, strict=True), columns))
     except (OSError, ValueError, csv.Error) as error:
-        raise ConfigError(f"{table}: cannot be read ({error}); the law's key `file` names it") from error
+        raise ConfigError(f"{table}: cannot be read ({why_unread(error)}); the law's key `file` names it") from error
 
 
 @contextmanager

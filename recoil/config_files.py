@@ -17,8 +17,9 @@ from typing import Any
 
 from pydantic import BaseModel
 
-from experiments.config.door import ConfigError, StudyConfig, checked_table, read_toml, toml_text
+from experiments.config.door import ConfigError, StudyConfig, checked_table, read_toml
 from experiments.config.setup import GunConfig
+from experiments.config.toml_text import toml_text
 from experiments.design.config import DesignConfig
 from experiments.load import load_setup, shipped_folder
 from experiments.record import journal, storage

@@ -109,35 +109,35 @@ def of_a_law(old: str, new: str, *said: str, at: str = "") -> Broken:
 PERCEPT, DIFFUSION, PEOPLE = (f"questions.response.{key}" for key in ("percept", "diffusion", "people"))
 ALL_BOUNDARIES = "speed = 1.0, neutral = 1.5, accuracy = 2.2"
 REFUSED = {
-    "no power law": of_a_law("exponent = 1.7", "exponent = 0.0", f"{PERCEPT}.exponent = 0.0", "greater than 0"),
-    "no leak": of_a_law("leak_s = 0.02", "leak_s = -0.02", f"{PERCEPT}.leak_s = -0.02", "greater than 0"),
+    "no power law": of_a_law("exponent = 1.7", "exponent = 0.0", f"{PERCEPT}.exponent = 0.0", "must be above 0"),
+    "no leak": of_a_law("leak_s = 0.02", "leak_s = -0.02", f"{PERCEPT}.leak_s = -0.02", "must be above 0"),
     "endless leak": of_a_law("leak_s = 0.02", "leak_s = inf", f"{PERCEPT}.leak_s = inf", "finite"),
     "backward evidence": of_a_law("sensitivity = 0.213", "sensitivity = -1.0", f"{PERCEPT}.sensitivity = -1.0"),
     "no confusion number": of_a_law("confusion = 2.44", 'confusion = "much"', f"{PERCEPT}.confusion = 'much'"),
-    "start at the end": of_a_law("start = 0.557", "start = 1.0", f"{PERCEPT}.start = 1.0", "less than 1"),
+    "start at the end": of_a_law("start = 0.557", "start = 1.0", f"{PERCEPT}.start = 1.0", "must be below 1"),
     "misspelt": of_a_law("\nleak_s =", "\nleaks_s =", f"{PERCEPT}.leaks_s = 0.02", "unknown key", at="leaks_s ="),
     "no boundary": of_a_law(
-        ALL_BOUNDARIES, "neutral = 0.0", f"{DIFFUSION}.boundaries.neutral = 0.0", "greater than 0", at="boundaries ="
+        ALL_BOUNDARIES, "neutral = 0.0", f"{DIFFUSION}.boundaries.neutral = 0.0", "must be above 0", at="boundaries ="
     ),
     "no neutral boundary": of_a_law(
         ALL_BOUNDARIES, "speed = 1.0", f"{DIFFUSION}: boundaries has no value for neutral", "give one",
         at="[questions.response.diffusion]",
     ),
     "negative time": of_a_law(
-        "non_decision_s = 0.35", "non_decision_s = -0.1", f"{DIFFUSION}.non_decision_s = -0.1", "equal to 0"
+        "non_decision_s = 0.35", "non_decision_s = -0.1", f"{DIFFUSION}.non_decision_s = -0.1", "must be at least 0"
     ),
     "lapses beyond all": of_a_law(
-        "rate = 0.0", "rate = 1.5", f"{DIFFUSION}.lapses.rate = 1.5", "equal to 1", at="lapses ="
+        "rate = 0.0", "rate = 1.5", f"{DIFFUSION}.lapses.rate = 1.5", "must be at most 1", at="lapses ="
     ),
     "lapses backward": of_a_law(
         "earliest_s = 0.2, latest_s = 3.0", "earliest_s = 3.0, latest_s = 0.2",
         f"{DIFFUSION}.lapses: earliest_s = 3 must be below latest_s = 0.2",
     ),
     "people of no spread": of_a_law(
-        "log_boundary_sd = 0.0", "log_boundary_sd = -0.1", f"{PEOPLE}.log_boundary_sd = -0.1", "equal to 0"
+        "log_boundary_sd = 0.0", "log_boundary_sd = -0.1", f"{PEOPLE}.log_boundary_sd = -0.1", "must be at least 0"
     ),
     "an appeal without a difference": Broken(
-        PREFERENCE, LIKING, "jnd = 0.33", "jnd = -0.1", ("questions.rating.appeal.jnd = -0.1", "equal to 0"), "jnd ="
+        PREFERENCE, LIKING, "jnd = 0.33", "jnd = -0.1", ("questions.rating.appeal.jnd = -0.1", "at least 0"), "jnd ="
     ),
     "who decides on no direction": Broken(
         PREFERENCE, LIKING, 'law = "words"', 'law = "diffusion"', ("questions.comment.law = 'diffusion'", "has words")
@@ -159,7 +159,7 @@ REFUSED = {
     ),
     "an empty text": Broken(
         HURRY, HURRY, '"Answer fast and well."', '""',
-        ("factors.instruction.texts.neutral = ''", "at least 1 character"), 'texts.neutral = ""',
+        ("factors.instruction.texts.neutral = ''", "must not be empty"), 'texts.neutral = ""',
     ),
     "an instruction twice": Broken(
         HURRY, HURRY, '"accuracy"]', '"speed"]', ("factors.instruction.levels", "speed stands there more than once"),

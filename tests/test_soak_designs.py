@@ -14,7 +14,8 @@ from typing import Any
 
 import pytest
 
-from experiments.config.door import read_toml, toml_text
+from experiments.config.door import read_toml
+from experiments.config.toml_text import toml_text
 from experiments.design.planning import plan_of
 from experiments.load import load_setup, shipped_folder
 from experiments.record.journal import read_journal

@@ -9,8 +9,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from experiments.config.door import read_toml, toml_text
+from experiments.config.door import read_toml
 from experiments.config.setup import canonical_json
+from experiments.config.toml_text import toml_text
 from experiments.load import shipped_folder
 
 texts = st.text(st.characters(exclude_categories=["Cs"]), max_size=20)

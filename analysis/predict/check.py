@@ -4,13 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, fields
+from pathlib import Path
 
 from analysis.paper.paper import load_paper
 from analysis.predict.check_design import DesignCheck, check_design, design_sections
 from analysis.report.section import Section
 from analysis.report.serial import plain
 from analysis.report.terminal import in_text, with_tables
-from experiments.config.door import ConfigError, EligibilityConfig, participant_codes, read_toml
+from experiments.config.door import ConfigError, EligibilityConfig, at_key, participant_codes, read_toml
 from experiments.config.setup import Setup
 from experiments.design.config import DesignConfig
 from experiments.load import check_methods, find, load_gun, load_setup, load_study
@@ -69,6 +70,8 @@ def check(name: str, seed: int | None, participants: int) -> AnyCheck:
 
 def _study(name: str, seed: int | None) -> StudyCheck:
     study, folder = load_study(name)
+    if study.paper is not None:
+        _check_paper(find(name), folder / study.paper)
     setups = [load_setup(folder / experiment) for experiment in study.experiments]
     return StudyCheck(
         study=study.title,
@@ -76,6 +79,13 @@ def _study(name: str, seed: int | None) -> StudyCheck:
         eligibility=study.eligibility,
         experiments=tuple(_design(setup, seed, study.codes()) for setup in setups),
     )
+
+
+def _check_paper(study: Path, paper: Path) -> None:
+    """`ConfigError`: the numbers that a study is to be compared with are not there, or are none."""
+    if not paper.is_file():
+        raise ConfigError(at_key(study, f"paper = {paper.name!r}: no such file beside the study; leave the key out"))
+    load_paper(paper)
 
 
 def _design(setup: Setup[DesignConfig], seed: int | None, codes: Sequence[str]) -> DesignCheck:

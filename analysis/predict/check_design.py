@@ -16,7 +16,7 @@ from device.methods import Method
 from device.parameters import GunParameters
 from device.physics import simulate
 from device.words import MAX_PULSE_S, MAX_VOLTAGE_V, Pulse
-from experiments.config.door import ConfigError
+from experiments.config.door import ConfigError, at_key
 from experiments.config.setup import Setup
 from experiments.design.config import DesignConfig
 from experiments.design.language import shown_level
@@ -27,7 +27,7 @@ from experiments.design.planning import groups, plan_of, square_size
 from experiments.design.stimuli import ConditionLimits, limits, settings, stimulus
 from experiments.load import check_limits
 from experiments.screens.synthetic import synthetic_participant_of
-from experiments.synthetic.laws import DiffusionLaw
+from experiments.synthetic.laws import DiffusionLaw, SyntheticAnswers, superfluous
 from experiments.synthetic.model_based import NEUTRAL, rates_by_instruction
 
 _MOST_CELLS = 60
@@ -96,13 +96,21 @@ def check_design(setup: Setup[DesignConfig], seed: int, codes: Sequence[str]) ->
         cells=tuple(_cell(setup, one) for one in cells),
         exposure=shaken,
         felt_forward_rates=_felt(setup, first),
-        warnings=tuple(_warnings(design, planned, [*plans.values()], cells, shaken)),
+        warnings=(*_warnings(design, planned, [*plans.values()], cells, shaken), *_superfluous(setup)),
         assumed=(
             *design.assumed,
             *(f"{design.synthetic}: {key}" for key in getattr(setup.laws, "assumed", ())),
             *(f"{design.gun}: {key}" for key in setup.gun.assumed),
         ),
     )
+
+
+def _superfluous(setup: Setup[DesignConfig]) -> Iterator[str]:
+    """What the file of the synthetic people says of nothing that there is, with its line."""
+    if isinstance(setup.laws, SyntheticAnswers):
+        people, design = setup.source.parent / str(setup.config.synthetic), setup.config
+        plans = [plan_of(design, "P01", 0, group=group) for group in range(len(groups(design)))]
+        yield from (at_key(people, one) for one in superfluous(design, setup.laws, plans))
 
 
 def _felt(setup: Setup[DesignConfig], plan: Plan) -> dict[str, dict[str, float]]:

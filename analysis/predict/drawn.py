@@ -10,7 +10,7 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 from device.words import DIRECTIONS, Direction
-from experiments.config.door import ConfigError
+from experiments.config.door import ConfigError, at_key
 from experiments.config.setup import Setup
 from experiments.design.config import DesignConfig
 from experiments.design.language import DIRECTION_FACTOR, INSTRUCTION_FACTOR, METHOD_FACTOR, NumberScale
@@ -105,7 +105,8 @@ def studies_of(setup: Setup[DesignConfig]) -> Drawn:
     found = _view(setup.config, name, law)
     if found is None:
         rule = _RATES if setup.config.questions[name].correct else _RATINGS
-        raise ConfigError(f'{setup.source}: questions.{name}: the law "{law.law}" has no power; {rule}')
+        people = setup.source.parent / str(setup.config.synthetic)
+        raise ConfigError(at_key(people, f'questions.{name}.law: "{law.law}" has no power; {rule}'))
     if isinstance(found, DirectionStudies) and not found.trials[0]:
         raise ConfigError(
             f"{setup.source}: factors.direction has no level forward; the planned analysis is of forward trials"

@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
-from functools import reduce
 from itertools import chain, combinations
 
 import numpy as np
@@ -117,7 +116,9 @@ def _stratum(scores: FloatArray, groups: NDArray[np.str_], factors: tuple[int, .
         helmert(levels) if place in factors else np.full((1, levels), levels**-0.5)
         for place, levels in enumerate(scores.shape[1:])
     ]
-    contrasts = reduce(np.kron, parts, np.ones((1, 1)))
+    contrasts = np.ones((1, 1))
+    for part in parts:
+        contrasts = np.kron(contrasts, part)
     values = scores.reshape(len(scores), -1) @ contrasts.T
     own = [values[groups == one] for one in np.unique(groups)]
     return _Stratum(factors=factors, parts=own, left=float(sum(((one - one.mean(axis=0)) ** 2).sum() for one in own)))

@@ -32,7 +32,7 @@ from pydantic import Field, model_validator
 from analysis.logs.patterns import Pattern, holding
 from analysis.report import apa
 from analysis.report.section import Section, Table
-from experiments.config.door import ConfigError, Model, load
+from experiments.config.door import ConfigError, Model, load, why_unread
 
 _NonEmpty = Annotated[str, Field(min_length=1)]
 
@@ -123,7 +123,9 @@ def _hand_coded(path: Path, known: set[str]) -> Iterable[tuple[str, str]]:
             reader = csv.DictReader(file, strict=True)
             rows = list(reader)
     except (OSError, ValueError, csv.Error) as error:
-        raise ConfigError(f"{path}: cannot be read ({error}); the codebook's key hand_coded names it") from error
+        raise ConfigError(
+            f"{path}: cannot be read ({why_unread(error)}); the codebook's key hand_coded names it"
+        ) from error
     if list(reader.fieldnames or ()) != ["participant_id", "code"]:
         raise ConfigError(f"{path}: line 1: columns are {reader.fieldnames}; they must be participant_id, code")
     for number, row in enumerate(rows, start=2):

@@ -12,6 +12,7 @@ from pydantic import Field, model_validator
 
 from device.words import Direction
 from experiments.config.door import ConsoleConfig, Model, Text, leaves
+from experiments.config.findings import DESIGN_NAME
 from experiments.design.language import (
     DIRECTION_FACTOR,
     EMPTY,
@@ -37,7 +38,7 @@ from experiments.design.language import (
 class DesignConfig(Model):
     """A design: `docs/design-language.md`."""
 
-    design: Annotated[str, Field(pattern=r"^[a-z]{1,32}$")]
+    design: Annotated[str, Field(pattern=DESIGN_NAME)]
     title: LineText
     gun: Text
     synthetic: Text | None = None

@@ -5,37 +5,35 @@ What a table can tell by itself is checked here; what two must agree on, where t
 
 from __future__ import annotations
 
-import unicodedata
 from collections.abc import Iterator, Mapping
 from typing import Annotated, Literal, NamedTuple, Self
 
 from pydantic import AfterValidator, Field, model_validator
 
-from experiments.config.door import Model, Text, once
+from experiments.config.door import Model, Text, once, printable
+from experiments.config.findings import COLUMN_NAME, OWN_KEY
 
 MAX_TRIALS = 10_000
 """More trials than this are refused."""
 
 
-def _printable(text: str) -> str:
-    """The text; `ValueError` for control characters, marks that turn the direction of writing, and blanks alone."""
-    for letter in text:
-        if unicodedata.category(letter) in {"Cc", "Cf", "Cs", "Zl", "Zp"}:
-            raise ValueError(f"holds the character U+{ord(letter):04X}, which is not printed; remove it")
+def _words(text: str) -> str:
+    """The text; `ValueError` as `printable`, and for blanks alone."""
+    printable(text)
     if not text.strip():
         raise ValueError("is blank; give it words or leave the key out")
     return text
 
 
-ColumnName = Annotated[str, Field(pattern=r"^[A-Za-z][A-Za-z0-9_]{0,31}$")]
+ColumnName = Annotated[str, Field(pattern=COLUMN_NAME)]
 """A factor's or question's name: it becomes a column."""
 Level = str | float
 Levels = tuple[Level, ...]
 DurationSeconds = Annotated[float, Field(gt=0, le=86_400)]
 PauseSeconds = Annotated[float, Field(ge=0, le=86_400)]
 ShotCount = Annotated[int, Field(ge=1, le=10_000)]
-LineText = Annotated[str, Field(min_length=1, max_length=200), AfterValidator(_printable)]
-PageText = Annotated[Text, AfterValidator(_printable)]
+LineText = Annotated[str, Field(min_length=1, max_length=200), AfterValidator(_words)]
+PageText = Annotated[Text, AfterValidator(_words)]
 
 METHOD_FACTOR, DIRECTION_FACTOR, INSTRUCTION_FACTOR, TRAIN_INTERVAL = (
     "method",
@@ -61,7 +59,7 @@ def _levels(levels: Levels) -> Levels:
         raise ValueError(f"{', '.join(shown)} mixes words and numbers; use one kind")
     for level in levels:
         if isinstance(level, str):
-            _printable(level)
+            _words(level)
             if level[0] in "=+-@'":
                 raise ValueError(
                     f"{level!r} begins with {level[0]!r}, which a spreadsheet takes for a formula; rename it"
@@ -256,7 +254,7 @@ class QuestionConfig(Model):
     when: Literal["trial", "block"] = "trial"
     answers: Annotated[tuple[ColumnName, ...], Field(max_length=MAX_ANSWERS), AfterValidator(once)] = ()
     labels: dict[str, LineText] = Field(default_factory=dict)
-    keys: dict[str, Annotated[str, Field(pattern=r"^[a-z0-9]$|^(left|right|up|down)$")]] = Field(default_factory=dict)
+    keys: dict[str, Annotated[str, Field(pattern=OWN_KEY)]] = Field(default_factory=dict)
     correct: ColumnName | None = None
     minimum: float | None = None
     maximum: float | None = None

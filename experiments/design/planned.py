@@ -145,12 +145,21 @@ def trial_text(design: DesignConfig, trial: Trial) -> str:
     return " ".join(filter(None, (levels_text(trial, varied), " – ".join(map(shown_level, trial.intervals))))) or "shot"
 
 
+_MUCH = 1.5
+"""A stated duration may be so many times the planned one before it is most likely a slip (assumed)."""
+
+
 def warnings(design: DesignConfig, found: PlannedRun) -> Iterator[str]:
     """What is allowed and most likely not meant."""
     if found.duration_s > design.timing.planned_s:
         yield (
             f"the plan takes {found.duration_s:g} s, longer than timing.planned_s = {design.timing.planned_s:g} s, "
             "which is what participants are told"
+        )
+    if design.timing.planned_s > _MUCH * found.duration_s:
+        yield (
+            f"timing.planned_s = {design.timing.planned_s:g} s, which is what participants are told, is more than "
+            f"{_MUCH:g} times the {found.duration_s:g} s that the plan takes"
         )
     if found.trials > 1 and found.hand_changes > found.trials // 2:
         varied = [name for name in by_hand(design) if name in design.varying and len(design.factors[name].levels) > 1]

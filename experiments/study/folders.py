@@ -14,7 +14,8 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 from device.words import RecoilError
-from experiments.config.door import CODE, StudyConfig
+from experiments.config.door import StudyConfig
+from experiments.config.findings import CODE
 from experiments.config.setup import Setup
 from experiments.design import planning
 from experiments.design.config import DesignConfig

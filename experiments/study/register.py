@@ -18,7 +18,8 @@ from typing import Annotated, Literal
 from pydantic import AfterValidator, Field, StringConstraints, TypeAdapter, ValidationError
 
 from experiments.clock import Clock
-from experiments.config.door import CODE, Model, Text
+from experiments.config.door import Model, Text
+from experiments.config.findings import CODE
 from experiments.config.setup import canonical_json
 from experiments.record import storage
 from experiments.record.journal import JournalError, check_chain, link_of, parsed_line

@@ -6,7 +6,7 @@ import math
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from typing import Annotated, Literal, Self, TypeVar
 
-from pydantic import Field, model_validator
+from pydantic import AfterValidator, Field, model_validator
 
 from device.words import DIRECTIONS
 from experiments.config.door import (
@@ -19,10 +19,12 @@ from experiments.config.door import (
     Spread,
     Text,
     leaves,
+    printable,
 )
 from experiments.design.config import DesignConfig
 from experiments.design.language import (
     DIRECTION_FACTOR,
+    EMPTY,
     INSTRUCTION_FACTOR,
     ColumnName,
     Level,
@@ -35,6 +37,7 @@ from experiments.synthetic.percept import PerceptConfig
 from experiments.synthetic.preference import Appeal
 
 Positive = Annotated[float, Field(gt=0, le=1e9)]
+SaidText = Annotated[str, Field(max_length=2_000), AfterValidator(printable)]
 
 EVERYWHERE = "all"
 """The cell of a law that does not say by what it differs."""
@@ -158,7 +161,9 @@ class WordsLaw(Model):
     """One of some texts, at random; an empty one is none."""
 
     law: Literal["words"]
-    texts: Annotated[tuple[Annotated[str, Field(max_length=2_000)], ...], Field(min_length=1)] = ("",)
+    texts: Annotated[
+        tuple[Annotated[str, Field(max_length=2_000), AfterValidator(printable)], ...], Field(min_length=1)
+    ] = ("",)
 
 
 class DiffusionLaw(Model):
@@ -264,6 +269,22 @@ def check_laws(design: DesignConfig, laws: SyntheticAnswers, plans: Iterable[Pla
         for place, values in {"share": getattr(law, "share", {}), "mean": getattr(law, "mean", {})}.items():
             for levels in met if values else ():
                 of_condition(values, getattr(law, "by", ()), levels, f"questions.{name}.{place}")
+
+
+def superfluous(design: DesignConfig, laws: SyntheticAnswers, plans: Iterable[Plan]) -> Iterator[str]:
+    """The cells and levels that a law has a value for, and nobody meets. `plans`: one of each group."""
+    met = list(dict.fromkeys(trial.levels for plan in plans for trial in plan.trials))
+    for name, law in laws.questions.items():
+        for place in ("share", "mean", "worth"):
+            values = getattr(law, place, {})
+            if isinstance(law, WorthLaw):
+                known = [*map(shown_level, design.factors[law.factor].all_levels), EMPTY]
+            else:
+                known = list(dict.fromkeys(cell_of(getattr(law, "by", ()), levels) for levels in met))
+            for cell in values:
+                if cell not in known:
+                    there = ", ".join(known)
+                    yield f'questions.{name}.{place}."{cell}": nobody meets that; {design.design} has {there}'
 
 
 def _problems(design: DesignConfig, question: QuestionConfig, law: Law) -> Iterator[str]:
