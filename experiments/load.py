@@ -185,9 +185,9 @@ def check_methods(gun: GunConfig, methods: tuple[str, ...], source: Path) -> lis
         try:
             drive, rendering = drive_of(method), rendering_of(method)
         except LimitError as error:
-            raise ConfigError(f"{source}: methods.{name}: {error}") from error
+            raise ConfigError(at_key(source, f"methods.{name}: {error}")) from error
         if isinstance(method, GunParameters) and rendering.motion == "no-break-away":
-            raise ConfigError(f"{source}: methods.{name}: {_never_moves(method)}")
+            raise ConfigError(at_key(source, f"methods.{name}: {_never_moves(method)}"))
         found.append(MethodLimits(method=name, drive=drive, load=rendering.load, settle_s=rendering.settle_s))
     return found
 
@@ -214,9 +214,11 @@ def _check_train(source: Path, method: MethodLimits, every_s: float, shots: int,
             history = history.record(method.load, start_s, start_s + method.settle_s)
     except LimitError as error:
         raise ConfigError(
-            f"{source}: {key} = {every_s:g}: {method.method} needs {method.settle_s:.4g} s "
-            f"until its magnet is home, and no more than {MAX_SHOTS_PER_MINUTE} shots a minute are allowed "
-            f"({error}); repeat more slowly"
+            at_key(
+                source,
+                f"{key} = {every_s:g}: {method.method} needs {method.settle_s:.4g} s until its magnet is home, and no "
+                f"more than {MAX_SHOTS_PER_MINUTE} shots a minute are allowed ({error}); repeat more slowly",
+            )
         ) from error
 
 

@@ -95,5 +95,31 @@ def test_first_sessions_that_chance_left_uneven_are_a_warning():
 
 
 def test_a_cell_beyond_a_limit_is_refused_with_its_levels(tmp_path):
-    with pytest.raises(ConfigError, match=r"voltage_V = 30.*24"):
+    with pytest.raises(ConfigError, match=r"voltages\.toml:13: factors\.voltage_V\.levels: .*voltage_V = 30.*24"):
         check(written(tmp_path, "voltages", ("18.0]", "30.0]")), None, 1)
+
+
+def test_a_stated_duration_far_from_the_plan_is_a_warning_either_way(tmp_path):
+    for number, stated in enumerate(("60.0", "36000.0")):
+        place = tmp_path / str(number)
+        place.mkdir()
+        told = check(written(place, "voltages", ("planned_s = 1800.0", f"planned_s = {stated}")), None, 1)
+        assert any("which is what participants are told" in one for one in told.warnings)
+
+
+def test_what_synthetic_people_are_given_for_nothing_that_there_is_is_a_warning_with_its_line(tmp_path):
+    told = check(written(tmp_path, "direction", (', "asymmetric-2"]', "]")), None, 1)
+    forward, backward = [one for one in told.warnings if "nobody meets that" in one]
+    assert "direction.toml:" in forward
+    assert 'questions.response.share."asymmetric-2/forward": nobody meets that; direction has vibration/' in forward
+    assert "asymmetric-2/backward" in backward
+
+
+def test_a_study_whose_papers_numbers_are_not_there_is_refused_with_the_line(tmp_path):
+    study = tmp_path / "study.toml"
+    text = (shipped_folder() / "study.toml").read_text()
+    study.write_text(text.replace('paper = "paper.toml"', 'paper = "papers.toml"'))
+    for name in ("direction.toml", "preference.toml", "gun.toml", "synthetic"):
+        (tmp_path / name).symlink_to(shipped_folder() / name)
+    with pytest.raises(ConfigError, match=r"study\.toml:\d+: paper = 'papers\.toml': no such file beside the study"):
+        check(str(study), None, 1)

@@ -9,13 +9,13 @@ from experiments.design.config import DesignConfig
 from experiments.design.methods_section import methods_section
 from experiments.design.planned import planned_run
 from experiments.design.planning import plan_of, square_size
-from tests.designs import path_of
+from tests.designs import design, path_of
 
 
 def said(name):
-    design = load(DesignConfig, path_of(name))
-    plan = plan_of(design, "P01", 1, row=0 if square_size(design) else None)
-    return "\n".join(methods_section(design, planned_run(design, plan)))
+    config = load(DesignConfig, path_of(name))
+    plan = plan_of(config, "P01", 1, row=0 if square_size(config) else None)
+    return "\n".join(methods_section(config, [planned_run(config, plan)]))
 
 
 def test_the_papers_first_experiment_reads_as_in_the_paper():
@@ -28,6 +28,23 @@ def test_the_papers_first_experiment_reads_as_in_the_paper():
         "After each trial participants were asked: “Which way did the gun shoot?” (forward or backward).\n"
         "Sets were 20 s apart. Sessions were 300 s apart. The 60 trials took 30 min as planned."
     )
+
+
+def test_what_nesting_makes_differ_is_told_of_every_group_and_session():
+    nested = design(
+        factors={
+            "grip": {"levels": ["one", "two"], "between": True},
+            "method": {"levels": ["a"]},
+            "voltage_V": {"within": "grip", "levels": {"one": [9.0, 12.0], "two": [9.0, 12.0, 16.0]}},
+            "direction": {"levels": ["forward", "backward"]},
+        },
+        order={"session": ["voltage_V"]},
+    )
+    runs = [planned_run(nested, plan_of(nested, "P01", 1, group=group)) for group in (0, 1)]
+    text = "\n".join(methods_section(nested, runs))
+    assert "There were 2 or 3 sessions, each of one voltage in V" in text
+    assert "In each session every condition came once, in random order: 2 trials." in text
+    assert "The 4 or 6 trials took" in text
 
 
 @pytest.mark.parametrize(

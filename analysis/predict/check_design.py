@@ -81,11 +81,12 @@ def check_design(setup: Setup[DesignConfig], seed: int, codes: Sequence[str]) ->
     plans = dict(zip(codes, _plans(design, seed, codes), strict=True))
     first = next(iter(plans.values()))
     planned = planned_run(design, first, setup.gun)
+    of_groups = [planned_run(design, plan, setup.gun) for plan in _plans_of_groups(design, seed)]
     cells, shaken = limits(design, setup.gun), exposure(_shots(setup, first))
     return DesignCheck(
         experiment=design.design,
         title=design.title,
-        text=methods_section(design, planned),
+        text=methods_section(design, of_groups),
         trials=planned.trials,
         duration_s=planned.duration_s,
         break_s=planned.break_s,
@@ -109,8 +110,12 @@ def _superfluous(setup: Setup[DesignConfig]) -> Iterator[str]:
     """What the file of the synthetic people says of nothing that there is, with its line."""
     if isinstance(setup.laws, SyntheticAnswers):
         people, design = setup.source.parent / str(setup.config.synthetic), setup.config
-        plans = [plan_of(design, "P01", 0, group=group) for group in range(len(groups(design)))]
-        yield from (at_key(people, one) for one in superfluous(design, setup.laws, plans))
+        yield from (at_key(people, one) for one in superfluous(design, setup.laws, _plans_of_groups(design, 0)))
+
+
+def _plans_of_groups(design: DesignConfig, seed: int) -> list[Plan]:
+    """A plan of each group."""
+    return [plan_of(design, "P01", seed, group=group) for group in range(len(groups(design)))]
 
 
 def _felt(setup: Setup[DesignConfig], plan: Plan) -> dict[str, dict[str, float]]:

@@ -116,9 +116,9 @@ def _stratum(scores: FloatArray, groups: NDArray[np.str_], factors: tuple[int, .
         helmert(levels) if place in factors else np.full((1, levels), levels**-0.5)
         for place, levels in enumerate(scores.shape[1:])
     ]
-    contrasts = np.ones((1, 1))
+    contrasts: FloatArray = np.ones((1, 1))
     for part in parts:
-        contrasts = np.kron(contrasts, part)
+        contrasts = np.asarray(np.kron(contrasts, part), dtype=np.float64)
     values = scores.reshape(len(scores), -1) @ contrasts.T
     own = [values[groups == one] for one in np.unique(groups)]
     return _Stratum(factors=factors, parts=own, left=float(sum(((one - one.mean(axis=0)) ** 2).sum() for one in own)))

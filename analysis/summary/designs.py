@@ -272,7 +272,8 @@ def _untested(design: DesignConfig, question: QuestionConfig, people: pd.DataFra
 
 def _sizes(people: pd.DataFrame) -> tuple[int, ...]:
     """How many levels each factor within people has."""
-    return tuple(people.columns.get_level_values(name).nunique() for name in people.columns.names if name is not None)
+    named = [str(name) for name in people.columns.names if name is not None]
+    return tuple(people.columns.get_level_values(name).nunique() for name in named)
 
 
 def _factorial(names: Sequence[str], people: pd.DataFrame, group: pd.Series | None) -> Iterator[DesignTest]:

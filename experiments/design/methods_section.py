@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 
 from experiments.design.config import DesignConfig
 from experiments.design.language import EMPTY, INSTRUCTION_FACTOR, BlockOrder, FactorConfig, QuestionConfig, shown_level
@@ -10,14 +10,17 @@ from experiments.design.planned import PlannedRun
 from experiments.design.stimuli import by_hand
 
 
-def methods_section(design: DesignConfig, planned: PlannedRun) -> tuple[str, ...]:
-    """The paragraphs: what varied, in which order, what a trial was, what was asked, practice, how long it took."""
+def methods_section(design: DesignConfig, runs: Sequence[PlannedRun]) -> tuple[str, ...]:
+    """The paragraphs: what varied, in which order, what a trial was, what was asked, practice, how long it took.
+
+    `runs`: what is planned for a participant of each group, which nested factors make differ.
+    """
     return (
         " ".join(_factors(design)),
-        " ".join(_order(design, planned)),
-        " ".join(_trial(design, planned)),
+        " ".join(_order(design, runs)),
+        " ".join(_trial(design, runs[0])),
         " ".join(_questions(design)),
-        " ".join(_rests(design, planned)),
+        " ".join(_rests(design, runs)),
     )
 
 
@@ -74,15 +77,25 @@ _HOW: dict[BlockOrder, str] = {
 }
 
 
-def _order(design: DesignConfig, planned: PlannedRun) -> Iterator[str]:
-    order = design.order
-    each = planned.trials // planned.sessions
-    if planned.sessions > 1:
+def _counts(numbers: Iterable[float], unit: float = 1.0) -> str:
+    """A number, or those that there are.
+
+    >>> _counts([2, 2]), _counts([3, 2]), _counts([2, 3, 5])
+    ('2', '2 or 3', '2 to 5')
+    """
+    found = [f"{number / unit:.4g}" for number in sorted(set(numbers))]
+    return f"{found[0]} to {found[-1]}" if len(found) > 2 else " or ".join(found)
+
+
+def _order(design: DesignConfig, runs: Sequence[PlannedRun]) -> Iterator[str]:
+    order, sessions = design.order, [run.sessions for run in runs]
+    each = [trials for run in runs for trials in run.session_trials]
+    if max(sessions) > 1:
         blocked = _listed([_word(name) for name in order.session])
-        yield f"There were {planned.sessions} sessions, each of one {blocked}, {_HOW[order.sessions]}."
-    where = "In each session" if planned.sessions > 1 else "In the session"
+        yield f"There were {_counts(sessions)} sessions, each of one {blocked}, {_HOW[order.sessions]}."
+    where = "In each session" if max(sessions) > 1 else "In the session"
     times = {1: "once", 2: "twice"}.get(order.repetitions, f"{order.repetitions} times")
-    yield f"{where} every condition came {times}, {_HOW[order.trials]}: {each} trials{_sets(design, each)}."
+    yield f"{where} every condition came {times}, {_HOW[order.trials]}: {_counts(each)} trials{_sets(design, each)}."
     if INSTRUCTION_FACTOR in design.factors:
         yield from _told(design, design.factors[INSTRUCTION_FACTOR])
     if order.set:
@@ -97,7 +110,7 @@ def _told(design: DesignConfig, factor: FactorConfig) -> Iterator[str]:
     yield f"Before each {where} participants were told: {'; '.join(words)}."
 
 
-def _sets(design: DesignConfig, trials: int) -> str:
+def _sets(design: DesignConfig, trials: Sequence[int]) -> str:
     sets = design.order.sets
     if sets == 1:
         return ""
@@ -106,7 +119,7 @@ def _sets(design: DesignConfig, trials: int) -> str:
         "set": ", each condition as evenly over the sets as it goes",
         "set-exact": ", each condition equally often in every set",
     }[design.order.balance]
-    return f" in {sets} sets of {trials // sets}{balance}"
+    return f" in {sets} sets of {_counts([count // sets for count in trials])}{balance}"
 
 
 def _trial(design: DesignConfig, planned: PlannedRun) -> Iterator[str]:
@@ -171,10 +184,11 @@ def _question(question: QuestionConfig) -> str:
     return f"“{question.text}” ({how})"
 
 
-def _rests(design: DesignConfig, planned: PlannedRun) -> Iterator[str]:
+def _rests(design: DesignConfig, runs: Sequence[PlannedRun]) -> Iterator[str]:
     breaks = design.breaks
-    if breaks.between_sets_s and planned.sets > planned.sessions:
+    if breaks.between_sets_s and any(run.sets > run.sessions for run in runs):
         yield f"Sets were {breaks.between_sets_s:g} s apart."
-    if breaks.between_sessions_s and planned.sessions > 1:
+    if breaks.between_sessions_s and any(run.sessions > 1 for run in runs):
         yield f"Sessions were {breaks.between_sessions_s:g} s apart."
-    yield f"The {planned.trials} trials took {planned.duration_s / 60:.3g} min as planned."
+    trials, minutes = _counts([run.trials for run in runs]), _counts([run.duration_s for run in runs], 60.0)
+    yield f"The {trials} trials took {minutes} min as planned."

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
@@ -18,12 +19,14 @@ from experiments.design.stimuli import by_hand, settings
 class PlannedRun:
     """One run as planned: `break_s` of `duration_s` are rests; `hand_changes` is how often hands set something anew.
 
-    `hands_within`: how often they have something to set or to turn between the intervals of a trial.
+    `session_trials`: how many trials each session has. `hands_within`: how often hands have something to set or to turn
+    between the intervals of a trial.
     """
 
     sessions: int
     sets: int
     trials: int
+    session_trials: tuple[int, ...]
     break_s: float
     duration_s: float
     trials_without_break: int
@@ -51,6 +54,7 @@ def workload(design: DesignConfig, plan: Plan, gun: GunConfig | None = None) -> 
         sessions=len({trial.session for trial in trials}),
         sets=len({(trial.session, trial.set) for trial in trials}),
         trials=len(trials),
+        session_trials=tuple(Counter(trial.session for trial in trials).values()),
         break_s=sum(rests_s),
         duration_s=timing.opening_s + len(trials) * trial_s + within * timing.hand_over_s + sum(rests_s),
         trials_without_break=max(_stretches(rests_s)),

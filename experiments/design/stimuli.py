@@ -145,7 +145,7 @@ def stimulus(design: DesignConfig, gun: GunConfig, levels: Condition) -> Interva
     try:
         drive = drive_of(parameters)
     except LimitError as error:
-        raise ConfigError(f"{shown_cell(levels)}: {error}") from error
+        raise _beyond(design, levels, str(error)) from error
     return IntervalStimulus(
         method=method,
         direction=cast("Direction", held.get(DIRECTION_FACTOR, "forward")),
@@ -235,15 +235,23 @@ def _limits_of(design: DesignConfig, gun: GunConfig, levels: Condition) -> Condi
     try:
         rendering = rendering_of(shot.parameters)
     except LimitError as error:
-        raise ConfigError(f"{shown_cell(levels)}: {error}") from error
+        raise _beyond(design, levels, str(error)) from error
     if rendering.motion == "no-break-away" and not design.below_break_away:
-        raise ConfigError(
-            f"{shown_cell(levels)}: no shot of it ever moves the magnet, by the model; raise the voltage or the pulse, "
-            "or say `below_break_away = true` if that is what you study"
+        raise _beyond(
+            design,
+            levels,
+            "no shot of it ever moves the magnet, by the model; raise the voltage or the pulse, or say "
+            "`below_break_away = true` if that is what you study",
         )
     return ConditionLimits(
         levels=levels, drive=shot.drive, load=rendering.load, status=rendering.motion, settle_s=rendering.settle_s
     )
+
+
+def _beyond(design: DesignConfig, levels: Condition, why: str) -> ConfigError:
+    """That a cell cannot be fired, at the key of the first factor that says a number of the gun; else of the method."""
+    numbers = (name for name, factor in design.factors.items() if name in _GUN_NUMBERS or factor.sets)
+    return ConfigError(f"factors.{next(numbers, METHOD_FACTOR)}.levels: {shown_cell(levels)}: {why}")
 
 
 def shown_cell(levels: Condition) -> str:
