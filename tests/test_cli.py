@@ -135,7 +135,7 @@ def test_a_broken_config_is_refused_with_file_line_key_value_and_rule(recoil: Re
     config.write_text(config.read_text().replace("between_sets_s = 20.0", "between_sets_s = -20.0"))
     line = 1 + config.read_text()[: config.read_text().index("between_sets_s")].count("\n")
     done = recoil("check", "mine/direction.toml")
-    refused(done, f"mine/direction.toml:{line}: breaks.between_sets_s = -20.0", "greater than or equal to 0")
+    refused(done, f"mine/direction.toml:{line}: breaks.between_sets_s = -20.0", "must be at least 0")
     assert done.stderr.count("\n") == 1
 
 

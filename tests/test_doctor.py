@@ -406,7 +406,7 @@ def test_the_limit_of_the_line_is_the_guns_and_no_part_of_a_run(tmp_path: Path) 
     assert load_gun(own).serial.round_trip_limit_s == 0.004
     assert load_gun(own).model_dump() == load_gun(find("gun")).model_dump()
     own.write_text(f"{shipped}\n[serial]\nround_trip_limit_s = 0\n", encoding="utf-8")
-    with pytest.raises(ConfigError, match=r"gun\.toml:\d+: serial\.round_trip_limit_s = 0.*greater than 0"):
+    with pytest.raises(ConfigError, match=r"gun\.toml:\d+: serial\.round_trip_limit_s = 0.*must be above 0"):
         load_gun(own)
 
 

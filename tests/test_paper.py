@@ -53,7 +53,7 @@ def test_a_paper_without_claims_and_head_is_read_as_before(tmp_path: Path) -> No
         ('p = "0.205"', 'p = "20.5"', ["direction.binomial.0.p", "'20.5'", "above 1"]),
         ('direction = "forward"', 'direction = "left"', ["direction.binomial.0.direction", "'left'", "forward"]),
         ('higher = "asymmetric-1"', 'higher = "ramp"', ["direction", "ramp above vibration", "two of"]),
-        ("[participants]\nn = 14", "[participants]\nn = 0", ["participants.n", "0", "greater than or equal to 1"]),
+        ("[participants]\nn = 14", "[participants]\nn = 0", ["participants.n", "0", "must be at least 1"]),
         ("[participants]", "[participants", ["not TOML", "line"]),
     ],
 )

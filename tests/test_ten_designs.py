@@ -120,7 +120,7 @@ def answered_by(design, gun, laws, plan):
             {"response": {"law": "rates", "by": ["method"], "share": {"vibration": 0.5}}},
             "for 'asymmetric-",
         ),
-        ("direction", {"response": {"law": "rates", "share": {"all": 1.0}}}, "less than 1"),
+        ("direction", {"response": {"law": "rates", "share": {"all": 1.0}}}, "must be below 1"),
         ("direction", {"answer": {"law": "rates", "share": {"all": 0.5}}}, "questions.response is missing"),
         (
             "voltages",
