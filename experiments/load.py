@@ -19,8 +19,7 @@ from experiments.config.door import ConfigError, StudyConfig, at_key, load, read
 from experiments.config.setup import GunConfig, Setup
 from experiments.design.config import DesignConfig
 from experiments.design.language import TRAIN_INTERVAL
-from experiments.design.planned import planned_run
-from experiments.design.planning import groups, plan_of
+from experiments.design.planned import planned_run, plans_of_groups
 from experiments.design.stimuli import limits, shown_cell, unchanged_methods
 from experiments.record.design_table import columns
 from experiments.record.tables import MAY_LACK, TABLES
@@ -61,7 +60,7 @@ def load_setup(name: str | Path) -> Setup[DesignConfig]:
     setup = Setup(config=design, gun=load_gun(path.parent / design.gun), source=path)
     with _named(path):
         _check_known_columns(design)
-        plans = [plan_of(design, "P01", 0, group=group) for group in range(len(groups(design)))]
+        plans = plans_of_groups(design)
         for plan in plans:
             planned_run(design, plan)
     by_gun = () if design.below_break_away else unchanged_methods(design)

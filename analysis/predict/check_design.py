@@ -22,7 +22,15 @@ from experiments.design.config import DesignConfig
 from experiments.design.language import shown_level
 from experiments.design.methods_section import methods_section
 from experiments.design.plan import Plan
-from experiments.design.planned import PlannedRun, levels_text, planned_run, trial_text, warnings
+from experiments.design.planned import (
+    PlannedRun,
+    levels_text,
+    planned_run,
+    plans_of_groups,
+    runs_of_groups,
+    trial_text,
+    warnings,
+)
 from experiments.design.planning import groups, plan_of, square_size
 from experiments.design.stimuli import ConditionLimits, limits, settings, stimulus
 from experiments.load import check_limits
@@ -81,12 +89,11 @@ def check_design(setup: Setup[DesignConfig], seed: int, codes: Sequence[str]) ->
     plans = dict(zip(codes, _plans(design, seed, codes), strict=True))
     first = next(iter(plans.values()))
     planned = planned_run(design, first, setup.gun)
-    of_groups = [planned_run(design, plan, setup.gun) for plan in _plans_of_groups(design, seed)]
     cells, shaken = limits(design, setup.gun), exposure(_shots(setup, first))
     return DesignCheck(
         experiment=design.design,
         title=design.title,
-        text=methods_section(design, of_groups),
+        text=methods_section(design, runs_of_groups(design, setup.gun)),
         trials=planned.trials,
         duration_s=planned.duration_s,
         break_s=planned.break_s,
@@ -110,12 +117,7 @@ def _superfluous(setup: Setup[DesignConfig]) -> Iterator[str]:
     """What the file of the synthetic people says of nothing that there is, with its line."""
     if isinstance(setup.laws, SyntheticAnswers):
         people, design = setup.source.parent / str(setup.config.synthetic), setup.config
-        yield from (at_key(people, one) for one in superfluous(design, setup.laws, _plans_of_groups(design, 0)))
-
-
-def _plans_of_groups(design: DesignConfig, seed: int) -> list[Plan]:
-    """A plan of each group."""
-    return [plan_of(design, "P01", seed, group=group) for group in range(len(groups(design)))]
+        yield from (at_key(people, one) for one in superfluous(design, setup.laws, plans_of_groups(design)))
 
 
 def _felt(setup: Setup[DesignConfig], plan: Plan) -> dict[str, dict[str, float]]:

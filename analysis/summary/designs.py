@@ -26,8 +26,7 @@ from analysis.summary.results import ConditionSummary, DesignSummary, DesignTest
 from experiments.design.config import DesignConfig
 from experiments.design.language import Level, QuestionConfig, shown_level
 from experiments.design.methods_section import methods_section
-from experiments.design.planned import workload
-from experiments.design.planning import plan_of
+from experiments.design.planned import runs_of_groups
 from experiments.tasks.questions import chance, correct_columns
 
 
@@ -45,7 +44,7 @@ def summarise(design: DesignConfig, table: pd.DataFrame) -> DesignSummary:
         origin=_hands(design, table),
         words={name: int(table[name].notna().sum()) for name in design.questions if name not in asked},
         assumed=design.assumed,
-        protocol=methods_section(design, workload(design, plan_of(design, "P01", 0))),
+        protocol=methods_section(design, runs_of_groups(design)),
     )
 
 

@@ -5,7 +5,15 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator, Sequence
 
 from experiments.design.config import DesignConfig
-from experiments.design.language import EMPTY, INSTRUCTION_FACTOR, BlockOrder, FactorConfig, QuestionConfig, shown_level
+from experiments.design.language import (
+    EMPTY,
+    INSTRUCTION_FACTOR,
+    BlockOrder,
+    FactorConfig,
+    Level,
+    QuestionConfig,
+    shown_level,
+)
 from experiments.design.planned import PlannedRun
 from experiments.design.stimuli import by_hand
 
@@ -40,9 +48,8 @@ def _factors(design: DesignConfig) -> Iterator[str]:
 
 
 def _sentence(named: Sequence[tuple[str, FactorConfig]]) -> str:
-    told = [
-        f"{_word(name)} ({', '.join(factor.label(level) for level in factor.all_levels)})" for name, factor in named
-    ]
+    levels = (", ".join(factor.label(level) for level in factor.all_levels) for _, factor in named)
+    told = [f"{factor_words(name)} ({some})" for (name, _), some in zip(named, levels, strict=True)]
     text = _listed(told)
     return text[0].upper() + text[1:]
 
@@ -50,14 +57,28 @@ def _sentence(named: Sequence[tuple[str, FactorConfig]]) -> str:
 _UNITS = {"V": "V", "s": "s", "N": "N", "A": "A", "ohm": "Ω", "m": "m", "kg": "kg", "Hz": "Hz"}
 
 
-def _word(name: str) -> str:
+def factor_words(name: str) -> str:
     """A factor's name as words, with its unit.
 
-    >>> _word("voltage_V"), _word("posture")
-    ('voltage in V', 'posture')
+    >>> factor_words("voltage_V"), factor_words("posture"), factor_words("voltage_V_1")
+    ('voltage in V', 'posture', 'voltage in V 1')
     """
     stem, _, unit = name.rpartition("_")
+    if stem and unit.isdigit():  # of an interval
+        return f"{factor_words(stem)} {unit}"
     return f"{stem.replace('_', ' ')} in {_UNITS[unit]}" if stem and unit in _UNITS else name.replace("_", " ")
+
+
+def level_words(name: str, level: Level) -> str:
+    """A level as words: a number with its unit, or else with its factor's name.
+
+    >>> level_words("voltage_V", 12.0), level_words("grip", "one hand"), level_words("distance", 2.0)
+    ('12 V', 'one hand', 'distance 2')
+    """
+    if isinstance(level, str):
+        return level
+    unit = next((part for part in reversed(name.split("_")[1:]) if part in _UNITS), "")
+    return f"{shown_level(level)} {_UNITS[unit]}" if unit else f"{factor_words(name)} {shown_level(level)}"
 
 
 def _listed(words: Sequence[str]) -> str:
@@ -91,7 +112,7 @@ def _order(design: DesignConfig, runs: Sequence[PlannedRun]) -> Iterator[str]:
     order, sessions = design.order, [run.sessions for run in runs]
     each = [trials for run in runs for trials in run.session_trials]
     if max(sessions) > 1:
-        blocked = _listed([_word(name) for name in order.session])
+        blocked = _listed([factor_words(name) for name in order.session])
         yield f"There were {_counts(sessions)} sessions, each of one {blocked}, {_HOW[order.sessions]}."
     where = "In each session" if max(sessions) > 1 else "In the session"
     times = {1: "once", 2: "twice"}.get(order.repetitions, f"{order.repetitions} times")
@@ -99,9 +120,9 @@ def _order(design: DesignConfig, runs: Sequence[PlannedRun]) -> Iterator[str]:
     if INSTRUCTION_FACTOR in design.factors:
         yield from _told(design, design.factors[INSTRUCTION_FACTOR])
     if order.set:
-        yield f"{_listed([_word(name) for name in order.set]).capitalize()} was constant in a set."
+        yield f"{_listed([factor_words(name) for name in order.set]).capitalize()} was constant in a set."
     for name, most in order.longest_run.items():
-        yield f"No level of {_word(name)} came more than {most} times in a row."
+        yield f"No level of {factor_words(name)} came more than {most} times in a row."
 
 
 def _told(design: DesignConfig, factor: FactorConfig) -> Iterator[str]:
@@ -129,7 +150,7 @@ def _trial(design: DesignConfig, planned: PlannedRun) -> Iterator[str]:
         yield f"{trial.catch} catch trials in a session had no stimulus."
     yield "Participants were told whether they were right." if trial.feedback else "There was no feedback."
     if design.practice.repetitions:
-        each = _listed([_word(name) for name in design.practice.of])
+        each = _listed([factor_words(name) for name in design.practice.of])
         told = ", with feedback" if design.practice.feedback else ""
         yield f"{design.practice.repetitions} of each {each} could be practised first{told}; that was not analysed."
 
@@ -145,7 +166,7 @@ def _one_interval(design: DesignConfig) -> str:
 
 
 def _several_intervals(design: DesignConfig, planned: PlannedRun) -> str:
-    trial, compared = design.trial, _word(design.trial.compare or "")
+    trial, compared = design.trial, factor_words(design.trial.compare or "")
     gap = "with a hand-over between" if planned.hands_within else f"{trial.gap_s:g} s apart"
     if trial.kind == "pair":
         return f"two shots {gap} that differed in {compared}: all pairs, in both orders as often as it goes"

@@ -12,6 +12,7 @@ from experiments.config.setup import GunConfig
 from experiments.design.config import DesignConfig
 from experiments.design.language import DIRECTION_FACTOR, shown_level
 from experiments.design.plan import Condition, Plan, Trial
+from experiments.design.planning import groups, plan_of
 from experiments.design.stimuli import by_hand, settings
 
 
@@ -61,6 +62,16 @@ def workload(design: DesignConfig, plan: Plan, gun: GunConfig | None = None) -> 
         hand_changes=sum(_by_hand(design, gun, one) != _by_hand(design, gun, other) for one, other in pairwise(trials)),
         hands_within=within,
     )
+
+
+def plans_of_groups(design: DesignConfig) -> list[Plan]:
+    """A plan of someone in each group: all that is ever met. `ConfigError` as `plan_of`."""
+    return [plan_of(design, "P01", 0, group=group) for group in range(len(groups(design)))]
+
+
+def runs_of_groups(design: DesignConfig, gun: GunConfig | None = None) -> list[PlannedRun]:
+    """What is asked of someone in each group."""
+    return [workload(design, plan, gun) for plan in plans_of_groups(design)]
 
 
 def _rest_s(design: DesignConfig, before: Trial, trial: Trial) -> float:

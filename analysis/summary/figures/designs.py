@@ -14,6 +14,7 @@ from matplotlib.ticker import ScalarFormatter
 from analysis.report.figures.style import METHOD_LINES, display_name, drawn, light_grid, method_colour, reference_line
 from analysis.summary.results import ConditionSummary, DesignSummary, QuestionSummary
 from experiments.design.language import shown_level
+from experiments.design.methods_section import factor_words, level_words
 
 _MARKERS = ("o", "s", "^", "D", "v", "P", "X")
 _ACROSS = 2
@@ -84,7 +85,7 @@ def _series(cells: Sequence[ConditionSummary], factor: str | None) -> dict[str, 
     """The conditions by the levels of the other factors."""
     found: dict[str, list[ConditionSummary]] = {}
     for cell in cells:
-        others = [display_name(shown_level(level)) for name, level in cell.levels.items() if name != factor]
+        others = [display_name(level_words(name, level)) for name, level in cell.levels.items() if name != factor]
         found.setdefault(", ".join(others), []).append(cell)
     return found
 
@@ -138,9 +139,9 @@ def _label(
 ) -> None:
     numeric = all(isinstance(level, float) for level in places) and len(places) > 1
     scored = any(cell.right is not None for cell in question.cells)
-    share = "right [%]" if scored else f"{name} [%]"
+    share = "right [%]" if scored else "chosen [%]" if question.preferred else f"{name} [%]"
     axes.set_ylabel(share if question.kind in ("choice", "yes-no") else name)
-    axes.set_xlabel(factor or "")
+    axes.set_xlabel(factor_words(factor) if factor else "")
     axes.set_title(name, loc="left", fontweight="bold", parse_math=False)
     if scored and question.chance is not None and question.kind == "choice":
         reference_line(axes, 100.0 * question.chance, "chance")
@@ -154,4 +155,6 @@ def _label(
     labels = axes.get_legend_handles_labels()[1]
     if labels:  # below the axis, where no mark can lie
         columns = min(len(labels), _LEGEND_COLUMNS)
-        axes.legend(frameon=False, fontsize=8.0, loc="upper center", bbox_to_anchor=(0.5, -0.17), ncols=columns)
+        others = ", ".join(factor_words(one) for one in _factors(question) if one != factor)
+        place = {"loc": "upper center", "bbox_to_anchor": (0.5, -0.17), "ncols": columns}
+        axes.legend(frameon=False, fontsize=8.0, title=others, title_fontsize=8.0, **place)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterator
 from dataclasses import replace
 
@@ -12,16 +13,18 @@ from analysis.summary.results import ConditionSummary, DesignSummary, DesignTest
 from analysis.summary.sections.content import ReportData
 from analysis.summary.sections.pictures import figure_of
 from experiments.design.language import shown_level
+from experiments.design.methods_section import factor_words, level_words
 
 _TESTS = {
-    "anova": "ANOVA",
-    "tukey": "Tukey",
-    "friedman": "Friedman",
+    "anova": "ANOVA, F",
+    "tukey": "Tukey, q",
+    "friedman": "Friedman, χ²",
     "exponent": "exponent",
     "d_prime": "d′",
-    "criterion": "criterion",
+    "criterion": "criterion c",
     "preferred": "preferred",
 }
+"""What a test is called, with the letter of its statistic."""
 _ESTIMATES = frozenset(["d_prime", "criterion", "preferred"])
 _TOLD = 6
 """So many conditions or pairs are told in a sentence; more are in the table."""
@@ -62,7 +65,7 @@ def result_sentences(name: str, found: DesignSummary, *, exact: bool = False) ->
     for asked, question in found.questions.items():
         if question.cells:
             told = " ".join([_cells_words(question), *_tests_words(question, exact=exact)])
-            yield f"{found.title or name.capitalize()}, {asked} ({people}): {told}"
+            yield f"{(found.title or name.capitalize()).rstrip('.?!')}, {asked} ({people}): {told}"
 
 
 def _cells_words(question: QuestionSummary) -> str:
@@ -97,7 +100,7 @@ def _mean_and_spread(question: QuestionSummary, cell: ConditionSummary) -> str:
 
 def _tests_words(question: QuestionSummary, *, exact: bool) -> Iterator[str]:
     planned = [test for test in question.tests if _standing(question, test) == "planned"]
-    yield from (f"No test of {named(test.effect)}: {test.reason}." for test in planned if test.reason)
+    yield from (f"No test of {effect_words(test.effect)}: {test.reason}." for test in planned if test.reason)
     anovas = [_anova_words(test, exact=exact) for test in planned if test.name == "anova" and not test.reason]
     if anovas:
         yield f"ANOVA: {'; '.join(anovas)}."
@@ -108,7 +111,7 @@ def _tests_words(question: QuestionSummary, *, exact: bool) -> Iterator[str]:
         yield f"Planned comparisons (Tukey's HSD): {below} of {len(pairs)} pairs differed at p < .05."
     elif pairs:
         told = "; ".join(
-            f"{named(test.effect)}, q = {apa.number(test.statistic)}, {apa.p_value(test.p, exact=exact)}"
+            f"{effect_words(test.effect)}, q = {apa.number(test.statistic)}, {apa.p_value(test.p, exact=exact)}"
             for test in pairs
         )
         yield f"Planned comparisons (Tukey's HSD): {told}."
@@ -120,17 +123,30 @@ def _tests_words(question: QuestionSummary, *, exact: bool) -> Iterator[str]:
 def _anova_words(test: DesignTest, *, exact: bool) -> str:
     size = "" if test.size is None else f", generalised η² = {apa.below_one(test.size)}"
     effect = "significant effect" if test.p is not None and test.p < 0.05 else "no significant effect"
-    return f"{effect} of {named(test.effect)}, {apa.f_test(test.statistic, test.df or (), test.p, exact=exact)}{size}"
+    told = apa.f_test(test.statistic, test.df or (), test.p, exact=exact)
+    return f"{effect} of {effect_words(test.effect)}, {told}{size}"
 
 
 def _ranks_words(test: DesignTest, *, exact: bool) -> str:
     told = f"χ² = {apa.number(test.statistic)}, {apa.p_value(test.p, exact=exact)}"
-    return f"Friedman's test of {named(test.effect)}: {told}."
+    return f"Friedman's test of {effect_words(test.effect)}: {told}."
+
+
+_WITH_UNIT = re.compile(r"[A-Za-z]\w*_(?:V|s|N|A|ohm|m|kg|Hz)\b")
+
+
+def effect_words(effect: str) -> str:
+    """What a test is of, in words.
+
+    >>> effect_words("voltage_V × method"), effect_words("vibration – asymmetric-1")
+    ('voltage in V × method', 'Vibration – Asymmetric Force I')
+    """
+    return _WITH_UNIT.sub(lambda found: factor_words(found[0]), named(effect))
 
 
 def _factors(found: DesignSummary) -> str:
     varied = {name: levels for name, levels in found.factors.items() if len(levels) > 1}
-    said = "; ".join(f"{name}: {', '.join(map(shown_level, levels))}" for name, levels in varied.items())
+    said = "; ".join(f"{factor_words(name)}: {', '.join(map(shown_level, levels))}" for name, levels in varied.items())
     return f"What varied: {named(said)}." if said else "Nothing varied."
 
 
@@ -161,15 +177,14 @@ def _picture(name: str, found: DesignSummary) -> Picture:
         f"{asked}: {', '.join(f'{_condition(question, cell)} {_mean(question, cell)}' for cell in question.cells)}"
         for asked, question in found.questions.items()
     )
-    return Picture(stem=figure_of(name), caption=f"{found.title}. {spread}", alt=f"Means by condition. {means}")
+    return Picture(
+        stem=figure_of(name), caption=f"{found.title.rstrip('.?!')}. {spread}", alt=f"Means by condition. {means}"
+    )
 
 
 def _condition(question: QuestionSummary, cell: ConditionSummary) -> str:
-    """The levels of a condition; a number with the name of its factor."""
-    levels = (
-        shown_level(level) if isinstance(level, str) else f"{name} {shown_level(level)}"
-        for name, level in cell.levels.items()
-    )
+    """The levels of a condition; a number with its unit, or the name of its factor."""
+    levels = (level_words(name, level) for name, level in cell.levels.items())
     return named(", ".join(levels)) or ("catch trials" if len(question.cells) > 1 else "all trials")
 
 
@@ -183,7 +198,8 @@ def _tables(name: str, question: QuestionSummary) -> Iterator[Table]:
     if question.preferred:
         yield _conditions(f"{name}: how often each was chosen,", replace(question, cells=question.preferred))
     if question.cells:
-        yield _conditions(f"{name} ({question.scale})" if question.scale else name, question)
+        named_scale = f"{name} ({question.scale})" if question.scale else name
+        yield _conditions(named_scale, replace(question, preferred=None))
     if question.tests:
         header = ("Test", "Of", "Statistic", "df", "p", "Effect or interval", "Standing")
         rows = tuple((*_test(test), _standing(question, test)) for test in question.tests)
@@ -203,23 +219,23 @@ def _conditions(name: str, question: QuestionSummary) -> Table:
             str(cell.trials),
             *(str((cell.answers or {})[answer]) for answer in answers),
             _mean(question, cell),
-            *_spread(cell, scored=scored),
+            *_spread(question, cell, scored=scored),
         )
         for cell in question.cells
     )
-    first = f"Share of {answers[0]}" if answers else "Share"
+    first = f"Share of {answers[0]}" if answers else "Chosen"
     mean = {"number": "Geometric mean", "choice": first, "yes-no": first}.get(question.kind, "Mean")
-    header = (*factors, "People", "Trials", *answers, "Right" if scored else mean, *last)
+    header = (*map(factor_words, factors), "People", "Trials", *answers, "Right" if scored else mean, *last)
     return Table(caption=f"{name} by condition", header=header, rows=rows)
 
 
 def _level(cell: ConditionSummary, factor: str) -> str:
-    return named(shown_level(cell.levels[factor])) if factor in cell.levels else apa.NO_NUMBER
+    return named(shown_level(cell.levels[factor])) if factor in cell.levels else "catch trials"
 
 
-def _spread(cell: ConditionSummary, *, scored: bool) -> tuple[str, ...]:
+def _spread(question: QuestionSummary, cell: ConditionSummary, *, scored: bool) -> tuple[str, ...]:
     if not scored:
-        return (apa.number(cell.sd),)
+        return (apa.percent(cell.sd) if question.kind in ("choice", "yes-no") else apa.number(cell.sd),)
     low, high = apa.percent(cell.ci_low), apa.percent(cell.ci_high)
     return f"{low} to {high}", apa.p_cell(cell.p)
 
@@ -233,4 +249,4 @@ def _test(test: DesignTest) -> tuple[str, ...]:
     else:
         more = apa.NO_NUMBER if test.size is None else f"η²_G = {apa.below_one(test.size)}"
     p = apa.NO_NUMBER if test.p is None else apa.p_cell(test.p)
-    return (_TESTS.get(test.name, test.name), named(test.effect), apa.number(test.statistic), df, p, more)
+    return (_TESTS.get(test.name, test.name), effect_words(test.effect), apa.number(test.statistic), df, p, more)
