@@ -156,5 +156,12 @@ def _label(
     if labels:  # below the axis, where no mark can lie
         columns = min(len(labels), _LEGEND_COLUMNS)
         others = ", ".join(factor_words(one) for one in _factors(question) if one != factor)
-        place = {"loc": "upper center", "bbox_to_anchor": (0.5, -0.17), "ncols": columns}
-        axes.legend(frameon=False, fontsize=8.0, title=others, title_fontsize=8.0, **place)
+        axes.legend(
+            frameon=False,
+            fontsize=8.0,
+            title=others,
+            title_fontsize=8.0,
+            loc="upper center",
+            bbox_to_anchor=(0.5, -0.17),
+            ncols=columns,
+        )

@@ -210,7 +210,8 @@ def _tables(name: str, question: QuestionSummary) -> Iterator[Table]:
 def _conditions(name: str, question: QuestionSummary) -> Table:
     factors = list(dict.fromkeys(factor for cell in question.cells for factor in cell.levels))
     scored = any(cell.right is not None for cell in question.cells)
-    last = ("95 % interval", "p against chance") if scored else ("SD",)
+    sd = "SD of ln" if question.kind == "number" else "SD"
+    last = ("95 % interval", "p against chance") if scored else (sd,)
     answers = () if question.preferred is not None else tuple(next(iter(question.cells)).answers or ())
     rows = tuple(
         (
