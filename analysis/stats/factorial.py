@@ -75,8 +75,8 @@ def factorial_anova(
     `scores`: (n people, levels of the first factor within people, of the second, ...). `group`: each one's group, if a
     factor varies between people. `names`: of the factors, the one between people first. `ValueError`: fewer than two
     people, levels or groups, a group of one, or no finite numbers. Groups of unequal size are compared as sums of
-    squares of type III do, the levels by the means of the groups' means, as afex and SPSS have them. Of one factor within
-    people `scores` may be a table with a column a level.
+    squares of type III do, the levels by the means of the groups' means, as afex and SPSS have them. Of one
+    factor within people `scores` may be a table with a column a level.
     Sources: Winer 1971, chapter 7; Olejnik & Algina 2003, Psychological Methods 8, 434.
 
     >>> [effect.source for effect in factorial_anova([[[1, 2], [2, 4]], [[1, 3], [2, 2]]], ["damper", "voltage"])]
