@@ -78,6 +78,20 @@ def test_people_with_one_kind_of_answer_each_have_no_finite_spread():
     assert random_intercept_logit((WHO % 2).tolist(), WHO, {"force": FORCE}).reason == RUNS_AWAY
 
 
+def test_every_small_table_has_an_estimate_or_a_reason():
+    draw = np.random.default_rng(12)
+    reasons = set()
+    for _ in range(60):
+        people, each, sd = int(draw.integers(2, 9)), int(draw.integers(2, 8)), draw.choice([0.0, 0.5, 2.0, 8.0, 30.0])
+        who = np.repeat(np.arange(people), each)
+        force, own = np.arange(who.size) % 2.0, sd * draw.normal(size=people)
+        answers = (own[who] + force + draw.normal(size=who.size) > 0).astype(int)
+        found = random_intercept_logit(answers, who, {"force": force})
+        reasons.add(found.reason)
+        assert found.reason or all(0 < one.se < 100 for one in found.coefficients)
+    assert {None, RUNS_AWAY, ALL_ALIKE} <= reasons
+
+
 @pytest.mark.parametrize(
     ("right", "people", "reason"),
     [

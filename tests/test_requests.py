@@ -154,7 +154,7 @@ weights.x = { vibration = -1.0, asymmetric-1 = 1.0 }
     assert [one.name for one in model.coefficients] == ["intercept", "on", "voltage_V", "on:voltage_V"]
     model = logistic.result
     assert [one.name for one in model.coefficients] == ["intercept", "voltage_V", "backward"]
-    assert grip.note.endswith("Scores are ratings, people of all groups together.")
+    assert grip.note.endswith("Scores: participants' means of ratings, people of all groups together.")
 
 
 def test_numbers_are_asked_as_their_logarithms() -> None:

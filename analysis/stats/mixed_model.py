@@ -106,4 +106,5 @@ def _fit(values: FloatArray, matrix: FloatArray, codes: NDArray[np.intp]) -> Any
             found = model(values, matrix, groups=codes).fit(reml=True, method=_METHODS, gtol=1e-10)
         except np.linalg.LinAlgError:
             return None
-    return found if found.converged else None
+    variances = np.diag(found.cov_params())
+    return found if found.converged and np.isfinite(variances).all() and (variances[:-1] > 0.0).all() else None

@@ -23,10 +23,10 @@ from analysis.stats.fixed_effects import Coefficient, PredictorColumns, coeffici
 from analysis.stats.logit_model import ONE_PERSON, ONE_TRIAL
 
 NODES = 25
-"""As many as lme4 allows; nine already give six digits of usual data."""
+"""As many as lme4 allows. Of people who differ by an SD above 3 (in log odds) they leave an error of 1 %; 99 do not."""
 LARGEST_SD = 10.0
 """Log odds that differ so much between people leave hardly anybody with answers of both kinds."""
-_STEPS, _CLOSE, _LONGEST = 100, 1e-9, 2.0
+_STEPS, _CLOSE, _NEAR, _LONGEST = 100, 1e-9, 0.05, 2.0
 _SINGULAR, _FLAT = 1e-4, 1e-10
 """A spread between people below the first is none; a peak as flat in one direction as the second is none."""
 
@@ -205,11 +205,14 @@ def _climbed(cells: _Cells, start: FloatArray, rule: tuple[FloatArray, FloatArra
 def _upwards(
     cells: _Cells, theta: FloatArray, here: _Peak, step: FloatArray, rule: tuple[FloatArray, FloatArray]
 ) -> tuple[FloatArray, _Peak]:
-    """The step, halved until it gains some of what its slope promises: s and -s are the same model, and no gain."""
+    """The step, halved until it gains some of what its slope promises: s and -s are the same model, and no gain.
+
+    Near the peak it is Newton's own: there the value, of so many nodes, tells less than the slope.
+    """
     while True:
         there = _likelihood(cells, theta + step, rule)
-        promised = 1e-4 * float(here.gradient @ step) - 1e-12 * abs(here.value)
-        if there.value >= here.value + promised or np.abs(step).max() < _CLOSE:
+        promised = 1e-4 * float(here.gradient @ step)
+        if there.value >= here.value + promised or np.abs(step).max() < _NEAR:
             return step, there
         step = step / 2.0
 

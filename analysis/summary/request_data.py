@@ -60,7 +60,7 @@ def _of_experiment(name: str, table: pd.DataFrame, measure: str) -> RequestData:
         }
     )
     scores = trials.pivot_table(index="participant_id", columns="method", values="score").reindex(columns=methods)
-    unit = "shares of right answers to forward shots" if name == "direction" else "ratings"
+    unit = "right answers to forward shots" if name == "direction" else "ratings"
     return RequestData(scores=scores, trials=trials, factors={"method": tuple(methods)}, unit=unit)
 
 

@@ -141,14 +141,15 @@ def answer_to(request: AnyRequest, data: RequestData) -> Requested:
             note, result = _mixed_model(request, data)
         case LogisticRequest():
             note, result = _logistic(request, data)
-    together = data.grouped and isinstance(request, ContrastsRequest | EquivalenceRequest)
     of_trials = isinstance(result, LinearMixedModel | RandomInterceptLogit)
+    together = ", people of all groups together" if data.grouped else ""
+    said = f"The trials: {data.unit}" if of_trials else f"Scores: participants' means of {data.unit}{together}"
     return Requested(
         kind=request.kind,
         of=request.of,
         question=request.question,
         people=data.trials["participant_id"].nunique() if of_trials else len(data.scores),
-        note=f"{note} Scores are {data.unit}{', people of all groups together' if together else ''}.",
+        note=f"{note} {said}.",
         result=result,
     )
 
@@ -259,7 +260,7 @@ def _factor_columns(name: str, data: RequestData) -> dict[str, FloatArray]:
 
 def _references(terms: tuple[str, ...], data: RequestData) -> str:
     """What words are compared with."""
-    return "".join(f" {name}: against {first}." for name, first in _first_levels(terms, data))
+    return "".join(f" Levels of {name} are compared with {first}." for name, first in _first_levels(terms, data))
 
 
 def _first_levels(terms: tuple[str, ...], data: RequestData) -> Iterator[tuple[str, str]]:
