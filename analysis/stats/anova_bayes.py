@@ -19,13 +19,14 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import NDArray
 from scipy import special
 from scipy.optimize import minimize
 
-from analysis.stats.anova import F_UNDEFINED, NO_ERROR, check_groups, check_scores
+from analysis.stats.anova import F_UNDEFINED, NO_ERROR, check_groups, check_scores, one_table
 from analysis.stats.arrays import FloatArray
 from analysis.stats.diagnostics import unit_scaled
+from analysis.stats.frames import GroupTable, Result, ScoreTable
 from analysis.stats.sums_of_squares import between_sums, repeated_sums
 
 FIXED_SCALE = 0.5
@@ -35,7 +36,7 @@ RANDOM_SCALE = 1.0
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class AnovaBayesFactor:
+class AnovaBayesFactor(Result):
     """`bf10`: how much likelier the data are under an effect of the conditions than under none; `log_bf10` its log.
 
     `bf10` is inf beyond 1.8e308, `log_bf10` stands. None where F is infinite or undefined, for `reason`.
@@ -57,7 +58,7 @@ class _Factor:
 
 
 def rm_anova_bayes_factor(
-    scores: ArrayLike, fixed_scale: float = FIXED_SCALE, random_scale: float = RANDOM_SCALE
+    scores: ScoreTable, fixed_scale: float = FIXED_SCALE, random_scale: float = RANDOM_SCALE
 ) -> AnovaBayesFactor:
     """BF10 of a one-way repeated-measures ANOVA: conditions and participants against participants alone.
 
@@ -72,9 +73,7 @@ def rm_anova_bayes_factor(
     >>> round(rm_anova_bayes_factor(rates).bf10, 2)
     44.01
     """
-    array = check_scores(scores)
-    if array.ndim != 2:
-        raise ValueError(f"scores must have two axes (participants, conditions), not {array.ndim}")
+    array = one_table(check_scores(scores))
     n, k = array.shape
     sums = repeated_sums(array)
     effect, people, error = (float(part) for part in (sums.effect, sums.participants, sums.error))
@@ -88,7 +87,7 @@ def rm_anova_bayes_factor(
     )
 
 
-def one_way_bayes_factor(groups: Sequence[ArrayLike], fixed_scale: float = FIXED_SCALE) -> AnovaBayesFactor:
+def one_way_bayes_factor(groups: GroupTable, fixed_scale: float = FIXED_SCALE) -> AnovaBayesFactor:
     """BF10 of a one-way ANOVA between people: groups against none; they may differ in size.
 
     `groups`: k >= 2 arrays (n_i,). `ValueError` as in `one_way_anova`, or a scale that is not above 0. Equals R's

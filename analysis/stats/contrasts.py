@@ -7,12 +7,12 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import ArrayLike
 from scipy import special
 
-from analysis.stats.anova import check_scores, own_pairs
+from analysis.stats.anova import check_scores, one_table, own_pairs
 from analysis.stats.arrays import FloatArray, numbers, share
 from analysis.stats.corrections import Correction, corrected
+from analysis.stats.frames import Result, Results, ScoreTable
 from analysis.stats.paired import CONSTANT, EQUAL
 
 _UNBALANCED = 1e-9
@@ -20,7 +20,7 @@ _UNBALANCED = 1e-9
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class PlannedContrast:
+class PlannedContrast(Result):
     """One contrast: `estimate` is the sum of weights times means, `se` its own standard error, t on n - 1 df.
 
     `p_adjusted` is corrected for all contrasts asked for together; the interval is for this one alone. `d_z` is
@@ -42,11 +42,11 @@ class PlannedContrast:
 
 
 def planned_contrasts(
-    scores: ArrayLike,
+    scores: ScoreTable,
     weights: Mapping[str, Sequence[float]],
     correction: Correction = "none",
     confidence: float = 0.95,
-) -> tuple[PlannedContrast, ...]:
+) -> Results[PlannedContrast]:
     """Contrasts of conditions within people, each on its own error, so that none needs sphericity.
 
     With c_i = sum_j w_j x_ij of participant i: t = mean(c) / (sd(c) / sqrt(n)) on n - 1 degrees of freedom.
@@ -61,12 +61,10 @@ def planned_contrasts(
     >>> round(found.estimate, 4), round(found.t, 3), found.df
     (0.2875, 7.667, 3)
     """
-    array = check_scores(scores)
-    if array.ndim != 2:
-        raise ValueError(f"scores must have two axes (participants, conditions), not {array.ndim}")
+    array = one_table(check_scores(scores))
     tests = [_contrast(array, name, _checked(name, some, array.shape[1]), confidence) for name, some in weights.items()]
     adjusted = iter(corrected([test.p for test in tests if test.p is not None], correction).tolist())
-    return tuple(test if test.p is None else replace(test, p_adjusted=next(adjusted)) for test in tests)
+    return Results(test if test.p is None else replace(test, p_adjusted=next(adjusted)) for test in tests)
 
 
 def _checked(name: str, weights: Sequence[float], k: int) -> FloatArray:

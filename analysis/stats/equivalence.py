@@ -11,12 +11,13 @@ from scipy import special
 
 from analysis.stats.anova import own_pairs
 from analysis.stats.arrays import FloatArray, numbers
+from analysis.stats.frames import Result
 
 NO_VARIANCE = "There is no variance, so there is no test: the mean itself says on which side of the bounds it lies."
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Equivalence:
+class Equivalence(Result):
     """Two one-sided tests of `difference` against `low` and `high`; equivalent at `alpha` if `p` is below it.
 
     `p_low`: of a difference at or below `low`; `p_high`: at or above `high`; `p` is the larger. The interval has

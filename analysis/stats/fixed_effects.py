@@ -11,12 +11,13 @@ from numpy.typing import ArrayLike, NDArray
 from scipy import special
 
 from analysis.stats.arrays import FloatArray, by_row, numbers, share
+from analysis.stats.frames import Result, Results
 
 INTERCEPT = "intercept"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Coefficient:
+class Coefficient(Result):
     """One coefficient with its standard error, z = estimate / se, p of the normal distribution, and interval."""
 
     name: str
@@ -91,7 +92,7 @@ def columns_of(predictors: Mapping[str, ArrayLike], rows: int) -> PredictorColum
 
 def coefficients(
     names: Sequence[str], estimates: FloatArray, se: FloatArray, confidence: float
-) -> tuple[Coefficient, ...]:
+) -> Results[Coefficient]:
     """Wald tests and intervals of estimates (p,) with their standard errors (p,)."""
     z, half = estimates / se, -float(special.ndtri((1.0 - share(confidence, "confidence")) / 2.0)) * se
     rows = by_row(
@@ -102,4 +103,4 @@ def coefficients(
         ci_low=estimates - half,
         ci_high=estimates + half,
     )
-    return tuple(Coefficient(name=name, **row) for name, row in zip(names, rows, strict=True))
+    return Results(Coefficient(name=name, **row) for name, row in zip(names, rows, strict=True))

@@ -16,6 +16,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from analysis.stats.arrays import FloatArray, numbers
 from analysis.stats.fixed_effects import Coefficient, coefficients, columns_of, people_codes
+from analysis.stats.frames import Result
 
 TOO_FEW_PEOPLE = "There are fewer than two participants: nothing tells the spread between people from that of trials."
 NO_SPREAD_LEFT = "The predictors and the people explain every value exactly: there is no error to test against."
@@ -29,7 +30,7 @@ _SINGULAR = 1e-4
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class LinearMixedModel:
+class LinearMixedModel(Result):
     """The fitted model: coefficients in the unit of the values, SD between people and SD of a single trial.
 
     `person_sd` is 0 where people differ no more than chance has them. Empty where there is no fit, for `reason`.
@@ -41,6 +42,10 @@ class LinearMixedModel:
     people: int
     trials: int
     reason: str | None = None
+
+    def rows(self) -> list[dict[str, object]]:
+        """The coefficients, a row each."""
+        return [row for coefficient in self.coefficients for row in coefficient.rows()]
 
 
 def linear_mixed_model(

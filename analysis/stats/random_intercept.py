@@ -20,6 +20,7 @@ from scipy.optimize import linprog
 
 from analysis.stats.arrays import FloatArray, numbers
 from analysis.stats.fixed_effects import Coefficient, PredictorColumns, coefficients, columns_of, people_codes
+from analysis.stats.frames import Result
 from analysis.stats.logit_model import ONE_PERSON, ONE_TRIAL
 
 NODES = 25
@@ -39,7 +40,7 @@ NOT_FOUND = "The likelihood has no peak that could be found."
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class RandomInterceptLogit:
+class RandomInterceptLogit(Result):
     """The fitted model: log odds of a right answer for the person of u = 0, and how people differ.
 
     `person_sd`: SD of the people's own log odds; 0 if they differ no more than chance has them. Empty where there is no
@@ -52,6 +53,10 @@ class RandomInterceptLogit:
     people: int
     trials: int
     reason: str | None = None
+
+    def rows(self) -> list[dict[str, object]]:
+        """The coefficients, a row each."""
+        return [row for coefficient in self.coefficients for row in coefficient.rows()]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
