@@ -281,3 +281,11 @@ def test_scores_refuse_what_is_no_rate_or_time(score: object) -> None:
     for rates, times in (([1.1], [0.5]), ([0.5], [0.0]), ([0.5, 0.6], [0.5])):
         with pytest.raises(ValueError, match="correct_rate"):
             score(rates, times)
+
+
+def test_no_time_has_no_density_and_neither_end_of_time_has_any() -> None:
+    times = [math.nan, -1.0, 0.0, math.inf]
+    assert str(log_density(times, True, 1.0, 1.0, 0.5).tolist()) == "[nan, -inf, -inf, -inf]"  # type: ignore[union-attr]
+    after = distribution(times, True, 1.0, 1.0, 0.5)
+    assert str(after[:3].tolist()) == "[nan, 0.0, 0.0]"  # type: ignore[index]
+    assert after[3] == pytest.approx(moments(1.0, 1.0).upper, rel=1e-14)  # type: ignore[index]

@@ -109,6 +109,12 @@ def test_results_of_pairs_are_a_tuple_and_a_table() -> None:
     assert "<td>vibration</td>" in found._repr_html_()
 
 
+def test_within_subject_intervals_are_a_row_a_condition_with_its_name() -> None:
+    table = cousineau_morey(WIDE).to_frame()
+    assert table["conditions"].tolist() == list(METHODS)
+    assert table["means"].tolist() == pytest.approx(WIDE.mean().tolist())
+
+
 def test_results_within_a_result_stand_under_both_names() -> None:
     row = sphericity(RIGHT).rows()[0]
     assert row["greenhouse_geisser_epsilon"] == sphericity(RIGHT).greenhouse_geisser.epsilon  # type: ignore[union-attr]

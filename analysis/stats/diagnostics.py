@@ -11,9 +11,9 @@ import pandas as pd
 from scipy import special, stats
 from scipy.optimize import brentq
 
-from analysis.stats.anova import RepeatedMeasuresAnova, check_scores, one_table, rm_anova
+from analysis.stats.anova import RepeatedMeasuresAnova, check_scores, one_table, rm_anova, scores_and_names
 from analysis.stats.arrays import FloatArray, pingouin, share
-from analysis.stats.frames import Result, Results, ScoreTable, named_scores
+from analysis.stats.frames import Label, Result, Results, ScoreTable, named_scores
 from analysis.stats.sums_of_squares import repeated_sums
 
 
@@ -321,15 +321,20 @@ def _above(excess: Callable[[float], float], start: float) -> float:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class WithinSubject(Result):
-    """Means of the conditions and their intervals, arrays (conditions,).
+    """Means of the `conditions` and their intervals, arrays (conditions,).
 
     `half_widths` keep their digits also where the means are so large that their ends cannot show them.
     """
 
+    conditions: tuple[Label, ...]
     means: FloatArray
     half_widths: FloatArray
     ci_low: FloatArray
     ci_high: FloatArray
+
+    def rows(self) -> list[dict[str, object]]:
+        """The conditions, a row each."""
+        return [row | {"conditions": name} for name, row in zip(self.conditions, Result.rows(self), strict=True)]
 
 
 def cousineau_morey(scores: ScoreTable, confidence: float = 0.95) -> WithinSubject:
@@ -343,12 +348,13 @@ def cousineau_morey(scores: ScoreTable, confidence: float = 0.95) -> WithinSubje
     >>> cousineau_morey([[1, 2, 3], [5, 6, 7]]).ci_low.tolist()
     [3.0, 4.0, 5.0]
     """
-    array = one_table(check_scores(scores))
-    n, k = array.shape
+    array, names = scores_and_names(scores)
+    n, k = one_table(array).shape
     t = special.stdtrit(n - 1, 0.5 + share(confidence, "confidence") / 2.0)
     spread = np.sqrt(np.square(residuals(array)).sum(axis=0) / (n - 1))
     exponent = np.frexp(np.abs(array).max())[1]
     half = np.ldexp(t * spread / math.sqrt(n) * math.sqrt(k / (k - 1)), exponent)
     means = np.ldexp(unit_scaled(array).mean(axis=0), exponent)
     with np.errstate(over="ignore"):
-        return WithinSubject(means=means, half_widths=half, ci_low=means - half, ci_high=means + half)
+        low, high = means - half, means + half
+    return WithinSubject(conditions=tuple(names), means=means, half_widths=half, ci_low=low, ci_high=high)

@@ -34,7 +34,7 @@ from experiments.config.door import Model
 from experiments.design.language import Level
 
 RequestKind = Literal["contrasts", "equivalence", "bayes-factor", "mixed-model", "logistic"]
-Result = tuple[PlannedContrast, ...] | Equivalence | AnovaBayesFactor | LinearMixedModel | RandomInterceptLogit
+AnyResult = tuple[PlannedContrast, ...] | Equivalence | AnovaBayesFactor | LinearMixedModel | RandomInterceptLogit
 
 
 class _OfData(Model):
@@ -102,7 +102,7 @@ class Requested:
     question: str | None
     people: int
     note: str
-    result: Result
+    result: AnyResult
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -154,7 +154,7 @@ def answer_to(request: AnyRequest, data: RequestData) -> Requested:
     )
 
 
-def _contrasts(request: ContrastsRequest, data: RequestData) -> tuple[str, Result]:
+def _contrasts(request: ContrastsRequest, data: RequestData) -> tuple[str, AnyResult]:
     for weights in request.weights.values():
         for name in weights:
             _column(data, name)
@@ -167,7 +167,7 @@ def _contrasts(request: ContrastsRequest, data: RequestData) -> tuple[str, Resul
     return note, planned_contrasts(_table(data), wide, request.correction)
 
 
-def _equivalence(request: EquivalenceRequest, data: RequestData) -> tuple[str, Result]:
+def _equivalence(request: EquivalenceRequest, data: RequestData) -> tuple[str, AnyResult]:
     _table(data)
     first, bounds = _column(data, request.a), (request.low, request.high, request.alpha)
     what = request.a if request.b is None else f"{request.a} − {request.b}"
@@ -181,7 +181,7 @@ def _equivalence(request: EquivalenceRequest, data: RequestData) -> tuple[str, R
     return note, tost_paired(first, _column(data, request.b), *bounds)
 
 
-def _bayes_factor(request: BayesFactorRequest, data: RequestData) -> tuple[str, Result]:
+def _bayes_factor(request: BayesFactorRequest, data: RequestData) -> tuple[str, AnyResult]:
     within = len(data.factors)
     if data.grouped or within > 1:
         raise ValueError("a Bayes factor is of one factor within people, and there are more")
@@ -193,7 +193,7 @@ def _bayes_factor(request: BayesFactorRequest, data: RequestData) -> tuple[str, 
     return note, rm_anova_bayes_factor(_table(data), request.scale)
 
 
-def _mixed_model(request: MixedModelRequest, data: RequestData) -> tuple[str, Result]:
+def _mixed_model(request: MixedModelRequest, data: RequestData) -> tuple[str, AnyResult]:
     note = (
         "Linear mixed model of single trials with a random intercept a person, fitted by REML (statsmodels "
         f"{version('statsmodels')}); Wald tests on the normal distribution.{_references(request.terms, data)}"
@@ -202,7 +202,7 @@ def _mixed_model(request: MixedModelRequest, data: RequestData) -> tuple[str, Re
     return note, linear_mixed_model(trials["score"], list(trials["participant_id"]), _predictors(request.terms, data))
 
 
-def _logistic(request: LogisticRequest, data: RequestData) -> tuple[str, Result]:
+def _logistic(request: LogisticRequest, data: RequestData) -> tuple[str, AnyResult]:
     trials = data.trials
     if not trials["score"].isin((0.0, 1.0)).all():
         raise ValueError("a logistic model is of answers that are right or wrong, or one of two; take mixed-model")
