@@ -182,9 +182,11 @@ def test_a_second_log_of_a_participant_is_a_problem_whatever_the_case_of_the_cod
 
 
 def test_missing_paths_and_folders_without_logs_are_problems(tmp_path: Path) -> None:
-    messages = [str(problem) for problem in read_logs([tmp_path / "nowhere.csv", tmp_path]).problems]
-    assert "no such file or folder" in messages[0]
-    assert "in this folder" in messages[1]
+    problems = {
+        problem.file.name: problem.message for problem in read_logs([tmp_path / "nowhere.csv", tmp_path]).problems
+    }
+    assert problems["nowhere.csv"] == "no such file or folder"
+    assert problems[tmp_path.name].endswith("in this folder")
 
 
 def _journal(table: Path, record: str) -> Path:

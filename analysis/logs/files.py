@@ -66,7 +66,7 @@ class Problem:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Found:
+class FoundFiles:
     """Logs and journals by their paths, each with the folder that stands for its study; and what cannot be read."""
 
     logs: Mapping[str, str]
@@ -74,7 +74,7 @@ class Found:
     problems: tuple[Problem, ...]
 
 
-def find_logs(paths: Sequence[Path], endings: tuple[str, ...] = ENDINGS) -> Found:
+def find_logs(paths: Sequence[Path], endings: tuple[str, ...] = ENDINGS) -> FoundFiles:
     """The files in `paths`, each once, with the folder that stands for its study; files in folders by their endings.
 
     Logs of practices are left out; journals are all there. All comes in the order of real paths, whatever the order of
@@ -96,7 +96,7 @@ def find_logs(paths: Sequence[Path], endings: tuple[str, ...] = ENDINGS) -> Foun
     in_order = [log for _, log in sorted(found.items(), key=lambda one: one[0].split(os.sep))]  # noqa: PTH206 - many
     journals = {log: study for log, study in in_order if _is_journal(log)}
     logs_found = {log: study for log, study in in_order if log not in journals and _is_counted(log)}
-    return Found(logs=logs_found, journals=journals, problems=tuple(problems))
+    return FoundFiles(logs=logs_found, journals=journals, problems=tuple(problems))
 
 
 _JOURNALS = ".jsonl"

@@ -89,7 +89,7 @@ def _own(paths: Sequence[Path], logs: Logs) -> OwnTrials:
     """The trials with the participants' own times. `PlaceError` without enough of them."""
     where = ", ".join(map(str, paths))
     if not len(logs.trials):
-        reasons = [str(problem) for problem in logs.problems]
+        reasons = [str(one) for one in (*logs.problems, *logs.begun)]
         raise PlaceError("\n".join([f"no usable log of experiment 1 in {where}", *reasons]))
     methods = [str(name) for name in logs.trials["method"].cat.categories]
     own = own_trials(logs.trials, methods)
