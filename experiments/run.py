@@ -25,7 +25,15 @@ from experiments.load import check_limits
 from experiments.rebuild import began_with, table
 from experiments.record import replay, storage
 from experiments.record.dictionary import design_dictionary
-from experiments.record.journal import Contents, Journal, JournalError, begun, hold_journal, read_journal
+from experiments.record.journal import (
+    Contents,
+    Journal,
+    JournalError,
+    ParticipantKind,
+    begun,
+    hold_journal,
+    read_journal,
+)
 from experiments.record.provenance import provenance
 from experiments.record.replay import RunPosition
 from experiments.runner import carry_out, gun_name
@@ -96,6 +104,11 @@ class RunRequest:
     def simulated(self) -> bool:
         """Whether a synthetic participant answers."""
         return self.screen == "synthetic" or self.visual
+
+    @property
+    def participant_kind(self) -> ParticipantKind:
+        """Who does the run, as the journal's head says it."""
+        return "synthetic" if self.simulated else "person"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -181,7 +194,10 @@ def _before(where: Place, request: RunRequest, clock: Clock) -> Contents | None:
         if not anew:
             raise
         contents = None
-    _refuse_finished(where, contents)
+    if contents is not None and _gives_way(contents, request):
+        request, anew = replace(request, anew_reason=GAVE_WAY), True
+    else:
+        _refuse_finished(where, contents)
     if contents is not None and not anew:
         if request.again == "ask":
             raise UnfinishedRun(where, contents)
@@ -190,6 +206,15 @@ def _before(where: Place, request: RunRequest, clock: Clock) -> Contents | None:
     _record_reason(where, request.anew_reason, clock)
     folders.set_aside(where)
     return None
+
+
+GAVE_WAY = "a synthetic run, which gave way to a person's"
+
+
+def _gives_way(contents: Contents, request: RunRequest) -> bool:
+    """Whether a synthetic run stands where a person comes to: it does not use up their place."""
+    synthetic = contents.head.participant == "synthetic"
+    return synthetic and not request.simulated and not request.practice and request.again != "resume"
 
 
 def _record_reason(where: Place, reason: str, clock: Clock) -> None:
@@ -209,9 +234,10 @@ def _refuse_finished(where: Place, contents: Contents | None) -> None:
 
 def _new_plan(request: RunRequest, place: Place, registered: Register) -> Plan:
     setup, seed = request.setup, resolve_seed(request)
-    group = balance.group_of_next_run(setup, place.results, registered)
+    by = request.participant_kind
+    group = balance.group_of_next_run(setup, place.results, registered, by=by)
     if not request.practice:
-        row = balance.row_of_next_run(setup, place.results, registered)
+        row = balance.row_of_next_run(setup, place.results, registered, by=by)
         return plan_of(setup.config, place.participant_id, seed, row=row, group=group)
     plan = practice_of(setup.config, place.participant_id, seed, group=group)
     if plan is None:
@@ -270,7 +296,8 @@ def _begin(
     """Write the head of a new journal."""
     setup, why = request.setup, {"set_aside_reason": request.anew_reason} if request.anew_reason else {}
     laws = {} if setup.laws is None else {"laws": setup.laws.model_dump(mode="json")}
-    plan_head = {"plan": plan.record(), "plan_sha256": plan.sha256(), **why, **laws}
+    who = {"participant": request.participant_kind}
+    plan_head = {"plan": plan.record(), "plan_sha256": plan.sha256(), **who, **why, **laws}
     journal.append("run", **plan_head, setup=setup.record(), setup_sha256=setup.sha256(), **head)
     return RunPosition(step=next(session))
 

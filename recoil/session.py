@@ -132,7 +132,8 @@ _SCREENS: dict[ScreenName, Callable[[RunRequest], Finished]] = {
 def run_lab_day(request: RunRequest) -> None:
     """The start window at the console, and one run after the other from it; `request` is without a participant."""
     if request.screen != "console":
-        raise PlaceError("give --participant CODE, or --screen console for its start window")
+        code = "S01, or another code of a synthetic participant" if request.screen == "synthetic" else "CODE"
+        raise PlaceError(f"who runs? Add --participant {code}; --screen console has a start window that asks")
     if request.again != "ask" or request.visual or request.practice:
         raise PlaceError(
             "--resume, --fresh, --practice and --visual go with --participant CODE; the start window asks by itself"

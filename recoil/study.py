@@ -13,10 +13,10 @@ from analysis.report.terminal import with_tables
 from experiments.clock import RealClock, date_text
 from experiments.study import enrolment
 from experiments.study.folders import Overview, PlaceError, StudyFolder, open_study, overview
-from experiments.study.study import Facts, Participant, RunProgress, eligible
+from experiments.study.study import Facts, Participant, RunProgress, eligible, taking_part
 
 _OPTIONS = {"age_years": "--age", "sex": "--sex", "handedness": "--handedness"}
-_UNDER_WAY = ("in progress", "open elsewhere")
+_UNDER_WAY = ("in progress", "open elsewhere", "synthetic")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -142,20 +142,24 @@ def _cells(found: StudyStatus, one: Participant) -> Iterator[str]:
 def _state(run: RunProgress) -> str:
     counts = f", {run.answered} of {run.planned} trials, last record {date_text(run.last_utc)}"
     lines = [f"{run.state}{counts if run.state in _UNDER_WAY and run.planned else ''}", " > ".join(run.methods)]
-    return "\n".join(filter(None, [*lines, "practice done" if run.practised else ""]))
+    gun = "on a simulated gun" if run.data == "simulated gun" else ""
+    return "\n".join(filter(None, [*lines, gun, "practice done" if run.practised else ""]))
 
 
 def _count_lines(found: StudyStatus) -> Iterator[str]:
-    taking_part = [one for one in found.overview.participants if one.excluded is None]
-    done = sum(all(run.state == "done" for run in one.runs) for one in taking_part)
-    excluded = len(found.overview.participants) - len(taking_part)
+    people = found.overview.participants
+    done = sum(all(run.state == "done" for run in one.runs) for one in taking_part(people))
+    excluded = sum(one.excluded is not None for one in people)
     yield f"{done} of {found.study.config.participants} participants done, {excluded} excluded"
+    if synthetic := [run for one in people for run in one.runs if run.state == "synthetic"]:
+        runs = f"{len(synthetic)} run{'s' if len(synthetic) > 1 else ''} of synthetic participants"
+        yield f"{runs}: not counted, and set aside when a person comes to that code and experiment"
 
 
 def _next_lines(found: StudyStatus) -> Iterator[str]:
     coming = found.overview.next
     if coming is None:
-        yield f"Next: {_nobody([one for one in found.overview.participants if one.excluded is None])}"
+        yield f"Next: {_nobody(taking_part(found.overview.participants))}"
         return
     yield f"Next: {coming.participant_id}{' (new)' if coming.new else ''}"
     for run in coming.runs:
@@ -164,8 +168,8 @@ def _next_lines(found: StudyStatus) -> Iterator[str]:
         yield f"  {run.experiment}: {' > '.join(methods) if methods else 'order drawn when the run begins'}{go_on}"
 
 
-def _nobody(taking_part: list[Participant]) -> str:
-    if any(run.state == "unreadable" for one in taking_part for run in one.runs):
+def _nobody(people: list[Participant]) -> str:
+    if any(run.state == "unreadable" for one in people for run in one.runs):
         return "nobody who can be named, see what could not be read"
-    elsewhere = [one.participant_id for one in taking_part if one.is_elsewhere]
+    elsewhere = [one.participant_id for one in people if one.is_elsewhere]
     return f"nobody waits; at a console now: {', '.join(elsewhere)}" if elsewhere else "nobody, the study is done"

@@ -179,7 +179,9 @@ def study(tmp_path: Path) -> StudyFolder:
 def broken_off(study: StudyFolder, code: str = "P01") -> Path:
     """A run of experiment 1 that was broken off; its journal."""
     journal = run(
-        RunRequest(setup=study.setups[0], participant_id=code, results=study.results), synthetic_screen, VirtualClock()
+        RunRequest(setup=study.setups[0], participant_id=code, results=study.results, screen="terminal"),
+        synthetic_screen,
+        VirtualClock(),
     ).place.journal
     journal.write_bytes(b"".join(journal.read_bytes().splitlines(keepends=True)[:40]))
     return journal

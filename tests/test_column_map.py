@@ -140,7 +140,10 @@ scale_max = 7
 def test_recoils_own_logs_may_lie_beside_them(tmp_path: Path) -> None:
     write_study(tmp_path / "both", participants=1)
     _write(tmp_path / "both" / "P02_old.csv", _psychopy(trial_rows("P02", 2)))
-    logs = _read(tmp_path / "both")
+    synthetic = EXAMPLE.read_text(encoding="utf-8").replace(
+        'response_source = "participant"', 'response_source = "synthetic"'
+    )
+    logs = _read(tmp_path / "both", synthetic)
     assert (logs.problems, len(logs.trials), len(logs.ratings)) == ((), 120, 3)
 
 

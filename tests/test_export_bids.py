@@ -114,7 +114,7 @@ def real(tmp_path_factory: pytest.TempPathFactory) -> Path:
 @pytest.fixture(scope="module")
 def exported(real: Path) -> Path:
     """The data set made of it, to look at."""
-    feature.export(real, real.parent / "bids")
+    feature.export(real, real.parent / "bids", include_synthetic=True)
     return real.parent / "bids"
 
 
@@ -131,7 +131,7 @@ def tree(folder: Path) -> dict[str, bytes]:
 
 
 def test_the_official_validator_finds_only_what_people_must_fill_in(recoil: Recoil, real: Path, tmp_path: Path) -> None:
-    for more in ([], ["--free-text"]):
+    for more in (["--include-synthetic"], ["--include-synthetic", "--free-text"]):
         done = recoil("export", "bids", real, "--out", "bids", *more)
         assert done.returncode == 1, done
         assert "2 of 6 logs have no journal beside them, as the others have, so nothing proves them: Z9" in done.stderr
@@ -247,7 +247,7 @@ def test_text_stays_in_its_cell(text: str) -> None:
 
 
 def test_json_gives_the_counts(recoil: Recoil, real: Path) -> None:
-    done = recoil("export", "bids", real, "--out", "bids", "--json")
+    done = recoil("export", "bids", real, "--out", "bids", "--include-synthetic", "--json")
     counts = json.loads(done.stdout)
     assert "2 of 6 logs have no journal" in counts.pop("remarks")[0]
     assert counts == {
@@ -264,13 +264,24 @@ def test_json_gives_the_counts(recoil: Recoil, real: Path) -> None:
 
 
 def test_the_data_set_is_for_its_owner_alone(recoil: Recoil, real: Path, tmp_path: Path) -> None:
-    recoil("export", "bids", real, "--out", "new/bids")
+    recoil("export", "bids", real, "--out", "new/bids", "--include-synthetic")
     made = [tmp_path / "new", *(tmp_path / "new").rglob("*")]
     assert len(made) > 12
     assert all(path.stat().st_mode & 0o077 == 0 for path in made)
 
 
 # what is left out
+
+
+def test_synthetic_logs_beside_a_persons_are_left_out_unless_asked_for(
+    recoil: Recoil, real: Path, tmp_path: Path
+) -> None:
+    done = recoil("export", "bids", real, "--out", "bids")
+    assert (done.returncode, done.stderr.count("is of synthetic participants, beside logs of people at a gun")) == (
+        1,
+        4,
+    )
+    assert [row["participant_id"] for row in table(tmp_path / "bids", "participants.tsv")] == ["sub-Z9"]
 
 
 def test_broken_logs_are_listed_and_the_rest_is_exported(recoil: Recoil, tmp_path: Path) -> None:

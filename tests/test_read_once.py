@@ -39,7 +39,9 @@ def study(tmp_path: Path) -> StudyFolder:
 
 
 def asked(study: StudyFolder, code: str, **more: Any) -> RunRequest:
-    return RunRequest(setup=study.setups[1], participant_id=code, results=study.results, seed=1, **more)
+    return RunRequest(
+        setup=study.setups[1], participant_id=code, results=study.results, seed=1, screen="terminal", **more
+    )
 
 
 @pytest.fixture

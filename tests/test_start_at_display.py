@@ -47,7 +47,7 @@ def pilot(tmp_path: Path) -> Path:
     """A study in which P01 stopped, in a folder with a long name."""
     new_study(tmp_path / "pilot")
     setup = load_setup(str(tmp_path / "pilot" / "direction.toml"))
-    where = RunRequest(setup=setup, participant_id="P01", results=tmp_path / LONG, seed=1)
+    where = RunRequest(setup=setup, participant_id="P01", results=tmp_path / LONG, seed=1, screen="terminal")
     journal = run(where, synthetic_screen, VirtualClock()).place.journal
     journal.write_bytes(b"".join(journal.read_bytes().splitlines(keepends=True)[:40]))
     return tmp_path

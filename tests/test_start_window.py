@@ -91,7 +91,9 @@ def do(study: StudyFolder, code: str, experiment: str = "direction", records: in
 def whole_run(code: str, experiment: str) -> list[bytes]:
     """The lines of the journal of a run with the shipped configs."""
     with tempfile.TemporaryDirectory() as results:
-        request = RunRequest(setup=load_setup(experiment), participant_id=code, results=Path(results))
+        request = RunRequest(
+            setup=load_setup(experiment), participant_id=code, results=Path(results), screen="terminal"
+        )
         return run(request, synthetic_screen, VirtualClock()).place.journal.read_bytes().splitlines(keepends=True)
 
 
@@ -790,7 +792,7 @@ def test_a_window_that_is_closed_in_a_test_shot_stops_it_first(opened: Open) -> 
 def test_the_table_shows_practice_and_no_numbers_of_its_own(study: StudyFolder, opened: Open) -> None:
     setup = study.setups[0]
     run(
-        RunRequest(setup=setup, participant_id="P01", results=study.results, practice=True),
+        RunRequest(setup=setup, participant_id="P01", results=study.results, practice=True, screen="terminal"),
         synthetic_screen,
         VirtualClock(),
     )

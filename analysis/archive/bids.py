@@ -247,10 +247,10 @@ def is_ours(path: str) -> bool:
     return bool(_OURS.fullmatch(path))
 
 
-def runs_of(logs: Logs) -> Runs:
+def runs_of(*logs: Logs) -> Runs:
     """The runs in the logs. A code that differs from another in case alone would share its folder: it is left out."""
     runs, problems, known = [], list[str](), dict[str, str]()
-    for run in _all_runs(logs):
+    for run in (run for part in logs for run in _all_runs(part)):
         first = known.setdefault(run.participant_id.casefold(), run.participant_id)
         if first != run.participant_id:
             rule = f"differs from {first!r} in case alone (rule: one code a participant)"

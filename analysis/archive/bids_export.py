@@ -14,7 +14,9 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from analysis.archive import bids
+from analysis.logs.column_map import ColumnMap
 from analysis.logs.reading import Logs, Track, read_logs, refuse_nothing
+from experiments.config.door import load
 from experiments.load import load_study
 from experiments.record import storage
 from experiments.record.provenance import recoil_version
@@ -47,9 +49,18 @@ class Exported:
     begun: tuple[str, ...] = ()
 
 
-def export(folder: Path, out: Path, *, free_text: bool = False, track: Track = iter) -> Exported:
+def export(
+    folder: Path,
+    out: Path,
+    *,
+    free_text: bool = False,
+    columns: Path | None = None,
+    include_synthetic: bool = False,
+    track: Track = iter,
+) -> Exported:
     """Write the usable logs in `folder` as the data set `out`; an earlier export there is replaced.
 
+    With `include_synthetic` data of people and of synthetic participants come into one set, where each is marked.
     `PlaceError` if no log is usable, if they are of several studies, or if `out` holds what no export wrote;
     `RegisterError` if the register cannot be trusted, since someone who was excluded might be published.
     """
@@ -57,10 +68,11 @@ def export(folder: Path, out: Path, *, free_text: bool = False, track: Track = i
         raise PlaceError(f"{folder}: no such folder; name the folder that holds the logs")
     target = out.resolve()
     earlier = _earlier(target)
-    logs = read_logs([folder], track)
+    mapping = load(ColumnMap, columns) if columns else None
+    logs = read_logs([folder], track, mapping, include_synthetic=include_synthetic)
     refuse_nothing([folder], logs)
     results = _results(folder, logs)
-    runs = bids.runs_of(logs)
+    runs = bids.runs_of(logs, *logs.apart)
     files = bids.data_set(runs, _members(results), _name(results), recoil_version(), free_text=free_text)
     _put(target, files | _filled_in(earlier, files))
     by_task = {task: [run for run in runs.runs if run.experiment == task] for task in runs.tasks}
@@ -110,7 +122,8 @@ def _read_json(path: Path) -> dict[str, object]:
 
 def _results(folder: Path, logs: Logs) -> Path:
     """The results folder whose logs these are. `PlaceError` if there are several: P01 here may not be P01 there."""
-    found = {file.parent.parent if file.parent.name.startswith("sub-") else folder for file in logs.files}
+    files = [file for part in (logs, *logs.apart) for file in part.files]
+    found = {file.parent.parent if file.parent.name.startswith("sub-") else folder for file in files}
     if len(found) > 1:
         shown = ", ".join(sorted(map(str, found)))
         raise PlaceError(f"{folder}: holds the logs of several studies ({shown}); export each by itself")

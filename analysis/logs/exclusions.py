@@ -172,7 +172,10 @@ def by_study(logs: Logs) -> dict[str, Logs]:
     names = sorted({str(name) for table in (logs.trials, logs.ratings) for name in table[STUDY].unique()})
     if len(names) < 2:
         return {}
-    return {name: replace(logs, trials=_alone(logs.trials, name), ratings=_alone(logs.ratings, name)) for name in names}
+    alone = replace(logs, apart=())
+    return {
+        name: replace(alone, trials=_alone(logs.trials, name), ratings=_alone(logs.ratings, name)) for name in names
+    }
 
 
 def _alone(table: pd.DataFrame, study: str) -> pd.DataFrame:

@@ -10,8 +10,9 @@ import os
 from collections import deque
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from concurrent.futures import Future, ThreadPoolExecutor
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
+from typing import get_args
 
 import pandas as pd
 
@@ -28,9 +29,11 @@ from analysis.logs.files import (
     study_names,
 )
 from analysis.logs.journals import BegunRun, RunFile, compared, gone, made_again, run_file, without_table
+from analysis.logs.kinds import kept_out, kind_of_design, kinds_of, kinds_there
 from analysis.logs.rules import Log, check_logs
 from analysis.logs.texts import Block, TextTable, joined, table_of_records, text_tables
 from experiments.record import tables
+from experiments.record.tables import DataKind
 from experiments.study import register
 from experiments.study.folders import PlaceError
 from experiments.study.study import Member
@@ -53,7 +56,8 @@ Track = Callable[[Sequence[Path]], Iterable[Path]]
 class Logs:
     """The rows of all good files, with the columns of `experiments.record.tables` and the study; empty cells are NA.
 
-    With several studies a participant is `study/code`: the same code in another study is another person.
+    With several studies a participant is `study/code`: the same code in another study is another person. All rows are
+    of one `kind` of data; those of other kinds, if they were asked for, are logs of their own, `apart`.
     """
 
     trials: pd.DataFrame
@@ -74,6 +78,9 @@ class Logs:
         """What a participant is called in the tables."""
         several = len(set(self.names.values())) > 1
         return f"{self.names.get(study, Path(study).name)}/{code}" if several else code
+
+    kind: DataKind = "real"
+    apart: tuple[Logs, ...] = ()
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -97,6 +104,8 @@ class _Batch:
     """Logs of other programs."""
     journals: dict[int, str | None] = field(default_factory=dict)
     """Of logs of our own what there is to say of their journals, `None` where there is none."""
+    kinds: dict[int, DataKind | None] = field(default_factory=dict)
+    """Whose data each good log holds; None where nobody answered."""
 
 
 @dataclass(slots=True, kw_only=True)
@@ -108,8 +117,11 @@ class _Reading:
     studies: dict[int, str] = field(default_factory=dict)
     """The study's folder of each good log."""
     codes: dict[int, str] = field(default_factory=dict)
-    firsts: dict[tuple[str, str, str], int] = field(default_factory=dict)
-    """The first log of each study, experiment and code, upper and lower case alike."""
+    experiments: dict[int, str] = field(default_factory=dict)
+    kinds: dict[int, DataKind | None] = field(default_factory=dict)
+    """Whose data each good log holds; None where nobody answered."""
+    earlier: dict[tuple[str, str, str], list[int]] = field(default_factory=dict)
+    """The logs of each study, experiment and code, upper and lower case alike."""
     files: dict[int, Path] = field(default_factory=dict)
     """The files of good logs, numbered."""
     members: dict[str, Mapping[str, Member]] = field(default_factory=dict)
@@ -121,6 +133,7 @@ class _Reading:
     def add(self, waiting: Sequence[_Waiting], batch: _Batch) -> None:
         """Take over the logs of some files."""
         self.blocks += batch.blocks
+        self.kinds |= batch.kinds
         files = {one.number: one for one in waiting}
         for number, log in sorted(batch.logs.items()):
             one, mapped = files[number // _LOGS_A_FILE], batch.mapped.get(number)
@@ -151,7 +164,7 @@ class _Reading:
             how = f"`recoil study DIR --readmit {log.code} --reason TEXT`"
             raise BadLogError(f"participant {log.code} is excluded: {reason} ({how} readmits them)")
         self._check_new(study, log, number)
-        self.studies[number], self.codes[number] = study, log.code
+        self.studies[number], self.codes[number], self.experiments[number] = study, log.code, log.experiment
         self.files[number // _LOGS_A_FILE] = one.file
 
     def known(self, results: str) -> Mapping[str, Member]:
@@ -165,21 +178,56 @@ class _Reading:
         return self.members[results]
 
     def _check_new(self, study: str, log: Log, number: int) -> None:
-        first = self.firsts.setdefault((study, log.experiment, log.code.casefold()), number)
-        if first != number:
+        earlier = self.earlier.setdefault((study, log.experiment, log.code.casefold()), [])
+        first = next((one for one in earlier if self._go_together(one, number)), None)
+        if first is not None:
             there = self.codes[first]
             name = f"participant {log.code!r}" if log.code == there else f"participant {log.code!r} (there {there!r})"
             rule = "(rule: one log a participant and experiment, upper and lower case alike)"
             message = f"{name} has a {log.experiment} log already in {self.files[first // _LOGS_A_FILE]} {rule}"
             raise BadLogError(message, None, "participant_id")
+        earlier.append(number)
+
+    def keep_out(self, first: DataKind) -> None:
+        """Leave out the logs of other kinds of data than the first that is there."""
+        for number in [*self.studies]:
+            kind = self.kinds[number] or first
+            if kind != first:
+                file, study = self.files[number // _LOGS_A_FILE], self.studies.pop(number)
+                bad = BadLogError(kept_out(kind, first))
+                self.problems.append(bad.of(file, self.codes[number], self.experiments[number], study))
+
+    def runs_by_kind(self, runs: Iterable[RunFile], first: DataKind) -> Mapping[DataKind, list[RunFile]]:
+        """The runs that journals tell of, by the kind of data that they gave; without any, they are of the first."""
+        kinds = {
+            (study, self.codes[number], self.experiments[number]): self.kinds[number] or first
+            for number, study in self.studies.items()
+        }
+        found: dict[DataKind, list[RunFile]] = {kind: [] for kind in get_args(DataKind)}
+        for run in runs:
+            found[kinds.get((run.study, run.participant, run.experiment), first)].append(run)
+        return found
+
+    def _go_together(self, one: int, other: int) -> bool:
+        """Whether two logs may come into one table; where nobody answered, a log goes with all."""
+        return self.kinds[one] == self.kinds[other] or None in (self.kinds[one], self.kinds[other])
 
 
-def read_logs(paths: Iterable[str | Path], track: Track = iter, mapping: ColumnMap | None = None) -> Logs:
+def read_logs(
+    paths: Iterable[str | Path],
+    track: Track = iter,
+    mapping: ColumnMap | None = None,
+    *,
+    include_synthetic: bool = False,
+) -> Logs:
     """The logs in `paths`, files or folders (searched through for `*_trials.csv` and `*_ratings.csv`).
 
     Files with `practice` in their name are not read. A bad file, a missing path or a second log of the same participant
     for an experiment in a study is a `Problem`, never an exception. `track` is given the files and gives them back one
     by one: for a progress bar. With a `mapping`, files without the header of Recoil's own tables are read by it.
+
+    Data of people at a gun, at a simulated gun, and of synthetic participants are never put together: beside the first
+    of these kinds that is there, logs of the others are problems; with `include_synthetic` they stand `apart`.
     """
     endings = mapping.files_end_with if mapping else ()
     files = find_logs([Path(path) for path in paths], (*ENDINGS, *endings))
@@ -192,20 +240,37 @@ def read_logs(paths: Iterable[str | Path], track: Track = iter, mapping: ColumnM
         reading.add(waiting, batch)
     designs = _designed(reading, {path: every[path] for path in every if path not in found}, track, len(found), made)
     reading.remarks += gone(reading.proven)
-    names = study_names(folder for folder in set(reading.studies.values()) if Path(folder).is_absolute())
-    studies = {number: names.get(study, study) for number, study in reading.studies.items()}
-    by_design = _by_design(reading, designs, studies)
+    kinds = kinds_there(reading.kinds[number] for number in reading.studies)
+    if not include_synthetic:
+        reading.keep_out(kinds[0])
+    first, *apart = [_of_kind(reading, designs, kind, kinds[0]) for kind in (kinds if include_synthetic else kinds[:1])]
+    runs_of = reading.runs_by_kind(runs, kinds[0])
+    return replace(
+        first,
+        problems=tuple(sorted(reading.problems, key=_by_place)),
+        remarks=tuple(reading.remarks),
+        begun=tuple(begun),
+        runs=tuple(runs_of[kinds[0]]),
+        joined=tuple((os.path.realpath(where), code) for where, codes in reading.members.items() for code in codes),
+        apart=tuple(replace(part, runs=tuple(runs_of[part.kind])) for part in apart),
+    )
+
+
+def _of_kind(reading: _Reading, designs: dict[int, DesignLog], kind: DataKind, first: DataKind) -> Logs:
+    """The good logs of one kind of data; where nobody answered, they count as of the first."""
+    mine = {number: study for number, study in reading.studies.items() if (reading.kinds[number] or first) == kind}
+    names = study_names(folder for folder in set(mine.values()) if Path(folder).is_absolute())
+    studies = {number: names.get(study, study) for number, study in mine.items()}
+    by_design = _by_design(reading, {number: log for number, log in designs.items() if number in mine}, studies)
+    files = {number // _LOGS_A_FILE for number in mine}
     return Logs(
         trials=joined("direction", reading.blocks, studies),
         ratings=joined("preference", reading.blocks, studies),
         designs=by_design,
-        problems=tuple(sorted(reading.problems, key=_by_place)),
-        files=tuple(reading.files.values()),
-        remarks=tuple(reading.remarks),
-        begun=tuple(begun),
-        runs=tuple(runs),
-        joined=tuple((os.path.realpath(where), code) for where, codes in reading.members.items() for code in codes),
-        names={study: names.get(study, study) for study in reading.studies.values()},
+        problems=(),
+        files=tuple(file for number, file in reading.files.items() if number in files),
+        names={study: names.get(study, study) for study in mine.values()},
+        kind=kind,
     )
 
 
@@ -241,6 +306,7 @@ def _designed(
         try:
             log = read_design_log(path, made.get(path))
             of_design = Log(code=log.code, experiment=log.design.design)
+            reading.kinds[number * _LOGS_A_FILE] = kind_of_design(log)
             reading.admit(number * _LOGS_A_FILE, waiting, of_design, study)
             reading.note(waiting, of_design, log.journal)
             logs[number * _LOGS_A_FILE] = log
@@ -327,6 +393,7 @@ def _checked(waiting: Sequence[_Waiting], mapping: ColumnMap | None) -> _Batch:
             batch.logs |= dict.fromkeys(texts.logs, bad)
         else:
             batch.blocks.append(block)
+            batch.kinds |= dict(kinds_of(block))
             batch.logs |= logs
     return batch
 

@@ -29,6 +29,12 @@ SeedOption = Annotated[int | None, typer.Option(min=0, max=2**63 - 1, help="Seed
 FixedSeedOption = Annotated[int, typer.Option(min=0, max=2**63 - 1, help="Seed of the random streams.")]
 GunConfigOption = Annotated[str, typer.Option(help="Config of a gun, or the name of a shipped one.")]
 ConfigArgument = Annotated[str, typer.Argument(help="File or name of a shipped config.")]
+ColumnsOption = Annotated[
+    Path | None, typer.Option(metavar="MAP.toml", help="Which columns mean what in logs that Recoil did not write.")
+]
+IncludeSyntheticOption = Annotated[
+    bool, typer.Option("--include-synthetic", help="Synthetic data beside real ones too; the two are kept apart.")
+]
 WorkersOption = Annotated[int | None, typer.Option(min=1, help="Processes; as many as cores unless given.")]
 
 

@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
 from analysis.logs.column_map import ColumnMap
 from analysis.logs.exclusions import ExclusionEffect, Rules, apply_rules, by_study, left_out_by_files
+from analysis.logs.kinds import OF_KIND, folder_of
 from analysis.logs.reading import Logs, Track, read_logs, refuse_nothing
 from analysis.paper.audit.page import predictions
 from analysis.paper.audit.run import audit, load_paper_file
@@ -44,6 +45,17 @@ class Request:
     codebook: Path | None = None
     fits: bool = False
     requests: Path | None = None
+    include_synthetic: bool = False
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class _Analysed:
+    """Logs of one kind of data, their statistics, what rules did to them, and the tables of results by file name."""
+
+    logs: Logs
+    statistics: StudyStatistics
+    effect: ExclusionEffect | None
+    tables: Mapping[str, bytes]
 
 
 def analyze(request: Request, track: Track = iter) -> tuple[StudyStatistics, tuple[str, ...]]:
@@ -58,21 +70,18 @@ def analyze(request: Request, track: Track = iter) -> tuple[StudyStatistics, tup
     rules = load(Rules, request.rules) if request.rules else None
     asked = load(Requests, request.requests) if request.requests else None
     book = remarks_coding.load_codebook(request.codebook) if request.codebook else None
-    logs = read_logs(request.paths, track, mapping)
+    logs = read_logs(request.paths, track, mapping, include_synthetic=request.include_synthetic)
     refuse_nothing(request.paths, logs)
-    effect = apply_rules(logs, rules) if rules is not None else None
-    used = effect.logs if effect is not None else logs
-    statistics = replace(summarize(used, fits=request.fits), studies=_by_study(used, fits=request.fits))
-    if effect is not None and rules is not None and request.rules is not None:
-        statistics = _with_rules(statistics, effect, rules, request.rules)
-    coded = None if book is None else _coded(used, statistics, book)
+    parts = (replace(logs, apart=()), *logs.apart)
+    main, *others = [_analysed(part, rules, request) for part in parts]
+    kept_apart = {one.logs.kind: replace(one.statistics, versions=None) for one in others}
+    statistics = replace(main.statistics, kept_apart=kept_apart or None)
+    coded = None if book is None else _coded(main.logs, statistics, book)
     if coded is not None:
         statistics = replace(statistics, remarks=coded)
     if asked is not None and request.requests is not None:
-        statistics = replace(statistics, requested=answers_to(asked, request.requests, used))
-    statistics = with_everybody(statistics, used)
+        statistics = replace(statistics, requested=answers_to(asked, request.requests, main.logs))
     storage.make_folder(request.out)
-    tables = result_tables(used, statistics.analysed)
     report = ReportData(
         title=report_title(request.paths),
         statistics=statistics,
@@ -80,14 +89,17 @@ def analyze(request: Request, track: Track = iter) -> tuple[StudyStatistics, tup
         remarks=logs.remarks,
         comparison=None if published is None else compare(statistics, published, _predicted(request.paper)),
         files=logs.files,
-        beside=tuple(tables),
+        beside=tuple(main.tables),
         provenance=provenance() | _read_by(request.columns, mapping),
-        dropped=tuple(_notes(effect)),
+        dropped=tuple(_notes(main.effect)),
         extra=() if coded is None else (remarks_coding.coding_section(coded),),
+        apart=tuple(_report_apart(one) for one in others),
     )
     write_report(request.out, report)
-    for name, content in tables.items():
-        storage.write_whole(request.out / name, content)
+    _write_tables(request.out, main)
+    for one in others:
+        storage.make_folder(request.out / folder_of(one.logs.kind))
+        _write_tables(request.out / folder_of(one.logs.kind), one)
     return statistics, tuple(_said(logs, statistics))
 
 
@@ -95,6 +107,8 @@ def _said(logs: Logs, statistics: StudyStatistics) -> Iterator[str]:
     yield from (f"left out: {problem}" for problem in logs.problems)
     yield from (f"left out: {run}" for run in logs.begun)
     yield from exclusion_lines(statistics.excluded)
+    for kind, one in (statistics.kept_apart or {}).items():
+        yield from (f"{OF_KIND[kind]}, kept apart: {line}" for line in exclusion_lines(one.excluded))
     yield from map(str, logs.remarks)
 
 
@@ -119,6 +133,31 @@ def report_title(paths: Sequence[Path]) -> str:
     names = sorted({path.name or path.absolute().name or str(path) for path in paths})
     more = f" and {len(names) - _TITLED} more" if len(names) > _TITLED else ""
     return f"Statistics of {', '.join(names[:_TITLED])}{more}"
+
+
+def _analysed(logs: Logs, rules: Rules | None, request: Request) -> _Analysed:
+    """The statistics of logs of one kind of data, after the rules if there are some."""
+    effect = apply_rules(logs, rules) if rules is not None else None
+    used = effect.logs if effect is not None else logs
+    statistics = replace(summarize(used, fits=request.fits), studies=_by_study(used, fits=request.fits))
+    if effect is not None and rules is not None and request.rules is not None:
+        statistics = _with_rules(statistics, effect, rules, request.rules)
+    return _Analysed(
+        logs=used,
+        statistics=with_everybody(statistics, used),
+        effect=effect,
+        tables=result_tables(used, statistics.analysed),
+    )
+
+
+def _report_apart(one: _Analysed) -> ReportData:
+    """What is told of data that are kept apart."""
+    return ReportData(title="", statistics=one.statistics, files=one.logs.files, dropped=tuple(_notes(one.effect)))
+
+
+def _write_tables(folder: Path, one: _Analysed) -> None:
+    for name, content in one.tables.items():
+        storage.write_whole(folder / name, content)
 
 
 def _predicted(paper: Path | None) -> dict[str, Prediction]:

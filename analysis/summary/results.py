@@ -9,7 +9,7 @@ from __future__ import annotations
 import html
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 from analysis.logs.exclusions import KeptTrials, LeftOut
@@ -25,6 +25,7 @@ from analysis.summary.requests import Requested
 from analysis.times.own_trials import ResponseTimes
 from analysis.times.speed_accuracy import NoSpeedAccuracy, SpeedAccuracy
 from experiments.design.language import Level
+from experiments.record.tables import DataKind
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -380,7 +381,8 @@ class RulesApplied:
 class StudyStatistics(NotebookResult):
     """The statistics of logs; None for an experiment without a log. `studies` of each study, if there are several.
 
-    `designs` by their names, which stand beside the two experiments in the file.
+    `designs` by their names, which stand beside the two experiments in the file. All are of one kind of data, which
+    `data_kind` names; those of other kinds, if they were asked for, are `kept_apart` in the same form.
     """
 
     direction: DirectionStatistics | None = field(default=None, metadata=OPTIONAL)
@@ -394,6 +396,8 @@ class StudyStatistics(NotebookResult):
     rules: RulesApplied | None = field(default=None, metadata=OPTIONAL)
     remarks: CodedRemarks | None = field(default=None, metadata=OPTIONAL)
     requested: tuple[Requested, ...] | None = field(default=None, metadata=OPTIONAL)
+    data_kind: DataKind = "real"
+    kept_apart: Mapping[DataKind, StudyStatistics] | None = field(default=None, metadata=OPTIONAL)
 
     def of(self, experiment: str) -> WithinStatistics | None:
         """The statistics of an experiment by its name."""
@@ -406,7 +410,13 @@ class StudyStatistics(NotebookResult):
         return {name: found for name in names if (found := self.of(name)) is not None and found.n}
 
     def rows(self) -> list[dict[str, object]]:
-        """A row an experiment and method: participants, mean and SD, and the within-subject interval of the mean."""
+        """A row an experiment and method: participants, mean and SD, and the within-subject interval of the mean.
+
+        Where data of several kinds are kept apart, each row names its own.
+        """
+        if self.kept_apart:
+            kinds = {self.data_kind: replace(self, kept_apart=None), **self.kept_apart}
+            return [{"data": kind} | row for kind, one in kinds.items() for row in one.rows()]
         blank = ConfidenceInterval(ci_low=math.nan, ci_high=math.nan)
         return [
             {"experiment": name, "method": method, "n": found.n, "mean": found.means[method], "sd": found.sds[method]}

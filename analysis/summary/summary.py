@@ -72,17 +72,22 @@ def summarize(logs: Logs, *, trade: bool = True, fits: bool = False) -> results.
 
     `trade`: with the measures of speed and accuracy; `fits`: with diffusion fits among them. An experiment without a
     log is left out. Participants who miss an answer or a method are left out of that experiment and listed in
-    `excluded`. Numbers that are NaN or infinite are named in `warnings`.
+    `excluded`. Numbers that are NaN or infinite are named in `warnings`. What stands apart in the logs is kept apart.
     """
     direction, left_out = _direction(logs.trials, trade=trade, fits=fits) if len(logs.trials) else (None, [])
     preference, also_out = _preference(logs.ratings) if len(logs.ratings) else (None, [])
     designs = {one.design.design: summarise(one.design, one.table) for one in logs.designs}
     lacking = (out for name, one in designs.items() for out in _lacking(name, one))
     found = results.StudyStatistics(
-        direction=direction, preference=preference, designs=designs, excluded=(*left_out, *also_out, *lacking)
+        direction=direction,
+        preference=preference,
+        designs=designs,
+        excluded=(*left_out, *also_out, *lacking),
+        data_kind=logs.kind,
     )
+    apart = {part.kind: replace(summarize(part, trade=trade, fits=fits), versions=None) for part in logs.apart}
     said = (*_hasty(logs.trials), *_repeated(logs.ratings), *_warnings(found))
-    return replace(found, warnings=said, versions=statistics_versions())
+    return replace(found, warnings=said, versions=statistics_versions(), kept_apart=apart or None)
 
 
 def _hasty(table: pd.DataFrame) -> Iterator[str]:

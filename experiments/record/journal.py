@@ -19,12 +19,14 @@ from typing import Literal, Self, TypeVar, get_args
 
 from pydantic import TypeAdapter, ValidationError
 
-from device.words import RecoilError
+from device.words import Identity, RecoilError
 from experiments.clock import Clock
 from experiments.config.setup import sha256
 from experiments.design.plan import Plan
 from experiments.record import storage
 
+ParticipantKind = Literal["person", "synthetic"]
+"""Who does a run."""
 Kind = Literal["run", "step", "outcome", "shot", "remark", "resumed", "stopped", "finished"]
 _KINDS = get_args(Kind)
 ENDING = "_journal.jsonl"
@@ -64,7 +66,7 @@ class Record:
 class Head(Record):
     """The first line of a journal: the frozen plan, and the resolved setup as JSON, with their hashes.
 
-    `laws_json`: how synthetic people answer the design, `None` where nothing says so.
+    `laws_json`: how synthetic people answer the design, `None` where nothing says so. `participant`: who was to do it.
     """
 
     path: Path
@@ -73,6 +75,8 @@ class Head(Record):
     setup_json: object
     setup_sha256: str
     laws_json: object = None
+    participant: ParticipantKind = "person"
+    gun: Identity | None = None
 
     @property
     def plan(self) -> Plan:

@@ -12,6 +12,7 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 from typing import Literal
 
+from device.twin.core import IDENTITY
 from experiments.session import remarks
 from experiments.session.history import TrialHistory, is_attempt
 from experiments.session.steps import Answered, Failed, Fired, Interrupted, Presented
@@ -102,6 +103,22 @@ ONSET = text_column(
     "date and time (UTC, ISO 8601) of the first pulse of the last presentation; empty if none",
 )
 GUN = text_column("gun", "who rendered it: model and serial number of the gun, `simulated` for the simulated one")
+
+DataKind = Literal["real", "simulated gun", "synthetic"]
+"""Whose data: of people at a gun, of people at a gun that is only simulated, or of synthetic participants."""
+_SIMULATED_GUNS = frozenset(["simulated", f"{IDENTITY.model}:{IDENTITY.serial}"])
+"""As they stand in the column `gun`: the simulated gun, and its twin on a line."""
+
+
+def is_simulated(gun: object) -> bool:
+    """Whether a gun by this name is none."""
+    return gun in _SIMULATED_GUNS
+
+
+def data_kind(*, synthetic: bool, simulated: bool) -> DataKind:
+    """Whose data they are: did a synthetic participant give any answer, did a simulated gun render any trial?"""
+    return "synthetic" if synthetic else "simulated gun" if simulated else "real"
+
 
 PRESENTATION = (ATTEMPTS, FLAGS, NOTE, ONSET, GUN)
 """How a trial was presented: the last columns of every table."""

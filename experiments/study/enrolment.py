@@ -171,14 +171,19 @@ def join(study: StudyFolder, participant_id: str, facts: Facts, clock: Clock) ->
     registered = register.read_register(study.results)
     folders.place(study.results, participant_id, study.experiments[0], registered)
     reasons = eligible(facts, study.config.eligibility)
-    known = participant_id in folders.known_codes(study.results, registered)
-    if reasons and not known:
+    if reasons and not _is_known(study, participant_id, registered):
         raise PlaceError(
             f"participant {participant_id} is not eligible: {'; '.join(reasons)} (rules: {study.source}); "
             "nothing was recorded"
         )
     register.append(study.results, register.entry("joined", participant_id, facts=facts), clock)
     return reasons
+
+
+def _is_known(study: StudyFolder, participant_id: str, registered: register.Register) -> bool:
+    """Whether a person has had a code before; a synthetic participant does not count."""
+    known = participant_id in folders.known_codes(study.results, registered)
+    return known and not look_at(study, participant_id)[0].is_synthetic
 
 
 def _refuse_wrong_facts(study: StudyFolder, facts: Facts) -> None:

@@ -24,11 +24,12 @@ from experiments.load import load_setup, load_study
 from experiments.rebuild import began_with
 from experiments.record import journal, replay, storage, tables
 from experiments.record.journal import Contents, Head, JournalError
+from experiments.runner import gun_name
 from experiments.session.history import answered
 from experiments.study import register
 from experiments.study.balance import group_of_next_run, row_of_next_run
 from experiments.study.register import Register
-from experiments.study.study import Member, NextParticipant, Participant, RunProgress, by_code, who_is_next
+from experiments.study.study import Member, NextParticipant, Participant, RunProgress, RunState, by_code, who_is_next
 
 _CODE = re.compile(CODE)
 
@@ -316,13 +317,19 @@ def progress_of(where: Place, contents: Contents | None, *, elsewhere: bool = Fa
             f"{where.journal}: line 1: is of participant {plan.participant_id}, experiment {plan.experiment}; "
             "it was renamed or copied here, so put it back"
         )
+    head, told = contents.head, replay.history(contents)
+    state: RunState = "done" if contents.finished else "open elsewhere" if elsewhere else "in progress"
     return RunProgress(
         experiment=where.experiment,
-        state="done" if contents.finished else "open elsewhere" if elsewhere else "in progress",
-        answered=len(answered(replay.history(contents))),
+        state="synthetic" if head.participant == "synthetic" and state != "open elsewhere" else state,
+        answered=len(answered(told)),
         planned=len(plan.trials),
         last_utc=contents.records[-1].utc,
-        methods=order_shown(began_with(contents.head), plan),
+        methods=order_shown(began_with(head), plan),
+        data=tables.data_kind(
+            synthetic=head.participant == "synthetic",
+            simulated=head.gun is not None and tables.is_simulated(gun_name(head.gun)),
+        ),
     )
 
 
@@ -338,6 +345,7 @@ def _practised(where: Place) -> bool:
     practice = replace(where, practice=True)
     for path in practice.folder.glob(f"{practice.journal.stem}*{practice.journal.suffix}"):
         with suppress(JournalError):  # a practice is not analysed, so a broken one is nobody's concern
-            if journal.read_journal(path).finished:
+            contents = journal.read_journal(path)
+            if contents.finished and contents.head.participant == "person":
                 return True
     return False

@@ -9,9 +9,14 @@ from itertools import count
 from typing import Literal, get_args
 
 from experiments.config.door import AgeYears, EligibilityConfig, Fact, Handedness, Model, Sex, StudyConfig
+from experiments.record.tables import DataKind
 
-RunState = Literal["done", "in progress", "open elsewhere", "not begun", "unreadable"]
-"""How a run stands; `open elsewhere`: another process is carrying it out at this moment."""
+RunState = Literal["done", "in progress", "open elsewhere", "not begun", "unreadable", "synthetic"]
+"""How a run stands.
+
+`open elsewhere`: another process is carrying it out at this moment; `synthetic`: a synthetic participant has begun it,
+so for people it is not begun, and it gives way to theirs.
+"""
 
 
 class Facts(Model):
@@ -30,8 +35,9 @@ class Facts(Model):
 class RunProgress:
     """How far a participant has come in one experiment.
 
-    `answered` of `planned` trials, `last_utc` the time of the last record, `methods` in the order of the run. All four
-    are empty where no run has begun, or where its journal cannot be read. `practised`: a practice was done to its end.
+    `answered` of `planned` trials, `last_utc` the time of the last record, `methods` in the order of the run, and whose
+    `data` they are. All five are empty where no run has begun, or where its journal cannot be read. `practised`: a
+    practice was done to its end.
     """
 
     experiment: str
@@ -40,6 +46,7 @@ class RunProgress:
     planned: int = 0
     last_utc: str = ""
     methods: tuple[str, ...] = ()
+    data: DataKind | None = None
     practised: bool = False
 
 
@@ -62,12 +69,19 @@ class Participant(Member):
     @property
     def open_runs(self) -> tuple[RunProgress, ...]:
         """The runs to go on with or to begin."""
-        return tuple(run for run in self.runs if run.state in ("in progress", "not begun"))
+        return tuple(run for run in self.runs if run.state in ("in progress", "not begun", "synthetic"))
 
     @property
     def in_progress(self) -> bool:
         """Whether a run has begun and not ended."""
         return any(run.state == "in progress" for run in self.runs)
+
+    @property
+    def is_synthetic(self) -> bool:
+        """Whether nobody but a synthetic participant had this code so far, so that it is free for a person."""
+        states = {run.state for run in self.runs}
+        on_record = bool(self.joined_utc) or self.facts is not None or self.excluded is not None
+        return "synthetic" in states and states <= {"synthetic", "not begun"} and not on_record
 
     @property
     def is_elsewhere(self) -> bool:
@@ -121,6 +135,11 @@ def unasked(facts: Facts, eligibility: EligibilityConfig) -> tuple[Fact, ...]:
     return tuple(fact for fact in facts.known() if fact not in eligibility.ask)
 
 
+def taking_part(people: Sequence[Participant]) -> list[Participant]:
+    """Those who count: people, and not excluded."""
+    return [one for one in people if one.excluded is None and not one.is_synthetic]
+
+
 def who_is_next(
     people: Sequence[Participant], study: StudyConfig, experiments: Sequence[str]
 ) -> NextParticipant | None:
@@ -129,14 +148,15 @@ def who_is_next(
     `None` when the study has its participants and none of them waits. Who is excluded does not count: a new
     participant takes their place. Who sits at another console does not wait.
     """
-    taking_part = sorted((one for one in people if one.excluded is None), key=lambda one: by_code(one.participant_id))
-    waiting = [one for one in taking_part if one.open_runs and not one.is_elsewhere]
+    counted = sorted(taking_part(people), key=lambda one: by_code(one.participant_id))
+    waiting = [one for one in counted if one.open_runs and not one.is_elsewhere]
     for one in sorted(waiting, key=lambda one: not one.in_progress):  # stable: codes stay in order
         return NextParticipant(participant_id=one.participant_id, new=False, runs=one.open_runs)
-    if len(taking_part) >= study.participants:
+    if len(counted) >= study.participants:
         return None
     runs = tuple(RunProgress(experiment=experiment, state="not begun") for experiment in experiments)
-    return NextParticipant(participant_id=free_code(study, [one.participant_id for one in people]), new=True, runs=runs)
+    taken = [one.participant_id for one in people if not one.is_synthetic]
+    return NextParticipant(participant_id=free_code(study, taken), new=True, runs=runs)
 
 
 def free_code(study: StudyConfig, taken: Collection[str]) -> str:

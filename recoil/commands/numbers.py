@@ -8,7 +8,17 @@ from typing import Annotated
 
 import typer
 
-from analysis.report.terminal import AsJsonOption, FixedSeedOption, end, progress, say, show, tracked
+from analysis.report.terminal import (
+    AsJsonOption,
+    ColumnsOption,
+    FixedSeedOption,
+    IncludeSyntheticOption,
+    end,
+    progress,
+    say,
+    show,
+    tracked,
+)
 from device.words import few_of_each
 
 
@@ -43,9 +53,7 @@ def reproduce(
 def analyze(
     paths: Annotated[list[Path], typer.Argument(metavar="PATH...", help="Logs, or folders with logs.")],
     out: Annotated[Path, typer.Option(help="Folder for statistics, figures and report.")],
-    columns: Annotated[
-        Path | None, typer.Option(metavar="MAP.toml", help="Which columns mean what in logs that Recoil did not write.")
-    ] = None,
+    columns: ColumnsOption = None,
     rules: Annotated[
         Path | None, typer.Option(metavar="RULES.toml", help="Which trials and participants to leave out.")
     ] = None,
@@ -55,13 +63,22 @@ def analyze(
         Path | None, typer.Option(metavar="REQUESTS.toml", help="Further tests and models, such as planned contrasts.")
     ] = None,
     fits: Annotated[bool, typer.Option("--fits", help="With the diffusion model fitted to response times.")] = False,
+    include_synthetic: IncludeSyntheticOption = False,
     as_json: AsJsonOption = False,
 ) -> None:
     """Statistics, tables, figures and report of any number of logs."""
     from analysis.summary import analyze as feature
 
     asked = feature.Request(
-        paths=paths, out=out, paper=paper, columns=columns, rules=rules, codebook=codebook, requests=requests, fits=fits
+        paths=paths,
+        out=out,
+        paper=paper,
+        columns=columns,
+        rules=rules,
+        codebook=codebook,
+        requests=requests,
+        fits=fits,
+        include_synthetic=include_synthetic,
     )
     statistics, said = feature.analyze(asked, tracked)
     for line in few_of_each(said):
@@ -78,12 +95,21 @@ def bids(
     free_text: Annotated[
         bool, typer.Option("--free-text", help="With comments and notes; they might say who someone is.")
     ] = False,
+    columns: ColumnsOption = None,
+    include_synthetic: IncludeSyntheticOption = False,
     as_json: AsJsonOption = False,
 ) -> None:
     """The logs as a BIDS data set of behavioural runs; an earlier export is replaced."""
     from analysis.archive.bids_export import export as feature
 
-    done = feature(folder, out or folder / "bids", free_text=free_text, track=tracked)
+    done = feature(
+        folder,
+        out or folder / "bids",
+        free_text=free_text,
+        columns=columns,
+        include_synthetic=include_synthetic,
+        track=tracked,
+    )
     for line in few_of_each(f"left out: {problem}" for problem in done.left_out):
         say(f"recoil: {line}")
     for remark in (*done.remarks, *done.begun):

@@ -176,13 +176,22 @@ def times(
     ] = "none",
     bias: Annotated[bool, typer.Option("--bias/--no-bias", help="Fit the start, or hold it at one half.")] = True,
     profile: Annotated[bool, typer.Option("--profile", help="Likelihood intervals as well; slower.")] = False,
+    columns: terminal.ColumnsOption = None,
+    include_synthetic: terminal.IncludeSyntheticOption = False,
     out: Annotated[Path, typer.Option(help="Folder for fit.json, figure and report.")] = Path("results/fit-times"),
     as_json: terminal.AsJsonOption = False,
 ) -> None:
     """The diffusion model (drift, boundary, start, non-decision time) fitted to people's own response times."""
     from analysis.predict.fit import times as feature
 
-    request = feature.TimesRequest(paths=logs, lapses=lapses, bias=bias, profiled=profile)
+    request = feature.TimesRequest(
+        paths=logs,
+        columns=columns,
+        include_synthetic=include_synthetic,
+        lapses=lapses,
+        bias=bias,
+        profiled=profile,
+    )
     found, problems = feature.times(request, out, terminal.tracked, terminal.progress)
     missing = [*map(str, problems), *feature.left_out(found)]
     for one in missing:

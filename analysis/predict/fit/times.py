@@ -10,7 +10,9 @@ from pathlib import Path
 
 import numpy as np
 
+from analysis.logs.column_map import ColumnMap
 from analysis.logs.files import Problem
+from analysis.logs.kinds import OF_KIND, folder_of
 from analysis.logs.reading import Logs, Track, read_logs
 from analysis.predict.fit.figures import TimesPanel, figure_times
 from analysis.predict.fit.percept import NO_OWN_TIMES
@@ -25,7 +27,7 @@ from analysis.times.fit import AnsweredBy, DiffusionFit, Estimate, answered_by, 
 from analysis.times.likelihood import LapseRange, Trials
 from analysis.times.own_trials import REFUSALS, OwnTrials, own_trials
 from analysis.times.people import FEWEST_TRIALS, MeanEstimate, as_trials, fit_people
-from experiments.config.door import ConfigError
+from experiments.config.door import ConfigError, load
 from experiments.record import storage
 from experiments.study.folders import PlaceError
 
@@ -36,10 +38,13 @@ __all__ = ["TimesRequest", "in_short", "left_out", "times"]
 class TimesRequest:
     """The logs; lapses `none`, over the `data`'s range of times, or over one in s such as `0.2-3`.
 
-    `bias`: is the start fitted, or one half? `profiled`: likelihood intervals beside the others.
+    `bias`: is the start fitted, or one half? `profiled`: likelihood intervals beside the others. `columns`: a map of
+    logs that Recoil did not write. With `include_synthetic` data of other kinds than the first are fitted apart.
     """
 
     paths: Sequence[Path]
+    columns: Path | None = None
+    include_synthetic: bool = False
     lapses: str = "none"
     bias: bool = True
     profiled: bool = False
@@ -48,11 +53,24 @@ class TimesRequest:
 def times(request: TimesRequest, out: Path, track: Track, progress: Progress) -> tuple[TimesFit, tuple[Problem, ...]]:
     """Fit, and write `fit.json`, report and figure into `out`; what was found and the logs left out are returned.
 
+    The fits of data that are kept apart go to folders of their own in `out`.
     `ConfigError`: a range of lapses that is none. `PlaceError`: no usable log, or none of its times is the
     participant's own; with the reasons.
     """
     lapses = lapse_range(request.lapses)
-    logs = read_logs(request.paths, track)
+    mapping = load(ColumnMap, request.columns) if request.columns else None
+    logs = read_logs(request.paths, track, mapping, include_synthetic=request.include_synthetic)
+    found, problems = _fit_of(logs, lapses, request, out, progress), list(logs.problems)
+    for part in logs.apart:
+        try:
+            _fit_of(part, lapses, request, out / folder_of(part.kind), progress)
+        except PlaceError as error:
+            problems.append(Problem(file=part.files[0].parent, line=None, column=None, message=str(error)))
+    return found, tuple(problems)
+
+
+def _fit_of(logs: Logs, lapses: bool | LapseRange, request: TimesRequest, out: Path, progress: Progress) -> TimesFit:
+    """The fit of one kind of data, with its files."""
     own = _own(request.paths, logs)
     trials = as_trials(own)
     try:
@@ -63,8 +81,9 @@ def times(request: TimesRequest, out: Path, track: Track, progress: Progress) ->
     found = times_fit(fitted, logs, request.lapses, bias=request.bias)
     storage.make_folder(out)
     storage.write_whole(out / "fit.json", as_json(found))
-    write_page(out, "The diffusion model fitted to response times", sections(found, fitted, out / "figures"))
-    return found, logs.problems
+    whose = "" if logs.kind == "real" else f" of {OF_KIND[logs.kind]}"
+    write_page(out, f"The diffusion model fitted to response times{whose}", sections(found, fitted, out / "figures"))
+    return found
 
 
 def lapse_range(text: str) -> bool | LapseRange:

@@ -16,6 +16,7 @@ from analysis.times.own_trials import REFUSALS, OwnTrials
 from analysis.times.people import MeanEstimate, PeopleFit, mean_estimate
 from analysis.times.trade import EZ, ez, ez_people
 from experiments.record.provenance import provenance
+from experiments.record.tables import DataKind
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -83,6 +84,7 @@ class TimesFit:
     left_out: tuple[str, ...]
     ez: tuple[EZCell, ...]
     provenance: dict[str, str]
+    data_kind: DataKind
 
     @property
     def main_estimates(self) -> tuple[MeanEstimate | Estimate, ...]:
@@ -111,6 +113,7 @@ def times_fit(fitted: FittedTimes, logs: Logs, lapses: str, *, bias: bool) -> Ti
         left_out=() if each is None else tuple(people[place] for place in each.left_out),
         ez=tuple(_ez(own)),
         provenance=provenance(),
+        data_kind=logs.kind,
     )
 
 

@@ -23,7 +23,7 @@ class ReportData:
     `files` are the logs used, `remarks` what there is to say of some, `beside` the names of the tables beside the page;
     `provenance` is label -> text; `notes` are the assumptions behind the numbers, `dropped` what rules left out of
     trials; `extra` are finished sections that follow the results; the participants may be `reconstructed` from the
-    published numbers.
+    published numbers. `apart`: the same of data of other kinds, which are kept apart.
     """
 
     title: str
@@ -40,3 +40,4 @@ class ReportData:
     dropped: tuple[str, ...] = ()
     extra: tuple[Section, ...] = ()
     reconstructed: bool = False
+    apart: tuple[ReportData, ...] = ()

@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
+from dataclasses import replace
 from pathlib import Path
 
+from analysis.logs.kinds import OF_KIND, folder_of
 from analysis.report.page import write_page
 from analysis.report.section import PageHead, Section, Table, shortened
 from analysis.report.serial import as_json
@@ -49,6 +51,18 @@ def _log_files(report: ReportData) -> Iterator[Section]:
         yield Section(title="Log files", items=listed, appendix=True, folded=True)
 
 
+def _kept_apart(report: ReportData) -> Iterator[Section]:
+    """The sections of data of other kinds, each with its own notices, and figures from folders of their own."""
+    for one in report.apart:
+        kind = one.statistics.data_kind
+        whose = OF_KIND[kind]
+        said = f"What follows is of {whose} alone, and kept apart: no number above rests on it."
+        yield Section(title=whose.capitalize(), paragraphs=(said, *(notice.text for notice in notices(one))))
+        for section in (section for part in READERS_ORDER if part is not manuscript_section for section in part(one)):
+            pictures = tuple(replace(shown, stem=f"{folder_of(kind)}/{shown.stem}") for shown in section.pictures)
+            yield replace(section, title=f"{whose.capitalize()}: {section.title}", pictures=pictures)
+
+
 READERS_ORDER: tuple[Callable[[ReportData], Iterator[Section]], ...] = (
     participants_section,
     glance_section,
@@ -71,6 +85,7 @@ READERS_ORDER: tuple[Callable[[ReportData], Iterator[Section]], ...] = (
     shot_section,
     _provenance,
     _log_files,
+    _kept_apart,
 )
 """The reader's order: who, what was found, how sure, what else; then what only some readers look up."""
 
@@ -82,6 +97,8 @@ def write_report(out: Path, report: ReportData) -> None:
     """
     out.mkdir(parents=True, exist_ok=True)
     write_figures(out / "figures", report)
+    for one in report.apart:
+        write_figures(out / "figures" / folder_of(one.statistics.data_kind), one)
     head = PageHead(notices=tuple(notices(report)), files=(STATISTICS, *report.beside))
     write_page(out, report.title, sections(report), head)
     (out / STATISTICS).write_bytes(as_json(report.statistics))

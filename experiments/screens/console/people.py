@@ -7,9 +7,9 @@ from collections.abc import Iterator, Sequence
 from experiments.clock import date_text
 from experiments.study.enrolment import left_to_do, passed_over, run_of
 from experiments.study.folders import Overview, is_code
-from experiments.study.study import Participant, RunProgress
+from experiments.study.study import Participant, RunProgress, taking_part
 
-_CELL = {"done": "done", "not begun": "–", "unreadable": "cannot be read"}
+_CELL = {"done": "done", "not begun": "–", "unreadable": "cannot be read", "synthetic": "synthetic"}
 
 
 def cell_text(run: RunProgress) -> str:
@@ -37,11 +37,11 @@ def coming_text(seen: Overview) -> str:
     if seen.next is not None:
         new = " (new)" if seen.next.new else ""
         return f"Next: {seen.next.participant_id}{new}, {' and '.join(run.experiment for run in seen.next.runs)}"
-    taking_part = [one for one in seen.participants if one.excluded is None]
-    elsewhere = [one.participant_id for one in taking_part if one.is_elsewhere]
+    counted = taking_part(seen.participants)
+    elsewhere = [one.participant_id for one in counted if one.is_elsewhere]
     if elsewhere:
         return f"Nobody waits; at another console now: {', '.join(elsewhere)}."
-    done = all(run.state == "done" for one in taking_part for run in one.runs)
+    done = all(run.state == "done" for one in counted for run in one.runs)
     return "Everyone has done everything." if done else "Nobody can be named next: see what cannot be read."
 
 
@@ -93,6 +93,8 @@ def _hindrances(person: Participant, experiment: str, experiments: Sequence[str]
 
 def _progress(person: Participant, experiment: str) -> str:
     code, run = person.participant_id, run_of(person, experiment)
+    if run.state == "synthetic":
+        return f"A synthetic participant did {experiment} as {code}; that run is set aside when {code} begins."
     if run.state == "in progress":
         return stopped_text(code, run)
     done = [one.experiment for one in person.runs if one.state == "done"]
